@@ -1,0 +1,3 @@
+//! `softgrasp-bench REPORT`: measured figures, each with its error.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Grasp rules (thesis 4.5–4.6) as a pure state machine.

@@ -1,0 +1,1 @@
+//! The hand: joints, dimensions, kinematics and the colliders made from them.

@@ -1,0 +1,1 @@
+//! Mesh files: bytes in, [`crate::mesh::TetMesh`] and findings out; decided by content.

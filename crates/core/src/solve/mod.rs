@@ -1,0 +1,1 @@
+//! Partition and the methods that solve it.

@@ -1,0 +1,3 @@
+//! The `fea-server` program.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Instrumented glove and tracker: device bytes ⇄ samples, without I/O.

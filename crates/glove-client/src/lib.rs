@@ -1,0 +1,3 @@
+//! Client of Softgrasp: devices, grasp loop, link to the server, commands.
+
+pub mod devices;

@@ -1,0 +1,3 @@
+//! The `glove-client` program.
+
+fn main() {}

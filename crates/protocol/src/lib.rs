@@ -1,0 +1,1 @@
+//! Bytes ⇄ messages of the Softgrasp wire, without I/O.

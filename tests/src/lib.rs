@@ -1,0 +1,1 @@
+//! Helpers shared by the system tests: meshes, servers, a faulty proxy.
