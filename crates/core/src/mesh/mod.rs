@@ -2,4 +2,4 @@
 
 mod tet_mesh;
 
-pub use tet_mesh::{MeshError, TetMesh};
+pub use tet_mesh::{MeshError, TetMesh, signed_volume};
