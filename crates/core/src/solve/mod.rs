@@ -1,1 +1,16 @@
-//! Partition and the methods that solve it.
+//! Known and unknown degrees of freedom, and the methods that answer for them (thesis 3.4).
+
+mod direct;
+mod gauss_jordan;
+mod k11;
+mod method;
+mod ordering;
+mod partition;
+mod sparse;
+mod stage;
+mod tiles;
+
+pub use direct::{Factored, Loads, Solution, SolveError};
+pub use method::{Method, UnknownMethod};
+pub use partition::{KnownDisplacements, KnownError, Partition, PartitionError};
+pub use stage::Stage;

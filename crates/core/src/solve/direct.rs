@@ -1,0 +1,287 @@
+//! One interface to all direct methods: factor a partition once, then answer known displacements.
+
+use super::k11::{SparseK11, right_hand_side, visit_k11};
+use super::partition::AXIS_NAMES;
+use super::sparse::{Analysis, SparseFactor};
+use super::tiles::Tiles;
+use super::{Method, Partition, Stage, gauss_jordan, ordering};
+use crate::fem::Stiffness;
+
+/// `K11` of one partition, inverted or factored by one method.
+///
+/// Source: thesis (3.43a).
+pub struct Factored {
+    method: Method,
+    partition: Partition,
+    kernel: Kernel,
+}
+
+enum Kernel {
+    /// Explicit inverse, row-major n × n.
+    Inverse(Vec<f64>),
+    /// Explicit inverse in tiles.
+    TiledInverse(Tiles),
+    /// Dense Cholesky factor in tiles.
+    TiledFactor(Tiles),
+    /// Sparse Cholesky factor.
+    Sparse(SparseFactor),
+}
+
+/// Known displacements and external forces of one answer.
+///
+/// Shapes: `q_known` one per known degree of freedom of the partition, in its order; `forces`
+/// empty or 3N (entries on known degrees of freedom must be zero). Units: m, N.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Loads<'a> {
+    /// `Q_k`.
+    pub q_known: &'a [f64],
+    /// `f₁` of (3.7), scattered over all degrees of freedom.
+    pub forces: &'a [f64],
+}
+
+/// Displacements, reactions and how exact they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// Displacement of every degree of freedom, 3N, m; zero at orphan nodes.
+    pub displacement: Vec<f64>,
+    /// Reaction `F_u` (3.43b) of every known degree of freedom, in the partition's order, N.
+    pub reaction: Vec<f64>,
+    /// `‖K11 Q_u − b‖₂ / ‖b‖₂`, zero when `b` is.
+    pub residual_rel: f64,
+    /// Refinement steps taken.
+    pub refinement_steps: u32,
+}
+
+/// Row of `K11` where a pivot was not positive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct NotPositive {
+    pub row: usize,
+}
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// A pivot of `K11` was not positive.
+    #[error(
+        "{method}: the stiffness of the free nodes is not positive definite at node {node} axis \
+         {axis}: the known displacements leave a motion free, or an element there is degenerate"
+    )]
+    NotPositiveDefinite {
+        /// Method that found it.
+        method: Method,
+        /// Node of the pivot.
+        node: usize,
+        /// Axis of the pivot.
+        axis: char,
+    },
+    /// Memory for the factor could not be had.
+    #[error("{method}: no memory for the factor of {unknown_dofs} unknowns")]
+    OutOfMemory {
+        /// Method that asked.
+        method: Method,
+        /// Size of `K11`.
+        unknown_dofs: usize,
+    },
+    /// The answer holds NaN or infinity.
+    #[error(
+        "{method}: the answer is not finite; the numbers of the mesh, the material or the known \
+         displacements are too large or too small for double precision"
+    )]
+    NotFinite {
+        /// Method used.
+        method: Method,
+    },
+    /// Loads that do not fit the partition.
+    #[error("{given} values for {expected} {what}")]
+    LoadCount {
+        /// Which list.
+        what: &'static str,
+        /// Values given.
+        given: usize,
+        /// Values expected.
+        expected: usize,
+    },
+}
+
+/// Refinement stops at this relative residual; one step more would only move the last bits.
+const RESIDUAL_GOOD: f64 = 1e-13;
+/// Refinement stops after this many steps in any case.
+const REFINEMENT_STEPS_MAX: u32 = 3;
+
+impl Factored {
+    /// Inverts or factors `K11` of a partition on the current rayon pool.
+    ///
+    /// `on_stage` hears [`Stage::Order`] and [`Stage::Factor`] as they begin.
+    ///
+    /// # Errors
+    /// [`SolveError::NotPositiveDefinite`] with the node, [`SolveError::OutOfMemory`].
+    ///
+    /// Source: thesis (3.43a), Appendix A for `gauss-jordan`.
+    pub fn try_new(
+        stiffness: &Stiffness,
+        partition: Partition,
+        method: Method,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Self, SolveError> {
+        let n = partition.unknown().len();
+        let not_positive = |error: NotPositive| {
+            let dof = partition.unknown().get(error.row).map_or(0, |&d| d as usize);
+            let (node, axis) = (dof / 3, AXIS_NAMES[dof % 3]);
+            SolveError::NotPositiveDefinite { method, node, axis }
+        };
+        let out_of_memory = || SolveError::OutOfMemory { method, unknown_dofs: n };
+        let kernel = match method {
+            Method::GaussJordan => {
+                on_stage(Stage::Factor);
+                let entries = n.checked_mul(n).ok_or_else(out_of_memory)?;
+                let mut inverse = Vec::new();
+                inverse.try_reserve_exact(entries).map_err(|_| out_of_memory())?;
+                inverse.resize(entries, 0.0);
+                visit_k11(stiffness, &partition, |i, j, value| inverse[i * n + j] = value);
+                gauss_jordan::invert(&mut inverse, n).map_err(not_positive)?;
+                Kernel::Inverse(inverse)
+            }
+            Method::DenseInverse | Method::DenseCholesky => {
+                on_stage(Stage::Factor);
+                let mut tiles = Tiles::zeros(n);
+                visit_k11(stiffness, &partition, |i, j, value| tiles.add(i, j, value));
+                tiles.factor().map_err(not_positive)?;
+                match method {
+                    Method::DenseInverse => Kernel::TiledInverse(tiles.inverse()),
+                    _ => Kernel::TiledFactor(tiles),
+                }
+            }
+            Method::SparseCholesky => {
+                on_stage(Stage::Order);
+                let order = ordering::nested_dissection(stiffness, &partition);
+                let k11 = SparseK11::new(stiffness, &partition);
+                let analysis = Analysis::new(k11, order).map_err(|_| out_of_memory())?;
+                on_stage(Stage::Factor);
+                Kernel::Sparse(analysis.factor().map_err(not_positive)?)
+            }
+        };
+        Ok(Self { method, partition, kernel })
+    }
+
+    /// The method used.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The partition answered for.
+    pub fn partition(&self) -> &Partition {
+        &self.partition
+    }
+
+    /// Bytes held by the factor or inverse.
+    pub fn bytes(&self) -> usize {
+        let n = self.partition.unknown().len();
+        match &self.kernel {
+            Kernel::Inverse(values) => std::mem::size_of_val(values.as_slice()),
+            Kernel::TiledInverse(_) | Kernel::TiledFactor(_) => 4 * n * n,
+            Kernel::Sparse(factor) => factor.bytes(),
+        }
+    }
+
+    /// Displacements and reactions for one set of loads: (3.43a) and (3.43b), refined while the
+    /// residual falls.
+    ///
+    /// `stiffness` must be the one this was factored from.
+    ///
+    /// # Errors
+    /// [`SolveError::LoadCount`], [`SolveError::NotFinite`].
+    ///
+    /// Source: thesis (3.43), (3.7).
+    pub fn solve(
+        &self,
+        stiffness: &Stiffness,
+        loads: Loads<'_>,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Solution, SolveError> {
+        on_stage(Stage::Solve);
+        self.check(loads)?;
+        let partition = &self.partition;
+        let b = right_hand_side(stiffness, partition, loads.q_known, loads.forces);
+        let b_norm = norm(&b);
+        let mut q = vec![0.0; partition.dof_count()];
+        for (&dof, &value) in partition.known().iter().zip(loads.q_known) {
+            q[dof as usize] = value;
+        }
+        let mut correction = self.apply_inverse(b);
+        for (&dof, x) in partition.unknown().iter().zip(&correction) {
+            q[dof as usize] = *x;
+        }
+        let mut f = stiffness.mul(&q);
+        let mut residual = self.residual(&f, loads.forces);
+        let mut refinement_steps = 0;
+        while norm(&residual) > RESIDUAL_GOOD * b_norm && refinement_steps < REFINEMENT_STEPS_MAX {
+            correction = self.apply_inverse(residual.clone());
+            let mut refined = q.clone();
+            for (&dof, x) in partition.unknown().iter().zip(&correction) {
+                refined[dof as usize] += x;
+            }
+            let refined_f = stiffness.mul(&refined);
+            let refined_residual = self.residual(&refined_f, loads.forces);
+            // Written so that a NaN ends the loop too.
+            if !(norm(&refined_residual) < norm(&residual)) {
+                break;
+            }
+            (q, f, residual) = (refined, refined_f, refined_residual);
+            refinement_steps += 1;
+        }
+        if !q.iter().all(|x| x.is_finite()) {
+            return Err(SolveError::NotFinite { method: self.method });
+        }
+        let reaction = partition.known().iter().map(|&dof| f[dof as usize]).collect();
+        let residual_rel = if b_norm > 0.0 { norm(&residual) / b_norm } else { norm(&residual) };
+        Ok(Solution { displacement: q, reaction, residual_rel, refinement_steps })
+    }
+
+    fn check(&self, loads: Loads<'_>) -> Result<(), SolveError> {
+        let expected = self.partition.known().len();
+        if loads.q_known.len() != expected {
+            let given = loads.q_known.len();
+            return Err(SolveError::LoadCount { what: "known displacements", given, expected });
+        }
+        let expected = self.partition.dof_count();
+        if !loads.forces.is_empty() && loads.forces.len() != expected {
+            let given = loads.forces.len();
+            return Err(SolveError::LoadCount { what: "external forces", given, expected });
+        }
+        Ok(())
+    }
+
+    /// `K11⁻¹ b`.
+    fn apply_inverse(&self, mut b: Vec<f64>) -> Vec<f64> {
+        match &self.kernel {
+            Kernel::Inverse(inverse) => gauss_jordan::mul(inverse, &b),
+            Kernel::TiledInverse(inverse) => inverse.mul(&b),
+            Kernel::TiledFactor(factor) => {
+                factor.solve_in_place(&mut b);
+                b
+            }
+            Kernel::Sparse(factor) => {
+                factor.solve_in_place(&mut b);
+                b
+            }
+        }
+    }
+
+    /// `f₁ − (K11 Q_u + K12 Q_k)` from the nodal forces `f = K q`.
+    fn residual(&self, f: &[f64], forces: &[f64]) -> Vec<f64> {
+        let external = |dof: u32| forces.get(dof as usize).copied().unwrap_or(0.0);
+        self.partition.unknown().iter().map(|&dof| external(dof) - f[dof as usize]).collect()
+    }
+}
+
+/// Euclidean norm, scaled so that tiny and huge units neither vanish nor overflow.
+fn norm(v: &[f64]) -> f64 {
+    let scale = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    if scale == 0.0 || !scale.is_finite() {
+        return scale;
+    }
+    scale * v.iter().map(|x| (x / scale) * (x / scale)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,204 @@
+//! All methods on one small irregular mesh: patch test, agreement, threads, awkward partitions.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use super::*;
+use crate::fem::{Material, StiffnessPattern, assemble};
+use crate::mesh::{TetMesh, signed_volume};
+
+/// n³ nodes, six tetrahedra a cell, inner nodes moved irregularly.
+fn irregular_cube(n: usize) -> TetMesh {
+    let at = |i: usize, j: usize, k: usize| (i + n * (j + n * k)) as u32;
+    let mut vertices = Vec::new();
+    for (k, j, i) in (0..n).flat_map(|k| (0..n).flat_map(move |j| (0..n).map(move |i| (k, j, i)))) {
+        let inner = [i, j, k].iter().all(|&c| c > 0 && c < n - 1);
+        let wiggle =
+            |s: f64| if inner { 0.15 * (s * (1.0 + at(i, j, k) as f64)).sin() } else { 0.0 };
+        let p = [i as f64 + wiggle(1.3), j as f64 + wiggle(2.1), k as f64 + wiggle(3.7)];
+        vertices.push(Point3::from(p) / (n - 1) as f64);
+    }
+    let mut tets = Vec::new();
+    for (k, j, i) in
+        (0..n - 1).flat_map(|k| (0..n - 1).flat_map(move |j| (0..n - 1).map(move |i| (k, j, i))))
+    {
+        // Kuhn: one tetrahedron per order of the axes, along the cell's diagonal.
+        for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let mut corner = [i, j, k];
+            let mut tet = vec![at(i, j, k)];
+            for axis in axes {
+                corner[axis] += 1;
+                tet.push(at(corner[0], corner[1], corner[2]));
+            }
+            let mut tet: [u32; 4] = tet.try_into().unwrap();
+            if signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
+                tet.swap(0, 1);
+            }
+            tets.push(tet);
+        }
+    }
+    TetMesh::try_new(vertices, tets, vec![]).unwrap()
+}
+
+fn stiffness_of(mesh: &TetMesh, poisson: f64) -> Stiffness {
+    let pattern = Arc::new(StiffnessPattern::new(mesh));
+    assemble(&pattern, mesh, &[Material::try_new(1.0e5, poisson).unwrap()]).unwrap()
+}
+
+fn solve_with(
+    mesh: &TetMesh,
+    stiffness: &Stiffness,
+    method: Method,
+    known: &[(u32, f64)],
+    forces: &[f64],
+) -> Solution {
+    let dofs: Vec<u32> = known.iter().map(|k| k.0).collect();
+    let q_known: Vec<f64> = known.iter().map(|k| k.1).collect();
+    let partition = Partition::try_new(&mesh.used_nodes(), &dofs).unwrap();
+    let factored = Factored::try_new(stiffness, partition, method, &mut |_| {}).unwrap();
+    factored.solve(stiffness, Loads { q_known: &q_known, forces }, &mut |_| {}).unwrap()
+}
+
+/// Three corner nodes and two others, moved.
+fn five_contacts(mesh: &TetMesh) -> Vec<(u32, f64)> {
+    let last = mesh.node_count() as u32 - 1;
+    let mut nodes = vec![0, 4, last / 2, last - 7, last];
+    nodes.sort_unstable();
+    nodes
+        .iter()
+        .flat_map(|&n| (0..3).map(move |a| (3 * n + a, 0.01 * f64::from(n + 2 * a).sin())))
+        .collect()
+}
+
+#[test]
+fn linear_field_on_the_boundary_is_reproduced_inside() {
+    let mesh = irregular_cube(5);
+    let stiffness = stiffness_of(&mesh, 0.3);
+    let gradient = Matrix3::new(0.1, 0.2, -0.1, 0.05, -0.2, 0.3, 0.15, 0.1, 0.25);
+    let field = |p: &Point3<f64>| gradient * p.coords + Vector3::new(0.3, -0.2, 0.1);
+    let on_boundary = |p: &Point3<f64>| p.iter().any(|&c| c == 0.0 || c == 1.0);
+    let mut known = Vec::new();
+    for (node, p) in mesh.vertices().iter().enumerate().filter(|(_, p)| on_boundary(p)) {
+        known.extend((0..3).map(|a| ((3 * node + a) as u32, field(p)[a])));
+    }
+    for method in Method::ALL {
+        let solution = solve_with(&mesh, &stiffness, method, &known, &[]);
+        for (node, p) in mesh.vertices().iter().enumerate() {
+            for a in 0..3 {
+                let error = (solution.displacement[3 * node + a] - field(p)[a]).abs();
+                assert!(error <= 1e-12 * 0.6, "{method}: node {node} is off by {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn all_methods_agree_with_contacts_and_with_forces() {
+    let mesh = irregular_cube(6);
+    let stiffness = stiffness_of(&mesh, 0.45);
+    let known = five_contacts(&mesh);
+    let mut forces = vec![0.0; 3 * mesh.node_count()];
+    forces[3 * 50 + 1] = 7.0;
+    for forces in [&[][..], &forces] {
+        let first = solve_with(&mesh, &stiffness, Method::GaussJordan, &known, forces);
+        let largest = first.displacement.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        for method in &Method::ALL[1..] {
+            let other = solve_with(&mesh, &stiffness, *method, &known, forces);
+            assert!(other.residual_rel < 1e-12, "{method}: residual {:e}", other.residual_rel);
+            for (a, b) in first.displacement.iter().zip(&other.displacement) {
+                assert!((a - b).abs() <= 1e-10 * largest, "{method}");
+            }
+            let push = first.reaction.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+            for (a, b) in first.reaction.iter().zip(&other.reaction) {
+                assert!((a - b).abs() <= 1e-10 * push, "{method}");
+            }
+        }
+    }
+}
+
+#[test]
+fn reactions_balance_the_external_forces() {
+    let mesh = irregular_cube(4);
+    let stiffness = stiffness_of(&mesh, 0.3);
+    let mut forces = vec![0.0; 3 * mesh.node_count()];
+    forces[3 * 21] = 5.0;
+    let solution =
+        solve_with(&mesh, &stiffness, Method::SparseCholesky, &five_contacts(&mesh), &forces);
+    let sum: f64 = solution.reaction.iter().step_by(3).sum();
+    assert!((sum + 5.0).abs() < 1e-9, "reactions along x sum to {sum}");
+}
+
+#[test]
+fn same_bits_for_one_two_four_and_seven_threads() {
+    let mesh = irregular_cube(7);
+    let known = five_contacts(&mesh);
+    for method in Method::ALL {
+        let answers: Vec<Vec<u64>> = [1, 2, 4, 7]
+            .into_iter()
+            .map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let solution = pool.install(|| {
+                    let stiffness = stiffness_of(&mesh, 0.3);
+                    solve_with(&mesh, &stiffness, method, &known, &[])
+                });
+                solution
+                    .displacement
+                    .iter()
+                    .chain(&solution.reaction)
+                    .map(|x| x.to_bits())
+                    .collect()
+            })
+            .collect();
+        for other in &answers[1..] {
+            assert!(other == &answers[0], "{method} depends on the number of threads");
+        }
+    }
+}
+
+#[test]
+fn everything_known_leaves_nothing_to_solve() {
+    let mesh = irregular_cube(2);
+    let stiffness = stiffness_of(&mesh, 0.3);
+    let known: Vec<(u32, f64)> = (0..24).map(|d| (d, 0.01 * f64::from(d))).collect();
+    for method in Method::ALL {
+        let solution = solve_with(&mesh, &stiffness, method, &known, &[]);
+        assert_eq!(solution.residual_rel, 0.0);
+        assert_eq!(solution.displacement[23], 0.23);
+    }
+}
+
+#[test]
+fn free_rigid_motion_never_gives_nan() {
+    let mesh = irregular_cube(3);
+    let stiffness = stiffness_of(&mesh, 0.3);
+    for method in Method::ALL {
+        let partition = Partition::try_new(&mesh.used_nodes(), &[0, 1, 2]).unwrap();
+        // Rounding decides whether the last pivot is positive: an error or a finite answer.
+        if let Ok(factored) = Factored::try_new(&stiffness, partition, method, &mut |_| {}) {
+            let loads = Loads { q_known: &[0.1, 0.0, 0.0], forces: &[] };
+            if let Ok(solution) = factored.solve(&stiffness, loads, &mut |_| {}) {
+                assert!(solution.displacement.iter().all(|x| x.is_finite()));
+            }
+        }
+    }
+}
+
+#[test]
+fn nested_dissection_fills_less_than_the_natural_order() {
+    let mesh = irregular_cube(10);
+    let stiffness = stiffness_of(&mesh, 0.3);
+    let partition = Partition::try_new(&mesh.used_nodes(), &[0, 1, 2]).unwrap();
+    let fill = |order: Vec<usize>| {
+        Analysis::new(SparseK11::new(&stiffness, &partition), order).ok().unwrap().fill()
+    };
+    let natural = fill((0..partition.unknown().len()).collect());
+    let dissected = ordering::nested_dissection(&stiffness, &partition);
+    let mut swapped = vec![0; dissected.len()];
+    for (new, &old) in dissected.iter().enumerate() {
+        swapped[old] = new;
+    }
+    // The inverse permutation is easy to pass by mistake and fills several times as much.
+    assert!(3 * fill(dissected.clone()) < fill(swapped));
+    assert!(fill(dissected) < natural);
+}

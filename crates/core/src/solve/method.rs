@@ -1,0 +1,71 @@
+//! The methods by name.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How `K11` is inverted or factored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Method {
+    /// Gauss–Jordan elimination of Appendix A, rows in parallel: the thesis's own method.
+    GaussJordan,
+    /// Explicit inverse through a tiled Cholesky factor.
+    DenseInverse,
+    /// Tiled dense Cholesky factor.
+    DenseCholesky,
+    /// Sparse Cholesky factor in a nested-dissection order.
+    SparseCholesky,
+}
+
+/// A method name that is none of [`Method::ALL`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "no method is called '{name}'; there are gauss-jordan, dense-inverse, dense-cholesky and sparse-cholesky"
+)]
+pub struct UnknownMethod {
+    /// The name given.
+    pub name: String,
+}
+
+impl Method {
+    /// All methods, slowest first.
+    pub const ALL: [Self; 4] =
+        [Self::GaussJordan, Self::DenseInverse, Self::DenseCholesky, Self::SparseCholesky];
+
+    /// Name on the command line, on the wire and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::GaussJordan => "gauss-jordan",
+            Self::DenseInverse => "dense-inverse",
+            Self::DenseCholesky => "dense-cholesky",
+            Self::SparseCholesky => "sparse-cholesky",
+        }
+    }
+
+    /// Bytes of the factor or inverse at its peak, for `n` unknowns; `None` where it depends on
+    /// the sparsity.
+    pub fn dense_bytes(self, n: usize) -> Option<u64> {
+        let square = 8 * (n as u64) * (n as u64);
+        match self {
+            Self::GaussJordan | Self::DenseInverse => Some(square),
+            Self::DenseCholesky => Some(square / 2),
+            Self::SparseCholesky => None,
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Method {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        Self::ALL
+            .into_iter()
+            .find(|m| m.name() == name)
+            .ok_or_else(|| UnknownMethod { name: name.to_owned() })
+    }
+}
