@@ -1,5 +1,14 @@
 //! Tetrahedral meshes: the mesh itself, its surface, its quality, and the built-in objects.
 
+mod bodies;
+mod faces;
+mod generate;
+mod quality;
+mod surface;
 mod tet_mesh;
 
+pub use bodies::Bodies;
+pub use generate::{BuiltIn, GenerateError, NODES_MAX, NODES_MIN, UnknownShape, generate};
+pub use quality::{Quality, TetQuality, tet_quality};
+pub use surface::Surface;
 pub use tet_mesh::{MeshError, TetMesh, signed_volume};
