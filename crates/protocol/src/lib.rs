@@ -1,1 +1,30 @@
 //! Bytes ⇄ messages of the Softgrasp wire, without I/O.
+//!
+//! A stream is a sequence of frames; a frame is a 32-byte header and a payload; a payload is one
+//! small part in bincode's format followed by raw little-endian arrays. `docs/wire.md` describes
+//! every byte. The layers, bottom up:
+//!
+//! * [`Header`], [`Kind`], [`Limits`]: what a frame says about itself and how large it may be.
+//! * [`FrameBuffer`]: bytes in any pieces → [`Frame`]s; "not yet" is `Ok(None)`, "wrong" is `Err`.
+//! * [`Request`] (client → server) and [`Reply`] (server → client): frames ⇄ typed messages.
+//! * [`blocking`] and [`asynchronous`]: thin adapters to std and tokio streams.
+//!
+//! It does not interpret a message: whether a degree of freedom exists, a coordinate is finite or
+//! a method is known is the server's business.
+
+pub mod asynchronous;
+pub mod blocking;
+mod error;
+mod frame_buffer;
+mod header;
+mod kind;
+mod limits;
+mod message;
+mod payload;
+
+pub use error::{ConnectionError, DecodeError, EncodeError, FrameError};
+pub use frame_buffer::{Frame, FrameBuffer};
+pub use header::{HEADER_LEN, Header, MAGIC, VERSION};
+pub use kind::Kind;
+pub use limits::{Limits, PART_LEN_MAX};
+pub use message::*;

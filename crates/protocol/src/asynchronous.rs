@@ -1,0 +1,103 @@
+//! Frames over a tokio stream, whole or split into a reading and a writing half.
+
+use std::io::ErrorKind;
+
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+
+use crate::{ConnectionError, Frame, FrameBuffer, Limits};
+
+/// A stream, or one half of it, that frames are read from and written to.
+///
+/// Knows nothing of the format: what comes goes into a [`FrameBuffer`], what goes is bytes. Time
+/// limits are the caller's (`tokio::time::timeout` around a call).
+#[derive(Debug)]
+pub struct Connection<S> {
+    stream: S,
+    buffer: FrameBuffer,
+}
+
+impl<S> Connection<S> {
+    /// Wraps a stream; `limits` hold for what is read.
+    pub fn new(stream: S, limits: Limits) -> Self {
+        Self { stream, buffer: FrameBuffer::new(limits) }
+    }
+
+    /// The stream below.
+    pub fn stream(&self) -> &S {
+        &self.stream
+    }
+
+    /// Whether a frame has begun to come and has not ended; an idle peer may be waited for longer
+    /// than one that stops inside a frame.
+    pub fn is_inside_frame(&self) -> bool {
+        self.buffer.received() > 0
+    }
+}
+
+impl<S: AsyncRead + Unpin> Connection<S> {
+    /// Next frame; `None` when the peer has closed between two frames.
+    ///
+    /// May be dropped at any await: bytes that have come stay in the buffer.
+    ///
+    /// # Errors
+    /// [`ConnectionError::Frame`] for bad or cut bytes: give the stream up.
+    pub async fn read_frame(&mut self) -> Result<Option<Frame>, ConnectionError> {
+        loop {
+            if let Some(frame) = self.buffer.next_frame()? {
+                return Ok(Some(frame));
+            }
+            match self.stream.read(self.buffer.spare_mut()).await {
+                Ok(0) => {
+                    self.buffer.finish()?;
+                    return Ok(None);
+                }
+                Ok(count) => self.buffer.advance(count),
+                Err(error) => match error.kind() {
+                    ErrorKind::Interrupted => {}
+                    // Streams with a timeout of their own may say so.
+                    ErrorKind::TimedOut => {
+                        let received = self.buffer.received();
+                        return Err(ConnectionError::ReadTimedOut { received });
+                    }
+                    _ => return Err(error.into()),
+                },
+            }
+        }
+    }
+}
+
+impl<S: AsyncWrite + Unpin> Connection<S> {
+    /// Writes all bytes of one or more frames and flushes.
+    ///
+    /// Must not be dropped at an await if the stream is used further: the next frame would start
+    /// inside this one.
+    ///
+    /// # Errors
+    /// [`ConnectionError`]; the stream is to be given up, except after `WriteTimedOut`, where the
+    /// rest of the same bytes may follow.
+    pub async fn write_bytes(&mut self, bytes: &[u8]) -> Result<(), ConnectionError> {
+        let mut written = 0;
+        while let Some(rest) = bytes.get(written..).filter(|rest| !rest.is_empty()) {
+            match self.stream.write(rest).await {
+                Ok(0) => return Err(ConnectionError::Closed { written }),
+                Ok(count) => written += count,
+                Err(error) => keep_writing(error, written)?,
+            }
+        }
+        loop {
+            match self.stream.flush().await {
+                Ok(()) => return Ok(()),
+                Err(error) => keep_writing(error, written)?,
+            }
+        }
+    }
+}
+
+/// Whether a failed write is to be tried again at once.
+fn keep_writing(error: std::io::Error, written: usize) -> Result<(), ConnectionError> {
+    match error.kind() {
+        ErrorKind::Interrupted => Ok(()),
+        ErrorKind::TimedOut => Err(ConnectionError::WriteTimedOut { written }),
+        _ => Err(error.into()),
+    }
+}

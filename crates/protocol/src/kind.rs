@@ -1,0 +1,96 @@
+//! The number of each message on the wire.
+
+use std::fmt;
+
+/// What a frame carries; the high bit says who sends it (0 client, 1 server).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u16)]
+pub enum Kind {
+    /// Client introduces itself.
+    Hello = 0x0001,
+    /// Mesh, material, partition and question in one request.
+    SolveOnce = 0x0002,
+    /// Is this model known?
+    HaveModel = 0x0003,
+    /// Mesh, material and fixed degrees of freedom to keep.
+    UploadModel = 0x0004,
+    /// New known displacements and forces for a kept model.
+    Frame = 0x0005,
+    /// Hint which nodes will be asked about soon; never answered.
+    Prefetch = 0x0006,
+    /// The model is not needed any more; never answered.
+    Drop = 0x0007,
+    /// Are you there?
+    Ping = 0x0008,
+    /// Server introduces itself.
+    Welcome = 0x8001,
+    /// Displacements and what they cost.
+    Answer = 0x8002,
+    /// Whether a model is known.
+    ModelState = 0x8003,
+    /// An uploaded model can be used.
+    ModelReady = 0x8004,
+    /// The request was understood but not granted, or not understood.
+    Rejected = 0x8005,
+    /// I am here.
+    Pong = 0x8008,
+}
+
+impl Kind {
+    /// All kinds, in the order of their numbers.
+    pub const ALL: [Self; 14] = [
+        Self::Hello,
+        Self::SolveOnce,
+        Self::HaveModel,
+        Self::UploadModel,
+        Self::Frame,
+        Self::Prefetch,
+        Self::Drop,
+        Self::Ping,
+        Self::Welcome,
+        Self::Answer,
+        Self::ModelState,
+        Self::ModelReady,
+        Self::Rejected,
+        Self::Pong,
+    ];
+
+    /// Number in the header.
+    pub const fn number(self) -> u16 {
+        self as u16
+    }
+
+    /// Kind with this number, if there is one.
+    pub fn from_number(number: u16) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.number() == number)
+    }
+
+    /// Whether the server sends it.
+    pub const fn is_reply(self) -> bool {
+        self.number() & 0x8000 != 0
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(self, f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_names_at_most_one_kind() {
+        let mut found = 0;
+        for number in 0..=u16::MAX {
+            if let Some(kind) = Kind::from_number(number) {
+                assert_eq!(kind.number(), number);
+                found += 1;
+            }
+        }
+        assert_eq!(found, Kind::ALL.len());
+        assert!(Kind::ALL.is_sorted());
+    }
+}

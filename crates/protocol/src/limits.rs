@@ -1,0 +1,92 @@
+//! How large anything that comes from the other side may be.
+
+use wincode::{SchemaRead, SchemaWrite};
+
+use crate::DecodeError;
+
+/// Most bytes the bincode part of a payload may take; part of the format.
+pub const PART_LEN_MAX: usize = 64 * 1024;
+
+/// Limits one side puts on what it reads; the server tells its own in `Welcome`.
+///
+/// Units: bytes for `…_len_max`, entries for `…_count_max`. Announced counts are compared with
+/// these and with the bytes that are really there before memory is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, SchemaRead, SchemaWrite)]
+pub struct Limits {
+    /// Bytes of one payload.
+    pub payload_len_max: u32,
+    /// Vertices of a mesh, nodes asked for, nodes answered.
+    pub node_count_max: u32,
+    /// Tetrahedra of a mesh.
+    pub tet_count_max: u32,
+    /// Entries of one list of degrees of freedom (known, forces, fixed, reactions).
+    pub dof_count_max: u32,
+    /// Entries of the material table.
+    pub material_count_max: u32,
+    /// Bytes of one text.
+    pub text_len_max: u32,
+}
+
+impl Default for Limits {
+    /// Chosen: 400 000 nodes and six elements per node come to 61 MiB, a quarter of the payload.
+    fn default() -> Self {
+        Self {
+            payload_len_max: 256 * 1024 * 1024,
+            node_count_max: 400_000,
+            tet_count_max: 2_400_000,
+            dof_count_max: 1_200_000,
+            material_count_max: 65_536,
+            text_len_max: 16 * 1024,
+        }
+    }
+}
+
+impl Limits {
+    /// A text within `text_len_max`.
+    ///
+    /// # Errors
+    /// [`DecodeError::TextTooLong`] naming the text.
+    pub(crate) fn check_text(&self, what: &'static str, text: &str) -> Result<(), DecodeError> {
+        let (len, len_max) = (text.len(), self.text_len_max);
+        if len > len_max as usize {
+            return Err(DecodeError::TextTooLong { what, len, len_max });
+        }
+        Ok(())
+    }
+}
+
+/// `count` as an array length, if it is within `count_max`.
+///
+/// # Errors
+/// [`DecodeError::TooMany`] naming the array.
+pub(crate) fn check_count(
+    what: &'static str,
+    count: u32,
+    count_max: u32,
+) -> Result<usize, DecodeError> {
+    if count > count_max {
+        return Err(DecodeError::TooMany { what, count, count_max });
+    }
+    Ok(count as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_at_the_limit_passes_and_one_more_does_not() {
+        assert_eq!(check_count("vertices", 7, 7).unwrap(), 7);
+        assert!(matches!(
+            check_count("vertices", 8, 7),
+            Err(DecodeError::TooMany { what: "vertices", count: 8, count_max: 7 })
+        ));
+    }
+
+    #[test]
+    fn a_text_at_the_limit_passes_and_one_more_byte_does_not() {
+        let limits = Limits { text_len_max: 2, ..Limits::default() };
+        assert!(limits.check_text("client", "é").is_ok());
+        assert!(limits.check_text("client", "éa").is_err());
+    }
+}

@@ -1,0 +1,188 @@
+//! Displacements and reaction forces, and how they shrink for the way.
+
+use wincode::{SchemaRead, SchemaWrite};
+
+use super::question::{DofValue, NodeChoice, Precision};
+use super::report::SolveReport;
+use crate::limits::check_count;
+use crate::payload::{PayloadReader, PayloadWriter, count_of};
+use crate::{DecodeError, EncodeError, Limits};
+
+/// Displacements of the nodes asked for, m, three components each.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Displacements {
+    /// As computed.
+    F64(Vec<[f64; 3]>),
+    /// Divided by `scale`, m, and rounded to single precision.
+    F32Quantised {
+        /// Largest component in magnitude.
+        scale: f64,
+        /// Components over `scale`, within ±1.
+        values: Vec<[f32; 3]>,
+    },
+}
+
+/// Answer to `SolveOnce` and `Frame`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// What it cost and how wrong it can be.
+    pub report: SolveReport,
+    /// Nodes that `displacements` belong to, in this order.
+    pub nodes: NodeChoice,
+    /// Displacements.
+    pub displacements: Displacements,
+    /// Forces at the known degrees of freedom, N; empty if not asked for.
+    pub reactions: Vec<DofValue>,
+}
+
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct AnswerPart {
+    report: SolveReport,
+    listed: bool,
+    precision: Precision,
+    scale: f64,
+    node_count: u32,
+    reaction_count: u32,
+}
+
+impl Displacements {
+    /// Displacements for the way, in the precision asked for.
+    ///
+    /// Units: m. With [`Precision::F32Quantised`] each component is off by at most 2⁻²⁴ of the
+    /// largest one, since `|u / scale| ≤ 1` and single precision rounds to half of 2⁻²³. Where the
+    /// largest is not a finite number or its inverse is not, nothing is divided that would only
+    /// hide this: the values travel as they are.
+    pub fn of(displacements: Vec<[f64; 3]>, precision: Precision) -> Self {
+        let scale = displacements.iter().flatten().fold(0.0, |most: f64, u| most.max(u.abs()));
+        let finite = displacements.iter().flatten().all(|u| u.is_finite());
+        match precision {
+            Precision::F32Quantised if finite && (scale == 0.0 || scale.recip().is_finite()) => {
+                let divisor = if scale == 0.0 { 1.0 } else { scale };
+                let values = displacements.iter().map(|u| u.map(|c| (c / divisor) as f32));
+                Self::F32Quantised { scale, values: values.collect() }
+            }
+            _ => Self::F64(displacements),
+        }
+    }
+
+    /// Number of nodes.
+    pub fn node_count(&self) -> usize {
+        match self {
+            Self::F64(values) => values.len(),
+            Self::F32Quantised { values, .. } => values.len(),
+        }
+    }
+
+    /// Displacements in double precision, m.
+    pub fn into_f64(self) -> Vec<[f64; 3]> {
+        match self {
+            Self::F64(values) => values,
+            Self::F32Quantised { scale, values } => {
+                values.iter().map(|u| u.map(|c| f64::from(c) * scale)).collect()
+            }
+        }
+    }
+}
+
+impl Answer {
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        let expected = self.displacements.node_count();
+        let listed = match &self.nodes {
+            NodeChoice::All => false,
+            NodeChoice::Nodes(nodes) if nodes.len() == expected => true,
+            NodeChoice::Nodes(nodes) => {
+                let count = nodes.len();
+                return Err(EncodeError::CountMismatch { what: "answered nodes", count, expected });
+            }
+        };
+        let (precision, scale) = match self.displacements {
+            Displacements::F64(_) => (Precision::F64, 1.0),
+            Displacements::F32Quantised { scale, .. } => (Precision::F32Quantised, scale),
+        };
+        writer.part(&AnswerPart {
+            // A few hundred bytes; the arrays are not copied.
+            report: self.report.clone(),
+            listed,
+            precision,
+            scale,
+            node_count: count_of("displacements", expected)?,
+            reaction_count: count_of("reaction forces", self.reactions.len())?,
+        })?;
+        if let NodeChoice::Nodes(nodes) = &self.nodes {
+            writer.array(nodes);
+        }
+        match &self.displacements {
+            Displacements::F64(values) => writer.array(values),
+            Displacements::F32Quantised { values, .. } => writer.array(values),
+        }
+        writer.dof_values(&self.reactions);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: AnswerPart = reader.part()?;
+        part.report.check(limits)?;
+        let count = check_count("displacements", part.node_count, limits.node_count_max)?;
+        let what = "reaction forces";
+        let reaction_count = check_count(what, part.reaction_count, limits.dof_count_max)?;
+        let nodes = if part.listed {
+            NodeChoice::Nodes(reader.array("answered nodes", count)?)
+        } else {
+            NodeChoice::All
+        };
+        let displacements = match part.precision {
+            Precision::F64 => Displacements::F64(reader.array("displacements", count)?),
+            Precision::F32Quantised => {
+                let values = reader.array("displacements", count)?;
+                Displacements::F32Quantised { scale: part.scale, values }
+            }
+        };
+        let reactions = reader.dof_values(what, reaction_count)?;
+        Ok(Self { report: part.report, nodes, displacements, reactions })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn quantised_displacements_are_off_by_at_most_a_part_in_2_pow_24(
+            values in prop::collection::vec(prop::array::uniform3(-1e3..1e3_f64), 0..40),
+            exponent in -290..290_i32,
+        ) {
+            let factor = 10_f64.powi(exponent);
+            let exact: Vec<_> = values.iter().map(|u| u.map(|c| c * factor)).collect();
+            let most = exact.iter().flatten().fold(0.0, |most: f64, c| most.max(c.abs()));
+            let back = Displacements::of(exact.clone(), Precision::F32Quantised).into_f64();
+            prop_assert_eq!(back.len(), exact.len());
+            for (back, exact) in back.iter().flatten().zip(exact.iter().flatten()) {
+                // One more rounding of double precision is made on each way.
+                prop_assert!((back - exact).abs() <= most * (0.5_f64.powi(24) + 1e-15));
+            }
+        }
+    }
+
+    #[test]
+    fn zero_displacements_stay_zero() {
+        let quantised = Displacements::of(vec![[0.0; 3]; 2], Precision::F32Quantised);
+        assert!(matches!(quantised, Displacements::F32Quantised { scale: 0.0, .. }));
+        assert_eq!(quantised.into_f64(), [[0.0; 3]; 2]);
+    }
+
+    #[test]
+    fn values_that_cannot_be_scaled_travel_as_they_are() {
+        for odd in [f64::INFINITY, f64::MIN_POSITIVE / 16.0] {
+            let sent = Displacements::of(vec![[odd, 0.0, -0.0]], Precision::F32Quantised);
+            assert_eq!(sent, Displacements::F64(vec![[odd, 0.0, -0.0]]));
+        }
+        let sent = Displacements::of(vec![[f64::NAN, 1.0, 0.0]], Precision::F32Quantised);
+        assert!(matches!(sent, Displacements::F64(values) if values[0][0].is_nan()));
+    }
+}

@@ -1,0 +1,23 @@
+//! Typed messages: what the client asks and what the server answers.
+
+mod answer;
+mod mesh;
+mod model;
+mod names;
+mod question;
+mod reject;
+mod reply;
+mod report;
+mod request;
+mod session;
+
+pub use answer::{Answer, Displacements};
+pub use mesh::{Material, MeshData};
+pub use model::{FrameRequest, ModelHash, ModelHashError, ModelReady, Prefetch, UploadModel};
+pub use names::{ElementName, MethodName, MethodNameError};
+pub use question::{DofValue, NodeChoice, Precision, Question, SolveOnce, Want};
+pub use reject::{RejectCode, Rejected};
+pub use reply::Reply;
+pub use report::{SolveReport, StageMs};
+pub use request::Request;
+pub use session::{Hello, Welcome};

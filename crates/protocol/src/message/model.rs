@@ -1,0 +1,208 @@
+//! Models that the server keeps, and requests that name them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use wincode::{SchemaRead, SchemaWrite};
+
+use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
+use super::names::ElementName;
+use super::question::{Question, QuestionPart};
+use super::report::StageMs;
+use crate::limits::check_count;
+use crate::payload::{PayloadReader, PayloadWriter, count_of};
+use crate::{DecodeError, EncodeError, Limits};
+
+/// Content hash that names a model; opaque here, shown as 64 hexadecimal digits.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub struct ModelHash(pub [u8; 32]);
+
+/// A text that is not 64 hexadecimal digits.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{text:?} is not a model's name (64 hexadecimal digits)")]
+pub struct ModelHashError {
+    /// The text.
+    pub text: String,
+}
+
+/// Mesh, material and the degrees of freedom that are known in every frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UploadModel {
+    /// Nodes and elements.
+    pub mesh: MeshData,
+    /// One material, or one for each region.
+    pub materials: Vec<Material>,
+    /// Which element.
+    pub element: ElementName,
+    /// Degrees of freedom `3 · node + axis` that stay at zero unless a frame gives them a value.
+    pub fixed: Vec<u32>,
+}
+
+/// An uploaded model can be used.
+#[derive(Clone, Debug, PartialEq, SchemaRead, SchemaWrite)]
+pub struct ModelReady {
+    /// Its name from now on.
+    pub model: ModelHash,
+    /// Degrees of freedom to be solved for.
+    pub unknown_dofs: u64,
+    /// Degrees of freedom that are fixed.
+    pub fixed_dofs: u64,
+    /// Whether the server had it already.
+    pub reused: bool,
+    /// What it took.
+    pub stage_ms: StageMs,
+}
+
+/// Question about a kept model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameRequest {
+    /// Which model.
+    pub model: ModelHash,
+    /// What is known and asked.
+    pub question: Question,
+}
+
+/// Hint which nodes will be touched or asked about soon.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Prefetch {
+    /// Which model.
+    pub model: ModelHash,
+    /// The nodes.
+    pub nodes: Vec<u32>,
+}
+
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct UploadModelPart {
+    mesh: MeshPart,
+    element: ElementName,
+    fixed_count: u32,
+}
+
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct FramePart {
+    model: ModelHash,
+    question: QuestionPart,
+}
+
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct PrefetchPart {
+    model: ModelHash,
+    node_count: u32,
+}
+
+impl UploadModel {
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        writer.part(&UploadModelPart {
+            mesh: MeshPart::of(&self.mesh, &self.materials)?,
+            element: self.element,
+            fixed_count: count_of("fixed degrees of freedom", self.fixed.len())?,
+        })?;
+        write_mesh(writer, &self.mesh, &self.materials);
+        writer.array(&self.fixed);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: UploadModelPart = reader.part()?;
+        part.mesh.check(limits)?;
+        let what = "fixed degrees of freedom";
+        let fixed_count = check_count(what, part.fixed_count, limits.dof_count_max)?;
+        let (mesh, materials) = read_mesh(reader, &part.mesh)?;
+        let fixed = reader.array(what, fixed_count)?;
+        Ok(Self { mesh, materials, element: part.element, fixed })
+    }
+}
+
+impl FrameRequest {
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        writer.part(&FramePart { model: self.model, question: self.question.part()? })?;
+        self.question.write_arrays(writer);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: FramePart = reader.part()?;
+        part.question.check(limits)?;
+        let question = Question::read_arrays(reader, part.question)?;
+        Ok(Self { model: part.model, question })
+    }
+}
+
+impl Prefetch {
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        let node_count = count_of("prefetched nodes", self.nodes.len())?;
+        writer.part(&PrefetchPart { model: self.model, node_count })?;
+        writer.array(&self.nodes);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: PrefetchPart = reader.part()?;
+        let what = "prefetched nodes";
+        let count = check_count(what, part.node_count, limits.node_count_max)?;
+        Ok(Self { model: part.model, nodes: reader.array(what, count)? })
+    }
+}
+
+impl fmt::Display for ModelHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl fmt::Debug for ModelHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ModelHash({self})")
+    }
+}
+
+impl FromStr for ModelHash {
+    type Err = ModelHashError;
+
+    fn from_str(text: &str) -> Result<Self, ModelHashError> {
+        parse_hash(text).map(Self).ok_or_else(|| ModelHashError { text: text.to_owned() })
+    }
+}
+
+fn parse_hash(text: &str) -> Option<[u8; 32]> {
+    let (pairs, rest) = text.as_bytes().as_chunks::<2>();
+    let mut hash = [0; 32];
+    if pairs.len() != hash.len() || !rest.is_empty() {
+        return None;
+    }
+    let digit = |c: u8| char::from(c).to_digit(16).and_then(|d| u8::try_from(d).ok());
+    for (byte, [high, low]) in hash.iter_mut().zip(pairs) {
+        *byte = 16 * digit(*high)? + digit(*low)?;
+    }
+    Some(hash)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hash_text_reads_back() {
+        let hash = ModelHash(std::array::from_fn(|i| (i * 37 + 5) as u8));
+        let text = hash.to_string();
+        assert!(text.starts_with("052a4f"));
+        assert_eq!(text.parse(), Ok(hash));
+        assert_eq!(text.to_uppercase().parse(), Ok(hash));
+    }
+
+    #[test]
+    fn other_texts_are_not_hashes() {
+        for text in ["", &"0".repeat(63), &"0".repeat(65), &"0g".repeat(32), &"+1".repeat(32)] {
+            assert_eq!(text.parse::<ModelHash>().unwrap_err().text, text);
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Names of solution methods and elements as they travel.
+
+use std::fmt;
+use std::str::FromStr;
+
+use wincode::{SchemaRead, SchemaWrite};
+
+/// Name of a solution method: 1 to 32 characters of `a-z 0-9 - _`.
+///
+/// A text and not a number, so that a server may learn methods without a new protocol version; a
+/// name it does not know is answered with `RejectCode::UnknownMethod`.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MethodName(String);
+
+/// A text that cannot be a method's name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{name:?} cannot be a method's name (1 to 32 of a-z, 0-9, - and _)")]
+pub struct MethodNameError {
+    /// The text.
+    pub name: String,
+}
+
+impl MethodName {
+    /// Checked constructor.
+    ///
+    /// # Errors
+    /// [`MethodNameError`] for an empty or long text or one with other characters.
+    pub fn try_new(name: impl Into<String>) -> Result<Self, MethodNameError> {
+        let name = name.into();
+        let known =
+            |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, b'-' | b'_');
+        if (1..=NAME_LEN_MAX).contains(&name.len()) && name.bytes().all(known) {
+            Ok(Self(name))
+        } else {
+            Err(MethodNameError { name })
+        }
+    }
+
+    /// The choice is left to the server.
+    pub fn auto() -> Self {
+        Self("auto".to_owned())
+    }
+
+    /// The name itself.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for MethodName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+impl FromStr for MethodName {
+    type Err = MethodNameError;
+
+    fn from_str(name: &str) -> Result<Self, MethodNameError> {
+        Self::try_new(name)
+    }
+}
+
+/// Kind of finite element.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub enum ElementName {
+    /// Linear tetrahedron, four nodes (thesis Table 3.1, list 2).
+    #[default]
+    T4,
+    /// Quadratic tetrahedron, ten nodes; its mid-edge nodes are made by the server.
+    T10,
+}
+
+impl ElementName {
+    /// Name used in commands and reports.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::T4 => "t4",
+            Self::T10 => "t10",
+        }
+    }
+}
+
+impl fmt::Display for ElementName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+const NAME_LEN_MAX: usize = 32;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn method_names_are_short_lower_case_words() {
+        for good in ["auto", "gauss-jordan", "pcg_2", &"x".repeat(32)] {
+            assert_eq!(good.parse::<MethodName>().unwrap().as_str(), good);
+        }
+        for bad in ["", "Sparse", "a b", "ä", "a\0", &"x".repeat(33)] {
+            assert_eq!(MethodName::try_new(bad).unwrap_err().name, bad);
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! What a client wants to know about a mesh or a kept model.
+
+use wincode::{SchemaRead, SchemaWrite};
+
+use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
+use super::names::{ElementName, MethodName};
+use crate::limits::check_count;
+use crate::payload::{PayloadReader, PayloadWriter, count_of};
+use crate::{DecodeError, EncodeError, Limits};
+
+/// A number at one degree of freedom: known displacement (m), force (N) or reaction force (N).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DofValue {
+    /// `3 · node + axis`, axis 0 to 2.
+    pub dof: u32,
+    /// Its value, m or N.
+    pub value: f64,
+}
+
+/// Nodes to be answered.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum NodeChoice {
+    /// Every node, in the order of the mesh.
+    #[default]
+    All,
+    /// These nodes, in this order.
+    Nodes(Vec<u32>),
+}
+
+/// How displacements are to travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
+pub enum Precision {
+    /// Eight bytes a component, as computed.
+    #[default]
+    F64,
+    /// Four bytes a component, rounded to 2⁻²⁴ of the largest one.
+    F32Quantised,
+}
+
+/// What the answer shall hold.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Want {
+    /// Nodes whose displacements are wanted.
+    pub nodes: NodeChoice,
+    /// Whether the forces at the known degrees of freedom are wanted.
+    pub reactions: bool,
+    /// How displacements are to travel.
+    pub precision: Precision,
+}
+
+/// Partition, load, and how well and how soon the answer is needed.
+///
+/// Units: `known` m, `forces` N, `max_error` relative, `deadline_ms` ms from the arrival.
+///
+/// Source: thesis (3.41) to (3.43) for the partition, 4.5.1 for where known displacements come from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Question {
+    /// Known displacements.
+    pub known: Vec<DofValue>,
+    /// Forces at free degrees of freedom; those not named are zero.
+    pub forces: Vec<DofValue>,
+    /// How to solve.
+    pub method: MethodName,
+    /// What to answer.
+    pub want: Want,
+    /// Largest relative error that is acceptable; `None` leaves it to the method.
+    pub max_error: Option<f64>,
+    /// Time after which the answer is of no use.
+    pub deadline_ms: Option<f64>,
+}
+
+/// Mesh, material, partition and question in one request, as in the thesis (5.1.1).
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolveOnce {
+    /// Nodes and elements.
+    pub mesh: MeshData,
+    /// One material, or one for each region.
+    pub materials: Vec<Material>,
+    /// Which element.
+    pub element: ElementName,
+    /// What is known and asked.
+    pub question: Question,
+}
+
+/// Announces the arrays of a [`Question`].
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+pub(super) struct QuestionPart {
+    method: String,
+    nodes: NodeChoicePart,
+    reactions: bool,
+    precision: Precision,
+    max_error: Option<f64>,
+    deadline_ms: Option<f64>,
+    known_count: u32,
+    force_count: u32,
+}
+
+#[derive(Clone, Copy, Debug, SchemaRead, SchemaWrite)]
+enum NodeChoicePart {
+    All,
+    Nodes { count: u32 },
+}
+
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct SolveOncePart {
+    mesh: MeshPart,
+    element: ElementName,
+    question: QuestionPart,
+}
+
+impl Question {
+    pub(super) fn part(&self) -> Result<QuestionPart, EncodeError> {
+        let nodes = match &self.want.nodes {
+            NodeChoice::All => NodeChoicePart::All,
+            NodeChoice::Nodes(nodes) => {
+                NodeChoicePart::Nodes { count: count_of("wanted nodes", nodes.len())? }
+            }
+        };
+        Ok(QuestionPart {
+            method: self.method.as_str().to_owned(),
+            nodes,
+            reactions: self.want.reactions,
+            precision: self.want.precision,
+            max_error: self.max_error,
+            deadline_ms: self.deadline_ms,
+            known_count: count_of("known displacements", self.known.len())?,
+            force_count: count_of("forces", self.forces.len())?,
+        })
+    }
+
+    /// Arrays: known displacements, forces, wanted nodes if listed.
+    pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
+        writer.dof_values(&self.known);
+        writer.dof_values(&self.forces);
+        if let NodeChoice::Nodes(nodes) = &self.want.nodes {
+            writer.array(nodes);
+        }
+    }
+
+    /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
+    pub(super) fn read_arrays(
+        reader: &mut PayloadReader<'_>,
+        part: QuestionPart,
+    ) -> Result<Self, DecodeError> {
+        let method = MethodName::try_new(part.method)?;
+        let known = reader.dof_values("known displacements", part.known_count as usize)?;
+        let forces = reader.dof_values("forces", part.force_count as usize)?;
+        let nodes = match part.nodes {
+            NodeChoicePart::All => NodeChoice::All,
+            NodeChoicePart::Nodes { count } => {
+                NodeChoice::Nodes(reader.array("wanted nodes", count as usize)?)
+            }
+        };
+        let want = Want { nodes, reactions: part.reactions, precision: part.precision };
+        let (max_error, deadline_ms) = (part.max_error, part.deadline_ms);
+        Ok(Self { known, forces, method, want, max_error, deadline_ms })
+    }
+}
+
+impl QuestionPart {
+    pub(super) fn check(&self, limits: &Limits) -> Result<(), DecodeError> {
+        limits.check_text("method", &self.method)?;
+        check_count("known displacements", self.known_count, limits.dof_count_max)?;
+        check_count("forces", self.force_count, limits.dof_count_max)?;
+        if let NodeChoicePart::Nodes { count } = self.nodes {
+            check_count("wanted nodes", count, limits.node_count_max)?;
+        }
+        Ok(())
+    }
+}
+
+impl SolveOnce {
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        writer.part(&SolveOncePart {
+            mesh: MeshPart::of(&self.mesh, &self.materials)?,
+            element: self.element,
+            question: self.question.part()?,
+        })?;
+        write_mesh(writer, &self.mesh, &self.materials);
+        self.question.write_arrays(writer);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: SolveOncePart = reader.part()?;
+        part.mesh.check(limits)?;
+        part.question.check(limits)?;
+        let (mesh, materials) = read_mesh(reader, &part.mesh)?;
+        let question = Question::read_arrays(reader, part.question)?;
+        Ok(Self { mesh, materials, element: part.element, question })
+    }
+}

@@ -1,0 +1,196 @@
+//! Sound frames with payloads that lie: an error, no panic, and no memory beyond what is there.
+
+use softgrasp_protocol::*;
+
+use crate::allocation::counted;
+use crate::raw::{Random, fuzz_plan, only_frame, raw_frame};
+use crate::samples::{Message, conversation};
+
+fn decode(kind: u16, payload: &[u8]) -> Result<Message, DecodeError> {
+    decode_within(kind, payload, &Limits::default())
+}
+
+/// Decodes and checks that no more memory was asked for than a few times what came and one part.
+fn decode_within(kind: u16, payload: &[u8], limits: &Limits) -> Result<Message, DecodeError> {
+    let frame = only_frame(&raw_frame(kind, 1, payload));
+    let (result, asked) = counted(|| Message::decode(&frame, limits));
+    let most = 4 * payload.len() + 2 * PART_LEN_MAX;
+    assert!(asked <= most, "{asked} bytes of memory for a payload of {}", payload.len());
+    result
+}
+
+fn samples() -> Vec<(u16, Vec<u8>)> {
+    let payload = |message: &Message| only_frame(&message.encode()).payload.to_vec();
+    conversation().iter().map(|m| (m.kind().number(), payload(m))).collect()
+}
+
+#[test]
+fn no_count_takes_memory_that_its_bytes_do_not_cover() {
+    for (kind, payload) in samples() {
+        let good = decode(kind, &payload).unwrap();
+        let mut refused = 0;
+        for at in 0..payload.len() {
+            for lie in [&[0xff; 4][..], &[0, 0, 6, 0], &[0xff; 8], &[0, 0, 1, 0, 0, 0, 0, 0]] {
+                let mut hostile = payload.clone();
+                let end = (at + lie.len()).min(payload.len());
+                hostile[at..end].copy_from_slice(&lie[..end - at]);
+                match decode(kind, &hostile) {
+                    // Bytes of a number or a name may be anything.
+                    Ok(message) => assert_eq!(message.kind(), good.kind()),
+                    Err(_) => refused += 1,
+                }
+            }
+        }
+        let plain = [Kind::HaveModel, Kind::Drop, Kind::Ping, Kind::Pong];
+        let plain = plain.iter().any(|kind| *kind == good.kind());
+        assert_eq!(refused == 0, plain, "{}: {refused} lies were seen", good.kind());
+    }
+}
+
+#[test]
+fn every_shortened_or_lengthened_payload_is_refused() {
+    for (kind, payload) in samples() {
+        for cut in 0..payload.len() {
+            let error = decode(kind, &payload[..cut]).expect_err("a cut payload must not pass");
+            assert!(
+                matches!(
+                    error,
+                    DecodeError::Part { .. }
+                        | DecodeError::ArrayCut { .. }
+                        | DecodeError::Padding { .. }
+                ),
+                "kind {kind:#06x} cut after {cut} bytes: {error}"
+            );
+        }
+        for more in [1, 8] {
+            let longer = [payload.as_slice(), &vec![0; more]].concat();
+            let error = decode(kind, &longer).expect_err("left-over bytes must not pass");
+            assert!(matches!(error, DecodeError::LeftOver { count } if count == more), "{error}");
+        }
+    }
+}
+
+#[test]
+fn random_payloads_never_panic() {
+    for seed in fuzz_plan(5, 3000) {
+        let mut random = Random::new(seed);
+        for (kind, payload) in samples() {
+            let mut hostile = payload;
+            for _ in 0..1 + random.below(6) {
+                let at = random.below(hostile.len());
+                hostile[at] = [0, 1, 2, 0xff, random.next().to_le_bytes()[3]][random.below(5)];
+            }
+            // Whatever is accepted can be said again.
+            if let Ok(message) = decode(kind, &hostile) {
+                message.encode();
+            }
+        }
+    }
+}
+
+#[test]
+fn counts_over_a_limit_are_named() {
+    let limits = Limits { node_count_max: 3, ..Limits::default() };
+    let (kind, payload) = &samples()[1];
+    let error = decode_within(*kind, payload, &limits).unwrap_err();
+    let expected = "4 vertices are announced, the limit is 3";
+    assert_eq!(error.to_string(), expected);
+    let limits = Limits { dof_count_max: 1, ..Limits::default() };
+    let error = decode_within(*kind, payload, &limits).unwrap_err();
+    assert_eq!(error.to_string(), "2 known displacements are announced, the limit is 1");
+    for (kind, payload) in samples() {
+        let tight = Limits {
+            payload_len_max: u32::MAX,
+            node_count_max: 0,
+            tet_count_max: 0,
+            dof_count_max: 0,
+            material_count_max: 0,
+            text_len_max: 0,
+        };
+        let result = decode_within(kind, &payload, &tight);
+        let without_lists = matches!(kind, 3 | 7 | 8 | 0x8003 | 0x8004 | 0x8008);
+        assert_eq!(result.is_ok(), without_lists, "kind {kind:#06x}");
+    }
+}
+
+#[test]
+fn a_long_list_of_empty_texts_takes_no_more_than_a_part() {
+    let mut report = vec![];
+    report.extend(0_u64.to_le_bytes()); // method
+    report.extend([0; 4 + 16 + 56 + 8 + 1 + 8 + 4 + 16 + 8 + 1]); // up to condition_estimate
+    for count in [u64::MAX, 1 << 40, 65_536, 2730] {
+        let mut payload = report.clone();
+        payload.extend(count.to_le_bytes());
+        payload.resize(80_000, 0);
+        assert!(decode(Kind::Answer.number(), &payload).is_err());
+    }
+}
+
+#[test]
+fn values_that_do_not_exist_are_refused() {
+    let reject = |code: u16| {
+        let mut payload = code.to_le_bytes().to_vec();
+        payload.extend([0; 16 + 6]);
+        decode(Kind::Rejected.number(), &payload)
+    };
+    assert!(reject(1).is_ok());
+    assert!(matches!(reject(0), Err(DecodeError::Part { .. })));
+    assert!(matches!(reject(999), Err(DecodeError::Part { .. })));
+    let state = |known: u8| decode(Kind::ModelState.number(), &[known, 0, 0, 0, 0, 0, 0, 0]);
+    assert!(state(1).is_ok());
+    assert!(matches!(state(2), Err(DecodeError::Part { .. })));
+    let mut hello = 2_u64.to_le_bytes().to_vec();
+    hello.extend([0xc3, 0x28, 0, 0, 0, 0, 0, 0]);
+    let error = decode(Kind::Hello.number(), &hello);
+    assert!(matches!(error, Err(DecodeError::Part { .. })), "text that is not UTF-8");
+}
+
+#[test]
+fn a_method_name_with_a_capital_is_a_bad_request() {
+    let (kind, mut payload) = samples().swap_remove(4);
+    let at = payload.windows(4).position(|four| four == b"auto").unwrap();
+    payload[at] = b'A';
+    assert!(matches!(decode(kind, &payload), Err(DecodeError::MethodName(_))));
+}
+
+#[test]
+fn unknown_kinds_and_wrong_directions_leave_the_stream_sound() {
+    let unknown = only_frame(&raw_frame(0x7777, 5, b"from the future"));
+    assert_eq!(unknown.kind(), None);
+    let limits = Limits::default();
+    let expected = "unknown message kind 0x7777";
+    assert_eq!(Request::decode(&unknown, &limits).unwrap_err().to_string(), expected);
+    assert_eq!(Reply::decode(&unknown, &limits).unwrap_err().to_string(), expected);
+    for message in conversation() {
+        let frame = only_frame(&message.encode());
+        let wrong = match message {
+            Message::Request(..) => Reply::decode(&frame, &limits).map(|_| ()),
+            Message::Reply(..) => Request::decode(&frame, &limits).map(|_| ()),
+        };
+        let kind_sent = message.kind();
+        assert_eq!(kind_sent.is_reply(), matches!(message, Message::Reply(..)));
+        assert!(matches!(wrong, Err(DecodeError::WrongDirection { kind }) if kind == kind_sent));
+    }
+}
+
+#[test]
+fn large_arrays_are_copied_once_each_way() {
+    let vertices = vec![[1.0, 2.0, 3.0]; 100_000];
+    let tets = vec![[0, 1, 2, 3]; 400_000];
+    let array_len = 24 * vertices.len() + 16 * tets.len();
+    let upload = UploadModel {
+        mesh: MeshData { vertices, tets, regions: vec![] },
+        materials: vec![],
+        element: ElementName::T4,
+        fixed: vec![],
+    };
+    let request = Request::UploadModel(upload);
+    let mut out = Vec::with_capacity(array_len + 4096);
+    let (result, asked) = counted(|| request.encode_into(1, &Limits::default(), &mut out));
+    result.unwrap();
+    assert!(asked < 4096, "{asked} bytes of memory beside the buffer");
+    let frame = only_frame(&out);
+    let (decoded, asked) = counted(|| Request::decode(&frame, &Limits::default()).unwrap());
+    assert!(asked < array_len + 4096, "{asked} bytes of memory for {array_len}");
+    assert_eq!(decoded, request);
+}

@@ -1,0 +1,97 @@
+//! What is decoded is what was encoded.
+
+use proptest::prelude::*;
+use softgrasp_protocol::*;
+
+use crate::raw::{only_frame, raw_frame};
+use crate::samples::{Message, any_message, conversation};
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    #[test]
+    fn decoded_message_is_the_encoded_one(message in any_message()) {
+        let bytes = message.encode();
+        prop_assert_eq!(bytes.len() % 8, 0);
+        let frame = only_frame(&bytes);
+        prop_assert_eq!(frame.kind(), Some(message.kind()));
+        prop_assert_eq!(Message::decode(&frame, &Limits::default()).unwrap(), message);
+    }
+
+    #[test]
+    fn frames_equal_those_written_from_the_document(message in any_message()) {
+        let bytes = message.encode();
+        let frame = only_frame(&bytes);
+        let written = raw_frame(message.kind().number(), frame.request_id(), &frame.payload);
+        prop_assert_eq!(written, bytes);
+    }
+}
+
+#[test]
+fn conversation_holds_every_kind_once() {
+    let kinds: Vec<Kind> = conversation().iter().map(Message::kind).collect();
+    assert_eq!(kinds, Kind::ALL);
+}
+
+#[test]
+fn numbers_that_are_not_finite_keep_their_bits() {
+    let odd = [f64::NAN, -f64::NAN, f64::from_bits(0x7ff0_0000_dead_beef), f64::INFINITY, -0.0];
+    let known = odd.iter().map(|&value| DofValue { dof: 1, value }).collect();
+    let question = Question {
+        known,
+        forces: vec![],
+        method: MethodName::auto(),
+        want: Want::default(),
+        max_error: Some(f64::NAN),
+        deadline_ms: Some(f64::NEG_INFINITY),
+    };
+    let mesh = MeshData { vertices: odd.map(|x| [x; 3]).to_vec(), ..MeshData::default() };
+    let (materials, element) = (vec![], ElementName::T4);
+    let solve = SolveOnce { mesh, materials, element, question };
+    let mut bytes = Vec::new();
+    let request = Request::SolveOnce(Box::new(solve));
+    request.encode_into(1, &Limits::default(), &mut bytes).unwrap();
+    let back = Request::decode(&only_frame(&bytes), &Limits::default()).unwrap();
+    let Request::SolveOnce(solve) = back else { panic!("another kind: {back:?}") };
+    let known: Vec<u64> = solve.question.known.iter().map(|k| k.value.to_bits()).collect();
+    assert_eq!(known, odd.map(f64::to_bits));
+    let x: Vec<u64> = solve.mesh.vertices.iter().map(|v| v[2].to_bits()).collect();
+    assert_eq!(x, odd.map(f64::to_bits));
+    assert!(solve.question.max_error.is_some_and(f64::is_nan));
+}
+
+#[test]
+fn messages_are_appended_one_behind_the_other() {
+    let mut bytes = vec![];
+    let nonces = [1, 2, 3];
+    for nonce in nonces {
+        Request::Ping { nonce }.encode_into(nonce, &Limits::default(), &mut bytes).unwrap();
+    }
+    let mut buffer = FrameBuffer::new(Limits::default());
+    buffer.feed(&bytes);
+    for nonce in nonces {
+        let frame = buffer.next_frame().unwrap().unwrap();
+        assert_eq!(frame.request_id(), nonce);
+        let request = Request::decode(&frame, &Limits::default()).unwrap();
+        assert_eq!(request, Request::Ping { nonce });
+    }
+    assert_eq!(buffer.next_frame(), Ok(None));
+}
+
+#[test]
+fn lists_that_do_not_fit_together_are_not_sent() {
+    let mesh = MeshData { regions: vec![1], ..MeshData::default() };
+    let upload = UploadModel { mesh, materials: vec![], element: ElementName::T4, fixed: vec![] };
+    let mut out = vec![];
+    let error = Request::UploadModel(upload).encode_into(1, &Limits::default(), &mut out);
+    assert!(matches!(error, Err(EncodeError::CountMismatch { count: 1, expected: 0, .. })));
+    let answer = conversation().into_iter().find_map(|message| match message {
+        Message::Reply(_, Reply::Answer(answer)) => Some(answer),
+        _ => None,
+    });
+    let mut answer = answer.unwrap();
+    answer.nodes = NodeChoice::Nodes(vec![1]);
+    let error = Reply::Answer(answer).encode_into(1, &Limits::default(), &mut out);
+    assert!(matches!(error, Err(EncodeError::CountMismatch { count: 1, expected: 3, .. })));
+    assert!(out.is_empty(), "nothing is appended");
+}
