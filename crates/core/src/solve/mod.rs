@@ -4,6 +4,7 @@ mod direct;
 mod gauss_jordan;
 mod k11;
 mod method;
+mod mobility;
 mod ordering;
 mod partition;
 mod sparse;
@@ -12,5 +13,6 @@ mod tiles;
 
 pub use direct::{Factored, Loads, Solution, SolveError};
 pub use method::{Method, UnknownMethod};
+pub use mobility::{FreeMotion, Motion, find_free_motion};
 pub use partition::{KnownDisplacements, KnownError, Partition, PartitionError};
 pub use stage::Stage;

@@ -1,0 +1,325 @@
+//! Motions that cost no energy and that the known displacements do not hold back.
+//!
+//! `K11` is positive definite exactly when no such motion is left. An element stores no energy
+//! only when it moves rigidly, and elements that share a face must then share the motion, so the
+//! candidates are: one rigid motion for each face-connected piece, equal where pieces share nodes
+//! (a shared edge is a hinge, a shared node a ball joint). That is a small linear system, decided
+//! here before anything is factored.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
+
+use crate::mesh::{Bodies, TetMesh};
+
+/// A body that can still move without deforming.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeMotion {
+    /// Body, from 0 in the order of the file's elements.
+    pub body: usize,
+    /// Lowest node of the body.
+    pub first_node: usize,
+    /// Number of nodes of the body.
+    pub node_count: usize,
+    /// Known degrees of freedom on the body.
+    pub known_dofs: usize,
+    /// The motion left free.
+    pub motion: Motion,
+    /// The motion moves a part of the body about a hinge and leaves the rest where it is.
+    pub hinged: bool,
+}
+
+/// A rigid motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// Along a unit direction.
+    Translation {
+        /// Unit direction.
+        direction: Vector3<f64>,
+    },
+    /// About an axis.
+    Rotation {
+        /// A point of the axis, in mesh units.
+        point: Point3<f64>,
+        /// Unit direction of the axis.
+        axis: Vector3<f64>,
+    },
+}
+
+impl fmt::Display for FreeMotion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { body, first_node, node_count, known_dofs, motion, hinged } = self;
+        let part = if *hinged { "a part of body" } else { "body" };
+        write!(f, "{part} {body} ({node_count} nodes, the first is node {first_node}; ")?;
+        write!(f, "{known_dofs} known degrees of freedom) can still ")?;
+        match motion {
+            Motion::Translation { direction: d } => {
+                write!(f, "move along ({:.3}, {:.3}, {:.3})", d.x, d.y, d.z)?;
+            }
+            Motion::Rotation { point: p, axis: a } => {
+                write!(f, "turn about the axis through ({:.4e}, {:.4e}, {:.4e}) ", p.x, p.y, p.z)?;
+                write!(f, "along ({:.3}, {:.3}, {:.3})", a.x, a.y, a.z)?;
+            }
+        }
+        f.write_str("; prescribe all three axes of at least three nodes of it that are not in line")
+    }
+}
+
+/// Relative singular value below which a motion counts as free. Above it the support may be weak,
+/// which shows in the condition of the answer, but it is there.
+const FREE_BELOW: f64 = 1e-10;
+
+/// Hinged bodies with more parts than this are left to the pivots of the factor.
+const PARTS_MAX: usize = 100;
+
+/// First body that can move without deforming, if any.
+///
+/// Shapes: `known` ascending degrees of freedom. Units: those of the mesh.
+///
+/// Source: thesis (3.43) presumes that `K11⁻¹` exists; this is the condition.
+pub fn find_free_motion(mesh: &TetMesh, bodies: &Bodies, known: &[u32]) -> Option<FreeMotion> {
+    let parts = rigid_parts(mesh, bodies);
+    (0..bodies.count()).find_map(|body| {
+        let nodes: Vec<u32> = (0..mesh.node_count() as u32)
+            .filter(|&n| bodies.of_node[n as usize] == Some(body as u32))
+            .collect();
+        let held: Vec<u32> = known
+            .iter()
+            .copied()
+            .filter(|&d| bodies.of_node.get(d as usize / 3) == Some(&Some(body as u32)))
+            .collect();
+        let (motion, hinged) = free_motion_of_body(mesh, &parts, &nodes, &held)?;
+        Some(FreeMotion {
+            body,
+            first_node: nodes.first().map_or(0, |&n| n as usize),
+            node_count: nodes.len(),
+            known_dofs: held.len(),
+            motion,
+            hinged,
+        })
+    })
+}
+
+/// For every node the rigid parts that meet there, ascending.
+struct Parts {
+    of_node: Vec<Vec<u32>>,
+}
+
+/// Face-connected pieces, joined further where two share three nodes that are not in line.
+fn rigid_parts(mesh: &TetMesh, bodies: &Bodies) -> Parts {
+    let mut of_node: Vec<Vec<u32>> = vec![Vec::new(); mesh.node_count()];
+    for (tet, &piece) in mesh.tets().iter().zip(&bodies.piece_of_tet) {
+        for &n in tet {
+            let list = &mut of_node[n as usize];
+            if let Err(at) = list.binary_search(&piece) {
+                list.insert(at, piece);
+            }
+        }
+    }
+    loop {
+        let mut shared: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+        for (node, list) in of_node.iter().enumerate() {
+            for (i, &a) in list.iter().enumerate() {
+                for &b in &list[i + 1..] {
+                    shared.entry((a, b)).or_default().push(node as u32);
+                }
+            }
+        }
+        let joined = shared.into_iter().find(|(_, nodes)| spans_a_plane(mesh, nodes));
+        let Some(((kept, gone), _)) = joined else { return Parts { of_node } };
+        for list in &mut of_node {
+            if let Ok(at) = list.binary_search(&gone) {
+                list.remove(at);
+                if let Err(at) = list.binary_search(&kept) {
+                    list.insert(at, kept);
+                }
+            }
+        }
+    }
+}
+
+/// Whether three of the nodes are not in line.
+fn spans_a_plane(mesh: &TetMesh, nodes: &[u32]) -> bool {
+    let Some((&first, rest)) = nodes.split_first() else { return false };
+    let p0 = mesh.vertices()[first as usize];
+    let arms: Vec<Vector3<f64>> = rest.iter().map(|&n| mesh.vertices()[n as usize] - p0).collect();
+    let Some(longest) = arms.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm())) else {
+        return false;
+    };
+    arms.iter().any(|a| longest.cross(a).norm() > FREE_BELOW * longest.norm_squared())
+}
+
+/// Null vector of the constraints on the rigid motions of a body's parts.
+fn free_motion_of_body(
+    mesh: &TetMesh,
+    parts: &Parts,
+    nodes: &[u32],
+    held: &[u32],
+) -> Option<(Motion, bool)> {
+    let mut names: Vec<u32> =
+        nodes.iter().flat_map(|&n| parts.of_node[n as usize].iter().copied()).collect();
+    names.sort_unstable();
+    names.dedup();
+    if names.len() > PARTS_MAX {
+        return None;
+    }
+    let centre = Point3::from(
+        nodes.iter().map(|&n| mesh.vertices()[n as usize].coords).sum::<Vector3<f64>>()
+            / nodes.len() as f64,
+    );
+    let size = nodes
+        .iter()
+        .map(|&n| (mesh.vertices()[n as usize] - centre).norm())
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let column_of = |part: u32| 6 * names.partition_point(|&p| p < part);
+    // Motion of a point: t + ω × r, with r in units of the body's size.
+    let arm = |node: u32| (mesh.vertices()[node as usize] - centre) / size;
+    let mut rows: Vec<DVector<f64>> = Vec::new();
+    let mut add_row = |node: u32, axis: usize, plus: u32, minus: Option<u32>| {
+        let mut row = DVector::zeros(6 * names.len());
+        for (part, sign) in [(Some(plus), 1.0), (minus, -1.0)] {
+            if let Some(part) = part {
+                let c = column_of(part);
+                row[c + axis] += sign;
+                let r = arm(node);
+                // (ω × r)_axis = ω_{axis+1} r_{axis+2} − ω_{axis+2} r_{axis+1}.
+                let (next, after) = ((axis + 1) % 3, (axis + 2) % 3);
+                row[c + 3 + next] += sign * r[after];
+                row[c + 3 + after] -= sign * r[next];
+            }
+        }
+        rows.push(row);
+    };
+    for &dof in held {
+        let node = dof / 3;
+        add_row(node, dof as usize % 3, parts.of_node[node as usize][0], None);
+    }
+    for &node in nodes {
+        if let Some((&first, others)) = parts.of_node[node as usize].split_first() {
+            for &other in others {
+                (0..3).for_each(|axis| add_row(node, axis, first, Some(other)));
+            }
+        }
+    }
+    let null = null_vector(&rows, 6 * names.len())?;
+    let moving: Vec<f64> =
+        null.as_slice().chunks(6).map(|m| m.iter().map(|x| x * x).sum()).collect();
+    let part = (0..moving.len()).max_by(|&a, &b| moving[a].total_cmp(&moving[b]))?;
+    let hinged = moving.iter().any(|&m| m < 1e-12 * moving[part]);
+    Some((motion_from(&null.as_slice()[6 * part..6 * part + 6], centre, size), hinged))
+}
+
+/// Unit vector that all rows annihilate to [`FREE_BELOW`], if there is one.
+fn null_vector(rows: &[DVector<f64>], columns: usize) -> Option<DVector<f64>> {
+    // QR first: thousands of known nodes shrink to a square without squaring the condition.
+    let mut a = DMatrix::zeros(rows.len().max(columns), columns);
+    for (i, row) in rows.iter().enumerate() {
+        a.row_mut(i).copy_from(&row.transpose());
+    }
+    let r = a.qr().r();
+    let svd = r.svd(false, true);
+    let v_t = svd.v_t?;
+    let (at, smallest) = svd.singular_values.argmin();
+    let largest = svd.singular_values.max();
+    (smallest <= FREE_BELOW * largest).then(|| v_t.row(at).transpose())
+}
+
+/// Reads translation and rotation out of `(t, ω)` about `centre`.
+fn motion_from(t_and_omega: &[f64], centre: Point3<f64>, size: f64) -> Motion {
+    let t = Vector3::from_column_slice(&t_and_omega[..3]);
+    let omega = Vector3::from_column_slice(&t_and_omega[3..]);
+    if omega.norm() <= 1e-6 * t.norm() {
+        return Motion::Translation { direction: tidy(t.normalize()) };
+    }
+    // ω here is per unit of r, i.e. times `size`; points of the axis have no motion across it.
+    let offset = omega.cross(&t) / omega.norm_squared() * size;
+    Motion::Rotation { point: centre + offset, axis: tidy(omega.normalize()) }
+}
+
+/// Clears rounding dust and makes the first sizeable component positive, so that messages do not
+/// print `-0.000` and do not depend on the sign the decomposition happened to choose.
+fn tidy(v: Vector3<f64>) -> Vector3<f64> {
+    let sign = v.iter().find(|c| c.abs() > 1e-6).map_or(1.0, |c| c.signum());
+    v.map(|c| if c.abs() < 1e-9 { 0.0 } else { c * sign })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(vertices: &[[f64; 3]], tets: &[[u32; 4]]) -> TetMesh {
+        let vertices = vertices.iter().map(|&v| Point3::from(v)).collect();
+        TetMesh::try_new(vertices, tets.to_vec(), vec![]).unwrap()
+    }
+
+    fn unit_tet() -> TetMesh {
+        mesh(&[[1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [0.; 3]], &[[0, 1, 2, 3]])
+    }
+
+    fn all_axes(nodes: &[u32]) -> Vec<u32> {
+        nodes.iter().flat_map(|n| 3 * n..3 * n + 3).collect()
+    }
+
+    fn free(mesh: &TetMesh, known: &[u32]) -> Option<FreeMotion> {
+        find_free_motion(mesh, &Bodies::from_mesh(mesh), known)
+    }
+
+    #[test]
+    fn three_nodes_not_in_line_hold_a_body() {
+        assert_eq!(free(&unit_tet(), &all_axes(&[0, 1, 3])), None);
+        // Statically determinate 3 + 2 + 1 as well.
+        assert_eq!(free(&unit_tet(), &[1, 2, 5, 9, 10, 11]), None);
+    }
+
+    #[test]
+    fn two_nodes_leave_a_rotation_about_their_line() {
+        let found = free(&unit_tet(), &all_axes(&[0, 3])).unwrap();
+        let Motion::Rotation { point, axis } = found.motion else { panic!("{found:?}") };
+        assert!((axis - Vector3::x()).norm() < 1e-9);
+        assert!(point.y.abs() < 1e-9 && point.z.abs() < 1e-9);
+        assert!(found.to_string().contains("turn about the axis through"));
+    }
+
+    #[test]
+    fn nodes_held_along_two_axes_leave_a_translation() {
+        let known = [0, 1, 3, 4, 6, 7, 9, 10];
+        let found = free(&unit_tet(), &known).unwrap();
+        assert!(
+            matches!(found.motion, Motion::Translation { direction } if direction == Vector3::z())
+        );
+    }
+
+    #[test]
+    fn untouched_second_body_is_named() {
+        let shifted = [[3., 0., 0.], [2., 1., 0.], [2., 0., 1.], [2., 0., 0.]];
+        let first = [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [0.; 3]];
+        let both = mesh(&[first, shifted].concat(), &[[0, 1, 2, 3], [4, 5, 6, 7]]);
+        let found = free(&both, &all_axes(&[0, 1, 2])).unwrap();
+        assert_eq!((found.body, found.first_node, found.known_dofs), (1, 4, 0));
+    }
+
+    #[test]
+    fn piece_hinged_at_an_edge_is_found_and_held_by_one_more_node() {
+        // Two tetrahedra that share the edge 0–3 only.
+        let vertices =
+            [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [0.; 3], [0., -1., 0.], [0., 0., -1.]];
+        let hinged = mesh(&vertices, &[[0, 1, 2, 3], [0, 4, 5, 3]]);
+        let found = free(&hinged, &all_axes(&[0, 1, 2])).unwrap();
+        assert!(found.hinged);
+        let Motion::Rotation { axis, .. } = found.motion else { panic!("{found:?}") };
+        assert!((axis - Vector3::x()).norm() < 1e-9);
+        assert_eq!(free(&hinged, &all_axes(&[0, 1, 2, 4])), None);
+    }
+
+    #[test]
+    fn answer_does_not_depend_on_the_unit_of_the_mesh() {
+        for scale in [1e-6, 1.0, 1e6] {
+            let vertices = [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [5.; 3]]
+                .map(|v: [f64; 3]| v.map(|c| c * scale));
+            let tet = mesh(&vertices, &[[0, 2, 1, 3]]);
+            assert_eq!(free(&tet, &all_axes(&[0, 1, 3])), None, "scale {scale}");
+            assert!(free(&tet, &all_axes(&[0, 1])).is_some(), "scale {scale}");
+        }
+    }
+}
