@@ -27,6 +27,11 @@ impl<S> Connection<S> {
         &self.stream
     }
 
+    /// The stream below, to shut it down.
+    pub fn stream_mut(&mut self) -> &mut S {
+        &mut self.stream
+    }
+
     /// Whether a frame has begun to come and has not ended; an idle peer may be waited for longer
     /// than one that stops inside a frame.
     pub fn is_inside_frame(&self) -> bool {

@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn every_single_bit_flip_is_an_error_or_never_a_frame() {
+    fn every_single_bit_flip_is_an_error_that_stays() {
         let bytes = frame(8, 3, &[0x5a; 24]);
         for bit in 0..bytes.len() * 8 {
             let mut damaged = bytes.clone();
