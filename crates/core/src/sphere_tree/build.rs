@@ -37,9 +37,10 @@ impl SphereTree {
         let vertices: Vec<u32> = keyed.iter().map(|&(_, node)| node).collect();
         let points: Vec<Point3<f64>> = vertices.iter().map(|&n| positions[n as usize]).collect();
         let nodes = subdivide(&cube, &codes, &points);
-        let leaf_rest = leaf_rest(&nodes, &points);
+        let leaves = leaves(&nodes, &points);
+        let inner = (0..).zip(&nodes).filter(|(_, n)| !n.is_leaf()).map(|(i, _)| i).collect();
         let cost = search_cost(&nodes);
-        Ok(Self { nodes, vertices, points, leaf_rest, cost_built: cost, cost })
+        Ok(Self { nodes, vertices, points, leaves, inner, cost_built: cost, cost })
     }
 }
 
@@ -149,17 +150,17 @@ fn push_cell(
     levels.push(level);
 }
 
-fn leaf_rest(nodes: &[TreeNode], points: &[Point3<f64>]) -> Vec<LeafRest> {
-    let unset = LeafRest { centre_from_vertex: Vector3::zeros(), radius: 0.0 };
-    let mut rest = vec![unset; points.len()];
-    for node in nodes.iter().filter(|n| n.is_leaf()) {
-        let slot = node.first_slot as usize;
-        rest[slot] = LeafRest {
-            centre_from_vertex: node.sphere.centre - points[slot],
-            radius: node.sphere.radius,
-        };
-    }
-    rest
+fn leaves(nodes: &[TreeNode], points: &[Point3<f64>]) -> Vec<LeafRest> {
+    let leaves = (0..).zip(nodes).filter(|(_, node)| node.is_leaf());
+    leaves
+        .map(|(node, &TreeNode { sphere, first_slot, slots, .. })| LeafRest {
+            node,
+            first_slot,
+            slots,
+            centre_from_vertex: sphere.centre - points[first_slot as usize],
+            radius: sphere.radius,
+        })
+        .collect()
 }
 
 /// Which of the eight children of a cell at `level` holds `code`.

@@ -54,8 +54,9 @@ pub fn tip_hits(
     let mut nearest: [Option<Candidate>; TIP_HITS_MAX] = [None; TIP_HITS_MAX];
     let _ = tree.visit(
         |sphere| sphere_meets_sphere(tip, sphere),
+        |_| false,
         |leaf| {
-            let (nodes, points) = tree.leaf(leaf);
+            let (nodes, points) = tree.run(leaf);
             for (&node, point) in nodes.iter().zip(points) {
                 let d = contact_point - point;
                 if let Some(normal) = normals.get(node as usize).filter(|n| n.norm_squared() > 0.0)
@@ -97,8 +98,9 @@ impl SphereTree {
         let grown = |s: &Sphere| Sphere { centre: s.centre, radius: s.radius + margin };
         let _ = self.visit(
             |sphere| meets(&grown(sphere)),
+            |_| false,
             |leaf| {
-                for &centre in self.leaf(leaf).1 {
+                for &centre in self.run(leaf).1 {
                     if meets(&Sphere { centre, radius: 0.0 }) {
                         closest = Closeness::Colliding;
                         return ControlFlow::Break(());

@@ -37,7 +37,7 @@ pub(super) fn search(tree: &SphereTree, probe: &Probe) -> Option<Vec<u32>> {
             return None;
         }
         if gap < 0.0 {
-            found.extend_from_slice(tree.leaf(node).0);
+            found.extend_from_slice(tree.run(node).0);
         }
     }
     found.sort_unstable();

@@ -39,6 +39,25 @@ pub fn sphere_meets_sphere(a: &Sphere, b: &Sphere) -> bool {
     (a.centre - b.centre).norm_squared() <= reach * reach
 }
 
+/// Whether a solid finite cylinder holds the whole sphere.
+#[inline]
+pub(super) fn cylinder_covers_sphere(cylinder: &Cylinder, sphere: &Sphere) -> bool {
+    let centre = sphere.centre - cylinder.base;
+    let s_z = centre.dot(&cylinder.axis);
+    let room = cylinder.radius - sphere.radius;
+    let d_min_squared = (centre - cylinder.axis.into_inner() * s_z).norm_squared();
+    (s_z - cylinder.length).max(-s_z) <= -sphere.radius
+        && room >= 0.0
+        && d_min_squared <= room * room
+}
+
+/// Whether `outer` holds the whole of `inner`.
+#[inline]
+pub(super) fn sphere_covers_sphere(outer: &Sphere, inner: &Sphere) -> bool {
+    let room = outer.radius - inner.radius;
+    room >= 0.0 && (outer.centre - inner.centre).norm_squared() <= room * room
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::{Point3, Unit, Vector3};
@@ -106,6 +125,7 @@ mod tests {
             let gap = naive_distance(&cylinder, &sphere.centre) - sphere.radius;
             prop_assume!(gap.abs() > 1e-9);
             prop_assert_eq!(cylinder_meets_sphere(&cylinder, &sphere), gap < 0.0);
+            prop_assert!(gap < 0.0 || !cylinder_covers_sphere(&cylinder, &sphere));
         }
     }
 }

@@ -23,18 +23,24 @@ impl SphereTree {
         for (point, &node) in self.points.iter_mut().zip(&self.vertices) {
             *point = positions[node as usize];
         }
+        for leaf in &self.leaves {
+            let first = leaf.first_slot as usize;
+            let centre = self.points[first] + leaf.centre_from_vertex;
+            let mut radius = leaf.radius;
+            if leaf.slots > 1 {
+                for point in &self.points[first..first + leaf.slots as usize] {
+                    radius = greater(radius, (point - centre).norm());
+                }
+            }
+            let radius = rounded_up(radius, &centre);
+            self.nodes[leaf.node as usize].sphere = Sphere { centre, radius };
+        }
         let mut cost = 0.0;
         // Children lie behind their parents, so backwards is bottom-up.
-        for index in (0..self.nodes.len()).rev() {
-            let node = self.nodes[index];
-            let sphere = if node.is_leaf() {
-                self.leaf_sphere(&node)
-            } else {
-                let sphere = enclosing(&self.nodes[node.child_range()]);
-                cost += sphere.radius * sphere.radius;
-                sphere
-            };
-            self.nodes[index].sphere = sphere;
+        for &inner in self.inner.iter().rev() {
+            let sphere = enclosing(&self.nodes[self.nodes[inner as usize].child_range()]);
+            cost += sphere.radius * sphere.radius;
+            self.nodes[inner as usize].sphere = sphere;
         }
         self.cost = relative_cost(cost, self.bounding_sphere().radius);
         Ok(())
@@ -53,37 +59,35 @@ impl SphereTree {
     pub fn needs_rebuild(&self) -> bool {
         self.quality() > QUALITY_MAX
     }
-
-    fn leaf_sphere(&self, node: &TreeNode) -> Sphere {
-        let first = node.first_slot as usize;
-        let rest = &self.leaf_rest[first];
-        let centre = self.points[first] + rest.centre_from_vertex;
-        let mut radius = rest.radius;
-        if node.slots > 1 {
-            for point in &self.points[node.slot_range()] {
-                radius = radius.max((point - centre).norm());
-            }
-        }
-        Sphere { centre, radius: rounded_up(radius, &centre) }
-    }
 }
 
 /// Sphere around spheres: centre of the box around them, radius to the farthest.
 fn enclosing(children: &[TreeNode]) -> Sphere {
-    let mut low = Vector3::repeat(f64::INFINITY);
-    let mut high = Vector3::repeat(f64::NEG_INFINITY);
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
     for Sphere { centre, radius } in children.iter().map(|c| &c.sphere) {
         for axis in 0..3 {
-            low[axis] = low[axis].min(centre[axis] - radius);
-            high[axis] = high[axis].max(centre[axis] + radius);
+            low[axis] = lesser(low[axis], centre[axis] - radius);
+            high[axis] = greater(high[axis], centre[axis] + radius);
         }
     }
-    let centre = Point3::from((low + high) / 2.0);
-    let mut radius = 0.0_f64;
+    let centre = Point3::from((Vector3::from(low) + Vector3::from(high)) / 2.0);
+    let mut radius = 0.0;
     for child in children {
-        radius = radius.max((child.sphere.centre - centre).norm() + child.sphere.radius);
+        let reach = (child.sphere.centre - centre).norm() + child.sphere.radius;
+        radius = greater(radius, reach);
     }
     Sphere { centre, radius: rounded_up(radius, &centre) }
+}
+
+/// `f64::min` without its care for NaN, which costs a sixth of a refit; the input is checked.
+fn lesser(a: f64, b: f64) -> f64 {
+    if b < a { b } else { a }
+}
+
+/// `f64::max` without its care for NaN.
+fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 /// Search cost measure of a tree: squared radii of the inner nodes over the root's.

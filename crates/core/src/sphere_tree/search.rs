@@ -4,24 +4,34 @@ use std::ops::ControlFlow;
 
 use nalgebra::Point3;
 
-use super::overlap::{cylinder_meets_sphere, sphere_meets_sphere};
+use super::overlap::{
+    cylinder_covers_sphere, cylinder_meets_sphere, sphere_covers_sphere, sphere_meets_sphere,
+};
 use super::tree::{SphereTree, TreeNode};
 use crate::shape::{Cylinder, Sphere};
 
 impl SphereTree {
     /// Appends the vertices the thesis calls "near" a finger segment: those whose leaf sphere meets it.
     ///
-    /// Frame: that of the tree. Order: depth first, the same for the same tree and query.
+    /// Frame: that of the tree. Order: fixed by tree and query, without meaning.
     /// `out` is the caller's buffer and is not cleared; nothing else is allocated.
     ///
     /// Source: thesis 4.4.3.
     pub fn search_cylinder(&self, cylinder: &Cylinder, out: &mut Vec<u32>) {
-        self.collect(|sphere| cylinder_meets_sphere(cylinder, sphere), out);
+        self.collect(
+            |sphere| cylinder_meets_sphere(cylinder, sphere),
+            |sphere| cylinder_covers_sphere(cylinder, sphere),
+            out,
+        );
     }
 
     /// As [`SphereTree::search_cylinder`], for a fingertip.
     pub fn search_sphere(&self, tip: &Sphere, out: &mut Vec<u32>) {
-        self.collect(|sphere| sphere_meets_sphere(tip, sphere), out);
+        self.collect(
+            |sphere| sphere_meets_sphere(tip, sphere),
+            |sphere| sphere_covers_sphere(tip, sphere),
+            out,
+        );
     }
 
     /// Appends the vertices within `radius` of `point`: exact distances, for prefetching columns.
@@ -29,8 +39,9 @@ impl SphereTree {
         let ball = Sphere { centre: *point, radius };
         let _ = self.visit(
             |sphere| sphere_meets_sphere(&ball, sphere),
+            |_| false,
             |leaf| {
-                let (nodes, points) = self.leaf(leaf);
+                let (nodes, points) = self.run(leaf);
                 let near = points.iter().map(|p| (p - point).norm_squared() <= radius * radius);
                 out.extend(nodes.iter().zip(near).filter(|(_, near)| *near).map(|(&n, _)| n));
                 ControlFlow::Continue(())
@@ -38,34 +49,52 @@ impl SphereTree {
         );
     }
 
-    fn collect(&self, meets: impl Fn(&Sphere) -> bool, out: &mut Vec<u32>) {
-        let _ = self.visit(meets, |leaf| {
-            out.extend_from_slice(self.leaf(leaf).0);
+    fn collect(
+        &self,
+        meets: impl Fn(&Sphere) -> bool,
+        covers: impl Fn(&Sphere) -> bool,
+        out: &mut Vec<u32>,
+    ) {
+        let _ = self.visit(meets, covers, |found| {
+            match self.run(found).0 {
+                // Nearly always; spares the call that copies a slice.
+                [vertex] => out.push(*vertex),
+                several => out.extend_from_slice(several),
+            }
             ControlFlow::Continue(())
         });
     }
 
-    /// Calls `leaf` for each leaf whose sphere `meets` the query, until it breaks.
+    /// Calls `found` for each leaf whose sphere `meets` the query, until it breaks.
+    ///
+    /// A subtree whose sphere the query `covers` is reported once, as a whole: each sphere below
+    /// lies inside and would meet the query too.
     pub(super) fn visit(
         &self,
         meets: impl Fn(&Sphere) -> bool,
-        mut leaf: impl FnMut(&TreeNode) -> ControlFlow<()>,
+        covers: impl Fn(&Sphere) -> bool,
+        mut found: impl FnMut(&TreeNode) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        if !meets(&self.nodes[0].sphere) {
+        let root = &self.nodes[0];
+        if !meets(&root.sphere) {
             return ControlFlow::Continue(());
+        }
+        if root.is_leaf() {
+            return found(root);
         }
         let mut stack = [0_u32; STACK_LEN];
         let mut height = 1;
         while height > 0 {
             height -= 1;
             let node = &self.nodes[stack[height] as usize];
-            if node.is_leaf() {
-                leaf(node)?;
-                continue;
-            }
-            for (child, offset) in self.nodes[node.child_range()].iter().zip(0..) {
-                if meets(&child.sphere) {
-                    stack[height] = node.first_child + offset;
+            for (child, index) in self.nodes[node.child_range()].iter().zip(node.first_child..) {
+                if !meets(&child.sphere) {
+                    continue;
+                }
+                if child.is_leaf() || covers(&child.sphere) {
+                    found(child)?;
+                } else {
+                    stack[height] = index;
                     height += 1;
                 }
             }
@@ -74,5 +103,5 @@ impl SphereTree {
     }
 }
 
-/// At most seven siblings wait on each of 21 levels below the root, and eight on the last.
-const STACK_LEN: usize = 7 * 21 + 8;
+/// Inner nodes have at most 21 levels; on each, at most seven siblings wait, on the last eight.
+const STACK_LEN: usize = 7 * 21 + 1;

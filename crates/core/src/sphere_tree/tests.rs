@@ -85,7 +85,7 @@ fn assert_valid(tree: &SphereTree, points: &[Point3<f64>]) {
             assert!(gap <= 0.0, "vertex {vertex} is {gap:e} outside {node:?}");
         }
         if node.is_leaf() {
-            tree.leaf(node).0.iter().for_each(|&v| owners[v as usize] += 1);
+            tree.run(node).0.iter().for_each(|&v| owners[v as usize] += 1);
             continue;
         }
         assert!((2..=8).contains(&node.children), "{node:?}");

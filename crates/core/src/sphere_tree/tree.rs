@@ -26,8 +26,10 @@ pub struct SphereTree {
     pub(super) vertices: Vec<u32>,
     /// Position of the vertex in each slot, as of the last build or refit.
     pub(super) points: Vec<Point3<f64>>,
-    /// How to carry a leaf's sphere along, at the first slot of each leaf.
-    pub(super) leaf_rest: Vec<LeafRest>,
+    /// The leaves, with what it takes to carry their spheres along.
+    pub(super) leaves: Vec<LeafRest>,
+    /// The nodes that have children, ascending.
+    pub(super) inner: Vec<u32>,
     /// Search cost measure right after the build and now (see `SphereTree::quality`).
     pub(super) cost_built: f64,
     pub(super) cost: f64,
@@ -47,6 +49,9 @@ pub(super) struct TreeNode {
 /// A leaf's sphere relative to its first vertex, fixed when the tree is built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LeafRest {
+    pub(super) node: u32,
+    pub(super) first_slot: u32,
+    pub(super) slots: u32,
     pub(super) centre_from_vertex: Vector3<f64>,
     pub(super) radius: f64,
 }
@@ -102,8 +107,8 @@ impl SphereTree {
         &self.vertices
     }
 
-    /// The vertices of one leaf and where they are.
-    pub(super) fn leaf(&self, node: &TreeNode) -> (&[u32], &[Point3<f64>]) {
+    /// The vertices below a node and where they are.
+    pub(super) fn run(&self, node: &TreeNode) -> (&[u32], &[Point3<f64>]) {
         let slots = node.slot_range();
         (&self.vertices[slots.clone()], &self.points[slots])
     }
