@@ -301,6 +301,24 @@ fn far_away_tiny_and_huge_objects_keep_their_vertices_enclosed() {
     }
 }
 
+#[test]
+fn the_deepest_tree_with_all_branches_fits_the_search_stack() {
+    // Each cell at the low corner splits into itself and seven siblings of two vertices each.
+    let mut points = vec![Point3::origin(), Point3::from([1.0; 3])];
+    for level in 1..=21 {
+        let edge = 0.5_f64.powi(level);
+        for octant in 1..8_u8 {
+            let low = Vector3::new(octant >> 2, octant >> 1 & 1, octant & 1).map(f64::from) * edge;
+            points.extend([0.3, 0.7].map(|c| Point3::from(low + Vector3::repeat(c * edge))));
+        }
+    }
+    let tree = tree_over(&points);
+    assert_valid(&tree, &points);
+    let mut found = Vec::new();
+    tree.nodes_near(&Point3::origin(), 2.0, &mut found);
+    assert_eq!(found.len(), points.len());
+}
+
 /// Vertices of the TetGen armadillo among the shared data, scaled to a hand's size.
 fn armadillo() -> Option<Vec<Point3<f64>>> {
     let shared =
