@@ -1,1 +1,19 @@
 //! Grasp rules (thesis 4.5–4.6) as a pure state machine.
+
+mod event;
+mod finger;
+mod rules;
+#[cfg(test)]
+mod scene_tests;
+mod sense;
+mod state;
+mod step;
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use event::{Command, GraspEvent, KnownNode, StepInput, StepOutput};
+pub use finger::Finger;
+pub use sense::{FingerColliders, FingerInput, sense};
+pub use state::{Contact, Grasp, GraspError, GraspState, HandSegments, Hold, StateName};
+pub use table::transition_table;

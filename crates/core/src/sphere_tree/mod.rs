@@ -1,1 +1,16 @@
 //! Octree of spheres over the surface vertices (thesis 4.2–4.4).
+
+mod build;
+mod contact;
+#[cfg(test)]
+mod naive;
+mod overlap;
+mod refit;
+mod search;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+pub use contact::{Closeness, ContactHit, TIP_HITS_MAX, tip_hits, vertex_normals};
+pub use overlap::{cylinder_meets_sphere, sphere_meets_sphere};
+pub use tree::{SphereTree, TreeError};
