@@ -8,6 +8,7 @@ pub mod grasp;
 pub mod hand;
 pub mod mesh;
 pub mod mesh_io;
+pub mod model;
 pub mod shape;
 pub mod solve;
 pub mod sphere_tree;

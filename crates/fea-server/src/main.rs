@@ -1,3 +1,142 @@
-//! The `fea-server` program.
+//! The `fea-server` program: arguments, log, signals.
 
-fn main() {}
+use std::io::Write;
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::{Parser, ValueEnum};
+use fea_server::ServerConfig;
+use tokio::sync::watch;
+
+/// Finite element server of Softgrasp: solves deformations over TCP, once per frame.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// Address to listen on, HOST:PORT; port 0 picks a free one.
+    #[arg(long, default_value = "127.0.0.1:7878", value_name = "ADDR")]
+    listen: String,
+    /// Threads that solve, exactly as many [default: one per processor].
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Largest number of nodes of a mesh.
+    #[arg(long, value_name = "N", default_value_t = ServerConfig::default().max_nodes)]
+    max_nodes: u32,
+    /// Sessions at the same time.
+    #[arg(long, value_name = "N", default_value_t = ServerConfig::default().max_sessions)]
+    max_sessions: usize,
+    /// Bytes for kept models and factors, and for one request's dense matrix.
+    #[arg(long, value_name = "BYTES", default_value_t = ServerConfig::default().memory_limit)]
+    memory_limit: u64,
+    /// File whose first line is the token a client must show.
+    #[arg(long, value_name = "F")]
+    token_file: Option<PathBuf>,
+    /// Form of the log on standard error; RUST_LOG sets how much.
+    #[arg(long, value_enum, default_value_t = LogForm::Text)]
+    log: LogForm,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LogForm {
+    Text,
+    Json,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    start_log(arguments.log);
+    match run(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("fea-server: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn start_log(form: LogForm) {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    match form {
+        LogForm::Text => log.init(),
+        LogForm::Json => log.json().init(),
+    }
+}
+
+fn run(arguments: Arguments) -> anyhow::Result<()> {
+    let config = config(&arguments)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .thread_name("sockets")
+        .enable_all()
+        .build()
+        .context("cannot start the server's sockets")?;
+    runtime.block_on(async {
+        let (stop, stopped) = watch::channel(false);
+        tokio::spawn(async move {
+            wait_for_signal().await;
+            let _ = stop.send(true);
+        });
+        fea_server::serve(config, announce, stopped).await
+    })?;
+    tracing::info!("stopped");
+    Ok(())
+}
+
+fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
+    let usual = ServerConfig::default();
+    let token = match &arguments.token_file {
+        None => None,
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("cannot read the token file {}", path.display()))?;
+            let first = text.lines().next().unwrap_or("").trim().to_owned();
+            anyhow::ensure!(!first.is_empty(), "the token file {} is empty", path.display());
+            Some(first)
+        }
+    };
+    Ok(ServerConfig {
+        listen: address(&arguments.listen)?,
+        threads: arguments.threads.unwrap_or(usual.threads),
+        max_nodes: arguments.max_nodes,
+        max_sessions: arguments.max_sessions,
+        memory_limit: arguments.memory_limit,
+        token,
+    })
+}
+
+fn address(text: &str) -> anyhow::Result<SocketAddr> {
+    let mut found = text.to_socket_addrs().with_context(|| {
+        format!("--listen {text} is no address; write HOST:PORT, for example 127.0.0.1:7878")
+    })?;
+    found.next().with_context(|| format!("--listen {text} names no address"))
+}
+
+/// The contract's first line on standard output.
+fn announce(address: SocketAddr) {
+    let mut out = std::io::stdout();
+    // A closed standard output is no reason not to serve.
+    let _ = writeln!(out, "listening on {address}").and_then(|()| out.flush());
+    tracing::info!(%address, "ready");
+}
+
+/// Ctrl-C, or the signal that `docker stop` sends.
+async fn wait_for_signal() {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        if let Ok(mut terminate) = signal(SignalKind::terminate()) {
+            tokio::select! {
+                _ = tokio::signal::ctrl_c() => {}
+                _ = terminate.recv() => {}
+            }
+            return;
+        }
+    }
+    if tokio::signal::ctrl_c().await.is_err() {
+        // No signals here: serve until the process is ended from outside.
+        std::future::pending::<()>().await;
+    }
+}

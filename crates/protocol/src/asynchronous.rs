@@ -37,6 +37,11 @@ impl<S> Connection<S> {
     pub fn is_inside_frame(&self) -> bool {
         self.buffer.received() > 0
     }
+
+    /// Bytes of an unfinished frame that have come; tells a slow peer from one that has stopped.
+    pub fn received(&self) -> usize {
+        self.buffer.received()
+    }
 }
 
 impl<S: AsyncRead + Unpin> Connection<S> {

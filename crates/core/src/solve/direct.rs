@@ -24,7 +24,7 @@ enum Kernel {
     /// Dense Cholesky factor in tiles.
     TiledFactor(Tiles),
     /// Sparse Cholesky factor.
-    Sparse(SparseFactor),
+    Sparse(Box<SparseFactor>),
 }
 
 /// Known displacements and external forces of one answer.
@@ -157,7 +157,7 @@ impl Factored {
                 let k11 = SparseK11::new(stiffness, &partition);
                 let analysis = Analysis::new(k11, order).map_err(|_| out_of_memory())?;
                 on_stage(Stage::Factor);
-                Kernel::Sparse(analysis.factor().map_err(not_positive)?)
+                Kernel::Sparse(Box::new(analysis.factor().map_err(not_positive)?))
             }
         };
         Ok(Self { method, partition, kernel })
@@ -222,8 +222,9 @@ impl Factored {
             }
             let refined_f = stiffness.mul(&refined);
             let refined_residual = self.residual(&refined_f, loads.forces);
-            // Written so that a NaN ends the loop too.
-            if !(norm(&refined_residual) < norm(&residual)) {
+            let (before, after) = (norm(&residual), norm(&refined_residual));
+            // A NaN ends the loop too.
+            if after >= before || after.is_nan() {
                 break;
             }
             (q, f, residual) = (refined, refined_f, refined_residual);

@@ -54,6 +54,7 @@ impl Analysis {
     }
 
     /// Number of stored entries of the factor.
+    #[cfg(test)]
     pub fn fill(&self) -> usize {
         self.symbolic.len_val()
     }

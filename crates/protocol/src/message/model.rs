@@ -62,6 +62,46 @@ pub struct FrameRequest {
     pub question: Question,
 }
 
+impl ModelHash {
+    /// Name of a model: BLAKE3 of everything that decides its answers.
+    ///
+    /// Both sides compute it, so a client can ask for a model by name after a crash, or on another
+    /// server. Any change of what a model means must change its first section.
+    pub fn of(upload: &UploadModel) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        let mut section = |name: &str, count: usize, bytes: &[u8]| {
+            hasher.update(name.as_bytes());
+            hasher.update(&(count as u64).to_le_bytes());
+            hasher.update(bytes);
+        };
+        section(MODEL_FORMAT, 0, upload.element.as_str().as_bytes());
+        let vertices: Vec<u8> =
+            upload.mesh.vertices.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        section("vertices", upload.mesh.vertices.len(), &vertices);
+        let tets: Vec<u8> =
+            upload.mesh.tets.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
+        section("tets", upload.mesh.tets.len(), &tets);
+        let regions: Vec<u8> = upload.mesh.regions.iter().flat_map(|r| r.to_le_bytes()).collect();
+        section("regions", upload.mesh.regions.len(), &regions);
+        let materials: Vec<u8> = upload
+            .materials
+            .iter()
+            .flat_map(|m| [m.young, m.poisson])
+            .flat_map(f64::to_le_bytes)
+            .collect();
+        section("materials", upload.materials.len(), &materials);
+        let mut fixed = upload.fixed.clone();
+        fixed.sort_unstable();
+        fixed.dedup();
+        let bytes: Vec<u8> = fixed.iter().flat_map(|d| d.to_le_bytes()).collect();
+        section("fixed", fixed.len(), &bytes);
+        Self(*hasher.finalize().as_bytes())
+    }
+}
+
+/// First bytes of every hashed model; changes when the same upload would give other answers.
+const MODEL_FORMAT: &str = "softgrasp model 1";
+
 /// Hint which nodes will be touched or asked about soon.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prefetch {

@@ -63,7 +63,7 @@ fn solve_with(
 /// Three corner nodes and two others, moved.
 fn five_contacts(mesh: &TetMesh) -> Vec<(u32, f64)> {
     let last = mesh.node_count() as u32 - 1;
-    let mut nodes = vec![0, 4, last / 2, last - 7, last];
+    let mut nodes = [0, 4, last / 2, last - 7, last];
     nodes.sort_unstable();
     nodes
         .iter()

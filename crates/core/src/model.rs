@@ -1,0 +1,175 @@
+//! A shape that can be asked: mesh, stiffness, bodies, and the degrees of freedom the scene fixes.
+
+use std::sync::Arc;
+
+use crate::fem::{AssemblyError, Material, Stiffness, StiffnessPattern, assemble};
+use crate::mesh::{Bodies, TetMesh};
+use crate::solve::{
+    Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition, PartitionError,
+    SolveError, Stage, find_free_motion,
+};
+
+/// Everything about a shape that does not depend on which nodes are touched.
+///
+/// Shapes: N nodes, stiffness 3N × 3N. Units: m, Pa, N/m.
+///
+/// Source: thesis chapter 3 up to (3.39).
+pub struct Model {
+    mesh: TetMesh,
+    bodies: Bodies,
+    used: Vec<bool>,
+    stiffness: Stiffness,
+    fixed: Vec<u32>,
+}
+
+/// Why a model cannot be made or asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// Material and regions do not fit.
+    #[error(transparent)]
+    Assembly(#[from] AssemblyError),
+    /// Known displacements contradict each other.
+    #[error(transparent)]
+    Known(#[from] KnownError),
+    /// Known degrees of freedom do not fit the mesh.
+    #[error(transparent)]
+    Partition(#[from] PartitionError),
+    /// A rigid motion is not held back.
+    #[error("{0}")]
+    Free(FreeMotion),
+    /// The method failed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
+
+/// A partition and the known displacements in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known {
+    /// All known degrees of freedom, those fixed by the scene among them, ascending.
+    pub dofs: Vec<u32>,
+    /// `Q_k`, m.
+    pub q_known: Vec<f64>,
+}
+
+impl Model {
+    /// Assembles the stiffness of a mesh.
+    ///
+    /// Shapes: `materials` one, or one per region; `fixed` degrees of freedom held at zero, in any
+    /// order. Units: m, Pa.
+    ///
+    /// # Errors
+    /// [`ModelError`] for regions without material and for fixed nodes that are not there.
+    pub fn try_new(
+        mesh: TetMesh,
+        materials: &[Material],
+        mut fixed: Vec<u32>,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Self, ModelError> {
+        on_stage(Stage::Assemble);
+        fixed.sort_unstable();
+        fixed.dedup();
+        let used = mesh.used_nodes();
+        Partition::try_new(&used, &fixed)?;
+        let pattern = Arc::new(StiffnessPattern::new(&mesh));
+        let stiffness = assemble(&pattern, &mesh, materials)?;
+        let bodies = Bodies::from_mesh(&mesh);
+        Ok(Self { mesh, bodies, used, stiffness, fixed })
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> &TetMesh {
+        &self.mesh
+    }
+
+    /// The stiffness `kᵍ`.
+    pub fn stiffness(&self) -> &Stiffness {
+        &self.stiffness
+    }
+
+    /// Connected bodies and pieces.
+    pub fn bodies(&self) -> &Bodies {
+        &self.bodies
+    }
+
+    /// Degrees of freedom the scene holds at zero, ascending.
+    pub fn fixed(&self) -> &[u32] {
+        &self.fixed
+    }
+
+    /// Degrees of freedom of nodes that elements use.
+    pub fn modelled_dofs(&self) -> usize {
+        3 * self.used.iter().filter(|u| **u).count()
+    }
+
+    /// Bytes held by mesh and stiffness, roughly.
+    pub fn bytes(&self) -> usize {
+        self.mesh.node_count() * 40
+            + self.mesh.tets().len() * (16 + 4 * 24)
+            + self.stiffness.pattern().block_count() * 76
+    }
+
+    /// Joins the known displacements of one question with the fixed degrees of freedom; where both
+    /// name one, the question's value holds.
+    ///
+    /// Units: m.
+    ///
+    /// # Errors
+    /// [`ModelError::Known`] for contradictions and values that are not numbers.
+    pub fn known(&self, pairs: Vec<(u32, f64)>) -> Result<Known, ModelError> {
+        let mut dofs_given: Vec<u32> = pairs.iter().map(|p| p.0).collect();
+        dofs_given.sort_unstable();
+        let mut all = pairs;
+        let fixed_only = self.fixed.iter().filter(|d| dofs_given.binary_search(d).is_err());
+        all.extend(fixed_only.map(|&d| (d, 0.0)));
+        let known = KnownDisplacements::try_new(all)?;
+        Ok(Known { dofs: known.dofs().to_vec(), q_known: known.values().to_vec() })
+    }
+
+    /// Inverts or factors `K11` for a set of known degrees of freedom, after making sure that it
+    /// holds every body.
+    ///
+    /// # Errors
+    /// [`ModelError::Partition`], [`ModelError::Free`] naming the body and its motion,
+    /// [`ModelError::Solve`].
+    ///
+    /// Source: thesis (3.41)–(3.43).
+    pub fn factor(
+        &self,
+        dofs: &[u32],
+        method: Method,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Factored, ModelError> {
+        let partition = Partition::try_new(&self.used, dofs)?;
+        if let Some(free) = find_free_motion(&self.mesh, &self.bodies, dofs) {
+            return Err(ModelError::Free(free));
+        }
+        Ok(Factored::try_new(&self.stiffness, partition, method, on_stage)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{BuiltIn, generate};
+
+    fn cube() -> Model {
+        let mesh = generate(BuiltIn::Cube, 64).unwrap();
+        let material = Material::try_new(1.0e5, 0.3).unwrap();
+        Model::try_new(mesh, &[material], vec![5, 3, 4], &mut |_| {}).unwrap()
+    }
+
+    #[test]
+    fn fixed_dofs_join_the_known_ones_and_yield_to_them() {
+        let known = cube().known(vec![(4, 0.5), (0, 0.25)]).unwrap();
+        assert_eq!(known.dofs, [0, 3, 4, 5]);
+        assert_eq!(known.q_known, [0.25, 0.0, 0.5, 0.0]);
+    }
+
+    #[test]
+    fn body_held_at_two_nodes_is_refused_before_factoring() {
+        let error = cube().factor(&[0, 1, 2, 3, 4, 5], Method::SparseCholesky, &mut |stage| {
+            panic!("{stage:?} was begun");
+        });
+        assert!(matches!(error, Err(ModelError::Free(_))));
+    }
+}

@@ -1,0 +1,58 @@
+//! Stage times of one request, and the memory this process has used at most.
+
+use std::time::Instant;
+
+use softgrasp_core::solve::Stage;
+use softgrasp_protocol::StageMs;
+
+/// Takes the time between the stages that the core announces.
+pub(crate) struct StageClock {
+    stage_ms: StageMs,
+    running: Option<(Stage, Instant)>,
+}
+
+impl StageClock {
+    /// Starts with what was measured before the core was called.
+    pub fn new(decode_ms: f64, queued: Instant) -> Self {
+        let queue = ms_since(queued);
+        Self { stage_ms: StageMs { decode: decode_ms, queue, ..StageMs::default() }, running: None }
+    }
+
+    /// Ends the running stage and begins another.
+    pub fn begin(&mut self, stage: Stage) {
+        self.end();
+        self.running = Some((stage, Instant::now()));
+    }
+
+    /// Ends the running stage.
+    pub fn end(&mut self) {
+        if let Some((stage, start)) = self.running.take() {
+            let ms = ms_since(start);
+            match stage {
+                Stage::Assemble => self.stage_ms.assemble += ms,
+                Stage::Order => self.stage_ms.order += ms,
+                Stage::Factor => self.stage_ms.factor += ms,
+                Stage::Solve => self.stage_ms.solve += ms,
+            }
+        }
+    }
+
+    /// The times so far.
+    pub fn finish(mut self) -> StageMs {
+        self.end();
+        self.stage_ms
+    }
+}
+
+/// Milliseconds since an instant.
+pub(crate) fn ms_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+/// Largest resident set of this process so far, bytes; 0 where the system does not tell.
+pub(crate) fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = kib.and_then(|rest| rest.split_whitespace().next()?.parse::<u64>().ok());
+    kib.unwrap_or(0) * 1024
+}

@@ -1,0 +1,71 @@
+//! From what went wrong to what the client is told.
+
+use softgrasp_core::fem::MaterialError;
+use softgrasp_core::mesh::MeshError;
+use softgrasp_core::model::ModelError;
+use softgrasp_core::solve::{SolveError, UnknownMethod};
+use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
+
+/// Why a request is refused, before it becomes a message.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Refusal {
+    #[error("the request cannot be decoded: {0}")]
+    Decode(#[from] DecodeError),
+    #[error("the mesh cannot be modelled: {0}")]
+    Mesh(#[from] MeshError),
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Method(#[from] UnknownMethod),
+    #[error("no material was given")]
+    NoMaterial,
+    #[error("no model {0} is known here; upload it")]
+    UnknownModel(ModelHash),
+    #[error("{what} names node {node}, but the mesh has {node_count} nodes (0-based)")]
+    NoSuchNode { what: &'static str, node: u32, node_count: usize },
+    #[error("a force at node {node} is {value} N; it must be a finite number")]
+    ForceNotFinite { node: u32, value: f64 },
+    #[error("a force acts on node {node} along an axis whose displacement is known")]
+    ForceOnKnown { node: u32 },
+    #[error(
+        "{method} on {unknown_dofs} unknowns needs {needed} bytes for its matrix, more than the \
+         server's --memory-limit of {limit}; sparse-cholesky needs far less"
+    )]
+    Memory { method: String, unknown_dofs: usize, needed: u64, limit: u64 },
+    #[error("the mesh has {node_count} nodes; this server takes {max} (--max-nodes)")]
+    TooManyNodes { node_count: usize, max: u32 },
+    #[error("this server does not know the element '{0}' yet; use t4")]
+    Element(&'static str),
+    #[error("this server wants a token (--token-file); say Hello with the right one first")]
+    Token,
+    #[error("the server is at fault: the work on this request ended abnormally")]
+    Internal,
+}
+
+impl Refusal {
+    fn code(&self) -> RejectCode {
+        match self {
+            Self::UnknownModel(_) => RejectCode::UnknownModel,
+            Self::Model(ModelError::Free(_)) => RejectCode::RigidMotionFree,
+            Self::Model(ModelError::Solve(error)) => match error {
+                SolveError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
+                SolveError::OutOfMemory { .. } => RejectCode::MemoryLimit,
+                _ => RejectCode::BadRequest,
+            },
+            Self::Method(_) => RejectCode::UnknownMethod,
+            Self::Memory { .. } => RejectCode::MemoryLimit,
+            Self::TooManyNodes { .. } => RejectCode::TooLarge,
+            Self::Token => RejectCode::NotAuthorised,
+            Self::Internal => RejectCode::Internal,
+            Self::Decode(DecodeError::TooMany { .. }) => RejectCode::TooLarge,
+            _ => RejectCode::BadRequest,
+        }
+    }
+
+    /// The message for the client.
+    pub fn to_message(&self) -> Rejected {
+        Rejected { code: self.code(), text: self.to_string(), detail: String::new() }
+    }
+}

@@ -1,0 +1,198 @@
+//! Listening, accepting, stopping.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use softgrasp_protocol::asynchronous::Connection;
+use softgrasp_protocol::{Limits, RejectCode, Rejected, Reply};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{Semaphore, oneshot, watch};
+use tokio::task::JoinSet;
+
+use crate::answer::Desk;
+use crate::compute::Compute;
+use crate::config::{ConfigError, ServerConfig};
+use crate::session::{self, Hall};
+
+/// Why a server did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// Settings make no sense.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The address cannot be listened on.
+    #[error(
+        "cannot listen on {address}: {source}; is another server running there? (--listen HOST:PORT, port 0 picks a free one)"
+    )]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// No threads.
+    #[error("cannot start {threads} solving threads: {source}")]
+    Threads {
+        /// Threads asked for.
+        threads: usize,
+        /// The system's reason.
+        source: rayon::ThreadPoolBuildError,
+    },
+    /// No runtime.
+    #[error("cannot start the server's sockets: {0}")]
+    Runtime(std::io::Error),
+}
+
+/// Sessions that are still at work this long after a stop are cut off.
+const STOP_GRACE: Duration = Duration::from_secs(5);
+/// Pause after a failed accept, so that a process out of file descriptors does not spin.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
+
+/// Listens and serves until `stop` holds true; `on_ready` hears the address listened on.
+///
+/// # Errors
+/// [`StartError`] if it cannot start; once it listens it does not fail.
+pub async fn serve(
+    config: ServerConfig,
+    on_ready: impl FnOnce(SocketAddr),
+    stop: watch::Receiver<bool>,
+) -> Result<(), StartError> {
+    config.check()?;
+    let address = config.listen;
+    let listen_error = |source| StartError::Listen { address, source };
+    let listener = TcpListener::bind(address).await.map_err(listen_error)?;
+    let threads = config.threads;
+    let compute =
+        Compute::new(threads).map_err(|source| StartError::Threads { threads, source })?;
+    on_ready(listener.local_addr().map_err(listen_error)?);
+    let places = Arc::new(Semaphore::new(config.max_sessions));
+    let hall = Hall { desk: Arc::new(Desk::new(config)), compute, stop: stop.clone() };
+    let mut sessions = JoinSet::new();
+    accept_until_stopped(&listener, &hall, &places, stop, &mut sessions).await;
+    drop(listener);
+    tracing::info!(sessions = sessions.len(), "stopping");
+    let all_done = async { while sessions.join_next().await.is_some() {} };
+    if tokio::time::timeout(STOP_GRACE, all_done).await.is_err() {
+        tracing::warn!("sessions still at work are cut off");
+        sessions.abort_all();
+    }
+    Ok(())
+}
+
+async fn accept_until_stopped(
+    listener: &TcpListener,
+    hall: &Hall,
+    places: &Arc<Semaphore>,
+    mut stop: watch::Receiver<bool>,
+    sessions: &mut JoinSet<()>,
+) {
+    loop {
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            () = session::stopped(&mut stop) => return,
+            Some(_) = sessions.join_next(), if !sessions.is_empty() => continue,
+        };
+        match accepted {
+            Ok((stream, peer)) => match Arc::clone(places).try_acquire_owned() {
+                Ok(place) => {
+                    let hall = hall.clone();
+                    sessions.spawn(async move {
+                        session::serve(stream, peer, hall).await;
+                        drop(place);
+                    });
+                }
+                Err(_) => {
+                    tracing::warn!(%peer, "turned away: all sessions are taken");
+                    sessions.spawn(turn_away(stream));
+                }
+            },
+            Err(error) => {
+                tracing::error!(%error, "a connection could not be accepted");
+                tokio::time::sleep(ACCEPT_PAUSE).await;
+            }
+        }
+    }
+}
+
+/// Tells a client that there is no place, and closes.
+async fn turn_away(stream: TcpStream) {
+    let text = "all sessions of this server are taken (--max-sessions); try again later".to_owned();
+    let reply = Reply::Rejected(Rejected { code: RejectCode::Busy, text, detail: String::new() });
+    let mut bytes = Vec::new();
+    if reply.encode_into(0, &Limits::default(), &mut bytes).is_ok() {
+        let mut connection = Connection::new(stream, Limits::default());
+        let _ = tokio::time::timeout(STOP_GRACE, connection.write_bytes(&bytes)).await;
+    }
+}
+
+/// A server on a thread of this process; dropping it stops it.
+#[derive(Debug)]
+pub struct RunningServer {
+    address: SocketAddr,
+    stop: watch::Sender<bool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+/// Starts a server on a thread of its own and returns once it listens.
+///
+/// # Errors
+/// [`StartError`].
+pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
+    let (stop, stopped) = watch::channel(false);
+    let (ready, is_ready) = oneshot::channel();
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .thread_name("sockets")
+        .enable_all()
+        .build()
+        .map_err(StartError::Runtime)?;
+    let thread = std::thread::Builder::new().name("server".to_owned());
+    let thread = thread
+        .spawn(move || {
+            let ready = std::sync::Mutex::new(Some(ready));
+            let say = |outcome| {
+                let sender = ready.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
+                if let Some(sender) = sender {
+                    let _ = sender.send(outcome);
+                }
+            };
+            let served = runtime.block_on(serve(config, |address| say(Ok(address)), stopped));
+            if let Err(error) = served {
+                say(Err(error));
+            }
+        })
+        .map_err(StartError::Runtime)?;
+    match is_ready.blocking_recv() {
+        Ok(Ok(address)) => Ok(RunningServer { address, stop, thread: Some(thread) }),
+        Ok(Err(error)) => Err(error),
+        Err(_) => Err(StartError::Runtime(std::io::Error::other("the server's thread ended"))),
+    }
+}
+
+impl RunningServer {
+    /// Address it listens on.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Stops it and waits until its sessions have ended.
+    pub fn stop(mut self) {
+        self.stop_and_join();
+    }
+
+    fn stop_and_join(&mut self) {
+        let _ = self.stop.send(true);
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the server's thread ended abnormally");
+        }
+    }
+}
+
+impl Drop for RunningServer {
+    fn drop(&mut self) {
+        self.stop_and_join();
+    }
+}

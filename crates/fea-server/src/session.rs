@@ -1,0 +1,222 @@
+//! One client's connection: frames in, frames out, in order.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use softgrasp_protocol::asynchronous::Connection;
+use softgrasp_protocol::{
+    ConnectionError, Frame, FrameError, Hello, Limits, RejectCode, Rejected, Reply, Request,
+    Welcome,
+};
+use tokio::net::TcpStream;
+use tokio::sync::watch;
+use tokio::time::timeout;
+
+use crate::answer::Desk;
+use crate::clock::{StageClock, ms_since};
+use crate::compute::Compute;
+use crate::reject::Refusal;
+
+/// What a session needs of its server.
+#[derive(Clone)]
+pub(crate) struct Hall {
+    pub desk: Arc<Desk>,
+    pub compute: Compute,
+    pub stop: watch::Receiver<bool>,
+}
+
+/// A client that stops inside a frame for this long is given up.
+const STALL_MAX: Duration = Duration::from_secs(30);
+/// A client that does not take its reply for this long is given up.
+const WRITE_MAX: Duration = Duration::from_secs(60);
+
+/// Serves one connection until the client goes, sends bytes that are no frames, or the server
+/// stops.
+pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut hall: Hall) {
+    if let Err(error) = stream.set_nodelay(true) {
+        tracing::warn!(%peer, %error, "TCP_NODELAY could not be set");
+    }
+    let limits = hall.desk.config.limits();
+    let mut session = Session {
+        connection: Connection::new(stream, limits),
+        limits,
+        authorised: hall.desk.config.token.is_none(),
+        out: Vec::new(),
+    };
+    tracing::info!(%peer, "session begins");
+    match session.run(&mut hall).await {
+        Ok(()) => tracing::info!(%peer, "session ends"),
+        Err(error) => tracing::warn!(%peer, %error, "session is given up"),
+    }
+}
+
+/// Ends when the server is to stop, or when nobody is left who could say so.
+pub(crate) async fn stopped(stop: &mut watch::Receiver<bool>) {
+    let _ = stop.wait_for(|stop| *stop).await;
+}
+
+struct Session {
+    connection: Connection<TcpStream>,
+    limits: Limits,
+    authorised: bool,
+    /// Encoded reply, kept so that its memory is reused.
+    out: Vec<u8>,
+}
+
+/// Why a session is given up.
+#[derive(Debug, thiserror::Error)]
+enum SessionError {
+    #[error(transparent)]
+    Connection(#[from] ConnectionError),
+    #[error("the client stopped inside a frame for {} s", STALL_MAX.as_secs())]
+    Stalled,
+    #[error("the client did not take its reply for {} s", WRITE_MAX.as_secs())]
+    NotTaken,
+}
+
+impl Session {
+    async fn run(&mut self, hall: &mut Hall) -> Result<(), SessionError> {
+        loop {
+            let mut stop = hall.stop.clone();
+            let frame = tokio::select! {
+                frame = self.next_frame() => frame,
+                () = stopped(&mut stop) => {
+                    let text = "the server is stopping; connect again later".to_owned();
+                    self.reject(0, RejectCode::ShuttingDown, text).await?;
+                    return Ok(());
+                }
+            };
+            match frame {
+                Ok(Some(frame)) => self.handle(frame, hall).await?,
+                Ok(None) => return Ok(()),
+                Err(SessionError::Connection(ConnectionError::Frame(error))) => {
+                    self.answer_bad_stream(&error).await;
+                    return Err(ConnectionError::Frame(error).into());
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Waits for ever between frames, but not inside one.
+    async fn next_frame(&mut self) -> Result<Option<Frame>, SessionError> {
+        loop {
+            let inside = self.connection.is_inside_frame();
+            let received = self.connection.received();
+            match timeout(STALL_MAX, self.connection.read_frame()).await {
+                Ok(frame) => return Ok(frame?),
+                Err(_) if inside && self.connection.received() == received => {
+                    return Err(SessionError::Stalled);
+                }
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// Last words to a client whose bytes make no sense; whether they arrive is of no matter.
+    async fn answer_bad_stream(&mut self, error: &FrameError) {
+        let code = match error {
+            FrameError::Version { .. } => RejectCode::UnsupportedVersion,
+            FrameError::PayloadTooLong { .. } => RejectCode::TooLarge,
+            _ => RejectCode::BadRequest,
+        };
+        let _ = self.reject(0, code, error.to_string()).await;
+    }
+
+    async fn reject(
+        &mut self,
+        request_id: u64,
+        code: RejectCode,
+        text: String,
+    ) -> Result<(), SessionError> {
+        self.write(request_id, &Reply::Rejected(Rejected { code, text, detail: String::new() }))
+            .await
+    }
+
+    async fn write(&mut self, request_id: u64, reply: &Reply) -> Result<(), SessionError> {
+        self.out.clear();
+        // Replies are limited by the protocol, not by what this server reads.
+        if let Err(error) = reply.encode_into(request_id, &Limits::default(), &mut self.out) {
+            tracing::error!(%error, "a reply cannot be encoded");
+            let rejected = Reply::Rejected(Refusal::Internal.to_message());
+            if rejected.encode_into(request_id, &Limits::default(), &mut self.out).is_err() {
+                return Ok(());
+            }
+        }
+        match timeout(WRITE_MAX, self.connection.write_bytes(&self.out)).await {
+            Ok(written) => Ok(written?),
+            Err(_) => Err(SessionError::NotTaken),
+        }
+    }
+
+    /// One request: decoded, worked on, answered. A bad request is answered and the session lives.
+    async fn handle(&mut self, frame: Frame, hall: &Hall) -> Result<(), SessionError> {
+        let request_id = frame.request_id();
+        match self.reply_to(frame, hall).await {
+            Ok(Some(reply)) => self.write(request_id, &reply).await,
+            Ok(None) => Ok(()),
+            Err(refusal) => {
+                tracing::info!(%refusal, "request refused");
+                self.write(request_id, &Reply::Rejected(refusal.to_message())).await
+            }
+        }
+    }
+
+    async fn reply_to(&mut self, frame: Frame, hall: &Hall) -> Result<Option<Reply>, Refusal> {
+        let start = Instant::now();
+        let request = Request::decode(&frame, &self.limits)?;
+        drop(frame);
+        let decode_ms = ms_since(start);
+        if !self.authorised && !matches!(request, Request::Hello(_)) {
+            return Err(Refusal::Token);
+        }
+        let desk = Arc::clone(&hall.desk);
+        let queued = Instant::now();
+        let clock = move || StageClock::new(decode_ms, queued);
+        let run = &hall.compute;
+        Ok(Some(match request {
+            Request::Hello(hello) => self.welcome(&hello, hall)?,
+            Request::Ping { nonce } => Reply::Pong { nonce },
+            Request::HaveModel(hash) => {
+                Reply::ModelState { known: hall.desk.store.find(hash).is_some() }
+            }
+            Request::Drop(hash) => {
+                hall.desk.store.forget(hash);
+                return Ok(None);
+            }
+            // A hint; the direct methods have nothing to prepare.
+            Request::Prefetch(_) => return Ok(None),
+            Request::SolveOnce(once) => {
+                Reply::Answer(Box::new(run.run(move || desk.solve_once(*once, clock())).await?))
+            }
+            Request::UploadModel(upload) => {
+                Reply::ModelReady(run.run(move || desk.upload(upload, clock())).await?)
+            }
+            Request::Frame(frame) => {
+                Reply::Answer(Box::new(run.run(move || desk.frame(frame, clock())).await?))
+            }
+        }))
+    }
+
+    fn welcome(&mut self, hello: &Hello, hall: &Hall) -> Result<Reply, Refusal> {
+        if let Some(token) = &hall.desk.config.token {
+            if !same_secret(token, hello.token.as_deref().unwrap_or("")) {
+                return Err(Refusal::Token);
+            }
+            self.authorised = true;
+        }
+        tracing::info!(client = hello.client, "client introduced itself");
+        Ok(Reply::Welcome(Welcome {
+            server: "fea-server".to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            threads: hall.compute.threads() as u32,
+            limits: self.limits,
+        }))
+    }
+}
+
+/// Compares without telling by the time taken where the first difference is.
+fn same_secret(a: &str, b: &str) -> bool {
+    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |diff, (a, b)| diff | (a ^ b)) == 0
+}
