@@ -72,8 +72,10 @@ fn read_header(cursor: &mut Cursor) -> Result<Header, MeshFileError> {
     cursor.skip_space();
     let here = cursor.clone();
     let version = cursor.token().and_then(|token| {
-        let (major, minor) = token.split_at(token.iter().position(|&b| b == b'.')?);
-        Some((parse_integer(major)?, parse_integer(minor.get(1..)?)?))
+        let mut parts = token.splitn(2, |&b| b == b'.');
+        let major = parse_integer(parts.next()?)?;
+        // Gmsh writes 4 for 4.0.
+        Some((major, parts.next().map_or(Some(0), parse_integer)?))
     });
     let Some((major @ (2 | 4), minor)) = version else {
         return Err(here.expected("version 2.x or 4.x"));

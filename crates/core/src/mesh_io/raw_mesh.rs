@@ -31,6 +31,8 @@ pub(super) struct RawMesh {
     pub(super) region_names: BTreeMap<i64, String>,
     /// Cells that are not tetrahedra.
     pub(super) other_cells: BTreeMap<CellKind, usize>,
+    /// File with the tetrahedra where that is not the file that was given (TetGen).
+    pub(super) tets_file: Option<String>,
     /// Everything worth telling that is known while reading.
     pub(super) findings: Findings,
 }
@@ -84,7 +86,10 @@ impl RawMesh {
             given => NodeLabels::try_new(given).map_err(refuse)?,
         };
         self.findings.labels_mapped = labels.mapped();
-        let (tets, kept) = self.kept_tets(&labels, format).map_err(refuse)?;
+        let (tets, kept) = self.kept_tets(&labels, format).map_err(|fault| MeshFileError {
+            file: self.tets_file.clone().unwrap_or_else(|| name.to_owned()),
+            fault,
+        })?;
         if tets.is_empty() {
             return Err(refuse(self.nothing_to_model()));
         }
@@ -117,8 +122,7 @@ impl RawMesh {
                 })?;
             }
             let (volume, least) = self.volume_and_least(corners);
-            // Written so that a volume that is not a number is flat, too.
-            if !(volume.abs() > least) {
+            if volume.abs() <= least || volume.is_nan() {
                 self.findings.degenerate.push(tet);
                 continue;
             }

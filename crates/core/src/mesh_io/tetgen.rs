@@ -61,7 +61,7 @@ pub(super) fn read(
     let here = Cursor::with_comments(name, bytes, b'#');
     let there = Cursor::with_comments(&other_name, &other_bytes, b'#');
     let (node, ele) = if other == Half::Ele { (here, there) } else { (there, here) };
-    let mut raw = RawMesh::default();
+    let mut raw = RawMesh { tets_file: Some(format!("{stem}.ele")), ..RawMesh::default() };
     read_nodes(node, &mut raw)?;
     read_tets(ele, &mut raw)?;
     settle_base(&mut raw);

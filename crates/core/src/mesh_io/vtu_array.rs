@@ -101,7 +101,7 @@ impl<'a> DataArray<'a> {
         let format = attribute(self.attributes, "format").unwrap_or(b"ascii");
         let bytes = match format {
             b"ascii" => return Ok(None),
-            b"binary" => packed.from_base64(self.text)?,
+            b"binary" => packed.unpack_base64(self.text)?,
             b"appended" => {
                 let offset = attribute(self.attributes, "offset").unwrap_or_default();
                 let start = super::number::parse_integer(offset)
@@ -112,7 +112,7 @@ impl<'a> DataArray<'a> {
                     return Err(self.cursor.count_fault(&packed.array, &expected, &found));
                 };
                 if appended.is_base64 {
-                    packed.from_base64(bytes)?
+                    packed.unpack_base64(bytes)?
                 } else {
                     packed.unpack(bytes)?
                 }
@@ -141,7 +141,7 @@ struct Packed<'c, 'a> {
 impl Packed<'_, '_> {
     /// Base64 of lengths and data; appended arrays are followed by others, so that the lengths
     /// are read first to know where this one ends.
-    fn from_base64(&self, text: &[u8]) -> Result<Vec<u8>, MeshFileError> {
+    fn unpack_base64(&self, text: &[u8]) -> Result<Vec<u8>, MeshFileError> {
         let first = base64::decode(text, self.rules.header_bytes);
         let mut length = self.header_length(&first)?;
         let header = base64::decode(text, length);
