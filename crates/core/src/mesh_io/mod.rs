@@ -1,1 +1,47 @@
-//! Mesh files: bytes in, [`crate::mesh::TetMesh`] and findings out; decided by content.
+//! Mesh files: recognised by content, read into a checked mesh with what was found on the way.
+
+mod base64;
+mod byte_order;
+mod cell_kind;
+mod companion;
+mod cursor;
+mod error;
+mod findings;
+mod format;
+mod gmsh;
+mod medit;
+mod msh1;
+mod msh2;
+mod msh4;
+mod node_labels;
+mod number;
+mod parse;
+mod raw_mesh;
+mod scalar;
+mod sniff;
+mod tet;
+mod tetgen;
+mod thesis_lists;
+mod vega;
+mod vtk_cells;
+mod vtk_legacy;
+mod vtu;
+mod vtu_array;
+mod write_error;
+mod write_msh41;
+mod write_vtu;
+mod xml;
+
+#[cfg(test)]
+mod tests;
+
+pub use companion::Companion;
+pub use error::{Fault, MeshFileError, Place};
+pub use findings::{Findings, MeshFile};
+pub use format::{Foreign, Format};
+pub use parse::parse;
+pub use sniff::{Sniffed, sniff};
+pub use thesis_lists::write_thesis_lists;
+pub use write_error::WriteError;
+pub use write_msh41::write_msh41;
+pub use write_vtu::{PointField, write_vtu};

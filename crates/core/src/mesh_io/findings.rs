@@ -1,0 +1,63 @@
+//! What a mesh file was found to hold besides the mesh that came out of it.
+
+use std::collections::BTreeMap;
+
+use crate::mesh::TetMesh;
+use crate::mesh_io::Format;
+
+/// A mesh file after reading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshFile {
+    /// The format its content has, whatever its name says.
+    pub format: Format,
+    /// The mesh: node i is the i-th node record of the file.
+    pub mesh: TetMesh,
+    /// What was put right, left out or skipped on the way.
+    pub findings: Findings,
+}
+
+/// What was put right, left out or skipped while a file was read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Findings {
+    /// Node records in the file.
+    pub file_nodes: usize,
+    /// Tetrahedra of any order in the file.
+    pub file_tets: usize,
+    /// Tetrahedra (record numbers from 0) whose corners are ordered against the format's rule;
+    /// they were turned.
+    pub flipped: Vec<usize>,
+    /// Tetrahedra (record numbers from 0) without volume; they were dropped.
+    pub degenerate: Vec<usize>,
+    /// Nodes that are no corner of a kept tetrahedron; they keep their number.
+    pub orphans: usize,
+    /// Tetrahedra of second or higher order; their corners are used, mid nodes become orphans.
+    pub higher_order: usize,
+    /// Cells that are not tetrahedra, by plural name ("triangles").
+    pub other_cells: BTreeMap<String, usize>,
+    /// Whether node labels are something else than 0, 1, 2 … or 1, 2, 3 ….
+    pub labels_mapped: bool,
+    /// The file's own name of each region of the mesh; empty when the mesh has one region.
+    pub region_labels: Vec<String>,
+    /// Sections of the file that were not looked into.
+    pub skipped_sections: Vec<String>,
+    /// Anything else worth a sentence.
+    pub notes: Vec<String>,
+}
+
+impl Findings {
+    /// Adds a note once.
+    pub(super) fn note(&mut self, note: impl Into<String>) {
+        let note = note.into();
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Adds a skipped section once; a file of thousands of them does not fill the list.
+    pub(super) fn skip(&mut self, section: &[u8]) {
+        let section = section.get(..60).unwrap_or(section).escape_ascii().to_string();
+        if self.skipped_sections.len() < 50 && !self.skipped_sections.contains(&section) {
+            self.skipped_sections.push(section);
+        }
+    }
+}

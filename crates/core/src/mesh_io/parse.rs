@@ -1,0 +1,59 @@
+//! From the bytes of a mesh file to a mesh: find out the format, read, check.
+
+use super::companion::{Companion, FindCompanion};
+use super::cursor::{Cursor, quote};
+use super::error::{Fault, MeshFileError};
+use super::sniff::{Sniffed, sniff, without_mark};
+use super::{Format, MeshFile, gmsh, medit, tet, tetgen, thesis_lists, vega, vtk_legacy, vtu};
+
+/// Reads a mesh file of any known format.
+///
+/// `name` is for errors only; the format is found by content. `companion` is asked for the other
+/// files that some formats need, and returns their bytes or `None`.
+///
+/// # Errors
+/// [`MeshFileError`]: one line that names the file, the place, what was expected and what was
+/// found. Bytes from outside never make this panic or allocate by an announced count.
+pub fn parse(
+    name: &str,
+    bytes: &[u8],
+    companion: &mut dyn FnMut(&Companion) -> Option<Vec<u8>>,
+) -> Result<MeshFile, MeshFileError> {
+    let bytes = without_mark(bytes);
+    let refuse = |fault| MeshFileError { file: name.to_owned(), fault };
+    let start = bytes.trim_ascii_start();
+    if start.is_empty() {
+        return Err(refuse(Fault::Empty));
+    }
+    match sniff(bytes) {
+        Some(Sniffed::Readable(format)) => {
+            read(name, bytes, format, companion)?.finish(name, format)
+        }
+        Some(Sniffed::Foreign(what)) => Err(refuse(Fault::Foreign { what })),
+        None => Err(refuse(Fault::Unknown { start: quote(start) })),
+    }
+}
+
+fn read(
+    name: &str,
+    bytes: &[u8],
+    format: Format,
+    companion: &mut FindCompanion,
+) -> Result<super::raw_mesh::RawMesh, MeshFileError> {
+    let plain = Cursor::new(name, bytes);
+    let commented = Cursor::with_comments(name, bytes, b'#');
+    match format {
+        Format::GmshMsh1
+        | Format::GmshMsh2Ascii
+        | Format::GmshMsh2Binary
+        | Format::GmshMsh4Ascii
+        | Format::GmshMsh4Binary => gmsh::read(plain),
+        Format::VtkLegacy => vtk_legacy::read(plain),
+        Format::Vtu => vtu::read(plain),
+        Format::TetGen => tetgen::read(name, bytes, companion),
+        Format::Medit => medit::read(commented),
+        Format::Vega => vega::read(name, bytes, companion),
+        Format::Tet => tet::read(commented),
+        Format::ThesisLists => thesis_lists::read(commented),
+    }
+}

@@ -1,0 +1,267 @@
+//! What a reader collects, and the one way from there to a checked mesh.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Point3;
+
+use super::cell_kind::{CellKind, Shape};
+use super::error::{Fault, MeshFileError};
+use super::node_labels::NodeLabels;
+use crate::mesh::{MeshError, TetMesh};
+use crate::mesh_io::{Findings, Format, MeshFile};
+
+/// A volume below this fraction of the cube of the longest edge is rounding, not volume.
+const DEGENERATE: f64 = 1e-14;
+
+/// What a reader collects from a file, labels and all.
+#[derive(Debug, Default)]
+pub(super) struct RawMesh {
+    /// Node coordinates in file order.
+    pub(super) points: Vec<Point3<f64>>,
+    /// Label of each node; empty when the nodes are numbered from `first_label` without gaps.
+    pub(super) node_labels: Vec<i64>,
+    /// Label of the first node when `node_labels` is empty.
+    pub(super) first_label: i64,
+    /// Corner labels of each tetrahedron in file order.
+    pub(super) tets: Vec<[i64; 4]>,
+    /// Two candidates for the region of each tetrahedron; the second counts when the first is 0
+    /// everywhere (Gmsh: physical group, then geometric entity).
+    pub(super) regions: Vec<[i64; 2]>,
+    /// Names of regions, for the first candidate.
+    pub(super) region_names: BTreeMap<i64, String>,
+    /// Cells that are not tetrahedra.
+    pub(super) other_cells: BTreeMap<CellKind, usize>,
+    /// File with the tetrahedra where that is not the file that was given (TetGen).
+    pub(super) tets_file: Option<String>,
+    /// Everything worth telling that is known while reading.
+    pub(super) findings: Findings,
+}
+
+impl RawMesh {
+    /// Adds a cell: a tetrahedron of any order by its first four nodes, anything else as a count.
+    pub(super) fn add_cell(&mut self, kind: CellKind, nodes: &[i64], region: [i64; 2]) {
+        match (kind.shape, nodes) {
+            (Shape::Tetrahedron, &[a, b, c, d, ..]) => {
+                self.tets.push([a, b, c, d]);
+                self.regions.push(region);
+                self.findings.higher_order += usize::from(nodes.len() > 4);
+            }
+            _ => self.count_cells(kind, 1),
+        }
+    }
+
+    /// Adds cells that are not tetrahedra to the count of their kind.
+    pub(super) fn count_cells(&mut self, kind: CellKind, count: usize) {
+        *self.other_cells.entry(kind).or_default() += count;
+    }
+
+    /// Maps labels, turns inverted tetrahedra, drops flat ones, numbers the regions.
+    ///
+    /// # Errors
+    /// [`MeshFileError`] for file `name`: labels that fit nothing, or no tetrahedra left.
+    pub(super) fn finish(mut self, name: &str, format: Format) -> Result<MeshFile, MeshFileError> {
+        let refuse = |fault: Fault| MeshFileError { file: name.to_owned(), fault };
+        for (kind, count) in &self.other_cells {
+            *self.findings.other_cells.entry(kind.to_string()).or_default() += count;
+        }
+        self.findings.file_nodes = self.points.len();
+        self.findings.file_tets = self.tets.len();
+        if self.tets.is_empty() {
+            return Err(refuse(self.nothing_to_model()));
+        }
+        if self.points.len() >= u32::MAX as usize {
+            return Err(refuse(Fault::Count {
+                at: super::error::Place::Line(1),
+                array: "nodes".to_owned(),
+                expected: format!("fewer than {}", u32::MAX),
+                found: self.points.len().to_string(),
+            }));
+        }
+        if let Some(node) = self.points.iter().position(|p| !p.coords.iter().all(|c| c.is_finite()))
+        {
+            return Err(refuse(Fault::Mesh(MeshError::NotFinite { node })));
+        }
+        let labels = match self.node_labels.as_slice() {
+            [] => NodeLabels::sequence(self.first_label, self.points.len()),
+            given => NodeLabels::try_new(given).map_err(refuse)?,
+        };
+        self.findings.labels_mapped = labels.mapped();
+        let (tets, kept) = self.kept_tets(&labels, format).map_err(|fault| MeshFileError {
+            file: self.tets_file.clone().unwrap_or_else(|| name.to_owned()),
+            fault,
+        })?;
+        if tets.is_empty() {
+            return Err(refuse(self.nothing_to_model()));
+        }
+        let regions = self.dense_regions(&kept);
+        let mesh =
+            TetMesh::try_new(self.points, tets, regions).map_err(|e| refuse(Fault::Mesh(e)))?;
+        self.findings.orphans = mesh.used_nodes().iter().filter(|&&used| !used).count();
+        Ok(MeshFile { format, mesh, findings: self.findings })
+    }
+
+    /// Corner indices of the tetrahedra that have volume, ordered as [`TetMesh`] wants them, with
+    /// their record numbers.
+    fn kept_tets(
+        &mut self,
+        labels: &NodeLabels,
+        format: Format,
+    ) -> Result<(Vec<[u32; 4]>, Vec<usize>), Fault> {
+        // The mesh counts volume from corner 4 (thesis 3.23), every format but the thesis lists
+        // from corner 1: what is right there is mirrored here.
+        let format_sign = if format == Format::ThesisLists { 1.0 } else { -1.0 };
+        let mut tets = Vec::with_capacity(self.tets.len());
+        let mut kept = Vec::with_capacity(self.tets.len());
+        for (tet, corner_labels) in self.tets.iter().enumerate() {
+            let mut corners = [0_u32; 4];
+            for (corner, &label) in corners.iter_mut().zip(corner_labels) {
+                *corner = labels.index(label).ok_or_else(|| Fault::UnknownNode {
+                    tet,
+                    label,
+                    nodes: labels.describe(),
+                })?;
+            }
+            let (volume, least) = self.volume_and_least(corners);
+            if volume.abs() <= least || volume.is_nan() {
+                self.findings.degenerate.push(tet);
+                continue;
+            }
+            if volume * format_sign < 0.0 {
+                self.findings.flipped.push(tet);
+            }
+            tets.push(if volume > 0.0 { corners } else { mirrored(corners) });
+            kept.push(tet);
+        }
+        if self.findings.flipped.len() == kept.len() && kept.len() > 1 {
+            self.findings.note("every tetrahedron is ordered the other way round than usual");
+        }
+        Ok((tets, kept))
+    }
+
+    /// Signed volume (3.33 without the absolute value) and the least volume that is not rounding.
+    fn volume_and_least(&self, corners: [u32; 4]) -> (f64, f64) {
+        let [c1, c2, c3, c4] = corners.map(|node| self.points[node as usize]);
+        let volume = (c1 - c4).dot(&(c2 - c4).cross(&(c3 - c4))) / 6.0;
+        let edges = [c1 - c2, c1 - c3, c1 - c4, c2 - c3, c2 - c4, c3 - c4];
+        let longest = edges.iter().map(|edge| edge.norm_squared()).fold(0.0, f64::max).sqrt();
+        (volume, DEGENERATE * longest * longest * longest)
+    }
+
+    /// Regions of the kept tetrahedra as 0, 1, 2 … in order of appearance; empty if there is one.
+    fn dense_regions(&mut self, kept: &[usize]) -> Vec<u32> {
+        let second = self.regions.iter().all(|region| region[0] == 0);
+        let label_of = |tet: usize| {
+            let [first, fallback] = self.regions.get(tet).copied().unwrap_or_default();
+            if second { fallback } else { first }
+        };
+        let mut numbers = BTreeMap::new();
+        let mut names = Vec::new();
+        let mut regions = Vec::with_capacity(kept.len());
+        for &tet in kept {
+            let label = label_of(tet);
+            let number = *numbers.entry(label).or_insert_with(|| {
+                let name = self.region_names.get(&label).filter(|_| !second).cloned();
+                names.push(name.unwrap_or_else(|| label.to_string()));
+                names.len() as u32 - 1
+            });
+            regions.push(number);
+        }
+        if names.len() < 2 {
+            return Vec::new();
+        }
+        self.findings.region_labels = names;
+        regions
+    }
+
+    fn nothing_to_model(&self) -> Fault {
+        let mut parts: Vec<String> = self
+            .findings
+            .other_cells
+            .iter()
+            .map(|(kind, count)| format!("{count} {kind}"))
+            .collect();
+        if !self.findings.degenerate.is_empty() {
+            parts.push(format!("{} tetrahedra without volume", self.findings.degenerate.len()));
+        }
+        if parts.is_empty() {
+            parts.push(format!("{} nodes and no cells", self.points.len()));
+        }
+        Fault::NoTetrahedra { found: parts.join(", ") }
+    }
+}
+
+/// The same tetrahedron with the other orientation; applied twice it is the same list again.
+pub(super) fn mirrored([a, b, c, d]: [u32; 4]) -> [u32; 4] {
+    [a, b, d, c]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit_points() -> Vec<Point3<f64>> {
+        vec![
+            Point3::origin(),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.0, 1.0, 0.0),
+            Point3::new(0.0, 0.0, 1.0),
+            Point3::new(1.0, 1.0, 0.0),
+        ]
+    }
+
+    fn raw(tets: &[[i64; 4]], regions: &[[i64; 2]]) -> RawMesh {
+        RawMesh {
+            points: unit_points(),
+            tets: tets.to_vec(),
+            regions: regions.to_vec(),
+            ..RawMesh::default()
+        }
+    }
+
+    #[test]
+    fn inverted_is_turned_and_flat_is_dropped() {
+        let raw = raw(&[[0, 1, 2, 3], [0, 2, 1, 3], [0, 1, 2, 4], [1, 1, 2, 3]], &[[0; 2]; 4]);
+        let file = raw.finish("f", Format::Medit).unwrap();
+        assert_eq!(file.findings.flipped, [1]);
+        assert_eq!(file.findings.degenerate, [2, 3]);
+        assert_eq!(file.findings.orphans, 1);
+        assert_eq!(file.mesh.tets(), [[0, 1, 3, 2], [0, 2, 1, 3]]);
+    }
+
+    #[test]
+    fn regions_are_numbered_by_appearance_with_their_labels_kept() {
+        let tets = [[0, 1, 2, 3], [4, 2, 1, 3], [0, 1, 2, 3]];
+        let file = raw(&tets, &[[7, 1], [-2, 1], [7, 1]]).finish("f", Format::Vega).unwrap();
+        assert_eq!(file.mesh.regions(), [0, 1, 0]);
+        assert_eq!(file.findings.region_labels, ["7", "-2"]);
+        let file = raw(&tets, &[[0, 1], [0, 9], [0, 1]]).finish("f", Format::Vega).unwrap();
+        assert_eq!(file.findings.region_labels, ["1", "9"]);
+        let file = raw(&tets, &[[3, 1], [3, 9], [3, 1]]).finish("f", Format::Vega).unwrap();
+        assert!(file.mesh.regions().is_empty() && file.findings.region_labels.is_empty());
+    }
+
+    #[test]
+    fn a_file_without_tetrahedra_says_what_it_has() {
+        let mut raw = raw(&[], &[]);
+        raw.count_cells(CellKind::new(Shape::Triangle, 3), 3012);
+        let error = raw.finish("a.vtk", Format::VtkLegacy).unwrap_err();
+        assert_eq!(error.to_string(), "a.vtk: no tetrahedra: 3012 triangles");
+    }
+
+    #[test]
+    fn a_node_that_is_not_there_is_named() {
+        let error = raw(&[[0, 1, 2, 5]], &[[0; 2]]).finish("f", Format::Tet).unwrap_err();
+        let text = "f: tetrahedron 0 (from 0) names node 5, but there are 5 nodes, 0 to 4";
+        assert_eq!(error.to_string(), text);
+    }
+
+    #[test]
+    fn overflowing_volumes_are_not_volumes() {
+        let mut raw = raw(&[[0, 1, 2, 3]], &[[0; 2]]);
+        raw.points.iter_mut().for_each(|p| *p *= 1e200);
+        assert!(matches!(
+            raw.finish("f", Format::Tet).unwrap_err().fault,
+            Fault::NoTetrahedra { .. }
+        ));
+    }
+}

@@ -1,0 +1,66 @@
+//! Files that are recognised and refused, each with one line that says what it is.
+
+use super::samples::{read, refusal};
+use crate::mesh_io::{Fault, Foreign, Sniffed, sniff};
+
+#[test]
+fn q1_foreign_formats_are_recognised_by_content() {
+    let mut stl = vec![b's'; 80];
+    stl.extend(2_u32.to_le_bytes());
+    stl.extend([0; 100]);
+    let mut mujoco: Vec<u8> = [3_u32, 0, 0, 1].iter().flat_map(|v| v.to_le_bytes()).collect();
+    mujoco.extend([7; 48]);
+    let files: [(&[u8], Foreign); 24] = [
+        (b"MFEM mesh v1.0\n\n#\n# MFEM Geometry Types\n", Foreign::Mfem),
+        (&mujoco, Foreign::MujocoLegacy),
+        (b"# header\n# ndim npoint ncell\n3 8 5\n\n# points\n", Foreign::Gemlab),
+        (b"(0 \"GAMBIT to Fluent File\")\n(2 3)\n", Foreign::Fluent),
+        (b"(2 3)\n(10 (0 1 8 0 3))\n", Foreign::Fluent),
+        (b"$MeshFormat\n3 0 8\n$EndMeshFormat\n", Foreign::GmshOther),
+        (b"\x01\0\0\0\x02\0\0\0\x03\0\0\0", Foreign::MeditBinary),
+        (b"*Heading\n** Job name: x\n*Node\n1, 0., 0., 0.\n", Foreign::Abaqus),
+        (b"** comment\n*NODE, NSET=N\n1,0,0,-3.535534e-001\n*Element, TYPE=C3D10\n", Foreign::Abaqus),
+        (b"<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<!-- \xe9 --><febio_spec version=\"3.0\">", Foreign::Febio),
+        (b"#usda 1.0\ndef TetMesh \"m\" {}\n", Foreign::Usd),
+        (b"PXR-USDC\0\x08\0\0", Foreign::Usd),
+        (&stl, Foreign::Stl),
+        (b"solid x\n facet normal 0 0 1\n", Foreign::Stl),
+        (b"# Blender\nmtllib x.mtl\nv 0 0 0\nf 1 2 3\n", Foreign::Obj),
+        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Foreign::Obj),
+        (b"ply\nformat ascii 1.0\n", Foreign::Ply),
+        (b"OFF\n4 4 6\n", Foreign::Off),
+        (b"<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<Xdmf>", Foreign::Xdmf),
+        (b"<dolfin xmlns:dolfin=\"http://fenicsproject.org\">", Foreign::Xdmf),
+        (b"\x89HDF\r\n\x1a\n", Foreign::Hdf5),
+        (b"\x1f\x8b\x08\0", Foreign::Gzip),
+        (b"PK\x03\x04\x14", Foreign::Zip),
+        (b"\xfd7zXZ\0", Foreign::OtherCompression),
+    ];
+    for (bytes, foreign) in files {
+        let start = bytes.get(..30).unwrap_or(bytes).escape_ascii();
+        assert_eq!(sniff(bytes), Some(Sniffed::Foreign(foreign)), "{start}");
+        assert_eq!(read(bytes).unwrap_err().fault, Fault::Foreign { what: foreign });
+    }
+}
+
+#[test]
+fn refusals_are_one_line_with_advice() {
+    let error = refusal("MFEM mesh v1.0\n");
+    let known = "f: this is an MFEM mesh, which is not read here; \
+                 convert it with Gmsh or meshio to MSH 4.1";
+    assert_eq!(error, known);
+    assert!(refusal("ply\n").contains("it has no tetrahedra; fill it with TetGen"));
+    assert!(refusal([0x1f, 0x8b]).contains("unpack it first"));
+}
+
+#[test]
+fn empty_and_unknown_files_are_refused() {
+    for bytes in ["", " \r\n\t", "\u{feff}"] {
+        assert_eq!(refusal(bytes), "f: the file is empty");
+    }
+    for bytes in ["hello world", "1 2", "{\"json\": 1}", "*", "<html>", "1\n\0"] {
+        let error = refusal(bytes);
+        assert!(error.starts_with("f: no mesh format known here begins with \""), "{error}");
+        assert!(!error.contains('\n'));
+    }
+}

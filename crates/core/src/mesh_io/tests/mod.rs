@@ -1,0 +1,11 @@
+//! Tests of whole files: real ones, the quirks of each format, round trips, hostile bytes.
+
+mod foreign_files;
+mod gmsh_quirks;
+mod hostile_bytes;
+mod other_quirks;
+mod real_files;
+mod round_trips;
+mod samples;
+mod vtk_quirks;
+mod vtu_samples;

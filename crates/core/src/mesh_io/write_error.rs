@@ -1,0 +1,26 @@
+//! Why a mesh could not be written: data that does not belong to it.
+
+/// Data for a file that does not fit the mesh.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum WriteError {
+    /// A field has not one vector per node.
+    #[error("field {field}: expected {expected} vectors, one per node, found {found}")]
+    FieldLength {
+        /// Name of the field.
+        field: String,
+        /// Nodes of the mesh.
+        expected: usize,
+        /// Vectors given.
+        found: usize,
+    },
+    /// A triangle of the display list names a node that is not there.
+    #[error("display triangle {triangle} names node {node}, but there are {node_count} nodes")]
+    DisplayNode {
+        /// Triangle index, from 0.
+        triangle: usize,
+        /// The node.
+        node: u32,
+        /// Nodes of the mesh.
+        node_count: usize,
+    },
+}

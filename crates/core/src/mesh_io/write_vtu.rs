@@ -1,0 +1,108 @@
+//! Writes VTU with exact numbers (base64 of 64-bit values) and vector fields on the nodes.
+
+use std::io::Write;
+
+use super::base64;
+use super::raw_mesh::mirrored;
+use super::write_error::WriteError;
+use crate::mesh::TetMesh;
+
+/// A vector per node, such as displacement.
+#[derive(Clone, Copy, Debug)]
+pub struct PointField<'a> {
+    /// Name shown by viewers.
+    pub name: &'a str,
+    /// One vector per node, orphans included.
+    pub values: &'a [[f64; 3]],
+}
+
+/// The mesh as VTU; regions, if there are several, become the cell data `region`.
+///
+/// Corners are reordered to VTK's orientation, so that a file that was read comes out as it was.
+///
+/// # Errors
+/// [`WriteError::FieldLength`] when a field has not one vector per node.
+///
+/// Source: VTK user's guide, section "XML file formats".
+pub fn write_vtu(mesh: &TetMesh, fields: &[PointField]) -> Result<Vec<u8>, WriteError> {
+    for field in fields {
+        if field.values.len() != mesh.node_count() {
+            return Err(WriteError::FieldLength {
+                field: field.name.to_owned(),
+                expected: mesh.node_count(),
+                found: field.values.len(),
+            });
+        }
+    }
+    let mut out = Vec::new();
+    write_document(&mut out, mesh, fields).expect("writing to memory cannot fail");
+    Ok(out)
+}
+
+fn write_document(out: &mut Vec<u8>, mesh: &TetMesh, fields: &[PointField]) -> std::io::Result<()> {
+    let (nodes, cells) = (mesh.node_count(), mesh.tets().len());
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\">\n<UnstructuredGrid>"
+    )?;
+    writeln!(out, "<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{cells}\">\n<PointData>")?;
+    for field in fields {
+        let name = escaped(field.name);
+        write_array(
+            out,
+            "Float64",
+            &name,
+            3,
+            field.values.as_flattened().iter().map(|v| v.to_le_bytes()),
+        )?;
+    }
+    writeln!(out, "</PointData>\n<CellData>")?;
+    if !mesh.regions().is_empty() {
+        write_array(out, "UInt32", "region", 1, mesh.regions().iter().map(|r| r.to_le_bytes()))?;
+    }
+    writeln!(out, "</CellData>\n<Points>")?;
+    let coordinates = mesh.vertices().iter().flat_map(|p| [p.x, p.y, p.z]);
+    write_array(out, "Float64", "Points", 3, coordinates.map(f64::to_le_bytes))?;
+    writeln!(out, "</Points>\n<Cells>")?;
+    let corners = mesh.tets().iter().flat_map(|&tet| mirrored(tet)).map(i64::from);
+    write_array(out, "Int64", "connectivity", 1, corners.map(i64::to_le_bytes))?;
+    let ends = (1..=cells as i64).map(|cell| 4 * cell);
+    write_array(out, "Int64", "offsets", 1, ends.map(i64::to_le_bytes))?;
+    // 10 is VTK's number for a linear tetrahedron.
+    write_array(out, "UInt8", "types", 1, (0..cells).map(|_| [10_u8]))?;
+    writeln!(out, "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")
+}
+
+/// One inline array: length in bytes, then the values, as one base64 text.
+fn write_array<const N: usize>(
+    out: &mut Vec<u8>,
+    number_type: &str,
+    name: &str,
+    components: usize,
+    values: impl Iterator<Item = [u8; N]>,
+) -> std::io::Result<()> {
+    let mut bytes = vec![0; 8];
+    values.for_each(|value| bytes.extend_from_slice(&value));
+    let length = bytes.len() as u64 - 8;
+    bytes[..8].copy_from_slice(&length.to_le_bytes());
+    write!(out, "<DataArray type=\"{number_type}\" Name=\"{name}\" ")?;
+    writeln!(out, "NumberOfComponents=\"{components}\" format=\"binary\">")?;
+    out.extend(base64::encode(&bytes));
+    writeln!(out, "\n</DataArray>")
+}
+
+/// Text fit for an XML attribute.
+fn escaped(name: &str) -> String {
+    name.chars()
+        .map(|c| match c {
+            '&' => "&amp;".to_owned(),
+            '<' => "&lt;".to_owned(),
+            '>' => "&gt;".to_owned(),
+            '"' => "&quot;".to_owned(),
+            c if c.is_control() => " ".to_owned(),
+            c => c.to_string(),
+        })
+        .collect()
+}
