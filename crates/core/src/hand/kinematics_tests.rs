@@ -4,7 +4,7 @@ use nalgebra::Matrix4;
 use proptest::prelude::*;
 
 use super::*;
-use crate::hand::ANGLE_COUNT;
+use crate::hand::{ANGLE_COUNT, contact_jacobian};
 
 /// Joint angles inside what a hand can do.
 fn any_angles() -> impl Strategy<Value = JointAngles> {
@@ -198,29 +198,61 @@ fn thumb_swings_in_front_of_the_palm_with_its_pulp_to_the_fingers() {
     assert!(thumb.contact_point.z > thumb.tip_centre.z, "pulp looks back at the palm");
 }
 
-#[test]
-fn thumb_and_index_contact_points_meet_in_a_pinch() {
-    let mut angles = JointAngles::flat();
-    angles.thumb = ThumbAngles {
-        rotation: PINCH[0],
-        abduction: PINCH[1],
-        mcp_flexion: PINCH[2],
-        ip_flexion: PINCH[3],
-    };
-    angles.index = FingerAngles {
-        mcp_flexion: PINCH[4],
-        pip_flexion: PINCH[5],
-        dip_flexion: PINCH[6],
-        abduction: PINCH[7],
-    };
-    let pinch = pose(&HandDimensions::default(), &angles, Isometry3::identity());
-    let gap = (pinch.fingers[0].contact_point - pinch.fingers[1].contact_point).norm();
-    assert!(gap < 0.003, "gap {gap}");
-    let centres = (pinch.fingers[0].tip_centre - pinch.fingers[1].tip_centre).norm();
-    assert!(centres > 0.012, "pulps face each other, centres {centres} m apart");
+/// Ranges of thumb rotation, abduction, MPJ, IJ and index abduction, MPJ, PIJ, DIJ, in degrees: the
+/// active ranges of the KINE-ADL study, thumb rotation as in the glove vendor's own limits.
+const PINCH_RANGE_DEG: [[f64; 2]; 8] = [
+    [0.0, 90.0],
+    [-20.0, 20.5],
+    [-23.7, 31.8],
+    [-39.0, 75.2],
+    [-17.0, 17.0],
+    [-17.0, 67.6],
+    [-1.9, 107.2],
+    [0.0, 80.0],
+];
+
+/// Slots of [`JointAngles::to_array`] in the order of [`PINCH_RANGE_DEG`].
+const PINCH_SLOTS: [usize; 8] = [0, 3, 1, 2, 7, 4, 5, 6];
+
+/// Damped least squares on the gap between thumb and index contact point, inside the ranges.
+fn pinch(hand: &HandDimensions) -> HandPose {
+    let palm = Isometry3::identity();
+    let mut array = JointAngles::flat().lerp(&JointAngles::fist(), 0.5).to_array();
+    for _ in 0..200 {
+        let angles = JointAngles::from_array(&array);
+        let posed = pose(hand, &angles, palm);
+        let gap = posed.fingers[0].contact_point - posed.fingers[1].contact_point;
+        let thumb = contact_jacobian(hand, &angles, &palm, Finger::Thumb);
+        let index = contact_jacobian(hand, &angles, &palm, Finger::Index);
+        let normal =
+            thumb * thumb.transpose() + index * index.transpose() + Matrix3::identity() * 1e-6;
+        let pull = normal.try_inverse().unwrap() * gap;
+        for column in 0..8 {
+            let step = match column {
+                0..4 => -thumb.column(column).dot(&pull),
+                _ => index.column(column - 4).dot(&pull),
+            };
+            let [low, high] = PINCH_RANGE_DEG[column].map(f64::to_radians);
+            let value = &mut array[PINCH_SLOTS[column]];
+            *value = (*value + step).clamp(low, high);
+        }
+    }
+    pose(hand, &JointAngles::from_array(&array), palm)
 }
 
-const PINCH: [f64; 8] = [0.9, 0.0, 0.2, 0.3, 0.8, 0.9, 0.4, 0.0];
+#[test]
+fn thumb_and_index_pulps_meet_within_their_active_ranges() {
+    for (length, breadth) in [(0.166, 0.075), (0.185, 0.084), (0.2, 0.09)] {
+        let hand = HandDimensions::scaled(length, breadth).unwrap();
+        let pinched = pinch(&hand);
+        let [thumb, index] = [&pinched.fingers[0], &pinched.fingers[1]];
+        assert!((thumb.contact_point - index.contact_point).norm() < 1e-4);
+        // Pulp to pulp: the two spheres touch from outside instead of lying in each other.
+        let radii = hand.thumb.tip_radius + hand.fingers[0].tip_radius;
+        let centres = (thumb.tip_centre - index.tip_centre).norm();
+        assert!(centres > 0.6 * radii, "centres {centres} m apart, radii {radii} m together");
+    }
+}
 
 #[test]
 fn straight_wrist_puts_palm_and_forearm_together() {
