@@ -1,1 +1,15 @@
 //! The hand: joints, dimensions, kinematics and the colliders made from them.
+
+mod colliders;
+mod dimensions;
+mod jacobian;
+mod joints;
+mod kinematics;
+
+pub use colliders::{FingerColliders, HandColliders};
+pub use dimensions::{
+    DimensionsError, FingerDimensions, HandDimensions, Handedness, ThumbDimensions,
+};
+pub use jacobian::contact_jacobian;
+pub use joints::{ANGLE_COUNT, Finger, FingerAngles, JointAngles, ThumbAngles};
+pub use kinematics::{FingerPose, HandPose, SegmentPose, forearm_from_palm, pose};
