@@ -1,3 +1,47 @@
-//! The `glove-client` program.
+//! The `glove-client` program: arguments, exit codes, the one place that prints errors.
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use glove_client::commands::inspect::InspectCommand;
+use glove_client::commands::mesh::MeshCommand;
+use glove_client::commands::solve::SolveCommand;
+
+/// Grasp and squeeze a soft object with an instrumented glove.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Solve(SolveCommand),
+    Inspect(InspectCommand),
+    Mesh(MeshCommand),
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    start_log();
+    let outcome = match arguments.command {
+        Command::Solve(command) => command.run(),
+        Command::Inspect(command) => command.run(),
+        Command::Mesh(command) => command.run(),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("glove-client: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Warnings on standard error; `RUST_LOG` shows more.
+fn start_log() {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+}

@@ -1,0 +1,68 @@
+//! `glove-client mesh SHAPE --nodes N --out F`: generates a built-in object.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
+use softgrasp_core::mesh_io::{write_msh41, write_thesis_lists, write_vtu};
+
+use super::output::{print, write_file};
+use crate::progress::Progress;
+
+/// Generate a built-in object and write it to a file.
+#[derive(Args)]
+pub struct MeshCommand {
+    /// cube, sphere, strawberry or toothpaste.
+    shape: BuiltIn,
+    /// Number of nodes, as near as the shape allows.
+    #[arg(long, value_name = "N")]
+    nodes: usize,
+    /// File to write: .msh (Gmsh 4.1), .vtu, or .txt (the three lists of the thesis).
+    #[arg(long, value_name = "F")]
+    out: PathBuf,
+}
+
+impl MeshCommand {
+    /// Generates and writes.
+    ///
+    /// # Errors
+    /// A node count out of range, an unknown extension, a file that cannot be written.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let mesh = {
+            let _progress = Progress::start(&format!("generating a {}", self.shape));
+            generate(self.shape, self.nodes)?
+        };
+        let surface = Surface::from_mesh(&mesh);
+        write_file(&self.out, &encode_mesh(&self.out, &mesh, &surface)?)?;
+        print(&format!(
+            "{}: {} nodes, {} tetrahedra, {} surface triangles written to {}\n",
+            self.shape,
+            mesh.node_count(),
+            mesh.tets().len(),
+            surface.triangles.len(),
+            self.out.display()
+        ))
+    }
+}
+
+/// A mesh in the format that the file's extension names.
+///
+/// # Errors
+/// An extension that names none.
+pub(crate) fn encode_mesh(
+    path: &std::path::Path,
+    mesh: &TetMesh,
+    surface: &Surface,
+) -> anyhow::Result<Vec<u8>> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("msh") => Ok(write_msh41(mesh)),
+        Some("vtu") => write_vtu(mesh, &[]).context("cannot form the VTU file"),
+        Some("txt") => Ok(write_thesis_lists(mesh, &surface.triangles)?),
+        _ => bail!(
+            "{}: the extension names no format to write; use .msh (Gmsh 4.1), .vtu or .txt (the \
+             three lists of the thesis)",
+            path.display()
+        ),
+    }
+}

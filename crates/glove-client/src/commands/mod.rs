@@ -1,0 +1,6 @@
+//! The commands of `glove-client`, one file each; `main` only parses and prints the error.
+
+pub mod inspect;
+pub mod mesh;
+mod output;
+pub mod solve;

@@ -1,0 +1,251 @@
+//! `glove-client solve`: one request holding mesh, known displacements and partition.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use serde::Serialize;
+use softgrasp_core::mesh::TetMesh;
+use softgrasp_core::mesh_io::{MeshFile, PointField, write_vtu};
+use softgrasp_protocol::{
+    DofValue, ElementName, Material, MeshData, MethodName, NodeChoice, Precision, Question, Reply,
+    Request, SolveOnce, Want,
+};
+
+use super::output::{print, write_file, write_json};
+use crate::connection::{Host, ServerChoice, unexpected};
+use crate::displacement_table::{
+    DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError, read_table, write_displacements,
+};
+use crate::mesh_file::read_mesh_file;
+use crate::progress::Progress;
+use crate::solve_report::{SCHEMA, SolveSummary};
+
+/// Solve one request on a mesh file: known displacements in, all displacements out.
+#[derive(Args)]
+pub struct SolveCommand {
+    /// Mesh file; the format is recognised by its content.
+    #[arg(long, value_name = "F")]
+    mesh: PathBuf,
+    /// Known displacements: node,ux,uy,uz; nodes from 0 in the order of the file, an empty cell
+    /// leaves that direction free.
+    #[arg(long, value_name = "K.csv")]
+    known: PathBuf,
+    /// External forces: node,fx,fy,fz.
+    #[arg(long, value_name = "F.csv")]
+    forces: Option<PathBuf>,
+    /// Where to solve: HOST:PORT, or embedded.
+    #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
+    server: ServerChoice,
+    /// Threads of the embedded server [default: one per processor].
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// gauss-jordan, dense-inverse, dense-cholesky, sparse-cholesky or auto.
+    #[arg(long, default_value = "auto", value_name = "NAME|auto")]
+    method: MethodName,
+    /// Finite element.
+    #[arg(long, default_value = "t4", value_name = "t4|t10", value_parser = parse_element)]
+    element: ElementName,
+    /// Young's modulus, Pa (in the mesh's unit of length).
+    #[arg(long, default_value_t = 1.0e5, value_name = "PA")]
+    young: f64,
+    /// Poisson's ratio.
+    #[arg(long, default_value_t = 0.3, value_name = "NU")]
+    poisson: f64,
+    /// Largest relative error wanted; a worse answer is warned of.
+    #[arg(long, value_name = "REL")]
+    max_error: Option<f64>,
+    /// Time wanted, ms; a later answer is warned of.
+    #[arg(long, value_name = "MS")]
+    deadline: Option<f64>,
+    /// File for the displacements: .csv or .vtu.
+    #[arg(long, value_name = "U.csv|U.vtu", value_parser = parse_out)]
+    out: PathBuf,
+    /// File for a JSON report.
+    #[arg(long, value_name = "F.json")]
+    report: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    schema: u32,
+    command: &'static str,
+    mesh: MeshSummary,
+    server: String,
+    #[serde(flatten)]
+    solve: SolveSummary,
+    out: String,
+}
+
+#[derive(Serialize)]
+struct MeshSummary {
+    file: String,
+    format: String,
+    nodes: usize,
+    tets: usize,
+    flipped: usize,
+    degenerate_dropped: usize,
+    orphans: usize,
+}
+
+fn parse_element(text: &str) -> Result<ElementName, String> {
+    match text {
+        "t4" => Ok(ElementName::T4),
+        "t10" => Ok(ElementName::T10),
+        _ => Err("there are t4 and t10".to_owned()),
+    }
+}
+
+fn parse_out(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("csv" | "vtu") => Ok(path),
+        _ => Err("the name must end in .csv or .vtu".to_owned()),
+    }
+}
+
+impl SolveCommand {
+    /// Reads, asks, writes.
+    ///
+    /// # Errors
+    /// One line each: what happened, where, and what to do.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let progress = Progress::start("reading the mesh");
+        let file = read_mesh_file(&self.mesh)?;
+        let question = self.question(&file.mesh)?;
+        progress.now("starting");
+        let host = Host::open(&self.server, self.threads)?;
+        let mut connection = host.connect(None)?;
+        progress.now(&format!("solving for {} nodes", file.mesh.node_count()));
+        let request = Request::SolveOnce(Box::new(SolveOnce {
+            mesh: mesh_data(&file.mesh),
+            materials: vec![Material { young: self.young, poisson: self.poisson }],
+            element: self.element,
+            question,
+        }));
+        let start = Instant::now();
+        let answer = match connection.ask(&request)? {
+            Reply::Answer(answer) => answer,
+            other => return Err(unexpected("SolveOnce", &other).into()),
+        };
+        let round_trip_ms = start.elapsed().as_secs_f64() * 1e3;
+        progress.now("writing");
+        let summary = SolveSummary::new(&answer.report, round_trip_ms);
+        let displacements = answer.displacements.into_f64();
+        write_file(&self.out, &encode(&self.out, &file.mesh, &displacements)?)?;
+        if let Some(path) = &self.report {
+            write_json(path, &self.report(&file, &host, summary.clone()))?;
+        }
+        drop(progress);
+        for warning in &summary.warnings {
+            eprintln!("glove-client: warning: {warning}");
+        }
+        print(&describe(&file, &summary, &self.out))
+    }
+
+    fn question(&self, mesh: &TetMesh) -> anyhow::Result<Question> {
+        let node_count = mesh.node_count();
+        let known = read_values(&self.known, DISPLACEMENT_COLUMNS, node_count)?;
+        if known.is_empty() {
+            bail!(TableError::Empty { name: self.known.display().to_string() });
+        }
+        let forces = match &self.forces {
+            Some(path) => read_values(path, FORCE_COLUMNS, node_count)?,
+            None => Vec::new(),
+        };
+        for (option, value) in [("--max-error", self.max_error), ("--deadline", self.deadline)] {
+            if value.is_some_and(|v| v <= 0.0 || !v.is_finite()) {
+                bail!("{option} must be a number above 0");
+            }
+        }
+        Ok(Question {
+            known,
+            forces,
+            method: self.method.clone(),
+            want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+            max_error: self.max_error,
+            deadline_ms: self.deadline,
+        })
+    }
+
+    fn report(&self, file: &MeshFile, host: &Host, solve: SolveSummary) -> Report {
+        Report {
+            schema: SCHEMA,
+            command: "solve",
+            mesh: MeshSummary {
+                file: self.mesh.display().to_string(),
+                format: file.format.to_string(),
+                nodes: file.mesh.node_count(),
+                tets: file.mesh.tets().len(),
+                flipped: file.findings.flipped.len(),
+                degenerate_dropped: file.findings.degenerate.len(),
+                orphans: file.findings.orphans,
+            },
+            server: match &self.server {
+                ServerChoice::Embedded => "embedded".to_owned(),
+                ServerChoice::At(_) => host.address().to_owned(),
+            },
+            solve,
+            out: self.out.display().to_string(),
+        }
+    }
+}
+
+fn read_values(
+    path: &Path,
+    columns: [&'static str; 4],
+    node_count: usize,
+) -> anyhow::Result<Vec<DofValue>> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
+    Ok(read_table(&name, &bytes, columns, node_count)?)
+}
+
+/// A mesh as it travels.
+pub(crate) fn mesh_data(mesh: &TetMesh) -> MeshData {
+    MeshData {
+        vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
+        tets: mesh.tets().to_vec(),
+        regions: mesh.regions().to_vec(),
+    }
+}
+
+fn encode(path: &Path, mesh: &TetMesh, displacements: &[[f64; 3]]) -> anyhow::Result<Vec<u8>> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("vtu") => {
+            let field = PointField { name: "displacement", values: displacements };
+            write_vtu(mesh, &[field]).context("cannot form the VTU file")
+        }
+        _ => Ok(write_displacements(displacements).into_bytes()),
+    }
+}
+
+fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
+    let mut text = format!(
+        "{}: {} nodes, {} tetrahedra\n{}: {} unknown and {} known degrees of freedom, \
+         {:.1} ms, residual {:.1e}\nlargest element rotation {:.2} degrees, strain {:.2} %\n",
+        file.format,
+        file.mesh.node_count(),
+        file.mesh.tets().len(),
+        summary.method,
+        summary.unknown_dofs,
+        summary.known_dofs,
+        summary.round_trip_ms,
+        summary.residual_rel,
+        summary.max_rotation_deg,
+        100.0 * summary.max_strain,
+    );
+    let findings = &file.findings;
+    for (count, what) in [
+        (findings.flipped.len(), "inverted tetrahedra were turned"),
+        (findings.degenerate.len(), "tetrahedra without volume were dropped"),
+        (findings.orphans, "nodes belong to no tetrahedron and stay where they are"),
+    ] {
+        if count > 0 {
+            text.push_str(&format!("{count} {what}\n"));
+        }
+    }
+    text.push_str(&format!("displacements written to {}\n", out.display()));
+    text
+}

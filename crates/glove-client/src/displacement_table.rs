@@ -1,0 +1,169 @@
+//! Tables of the command contract: `node,ux,uy,uz` and `node,fx,fy,fz`, nodes counted from 0.
+
+use std::fmt::Write as _;
+
+use softgrasp_protocol::DofValue;
+
+/// A table that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// Another header.
+    #[error("{name}, line 1: the header is '{found}'; expected '{expected}'")]
+    Header {
+        /// File name.
+        name: String,
+        /// What stands there.
+        found: String,
+        /// What must.
+        expected: String,
+    },
+    /// A cell that is no number.
+    #[error("{name}, line {line}: '{found}' in column {column} is not a {expected}")]
+    Cell {
+        /// File name.
+        name: String,
+        /// Line from 1.
+        line: u64,
+        /// Column name.
+        column: &'static str,
+        /// What stands there.
+        found: String,
+        /// What must.
+        expected: &'static str,
+    },
+    /// Too few or too many cells, or bytes that are no text.
+    #[error("{name}: {source}")]
+    Csv {
+        /// File name.
+        name: String,
+        /// The reader's reason, with the line.
+        source: csv::Error,
+    },
+    /// Nothing in it.
+    #[error("{name} names no degree of freedom; every row is empty or there is none")]
+    Empty {
+        /// File name.
+        name: String,
+    },
+    /// A node that the mesh has not.
+    #[error(
+        "{name}, line {line}: node {node} does not exist; the mesh has {node_count} nodes, counted from 0 in the order of the file"
+    )]
+    NoSuchNode {
+        /// File name.
+        name: String,
+        /// Line from 1.
+        line: u64,
+        /// Node given.
+        node: u64,
+        /// Nodes of the mesh.
+        node_count: usize,
+    },
+}
+
+/// Column names of a table of known displacements.
+pub const DISPLACEMENT_COLUMNS: [&str; 4] = ["node", "ux", "uy", "uz"];
+/// Column names of a table of forces.
+pub const FORCE_COLUMNS: [&str; 4] = ["node", "fx", "fy", "fz"];
+
+/// Degrees of freedom and values of a table; an empty cell leaves its degree of freedom out.
+///
+/// Units: those of the file (m or N).
+///
+/// # Errors
+/// [`TableError`] names file, line and column.
+pub fn read_table(
+    name: &str,
+    bytes: &[u8],
+    columns: [&'static str; 4],
+    node_count: usize,
+) -> Result<Vec<DofValue>, TableError> {
+    let csv_error = |source| TableError::Csv { name: name.to_owned(), source };
+    // A byte order mark is what some spreadsheets begin with.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+    let header = reader.headers().map_err(csv_error)?;
+    if header.iter().ne(columns) {
+        let found = header.iter().collect::<Vec<_>>().join(",");
+        let expected = columns.join(",");
+        return Err(TableError::Header { name: name.to_owned(), found, expected });
+    }
+    let mut values = Vec::new();
+    for record in reader.into_records() {
+        let record = record.map_err(csv_error)?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let cell_error = |column: usize, expected| TableError::Cell {
+            name: name.to_owned(),
+            line,
+            column: columns[column],
+            found: record.get(column).unwrap_or("").to_owned(),
+            expected,
+        };
+        let cell = |column: usize| record.get(column).unwrap_or("");
+        let node: u64 = cell(0).parse().map_err(|_| cell_error(0, "node number, 0 or above"))?;
+        if node >= node_count as u64 {
+            return Err(TableError::NoSuchNode { name: name.to_owned(), line, node, node_count });
+        }
+        for axis in 0..3 {
+            let text = cell(axis + 1);
+            if text.is_empty() {
+                continue;
+            }
+            let value: f64 = text.parse().map_err(|_| cell_error(axis + 1, "number"))?;
+            if !value.is_finite() {
+                return Err(cell_error(axis + 1, "finite number"));
+            }
+            values.push(DofValue { dof: 3 * node as u32 + axis as u32, value });
+        }
+    }
+    Ok(values)
+}
+
+/// Table of displacements, every node, shortest decimals that read back to the same bits.
+///
+/// Units: m.
+pub fn write_displacements(displacements: &[[f64; 3]]) -> String {
+    let mut out = String::with_capacity(64 * displacements.len() + 16);
+    out.push_str("node,ux,uy,uz\n");
+    for (node, u) in displacements.iter().enumerate() {
+        // Writing to a String cannot fail.
+        let _ = writeln!(out, "{node},{:e},{:e},{:e}", u[0], u[1], u[2]);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<DofValue>, TableError> {
+        read_table("K.csv", text.as_bytes(), DISPLACEMENT_COLUMNS, 10)
+    }
+
+    #[test]
+    fn empty_cells_leave_their_degree_of_freedom_free() {
+        let values = read("node,ux,uy,uz\r\n3, 1.5 ,,-2e-3\r\n").unwrap();
+        let dofs: Vec<(u32, f64)> = values.iter().map(|v| (v.dof, v.value)).collect();
+        assert_eq!(dofs, [(9, 1.5), (11, -2e-3)]);
+    }
+
+    #[test]
+    fn faults_name_line_and_column() {
+        let message = |text: &str| read(text).unwrap_err().to_string();
+        assert!(message("node,x,y,z\n").contains("expected 'node,ux,uy,uz'"));
+        assert!(message("node,ux,uy,uz\n1,0,0,0\n2,a,0,0\n").contains("line 3: 'a' in column ux"));
+        assert!(message("node,ux,uy,uz\n1,inf,0,0\n").contains("finite number"));
+        assert!(message("node,ux,uy,uz\n10,0,0,0\n").contains("node 10 does not exist"));
+        assert!(message("node,ux,uy,uz\n-1,0,0,0\n").contains("node number"));
+        assert!(message("node,ux,uy,uz\n1,0,0\n").contains("K.csv"));
+        assert!(message("").contains("header is ''"));
+    }
+
+    #[test]
+    fn written_table_reads_back_to_the_same_bits() {
+        let u = [[1.0 / 3.0, -0.0, 1e-300], [f64::MIN_POSITIVE, 2.5e17, -1.0]];
+        let values = read(&write_displacements(&u)).unwrap();
+        let bits = |v: f64| v.to_bits();
+        assert!(values.iter().zip(u.iter().flatten()).all(|(a, b)| bits(a.value) == bits(*b)));
+    }
+}

@@ -1,0 +1,95 @@
+//! The part of every JSON report that tells what one solve cost and how wrong it can be.
+
+use serde::Serialize;
+use softgrasp_protocol::{SolveReport, StageMs};
+
+/// Version of the JSON reports; changes when a field changes its meaning or goes.
+pub const SCHEMA: u32 = 1;
+
+/// One solve, in the names of the command contract.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SolveSummary {
+    /// Method used.
+    pub method: String,
+    /// Element used.
+    pub element: &'static str,
+    /// Size of `K11`.
+    pub unknown_dofs: u64,
+    /// Number of known degrees of freedom.
+    pub known_dofs: u64,
+    /// Milliseconds by stage, on the server.
+    pub ms: StageSummary,
+    /// Milliseconds from sending the request to having the answer, on the client.
+    pub round_trip_ms: f64,
+    /// `‖K11 Q_u − b‖ / ‖b‖`.
+    pub residual_rel: f64,
+    /// Proven bound on the relative error, or null.
+    pub error_bound_rel: Option<f64>,
+    /// Why there is no bound; null when there is one.
+    pub why: Option<String>,
+    /// Refinement steps taken.
+    pub refinement_steps: u32,
+    /// Largest rotation of an element, degrees.
+    pub max_rotation_deg: f64,
+    /// Largest principal strain of an element.
+    pub max_strain: f64,
+    /// Precision of the factor.
+    pub precision: String,
+    /// Whether an earlier factor served again.
+    pub factor_reused: bool,
+    /// Why this method.
+    pub chosen_because: String,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Largest resident memory of the server so far, bytes.
+    pub peak_rss_bytes: u64,
+}
+
+/// Milliseconds by stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageSummary {
+    /// Bytes to request.
+    pub decode: f64,
+    /// Stiffness.
+    pub assemble: f64,
+    /// Fill-reducing order and symbolic analysis.
+    pub order: f64,
+    /// Factor or inverse.
+    pub factor: f64,
+    /// Substitution, refinement, residual.
+    pub solve: f64,
+    /// Gathering the rows asked for.
+    pub encode: f64,
+    /// Waiting for the solving threads.
+    pub queue: f64,
+}
+
+impl SolveSummary {
+    /// From the wire's report and the time the client waited.
+    pub fn new(report: &SolveReport, round_trip_ms: f64) -> Self {
+        let StageMs { decode, assemble, order, factor, solve, encode, queue } = report.stage_ms;
+        let why = match report.error_bound_rel {
+            Some(_) => None,
+            None => Some(report.error_bound_why.clone()),
+        };
+        Self {
+            method: report.method.clone(),
+            element: report.element.as_str(),
+            unknown_dofs: report.unknown_dofs,
+            known_dofs: report.known_dofs,
+            ms: StageSummary { decode, assemble, order, factor, solve, encode, queue },
+            round_trip_ms,
+            residual_rel: report.residual_rel,
+            error_bound_rel: report.error_bound_rel,
+            why,
+            refinement_steps: report.refinement_steps,
+            max_rotation_deg: report.max_rotation_deg,
+            max_strain: report.max_strain,
+            precision: report.precision.clone(),
+            factor_reused: report.factor_reused,
+            chosen_because: report.chosen_because.clone(),
+            warnings: report.warnings.clone(),
+            peak_rss_bytes: report.peak_rss_bytes,
+        }
+    }
+}
