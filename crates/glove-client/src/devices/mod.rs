@@ -1,1 +1,10 @@
 //! Instrumented glove and tracker: device bytes ⇄ samples, without I/O.
+
+pub mod calibration;
+pub mod cyberglove;
+pub mod fastrak;
+mod inbox;
+pub mod recordings;
+mod sample;
+
+pub use sample::{Freshness, GloveReading, HandSample, SampleHold, TrackerReading};

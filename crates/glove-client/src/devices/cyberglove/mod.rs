@@ -1,0 +1,12 @@
+//! CyberGlove and its interface unit: sensors, records and the parser of their byte stream.
+
+mod parser;
+mod record;
+mod sensor;
+mod sensor_health;
+
+pub use parser::{GloveError, GloveEvent, GloveFault, GloveFaultKind, GloveParser};
+pub use record::{GloveRecord, GloveStatus, GloveTicks, RecordKind, RecordOptions, encode_record};
+pub use sensor::{RawSensors, RawSensorsError, Sensor, SensorCount, SensorSet};
+pub use sensor_health::SensorHealth;
+pub(in crate::devices) use sensor_health::is_rail;

@@ -1,0 +1,236 @@
+//! From the glove's byte stream to records and faults, whatever the pieces it arrives in.
+
+use super::record::{GloveRecord, RecordError, RecordOptions, decode_frame};
+use super::sensor::SensorCount;
+use crate::devices::inbox::Inbox;
+
+/// What the interface unit complains about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GloveError {
+    /// `e?`
+    #[error("unknown command")]
+    UnknownCommand,
+    /// `en`
+    #[error("too many numbers in a command")]
+    TooManyNumbers,
+    /// `ey`
+    #[error("synchronisation rate too fast")]
+    SyncTooFast,
+    /// `eg`
+    #[error("glove not plugged in")]
+    NotPluggedIn,
+    /// `es`
+    #[error("sampling rate too fast")]
+    SamplingTooFast,
+}
+
+impl GloveError {
+    fn from_text(text: &[u8]) -> Option<Self> {
+        match text {
+            b"e?" => Some(Self::UnknownCommand),
+            b"en" => Some(Self::TooManyNumbers),
+            b"ey" => Some(Self::SyncTooFast),
+            b"eg" => Some(Self::NotPluggedIn),
+            b"es" => Some(Self::SamplingTooFast),
+            _ => None,
+        }
+    }
+}
+
+/// Why bytes did not become a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GloveFaultKind {
+    /// The unit reports an error.
+    #[error("the glove reports: {0}")]
+    Device(GloveError),
+    /// A NUL came too early or too late: lost or inserted bytes, or a zero among the sensors.
+    #[error("{got} bytes before the NUL, a record has {expected}")]
+    WrongLength {
+        /// Bytes before the NUL.
+        got: usize,
+        /// Bytes a record has there.
+        expected: usize,
+    },
+    /// No NUL where every possible record has ended: wrong speed, or not a glove.
+    #[error("no NUL within the length of a record")]
+    NoTerminator,
+    /// The right length, but the first byte is neither `G` nor `S`.
+    #[error("a record starts with byte {byte:#04x}")]
+    UnknownStart {
+        /// The byte.
+        byte: u8,
+    },
+    /// The status byte lacks its always-set bit.
+    #[error("status byte {byte:#04x} lacks bit 7")]
+    BadStatus {
+        /// The byte.
+        byte: u8,
+    },
+}
+
+/// Bytes that were thrown away, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{kind} ({bytes_skipped} bytes skipped)")]
+pub struct GloveFault {
+    /// Why.
+    pub kind: GloveFaultKind,
+    /// How many, NUL included; 0 when a good record came with the complaint.
+    pub bytes_skipped: usize,
+}
+
+/// What the stream contained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GloveEvent {
+    /// A sample.
+    Record(GloveRecord),
+    /// Something else.
+    Fault(GloveFault),
+}
+
+/// Parser of the glove's byte stream.
+///
+/// As an iterator it yields every event of the bytes fed so far; `None` means "feed more", and
+/// it may yield again afterwards. Memory is bounded whatever arrives.
+///
+/// Sensor values are never zero and every record ends with NUL, so the stream is cut at NULs and
+/// a piece is a record only if it has exactly the right length: garbage before a record costs
+/// that record, never the next one.
+///
+/// Source: thesis section 2.2.1.
+#[derive(Clone, Debug)]
+pub struct GloveParser {
+    count: SensorCount,
+    options: RecordOptions,
+    inbox: Inbox,
+    /// Set while inside a frame that is already too long: bytes of it dropped since the last
+    /// fault.
+    overlong: Option<usize>,
+    pending: Option<GloveEvent>,
+}
+
+/// An overlong frame is reported at least this often.
+const REPORT_EVERY: usize = 1024;
+
+impl GloveParser {
+    /// Parser for one glove, empty.
+    pub fn new(count: SensorCount, options: RecordOptions) -> Self {
+        Self { count, options, inbox: Inbox::default(), overlong: None, pending: None }
+    }
+
+    /// Takes bytes from the line and returns how many it took.
+    ///
+    /// It takes all of them unless some 4 KiB are waiting: then read the events and feed the rest.
+    #[must_use = "bytes beyond the returned number were not taken"]
+    pub fn feed(&mut self, bytes: &[u8]) -> usize {
+        self.inbox.push(bytes)
+    }
+
+    /// Feeds all bytes and hands each event to `on_event`.
+    pub fn feed_all(&mut self, mut bytes: &[u8], mut on_event: impl FnMut(GloveEvent)) {
+        loop {
+            let taken = self.feed(bytes);
+            bytes = &bytes[taken..];
+            for event in self.by_ref() {
+                on_event(event);
+            }
+            // Reading every event leaves less than one record waiting, so the next feed takes some.
+            if bytes.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// Longest possible piece before a NUL: a record with an error text.
+    fn longest(&self) -> usize {
+        self.options.frame_length(self.count) + 2
+    }
+
+    /// Drops up to `available` bytes of an overlong frame; `ends` if the last of them is its NUL.
+    fn drop_overlong(&mut self, available: usize, ends: bool) -> Option<GloveEvent> {
+        let dropped = self.overlong.unwrap_or(0);
+        let take = available.min(REPORT_EVERY - dropped);
+        self.inbox.consume(take);
+        let dropped = dropped + take;
+        let at_end = ends && take == available;
+        let report = at_end || dropped == REPORT_EVERY;
+        self.overlong = match (at_end, report) {
+            (true, _) => None,
+            (false, true) => Some(0),
+            (false, false) => Some(dropped),
+        };
+        report.then_some(GloveEvent::Fault(GloveFault {
+            kind: GloveFaultKind::NoTerminator,
+            bytes_skipped: dropped,
+        }))
+    }
+}
+
+impl Iterator for GloveParser {
+    type Item = GloveEvent;
+
+    fn next(&mut self) -> Option<GloveEvent> {
+        if let Some(event) = self.pending.take() {
+            return Some(event);
+        }
+        let waiting = self.inbox.waiting();
+        let Some(end) = waiting.iter().position(|&b| b == 0) else {
+            let available = waiting.len();
+            if available > self.longest() || (self.overlong.is_some() && available > 0) {
+                return self.drop_overlong(available, false);
+            }
+            return None;
+        };
+        if self.overlong.is_some() || end > self.longest() {
+            return self.drop_overlong(end + 1, true);
+        }
+        let (event, pending) = read_frame(&waiting[..end], self.count, self.options);
+        self.inbox.consume(end + 1);
+        self.pending = pending;
+        Some(event)
+    }
+}
+
+/// The meaning of the bytes between two NULs, and what follows it at once.
+fn read_frame(
+    frame: &[u8],
+    count: SensorCount,
+    options: RecordOptions,
+) -> (GloveEvent, Option<GloveEvent>) {
+    let expected = options.frame_length(count);
+    let bytes_skipped = frame.len() + 1;
+    let fault = |kind| (GloveEvent::Fault(GloveFault { kind, bytes_skipped }), None);
+    let (body, text) = frame.split_at(frame.len().saturating_sub(2));
+    // An error text stands alone, after the echoed letter, or after a whole record.
+    let complaint = match body.len() {
+        0 | 1 => GloveError::from_text(text),
+        length if length == expected => GloveError::from_text(text),
+        _ => None,
+    };
+    let record_bytes = match complaint {
+        Some(GloveError::SamplingTooFast) if body.len() == expected => body,
+        Some(error) => return fault(GloveFaultKind::Device(error)),
+        None => frame,
+    };
+    if record_bytes.len() != expected {
+        return fault(GloveFaultKind::WrongLength { got: frame.len(), expected });
+    }
+    match decode_frame(record_bytes, count, options) {
+        Ok(record) => {
+            // Only the rate could not be kept: the values themselves are good.
+            let late = complaint.map(|error| {
+                let kind = GloveFaultKind::Device(error);
+                GloveEvent::Fault(GloveFault { kind, bytes_skipped: 0 })
+            });
+            (GloveEvent::Record(record), late)
+        }
+        Err(RecordError::Letter(byte)) => fault(GloveFaultKind::UnknownStart { byte }),
+        Err(RecordError::Status(byte)) => fault(GloveFaultKind::BadStatus { byte }),
+        Err(RecordError::Sensors) => {
+            fault(GloveFaultKind::WrongLength { got: frame.len(), expected })
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "parser_tests.rs"]
+mod tests;

@@ -1,0 +1,15 @@
+//! Polhemus FASTRAK: records, their world poses, and the parser of the tracker's byte stream.
+
+mod decode;
+mod encode;
+mod flip;
+mod parser;
+mod record;
+
+pub use encode::{EncodeError, encode_record};
+pub use flip::{FlipWatch, HemisphereFlip};
+pub use parser::{FastrakEvent, FastrakFault, FastrakFaultKind, FastrakParser};
+pub use record::{
+    Attitude, Encoding, FastrakFormat, FastrakRecord, LengthUnit, OutputList, Station,
+    StationError, world_from_transmitter,
+};

@@ -1,0 +1,181 @@
+//! From the tracker's byte stream to records, replies and faults, whatever pieces it arrives in.
+
+use super::decode::{Head, head};
+use super::flip::{FlipWatch, HemisphereFlip};
+use super::record::{FastrakFormat, FastrakRecord};
+use crate::devices::inbox::Inbox;
+
+/// Why bytes did not become a record; the first reason of a run of skipped bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FastrakFaultKind {
+    /// A record starts with `0`, a reply with `2`.
+    #[error("byte {byte:#04x} starts neither a record nor a reply")]
+    UnexpectedByte {
+        /// The byte.
+        byte: u8,
+    },
+    /// The second byte is no station.
+    #[error("station byte {byte:#04x} is not '1' to '4'")]
+    BadStation {
+        /// The byte.
+        byte: u8,
+    },
+    /// The third byte is neither blank nor a letter.
+    #[error("error byte {byte:#04x} is neither blank nor a letter")]
+    BadErrorByte {
+        /// The byte.
+        byte: u8,
+    },
+    /// No CR LF at the end of the record.
+    #[error("the record does not end in CR LF")]
+    BadTerminator,
+    /// A field that no tracker sends.
+    #[error("number {index} of the record cannot be true")]
+    BadNumber {
+        /// Position among the numbers of the record, from 0.
+        index: usize,
+    },
+    /// It starts like a status or error record and does not go on like one.
+    #[error("not a status or error record")]
+    BadReply,
+}
+
+/// Bytes that were thrown away, and why the first of them was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{kind} ({bytes_skipped} bytes skipped)")]
+pub struct FastrakFault {
+    /// Why.
+    pub kind: FastrakFaultKind,
+    /// How many.
+    pub bytes_skipped: usize,
+}
+
+/// What the stream contained.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FastrakEvent {
+    /// A sample.
+    Record(FastrakRecord),
+    /// The next record, of the same station, is about opposite to the one before it.
+    HemisphereFlip(HemisphereFlip),
+    /// A status, read-back or error record (starts with `2`), without its CR LF.
+    Reply(String),
+    /// Something else.
+    Fault(FastrakFault),
+}
+
+/// Parser of the tracker's byte stream.
+///
+/// As an iterator it yields every event of the bytes fed so far; `None` means "feed more", and
+/// it may yield again afterwards. Memory is bounded whatever arrives.
+///
+/// Floats may contain `0` and CR LF, so a record counts only if station digit, error byte,
+/// length, CR LF and every number are what a tracker sends; else one byte is dropped and the next
+/// tried. A fault covers a whole run of dropped bytes.
+///
+/// Source: thesis section 2.1.
+#[derive(Clone, Debug)]
+pub struct FastrakParser {
+    format: FastrakFormat,
+    inbox: Inbox,
+    flips: FlipWatch,
+    lost: Option<FastrakFault>,
+    pending: Option<FastrakRecord>,
+}
+
+/// A run of skipped bytes is reported at least this often.
+const REPORT_EVERY: usize = 1024;
+
+impl FastrakParser {
+    /// Parser for one tracker, empty.
+    pub fn new(format: FastrakFormat) -> Self {
+        Self {
+            format,
+            inbox: Inbox::default(),
+            flips: FlipWatch::default(),
+            lost: None,
+            pending: None,
+        }
+    }
+
+    /// Takes bytes from the line and returns how many it took.
+    ///
+    /// It takes all of them unless some 4 KiB are waiting: then read the events and feed the rest.
+    #[must_use = "bytes beyond the returned number were not taken"]
+    pub fn feed(&mut self, bytes: &[u8]) -> usize {
+        self.inbox.push(bytes)
+    }
+
+    /// Feeds all bytes and hands each event to `on_event`.
+    pub fn feed_all(&mut self, mut bytes: &[u8], mut on_event: impl FnMut(FastrakEvent)) {
+        loop {
+            let taken = self.feed(bytes);
+            bytes = &bytes[taken..];
+            for event in self.by_ref() {
+                on_event(event);
+            }
+            // Reading every event leaves at most one reply waiting, so the next feed takes some.
+            if bytes.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// Drops one byte; a fault when the run is long enough to be reported.
+    fn skip(&mut self, kind: FastrakFaultKind) -> Option<FastrakEvent> {
+        self.inbox.consume(1);
+        let lost = self.lost.get_or_insert(FastrakFault { kind, bytes_skipped: 0 });
+        lost.bytes_skipped += 1;
+        if lost.bytes_skipped < REPORT_EVERY {
+            return None;
+        }
+        self.lost.take().map(FastrakEvent::Fault)
+    }
+}
+
+impl Iterator for FastrakParser {
+    type Item = FastrakEvent;
+
+    fn next(&mut self) -> Option<FastrakEvent> {
+        if let Some(record) = self.pending.take() {
+            return Some(FastrakEvent::Record(record));
+        }
+        loop {
+            let found = head(self.inbox.waiting(), self.format);
+            if matches!(found, Head::Record(_) | Head::Reply(_))
+                && let Some(fault) = self.lost.take()
+            {
+                return Some(FastrakEvent::Fault(fault));
+            }
+            match found {
+                Head::NeedMore => return None,
+                Head::Skip(kind) => {
+                    if let Some(event) = self.skip(kind) {
+                        return Some(event);
+                    }
+                }
+                Head::Reply(length) => {
+                    let text = &self.inbox.waiting()[..length];
+                    let text = String::from_utf8_lossy(text).trim_end().to_owned();
+                    self.inbox.consume(length);
+                    return Some(FastrakEvent::Reply(text));
+                }
+                Head::Record(record) => {
+                    self.inbox.consume(self.format.record_length());
+                    let position = record.position_in_transmitter();
+                    // A record with a failed self-test says nothing about the hemisphere.
+                    let flip = match record.error {
+                        None => self.flips.observe(record.station, position),
+                        Some(_) => None,
+                    };
+                    let Some(flip) = flip else { return Some(FastrakEvent::Record(record)) };
+                    self.pending = Some(record);
+                    return Some(FastrakEvent::HemisphereFlip(flip));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "parser_tests.rs"]
+mod tests;
