@@ -51,7 +51,8 @@ fn q9_quadratic_cells_give_their_corners() {
 #[test]
 fn q16_field_data_and_metadata_stand_where_they_like() {
     let cells = format!("CELLS 2 10\n{}CELL_TYPES 2\n10\n10\n", tet_lines("4 ", 0, ""));
-    let field = "FIELD FieldData 2\nTIME 1 1 double\n0.5\nname 1 1 string\nsome%20text\nMETADATA\nINFORMATION 0\n\n";
+    let field = "FIELD FieldData 2\nTIME 1 1 double\n0.5\nname 1 1 string\nsome%20text\n\
+                 METADATA\nINFORMATION 0\n\n";
     let text = vtk_head("4.2", "ASCII") + field + "POINTS 5 double\n" + &point_lines(None) + &cells;
     assert_is_sample(&read(&text).unwrap(), "field before points");
     let text = text
@@ -170,7 +171,8 @@ fn packed_lengths_that_lie_are_refused_before_unpacking() {
 
 #[test]
 fn many_pieces_on_one_array_do_not_multiply_it() {
-    let piece = "<Piece><Points><DataArray type=\"UInt8\" format=\"appended\" offset=\"0\"/></Points></Piece>";
+    let piece = "<Piece><Points>\
+                 <DataArray type=\"UInt8\" format=\"appended\" offset=\"0\"/></Points></Piece>";
     let file = |pieces: usize| {
         let mut bytes = format!(
             "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\">{}\
