@@ -1,4 +1,4 @@
-//! Position in a file's bytes: tokens, lines and raw bytes come off the front, errors name the place.
+//! Position in a file: words, lines and raw bytes come off the front, errors name the place.
 
 use super::error::{Fault, MeshFileError, Place};
 use super::number::{parse_integer, parse_real};
@@ -185,7 +185,11 @@ impl<'a> Cursor<'a> {
                 self.position += N;
                 Ok(bytes)
             }
-            None => Err(self.expected(what)),
+            None => Err(self.fault(Fault::Syntax {
+                at: self.place(),
+                expected: what.to_owned(),
+                found: format!("{} bytes to the end of the file", self.rest().len()),
+            })),
         }
     }
 

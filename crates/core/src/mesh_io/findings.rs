@@ -45,10 +45,10 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Adds a note once.
+    /// Adds a note once; a file cannot fill the list.
     pub(super) fn note(&mut self, note: impl Into<String>) {
         let note = note.into();
-        if !self.notes.contains(&note) {
+        if self.notes.len() < 50 && !self.notes.contains(&note) {
             self.notes.push(note);
         }
     }

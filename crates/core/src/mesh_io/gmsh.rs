@@ -63,7 +63,7 @@ pub(super) fn read(mut cursor: Cursor) -> Result<RawMesh, MeshFileError> {
     Ok(raw)
 }
 
-/// Node ids of every `$…` section come with an end mark; a file cut short lacks it.
+/// Moves past the end mark of a section; a file cut short lacks it.
 pub(super) fn end_section(cursor: &mut Cursor, mark: &str) -> Result<(), MeshFileError> {
     cursor.word(mark)
 }
@@ -124,12 +124,20 @@ fn read_physical_names(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<(), Mes
 }
 
 /// Moves past `$End…` or `$END…`; false when there is none.
+///
+/// One pass, so that a file of thousands of sections takes no longer than its length.
 fn skip_section(cursor: &mut Cursor, section: &[u8]) -> bool {
     let mut here = cursor.clone();
-    let end = [b"$End", section].concat();
-    let found = here.skip_past(&end) || here.skip_past(&[b"$END", section].concat());
-    if found {
-        *cursor = here;
+    while here.skip_past(b"$") {
+        let is_end = here.rest().split_first_chunk::<3>().is_some_and(|(word, after)| {
+            let name_ends = after.get(section.len()).is_none_or(u8::is_ascii_whitespace);
+            word.eq_ignore_ascii_case(b"end") && after.starts_with(section) && name_ends
+        });
+        if is_end {
+            here.token();
+            *cursor = here;
+            return true;
+        }
     }
-    found
+    false
 }

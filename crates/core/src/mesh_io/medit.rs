@@ -91,14 +91,17 @@ fn skip_keyword(cursor: &mut Cursor, keyword: &[u8], raw: &mut RawMesh) {
         _ => None,
     };
     let mut first = None;
-    while let Some(token) = cursor.peek().filter(|token| !token[0].is_ascii_alphabetic()) {
+    let mut numbers = 0_usize;
+    let starts_keyword = |token: &[u8]| token.first().is_some_and(u8::is_ascii_alphabetic);
+    while let Some(token) = cursor.peek().filter(|token| !starts_keyword(token)) {
         first = first.or_else(|| parse_integer(token));
+        numbers += 1;
         cursor.token();
     }
     match (kind, first.and_then(|count| usize::try_from(count).ok())) {
         (Some(_), Some(0)) => {}
-        // The count is only told, and a file cannot hold more cells than bytes.
-        (Some(kind), Some(count)) => raw.count_cells(kind, count.min(u32::MAX as usize)),
+        // The cells are not read, so that their count is believed up to the numbers there are.
+        (Some(kind), Some(count)) => raw.count_cells(kind, count.min(numbers)),
         _ => raw.findings.skip(keyword),
     }
 }

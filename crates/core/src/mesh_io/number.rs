@@ -79,7 +79,8 @@ mod tests {
         #[test]
         fn printed_reals_come_back_unchanged(value in proptest::num::f64::NORMAL) {
             prop_assert_eq!(parse_real(format!("{value:?}").as_bytes()), Some(value));
-            prop_assert_eq!(parse_real(format!("{value:e}").replace('e', "D").as_bytes()), Some(value));
+            let fortran = format!("{value:e}").replace('e', "D");
+            prop_assert_eq!(parse_real(fortran.as_bytes()), Some(value));
         }
     }
 }

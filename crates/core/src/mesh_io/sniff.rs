@@ -49,7 +49,7 @@ pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
 }
 
 fn by_magic(bytes: &[u8]) -> Option<Foreign> {
-    const MAGICS: [(&[u8], Foreign); 10] = [
+    const MAGICS: [(&[u8], Foreign); 8] = [
         (b"\x1f\x8b", Foreign::Gzip),
         (b"PK\x03\x04", Foreign::Zip),
         (b"PK\x05\x06", Foreign::Zip),
@@ -58,10 +58,11 @@ fn by_magic(bytes: &[u8]) -> Option<Foreign> {
         (b"\x28\xb5\x2f\xfd", Foreign::OtherCompression),
         (b"PXR-USDC", Foreign::Usd),
         (b"\x89HDF", Foreign::Hdf5),
-        // The number one, then version 1 to 4, all 32-bit.
-        (b"\x01\x00\x00\x00\x02\x00\x00\x00", Foreign::MeditBinary),
-        (b"\x01\x00\x00\x00\x03\x00\x00\x00", Foreign::MeditBinary),
     ];
+    // The number one, then version 1 to 4, in either byte order.
+    if let [1, 0, 0, 0, 1..=4, 0, 0, 0, ..] | [0, 0, 0, 1, 0, 0, 0, 1..=4, ..] = bytes {
+        return Some(Foreign::MeditBinary);
+    }
     MAGICS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, foreign)| foreign)
 }
 

@@ -1,6 +1,6 @@
 //! Vega FEM `.veg`: `*` sections of a text, included files, materials by region.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
 
@@ -209,23 +209,34 @@ impl Reader<'_, '_> {
         let mut by_label: Vec<(i64, usize)> =
             self.element_labels.iter().enumerate().map(|(tet, &label)| (label, tet)).collect();
         by_label.sort_unstable();
-        for (number, (set, material)) in self.regions.iter().enumerate() {
-            let region = [number as i64 + 1, 0];
-            self.raw.region_names.insert(region[0], format!("{set} ({material})"));
-            if set == "allElements" && !self.sets.contains_key(set) {
-                self.raw.regions.iter_mut().for_each(|r| *r = region);
+        // From the last region to the first, each set once: the first one to come stays.
+        let mut done = BTreeSet::new();
+        for (number, (set, material)) in self.regions.iter().enumerate().rev() {
+            let label = number as i64 + 1;
+            self.raw.region_names.insert(label, format!("{set} ({material})"));
+            if !done.insert(set) {
                 continue;
             }
-            let Some(labels) = self.sets.get(set) else {
-                self.raw.findings.note(format!("region of unknown set {}", set.escape_debug()));
-                continue;
+            let region_slots = &mut self.raw.regions;
+            let mut assign = |tet: usize| {
+                if let Some(region) = region_slots.get_mut(tet).filter(|region| region[0] == 0) {
+                    region[0] = label;
+                }
             };
-            for label in labels {
-                let at = by_label.partition_point(|pair| pair.0 < *label);
-                if let Some(&(_, tet)) = by_label.get(at).filter(|pair| pair.0 == *label)
-                    && let Some(r) = self.raw.regions.get_mut(tet)
-                {
-                    *r = region;
+            match self.sets.get(set) {
+                Some(elements) => {
+                    for element in elements {
+                        let at = by_label.partition_point(|pair| pair.0 < *element);
+                        by_label
+                            .get(at)
+                            .filter(|pair| pair.0 == *element)
+                            .iter()
+                            .for_each(|p| assign(p.1));
+                    }
+                }
+                None if set == "allElements" => (0..by_label.len()).for_each(assign),
+                None => {
+                    self.raw.findings.note(format!("region of unknown set {}", set.escape_debug()));
                 }
             }
         }

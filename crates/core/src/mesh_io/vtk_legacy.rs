@@ -53,6 +53,7 @@ pub(super) fn read(mut cursor: Cursor) -> Result<RawMesh, MeshFileError> {
 
 /// The four header lines, up to the kind of data set.
 fn read_header(cursor: &mut Cursor) -> Result<Encoding, MeshFileError> {
+    cursor.skip_space();
     cursor.rest_of_line();
     cursor.end_of_line()?;
     // The title may be empty, and may begin with a word that means something elsewhere.

@@ -8,7 +8,7 @@ use super::error::{Fault, MeshFileError};
 use super::number::parse_integer;
 use super::raw_mesh::RawMesh;
 use super::vtk_cells::VtkCells;
-use super::vtu_array::{Appended, BinaryRules, Compressor, DataArray};
+use super::vtu_array::{Appended, BinaryRules, Budget, Compressor, DataArray};
 use super::xml::{Event, attribute, next_event};
 
 /// One `Piece` with the arrays that make its grid.
@@ -38,13 +38,15 @@ struct Document<'a> {
 ///
 /// Source: VTK user's guide, section "XML file formats".
 pub(super) fn read(mut cursor: Cursor) -> Result<RawMesh, MeshFileError> {
+    let file_bytes = cursor.rest().len();
     let document = read_document(&mut cursor)?;
+    let mut budget = Budget::new(document.rules, file_bytes);
     let mut raw = RawMesh::default();
     for section in &document.skipped {
         raw.findings.skip(section.as_bytes());
     }
     for piece in &document.pieces {
-        read_piece(piece, &document, &cursor, &mut raw)?;
+        read_piece(piece, &document, &cursor, &mut budget, &mut raw)?;
     }
     Ok(raw)
 }
@@ -218,12 +220,13 @@ fn read_piece(
     piece: &Piece,
     document: &Document,
     cursor: &Cursor,
+    budget: &mut Budget,
     raw: &mut RawMesh,
 ) -> Result<(), MeshFileError> {
     let first_node = raw.points.len();
     let (rules, appended) = (document.rules, document.appended);
     if let Some(array) = &piece.coordinates {
-        let values = array.reals(rules, appended)?;
+        let values = array.reals(rules, appended, budget)?;
         let points = piece.points.unwrap_or(values.len() / 3);
         check_length(array, "Points", points.saturating_mul(3), values.len())?;
         raw.points.extend(values.chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])));
@@ -240,9 +243,9 @@ fn read_piece(
         };
     };
     let cells = VtkCells {
-        connectivity: connectivity.integers(rules, appended)?,
-        ends: offsets.integers(rules, appended)?,
-        types: types.integers(rules, appended)?,
+        connectivity: connectivity.integers(rules, appended, budget)?,
+        ends: offsets.integers(rules, appended, budget)?,
+        types: types.integers(rules, appended, budget)?,
     };
     if let Some(count) = piece.cells {
         check_length(offsets, "offsets", count, cells.ends.len())?;

@@ -9,8 +9,28 @@ use super::error::MeshFileError;
 use super::scalar::{Scalar, unsigned};
 use super::xml::attribute;
 
-/// No array of a mesh that can be modelled is larger; a small file can unpack to anything.
-const MAX_UNPACKED_BYTES: usize = 1 << 31;
+/// All compressed arrays of a mesh that can be modelled are smaller together (16 million
+/// tetrahedra); a small file can unpack to anything.
+const MAX_UNPACKED_BYTES: usize = 1 << 29;
+
+/// Bytes that binary arrays may still take.
+///
+/// Arrays that are not compressed take no more than the file has, unless many of them point to
+/// the same place, which no writer does.
+#[derive(Debug)]
+pub(super) struct Budget {
+    left: usize,
+}
+
+impl Budget {
+    /// For a file of this many bytes.
+    pub(super) fn new(rules: BinaryRules, file_bytes: usize) -> Self {
+        match rules.compressor {
+            Compressor::None => Self { left: file_bytes },
+            _ => Self { left: MAX_UNPACKED_BYTES },
+        }
+    }
+}
 
 /// What the root element says about all binary arrays.
 #[derive(Clone, Copy, Debug)]
@@ -51,8 +71,9 @@ impl<'a> DataArray<'a> {
         &self,
         rules: BinaryRules,
         appended: Appended<'a>,
+        budget: &mut Budget,
     ) -> Result<Vec<f64>, MeshFileError> {
-        match self.bytes(rules, appended)? {
+        match self.bytes(rules, appended, budget)? {
             Some((scalar, bytes)) => Ok(scalar.reals(&bytes, rules.order)),
             None => self.words(|cursor| cursor.real("a number")),
         }
@@ -63,8 +84,9 @@ impl<'a> DataArray<'a> {
         &self,
         rules: BinaryRules,
         appended: Appended<'a>,
+        budget: &mut Budget,
     ) -> Result<Vec<i64>, MeshFileError> {
-        match self.bytes(rules, appended)? {
+        match self.bytes(rules, appended, budget)? {
             Some((scalar, bytes)) => Ok(scalar.integers(&bytes, rules.order)),
             None => self.words(|cursor| cursor.integer("an integer")),
         }
@@ -90,14 +112,19 @@ impl<'a> DataArray<'a> {
         &self,
         rules: BinaryRules,
         appended: Appended<'a>,
+        budget: &mut Budget,
     ) -> Result<Option<(Scalar, Vec<u8>)>, MeshFileError> {
         let type_name = attribute(self.attributes, "type").unwrap_or_default();
         let Some(scalar) = Scalar::from_xml(type_name) else {
             return Err(self.cursor.expected_instead("a number type such as Float64", type_name));
         };
         let name = attribute(self.attributes, "Name").unwrap_or(b"Points");
-        let packed =
-            Packed { cursor: &self.cursor, rules, array: format!("array {}", name.escape_ascii()) };
+        let packed = Packed {
+            cursor: &self.cursor,
+            rules,
+            array: format!("array {}", name.escape_ascii()),
+            most_bytes: budget.left,
+        };
         let format = attribute(self.attributes, "format").unwrap_or(b"ascii");
         let bytes = match format {
             b"ascii" => return Ok(None),
@@ -119,6 +146,7 @@ impl<'a> DataArray<'a> {
             }
             _ => return Err(self.cursor.expected_instead("ascii, binary or appended", format)),
         };
+        budget.left = budget.left.saturating_sub(bytes.len());
         if bytes.len() % scalar.bytes() != 0 {
             let expected = format!("a multiple of {} bytes", scalar.bytes());
             return Err(self.cursor.count_fault(
@@ -136,6 +164,8 @@ struct Packed<'c, 'a> {
     cursor: &'c Cursor<'a>,
     rules: BinaryRules,
     array: String,
+    /// What is left of the budget.
+    most_bytes: usize,
 }
 
 impl Packed<'_, '_> {
@@ -158,6 +188,9 @@ impl Packed<'_, '_> {
             return Err(self.wrong(&format!("{data_length} bytes"), &format!("{}", after.len())));
         };
         match self.rules.compressor {
+            Compressor::None if data.len() > self.most_bytes => {
+                Err(self.wrong(&format!("at most {} bytes", self.most_bytes), "more"))
+            }
             Compressor::None => Ok(data.to_vec()),
             compressor => self.decompress(compressor, bytes, data),
         }
@@ -214,8 +247,8 @@ impl Packed<'_, '_> {
                 return Err(self.wrong(&format!("{packed} bytes"), &data.len().to_string()));
             };
             data = rest;
-            if bytes.len().saturating_add(unpacked) > MAX_UNPACKED_BYTES {
-                return Err(self.wrong(&format!("at most {MAX_UNPACKED_BYTES} bytes"), "more"));
+            if bytes.len().saturating_add(unpacked) > self.most_bytes {
+                return Err(self.wrong(&format!("at most {} bytes", self.most_bytes), "more"));
             }
             let before = bytes.len();
             match compressor {

@@ -19,8 +19,11 @@ fn q1_foreign_formats_are_recognised_by_content() {
         (b"$MeshFormat\n3 0 8\n$EndMeshFormat\n", Foreign::GmshOther),
         (b"\x01\0\0\0\x02\0\0\0\x03\0\0\0", Foreign::MeditBinary),
         (b"*Heading\n** Job name: x\n*Node\n1, 0., 0., 0.\n", Foreign::Abaqus),
-        (b"** comment\n*NODE, NSET=N\n1,0,0,-3.535534e-001\n*Element, TYPE=C3D10\n", Foreign::Abaqus),
-        (b"<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<!-- \xe9 --><febio_spec version=\"3.0\">", Foreign::Febio),
+        (b"** x\n*NODE, NSET=N\n1,0,0,-3.5e-001\n*Element, TYPE=C3D10\n", Foreign::Abaqus),
+        (
+            b"<?xml encoding=\"ISO-8859-1\"?>\n<!-- \xe9 --><febio_spec version=\"3.0\">",
+            Foreign::Febio,
+        ),
         (b"#usda 1.0\ndef TetMesh \"m\" {}\n", Foreign::Usd),
         (b"PXR-USDC\0\x08\0\0", Foreign::Usd),
         (&stl, Foreign::Stl),

@@ -124,3 +124,13 @@ fn an_inverted_element_of_the_lists_is_turned() {
     assert_eq!(file.findings.flipped, [0]);
     assert_eq!(file.mesh.tets(), [[1, 0, 3, 2]]);
 }
+
+#[test]
+fn the_example_of_the_documentation_is_read() {
+    let page = include_str!("../../../../../docs/files.md");
+    let start = page.find("softgrasp-lists 1\n").unwrap();
+    let end = start + page[start..].find("```").unwrap();
+    let file = read(&page[start..end]).unwrap();
+    assert_eq!((file.mesh.node_count(), file.mesh.tets()), (4, &[[0, 1, 2, 3]][..]));
+    assert!(file.findings.flipped.is_empty());
+}

@@ -51,7 +51,8 @@ fn q9_quadratic_cells_give_their_corners() {
 #[test]
 fn q16_field_data_and_metadata_stand_where_they_like() {
     let cells = format!("CELLS 2 10\n{}CELL_TYPES 2\n10\n10\n", tet_lines("4 ", 0, ""));
-    let field = "FIELD FieldData 2\nTIME 1 1 double\n0.5\nname 1 1 string\nsome%20text\nMETADATA\nINFORMATION 0\n\n";
+    let field = "FIELD FieldData 2\nTIME 1 1 double\n0.5\nname 1 1 string\nsome%20text\n\
+                 METADATA\nINFORMATION 0\n\n";
     let text = vtk_head("4.2", "ASCII") + field + "POINTS 5 double\n" + &point_lines(None) + &cells;
     assert_is_sample(&read(&text).unwrap(), "field before points");
     let text = text
@@ -133,11 +134,8 @@ fn q17_counts_that_lie_name_array_expectation_and_finding() {
 #[test]
 fn a_wrong_word_in_an_array_names_its_line() {
     let text = vtu_text(&point_lines(None), "0 1 2 3\n4 2 x 3", "4 8", "10 10");
-    let line = 1 + text[..text.find('x').unwrap()].matches('\n').count();
-    let error = refusal(&text);
-    // The `x` of "index" comes first; the array's own is two lines below it at most.
-    assert!(error.contains("expected an integer, found \"x\""), "{error}");
-    assert!(line < 20);
+    let line = 1 + text[..text.find("2 x 3").unwrap()].matches('\n').count();
+    assert_eq!(refusal(&text), format!("f: line {line}: expected an integer, found \"x\""));
 }
 
 #[test]
@@ -169,4 +167,24 @@ fn packed_lengths_that_lie_are_refused_before_unpacking() {
     ] {
         assert!(refusal(text).contains("array Points: expected"));
     }
+}
+
+#[test]
+fn many_pieces_on_one_array_do_not_multiply_it() {
+    let piece = "<Piece><Points>\
+                 <DataArray type=\"UInt8\" format=\"appended\" offset=\"0\"/></Points></Piece>";
+    let file = |pieces: usize| {
+        let mut bytes = format!(
+            "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\">{}\
+             <AppendedData encoding=\"raw\">_",
+            piece.repeat(pieces)
+        )
+        .into_bytes();
+        bytes.extend(30_000_u32.to_le_bytes());
+        bytes.extend(vec![1; 30_000]);
+        bytes
+    };
+    assert_eq!(refusal(file(1)), "f: no tetrahedra: 10000 nodes and no cells");
+    let error = refusal(file(20));
+    assert!(error.contains("array Points: expected at most"), "{error}");
 }

@@ -126,8 +126,10 @@ pub(super) fn vtu_text(points: &str, connectivity: &str, offsets: &str, types: &
          <UnstructuredGrid>\n<Piece NumberOfPoints=\"5      \" NumberOfCells=\"2   \">\n\
          <PointData></PointData>\n<CellData/>\n\
          <Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">{points}\
-         <InformationKey name=\"L2\"><Value index=\"0\">0</Value></InformationKey></DataArray></Points>\n\
-         <Cells>\n<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">{connectivity}</DataArray>\n\
+         <InformationKey name=\"L2\"><Value index=\"0\">0</Value>\
+         </InformationKey></DataArray></Points>\n\
+         <Cells>\n<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">\
+         {connectivity}</DataArray>\n\
          <DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">{offsets}</DataArray>\n\
          <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">\n{types}\n</DataArray>\n\
          </Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
