@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use nalgebra::Point3;
 use softgrasp_core::fem::{Material, summarise_strain};
-use softgrasp_core::mesh::TetMesh;
+use softgrasp_core::mesh::{TetMesh, signed_volume};
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Factored, Loads, Method, Solution};
 use softgrasp_protocol::{
@@ -110,8 +110,9 @@ impl Desk {
             .iter()
             .map(|m| Material::try_new(m.young, m.poisson))
             .collect::<Result<_, _>>()?;
-        let vertices = mesh.vertices.into_iter().map(Point3::from).collect();
-        let mesh = TetMesh::try_new(vertices, mesh.tets, mesh.regions)?;
+        let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
+        let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
+        let mesh = TetMesh::try_new(vertices, tets, mesh.regions)?;
         Ok(Model::try_new(mesh, &materials, fixed, &mut |stage| clock.begin(stage))?)
     }
 
@@ -127,6 +128,19 @@ impl Desk {
             }
             _ => Ok(method),
         }
+    }
+}
+
+/// The corners in the order of (3.23). Gmsh and VTK count them the other way round, and the
+/// stiffness does not depend on it, so clients may send either.
+fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
+    let corner = |i: usize| vertices.get(tet[i] as usize).copied();
+    match (corner(0), corner(1), corner(2), corner(3)) {
+        (Some(a), Some(b), Some(c), Some(d)) if signed_volume(&[a, b, c, d]) < 0.0 => {
+            [tet[0], tet[1], tet[3], tet[2]]
+        }
+        // Indices out of range are refused with the mesh.
+        _ => tet,
     }
 }
 

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::finger::Finger;
 use super::sense::FingerInput;
 use super::state::{HandSegments, StateName};
+use crate::hand::Finger;
 
 /// What the user asks for, at most once per tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

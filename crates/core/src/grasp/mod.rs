@@ -1,7 +1,6 @@
 //! Grasp rules (thesis 4.5–4.6) as a pure state machine.
 
 mod event;
-mod finger;
 mod rules;
 #[cfg(test)]
 mod scene_tests;
@@ -13,7 +12,6 @@ mod table;
 mod tests;
 
 pub use event::{Command, GraspEvent, KnownNode, StepInput, StepOutput};
-pub use finger::Finger;
-pub use sense::{FingerColliders, FingerInput, sense};
+pub use sense::{FingerInput, sense};
 pub use state::{Contact, Grasp, GraspError, GraspState, HandSegments, Hold, StateName};
 pub use table::transition_table;

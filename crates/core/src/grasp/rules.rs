@@ -3,9 +3,9 @@
 use nalgebra::Point3;
 
 use super::event::GraspEvent;
-use super::finger::Finger;
 use super::sense::FingerInput;
 use super::state::{Contact, Hold};
+use crate::hand::Finger;
 use crate::sphere_tree::ContactHit;
 
 /// How many segments of a finger are recalled, given how many were.

@@ -4,8 +4,9 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use proptest::prelude::*;
 
 use super::event::{GraspEvent, StepInput, StepOutput};
-use super::sense::{FingerColliders, sense};
+use super::sense::sense;
 use super::state::{Grasp, StateName};
+use crate::hand::{Finger, FingerColliders, HandColliders};
 use crate::shape::{Cylinder, Sphere};
 use crate::sphere_tree::SphereTree;
 
@@ -24,9 +25,9 @@ fn ball() -> (SphereTree, Vec<Vector3<f64>>) {
 }
 
 /// Five straight fingers that point at the ball's centre; `gaps` from contact point to surface.
-fn fingers_around(gaps: [f64; 5]) -> [FingerColliders; 5] {
+fn fingers_around(gaps: [f64; 5]) -> HandColliders {
     let angles: [f64; 5] = [3.1, -0.7, 0.0, 0.7, 1.4];
-    std::array::from_fn(|finger| {
+    let fingers = std::array::from_fn(|finger| {
         let (sin, cos) = angles[finger].sin_cos();
         let outward = Unit::new_normalize(Vector3::new(cos, sin, 0.1));
         let contact_point = Point3::from(outward.into_inner() * (0.035 + gaps[finger]));
@@ -35,11 +36,13 @@ fn fingers_around(gaps: [f64; 5]) -> [FingerColliders; 5] {
         let segment =
             |from: f64| Cylinder { base: along(from), axis: outward, length: 0.03, radius: 0.007 };
         FingerColliders {
-            segments: [segment(0.067), segment(0.037), segment(0.007)],
+            finger: Finger::ALL[finger],
+            cylinders: [segment(0.067), segment(0.037), segment(0.007)],
             tip: Sphere { centre: along(0.007), radius: 0.007 },
             contact_point,
         }
-    })
+    });
+    HandColliders { fingers }
 }
 
 struct Scene {
@@ -56,8 +59,8 @@ impl Scene {
 
     fn tick(&mut self, world_from_palm: Isometry3<f64>, gaps: [f64; 5]) -> StepOutput {
         let world_from_object = self.grasp.world_from_object(&world_from_palm);
-        let fingers = fingers_around(gaps).map(|f| f.in_frame(&world_from_palm));
-        let fingers = sense(&self.tree, &self.normals, &fingers, &world_from_object, 0.003);
+        let hand = fingers_around(gaps).in_frame(&world_from_palm);
+        let fingers = sense(&self.tree, &self.normals, &hand, &world_from_object, 0.003);
         self.grasp.step(&StepInput {
             world_from_palm,
             world_from_segment: [[world_from_palm; 3]; 5],
@@ -81,7 +84,7 @@ fn a_hand_closes_on_a_ball_squeezes_it_and_opens_again() {
     assert_eq!(output.state, StateName::Deforming);
     assert!((output.world_from_object.inverse() * away).translation.vector.norm() < 1e-12);
     let known = scene.tick(away, [-0.006; 5]).known.unwrap();
-    for (contact, tip) in known.iter().zip(fingers_around([0.0; 5])) {
+    for (contact, tip) in known.iter().zip(fingers_around([0.0; 5]).fingers) {
         let inward = -contact.displacement_in_object.dot(&tip.contact_point.coords.normalize());
         assert!((0.0039..=0.0051).contains(&inward), "{inward}");
         let vertex = scene.normals[contact.node as usize] * 0.035;

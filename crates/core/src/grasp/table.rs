@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::event::{Command, StepInput};
-use super::finger::Finger;
 use super::sense::FingerInput;
 use super::state::{Grasp, StateName};
+use crate::hand::Finger;
 use crate::sphere_tree::{ContactHit, TIP_HITS_MAX};
 
 /// Transition table in Markdown: state, what the tick brings, next state, events.

@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::event::{Command, GraspEvent, StepInput};
-use super::finger::Finger;
 use super::sense::FingerInput;
 use super::state::{Contact, Grasp, GraspError, GraspState, Hold, StateName};
 use super::table::{Case, grasp_in, transition_table};
+use crate::hand::Finger;
 use crate::sphere_tree::ContactHit;
 
 const COMMANDS: [Option<Command>; 4] =

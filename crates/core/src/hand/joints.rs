@@ -23,6 +23,19 @@ impl Finger {
     pub const fn index(self) -> usize {
         self as usize
     }
+
+    /// Whether this is one of the three fingers whose common touch attaches the object.
+    ///
+    /// Source: thesis 4.5.2.
+    pub const fn attaches(self) -> bool {
+        matches!(self, Self::Index | Self::Middle | Self::Ring)
+    }
+}
+
+impl std::fmt::Display for Finger {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(["thumb", "index", "middle", "ring", "little"][self.index()])
+    }
 }
 
 /// Joint angles of one of the four fingers.

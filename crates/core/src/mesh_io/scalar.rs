@@ -63,6 +63,15 @@ impl Scalar {
         }
     }
 
+    /// A number read from text, as this type holds it: VTK reads the text of a `float` array into
+    /// single precision, and two programs must see the same mesh.
+    pub(super) fn of_text(self, value: f64) -> f64 {
+        match self {
+            Self::F32 => f64::from(value as f32),
+            _ => value,
+        }
+    }
+
     /// Numbers of an array as floating point; a rest shorter than a number is left.
     pub(super) fn reals(self, bytes: &[u8], order: ByteOrder) -> Vec<f64> {
         let values = bytes.chunks_exact(self.bytes());

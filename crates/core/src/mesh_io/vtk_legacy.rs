@@ -223,7 +223,7 @@ fn reals(
     }
     cursor.check_count(count, 2, array)?;
     let what = format!("the next number of {array}");
-    (0..count).map(|_| cursor.real(&what)).collect()
+    (0..count).map(|_| Ok(scalar.of_text(cursor.real(&what)?))).collect()
 }
 
 /// `count` numbers as integers, after their announcement has ended.

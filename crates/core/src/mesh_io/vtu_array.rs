@@ -75,7 +75,12 @@ impl<'a> DataArray<'a> {
     ) -> Result<Vec<f64>, MeshFileError> {
         match self.bytes(rules, appended, budget)? {
             Some((scalar, bytes)) => Ok(scalar.reals(&bytes, rules.order)),
-            None => self.words(|cursor| cursor.real("a number")),
+            None => {
+                let scalar =
+                    Scalar::from_xml(attribute(self.attributes, "type").unwrap_or_default());
+                let scalar = scalar.unwrap_or(Scalar::F64);
+                self.words(|cursor| Ok(scalar.of_text(cursor.real("a number")?)))
+            }
         }
     }
 

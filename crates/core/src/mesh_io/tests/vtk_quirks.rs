@@ -188,3 +188,19 @@ fn many_pieces_on_one_array_do_not_multiply_it() {
     let error = refusal(file(20));
     assert!(error.contains("array Points: expected at most"), "{error}");
 }
+
+/// VTK itself reads the text of a `Float32` array into single precision; a reader that keeps more
+/// digits models a slightly different object and differs in the seventh digit of every answer.
+#[test]
+fn text_of_a_float_array_has_the_values_of_single_precision() {
+    let lines = point_lines(None).replacen('0', "0.1000000001", 1);
+    let in_single = f64::from(0.1f32);
+    let float = vtu_text(&lines, CONNECTIVITY, "4 8", "10 10").replace("Float64", "Float32");
+    let cells = format!("CELLS 2 10\n{}CELL_TYPES 2\n10\n10\n", tet_lines("4 ", 0, ""));
+    let legacy = format!("{}POINTS 5 float\n{lines}{cells}", vtk_head("4.2", "ASCII"));
+    for text in [float, legacy.clone()] {
+        assert_eq!(read(text).unwrap().mesh.vertices()[0].x, in_single);
+    }
+    let double = legacy.replace("5 float", "5 double");
+    assert_eq!(read(double).unwrap().mesh.vertices()[0].x, 0.1000000001);
+}
