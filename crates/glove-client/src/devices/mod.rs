@@ -4,7 +4,9 @@ pub mod calibration;
 pub mod cyberglove;
 pub mod fastrak;
 mod inbox;
+mod mount;
 pub mod recordings;
 mod sample;
 
+pub use mount::ReceiverMount;
 pub use sample::{Freshness, GloveReading, HandSample, SampleHold, TrackerReading};

@@ -1,7 +1,6 @@
 //! Camera-tracked hands as CSV: four joint places per finger and frame.
 
 use nalgebra::Point3;
-use serde::Deserialize;
 use softgrasp_core::hand::{Finger, Handedness};
 
 /// One frame of the recording.
@@ -43,14 +42,6 @@ pub enum LeapError {
     },
 }
 
-/// Columns beside the joints.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum HandWord {
-    Left,
-    Right,
-}
-
 const JOINTS: [&str; 4] = ["mcp", "pip", "dip", "tip"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -85,8 +76,8 @@ impl LeapRecording {
             let number = |column: usize| number(&record, column, row);
             let time_us = number(time)?;
             let hand = match record.get(hand) {
-                Some("left") => HandWord::Left,
-                Some("right") => HandWord::Right,
+                Some("left") => Handedness::Left,
+                Some("right") => Handedness::Right,
                 other => return Err(bad(row, &format!("hand {other:?} is not left or right"))),
             };
             let mut joints = [[Point3::origin(); 4]; 5];
@@ -97,10 +88,7 @@ impl LeapRecording {
             }
             frames.push(LeapFrame {
                 time_s: (time_us - *start_us.get_or_insert(time_us)) * 1e-6,
-                hand: match hand {
-                    HandWord::Left => Handedness::Left,
-                    HandWord::Right => Handedness::Right,
-                },
+                hand,
                 joints,
             });
         }

@@ -118,8 +118,8 @@ fn pose(rows: &[[f64; 4]], line: usize) -> Result<Isometry3<f64>, TrajError> {
     let matrix = Matrix3::from_fn(|r, c| [x, y, z][r][c]);
     let shear = (matrix.transpose() * matrix - Matrix3::identity()).abs().max();
     let off = shear.max((matrix.determinant() - 1.0).abs());
-    // Written so that an overflow to NaN is refused too.
-    if !(off <= ROTATION_TOLERANCE) {
+    // A range, so that an overflow to NaN is refused too.
+    if !(0.0..=ROTATION_TOLERANCE).contains(&off) {
         return Err(TrajError::Rotation { line, off });
     }
     let rotation = Rotation3::from_matrix_unchecked(matrix);
