@@ -118,16 +118,14 @@ fn run_front<T: Real>(
 fn run_faer(stiffness: &Stiffness, partition: &Partition, times: &mut Times) {
     let mut clock = Instant::now();
     let mut factor_began = clock;
-    let factored = Factored::try_new(
-        stiffness,
-        partition.clone(),
-        Method::SparseCholesky,
-        &mut |stage| match stage {
-            Stage::Factor => factor_began = Instant::now(),
-            _ => clock = Instant::now(),
-        },
-    )
-    .expect("definite");
+    let factored =
+        Factored::try_new(stiffness, partition.clone(), Method::SparseCholesky, &mut |stage| {
+            match stage {
+                Stage::Factor => factor_began = Instant::now(),
+                _ => clock = Instant::now(),
+            }
+        })
+        .expect("definite");
     times.factor.push(ms(factor_began));
     times.analyse.push((factor_began - clock).as_secs_f64() * 1e3);
     let q_known = vec![0.01; partition.known().len()];

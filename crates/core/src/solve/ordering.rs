@@ -124,15 +124,27 @@ fn metis_options() -> [i32; metis_sys::METIS_NOPTIONS as usize] {
     let mut options = [0; metis_sys::METIS_NOPTIONS as usize];
     // SAFETY: METIS writes METIS_NOPTIONS entries.
     unsafe { metis_sys::METIS_SetDefaultOptions(options.as_mut_ptr()) };
-    for (key, var) in [(metis_sys::moptions_et_METIS_OPTION_COMPRESS, "M_COMPRESS"), (metis_sys::moptions_et_METIS_OPTION_NITER, "M_NITER"), (metis_sys::moptions_et_METIS_OPTION_RTYPE, "M_RTYPE"), (metis_sys::moptions_et_METIS_OPTION_CTYPE, "M_CTYPE"), (metis_sys::moptions_et_METIS_OPTION_CCORDER, "M_CC"), (metis_sys::moptions_et_METIS_OPTION_UFACTOR, "M_UF"), (metis_sys::moptions_et_METIS_OPTION_NO2HOP, "M_NO2HOP"), (metis_sys::moptions_et_METIS_OPTION_NSEPS, "M_NSEPS"), (metis_sys::moptions_et_METIS_OPTION_SEED, "M_SEED")] {
-        if let Ok(v) = std::env::var(var) { options[key as usize] = v.parse().unwrap(); }
+    for (key, var) in [
+        (metis_sys::moptions_et_METIS_OPTION_COMPRESS, "M_COMPRESS"),
+        (metis_sys::moptions_et_METIS_OPTION_NITER, "M_NITER"),
+        (metis_sys::moptions_et_METIS_OPTION_RTYPE, "M_RTYPE"),
+        (metis_sys::moptions_et_METIS_OPTION_CTYPE, "M_CTYPE"),
+        (metis_sys::moptions_et_METIS_OPTION_CCORDER, "M_CC"),
+        (metis_sys::moptions_et_METIS_OPTION_UFACTOR, "M_UF"),
+        (metis_sys::moptions_et_METIS_OPTION_NO2HOP, "M_NO2HOP"),
+        (metis_sys::moptions_et_METIS_OPTION_NSEPS, "M_NSEPS"),
+        (metis_sys::moptions_et_METIS_OPTION_SEED, "M_SEED"),
+    ] {
+        if let Ok(v) = std::env::var(var) {
+            options[key as usize] = v.parse().unwrap();
+        }
     }
     options
 }
 
 fn is_permutation(order: &[u32]) -> bool {
     let mut seen = vec![false; order.len()];
-    order.iter().all(|&i| {
-        (i as usize) < seen.len() && !std::mem::replace(&mut seen[i as usize], true)
-    })
+    order
+        .iter()
+        .all(|&i| (i as usize) < seen.len() && !std::mem::replace(&mut seen[i as usize], true))
 }

@@ -157,8 +157,7 @@ impl FrontAnalysis {
         }
         first_row.push(order.len() as u32);
         let nodes = supernodes.order.iter().map(|&v| graph.nodes[v as usize]).collect();
-        let entries =
-            Entries { nodes, axes, node_axes, start: vec![0], target: Vec::new() };
+        let entries = Entries { nodes, axes, node_axes, start: vec![0], target: Vec::new() };
         let mut this = Self {
             position: inverse(&order),
             order,

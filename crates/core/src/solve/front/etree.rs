@@ -7,7 +7,7 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// Elimination tree in a postordered elimination order.
 ///
-/// Shapes: one entry per vertex of the graph. `order[new] = vertex`, `position[vertex] = new`;
+/// Shapes: one entry per vertex of the graph. `order[new] = vertex`;
 /// `parent` (or [`NONE`]) and `counts` by new position. `counts[j]` is the number of vertices in
 /// column j of the factor, its diagonal included. Every child precedes its parent and every
 /// subtree is a contiguous range.
@@ -15,7 +15,6 @@ pub(super) const NONE: u32 = u32::MAX;
 /// Source: Liu, "The role of elimination trees in sparse factorization" (1990).
 pub(super) struct EliminationTree {
     pub order: Vec<u32>,
-    pub position: Vec<u32>,
     pub parent: Vec<u32>,
     pub counts: Vec<u32>,
 }
@@ -38,7 +37,7 @@ impl EliminationTree {
             })
             .collect();
         let counts = column_counts(graph, &order, &position, &parent);
-        Self { order, position, parent, counts }
+        Self { order, parent, counts }
     }
 }
 
@@ -74,13 +73,12 @@ fn parents(graph: &NodeGraph, order: &[u32], position: &[u32]) -> Vec<u32> {
 }
 
 /// `postorder[new] = old` of a forest whose parents come after their children.
-pub(super) fn postorder(parent: &[u32]) -> Vec<u32> {
+fn postorder(parent: &[u32]) -> Vec<u32> {
     let mut first_child = vec![NONE; parent.len()];
     let mut next_sibling = vec![NONE; parent.len()];
     for j in (0..parent.len()).rev() {
         if parent[j] != NONE {
-            next_sibling[j] =
-                std::mem::replace(&mut first_child[parent[j] as usize], j as u32);
+            next_sibling[j] = std::mem::replace(&mut first_child[parent[j] as usize], j as u32);
         }
     }
     let mut order = Vec::with_capacity(parent.len());
@@ -111,12 +109,7 @@ pub(super) fn postorder(parent: &[u32]) -> Vec<u32> {
 ///
 /// Source: Gilbert, Ng, Peyton, "An efficient algorithm to compute row and column counts for
 /// sparse Cholesky factorization" (1994).
-fn column_counts(
-    graph: &NodeGraph,
-    order: &[u32],
-    position: &[u32],
-    parent: &[u32],
-) -> Vec<u32> {
+fn column_counts(graph: &NodeGraph, order: &[u32], position: &[u32], parent: &[u32]) -> Vec<u32> {
     let n = order.len();
     let mut first_descendant: Vec<u32> = (0..n as u32).collect();
     let mut delta = vec![1i64; n];
@@ -172,7 +165,7 @@ fn find(ancestor: &mut [u32], j: u32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
@@ -193,14 +186,14 @@ mod tests {
     }
 
     /// Elimination on the filled graph, column by column.
-    fn eliminate(graph: &NodeGraph, order: &[u32]) -> Vec<Vec<usize>> {
+    pub fn eliminate(graph: &NodeGraph, order: &[u32]) -> Vec<Vec<usize>> {
         let position = inverse(order);
         let n = order.len();
         let mut columns: Vec<std::collections::BTreeSet<usize>> = order
             .iter()
             .enumerate()
             .map(|(j, &v)| {
-                graph.neighbours(v).map(|o| position[o as usize] as usize).filter(|&i| i > j)
+                graph.neighbours(v).map(|o| position[o as usize] as usize).filter(move |&i| i > j)
             })
             .map(Iterator::collect)
             .collect();

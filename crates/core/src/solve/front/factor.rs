@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::Real;
 use super::analysis::{Front, FrontAnalysis};
 use super::assembly::{Contribution, add_entries, extend_add};
 use super::dense::{Tasks, factor_panel, form_contribution};
-use super::Real;
 use crate::fem::Stiffness;
 
 /// Columns of a parallel front that one task fills.
@@ -32,7 +32,7 @@ pub enum FrontError {
         row: usize,
     },
     /// Memory could not be had.
-    #[error("no memory for {bytes} bytes of a front")]
+    #[error("no memory for a factor of {bytes} bytes, contributions included")]
     OutOfMemory {
         /// Bytes asked for.
         bytes: usize,
@@ -66,6 +66,7 @@ impl<T: Real> FrontFactor<T> {
         if !self.analysis.fits(stiffness) {
             return Err(FrontError::OtherPattern);
         }
+        probe_memory(self.analysis.peak_bytes::<T>())?;
         let run = Run { analysis: &self.analysis, stiffness };
         run.subtrees(&self.analysis.roots, 0, &mut self.panels).map(drop)
     }
@@ -136,7 +137,7 @@ impl Run<'_> {
                 .zip(&blocks)
                 .map(|(&c, values)| self.contribution(c, values))
                 .collect();
-            let mut block = zeros(front.rest() * front.rest())?;
+            let mut block = vec![T::ZERO; front.rest() * front.rest()];
             self.front(v, panel, &mut block, &children, Tasks::Parallel)?;
             blocks = vec![block];
         }
@@ -147,7 +148,7 @@ impl Run<'_> {
     fn serial<T: Real>(&self, head: usize, panels: &mut [Vec<T>]) -> Result<Vec<T>, FrontError> {
         let fronts = &self.analysis.fronts;
         let first = fronts[head].subtree_first as usize;
-        let mut arena = zeros(fronts[head].arena)?;
+        let mut arena = vec![T::ZERO; fronts[head].arena];
         for (v, panel) in (first..=head).zip(panels) {
             let front = &fronts[v];
             let block_len = front.rest() * front.rest();
@@ -192,7 +193,7 @@ impl Run<'_> {
     ) -> Result<(), FrontError> {
         let front = &self.analysis.fronts[v];
         let (size, pivots) = (front.size, front.pivots);
-        reset(panel, front.panel_len())?;
+        reset(panel, front.panel_len());
         add_entries(panel, front, &self.analysis.entries, self.stiffness);
         add_children(panel, 0..pivots, 0, size, children, tasks);
         factor_panel(panel, size, pivots, tasks)
@@ -238,22 +239,18 @@ fn add_children<T: Real>(
     }
 }
 
-fn out_of_memory<T>(len: usize) -> FrontError {
-    FrontError::OutOfMemory { bytes: len.saturating_mul(size_of::<T>()) }
+/// Refuses a request the system would refuse, before it is made piece by piece.
+///
+/// The pieces themselves are zeroed by the system when they are first touched, by the thread that
+/// works on them; only the infallible constructors offer that.
+fn probe_memory(bytes: usize) -> Result<(), FrontError> {
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| FrontError::OutOfMemory { bytes })
 }
 
-/// Zeros, or an error instead of an abort.
-fn zeros<T: Real>(len: usize) -> Result<Vec<T>, FrontError> {
-    let mut values = Vec::new();
-    values.try_reserve_exact(len).map_err(|_| out_of_memory::<T>(len))?;
-    values.resize(len, T::ZERO);
-    Ok(values)
-}
-
-/// Makes `values` hold `len` zeros, in the memory it has if it can.
-fn reset<T: Real>(values: &mut Vec<T>, len: usize) -> Result<(), FrontError> {
-    values.clear();
-    values.try_reserve_exact(len).map_err(|_| out_of_memory::<T>(len))?;
-    values.resize(len, T::ZERO);
-    Ok(())
+/// Makes `values` hold `len` zeros, in the memory it has if that fits.
+fn reset<T: Real>(values: &mut Vec<T>, len: usize) {
+    match values.len() == len {
+        true => values.fill(T::ZERO),
+        false => *values = vec![T::ZERO; len],
+    }
 }

@@ -8,6 +8,8 @@ mod factor;
 mod real;
 mod solve;
 mod supernodes;
+#[cfg(test)]
+mod tests;
 
 pub use analysis::FrontAnalysis;
 pub use factor::{FrontError, FrontFactor};

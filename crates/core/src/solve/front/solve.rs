@@ -156,13 +156,9 @@ impl<T: Real> Solve<'_, T> {
     }
 
     /// The subtrees of siblings with their parts of `x`, which starts at front `first`.
-    fn split<'x>(
-        &self,
-        heads: &[u32],
-        first: usize,
-        x: &'x mut [T],
-    ) -> Vec<(usize, &'x mut [T])> {
-        let (mut rest, mut start) = (x, self.factor.analysis.fronts.get(first).map_or(0, |f| f.first));
+    fn split<'x>(&self, heads: &[u32], first: usize, x: &'x mut [T]) -> Vec<(usize, &'x mut [T])> {
+        let (mut rest, mut start) =
+            (x, self.factor.analysis.fronts.get(first).map_or(0, |f| f.first));
         let mut parts = Vec::with_capacity(heads.len());
         for &head in heads {
             let head = head as usize;

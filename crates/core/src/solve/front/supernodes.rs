@@ -158,7 +158,8 @@ fn merge(tree: &EliminationTree, part_start: &[u32]) -> (Vec<Group>, Vec<u32>) {
         // All children of p come before p and are final.
         let mut group = groups[p].take().expect("a group is taken only here and by its parent");
         let mut children = std::mem::take(&mut group.children);
-        let rows_of = |c: u32, groups: &[Option<Group>]| groups[c as usize].as_ref().map_or(0, |g| g.rows);
+        let rows_of =
+            |c: u32, groups: &[Option<Group>]| groups[c as usize].as_ref().map_or(0, |g| g.rows);
         children.sort_by_key(|&c| (std::cmp::Reverse(rows_of(c, &groups)), c));
         for c in children {
             let child = groups[c as usize].as_ref().expect("children are merged once");
@@ -228,13 +229,55 @@ const AXES: f64 = crate::fem::AXES as f64;
 /// their ratios matter, and they matter little.
 fn cost(columns: u32, rows: u32) -> f64 {
     let (s, m) = (AXES * f64::from(columns), AXES * f64::from(rows));
-    let rate = 50.0 * s / (s + ENV.with(|e| e[0]));
+    let rate = 50.0 * s / (s + 25.0);
     let contribution = (m - s) * (m - s);
-    ENV.with(|e| e[1]) + flops(s, m) / rate + ENV.with(|e| e[2]) * contribution + ENV.with(|e| e[3]) * s * m
+    1500.0 + flops(s, m) / rate + 0.6 * contribution + 0.5 * s * m
 }
-thread_local! { static ENV: [f64; 4] = ["F_S0", "F_OVER", "F_CB", "F_PANEL"].map(|k| std::env::var(k).ok().and_then(|v| v.parse().ok())).into_iter().zip([25.0, 1500.0, 0.6, 0.5]).map(|(a, b): (Option<f64>, f64)| a.unwrap_or(b)).collect::<Vec<_>>().try_into().unwrap(); }
 
 /// Floating point operations of eliminating `s` of `m` rows: `Σ (m − i)²`, i from 0 to s − 1.
 pub(super) fn flops(s: f64, m: f64) -> f64 {
     s * m * m - s * (s - 1.0) * m + (s - 1.0) * s * (2.0 * s - 1.0) / 6.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::etree::tests::{eliminate, graph};
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_entry_of_the_factor_has_a_place_in_its_front(
+            count in 1usize..40,
+            edges in proptest::collection::vec((0u32..40, 0u32..40), 0..90),
+        ) {
+            let count = count as u32;
+            let edges: Vec<_> = edges.into_iter().map(|(a, b)| (a % count, b % count)).collect();
+            let graph = graph(count as usize, &edges);
+            let tree = EliminationTree::new(&graph, (0..count).collect());
+            let supernodes = Supernodes::new(&graph, &tree);
+            prop_assert_eq!(*supernodes.start.last().unwrap(), count);
+            let columns = eliminate(&graph, &supernodes.order);
+            for v in 0..supernodes.len() {
+                let rows = supernodes.rows(v);
+                prop_assert!(rows.windows(2).all(|w| w[0] < w[1]));
+                for j in supernodes.columns(v) {
+                    for &i in &columns[j as usize] {
+                        let i = i as u32;
+                        let own = supernodes.columns(v).contains(&i);
+                        prop_assert!(own || rows.binary_search(&i).is_ok());
+                    }
+                }
+                // What is left over fits into the parent's front.
+                let parent = supernodes.parent[v];
+                prop_assert_eq!(parent == NONE, rows.is_empty());
+                for &i in rows {
+                    let p = parent as usize;
+                    prop_assert!(p > v && p < supernodes.len());
+                    let own = supernodes.columns(p).contains(&i);
+                    prop_assert!(own || supernodes.rows(p).binary_search(&i).is_ok());
+                }
+            }
+        }
+    }
 }
