@@ -119,26 +119,21 @@ fn dissect(start: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<u32>> {
     (status == metis_sys::rstatus_et_METIS_OK && is_permutation(&order)).then_some(order)
 }
 
+/// How much larger than the other one part may be, in thousandths.
+///
+/// METIS's default is 200. On cubes of 3375 to 21 952 nodes a fifth to a quarter of the time of
+/// the order goes at 50, for 1–3 % more operations in the factor: less than one seed or another
+/// makes (measured 60 → 45 ms against 17.2 → 17.3 GFlop at 10 648 nodes).
+const IMBALANCE_PER_MILLE: i32 = 50;
+
 /// Options of `METIS_NodeND`.
 fn metis_options() -> [i32; metis_sys::METIS_NOPTIONS as usize] {
     let mut options = [0; metis_sys::METIS_NOPTIONS as usize];
     // SAFETY: METIS writes METIS_NOPTIONS entries.
     unsafe { metis_sys::METIS_SetDefaultOptions(options.as_mut_ptr()) };
-    for (key, var) in [
-        (metis_sys::moptions_et_METIS_OPTION_COMPRESS, "M_COMPRESS"),
-        (metis_sys::moptions_et_METIS_OPTION_NITER, "M_NITER"),
-        (metis_sys::moptions_et_METIS_OPTION_RTYPE, "M_RTYPE"),
-        (metis_sys::moptions_et_METIS_OPTION_CTYPE, "M_CTYPE"),
-        (metis_sys::moptions_et_METIS_OPTION_CCORDER, "M_CC"),
-        (metis_sys::moptions_et_METIS_OPTION_UFACTOR, "M_UF"),
-        (metis_sys::moptions_et_METIS_OPTION_NO2HOP, "M_NO2HOP"),
-        (metis_sys::moptions_et_METIS_OPTION_NSEPS, "M_NSEPS"),
-        (metis_sys::moptions_et_METIS_OPTION_SEED, "M_SEED"),
-    ] {
-        if let Ok(v) = std::env::var(var) {
-            options[key as usize] = v.parse().unwrap();
-        }
-    }
+    options[metis_sys::moptions_et_METIS_OPTION_UFACTOR as usize] = IMBALANCE_PER_MILLE;
+    // One node is one vertex already; there is nothing to compress.
+    options[metis_sys::moptions_et_METIS_OPTION_COMPRESS as usize] = 0;
     options
 }
 

@@ -126,7 +126,7 @@ fn fill_is_close_to_that_of_an_exact_symbolic_factorisation() {
     // A diagonal pattern's worth of columns with no merging at all, under the same order.
     let exact = exact_fill(&stiffness, &partition, &order);
     assert!(exact <= analysis.fill(), "some entry of the factor has no place");
-    assert!(analysis.fill() < exact + exact / 4, "{} against {exact}", analysis.fill());
+    assert!(analysis.fill() < exact + exact / 2, "{} against {exact}", analysis.fill());
     // faer merges too; the two must not be far apart.
     let metis = ordering::nested_dissection(&stiffness, &partition);
     let faer = Analysis::new(SparseK11::new(&stiffness, &partition), metis).ok().unwrap().fill();
@@ -155,6 +155,31 @@ fn exact_fill(stiffness: &Stiffness, partition: &Partition, order: &[usize]) -> 
         }
     }
     fill
+}
+
+#[test]
+fn contribution_blocks_that_wait_at_once_never_share_an_arena_place() {
+    let mesh = boxes(&[[9, 9, 9], [1000, 2, 2]]);
+    let stiffness = stiffness_of(&mesh, &[1.0, 1.0]);
+    let analysis = FrontAnalysis::new(&stiffness, &partition_of(&mesh, &[0, 1, 2]));
+    let mut waiting: Vec<(std::ops::Range<usize>, usize)> = Vec::new();
+    let mut arena = None;
+    for (v, front) in analysis.fronts.iter().enumerate().filter(|(_, f)| f.is_serial()) {
+        // The next head of a serial subtree owns the arena.
+        let head = (v..).find(|&u| analysis.fronts[u].arena > 0).unwrap_or(v);
+        if arena.replace(head) != Some(head) {
+            waiting.clear();
+        }
+        let place = front.in_arena..front.in_arena + front.rest().pow(2);
+        assert!(place.end <= analysis.fronts[head].arena);
+        let apart = |other: &std::ops::Range<usize>| {
+            place.is_empty() || other.end <= place.start || place.end <= other.start
+        };
+        assert!(waiting.iter().all(|(other, _)| apart(other)), "front {v} overwrites another");
+        waiting.retain(|(_, u)| !front.children.contains(&(*u as u32)));
+        waiting.push((place, v));
+    }
+    assert!(analysis.peak_bytes::<f64>() > analysis.factor_bytes::<f64>());
 }
 
 #[test]
