@@ -136,6 +136,52 @@ impl Stiffness {
         });
     }
 
+    /// `|K| |q|` with absolute values of all entries: what rounding in a product is measured by.
+    ///
+    /// Shapes: `q` and the result 3N.
+    pub fn mul_abs(&self, q: &[f64]) -> Vec<f64> {
+        assert_eq!(q.len(), 3 * self.node_count(), "displacements do not fit the matrix");
+        let mut f = vec![0.0; q.len()];
+        f.par_chunks_exact_mut(3).enumerate().with_min_len(256).for_each(|(node, f_node)| {
+            for (column, b) in self.row(node) {
+                let x = &q[dof(column, 0)..dof(column, 0) + 3];
+                for (r, s) in f_node.iter_mut().enumerate() {
+                    *s += (0..3).map(|c| (b[3 * r + c] * x[c]).abs()).sum::<f64>();
+                }
+            }
+        });
+        f
+    }
+
+    /// The same matrix with `shift` added to every diagonal entry, N/m.
+    pub fn shifted(&self, shift: f64) -> Self {
+        let mut shifted = self.clone();
+        for node in 0..self.node_count() {
+            let row = self.pattern.row(node);
+            for (at, &column) in row.zip(self.pattern.columns(node)) {
+                if column as usize == node {
+                    (0..3).for_each(|axis| shifted.blocks[at][4 * axis] += shift);
+                }
+            }
+        }
+        shifted
+    }
+
+    /// Sum of the diagonal entries, N/m.
+    pub fn trace(&self) -> f64 {
+        let own = |node: usize| self.row(node).find(move |(column, _)| *column == node);
+        (0..self.node_count()).filter_map(own).map(|(_, b)| b[0] + b[4] + b[8]).sum()
+    }
+
+    /// Largest sum of absolute values in a row, N/m: a bound of the largest eigenvalue.
+    pub fn row_sum_max(&self) -> f64 {
+        let sum_of_row = |(node, r): (usize, usize)| -> f64 {
+            self.row(node).map(|(_, b)| (0..3).map(|c| b[3 * r + c].abs()).sum::<f64>()).sum()
+        };
+        let rows = (0..self.node_count()).flat_map(|n| (0..3).map(move |r| (n, r)));
+        rows.map(sum_of_row).fold(0.0, f64::max)
+    }
+
     /// Largest absolute entry, N/m.
     pub fn amax(&self) -> f64 {
         self.blocks.iter().flatten().fold(0.0, |m, v| m.max(v.abs()))

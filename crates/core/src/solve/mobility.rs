@@ -1,16 +1,13 @@
-//! Motions that cost no energy and that the known displacements do not hold back.
+//! Motions without energy that the known displacements do not hold back.
 //!
-//! `K11` is positive definite exactly when no such motion is left. An element stores no energy
-//! only when it moves rigidly, and elements that share a face must then share the motion, so the
-//! candidates are: one rigid motion for each face-connected piece, equal where pieces share nodes
-//! (a shared edge is a hinge, a shared node a ball joint). That is a small linear system, decided
-//! here before anything is factored.
+//! `K11` is positive definite exactly when no such motion is left; it is decided here before
+//! anything is factored.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
-use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
+use super::zero_energy::{BodyMotions, nodes_and_dofs_of_body, rigid_parts};
 use crate::mesh::{Bodies, TetMesh};
 
 /// A body that can still move without deforming.
@@ -66,13 +63,6 @@ impl fmt::Display for FreeMotion {
     }
 }
 
-/// Relative singular value below which a motion counts as free. Above it the support may be weak,
-/// which shows in the condition of the answer, but it is there.
-const FREE_BELOW: f64 = 1e-10;
-
-/// Hinged bodies with more parts than this are left to the pivots of the factor.
-const PARTS_MAX: usize = 100;
-
 /// First body that can move without deforming, if any.
 ///
 /// Shapes: `known` ascending degrees of freedom. Units: those of the mesh.
@@ -81,148 +71,20 @@ const PARTS_MAX: usize = 100;
 pub fn find_free_motion(mesh: &TetMesh, bodies: &Bodies, known: &[u32]) -> Option<FreeMotion> {
     let parts = rigid_parts(mesh, bodies);
     (0..bodies.count()).find_map(|body| {
-        let nodes: Vec<u32> = (0..mesh.node_count() as u32)
-            .filter(|&n| bodies.of_node[n as usize] == Some(body as u32))
-            .collect();
-        let held: Vec<u32> = known
-            .iter()
-            .copied()
-            .filter(|&d| bodies.of_node.get(d as usize / 3) == Some(&Some(body as u32)))
-            .collect();
-        let (motion, hinged) = free_motion_of_body(mesh, &parts, &nodes, &held)?;
+        let (nodes, held) = nodes_and_dofs_of_body(bodies, body, known);
+        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held)?;
+        let motion = motions.basis.first()?.as_slice();
+        let moving: Vec<f64> = motion.chunks(6).map(|m| m.iter().map(|x| x * x).sum()).collect();
+        let part = (0..moving.len()).max_by(|&a, &b| moving[a].total_cmp(&moving[b]))?;
         Some(FreeMotion {
             body,
             first_node: nodes.first().map_or(0, |&n| n as usize),
             node_count: nodes.len(),
             known_dofs: held.len(),
-            motion,
-            hinged,
+            motion: motion_from(&motion[6 * part..6 * part + 6], motions.centre, motions.size),
+            hinged: moving.iter().any(|&m| m < 1e-12 * moving[part]),
         })
     })
-}
-
-/// For every node the rigid parts that meet there, ascending.
-struct Parts {
-    of_node: Vec<Vec<u32>>,
-}
-
-/// Face-connected pieces, joined further where two share three nodes that are not in line.
-fn rigid_parts(mesh: &TetMesh, bodies: &Bodies) -> Parts {
-    let mut of_node: Vec<Vec<u32>> = vec![Vec::new(); mesh.node_count()];
-    for (tet, &piece) in mesh.tets().iter().zip(&bodies.piece_of_tet) {
-        for &n in tet {
-            let list = &mut of_node[n as usize];
-            if let Err(at) = list.binary_search(&piece) {
-                list.insert(at, piece);
-            }
-        }
-    }
-    loop {
-        let mut shared: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
-        for (node, list) in of_node.iter().enumerate() {
-            for (i, &a) in list.iter().enumerate() {
-                for &b in &list[i + 1..] {
-                    shared.entry((a, b)).or_default().push(node as u32);
-                }
-            }
-        }
-        let joined = shared.into_iter().find(|(_, nodes)| spans_a_plane(mesh, nodes));
-        let Some(((kept, gone), _)) = joined else { return Parts { of_node } };
-        for list in &mut of_node {
-            if let Ok(at) = list.binary_search(&gone) {
-                list.remove(at);
-                if let Err(at) = list.binary_search(&kept) {
-                    list.insert(at, kept);
-                }
-            }
-        }
-    }
-}
-
-/// Whether three of the nodes are not in line.
-fn spans_a_plane(mesh: &TetMesh, nodes: &[u32]) -> bool {
-    let Some((&first, rest)) = nodes.split_first() else { return false };
-    let p0 = mesh.vertices()[first as usize];
-    let arms: Vec<Vector3<f64>> = rest.iter().map(|&n| mesh.vertices()[n as usize] - p0).collect();
-    let Some(longest) = arms.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm())) else {
-        return false;
-    };
-    arms.iter().any(|a| longest.cross(a).norm() > FREE_BELOW * longest.norm_squared())
-}
-
-/// Null vector of the constraints on the rigid motions of a body's parts.
-fn free_motion_of_body(
-    mesh: &TetMesh,
-    parts: &Parts,
-    nodes: &[u32],
-    held: &[u32],
-) -> Option<(Motion, bool)> {
-    let mut names: Vec<u32> =
-        nodes.iter().flat_map(|&n| parts.of_node[n as usize].iter().copied()).collect();
-    names.sort_unstable();
-    names.dedup();
-    if names.len() > PARTS_MAX {
-        return None;
-    }
-    let centre = Point3::from(
-        nodes.iter().map(|&n| mesh.vertices()[n as usize].coords).sum::<Vector3<f64>>()
-            / nodes.len() as f64,
-    );
-    let size = nodes
-        .iter()
-        .map(|&n| (mesh.vertices()[n as usize] - centre).norm())
-        .fold(f64::MIN_POSITIVE, f64::max);
-    let column_of = |part: u32| 6 * names.partition_point(|&p| p < part);
-    // Motion of a point: t + ω × r, with r in units of the body's size.
-    let arm = |node: u32| (mesh.vertices()[node as usize] - centre) / size;
-    let mut rows: Vec<DVector<f64>> = Vec::new();
-    let mut add_row = |node: u32, axis: usize, plus: u32, minus: Option<u32>| {
-        let mut row = DVector::zeros(6 * names.len());
-        for (part, sign) in [(Some(plus), 1.0), (minus, -1.0)] {
-            if let Some(part) = part {
-                let c = column_of(part);
-                row[c + axis] += sign;
-                let r = arm(node);
-                // (ω × r)_axis = ω_{axis+1} r_{axis+2} − ω_{axis+2} r_{axis+1}.
-                let (next, after) = ((axis + 1) % 3, (axis + 2) % 3);
-                row[c + 3 + next] += sign * r[after];
-                row[c + 3 + after] -= sign * r[next];
-            }
-        }
-        rows.push(row);
-    };
-    for &dof in held {
-        let node = dof / 3;
-        add_row(node, dof as usize % 3, parts.of_node[node as usize][0], None);
-    }
-    for &node in nodes {
-        if let Some((&first, others)) = parts.of_node[node as usize].split_first() {
-            for &other in others {
-                (0..3).for_each(|axis| add_row(node, axis, first, Some(other)));
-            }
-        }
-    }
-    let null = null_vector(&rows, 6 * names.len())?;
-    let moving: Vec<f64> =
-        null.as_slice().chunks(6).map(|m| m.iter().map(|x| x * x).sum()).collect();
-    let part = (0..moving.len()).max_by(|&a, &b| moving[a].total_cmp(&moving[b]))?;
-    let hinged = moving.iter().any(|&m| m < 1e-12 * moving[part]);
-    Some((motion_from(&null.as_slice()[6 * part..6 * part + 6], centre, size), hinged))
-}
-
-/// Unit vector that all rows annihilate to [`FREE_BELOW`], if there is one.
-fn null_vector(rows: &[DVector<f64>], columns: usize) -> Option<DVector<f64>> {
-    // QR first: thousands of known nodes shrink to a square without squaring the condition.
-    let mut a = DMatrix::zeros(rows.len().max(columns), columns);
-    for (i, row) in rows.iter().enumerate() {
-        a.row_mut(i).copy_from(&row.transpose());
-    }
-    let r = a.qr().r();
-    let svd = r.svd(false, true);
-    let v_t = svd.v_t?;
-    let (at, smallest) = svd.singular_values.argmin();
-    let largest = svd.singular_values.max();
-    (smallest <= FREE_BELOW * largest).then(|| v_t.row(at).transpose())
 }
 
 /// Reads translation and rotation out of `(t, ω)` about `centre`.

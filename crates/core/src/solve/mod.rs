@@ -1,5 +1,6 @@
 //! Known and unknown degrees of freedom, and the methods that answer for them (thesis 3.4).
 
+pub mod condensed;
 mod direct;
 mod front;
 mod gauss_jordan;
@@ -12,6 +13,7 @@ mod pcg;
 mod sparse;
 mod stage;
 mod tiles;
+mod zero_energy;
 
 pub use direct::{Factored, Loads, Solution, SolveError};
 pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};

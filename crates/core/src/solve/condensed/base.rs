@@ -1,0 +1,231 @@
+//! What is worked out once per shape: the held base, its factor, the motions without energy.
+
+use std::sync::{Arc, OnceLock};
+
+use crate::fem::Stiffness;
+use crate::mesh::{Bodies, TetMesh};
+use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
+use crate::solve::partition::AXIS_NAMES;
+use crate::solve::pcg::norm;
+use crate::solve::zero_energy::{BodyMotions, nodes_and_dofs_of_body, rigid_parts};
+use crate::solve::{Partition, PartitionError, Stage};
+
+/// Base factor of one shape.
+///
+/// Shapes: 3N degrees of freedom; `modes` z columns of 3N numbers.
+/// Units: stiffness N/m, modes 1.
+pub struct Base {
+    pub(super) stiffness: Arc<Stiffness>,
+    pub(super) partition: Partition,
+    pub(super) factor: FrontFactor<f64>,
+    /// Degrees of freedom the scene fixes, ascending.
+    pub(super) fixed: Vec<u32>,
+    /// Degrees of freedom held in addition so that `K_B` is definite; as many as modes.
+    pub(super) held: Vec<u32>,
+    pub(super) modes: Vec<Mode>,
+    /// Lower bound of the smallest eigenvalue of `K_B`, once somebody has proven one.
+    pub(super) eigenvalue_min: OnceLock<Option<f64>>,
+}
+
+/// A motion that costs no energy and leaves the fixed degrees of freedom in place.
+pub(super) struct Mode {
+    /// Displacement of every degree of freedom, largest about one.
+    pub field: Vec<f64>,
+    /// Norm of the field.
+    pub norm: f64,
+    /// Bound on the norm of `K` times the field, which is rounding.
+    pub residual: f64,
+}
+
+/// Why a shape cannot be condensed, or a question not be answered this way.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CondensedError {
+    /// Fixed degrees of freedom that do not fit.
+    #[error(transparent)]
+    Partition(#[from] PartitionError),
+    /// A body of very many hinged parts.
+    #[error("condensed: body {body} has too many hinged parts; use front")]
+    Hinges {
+        /// The body.
+        body: usize,
+    },
+    /// A pivot of `K_B` was not positive.
+    #[error(
+        "condensed: the stiffness is not positive definite at node {node} axis {axis}: an element \
+         there is degenerate"
+    )]
+    NotPositiveDefinite {
+        /// Node of the pivot.
+        node: usize,
+        /// Axis of the pivot.
+        axis: char,
+    },
+    /// No memory.
+    #[error("condensed: no memory for the base factor ({bytes} bytes)")]
+    OutOfMemory {
+        /// Bytes asked for.
+        bytes: usize,
+    },
+    /// A contact set that alone is larger than the cache may be.
+    #[error(
+        "condensed: {nodes} touched nodes need {needed} bytes of columns, more than the cache \
+         bound of {bound}; raise the bound or use front"
+    )]
+    CacheTooSmall {
+        /// Touched nodes.
+        nodes: usize,
+        /// Bytes of their columns.
+        needed: usize,
+        /// The bound.
+        bound: usize,
+    },
+    /// The touched nodes leave a motion free or nearly so.
+    #[error("condensed: the touched nodes do not hold the body")]
+    NotHeld,
+    /// The answer is not finite.
+    #[error("condensed: the answer is not finite; the known displacements are too large")]
+    NotFinite,
+}
+
+impl Base {
+    /// Chooses the base of a shape and factors it on the current rayon pool.
+    ///
+    /// Shapes: `fixed` ascending degrees of freedom held at zero by the scene.
+    ///
+    /// # Errors
+    /// [`CondensedError`].
+    pub fn try_new(
+        mesh: &TetMesh,
+        bodies: &Bodies,
+        stiffness: &Arc<Stiffness>,
+        fixed: &[u32],
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Self, CondensedError> {
+        let fields = motions(mesh, bodies, fixed)?;
+        let held = hold(&fields, fixed);
+        let mut known = [fixed, held.as_slice()].concat();
+        known.sort_unstable();
+        let partition = Partition::try_new(&mesh.used_nodes(), &known)?;
+        on_stage(Stage::Order);
+        let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
+        on_stage(Stage::Factor);
+        let factor = FrontFactor::try_new(&analysis, stiffness)
+            .map_err(|error| refuse(error, &partition))?;
+        let modes = fields.into_iter().map(|field| Mode::new(stiffness, field)).collect();
+        Ok(Self {
+            stiffness: Arc::clone(stiffness),
+            partition,
+            factor,
+            fixed: fixed.to_vec(),
+            held,
+            modes,
+            eigenvalue_min: OnceLock::new(),
+        })
+    }
+
+    /// Number of degrees of freedom, orphans included.
+    pub fn dof_count(&self) -> usize {
+        self.partition.dof_count()
+    }
+
+    /// Degrees of freedom the scene fixes, ascending.
+    pub fn fixed(&self) -> &[u32] {
+        &self.fixed
+    }
+
+    /// Whether the scene's fixed nodes hold every body.
+    pub fn is_held_by_scene(&self) -> bool {
+        self.held.is_empty()
+    }
+
+    /// Bytes of the factor and the modes.
+    pub fn bytes(&self) -> usize {
+        self.factor.bytes() + self.modes.len() * 8 * self.dof_count()
+    }
+}
+
+fn refuse(error: FrontError, partition: &Partition) -> CondensedError {
+    match error {
+        FrontError::NotPositive { row } => {
+            let dof = partition.unknown().get(row).map_or(0, |&d| d as usize);
+            CondensedError::NotPositiveDefinite { node: dof / 3, axis: AXIS_NAMES[dof % 3] }
+        }
+        FrontError::OutOfMemory { bytes } => CondensedError::OutOfMemory { bytes },
+        // The analysis was made from this very stiffness.
+        FrontError::OtherPattern => CondensedError::OutOfMemory { bytes: 0 },
+    }
+}
+
+impl Mode {
+    fn new(stiffness: &Stiffness, field: Vec<f64>) -> Self {
+        let residual = norm(&stiffness.mul(&field)) + rounding_of_product(stiffness, &field);
+        Self { norm: norm(&field), residual, field }
+    }
+}
+
+/// Bound on how far the computed product `K x` can be off, as a norm.
+///
+/// Source: Higham, Accuracy and Stability of Numerical Algorithms, (3.12): `|fl(Kx) − Kx| ≤ γₙ |K||x|`
+/// with n the longest row.
+pub(super) fn rounding_of_product(stiffness: &Stiffness, x: &[f64]) -> f64 {
+    let rows = (0..stiffness.node_count()).map(|n| stiffness.pattern().columns(n).len());
+    let longest = 3 * rows.max().unwrap_or(0) + 3;
+    gamma(longest) * norm(&stiffness.mul_abs(x))
+}
+
+/// `γₙ = n ε / (1 − n ε)` with the unit roundoff ε.
+pub(super) fn gamma(n: usize) -> f64 {
+    let n = n as f64 * (f64::EPSILON / 2.0);
+    n / (1.0 - n)
+}
+
+/// Fields of all motions without energy that leave the fixed degrees of freedom in place.
+fn motions(
+    mesh: &TetMesh,
+    bodies: &Bodies,
+    fixed: &[u32],
+) -> Result<Vec<Vec<f64>>, CondensedError> {
+    let parts = rigid_parts(mesh, bodies);
+    let mut fields = Vec::new();
+    for body in 0..bodies.count() {
+        let (nodes, held) = nodes_and_dofs_of_body(bodies, body, fixed);
+        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held)
+            .ok_or(CondensedError::Hinges { body })?;
+        for motion in &motions.basis {
+            let mut field = vec![0.0; 3 * mesh.node_count()];
+            motions.add_field(mesh, &parts, &nodes, motion, &mut field);
+            for &dof in fixed {
+                field[dof as usize] = 0.0;
+            }
+            fields.push(field);
+        }
+    }
+    Ok(fields)
+}
+
+/// As many degrees of freedom as there are motions, so that none is left: the one that moves most,
+/// then the one that moves most in what is left, and so on (pivoted orthogonalisation of rows).
+fn hold(fields: &[Vec<f64>], fixed: &[u32]) -> Vec<u32> {
+    let z = fields.len();
+    let Some(dofs) = fields.first().map(Vec::len) else { return Vec::new() };
+    let mut rows: Vec<f64> = (0..dofs).flat_map(|d| fields.iter().map(move |f| f[d])).collect();
+    for &dof in fixed {
+        rows[dof as usize * z..(dof as usize + 1) * z].fill(0.0);
+    }
+    let mut held = Vec::with_capacity(z);
+    for _ in 0..z {
+        let size = |d: usize| rows[d * z..(d + 1) * z].iter().map(|x| x * x).sum::<f64>();
+        // The first of equals, so that the choice does not depend on rounding of equal sums.
+        let most = (0..dofs).map(size).fold(0.0, f64::max);
+        let Some(dof) = (0..dofs).find(|&d| size(d) >= most * (1.0 - 1e-9)) else { break };
+        let direction: Vec<f64> =
+            rows[dof * z..(dof + 1) * z].iter().map(|x| x / most.sqrt()).collect();
+        for row in rows.chunks_exact_mut(z) {
+            let along: f64 = row.iter().zip(&direction).map(|(r, d)| r * d).sum();
+            row.iter_mut().zip(&direction).for_each(|(r, d)| *r -= along * d);
+        }
+        held.push(dof as u32);
+    }
+    held.sort_unstable();
+    held
+}

@@ -1,0 +1,189 @@
+//! A proven bound on the error of every answer, from numbers worked out once per contact set.
+//!
+//! With the known displacements C in place, the error e of an answer with residual r obeys
+//! `K_C e = r`, so `‖e‖ ≤ ‖K_C⁻¹‖ ‖r‖`. Two facts make this cheap:
+//!
+//! * `r` is a combination of the columns' residuals, bounded by the triangle inequality.
+//! * If the scene's own fixed nodes are the base, `K_C` is a principal submatrix of `K_B` and
+//!   `λ_min(K_C) ≥ λ_min(K_B)` (Cauchy interlacing). If the base is artificial, any load f moves
+//!   the touched body by `u = K_B⁻¹ f + M y` with `S y = −Mᵀ f`, where `M = [G_C R]` and S is the
+//!   small matrix; hence `‖K_C⁻¹‖ ≤ 1/λ_min(K_B) + ‖M D‖² ‖(D S D)⁻¹‖` for any diagonal D.
+//!
+//! `λ_min(K_B)` is bounded from below by a Cholesky factor of `K_B − s I`: if it exists, the
+//! smallest eigenvalue is at least s less a rounding margin.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use super::base::{Base, CondensedError, gamma};
+use super::columns::NodeColumns;
+use super::contact_set::{ContactAnswer, ContactSet};
+use crate::solve::FrontFactor;
+use crate::solve::pcg::norm;
+
+/// How wrong an answer can be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Certificate {
+    /// Bound on `‖r‖ / ‖b‖`.
+    pub residual_rel: f64,
+    /// Proven bound on `‖e‖ / ‖u‖` over all nodes, or why there is none.
+    pub error_bound_rel: Result<f64, &'static str>,
+}
+
+/// What the bound needs of a contact set.
+pub(super) struct SmallBound {
+    /// `‖M D‖² ‖(D S D)⁻¹‖`; zero when the scene's own nodes are the base.
+    compliance: f64,
+}
+
+impl SmallBound {
+    /// Shapes: `inverse` of the scaled small matrix, (c + z)².
+    pub fn new(
+        base: &Base,
+        columns: &[Arc<NodeColumns>],
+        places: &[(usize, usize)],
+        inverse: &DMatrix<f64>,
+        scale: f64,
+    ) -> Result<Self, CondensedError> {
+        if !inverse.iter().all(|x| x.is_finite()) {
+            return Err(CondensedError::NotHeld);
+        }
+        if base.is_held_by_scene() {
+            return Ok(Self { compliance: 0.0 });
+        }
+        let column_norms = places.iter().map(|&(node, axis)| columns[node].norms[axis]);
+        let norms: Vec<f64> = column_norms.chain(base.modes.iter().map(|m| m.norm)).collect();
+        // D makes every column of M a unit vector; a zero column (a held node) keeps its place.
+        let largest = norms.iter().copied().fold(0.0, f64::max);
+        let d = |i: usize| 1.0 / norms[i].max(1e-6 * largest);
+        // The scaled system is diag(scale, 1) applied to the columns of λ and to q, so the true
+        // inverse is recovered by the same factors.
+        let c = places.len();
+        let unscale = |i: usize, j: usize| match (i < c, j < c) {
+            (true, true) => scale,
+            (false, false) => 1.0 / scale,
+            _ => 1.0,
+        };
+        let mut frobenius = 0.0f64;
+        for i in 0..norms.len() {
+            for j in 0..norms.len() {
+                frobenius = frobenius.hypot(inverse[(i, j)] * unscale(i, j) / (d(i) * d(j)));
+            }
+        }
+        let columns: f64 = (0..norms.len()).map(|i| (norms[i] * d(i)).powi(2)).sum();
+        Ok(Self { compliance: columns * frobenius })
+    }
+}
+
+/// Share of the estimated smallest eigenvalue that the shifted factor must prove.
+const SHIFT_SHARE: f64 = 0.7;
+/// Steps of inverse iteration: the estimate only has to be good to a few per cent.
+const INVERSE_STEPS: usize = 12;
+
+impl Base {
+    /// Proves a lower bound of `λ_min(K_B)`, once; costs a second factor for the moment.
+    ///
+    /// Returns N/m, or `None` where double precision cannot prove one.
+    pub fn prove_eigenvalue_min(&self) -> Option<f64> {
+        *self.eigenvalue_min.get_or_init(|| {
+            let estimate = self.estimate_eigenvalue_min()?;
+            let shift = SHIFT_SHARE * estimate;
+            let shifted = self.stiffness.shifted(-shift);
+            FrontFactor::<f64>::try_new(self.factor.analysis(), &shifted).ok()?;
+            // Rump 2006: a Cholesky factor that exists proves the matrix it belongs to, which is
+            // within γ_{n+1} tr of the given one; n is at most the number of rows.
+            let n = self.partition.unknown().len();
+            let margin = gamma(n + 2) * self.stiffness.trace() * 2.0;
+            let proven = shift - margin;
+            (proven > 0.0).then_some(proven)
+        })
+    }
+
+    /// Bound proven earlier, without proving one now.
+    pub fn eigenvalue_min(&self) -> Option<f64> {
+        self.eigenvalue_min.get().copied().flatten()
+    }
+
+    /// Rayleigh quotient after some steps of inverse iteration: an estimate from above.
+    fn estimate_eigenvalue_min(&self) -> Option<f64> {
+        let n = self.partition.unknown().len();
+        // A fixed start without symmetry.
+        let mut x: Vec<f64> = (0..n).map(|i| 1.0 + 0.5 * (1.7 * i as f64).sin()).collect();
+        let mut quotient = None;
+        for _ in 0..INVERSE_STEPS {
+            let size = norm(&x);
+            if size.is_nan() || size <= 0.0 || !size.is_finite() {
+                return None;
+            }
+            x.iter_mut().for_each(|v| *v /= size);
+            let mut y = x.clone();
+            self.factor.solve_in_place(&mut y, 1);
+            let along: f64 = x.iter().zip(&y).map(|(a, b)| a * b).sum();
+            quotient = (along > 0.0).then(|| 1.0 / along);
+            x = y;
+        }
+        quotient
+    }
+}
+
+impl ContactSet {
+    /// How wrong an answer can be; costs no more than a few products of the size of the set.
+    ///
+    /// Shapes: `q` one per touched degree of freedom; `delivered` displacements of distinct nodes,
+    /// whose size makes the relative bound sharper (may be empty).
+    pub fn certify(
+        &self,
+        base: &Base,
+        q: &[f64],
+        answer: &ContactAnswer,
+        delivered: &[[f64; 3]],
+    ) -> Certificate {
+        let places = self.places.iter().map(|&(node, axis)| {
+            let columns = &self.columns[node];
+            (columns.norms[axis], columns.residuals[axis])
+        });
+        let modes = base.modes.iter().map(|mode| (mode.norm, mode.residual));
+        let amounts = answer.lambda.iter().chain(&answer.amounts);
+        let (mut moved, mut residual) = (0.0, 0.0);
+        for ((field, field_residual), amount) in places.chain(modes).zip(amounts) {
+            moved += amount.abs() * field;
+            residual += amount.abs() * field_residual;
+        }
+        // What the touched nodes are off moves their neighbours by at most so much force.
+        let stiffest = base.stiffness.row_sum_max();
+        residual += stiffest * answer.mismatch;
+        let b = norm(&self.load_of(base, q));
+        let residual_rel = if b > 0.0 { residual / b } else { residual };
+        let rounding = gamma(self.dofs().len() + base.modes.len() + 2) * moved;
+        // Part of the answer bounds the size of the whole from below.
+        let size = norm(q).max(norm(delivered.as_flattened()));
+        let error_bound_rel = match base.eigenvalue_min() {
+            None => Err("no lower bound of the smallest eigenvalue has been proven for this shape"),
+            Some(_) if size <= 0.0 => Err("nothing moves"),
+            Some(eigenvalue) => {
+                let compliance = 1.0 / eigenvalue + self.bound.compliance;
+                Ok((residual * compliance + rounding + answer.mismatch) / size)
+            }
+        };
+        Certificate { residual_rel, error_bound_rel }
+    }
+
+    /// `b = −K12 q` of (3.42a), over the touched degrees of freedom's neighbours.
+    fn load_of(&self, base: &Base, q: &[f64]) -> Vec<f64> {
+        let mut load: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
+        for (&dof, &value) in self.dofs().iter().zip(q) {
+            let (node, axis) = (dof as usize / 3, dof as usize % 3);
+            for (other, block) in base.stiffness.row(node) {
+                for c in 0..3 {
+                    *load.entry(3 * other + c).or_default() -= block[3 * axis + c] * value;
+                }
+            }
+        }
+        let is_free = |dof: &usize| {
+            self.dofs().binary_search(&(*dof as u32)).is_err()
+                && base.fixed.binary_search(&(*dof as u32)).is_err()
+        };
+        load.into_iter().filter(|(dof, _)| is_free(dof)).map(|(_, value)| value).collect()
+    }
+}

@@ -1,0 +1,179 @@
+//! One set of touched degrees of freedom: the small system, and answers from it.
+
+use std::sync::Arc;
+
+use faer::linalg::matmul::matmul;
+use faer::prelude::*;
+use faer::{Accum, Mat, Par};
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+use rayon::prelude::*;
+
+use super::base::{Base, CondensedError};
+use super::bound::SmallBound;
+use super::columns::{Columns, NodeColumns};
+
+/// A set of touched degrees of freedom, ready to answer any displacements of them.
+///
+/// Shapes: c touched degrees of freedom, z modes; small system (c + z)².
+pub struct ContactSet {
+    dofs: Vec<u32>,
+    pub(super) columns: Vec<Arc<NodeColumns>>,
+    /// Position in `columns` and axis of every touched degree of freedom.
+    pub(super) places: Vec<(usize, usize)>,
+    /// Scaled `[ G_C R_C ; R_Cᵀ 0 ]`, so that both kinds of unknowns have size one.
+    small: DMatrix<f64>,
+    small_lu: LU<f64, Dyn, Dyn>,
+    /// Scale of λ.
+    scale: f64,
+    condition: f64,
+    pub(super) bound: SmallBound,
+    rows: Option<WantedRows>,
+}
+
+/// Rows of `[G_C R]` at the nodes asked for, gathered once per set of nodes.
+struct WantedRows {
+    nodes: Vec<u32>,
+    matrix: Mat<f64>,
+}
+
+/// Forces and motions that answer one set of displacements.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactAnswer {
+    /// Force at every touched degree of freedom, N: the reactions of (3.43b).
+    pub lambda: Vec<f64>,
+    /// Amounts of the modes.
+    pub amounts: Vec<f64>,
+    /// How far the touched degrees of freedom are from what was asked, as a norm, m.
+    pub mismatch: f64,
+}
+
+/// Above this condition the last digits of the small system are all rounding.
+const CONDITION_MAX: f64 = 1e14;
+/// Rows multiplied as one task, always the same, so that the bits do not depend on the threads.
+const ROWS_TOGETHER: usize = 1536;
+
+impl ContactSet {
+    /// Gathers (or computes) the columns of the touched nodes and factors the small system.
+    ///
+    /// Shapes: `dofs` ascending touched degrees of freedom, none of them fixed by the scene.
+    ///
+    /// # Errors
+    /// [`CondensedError::CacheTooSmall`]; [`CondensedError::NotHeld`] if a motion is left free.
+    pub fn try_new(base: &Base, columns: &Columns, dofs: &[u32]) -> Result<Self, CondensedError> {
+        let mut nodes: Vec<u32> = dofs.iter().map(|d| d / 3).collect();
+        nodes.dedup();
+        let columns = columns.of_nodes(base, &nodes)?;
+        let places: Vec<(usize, usize)> = dofs
+            .iter()
+            .map(|d| (nodes.partition_point(|n| n < &(d / 3)), *d as usize % 3))
+            .collect();
+        let (c, z) = (dofs.len(), base.modes.len());
+        let g = |i: usize, j: usize| {
+            let (node, axis) = places[j];
+            columns[node].fields[axis][dofs[i] as usize]
+        };
+        let trace: f64 = (0..c).map(|i| g(i, i)).sum();
+        let scale = if trace > 0.0 { c as f64 / trace } else { 1.0 };
+        let small = DMatrix::from_fn(c + z, c + z, |i, j| match (i < c, j < c) {
+            // Symmetrised: the two triangles differ by rounding of two different solves.
+            (true, true) => 0.5 * scale * (g(i, j) + g(j, i)),
+            (true, false) => base.modes[j - c].field[dofs[i] as usize],
+            (false, true) => base.modes[i - c].field[dofs[j] as usize],
+            (false, false) => 0.0,
+        });
+        let small_lu = small.clone().lu();
+        let inverse = small_lu.try_inverse().ok_or(CondensedError::NotHeld)?;
+        let condition = small.norm() * inverse.norm();
+        // Written so that a NaN is refused too.
+        if !(0.0..=CONDITION_MAX).contains(&condition) {
+            return Err(CondensedError::NotHeld);
+        }
+        let bound = SmallBound::new(base, &columns, &places, &inverse, scale)?;
+        let dofs = dofs.to_vec();
+        Ok(Self { dofs, columns, places, small, small_lu, scale, condition, bound, rows: None })
+    }
+
+    /// The touched degrees of freedom, ascending.
+    pub fn dofs(&self) -> &[u32] {
+        &self.dofs
+    }
+
+    /// Condition of the small system in the Frobenius norm: how weakly the touched nodes hold.
+    pub fn condition(&self) -> f64 {
+        self.condition
+    }
+
+    /// Gathers the rows of the nodes that answers are wanted for; does nothing if it is the same
+    /// list as before.
+    pub fn want(&mut self, base: &Base, nodes: &[u32]) {
+        if self.rows.as_ref().is_some_and(|rows| rows.nodes == nodes) {
+            return;
+        }
+        let c = self.dofs.len();
+        let matrix = Mat::from_fn(3 * nodes.len(), c + base.modes.len(), |i, j| {
+            let dof = 3 * nodes[i / 3] as usize + i % 3;
+            if j < c {
+                let (node, axis) = self.places[j];
+                self.columns[node].fields[axis][dof]
+            } else {
+                base.modes[j - c].field[dof]
+            }
+        });
+        self.rows = Some(WantedRows { nodes: nodes.to_vec(), matrix });
+    }
+
+    /// Forces and motions for displacements of the touched degrees of freedom.
+    ///
+    /// Shapes: `q` one per touched degree of freedom, m.
+    ///
+    /// # Errors
+    /// [`CondensedError::NotHeld`], [`CondensedError::NotFinite`].
+    pub fn solve(&self, q: &[f64]) -> Result<ContactAnswer, CondensedError> {
+        let c = self.dofs.len();
+        let right = DVector::from_fn(self.small.nrows(), |i, _| q.get(i).copied().unwrap_or(0.0));
+        let mut x = self.small_lu.solve(&right).ok_or(CondensedError::NotHeld)?;
+        // One step of refinement takes out the rounding of the elimination.
+        let miss = &right - &self.small * &x;
+        x += self.small_lu.solve(&miss).ok_or(CondensedError::NotHeld)?;
+        let mismatch = (&right - &self.small * &x).norm();
+        if !x.iter().all(|v| v.is_finite()) {
+            return Err(CondensedError::NotFinite);
+        }
+        Ok(ContactAnswer {
+            lambda: x.iter().take(c).map(|v| v * self.scale).collect(),
+            amounts: x.iter().skip(c).copied().collect(),
+            mismatch,
+        })
+    }
+
+    /// Displacements at the wanted nodes (see [`ContactSet::want`]), 3 per node, m.
+    ///
+    /// Source: `u = G λ + R a`, see the module.
+    pub fn wanted_displacements(&self, answer: &ContactAnswer) -> Vec<[f64; 3]> {
+        let Some(rows) = &self.rows else { return Vec::new() };
+        let x: Vec<f64> = answer.lambda.iter().chain(&answer.amounts).copied().collect();
+        let x = MatRef::from_column_major_slice(&x, x.len(), 1);
+        let mut u = vec![[0.0; 3]; rows.nodes.len()];
+        u.par_chunks_mut(ROWS_TOGETHER / 3).enumerate().for_each(|(chunk, u)| {
+            let count = 3 * u.len();
+            let part = rows.matrix.subrows(chunk * ROWS_TOGETHER, count);
+            let u = MatMut::from_column_major_slice_mut(u.as_flattened_mut(), count, 1);
+            matmul(u, Accum::Replace, part, x, 1.0, Par::Seq);
+        });
+        u
+    }
+
+    /// Displacement of every degree of freedom, 3N, m.
+    pub fn full_displacement(&self, base: &Base, answer: &ContactAnswer) -> Vec<f64> {
+        let mut u = vec![0.0; base.dof_count()];
+        let columns = self.places.iter().map(|&(node, axis)| &self.columns[node].fields[axis]);
+        let modes = base.modes.iter().map(|mode| &mode.field);
+        let amounts = answer.lambda.iter().chain(&answer.amounts);
+        for (field, amount) in columns.chain(modes).zip(amounts) {
+            for (u, g) in u.iter_mut().zip(field) {
+                *u += amount * g;
+            }
+        }
+        u
+    }
+}
