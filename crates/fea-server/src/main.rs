@@ -104,6 +104,7 @@ fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
         max_sessions: arguments.max_sessions,
         memory_limit: arguments.memory_limit,
         token,
+        ..usual
     })
 }
 

@@ -26,8 +26,6 @@ pub(crate) struct Hall {
     pub stop: watch::Receiver<bool>,
 }
 
-/// A client that stops inside a frame for this long is given up.
-const STALL_MAX: Duration = Duration::from_secs(30);
 /// A client that does not take its reply for this long is given up.
 const WRITE_MAX: Duration = Duration::from_secs(60);
 
@@ -41,6 +39,7 @@ pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut hall: Hall) {
     let mut session = Session {
         connection: Connection::new(stream, limits),
         limits,
+        stall_limit: hall.desk.config.stall_limit,
         authorised: hall.desk.config.token.is_none(),
         out: Vec::new(),
     };
@@ -59,6 +58,7 @@ pub(crate) async fn stopped(stop: &mut watch::Receiver<bool>) {
 struct Session {
     connection: Connection<TcpStream>,
     limits: Limits,
+    stall_limit: Duration,
     authorised: bool,
     /// Encoded reply, kept so that its memory is reused.
     out: Vec<u8>,
@@ -69,8 +69,8 @@ struct Session {
 enum SessionError {
     #[error(transparent)]
     Connection(#[from] ConnectionError),
-    #[error("the client stopped inside a frame for {} s", STALL_MAX.as_secs())]
-    Stalled,
+    #[error("the client stopped inside a frame for {} s", .0.as_secs_f64())]
+    Stalled(Duration),
     #[error("the client did not take its reply for {} s", WRITE_MAX.as_secs())]
     NotTaken,
 }
@@ -104,10 +104,10 @@ impl Session {
         loop {
             let inside = self.connection.is_inside_frame();
             let received = self.connection.received();
-            match timeout(STALL_MAX, self.connection.read_frame()).await {
+            match timeout(self.stall_limit, self.connection.read_frame()).await {
                 Ok(frame) => return Ok(frame?),
                 Err(_) if inside && self.connection.received() == received => {
-                    return Err(SessionError::Stalled);
+                    return Err(SessionError::Stalled(self.stall_limit));
                 }
                 Err(_) => {}
             }
