@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{
-    ConnectionError, Frame, FrameError, Hello, Limits, RejectCode, Rejected, Reply, Request,
+    ConnectionError, Frame, FrameError, Hello, Kind, Limits, RejectCode, Rejected, Reply, Request,
     Welcome,
 };
 use tokio::net::TcpStream;
@@ -153,12 +153,16 @@ impl Session {
     /// One request: decoded, worked on, answered. A bad request is answered and the session lives.
     async fn handle(&mut self, frame: Frame, hall: &Hall) -> Result<(), SessionError> {
         let request_id = frame.request_id();
+        let has_reply = !matches!(frame.kind(), Some(Kind::Prefetch | Kind::Drop));
         match self.reply_to(frame, hall).await {
             Ok(Some(reply)) => self.write(request_id, &reply).await,
             Ok(None) => Ok(()),
             Err(refusal) => {
                 tracing::info!(%refusal, "request refused");
-                self.write(request_id, &Reply::Rejected(refusal.to_message())).await
+                match has_reply {
+                    true => self.write(request_id, &Reply::Rejected(refusal.to_message())).await,
+                    false => Ok(()),
+                }
             }
         }
     }
