@@ -112,7 +112,8 @@ impl Desk {
             .collect::<Result<_, _>>()?;
         let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
         let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
-        let mesh = TetMesh::try_new(vertices, tets, mesh.regions)?;
+        let mesh = TetMesh::try_new(vertices, tets, regions)?;
+        let regions = ranks(&mesh.regions, materials.len())?;
         Ok(Model::try_new(mesh, &materials, fixed, &mut |stage| clock.begin(stage))?)
     }
 
@@ -147,6 +148,23 @@ fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
 struct Asked<'a> {
     question: &'a Question,
     known: Known,
+/// Region labels as positions in the list of materials, which stands in ascending order of the
+/// labels; empty when one material is for the whole body. Labels are any numbers: nothing may be
+/// as large as they are.
+fn ranks(labels: &[u32], materials: usize) -> Result<Vec<u32>, Refusal> {
+    if materials == 1 {
+        return Ok(Vec::new());
+    }
+    let mut known = labels.to_vec();
+    known.sort_unstable();
+    known.dedup();
+    // Without labels all elements belong to one region.
+    if known.len().max(1) != materials {
+        return Err(Refusal::Regions { labels: known.len(), materials });
+    }
+    Ok(labels.iter().map(|label| known.partition_point(|k| k < label) as u32).collect())
+}
+
     element: ElementName,
     factor_reused: bool,
 }

@@ -23,6 +23,11 @@ pub(crate) enum Refusal {
     NoMaterial,
     #[error("no model {0} is known here; upload it")]
     UnknownModel(ModelHash),
+    #[error(
+        "{materials} materials were given for {labels} region labels; give one material for the \
+         whole body, or one for each label in ascending order of the labels"
+    )]
+    Regions { labels: usize, materials: usize },
     #[error("{what} names node {node}, but the mesh has {node_count} nodes (0-based)")]
     NoSuchNode { what: &'static str, node: u32, node_count: usize },
     #[error("a force at node {node} is {value} N; it must be a finite number")]
