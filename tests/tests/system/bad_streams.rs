@@ -14,7 +14,7 @@ use softgrasp_tests::watchdog::{until, within};
 
 use crate::start::{answer, client, config, server};
 
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(120);
 /// The grace time of a stop, and some more for a busy machine.
 const STOP_MAX: Duration = Duration::from_secs(10);
 
@@ -78,7 +78,6 @@ fn every_flipped_bit_closes_its_session_and_no_other() {
         for bit in 0..8 * sound.len() {
             let mut bytes = sound.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
-            // A length that grew waits for more bytes, and their end is the fault.
             let (code, text) = last_words(server.address(), &bytes).expect("last words");
             match code {
                 RejectCode::BadRequest | RejectCode::UnsupportedVersion => {}

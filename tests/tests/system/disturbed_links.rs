@@ -11,7 +11,7 @@ use softgrasp_tests::watchdog::within;
 
 use crate::start::server;
 
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(120);
 
 /// A conversation, what is heard in it undisturbed, and its bytes.
 struct Reference {

@@ -12,7 +12,7 @@ use softgrasp_tests::watchdog::within;
 
 use crate::start::{answer, client, config, refusal, server};
 
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(120);
 const ROUNDS: usize = 4;
 
 /// Eight clients' requests: different meshes and methods, kept models and whole requests.

@@ -11,7 +11,7 @@ use softgrasp_tests::watchdog::within;
 
 use crate::start::{answer, client, server};
 
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(120);
 /// The grace time of a stop, and some more for a busy machine.
 const STOP_MAX: Duration = Duration::from_secs(10);
 
