@@ -1,1 +1,9 @@
-//! Helpers shared by the system tests: meshes, servers, a faulty proxy.
+//! What the system tests share: questions to ask, ways to ask them, and ways to disturb the asking.
+
+pub mod conversation;
+pub mod faulty_proxy;
+pub mod heard;
+pub mod questions;
+pub mod random;
+pub mod raw_session;
+pub mod watchdog;

@@ -36,8 +36,9 @@ impl Desk {
         let model = self.model(mesh, &materials, element, Vec::new(), &mut clock)?;
         let known = model.known(pairs(&question.known))?;
         let method = self.method(&question, &known, &model)?;
+        let forces = checked_forces(&model, &known, &question)?;
         let factored = model.factor(&known.dofs, method, &mut |stage| clock.begin(stage))?;
-        let asked = Asked { question: &question, known, element, factor_reused: false };
+        let asked = Asked { question: &question, known, forces, element, factor_reused: false };
         answer(&model, &factored, asked, clock)
     }
 
@@ -72,6 +73,7 @@ impl Desk {
         let model = &stored.model;
         let known = model.known(pairs(&question.known))?;
         let method = self.method(&question, &known, model)?;
+        let forces = checked_forces(model, &known, &question)?;
         let kept = stored.factor_for(&known.dofs, method);
         let factor_reused = kept.is_some();
         let factored = match kept {
@@ -84,7 +86,8 @@ impl Desk {
                 made
             }
         };
-        let asked = Asked { question: &question, known, element: ElementName::T4, factor_reused };
+        let element = ElementName::T4;
+        let asked = Asked { question: &question, known, forces, element, factor_reused };
         answer(model, &factored, asked, clock)
     }
 
@@ -110,9 +113,10 @@ impl Desk {
             .iter()
             .map(|m| Material::try_new(m.young, m.poisson))
             .collect::<Result<_, _>>()?;
+        let regions = ranks(&mesh.regions, materials.len())?;
         let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
         let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
-        let mesh = TetMesh::try_new(vertices, tets, mesh.regions)?;
+        let mesh = TetMesh::try_new(vertices, tets, regions)?;
         Ok(Model::try_new(mesh, &materials, fixed, &mut |stage| clock.begin(stage))?)
     }
 
@@ -144,9 +148,27 @@ fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
     }
 }
 
+/// Region labels as positions in the list of materials, which stands in ascending order of the
+/// labels; empty when one material is for the whole body. Labels are any numbers: nothing may be
+/// as large as they are.
+fn ranks(labels: &[u32], materials: usize) -> Result<Vec<u32>, Refusal> {
+    if materials == 1 {
+        return Ok(Vec::new());
+    }
+    let mut known = labels.to_vec();
+    known.sort_unstable();
+    known.dedup();
+    // Without labels all elements belong to one region.
+    if known.len().max(1) != materials {
+        return Err(Refusal::Regions { labels: known.len(), materials });
+    }
+    Ok(labels.iter().map(|label| known.partition_point(|k| k < label) as u32).collect())
+}
+
 struct Asked<'a> {
     question: &'a Question,
     known: Known,
+    forces: Vec<f64>,
     element: ElementName,
     factor_reused: bool,
 }
@@ -162,9 +184,7 @@ fn answer(
     asked: Asked<'_>,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    let Asked { question, known, element, factor_reused } = asked;
-    check_nodes(&question.want, model)?;
-    let forces = scatter_forces(model, &known, &question.forces)?;
+    let Asked { question, known, forces, element, factor_reused } = asked;
     let residual_rel = question.max_error.unwrap_or(0.0);
     let loads = Loads { q_known: &known.q_known, forces: &forces, residual_rel };
     let solution = factored
@@ -203,6 +223,13 @@ fn answer(
         },
     };
     Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
+}
+
+/// Forces by degree of freedom, once all that a question names is seen to be there; before a factor
+/// is made, because that is what costs.
+fn checked_forces(model: &Model, known: &Known, question: &Question) -> Result<Vec<f64>, Refusal> {
+    check_nodes(&question.want, model)?;
+    scatter_forces(model, known, &question.forces)
 }
 
 fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {

@@ -1,6 +1,7 @@
 //! What a server is started with, and what it checks before it starts.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use softgrasp_protocol::Limits;
 
@@ -20,6 +21,8 @@ pub struct ServerConfig {
     pub memory_limit: u64,
     /// Shared secret a client must show, if any.
     pub token: Option<String>,
+    /// A client that stops inside a frame for this long is given up.
+    pub stall_limit: Duration,
 }
 
 /// Settings that make no sense.
@@ -55,6 +58,7 @@ impl Default for ServerConfig {
             max_sessions: 64,
             memory_limit: 8 << 30,
             token: None,
+            stall_limit: Duration::from_secs(30),
         }
     }
 }
@@ -75,6 +79,7 @@ impl ServerConfig {
             ("--max-nodes", self.max_nodes == 0),
             ("--max-sessions", self.max_sessions == 0),
             ("--memory-limit", self.memory_limit == 0),
+            ("the stall limit", self.stall_limit.is_zero()),
         ] {
             if zero {
                 return Err(ConfigError::Zero { option });

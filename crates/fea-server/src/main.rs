@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
-use fea_server::ServerConfig;
+use fea_server::{ServerConfig, StartError};
 use tokio::sync::watch;
 
 /// Finite element server of Softgrasp: solves deformations over TCP, once per frame.
@@ -43,6 +43,9 @@ enum LogForm {
     Json,
 }
 
+/// Exit code for options that make no sense, as clap's own.
+const WRONG_USAGE: u8 = 2;
+
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     start_log(arguments.log);
@@ -50,7 +53,10 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("fea-server: {error:#}");
-            ExitCode::FAILURE
+            match error.downcast_ref() {
+                Some(StartError::Config(_)) => ExitCode::from(WRONG_USAGE),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }
@@ -104,6 +110,7 @@ fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
         max_sessions: arguments.max_sessions,
         memory_limit: arguments.memory_limit,
         token,
+        ..usual
     })
 }
 

@@ -10,7 +10,9 @@ use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Refusal {
     #[error("the request cannot be decoded: {0}")]
-    Decode(#[from] DecodeError),
+    Decode(DecodeError),
+    #[error("the request is too large for this server: {0} (--max-nodes sets most limits)")]
+    Limit(DecodeError),
     #[error("the mesh cannot be modelled: {0}")]
     Mesh(#[from] MeshError),
     #[error(transparent)]
@@ -21,6 +23,11 @@ pub(crate) enum Refusal {
     Method(#[from] UnknownMethod),
     #[error("no material was given")]
     NoMaterial,
+    #[error(
+        "{materials} materials were given for {labels} region labels; give one material for the \
+         whole body, or one for each label in ascending order of the labels"
+    )]
+    Regions { labels: usize, materials: usize },
     #[error("no model {0} is known here; upload it")]
     UnknownModel(ModelHash),
     #[error("{what} names node {node}, but the mesh has {node_count} nodes (0-based)")]
@@ -44,6 +51,15 @@ pub(crate) enum Refusal {
     Internal,
 }
 
+impl From<DecodeError> for Refusal {
+    fn from(error: DecodeError) -> Self {
+        match error {
+            DecodeError::TooMany { .. } => Self::Limit(error),
+            _ => Self::Decode(error),
+        }
+    }
+}
+
 impl Refusal {
     fn code(&self) -> RejectCode {
         match self {
@@ -59,7 +75,7 @@ impl Refusal {
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
             Self::Token => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,
-            Self::Decode(DecodeError::TooMany { .. }) => RejectCode::TooLarge,
+            Self::Limit(_) => RejectCode::TooLarge,
             _ => RejectCode::BadRequest,
         }
     }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{
-    ConnectionError, Frame, FrameError, Hello, Limits, RejectCode, Rejected, Reply, Request,
+    ConnectionError, Frame, FrameError, Hello, Kind, Limits, RejectCode, Rejected, Reply, Request,
     Welcome,
 };
 use tokio::net::TcpStream;
@@ -26,8 +26,6 @@ pub(crate) struct Hall {
     pub stop: watch::Receiver<bool>,
 }
 
-/// A client that stops inside a frame for this long is given up.
-const STALL_MAX: Duration = Duration::from_secs(30);
 /// A client that does not take its reply for this long is given up.
 const WRITE_MAX: Duration = Duration::from_secs(60);
 
@@ -41,6 +39,7 @@ pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut hall: Hall) {
     let mut session = Session {
         connection: Connection::new(stream, limits),
         limits,
+        stall_limit: hall.desk.config.stall_limit,
         authorised: hall.desk.config.token.is_none(),
         out: Vec::new(),
     };
@@ -59,6 +58,7 @@ pub(crate) async fn stopped(stop: &mut watch::Receiver<bool>) {
 struct Session {
     connection: Connection<TcpStream>,
     limits: Limits,
+    stall_limit: Duration,
     authorised: bool,
     /// Encoded reply, kept so that its memory is reused.
     out: Vec<u8>,
@@ -69,8 +69,8 @@ struct Session {
 enum SessionError {
     #[error(transparent)]
     Connection(#[from] ConnectionError),
-    #[error("the client stopped inside a frame for {} s", STALL_MAX.as_secs())]
-    Stalled,
+    #[error("the client stopped inside a frame for {} s", .0.as_secs_f64())]
+    Stalled(Duration),
     #[error("the client did not take its reply for {} s", WRITE_MAX.as_secs())]
     NotTaken,
 }
@@ -104,10 +104,10 @@ impl Session {
         loop {
             let inside = self.connection.is_inside_frame();
             let received = self.connection.received();
-            match timeout(STALL_MAX, self.connection.read_frame()).await {
+            match timeout(self.stall_limit, self.connection.read_frame()).await {
                 Ok(frame) => return Ok(frame?),
                 Err(_) if inside && self.connection.received() == received => {
-                    return Err(SessionError::Stalled);
+                    return Err(SessionError::Stalled(self.stall_limit));
                 }
                 Err(_) => {}
             }
@@ -153,12 +153,16 @@ impl Session {
     /// One request: decoded, worked on, answered. A bad request is answered and the session lives.
     async fn handle(&mut self, frame: Frame, hall: &Hall) -> Result<(), SessionError> {
         let request_id = frame.request_id();
+        let has_reply = !matches!(frame.kind(), Some(Kind::Prefetch | Kind::Drop));
         match self.reply_to(frame, hall).await {
             Ok(Some(reply)) => self.write(request_id, &reply).await,
             Ok(None) => Ok(()),
             Err(refusal) => {
                 tracing::info!(%refusal, "request refused");
-                self.write(request_id, &Reply::Rejected(refusal.to_message())).await
+                match has_reply {
+                    true => self.write(request_id, &Reply::Rejected(refusal.to_message())).await,
+                    false => Ok(()),
+                }
             }
         }
     }

@@ -54,10 +54,10 @@ pub struct SolveCommand {
     #[arg(long, default_value_t = 0.3, value_name = "NU")]
     poisson: f64,
     /// Largest relative error wanted; a worse answer is warned of.
-    #[arg(long, value_name = "REL")]
+    #[arg(long, value_name = "REL", value_parser = parse_positive)]
     max_error: Option<f64>,
     /// Time wanted, ms; a later answer is warned of.
-    #[arg(long, value_name = "MS")]
+    #[arg(long, value_name = "MS", value_parser = parse_positive)]
     deadline: Option<f64>,
     /// File for the displacements: .csv or .vtu.
     #[arg(long, value_name = "U.csv|U.vtu", value_parser = parse_out)]
@@ -94,6 +94,13 @@ fn parse_element(text: &str) -> Result<ElementName, String> {
         "t4" => Ok(ElementName::T4),
         "t10" => Ok(ElementName::T10),
         _ => Err("there are t4 and t10".to_owned()),
+    }
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a finite number above 0".to_owned()),
     }
 }
 
@@ -154,11 +161,6 @@ impl SolveCommand {
             Some(path) => read_values(path, FORCE_COLUMNS, node_count)?,
             None => Vec::new(),
         };
-        for (option, value) in [("--max-error", self.max_error), ("--deadline", self.deadline)] {
-            if value.is_some_and(|v| v <= 0.0 || !v.is_finite()) {
-                bail!("{option} must be a number above 0");
-            }
-        }
         Ok(Question {
             known,
             forces,

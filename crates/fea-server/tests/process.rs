@@ -1,0 +1,341 @@
+//! The `fea-server` program as a process: first line, signals, exit codes, memory.
+
+#![cfg(unix)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests fail and speak like tests"
+)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
+use softgrasp_protocol::blocking::Connection;
+use softgrasp_protocol::{
+    Answer, DofValue, ElementName, Hello, Kind, Limits, Material, MeshData, MethodName, Question,
+    RejectCode, Reply, Request, SolveOnce, Want,
+};
+
+const MIB: u64 = 1 << 20;
+/// A process that has not ended by then hangs.
+const END_MAX: Duration = Duration::from_secs(30);
+
+fn command() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fea-server"));
+    command.env_remove("RUST_LOG").stdin(Stdio::null());
+    command
+}
+
+/// Runs to the end.
+fn run(arguments: &[&str]) -> Output {
+    command().args(arguments).output().unwrap()
+}
+
+/// A running server; killed if a test fails.
+struct ServerProcess {
+    child: Child,
+    stdout: BufReader<ChildStdout>,
+    address: SocketAddr,
+}
+
+impl ServerProcess {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = command()
+            .args(["--listen", "127.0.0.1:0"])
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut stdout = BufReader::new(child.stdout.take().unwrap());
+        let mut first = String::new();
+        stdout.read_line(&mut first).unwrap();
+        let address = first.strip_prefix("listening on ").expect("the contract's first line");
+        let address: SocketAddr = address.trim_end().parse().unwrap();
+        assert!(address.ip().is_loopback() && address.port() != 0, "{first}");
+        Self { child, stdout, address }
+    }
+
+    fn connect(&self) -> Client {
+        let stream = TcpStream::connect(self.address).unwrap();
+        stream.set_nodelay(true).unwrap();
+        let mut client = Client { connection: Connection::new(stream, Limits::default()), id: 0 };
+        let hello = Hello { client: "a test".to_owned(), token: None };
+        assert!(matches!(client.ask(&Request::Hello(hello)), Reply::Welcome(_)));
+        client
+    }
+
+    /// Sends a signal by its name.
+    fn signal(&self, name: &str) {
+        let kill = format!("kill -{name} {}", self.child.id());
+        assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+    }
+
+    /// Exit code and the rest of standard output.
+    fn end(&mut self) -> (Option<i32>, String) {
+        let start = Instant::now();
+        let status = loop {
+            match self.child.try_wait().unwrap() {
+                Some(status) => break status,
+                None => assert!(start.elapsed() < END_MAX, "the server does not end"),
+            }
+            std::thread::yield_now();
+        };
+        let mut rest = String::new();
+        self.stdout.read_to_string(&mut rest).unwrap();
+        (status.code(), rest)
+    }
+
+    /// Largest resident memory so far, bytes; `None` where the system does not tell.
+    fn peak_bytes(&self) -> Option<u64> {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).ok()?;
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+        Some(line.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
+    }
+}
+
+impl Drop for ServerProcess {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+struct Client {
+    connection: Connection<TcpStream>,
+    id: u64,
+}
+
+impl Client {
+    fn ask(&mut self, request: &Request) -> Reply {
+        self.id += 1;
+        let mut bytes = Vec::new();
+        request.encode_into(self.id, &Limits::default(), &mut bytes).unwrap();
+        self.connection.write_bytes(&bytes).unwrap();
+        let frame = self.connection.read_frame().unwrap().expect("an answer");
+        assert_eq!(frame.request_id(), self.id);
+        Reply::decode(&frame, &Limits::default()).unwrap()
+    }
+
+    fn solve(&mut self, request: SolveOnce) -> Answer {
+        match self.ask(&Request::SolveOnce(Box::new(request))) {
+            Reply::Answer(answer) => *answer,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// A cube whose lowest layer is held and one of whose upper corners is pulled.
+fn pulled_cube(nodes: usize, method: &str) -> SolveOnce {
+    let mesh: TetMesh = generate(BuiltIn::Cube, nodes).unwrap();
+    let (low, high) = mesh.bounds();
+    let mut known = Vec::new();
+    for (node, p) in mesh.vertices().iter().enumerate() {
+        let value = match p.y {
+            y if y <= low.y => 0.0,
+            _ if *p == high => 0.002,
+            _ => continue,
+        };
+        known.extend((0..3).map(|axis| DofValue { dof: 3 * node as u32 + axis, value }));
+    }
+    SolveOnce {
+        mesh: MeshData {
+            vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
+            tets: mesh.tets().to_vec(),
+            regions: Vec::new(),
+        },
+        materials: vec![Material { young: 1.0e5, poisson: 0.3 }],
+        element: ElementName::T4,
+        question: Question {
+            known,
+            forces: Vec::new(),
+            method: MethodName::try_new(method).unwrap(),
+            want: Want::default(),
+            max_error: None,
+            deadline_ms: None,
+        },
+    }
+}
+
+#[test]
+fn first_line_names_the_address_and_both_signals_end_with_exit_code_0() {
+    for signal in ["TERM", "INT"] {
+        let mut server = ServerProcess::start(&["--threads", "1"]);
+        // A session that is open does not hold the end up.
+        let mut client = server.connect();
+        assert_eq!(client.ask(&Request::Ping { nonce: 4 }), Reply::Pong { nonce: 4 });
+        server.signal(signal);
+        assert_eq!(server.end(), (Some(0), String::new()), "SIG{signal}");
+        assert!(TcpStream::connect(server.address).is_err());
+    }
+}
+
+#[test]
+fn taken_port_ends_with_exit_code_1_and_one_clear_line() {
+    let taken = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let output = run(&["--listen", &address]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(output.stdout.is_empty());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.starts_with("fea-server: cannot listen on"), "{said}");
+    assert!(said.contains(&address) && said.contains("--listen HOST:PORT"), "{said}");
+}
+
+#[test]
+fn files_and_addresses_that_are_not_there_end_with_exit_code_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("no-token").display().to_string();
+    let empty = folder.path().join("empty").display().to_string();
+    std::fs::write(&empty, "\n").unwrap();
+    for (arguments, says) in [
+        (["--token-file", &missing], "cannot read the token file"),
+        (["--token-file", &empty], "is empty"),
+        (["--listen", "7878"], "write HOST:PORT"),
+    ] {
+        let output = run(&arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.starts_with("fea-server: ") && said.contains(says), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_exit_code_2() {
+    for arguments in [
+        &["--nonsense"][..],
+        &["--threads", "many"],
+        &["--threads", "0"],
+        &["--threads", "99999"],
+        &["--max-nodes", "0"],
+        &["--max-nodes", "-5"],
+        &["--max-sessions", "0"],
+        &["--memory-limit", "0"],
+        &["--log", "xml"],
+        &["stray"],
+    ] {
+        let arguments = [&["--listen", "127.0.0.1:0"], arguments].concat();
+        let output = run(&arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(!said.is_empty() && output.stdout.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn token_of_the_file_is_wanted() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("token");
+    std::fs::write(&file, "hush\nnot this line\n").unwrap();
+    let server = ServerProcess::start(&["--token-file", file.to_str().unwrap()]);
+    let stream = TcpStream::connect(server.address).unwrap();
+    let mut client = Client { connection: Connection::new(stream, Limits::default()), id: 0 };
+    let hello = |token: &str| {
+        Request::Hello(Hello { client: "a test".to_owned(), token: Some(token.to_owned()) })
+    };
+    match client.ask(&hello("not this line")) {
+        Reply::Rejected(rejected) => assert_eq!(rejected.code, RejectCode::NotAuthorised),
+        other => panic!("{other:?}"),
+    }
+    assert!(matches!(client.ask(&hello("hush")), Reply::Welcome(_)));
+}
+
+#[test]
+fn announced_sizes_take_no_memory() {
+    let server = ServerProcess::start(&["--threads", "1"]);
+    let mut client = server.connect();
+    let sound = || Request::SolveOnce(Box::new(pulled_cube(64, "auto")));
+    assert!(matches!(client.ask(&sound()), Reply::Answer(_)));
+    let Some(before) = server.peak_bytes() else {
+        println!("skipped: this system does not tell a process's memory");
+        return;
+    };
+    // Headers that announce the largest payload, each followed by a little of it.
+    let header = |len: u32| {
+        let mut raw = b"SGRP\x01\x00".to_vec();
+        raw.extend(Kind::UploadModel.number().to_le_bytes());
+        raw.extend(0_u32.to_le_bytes());
+        raw.extend(len.to_le_bytes());
+        raw.extend(1_u64.to_le_bytes());
+        raw.extend(crc32c::crc32c(&raw).to_le_bytes());
+        raw.extend(crc32c::crc32c(&raw).to_le_bytes());
+        raw
+    };
+    let mut half_open = Vec::new();
+    for _ in 0..20 {
+        let mut stream = TcpStream::connect(server.address).unwrap();
+        stream.write_all(&header(Limits::default().payload_len_max)).unwrap();
+        stream.write_all(&[0; 10_000]).unwrap();
+        half_open.push(stream);
+    }
+    // A part that announces all the nodes and elements there may be, and brings none.
+    let mut mesh = 400_000_u32.to_le_bytes().to_vec();
+    mesh.extend(2_400_000_u32.to_le_bytes());
+    mesh.extend([1, 0, 0, 1, 0]);
+    mesh.resize(24, 0);
+    for kind in [Kind::UploadModel, Kind::SolveOnce] {
+        let mut frame = header(0);
+        frame.truncate(6);
+        frame.extend(kind.number().to_le_bytes());
+        frame.extend(0_u32.to_le_bytes());
+        frame.extend((mesh.len() as u32).to_le_bytes());
+        frame.extend(1_u64.to_le_bytes());
+        frame.extend(crc32c::crc32c(&frame).to_le_bytes());
+        frame.extend(crc32c::crc32c_append(crc32c::crc32c(&frame), &mesh).to_le_bytes());
+        frame.extend(&mesh);
+        let mut stream = TcpStream::connect(server.address).unwrap();
+        stream.write_all(&frame).unwrap();
+        let refused = Connection::new(stream, Limits::default()).read_frame().unwrap().unwrap();
+        let reply = Reply::decode(&refused, &Limits::default()).unwrap();
+        assert!(matches!(reply, Reply::Rejected(_)), "{reply:?}");
+    }
+    assert!(matches!(client.ask(&sound()), Reply::Answer(_)));
+    let grown = server.peak_bytes().unwrap() - before;
+    assert!(grown < 16 * MIB, "grown by {} MiB", grown / MIB);
+}
+
+/// Peak of one dense solve in a fresh process: 2.2 n² × 8 bytes and 64 MiB.
+fn check_dense_memory(method: &str, nodes: usize, unknowns: std::ops::Range<u64>) {
+    let server = ServerProcess::start(&["--threads", "2"]);
+    let mut client = server.connect();
+    let Some(idle) = server.peak_bytes() else {
+        println!("skipped: this system does not tell a process's memory");
+        return;
+    };
+    assert!(idle < 64 * MIB, "{} MiB before anything was asked", idle / MIB);
+    let report = client.solve(pulled_cube(nodes, method)).report;
+    assert_eq!(report.method, method);
+    let n = report.unknown_dofs;
+    assert!(unknowns.contains(&n), "{n} unknowns");
+    assert!(report.residual_rel < 1e-10, "residual {:e}", report.residual_rel);
+    let peak = server.peak_bytes().unwrap();
+    // The same figure from inside; the system counts pages in batches per thread.
+    assert!(report.peak_rss_bytes.abs_diff(peak) < 2 * MIB && report.peak_rss_bytes > idle);
+    let bound = 22 * n * n * 8 / 10 + 64 * MIB;
+    println!("{method}, {n} unknowns: {} of {} MiB", peak / MIB, bound / MIB);
+    assert!(peak <= bound, "{method}: {} MiB, allowed {}", peak / MIB, bound / MIB);
+    // And it is all there: a matrix that is not in memory was not inverted.
+    let matrix = n * n * 8;
+    let least = if method == "dense-cholesky" { matrix / 2 } else { matrix };
+    assert!(peak > least, "{method}: {} MiB", peak / MIB);
+}
+
+#[test]
+fn dense_inverse_stays_within_its_memory() {
+    check_dense_memory("dense-inverse", 1000, 2500..3000);
+}
+
+#[test]
+fn dense_cholesky_stays_within_its_memory() {
+    check_dense_memory("dense-cholesky", 1000, 2500..3000);
+}
+
+#[test]
+fn gauss_jordan_stays_within_its_memory() {
+    check_dense_memory("gauss-jordan", 590, 1400..1700);
+}

@@ -1,0 +1,12 @@
+//! The `glove-client` program as a process: what it solves, and how it fails.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests fail and speak like tests"
+)]
+
+mod agreement;
+mod commands;
+mod references;
+mod start;

@@ -1,0 +1,92 @@
+//! One client's whole conversation with a server, to be held again under other conditions.
+
+use std::net::SocketAddr;
+
+use glove_client::connection::{LinkError, ServerConnection};
+use softgrasp_protocol::{ModelHash, NodeChoice, Precision, Request};
+
+use crate::heard::Heard;
+use crate::questions::{cube, frame, once, upload};
+
+/// Requests asked one after the other on one connection, after the Hello.
+#[derive(Clone, Debug)]
+pub struct Conversation {
+    requests: Vec<Request>,
+}
+
+/// What came of a conversation.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Replies in order, the Welcome first.
+    pub heard: Vec<Heard>,
+    /// Why it ended early, if it did.
+    pub error: Option<LinkError>,
+}
+
+impl Conversation {
+    /// Every kind of request that has a reply, on a small cube: asks for the model, uploads it,
+    /// two frames (one quantised and for listed nodes), one self-contained solve, ping.
+    pub fn small() -> Self {
+        let mesh = cube(27);
+        let upload = upload(&mesh);
+        let mut listed = frame(&mesh, 0.5, "dense-inverse");
+        listed.question.want.nodes = NodeChoice::Nodes(vec![13, 0, 26]);
+        listed.question.want.precision = Precision::F32Quantised;
+        Self {
+            requests: vec![
+                Request::HaveModel(ModelHash::of(&upload)),
+                Request::UploadModel(upload),
+                Request::Frame(frame(&mesh, 1.0, "sparse-cholesky")),
+                Request::Frame(listed),
+                Request::SolveOnce(Box::new(once(&mesh, "dense-cholesky"))),
+                Request::Ping { nonce: 7 },
+            ],
+        }
+    }
+
+    /// Number of replies when nothing goes wrong, the Welcome counted.
+    pub fn reply_count(&self) -> usize {
+        self.requests.len() + 1
+    }
+
+    /// The requests after the Hello.
+    pub fn requests(&self) -> &[Request] {
+        &self.requests
+    }
+
+    /// Holds the conversation; a refusal is a reply, anything else that fails ends it.
+    pub fn hold(&self, address: SocketAddr) -> Outcome {
+        let mut heard = Vec::new();
+        let mut connection = match ServerConnection::connect(&address.to_string(), None) {
+            Ok(connection) => connection,
+            Err(error) => return Outcome { heard, error: Some(error) },
+        };
+        heard.push(Heard::Welcome);
+        for request in &self.requests {
+            match connection.ask(request) {
+                Ok(reply) => heard.push(Heard::of(&reply)),
+                Err(LinkError::Rejected(r)) => heard.push(Heard::Rejected(r.code, r.text)),
+                Err(error) => return Outcome { heard, error: Some(error) },
+            }
+        }
+        Outcome { heard, error: None }
+    }
+}
+
+impl Outcome {
+    /// The replies of a conversation that must have gone well.
+    ///
+    /// # Panics
+    /// If it ended early.
+    pub fn all(self) -> Vec<Heard> {
+        match self.error {
+            None => self.heard,
+            Some(error) => panic!("after {} replies: {error}", self.heard.len()),
+        }
+    }
+
+    /// Whether the connection's end was told as such: not as a decoding fault, not as a wrong reply.
+    pub fn ended_cleanly(&self) -> bool {
+        matches!(self.error, None | Some(LinkError::Closed | LinkError::Connection(_)))
+    }
+}

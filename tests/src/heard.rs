@@ -1,0 +1,114 @@
+//! What of a reply must be the same to the last bit every time: all but times and memory.
+
+use softgrasp_protocol::{
+    Answer, Displacements, ModelHash, NodeChoice, RejectCode, Reply, SolveReport,
+};
+
+/// A reply without what may differ between runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// The server introduced itself.
+    Welcome,
+    /// An answer, as bits.
+    Answer(AnswerBits),
+    /// Whether a model was known; that depends on who was there before.
+    ModelState,
+    /// A model was prepared.
+    ModelReady {
+        /// Its name.
+        model: ModelHash,
+        /// Degrees of freedom not fixed.
+        unknown_dofs: u64,
+        /// Degrees of freedom fixed.
+        fixed_dofs: u64,
+    },
+    /// A refusal.
+    Rejected(RejectCode, String),
+    /// The number of the `Ping`.
+    Pong(u64),
+}
+
+/// The numbers of an answer, as bits.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AnswerBits {
+    method: String,
+    unknown_dofs: u64,
+    known_dofs: u64,
+    nodes: NodeChoice,
+    displacements: Vec<u64>,
+    reactions: Vec<(u32, u64)>,
+    residual: u64,
+    rotation: u64,
+    strain: u64,
+}
+
+impl AnswerBits {
+    /// Takes the bits of an answer.
+    pub fn of(answer: &Answer) -> Self {
+        let SolveReport { method, unknown_dofs, known_dofs, .. } = &answer.report;
+        Self {
+            method: method.clone(),
+            unknown_dofs: *unknown_dofs,
+            known_dofs: *known_dofs,
+            nodes: answer.nodes.clone(),
+            displacements: displacement_bits(&answer.displacements),
+            reactions: answer.reactions.iter().map(|r| (r.dof, r.value.to_bits())).collect(),
+            residual: answer.report.residual_rel.to_bits(),
+            rotation: answer.report.max_rotation_deg.to_bits(),
+            strain: answer.report.max_strain.to_bits(),
+        }
+    }
+}
+
+/// One number for all bits of the displacements: FNV-1a over them in order.
+pub fn displacement_hash(displacements: &Displacements) -> u64 {
+    displacement_bits(displacements)
+        .iter()
+        .flat_map(|bits| bits.to_le_bytes())
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+}
+
+fn displacement_bits(displacements: &Displacements) -> Vec<u64> {
+    match displacements {
+        Displacements::F64(values) => values.iter().flatten().map(|u| u.to_bits()).collect(),
+        Displacements::F32Quantised { scale, values } => {
+            let values = values.iter().flatten().map(|u| u64::from(u.to_bits()));
+            std::iter::once(scale.to_bits()).chain(values).collect()
+        }
+    }
+}
+
+impl Heard {
+    /// Takes from a reply what must not differ.
+    pub fn of(reply: &Reply) -> Self {
+        match reply {
+            Reply::Welcome(_) => Self::Welcome,
+            Reply::Answer(answer) => Self::Answer(AnswerBits::of(answer)),
+            Reply::ModelState { .. } => Self::ModelState,
+            Reply::ModelReady(ready) => Self::ModelReady {
+                model: ready.model,
+                unknown_dofs: ready.unknown_dofs,
+                fixed_dofs: ready.fixed_dofs,
+            },
+            Reply::Rejected(rejected) => Self::Rejected(rejected.code, rejected.text.clone()),
+            Reply::Pong { nonce } => Self::Pong(*nonce),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hash_sees_the_last_bit_and_the_order() {
+        let hash = |rows: Vec<[f64; 3]>| displacement_hash(&Displacements::F64(rows));
+        let rows = vec![[1.0, 2.0, 3.0], [0.0, -1.0, 0.5]];
+        assert_eq!(hash(rows.clone()), hash(rows.clone()));
+        assert_ne!(hash(rows.clone()), hash(vec![rows[1], rows[0]]));
+        assert_ne!(hash(rows.clone()), hash(vec![[1.0_f64.next_up(), 2.0, 3.0], rows[1]]));
+        assert_ne!(hash(vec![[0.0; 3]]), hash(vec![[-0.0, 0.0, 0.0]]));
+    }
+}

@@ -1,0 +1,15 @@
+//! Client and server together, over real sockets.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests fail and speak like tests"
+)]
+
+mod bad_requests;
+mod bad_streams;
+mod disturbed_links;
+mod many_clients;
+mod same_bits;
+mod start;
+mod stopping;

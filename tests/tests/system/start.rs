@@ -1,0 +1,45 @@
+//! Servers for the tests of this binary.
+
+use std::net::SocketAddr;
+
+use fea_server::{RunningServer, ServerConfig};
+use glove_client::connection::{LinkError, ServerConnection};
+use softgrasp_protocol::{Answer, Reply, Request};
+
+/// Settings for a server on a free loopback port with `threads` threads.
+pub fn config(threads: usize) -> ServerConfig {
+    ServerConfig {
+        listen: SocketAddr::from(([127, 0, 0, 1], 0)),
+        threads,
+        ..ServerConfig::default()
+    }
+}
+
+/// A server on a free loopback port.
+pub fn server(threads: usize) -> RunningServer {
+    fea_server::start(config(threads)).unwrap()
+}
+
+/// A client that has said hello.
+pub fn client(server: &RunningServer) -> ServerConnection {
+    ServerConnection::connect(&server.address().to_string(), None).unwrap()
+}
+
+/// The answer to a request that must be answered.
+pub fn answer(connection: &mut ServerConnection, request: &Request) -> Answer {
+    match connection.ask(request) {
+        Ok(Reply::Answer(answer)) => *answer,
+        other => panic!("{:?} got {other:?}", request.kind()),
+    }
+}
+
+/// The refusal of a request that must be refused: its code and its text.
+pub fn refusal(
+    connection: &mut ServerConnection,
+    request: &Request,
+) -> (softgrasp_protocol::RejectCode, String) {
+    match connection.ask(request) {
+        Err(LinkError::Rejected(rejected)) => (rejected.code, rejected.text),
+        other => panic!("{:?} got {other:?}", request.kind()),
+    }
+}
