@@ -1,9 +1,21 @@
 //! Client of Softgrasp: devices, grasp loop, link to the server, commands.
+//!
+//! The way of one tick, [`grasp_loop`]: device bytes ([`devices`], [`scripted`]) → hand pose
+//! ([`hand_reader`]) → contacts and grasp (`softgrasp_core::grasp`) → request ([`link`]) → answer →
+//! deformed object ([`soft_object`]).
 
 pub mod commands;
 pub mod connection;
 pub mod devices;
 pub mod displacement_table;
+pub mod grasp_loop;
+pub mod hand_reader;
+pub mod link;
 pub mod mesh_file;
 pub mod progress;
+pub mod run_report;
+pub mod scene;
+pub mod scripted;
+pub mod soft_object;
 pub mod solve_report;
+pub mod status_line;

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use glove_client::commands::inspect::InspectCommand;
 use glove_client::commands::mesh::MeshCommand;
+use glove_client::commands::run::RunCommand;
 use glove_client::commands::solve::SolveCommand;
 
 /// Grasp and squeeze a soft object with an instrumented glove.
@@ -12,11 +13,12 @@ use glove_client::commands::solve::SolveCommand;
 #[command(version)]
 struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Subcommand)]
 enum Command {
+    Run(RunCommand),
     Solve(SolveCommand),
     Inspect(InspectCommand),
     Mesh(MeshCommand),
@@ -25,7 +27,8 @@ enum Command {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     start_log();
-    let outcome = match arguments.command {
+    let outcome = match arguments.command.unwrap_or_else(|| Command::Run(RunCommand::default())) {
+        Command::Run(command) => command.run(),
         Command::Solve(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Mesh(command) => command.run(),

@@ -3,4 +3,7 @@
 pub mod inspect;
 pub mod mesh;
 mod output;
+pub mod run;
 pub mod solve;
+
+pub(crate) use solve::mesh_data;

@@ -81,10 +81,13 @@ pub struct Station(u8);
 pub struct StationError(pub u8);
 
 impl Station {
+    /// The first receiver.
+    pub const FIRST: Self = Self(1);
+
     /// Checked constructor.
     ///
     /// # Errors
-    /// [`StationError`] unless `number` is 1 to 4.
+    /// [`StationError`] for another number than 1 to 4.
     pub const fn try_new(number: u8) -> Result<Self, StationError> {
         match number {
             1..=4 => Ok(Self(number)),

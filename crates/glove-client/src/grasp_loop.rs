@@ -1,0 +1,288 @@
+//! One tick of the client in fixed order: bytes, pose, contacts, grasp, request, answer.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use nalgebra::Isometry3;
+use softgrasp_core::grasp::{
+    Command, Grasp, GraspEvent, KnownNode, StateName, StepInput, StepOutput, sense,
+};
+use softgrasp_core::hand::{HandColliders, HandPose};
+use softgrasp_protocol::{
+    DofValue, ElementName, Material, MethodName, ModelHash, NodeChoice, Precision, Question,
+    UploadModel, Want,
+};
+
+use crate::commands::mesh_data;
+use crate::hand_reader::HandReader;
+use crate::link::{Link, LinkEvent, ModelOrder};
+use crate::scripted::{Seen, Sent};
+use crate::soft_object::{ObjectError, SoftObject};
+use crate::solve_report::SolveSummary;
+
+/// How the tick and the server keep step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// The tick never waits; an answer is shown when it comes.
+    Free,
+    /// Each tick waits for its answer (bounded): every run gives the same frames.
+    Lockstep,
+}
+
+/// What the object is made of and how it is to be solved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolveSettings {
+    /// Its material.
+    pub material: Material,
+    /// Method asked for.
+    pub method: MethodName,
+}
+
+/// What happened, for the report; in the order it happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoopEvent {
+    /// The grasp changed.
+    Grasp(GraspEvent),
+    /// A shape was to be kept, but cannot be.
+    KeepRefused(String),
+    /// Something about the server.
+    Server(String),
+}
+
+/// One tick, for the status line and the report.
+#[derive(Clone, Debug)]
+pub struct TickOutcome {
+    /// Events of this tick.
+    pub events: Vec<LoopEvent>,
+    /// State after it.
+    pub state: Option<StateName>,
+    /// Which tips hold or touch, thumb first.
+    pub tips: [bool; 5],
+    /// Segments shown at their last free pose, by finger.
+    pub recalled: [u8; 5],
+    /// Answers that came, with the tick they were asked for in.
+    pub answers: Vec<(u64, SolveSummary)>,
+    /// What the person sees next.
+    pub seen: Seen,
+}
+
+/// The client between devices and server.
+pub struct GraspLoop {
+    reader: HandReader,
+    object: SoftObject,
+    grasp: Grasp,
+    link: Link,
+    settings: SolveSettings,
+    pace: Pace,
+    /// Tick of the last order, to tell answers of an earlier grasp from those of this one.
+    deforming_since: Option<u64>,
+    world_from_object: Isometry3<f64>,
+    hand: Option<HandPose>,
+}
+
+/// Longest wait of a lockstep tick; a server that takes longer is overtaken.
+const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
+
+impl GraspLoop {
+    /// A loop around an object at the origin; its model is sent to the server at once.
+    pub fn new(
+        reader: HandReader,
+        object: SoftObject,
+        grasp: Grasp,
+        link: Link,
+        settings: SolveSettings,
+        pace: Pace,
+    ) -> Self {
+        let this = Self {
+            reader,
+            object,
+            grasp,
+            link,
+            settings,
+            pace,
+            deforming_since: None,
+            world_from_object: Isometry3::identity(),
+            hand: None,
+        };
+        this.send_model();
+        this
+    }
+
+    /// The object as it is now.
+    pub fn object(&self) -> &SoftObject {
+        &self.object
+    }
+
+    /// Object pose after the last tick.
+    pub fn world_from_object(&self) -> &Isometry3<f64> {
+        &self.world_from_object
+    }
+
+    /// The hand as measured in the last tick.
+    pub fn hand(&self) -> Option<&HandPose> {
+        self.hand.as_ref()
+    }
+
+    /// The reader, for its faults.
+    pub fn reader(&self) -> &HandReader {
+        &self.reader
+    }
+
+    /// Waits until the server has answered all, at most so long.
+    pub fn wait_idle(&self, at_most: Duration) -> bool {
+        self.link.wait_idle(at_most)
+    }
+
+    /// One tick at a time on the client's clock.
+    ///
+    /// # Errors
+    /// [`ObjectError`] when the object cannot be shown any more.
+    pub fn tick(&mut self, tick: u64, now_s: f64, sent: &Sent) -> Result<TickOutcome, ObjectError> {
+        let mut outcome = TickOutcome {
+            events: Vec::new(),
+            state: None,
+            tips: [false; 5],
+            recalled: [0; 5],
+            answers: Vec::new(),
+            seen: Seen::default(),
+        };
+        self.reader.feed(&sent.glove, &sent.tracker, now_s);
+        self.pick_up(&mut outcome)?;
+        // Until both devices have spoken there is no hand to act with.
+        let Some(hand) = self.reader.hand(now_s) else { return Ok(outcome) };
+        let command = self.allowed(sent.command, &mut outcome);
+        let step = self.step(&hand, command, &mut outcome);
+        self.follow(tick, &step, &mut outcome)?;
+        self.world_from_object = step.world_from_object;
+        self.hand = Some(hand);
+        outcome.events.extend(step.events.iter().map(|&event| LoopEvent::Grasp(event)));
+        outcome.state = Some(step.state);
+        outcome.seen.state = Some(step.state);
+        outcome.recalled = step.recalled;
+        Ok(outcome)
+    }
+
+    /// A command, unless the shape that is to be kept cannot be.
+    fn allowed(&self, command: Option<Command>, outcome: &mut TickOutcome) -> Option<Command> {
+        if command == Some(Command::KeepShape)
+            && let Err(error) = self.object.check_shape()
+        {
+            outcome.events.push(LoopEvent::KeepRefused(error.to_string()));
+            return None;
+        }
+        command
+    }
+
+    fn step(
+        &mut self,
+        hand: &HandPose,
+        command: Option<Command>,
+        outcome: &mut TickOutcome,
+    ) -> StepOutput {
+        let colliders = HandColliders::new(&self.reader.setup().dimensions, hand);
+        let world_from_object = self.grasp.world_from_object(&hand.world_from_palm);
+        let margin = self.grasp.release_margin();
+        let (tree, normals) = (self.object.tree(), self.object.normals());
+        let fingers = sense(tree, normals, &colliders, &world_from_object, margin);
+        outcome.seen.inside = std::array::from_fn(|i| fingers[i].tip_hits[0].is_some());
+        outcome.tips = outcome.seen.inside;
+        self.grasp.step(&StepInput {
+            world_from_palm: hand.world_from_palm,
+            world_from_segment: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
+            fingers,
+            command,
+        })
+    }
+
+    /// Does to object and server what the grasp decided.
+    fn follow(
+        &mut self,
+        tick: u64,
+        step: &StepOutput,
+        outcome: &mut TickOutcome,
+    ) -> Result<(), ObjectError> {
+        if step.events.contains(&GraspEvent::ShapeKept) {
+            self.object.keep_shape()?;
+            self.send_model();
+        }
+        match &step.known {
+            Some(known) => {
+                outcome.tips = [true; 5];
+                self.deforming_since.get_or_insert(tick);
+                self.link.ask(tick, self.question(known));
+                if self.pace == Pace::Lockstep {
+                    self.link.wait_idle(LOCKSTEP_WAIT_MAX);
+                    self.pick_up(outcome)?;
+                }
+            }
+            // A tick whose input was ignored keeps the shape as it is.
+            None if step.state == StateName::Deforming => {}
+            None => {
+                self.deforming_since = None;
+                self.link.cancel();
+                self.object.relax()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn question(&self, known: &[KnownNode; 5]) -> Question {
+        let known = known.iter().flat_map(|k| {
+            (0..3u32).map(|axis| DofValue {
+                dof: 3 * k.node + axis,
+                value: k.displacement_in_object[axis as usize],
+            })
+        });
+        Question {
+            known: known.collect(),
+            forces: Vec::new(),
+            method: self.settings.method.clone(),
+            want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+            max_error: None,
+            deadline_ms: None,
+        }
+    }
+
+    /// Takes what has come from the server; only answers of the grasp that is going on are shown.
+    fn pick_up(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
+        for event in self.link.take_events() {
+            match event {
+                LinkEvent::Answer { tick, rest_shape, displacement, report, round_trip } => {
+                    let ms = round_trip.as_secs_f64() * 1e3;
+                    outcome.answers.push((tick, SolveSummary::new(&report, ms)));
+                    let current = rest_shape == self.object.rest_shapes()
+                        && self.deforming_since.is_some_and(|since| tick >= since);
+                    if current {
+                        self.object.apply(displacement)?;
+                    }
+                }
+                LinkEvent::Connected { server } => {
+                    outcome.events.push(LoopEvent::Server(format!("connected to {server}")));
+                }
+                LinkEvent::ModelReady(ready) => tracing::info!(model = %ready.model, "model ready"),
+                LinkEvent::Refused { text, .. } => {
+                    outcome.events.push(LoopEvent::Server(format!("refused: {text}")));
+                }
+                LinkEvent::Lost { text } => {
+                    outcome.events.push(LoopEvent::Server(format!("lost: {text}")));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives the link the rest shape as the model of the frames to come.
+    fn send_model(&self) {
+        let upload = UploadModel {
+            mesh: mesh_data(self.object.rest()),
+            materials: vec![self.settings.material],
+            element: ElementName::T4,
+            fixed: Vec::new(),
+        };
+        self.link.set_model(ModelOrder {
+            rest_shape: self.object.rest_shapes(),
+            hash: ModelHash::of(&upload),
+            upload: Arc::new(upload),
+        });
+    }
+}

@@ -1,0 +1,201 @@
+//! The object in the hand: rest shape, deformed shape, surface, and the sphere tree that follows.
+
+use nalgebra::{Point3, Vector3};
+use softgrasp_core::mesh::{MeshError, Surface, TetMesh};
+use softgrasp_core::sphere_tree::{SphereTree, TreeError, vertex_normals};
+
+/// A soft object as the client knows it.
+///
+/// Units: m. Frame: the object's own.
+/// Invariant: `tree` and `normals` belong to `shape`; `shape` is the rest shape unless an answer
+/// of the server has been applied since the last [`SoftObject::relax`].
+pub struct SoftObject {
+    rest: TetMesh,
+    surface: Surface,
+    shape: Vec<Point3<f64>>,
+    displacement: Vec<[f64; 3]>,
+    deformed: bool,
+    tree: SphereTree,
+    normals: Vec<Vector3<f64>>,
+    rest_shapes: u64,
+}
+
+/// An object that cannot be touched.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjectError {
+    /// The surface gives no tree or no normals.
+    #[error("the object's surface cannot be searched: {0}")]
+    Tree(#[from] TreeError),
+    /// A shape that cannot be kept.
+    #[error("the shape cannot be kept: {0}")]
+    Shape(#[from] MeshError),
+    /// An answer for another mesh.
+    #[error("the answer holds {got} displacements, the object has {expected} nodes")]
+    Count {
+        /// Displacements in the answer.
+        got: usize,
+        /// Nodes of the object.
+        expected: usize,
+    },
+}
+
+impl SoftObject {
+    /// An object at rest.
+    ///
+    /// # Errors
+    /// [`ObjectError::Tree`].
+    pub fn try_new(rest: TetMesh) -> Result<Self, ObjectError> {
+        let surface = Surface::from_mesh(&rest);
+        let shape = rest.vertices().to_vec();
+        let tree = SphereTree::try_build(&shape, &surface.nodes)?;
+        let mut normals = Vec::new();
+        vertex_normals(&shape, &surface.triangles, &mut normals)?;
+        let displacement = vec![[0.0; 3]; shape.len()];
+        Ok(Self {
+            rest,
+            surface,
+            shape,
+            displacement,
+            deformed: false,
+            tree,
+            normals,
+            rest_shapes: 1,
+        })
+    }
+
+    /// The shape it returns to when nothing holds it.
+    pub fn rest(&self) -> &TetMesh {
+        &self.rest
+    }
+
+    /// Boundary triangles and nodes.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// Vertices as they are now.
+    pub fn shape(&self) -> &[Point3<f64>] {
+        &self.shape
+    }
+
+    /// Displacement of every node from the rest shape.
+    pub fn displacement(&self) -> &[[f64; 3]] {
+        &self.displacement
+    }
+
+    /// Sphere tree over the surface as it is now.
+    pub fn tree(&self) -> &SphereTree {
+        &self.tree
+    }
+
+    /// Vertex normals of the surface as it is now, by node.
+    pub fn normals(&self) -> &[Vector3<f64>] {
+        &self.normals
+    }
+
+    /// How many rest shapes there have been; counts up with every kept shape.
+    pub fn rest_shapes(&self) -> u64 {
+        self.rest_shapes
+    }
+
+    /// Moves every vertex to its displaced place and lets the tree follow (thesis 3.5.3).
+    ///
+    /// # Errors
+    /// [`ObjectError::Count`], [`ObjectError::Tree`] for coordinates that are not finite; the
+    /// shape is then as before.
+    pub fn apply(&mut self, displacement: Vec<[f64; 3]>) -> Result<(), ObjectError> {
+        let expected = self.shape.len();
+        if displacement.len() != expected {
+            return Err(ObjectError::Count { got: displacement.len(), expected });
+        }
+        let moved = self.rest.vertices().iter().zip(&displacement);
+        self.follow(moved.map(|(p, u)| p + Vector3::from(*u)).collect())?;
+        self.displacement = displacement;
+        self.deformed = true;
+        Ok(())
+    }
+
+    /// Back to the rest shape (the fingers have let go).
+    ///
+    /// # Errors
+    /// [`ObjectError::Tree`], not seen for a shape that once was good.
+    pub fn relax(&mut self) -> Result<(), ObjectError> {
+        if self.deformed {
+            self.follow(self.rest.vertices().to_vec())?;
+            self.displacement.fill([0.0; 3]);
+            self.deformed = false;
+        }
+        Ok(())
+    }
+
+    /// Whether the shape as it is now could become the rest shape.
+    ///
+    /// # Errors
+    /// [`ObjectError::Shape`] names the first element that is turned inside out.
+    pub fn check_shape(&self) -> Result<(), ObjectError> {
+        self.rest.with_vertices(self.shape.clone())?;
+        Ok(())
+    }
+
+    /// Makes the shape as it is now the rest shape and rebuilds the tree (thesis 4.6, 6.1.2).
+    ///
+    /// # Errors
+    /// [`ObjectError::Shape`] if an element is turned inside out; nothing is changed then.
+    pub fn keep_shape(&mut self) -> Result<(), ObjectError> {
+        let rest = self.rest.with_vertices(self.shape.clone())?;
+        let rest_shapes = self.rest_shapes + 1;
+        *self = Self { rest_shapes, ..Self::try_new(rest)? };
+        Ok(())
+    }
+
+    fn follow(&mut self, shape: Vec<Point3<f64>>) -> Result<(), ObjectError> {
+        self.tree.refit(&shape)?;
+        if self.tree.needs_rebuild() {
+            self.tree = SphereTree::try_build(&shape, &self.surface.nodes)?;
+        }
+        vertex_normals(&shape, &self.surface.triangles, &mut self.normals)?;
+        self.shape = shape;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softgrasp_core::mesh::{BuiltIn, generate};
+
+    fn cube() -> SoftObject {
+        SoftObject::try_new(generate(BuiltIn::Cube, 64).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn relaxed_object_has_its_rest_shape_to_the_bit() {
+        let mut object = cube();
+        object.apply(vec![[0.001, -0.002, 0.0005]; 64]).unwrap();
+        assert!(object.shape() != object.rest().vertices());
+        object.relax().unwrap();
+        assert!(object.shape() == object.rest().vertices());
+        assert!(object.displacement().iter().flatten().all(|&u| u == 0.0));
+    }
+
+    #[test]
+    fn kept_shape_becomes_the_rest_shape_and_counts() {
+        let mut object = cube();
+        object.apply((0..64).map(|n| [0.0, 1e-4 * f64::from(n), 0.0]).collect()).unwrap();
+        let shape = object.shape().to_vec();
+        object.keep_shape().unwrap();
+        assert!(object.rest().vertices() == shape.as_slice());
+        assert_eq!(object.rest_shapes(), 2);
+    }
+
+    #[test]
+    fn shape_with_an_element_inside_out_is_not_kept() {
+        let mut object = cube();
+        let mut displacement = vec![[0.0; 3]; 64];
+        displacement[0] = [0.5, 0.5, 0.5];
+        object.apply(displacement).unwrap();
+        assert!(matches!(object.check_shape(), Err(ObjectError::Shape(_))));
+        assert!(object.keep_shape().is_err());
+        assert_eq!(object.rest_shapes(), 1);
+    }
+}
