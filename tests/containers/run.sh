@@ -98,7 +98,8 @@ build_images() {
     quietly 120 "${compose[@]}" build
 }
 
-container_of() { "${compose[@]}" ps -q "$1"; }
+# With -a: newer versions list running containers only.
+container_of() { "${compose[@]}" ps -aq "$1"; }
 
 # Waits until a command succeeds, at most so many seconds.
 wait_until() {
@@ -110,8 +111,8 @@ wait_until() {
     done
 }
 
-server_has_session() {
-    docker logs "$(container_of server)" 2>&1 | grep -q 'session begins'
+server_has_sessions() {
+    [ "$(docker logs "$(container_of server)" 2>&1 | grep -c 'session begins')" -ge "$1" ]
 }
 
 # Exit code of the client's container, which must end within so many seconds.
@@ -174,7 +175,7 @@ lost_server_ends_solve_with_one_line() {
     SOFTGRASP_CLIENT_COMMAND="solve --mesh /out/large.msh --known /out/known-large.csv \
         --method gauss-jordan --server server:7878 --out /out/never.csv" \
         quietly 60 "${compose[@]}" up -d client
-    wait_until 30 server_has_session || fail "no session within 30 s"
+    wait_until 30 server_has_sessions 1 || fail "no session within 30 s"
     docker kill "$(container_of server)" >/dev/null
     local code
     code="$(client_exit_code 30)"
@@ -183,6 +184,63 @@ lost_server_ends_solve_with_one_line() {
     [ "$code" = 1 ] || fail "after losing the server solve ended with $code, not 1: $said"
     grep -q '^glove-client: ' <<<"$said" || fail "no reason given: $said"
     say "server killed during a request: exit code 1, '$said'"
+}
+
+# The report of a run, which must have ended with 0 and played every tick.
+take_report() {
+    local code
+    code="$(client_exit_code 120)"
+    [ "$code" = 0 ] || fail "run ended with $code: $(docker logs "$(container_of client)" 2>&1)"
+    take_from_volume r.json "$work/r.json"
+    grep -qE '"ticks": '"$1"',' "$work/r.json" || fail "the report does not count $1 ticks"
+}
+
+reported() { grep -qE "$1" "$work/r.json"; }
+
+whole_run_through_the_compose_file() {
+    # Nothing but the file's own commands.
+    quietly 120 "${compose[@]}" up -d --force-recreate
+    take_report 600
+    local state
+    for state in Free Avoiding Attached Deforming Detached; do
+        reported "\"entered $state\"" || fail "the run never entered $state"
+    done
+    reported '"solves": [1-9]' || fail "no frame was solved"
+    if reported '"what": "(lost|refused):'; then
+        fail "the server was lost or refused in an undisturbed run"
+    fi
+    say "run: 600 ticks, every grasp state, frames solved by the other container"
+}
+
+# Starts a run in real time and waits until its link to the server stands: the first session only
+# asks whether somebody is there.
+start_run_in_real_time() {
+    quietly 60 "${compose[@]}" rm --force --stop client
+    start_server
+    SOFTGRASP_CLIENT_COMMAND="run --headless --server server:7878 --rate 60 --frames $1 \
+        --report /out/r.json" quietly 60 "${compose[@]}" up -d client
+    wait_until 30 server_has_sessions 2 || fail "no link to the server within 30 s"
+}
+
+lost_server_never_stops_a_tick() {
+    start_run_in_real_time 300
+    docker kill "$(container_of server)" >/dev/null
+    take_report 300
+    reported '"what": "lost: ' || fail "the report does not say that the server was lost"
+    reported '"entered Deforming"' || fail "the grasp did not go on"
+    say "server killed during a run: all 300 ticks played, the loss reported"
+}
+
+restarted_server_is_found_again() {
+    start_run_in_real_time 400
+    local server
+    server="$(container_of server)"
+    docker kill "$server" >/dev/null
+    docker start "$server" >/dev/null
+    take_report 400
+    reported '"what": "lost: ' || fail "the report does not say that the server was lost"
+    reported '"solves": [1-9]' || fail "no frame was solved after the server came back"
+    say "server killed and started again: found again, frames solved"
 }
 
 if [ -n "${BIN_DIR:-}" ]; then
@@ -196,4 +254,7 @@ say "building images on stand-in bases"
 build_images
 same_bits_in_containers_as_on_the_host
 lost_server_ends_solve_with_one_line
+whole_run_through_the_compose_file
+lost_server_never_stops_a_tick
+restarted_server_is_found_again
 say "passed"
