@@ -1,6 +1,7 @@
 //! Known and unknown degrees of freedom, and the methods that answer for them (thesis 3.4).
 
 mod direct;
+mod front;
 mod gauss_jordan;
 mod k11;
 mod method;
@@ -12,6 +13,7 @@ mod stage;
 mod tiles;
 
 pub use direct::{Factored, Loads, Solution, SolveError};
+pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};
 pub use method::{Method, UnknownMethod};
 pub use mobility::{FreeMotion, Motion, find_free_motion};
 pub use partition::{KnownDisplacements, KnownError, Partition, PartitionError};

@@ -21,7 +21,7 @@ use crate::link::Link;
 use crate::progress::Progress;
 use crate::run_report::{ObjectSummary, RunReport};
 use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile, SceneObject, load_object};
-use crate::scripted::{ScriptName, ScriptedHand, Seen};
+use crate::scripted::{NoGrasp, ScriptName, ScriptedHand, Seen};
 use crate::soft_object::SoftObject;
 use crate::status_line::StatusLine;
 
@@ -99,6 +99,10 @@ impl FromStr for HandChoice {
 /// Longest wait for the server to prepare the object before a lockstep run begins.
 const START_WAIT_MAX: Duration = Duration::from_secs(60);
 
+/// Factor by which an imported object grows while the hand finds no grip, and where it ends, m.
+const ENLARGE: f64 = 1.25;
+const ENLARGED_MAX_M: f64 = 0.2;
+
 /// A scene after flags and file have been put together.
 struct Plan {
     object: ObjectChoice,
@@ -126,18 +130,8 @@ impl RunCommand {
             eprintln!("glove-client: this build has no window yet; running without one");
         }
         let progress = Progress::start("preparing the object");
-        let SceneObject { mesh, notes } = load_object(&plan.object, plan.nodes, plan.object_size)?;
-        let object = ObjectSummary {
-            name: plan.object.to_string(),
-            nodes: mesh.node_count(),
-            tets: mesh.tets().len(),
-            size_m: mesh.size(),
-            notes,
-        };
-        let soft = SoftObject::try_new(mesh)?;
-        progress.now("the hand looks for a grip");
         let setup = HandSetup::default();
-        let mut hand = ScriptedHand::try_new(plan.script, setup.clone(), &soft)?;
+        let (object, soft, mut hand) = prepare(&plan, &setup)?;
         progress.now("starting the server");
         let host = Host::open(&plan.server, self.threads)?;
         // A wrong address is a wrong address; a server that goes later is survived.
@@ -247,6 +241,38 @@ impl RunCommand {
             }
         }
         Ok(())
+    }
+}
+
+/// The object, and a hand that knows how to grasp it.
+///
+/// An imported object whose size was not asked for is enlarged until the hand finds a grip.
+fn prepare(
+    plan: &Plan,
+    setup: &HandSetup,
+) -> anyhow::Result<(ObjectSummary, SoftObject, ScriptedHand)> {
+    let mut size = plan.object_size;
+    loop {
+        let SceneObject { mesh, notes } = load_object(&plan.object, plan.nodes, size)?;
+        let object = ObjectSummary {
+            name: plan.object.to_string(),
+            nodes: mesh.node_count(),
+            tets: mesh.tets().len(),
+            size_m: mesh.size(),
+            notes,
+        };
+        let soft = SoftObject::try_new(mesh)?;
+        match ScriptedHand::try_new(plan.script, setup.clone(), &soft) {
+            Ok(hand) => return Ok((object, soft, hand)),
+            Err(NoGrasp::OutOfReach { extent_m })
+                if plan.object_size.is_none()
+                    && matches!(plan.object, ObjectChoice::File(_))
+                    && extent_m < ENLARGED_MAX_M =>
+            {
+                size = Some(ENLARGE * extent_m);
+            }
+            Err(error) => return Err(error.into()),
+        }
     }
 }
 

@@ -6,4 +6,4 @@ mod script;
 
 pub use approach::PalmPath;
 pub use plan::{GraspPlan, Posture, angles, plan_grasp};
-pub use script::{ScriptName, ScriptedHand, Seen, Sent, UnknownScript};
+pub use script::{NoGrasp, ScriptName, ScriptedHand, Seen, Sent, UnknownScript};

@@ -89,8 +89,10 @@ const STRAIGHT_MIN: f64 = 0.3;
 const GATHERS: [f64; 3] = [0.0, 0.5, 1.0];
 const THUMB_ROTATIONS: [f64; 4] = [0.4, 0.7, 1.0, 1.3];
 const THUMB_ABDUCTIONS: [f64; 3] = [0.1, 0.4, 0.7];
-/// Tilts of the palm against the axes of the object, rad.
-const TILT: f64 = 0.45;
+/// Tilts of the palm against the axes of the object, rad: the few that suffice for a round object,
+/// and the many that a thin or a branched one may need.
+const TILTS_FEW: [f64; 2] = [0.0, 0.45];
+const TILTS_MANY: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 
 /// Best palm pose for grasping an object whose frame is the world's, or `None` if no pose tried
 /// lets all five tips touch.
@@ -103,12 +105,28 @@ pub fn plan_grasp(
     press_depth: f64,
     avoid_gaze: Option<Vector3<f64>>,
 ) -> Option<GraspPlan> {
+    // Five tips on five different nodes.
+    if object.surface().nodes.len() < 5 {
+        return None;
+    }
+    let few = search(object, setup, press_depth, avoid_gaze, &TILTS_FEW);
+    few.or_else(|| search(object, setup, press_depth, avoid_gaze, &TILTS_MANY))
+}
+
+fn search(
+    object: &SoftObject,
+    setup: &HandSetup,
+    press_depth: f64,
+    avoid_gaze: Option<Vector3<f64>>,
+    tilts: &[f64],
+) -> Option<GraspPlan> {
     let centre = centre_of(object);
-    let thumbs: Vec<(Posture, TipPath)> = thumb_paths(setup);
+    let thumbs = thumb_paths(setup);
+    let orientations = orientations(tilts);
     let mut best: Option<(f64, GraspPlan)> = None;
     for gather in GATHERS {
         let fingers = finger_paths(setup, gather);
-        for rotation in orientations() {
+        for &rotation in &orientations {
             let gaze = rotation * -Vector3::z();
             if avoid_gaze.is_some_and(|avoid| gaze.dot(&avoid) > 0.5) {
                 continue;
@@ -180,7 +198,7 @@ fn thumb_paths(setup: &HandSetup) -> Vec<(Posture, TipPath)> {
 }
 
 /// The 24 rotations of a cube, each straight and tilted; palm down and fingers forward comes first.
-fn orientations() -> Vec<UnitQuaternion<f64>> {
+fn orientations(tilts: &[f64]) -> Vec<UnitQuaternion<f64>> {
     let quarter = std::f64::consts::FRAC_PI_2;
     // Palm frame +Z (back of the hand) up, +Y (fingers) away from the viewer (−Z).
     let natural = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0);
@@ -196,13 +214,17 @@ fn orientations() -> Vec<UnitQuaternion<f64>> {
             straight.push(rotation);
         }
     }
-    let tilts = [(0.0, 0.0), (TILT, 0.0), (-TILT, 0.0), (0.0, TILT), (0.0, -TILT)];
-    let tilted = |(about_y, about_z): (f64, f64)| {
-        let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), about_y)
-            * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z);
-        straight.iter().map(move |rotation| rotation * tilt).collect::<Vec<_>>()
-    };
-    tilts.into_iter().flat_map(tilted).collect()
+    let signed = |tilt: &f64| if *tilt == 0.0 { vec![0.0] } else { vec![*tilt, -tilt] };
+    let angles: Vec<f64> = tilts.iter().flat_map(signed).collect();
+    let mut all = Vec::new();
+    for &about_y in &angles {
+        for &about_z in &angles {
+            let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), about_y)
+                * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z);
+            all.extend(straight.iter().map(|rotation| rotation * tilt));
+        }
+    }
+    all
 }
 
 /// Places of the object's centre in front of the palm, nearest to a natural grip first.

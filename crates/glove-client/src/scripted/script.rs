@@ -134,13 +134,22 @@ pub struct Sent {
 
 /// The hand found no way to grasp.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "the scripted hand found no palm pose from which all five fingertips reach this object \
-     ({extent_m:.3} m long); try another --object-size (0.05 to 0.10 m fits the hand)"
-)]
-pub struct NoGrasp {
-    /// Longest extent of the object.
-    pub extent_m: f64,
+pub enum NoGrasp {
+    /// No palm pose is good.
+    #[error(
+        "the scripted hand found no palm pose from which all five fingertips reach this object \
+         ({extent_m:.3} m long); try another --object-size"
+    )]
+    OutOfReach {
+        /// Longest extent of the object.
+        extent_m: f64,
+    },
+    /// Five tips need five nodes.
+    #[error("the object has {nodes} surface nodes; five fingertips need five different ones")]
+    TooFewNodes {
+        /// Nodes on its surface.
+        nodes: usize,
+    },
 }
 
 /// The scripted hand.
@@ -182,8 +191,13 @@ impl ScriptedHand {
         setup: HandSetup,
         object: &SoftObject,
     ) -> Result<Self, NoGrasp> {
-        let plan = plan_grasp(object, &setup, press_depth(object), None)
-            .ok_or_else(|| NoGrasp { extent_m: object.rest().size() })?;
+        let plan =
+            plan_grasp(object, &setup, press_depth(object), None).ok_or_else(|| {
+                match object.surface().nodes.len() {
+                    nodes @ ..5 => NoGrasp::TooFewNodes { nodes },
+                    _ => NoGrasp::OutOfReach { extent_m: object.rest().size() },
+                }
+            })?;
         Ok(Self {
             setup,
             steps: name.steps(),

@@ -1,0 +1,16 @@
+//! Parallel sparse Cholesky over the tree of fronts: analysis, factor, solves.
+
+mod analysis;
+mod assembly;
+mod dense;
+mod etree;
+mod factor;
+mod real;
+mod solve;
+mod supernodes;
+#[cfg(test)]
+mod tests;
+
+pub use analysis::FrontAnalysis;
+pub use factor::{FrontError, FrontFactor};
+pub use real::Real;

@@ -1,0 +1,347 @@
+//! Solves with a factor: down the tree to the roots and back, whole or on a few paths only.
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{
+    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
+};
+use faer::prelude::*;
+use faer::{Accum, Mat, Par};
+use rayon::prelude::*;
+
+use super::analysis::{Front, FrontAnalysis};
+use super::{FrontFactor, Real};
+
+/// Subtrees whose panels times right-hand sides are below this are not split into tasks.
+const SERIAL_PRODUCTS: usize = 400_000;
+
+/// Which fronts a solve passes through; both sets are closed towards the roots.
+struct Paths {
+    /// Fronts that right-hand sides reach on the way up.
+    up: Vec<bool>,
+    /// Fronts needed on the way down.
+    down: Vec<bool>,
+}
+
+impl<T: Real> FrontFactor<T> {
+    /// Solves `K11 X = B` in place on the current rayon pool; same bits for any number of threads.
+    ///
+    /// Shapes: `b` n × `columns` column-major. An `f32` factor rounds on the way in and answers
+    /// to about seven digits; refine with the residual in `f64`.
+    ///
+    /// # Panics
+    /// If `b` does not hold n × `columns` numbers.
+    ///
+    /// Source: thesis (3.43a).
+    pub fn solve_in_place(&self, b: &mut [f64], columns: usize) {
+        let n = self.analysis.row_count();
+        assert_eq!(b.len(), n * columns, "right-hand sides do not fit the factor");
+        if b.is_empty() {
+            return;
+        }
+        let mut x = vec![T::ZERO; b.len()];
+        self.each_row(columns, |row, at, stride| {
+            for (j, column) in b.chunks_exact(n).enumerate() {
+                x[at + j * stride] = T::from_f64(column[row]);
+            }
+        });
+        let all = vec![true; self.panels.len()];
+        self.solve_ordered(&mut x, columns, &Paths { up: all.clone(), down: all });
+        self.each_row(columns, |row, at, stride| {
+            for (j, column) in b.chunks_exact_mut(n).enumerate() {
+                column[row] = x[at + j * stride].to_f64();
+            }
+        });
+    }
+
+    /// Some rows of `K11⁻¹ B` for right-hand sides that are zero nearly everywhere.
+    ///
+    /// Only the fronts on the paths from the rows of `B` to the roots are passed on the way up,
+    /// and those on the paths from the roots to the wanted rows on the way down.
+    ///
+    /// Shapes: `right_hand_sides` one list of (row of `K11`, value) per column, repeated rows add
+    /// up; result `rows_wanted.len()` × columns, rows in the order asked for.
+    ///
+    /// # Panics
+    /// If a row is not below n.
+    ///
+    /// Source: thesis (3.43a), columns of the compliance.
+    pub fn solve_partial(
+        &self,
+        right_hand_sides: &[Vec<(usize, f64)>],
+        rows_wanted: &[usize],
+    ) -> Mat<f64> {
+        let columns = right_hand_sides.len();
+        let analysis = &*self.analysis;
+        let place = |row: usize| {
+            let new = analysis.position[row] as usize;
+            // Fronts are sorted by their first row.
+            let front = analysis.fronts.partition_point(|f| f.first <= new) - 1;
+            (front, new - analysis.fronts[front].first)
+        };
+        let mut x = vec![T::ZERO; analysis.row_count() * columns];
+        let mut paths = Paths {
+            up: vec![false; analysis.fronts.len()],
+            down: vec![false; analysis.fronts.len()],
+        };
+        for (j, entries) in right_hand_sides.iter().enumerate() {
+            for &(row, value) in entries {
+                let (front, within) = place(row);
+                let Front { first, pivots, .. } = analysis.fronts[front];
+                x[first * columns + j * pivots + within] += T::from_f64(value);
+                mark(&mut paths.up, analysis, front);
+            }
+        }
+        for &row in rows_wanted {
+            mark(&mut paths.down, analysis, place(row).0);
+        }
+        self.solve_ordered(&mut x, columns, &paths);
+        let mut wanted = Mat::zeros(rows_wanted.len(), columns);
+        for (i, &row) in rows_wanted.iter().enumerate() {
+            let (front, within) = place(row);
+            let Front { first, pivots, .. } = analysis.fronts[front];
+            for j in 0..columns {
+                wanted[(i, j)] = x[first * columns + j * pivots + within].to_f64();
+            }
+        }
+        wanted
+    }
+
+    /// Calls `visit(row of K11, position, stride)` for every row, where `position` and `stride`
+    /// are those of its values for all columns in the solve's own layout.
+    fn each_row(&self, columns: usize, mut visit: impl FnMut(usize, usize, usize)) {
+        for front in &self.analysis.fronts {
+            for i in 0..front.pivots {
+                let row = self.analysis.order[front.first + i] as usize;
+                visit(row, front.first * columns + i, front.pivots);
+            }
+        }
+    }
+
+    /// Solves in the layout of the fronts: the rows a front eliminates are one block, pivots ×
+    /// columns column-major, and blocks follow each other in elimination order.
+    fn solve_ordered(&self, x: &mut [T], columns: usize, paths: &Paths) {
+        if columns == 0 {
+            return;
+        }
+        let solve = Solve { factor: self, paths, columns };
+        solve.up_siblings(&self.analysis.roots, 0, x);
+        solve.down_siblings(&self.analysis.roots, 0, x, &[]);
+    }
+}
+
+/// Marks a front and its ancestors.
+fn mark(marks: &mut [bool], analysis: &FrontAnalysis, front: usize) {
+    let mut v = front;
+    while let Some(seen) = marks.get_mut(v)
+        && !std::mem::replace(seen, true)
+    {
+        v = analysis.fronts[v].parent as usize;
+    }
+}
+
+/// One solve under way.
+struct Solve<'a, T> {
+    factor: &'a FrontFactor<T>,
+    paths: &'a Paths,
+    columns: usize,
+}
+
+impl<T: Real> Solve<'_, T> {
+    fn front(&self, v: usize) -> &Front {
+        &self.factor.analysis.fronts[v]
+    }
+
+    fn is_serial(&self, v: usize) -> bool {
+        self.front(v).subtree_entries * self.columns < SERIAL_PRODUCTS
+    }
+
+    /// The subtrees of siblings with their parts of `x`, which starts at front `first`.
+    fn split<'x>(&self, heads: &[u32], first: usize, x: &'x mut [T]) -> Vec<(usize, &'x mut [T])> {
+        let (mut rest, mut start) =
+            (x, self.factor.analysis.fronts.get(first).map_or(0, |f| f.first));
+        let mut parts = Vec::with_capacity(heads.len());
+        for &head in heads {
+            let head = head as usize;
+            let end = self.front(head).first + self.front(head).pivots;
+            let (own, tail) = rest.split_at_mut((end - start) * self.columns);
+            parts.push((head, own));
+            (rest, start) = (tail, end);
+        }
+        parts
+    }
+
+    /// Forward substitution in sibling subtrees; what they hand to their parent, in their order.
+    fn up_siblings(&self, heads: &[u32], first: usize, x: &mut [T]) -> Vec<Vec<T>> {
+        let parts = self.split(heads, first, x);
+        let task = |(head, x): (usize, &mut [T])| self.up(head, x);
+        match parts.iter().filter(|(head, _)| !self.is_serial(*head)).count() {
+            0 | 1 => parts.into_iter().map(task).collect(),
+            _ => parts.into_par_iter().map(task).collect(),
+        }
+    }
+
+    fn up(&self, head: usize, x: &mut [T]) -> Vec<T> {
+        if !self.paths.up[head] {
+            return Vec::new();
+        }
+        let first = self.front(head).subtree_first as usize;
+        let start = self.front(first).first;
+        let bottom = self.bottom(head);
+        let (below, mut own) = x.split_at_mut((self.front(bottom).first - start) * self.columns);
+        let mut handed = match self.is_serial(bottom) {
+            true => self.up_serial(first, bottom, below),
+            false => self.up_siblings(&self.front(bottom).children, first, below),
+        };
+        for v in bottom..=head {
+            let (pivots, rest) = own.split_at_mut(self.front(v).pivots * self.columns);
+            handed = vec![self.up_front(v, pivots, &handed)];
+            own = rest;
+        }
+        handed.pop().unwrap_or_default()
+    }
+
+    /// Lowest front of the chain of only children below a front that is worth splitting.
+    fn bottom(&self, head: usize) -> usize {
+        let mut bottom = head;
+        while !self.is_serial(bottom)
+            && let [only] = self.front(bottom).children[..]
+        {
+            bottom = only as usize;
+        }
+        bottom
+    }
+
+    /// All fronts below `head`, one after another; what `head`'s children hand to it.
+    fn up_serial(&self, first: usize, head: usize, x: &mut [T]) -> Vec<Vec<T>> {
+        let mut stack: Vec<Vec<T>> = Vec::new();
+        let mut rest = x;
+        for v in first..head {
+            let (pivots, tail) = rest.split_at_mut(self.front(v).pivots * self.columns);
+            rest = tail;
+            let children = stack.split_off(stack.len() - self.front(v).children.len());
+            stack.push(match self.paths.up[v] {
+                true => self.up_front(v, pivots, &children),
+                false => Vec::new(),
+            });
+        }
+        stack
+    }
+
+    /// One front: `x1 ← L11⁻¹ x1`, and `x2 ← children − L21 x1` for the parent.
+    fn up_front(&self, v: usize, x1: &mut [T], handed: &[Vec<T>]) -> Vec<T> {
+        let front = self.front(v);
+        let (k, pivots, rest) = (self.columns, front.pivots, front.rest());
+        let mut x2 = vec![T::ZERO; rest * k];
+        for (&child, values) in front.children.iter().zip(handed).filter(|(_, h)| !h.is_empty()) {
+            let child = self.front(child as usize);
+            for (j, values) in values.chunks_exact(child.rest()).enumerate() {
+                for run in &child.runs {
+                    let (at, len) = (run.parent as usize, run.len as usize);
+                    let into = match at < pivots {
+                        true => &mut x1[j * pivots + at..][..len],
+                        false => &mut x2[j * rest + at - pivots..][..len],
+                    };
+                    for (slot, &value) in into.iter_mut().zip(&values[run.child as usize..]) {
+                        *slot += value;
+                    }
+                }
+            }
+        }
+        let (l11, l21) = self.panel(v);
+        let mut x1 = MatMut::from_column_major_slice_mut(x1, pivots, k);
+        solve_lower_triangular_in_place(l11, x1.as_mut(), Par::Seq);
+        if rest > 0 {
+            let x2 = MatMut::from_column_major_slice_mut(&mut x2, rest, k);
+            matmul(x2, Accum::Add, l21, x1, T::MINUS_ONE, Par::Seq);
+        }
+        x2
+    }
+
+    /// Backward substitution in sibling subtrees; `above` holds the parent's front.
+    fn down_siblings(&self, heads: &[u32], first: usize, x: &mut [T], above: &[T]) {
+        let parts = self.split(heads, first, x);
+        let task = |(head, x): (usize, &mut [T])| self.down(head, x, above);
+        match parts.iter().filter(|(head, _)| !self.is_serial(*head)).count() {
+            0 | 1 => parts.into_iter().for_each(task),
+            _ => parts.into_par_iter().for_each(task),
+        }
+    }
+
+    fn down(&self, head: usize, x: &mut [T], above: &[T]) {
+        if !self.paths.down[head] {
+            return;
+        }
+        let first = self.front(head).subtree_first as usize;
+        let start = self.front(first).first;
+        let bottom = self.bottom(head);
+        let (below, mut own) = x.split_at_mut((self.front(bottom).first - start) * self.columns);
+        let mut local = Vec::new();
+        for v in (bottom..=head).rev() {
+            let at = own.len() - self.front(v).pivots * self.columns;
+            let (rest, pivots) = own.split_at_mut(at);
+            local = self.down_front(v, pivots, if v == head { above } else { &local });
+            own = rest;
+        }
+        match self.is_serial(bottom) {
+            true => self.down_serial(first, bottom, below, local),
+            false => self.down_siblings(&self.front(bottom).children, first, below, &local),
+        }
+    }
+
+    /// All fronts below `head`, one after another, parents first.
+    fn down_serial(&self, first: usize, head: usize, x: &mut [T], local: Vec<T>) {
+        // Fronts whose children are not all done yet.
+        let mut open = vec![(head, local)];
+        let mut rest = x;
+        for v in (first..head).rev() {
+            let at = rest.len() - self.front(v).pivots * self.columns;
+            let (head, pivots) = rest.split_at_mut(at);
+            rest = head;
+            if !self.paths.down[v] {
+                continue;
+            }
+            let parent = self.front(v).parent as usize;
+            open.truncate(open.iter().rposition(|(u, _)| *u == parent).map_or(0, |i| i + 1));
+            let above = open.last().map_or(&[][..], |(_, local)| local);
+            let local = self.down_front(v, pivots, above);
+            if !self.front(v).children.is_empty() {
+                open.push((v, local));
+            }
+        }
+    }
+
+    /// One front: `x1 ← L11⁻ᵀ (x1 − L21ᵀ x2)` with `x2` taken from the parent; the whole front,
+    /// size × columns, for the children.
+    fn down_front(&self, v: usize, x1: &mut [T], above: &[T]) -> Vec<T> {
+        let front = self.front(v);
+        let (k, pivots, rest, size) = (self.columns, front.pivots, front.rest(), front.size);
+        let mut local = vec![T::ZERO; size * k];
+        let above_size = above.len() / k;
+        for j in 0..k {
+            local[j * size..][..pivots].copy_from_slice(&x1[j * pivots..][..pivots]);
+            for run in &front.runs {
+                let from = &above[j * above_size + run.parent as usize..][..run.len as usize];
+                let at = j * size + pivots + run.child as usize;
+                local[at..at + from.len()].copy_from_slice(from);
+            }
+        }
+        let (l11, l21) = self.panel(v);
+        let whole = MatMut::from_column_major_slice_mut(&mut local, size, k);
+        let (mut top, below) = whole.split_at_row_mut(pivots);
+        if rest > 0 {
+            matmul(top.as_mut(), Accum::Add, l21.transpose(), below, T::MINUS_ONE, Par::Seq);
+        }
+        solve_upper_triangular_in_place(l11.transpose(), top, Par::Seq);
+        for j in 0..k {
+            x1[j * pivots..][..pivots].copy_from_slice(&local[j * size..][..pivots]);
+        }
+        local
+    }
+
+    /// `L11` and `L21` of a front.
+    fn panel(&self, v: usize) -> (MatRef<'_, T>, MatRef<'_, T>) {
+        let front = self.front(v);
+        let panel = &self.factor.panels[v];
+        MatRef::from_column_major_slice(panel, front.size, front.pivots).split_at_row(front.pivots)
+    }
+}

@@ -1,0 +1,219 @@
+//! The whole story, headless: reach, attach, squeeze, keep the shape, grasp again, let go.
+//!
+//! The list of grasp events of each run is a golden file in `tests/golden`; `UPDATE_GOLDEN=1`
+//! writes them anew, and then a person looks at the difference.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use fea_server::ServerConfig;
+use glove_client::commands::run::RunCommand;
+use glove_client::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, TickOutcome};
+use glove_client::hand_reader::{HandReader, HandSetup};
+use glove_client::link::Link;
+use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
+use glove_client::soft_object::SoftObject;
+use nalgebra::Isometry3;
+use serde_json::Value;
+use softgrasp_core::grasp::{Grasp, StateName};
+use softgrasp_core::mesh::{BuiltIn, generate};
+use softgrasp_protocol::{Material, MethodName};
+
+#[derive(Parser)]
+struct Arguments {
+    #[command(flatten)]
+    run: RunCommand,
+}
+
+/// Plays a run with these flags and returns its report.
+fn play(flags: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("r.json");
+    let mut all = vec!["run", "--headless", "--report", report.to_str().unwrap()];
+    all.extend(flags);
+    Arguments::parse_from(all).run.run().unwrap();
+    serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap()
+}
+
+fn shared(name: &str) -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes").join(name);
+    let given =
+        std::env::var_os("SOFTGRASP_SHARED").map(|s| Path::new(&s).join("meshes").join(name));
+    let found = given.into_iter().chain([beside]).find(|path| path.exists());
+    if found.is_none() {
+        eprintln!("skipped: {name} is not there (a folder `shared` beside the repository)");
+    }
+    found
+}
+
+/// Compares the grasp events of a run with its golden file.
+fn check_events(name: &str, report: &Value) {
+    let mut events = String::new();
+    for event in report["events"].as_array().unwrap() {
+        if event["kind"] != "server" {
+            events.push_str(&format!("{} {}\n", event["tick"], event["what"].as_str().unwrap()));
+        }
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("golden/story-{name}.txt"));
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, &events).unwrap();
+    }
+    let golden = std::fs::read_to_string(&path).unwrap();
+    assert!(events == golden, "{name}: events differ from {}:\n{events}", path.display());
+}
+
+/// What every whole story must show, whatever the object.
+fn check_story(name: &str, report: &Value) {
+    assert_eq!(report["ticks"], 600, "{name}");
+    for state in ["Free", "Avoiding", "Attached", "Deforming", "Detached"] {
+        let reached = report["states_reached"].as_array().unwrap();
+        assert!(reached.iter().any(|s| s == state), "{name} never reached {state}");
+    }
+    let count = |what: &str| {
+        let events = report["events"].as_array().unwrap().iter();
+        events.filter(|e| e["what"] == what).count()
+    };
+    assert_eq!(count("shape kept"), 1, "{name}");
+    assert_eq!(count("entered Deforming"), 2, "{name} is grasped once before and once after");
+    for frame in report["frames"].as_array().unwrap() {
+        if frame["state"] == "Deforming" {
+            let residual = frame["solve"]["residual_rel"].as_f64().unwrap();
+            assert!(residual < 1e-10, "{name}: residual {residual:e} at tick {}", frame["tick"]);
+        }
+    }
+}
+
+fn check(name: &str, object: &str) {
+    let report = play(&["--frames", "600", "--object", object]);
+    check_story(name, &report);
+    check_events(name, &report);
+}
+
+#[test]
+fn every_built_in_object_is_squeezed_kept_and_grasped_again() {
+    for object in ["cube", "sphere", "strawberry", "toothpaste"] {
+        check(object, object);
+    }
+}
+
+#[test]
+fn meshes_of_other_programs_are_squeezed_kept_and_grasped_again() {
+    for file in ["liver.msh1.msh", "turtle.veg", "bunny.wrong-extension.vtk"] {
+        if let Some(path) = shared(file) {
+            check(file.split('.').next().unwrap(), path.to_str().unwrap());
+        }
+    }
+}
+
+#[test]
+fn thread_count_changes_no_event_and_no_residual() {
+    let run = |threads: &str| {
+        let report = play(&["--object", "cube", "--nodes", "216", "--threads", threads]);
+        let frames = report["frames"].as_array().unwrap().iter();
+        let residuals: Vec<Value> = frames.map(|f| f["solve"]["residual_rel"].clone()).collect();
+        (report["events"].as_array().unwrap()[1..].to_vec(), residuals)
+    };
+    assert!(run("1") == run("3"));
+}
+
+#[test]
+fn key_frames_are_written_and_can_be_grasped_in_turn() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("frames");
+    play(&["--object", "sphere", "--nodes", "300", "--out-dir", out.to_str().unwrap()]);
+    let mut names: Vec<_> = std::fs::read_dir(&out)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    for part in ["deforming", "kept", "squeezed", "detached"] {
+        assert!(names.iter().any(|n| n.contains(part)), "no {part} among {names:?}");
+    }
+    let kept = names.iter().find(|n| n.contains("kept")).unwrap();
+    let report =
+        play(&["--object", out.join(kept).to_str().unwrap(), "--hand", "scripted:release"]);
+    assert_eq!(report["object"]["nodes"], 300.0_f64 as u64);
+}
+
+/// The parts of a run, for a test that decides when the server dies.
+struct Bench {
+    grasp_loop: GraspLoop,
+    hand: ScriptedHand,
+    seen: Seen,
+    tick: u64,
+}
+
+impl Bench {
+    fn new(address: &str) -> Self {
+        let object = SoftObject::try_new(generate(BuiltIn::Cube, 216).unwrap()).unwrap();
+        let setup = HandSetup::default();
+        let hand = ScriptedHand::try_new(ScriptName::Squeeze, setup.clone(), &object).unwrap();
+        let settings = SolveSettings {
+            material: Material { young: 2.0e4, poisson: 0.4 },
+            method: MethodName::auto(),
+        };
+        let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
+        let (reader, link) = (HandReader::new(setup), Link::start(address).unwrap());
+        let grasp_loop = GraspLoop::new(reader, object, grasp, link, settings, Pace::Lockstep);
+        Self { grasp_loop, hand, seen: Seen::default(), tick: 0 }
+    }
+
+    fn tick(&mut self) -> TickOutcome {
+        let sent = self.hand.next(&self.seen, self.grasp_loop.object());
+        let outcome = self.grasp_loop.tick(self.tick, self.tick as f64 / 60.0, &sent).unwrap();
+        self.seen = outcome.seen;
+        self.tick += 1;
+        outcome
+    }
+
+    /// Ticks until the condition holds; a minute is far more than any machine needs.
+    fn tick_until(&mut self, what: &str, mut done: impl FnMut(&TickOutcome) -> bool) {
+        let start = Instant::now();
+        loop {
+            let outcome = self.tick();
+            if done(&outcome) {
+                return;
+            }
+            assert!(start.elapsed() < Duration::from_secs(60), "never came: {what}");
+            std::thread::yield_now();
+        }
+    }
+}
+
+fn says(outcome: &TickOutcome, beginning: &str) -> bool {
+    outcome.events.iter().any(|e| matches!(e, LoopEvent::Server(s) if s.starts_with(beginning)))
+}
+
+/// A server that goes away in the middle never stops a tick; the object keeps its last shape, and
+/// a new server at the same address is given the model and answers.
+#[test]
+fn killed_server_does_not_stop_the_hand_and_a_new_one_takes_over() {
+    let config = |listen: &str| ServerConfig {
+        listen: listen.parse().unwrap(),
+        threads: 1,
+        ..ServerConfig::default()
+    };
+    let server = fea_server::start(config("127.0.0.1:0")).unwrap();
+    let address = server.address().to_string();
+    let mut bench = Bench::new(&address);
+    bench.tick_until("an answer", |outcome| !outcome.answers.is_empty());
+    bench.tick();
+    let shape = bench.grasp_loop.object().shape().to_vec();
+    server.stop();
+    bench.tick_until("the loss", |outcome| says(outcome, "lost:"));
+    for _ in 0..20 {
+        assert_eq!(bench.tick().state, Some(StateName::Deforming));
+    }
+    assert!(bench.grasp_loop.object().shape() == shape.as_slice(), "the shape changed by itself");
+    let again = fea_server::start(config(&address)).unwrap();
+    let mut connected = false;
+    bench.tick_until("an answer of the new server", |outcome| {
+        connected |= says(outcome, "connected");
+        !outcome.answers.is_empty()
+    });
+    assert!(connected && bench.grasp_loop.object().shape() != shape.as_slice());
+    again.stop();
+}
