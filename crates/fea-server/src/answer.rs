@@ -165,7 +165,8 @@ fn answer(
     let Asked { question, known, element, factor_reused } = asked;
     check_nodes(&question.want, model)?;
     let forces = scatter_forces(model, &known, &question.forces)?;
-    let loads = Loads { q_known: &known.q_known, forces: &forces };
+    let residual_rel = question.max_error.unwrap_or(0.0);
+    let loads = Loads { q_known: &known.q_known, forces: &forces, residual_rel };
     let solution = factored
         .solve(model.stiffness(), loads, &mut |stage| clock.begin(stage))
         .map_err(|error| Refusal::Model(error.into()))?;
@@ -191,7 +192,7 @@ fn answer(
         refinement_steps: solution.refinement_steps,
         max_rotation_deg: strain.rotation_max.to_degrees(),
         max_strain: strain.strain_max,
-        precision: "f64".to_owned(),
+        precision: factored.method().precision().to_owned(),
         condition_estimate: None,
         warnings: warnings(strain.rotation_max.to_degrees(), strain.strain_max),
         peak_rss_bytes: peak_rss_bytes(),

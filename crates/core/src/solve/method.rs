@@ -12,8 +12,14 @@ pub enum Method {
     DenseInverse,
     /// Tiled dense Cholesky factor.
     DenseCholesky,
-    /// Sparse Cholesky factor in a nested-dissection order.
+    /// Sparse Cholesky factor in a nested-dissection order, one thread.
     SparseCholesky,
+    /// Sparse Cholesky factor over the tree of fronts, all threads.
+    Front,
+    /// [`Method::Front`] in single precision, refined in double.
+    FrontMixed,
+    /// Conjugate gradients preconditioned by the single-precision factor, to a stated residual.
+    Pcg,
 }
 
 /// A method name that is none of [`Method::ALL`].
@@ -28,8 +34,15 @@ pub struct UnknownMethod {
 
 impl Method {
     /// All methods, slowest first.
-    pub const ALL: [Self; 4] =
-        [Self::GaussJordan, Self::DenseInverse, Self::DenseCholesky, Self::SparseCholesky];
+    pub const ALL: [Self; 7] = [
+        Self::GaussJordan,
+        Self::DenseInverse,
+        Self::DenseCholesky,
+        Self::SparseCholesky,
+        Self::Front,
+        Self::FrontMixed,
+        Self::Pcg,
+    ];
 
     /// Name on the command line, on the wire and in reports.
     pub const fn name(self) -> &'static str {
@@ -38,6 +51,17 @@ impl Method {
             Self::DenseInverse => "dense-inverse",
             Self::DenseCholesky => "dense-cholesky",
             Self::SparseCholesky => "sparse-cholesky",
+            Self::Front => "front",
+            Self::FrontMixed => "front-mixed",
+            Self::Pcg => "pcg",
+        }
+    }
+
+    /// Precision of the factor or inverse.
+    pub const fn precision(self) -> &'static str {
+        match self {
+            Self::FrontMixed | Self::Pcg => "f32 factor, f64 residual",
+            _ => "f64",
         }
     }
 
@@ -48,7 +72,7 @@ impl Method {
         match self {
             Self::GaussJordan | Self::DenseInverse => Some(square),
             Self::DenseCholesky => Some(square / 2),
-            Self::SparseCholesky => None,
+            Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg => None,
         }
     }
 }

@@ -8,6 +8,7 @@ mod method;
 mod mobility;
 mod ordering;
 mod partition;
+mod pcg;
 mod sparse;
 mod stage;
 mod tiles;
