@@ -1,0 +1,347 @@
+//! Rules of the repository that no compiler checks: form of files, layers, documents that stay true.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Lines a source file may have.
+const LINES_MAX: usize = 500;
+/// Longer files, each with its reason; there is none.
+const LONGER_FILES: [(&str, &str); 0] = [];
+/// Folders that hold no sources of ours.
+const SKIPPED: [&str; 4] = ["target", "out", "node_modules", "proptest-regressions"];
+
+/// One text file of the repository.
+struct TextFile {
+    /// Path from the root, with `/`.
+    path: String,
+    text: String,
+}
+
+impl TextFile {
+    fn is_rust(&self) -> bool {
+        self.path.ends_with(".rs")
+    }
+
+    /// Code that ships: no test file, and nothing behind the test module's attribute.
+    fn shipped_code(&self) -> impl Iterator<Item = (usize, &str)> {
+        let is_test = self.path.starts_with("tests/")
+            || self.path.contains("/tests")
+            || self.path.ends_with("_tests.rs");
+        let lines = self.text.lines().enumerate().map(|(i, line)| (i + 1, line));
+        lines
+            .take_while(move |(_, line)| !is_test && !line.starts_with("#[cfg(test)]"))
+            .filter(|(_, line)| !is_comment(line))
+    }
+}
+
+fn is_comment(line: &str) -> bool {
+    line.trim_start().starts_with("//")
+}
+
+fn root() -> PathBuf {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    manifest.parent().expect("the package lies in a folder of the workspace").to_owned()
+}
+
+/// Every text file below the root, in path order.
+fn text_files() -> Vec<TextFile> {
+    let mut files = Vec::new();
+    collect(&root(), "", &mut files);
+    files.sort_by(|a, b| a.path.cmp(&b.path));
+    let sources = files.iter().filter(|f| f.is_rust()).count();
+    assert!(sources > 100, "only {sources} source files found: the walk is broken");
+    files
+}
+
+fn collect(folder: &Path, prefix: &str, files: &mut Vec<TextFile>) {
+    for entry in fs::read_dir(folder).expect("a folder of the repository can be read") {
+        let entry = entry.expect("an entry can be read");
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let hidden =
+            name.starts_with('.') && ![".ci", ".gitignore", ".dockerignore"].contains(&&*name);
+        if hidden || SKIPPED.contains(&&*name) {
+            continue;
+        }
+        let path = format!("{prefix}{name}");
+        if entry.path().is_dir() {
+            collect(&entry.path(), &format!("{path}/"), files);
+        } else if let Ok(text) = fs::read_to_string(entry.path()) {
+            files.push(TextFile { path, text });
+        }
+    }
+}
+
+/// Fails with one line per fault.
+fn assert_none(rule: &str, faults: Vec<String>) {
+    assert!(faults.is_empty(), "{rule}:\n  {}", faults.join("\n  "));
+}
+
+#[test]
+fn every_source_file_begins_with_what_it_is() {
+    let faults = text_files()
+        .into_iter()
+        .filter(TextFile::is_rust)
+        .filter(|f| !f.text.lines().next().is_some_and(|l| l.starts_with("//! ") && l.len() > 12))
+        .map(|f| f.path);
+    assert_none("the first line must be `//! ` and a sentence", faults.collect());
+}
+
+#[test]
+fn no_source_file_is_too_long_or_vaguely_named() {
+    let mut faults = Vec::new();
+    for file in text_files().iter().filter(|f| f.is_rust()) {
+        let lines = file.text.lines().count();
+        let allowed = LONGER_FILES.iter().any(|(path, _)| *path == file.path);
+        if lines > LINES_MAX && !allowed {
+            faults.push(format!("{}: {lines} lines, at most {LINES_MAX}", file.path));
+        }
+        let stem = file.path.rsplit('/').next().unwrap_or("").trim_end_matches(".rs");
+        if ["util", "utils", "common", "helper", "helpers", "misc"].contains(&stem) {
+            faults.push(format!("{}: the name says nothing; use a noun of the domain", file.path));
+        }
+    }
+    for (path, _) in LONGER_FILES {
+        if !root().join(path).exists() {
+            faults.push(format!("{path}: listed as an exception but not there"));
+        }
+    }
+    assert_none("files hold one noun each", faults);
+}
+
+#[test]
+fn nothing_is_left_half_done() {
+    // Written in halves so that this file does not find itself.
+    let banned = [
+        concat!("to", "do!("),
+        concat!("unimpl", "emented!("),
+        concat!("#[", "ignore"),
+        concat!("db", "g!("),
+        concat!("TO", "DO"),
+        concat!("FIX", "ME"),
+        concat!("target-", "cpu=native"),
+    ];
+    let mut faults = Vec::new();
+    for file in text_files().iter().filter(|f| f.is_rust() || f.path.ends_with(".toml")) {
+        for (i, line) in file.text.lines().enumerate() {
+            let found = banned.iter().filter(|b| line.contains(**b));
+            faults.extend(found.map(|b| format!("{}:{}: {b}", file.path, i + 1)));
+        }
+    }
+    assert_none("these have no place in the tree", faults);
+}
+
+#[test]
+fn crates_depend_downwards_only() {
+    let rules: [(&str, &[&str]); 3] = [
+        ("crates/core", &["softgrasp-protocol", "fea-server", "glove-client", "tokio"]),
+        ("crates/protocol", &["softgrasp-core", "fea-server", "glove-client", "rayon"]),
+        ("crates/fea-server", &["glove-client"]),
+    ];
+    let mut faults = Vec::new();
+    for (folder, forbidden) in rules {
+        let manifest = fs::read_to_string(root().join(folder).join("Cargo.toml"))
+            .expect("every crate has a manifest");
+        for line in manifest.lines() {
+            let name = line.split(['.', ' ', '=']).next().unwrap_or("");
+            if forbidden.contains(&name) {
+                faults.push(format!("{folder} depends on {name}"));
+            }
+        }
+    }
+    assert_none("layers", faults);
+}
+
+#[test]
+fn client_touches_the_server_crate_in_one_file() {
+    let mut faults = Vec::new();
+    let mut seen = false;
+    for file in text_files().iter().filter(|f| f.path.starts_with("crates/glove-client/src/")) {
+        for (line, text) in file.shipped_code() {
+            if text.contains("fea_server") {
+                seen |= file.path.ends_with("/connection.rs");
+                if !file.path.ends_with("/connection.rs") {
+                    faults.push(format!("{}:{line}: {}", file.path, text.trim()));
+                }
+            }
+        }
+    }
+    assert!(seen, "connection.rs no longer starts the embedded server: change this rule");
+    assert_none("everything but connection.rs goes over the wire", faults);
+}
+
+#[test]
+fn core_has_no_files_sockets_clock_or_threads() {
+    let banned =
+        ["std::fs", "std::net", "std::time", "std::thread", "std::process", "std::env", "println!"];
+    let mut faults = Vec::new();
+    for file in text_files().iter().filter(|f| f.path.starts_with("crates/core/src/")) {
+        for (line, text) in file.shipped_code() {
+            let found = banned.iter().filter(|b| text.contains(**b));
+            faults.extend(found.map(|b| format!("{}:{line}: {b}", file.path)));
+        }
+    }
+    assert_none("core is mathematics", faults);
+}
+
+/// Texts between single backticks on each line, code blocks left out.
+fn quoted(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let mut in_block = false;
+    text.lines().enumerate().flat_map(move |(i, line)| {
+        let fence = line.trim_start().starts_with("```");
+        in_block ^= fence;
+        let line = if in_block || fence { "" } else { line };
+        line.split('`').skip(1).step_by(2).map(move |quote| (i + 1, quote))
+    })
+}
+
+/// Whether a quoted text is meant to be a path of this repository.
+fn looks_like_a_path(quote: &str) -> bool {
+    let plain = quote.chars().all(|c| c.is_ascii_alphanumeric() || "._-/".contains(c));
+    let folders = ["crates/", "tests/", "benches/", "docs/", "scenes/", "reports/", ".ci/"];
+    let ends = [".rs", ".md", ".yml", ".sh"];
+    plain
+        && (folders.iter().any(|f| quote.starts_with(f)) || ends.iter().any(|e| quote.ends_with(e)))
+}
+
+#[test]
+fn paths_in_the_documents_exist() {
+    let files = text_files();
+    let mut faults = Vec::new();
+    let mut count = 0;
+    for document in files.iter().filter(|f| f.path.ends_with(".md")) {
+        for (line, quote) in quoted(&document.text).filter(|(_, q)| looks_like_a_path(q)) {
+            count += 1;
+            let suffix = format!("/{quote}");
+            let exists = root().join(quote).exists()
+                || files.iter().any(|f| f.path.ends_with(&suffix) || f.path == quote);
+            if !exists {
+                faults.push(format!("{}:{line}: `{quote}`", document.path));
+            }
+        }
+        let folder = document.path.rsplit_once('/').map_or("", |(folder, _)| folder);
+        for target in document.text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let target = target.split('#').next().unwrap_or("");
+            if !target.is_empty()
+                && !target.contains("://")
+                && !root().join(folder).join(target).exists()
+            {
+                faults.push(format!("{}: link to {target}", document.path));
+            }
+        }
+    }
+    assert!(count > 50, "only {count} paths found in the documents: the search is broken");
+    assert_none("these do not exist", faults);
+}
+
+/// Equation numbers in the form `(3.43a)` or `(A.1)`.
+fn equations(text: &str) -> BTreeSet<&str> {
+    let inside = text.split('(').skip(1).filter_map(|rest| rest.split_once(')'));
+    inside.map(|(number, _)| number).filter(|n| is_equation_number(n)).collect()
+}
+
+fn is_equation_number(text: &str) -> bool {
+    let Some((chapter, number)) = text.split_once('.') else { return false };
+    let digits = number.trim_end_matches(['a', 'b']);
+    matches!(chapter, "3" | "4" | "6" | "A" | "B" | "C")
+        && number.len() - digits.len() <= 1
+        && (1..=2).contains(&digits.len())
+        && digits.chars().all(|c| c.is_ascii_digit())
+        && !digits.starts_with('0')
+}
+
+#[test]
+fn equation_numbers_are_recognised() {
+    let text = "as (3.43a), (4.10)–(4.9) and (A.1), not (3.5 mm), (3.05), (2.1), 4.5 or (1, 0)";
+    assert_eq!(equations(text).into_iter().collect::<Vec<_>>(), ["3.43a", "4.10", "4.9", "A.1"]);
+}
+
+#[test]
+fn every_thesis_equation_is_in_the_notation() {
+    let notation = fs::read_to_string(root().join("docs/notation.md")).expect("notation.md");
+    let listed = equations(&notation);
+    let mut wanted: BTreeSet<String> = BTreeSet::new();
+    wanted.extend((8..=50).filter(|n| ![42, 43].contains(n)).map(|n| format!("3.{n}")));
+    wanted
+        .extend(["3.7", "3.42a", "3.42b", "3.43a", "3.43b", "6.1", "A.1", "A.2"].map(String::from));
+    wanted.extend((1..=10).map(|n| format!("4.{n}")));
+    wanted.extend((1..=5).map(|n| format!("C.{n}")));
+    let faults = wanted.iter().filter(|n| !listed.contains(n.as_str())).map(|n| format!("({n})"));
+    assert_none("docs/notation.md has no row for", faults.collect());
+}
+
+#[test]
+fn equations_cited_in_the_code_are_in_the_notation() {
+    let notation = fs::read_to_string(root().join("docs/notation.md")).expect("notation.md");
+    let listed = equations(&notation);
+    let mut faults = Vec::new();
+    let mut count = 0;
+    for file in text_files().iter().filter(|f| f.is_rust() && f.path.starts_with("crates/")) {
+        for (i, line) in file.text.lines().enumerate().filter(|(_, line)| is_comment(line)) {
+            for number in equations(line) {
+                count += 1;
+                // (3.43) stands for (3.43a) and (3.43b).
+                let half = format!("{number}a");
+                if !listed.contains(number) && !listed.contains(half.as_str()) {
+                    faults.push(format!("{}:{}: ({number})", file.path, i + 1));
+                }
+            }
+        }
+    }
+    assert!(count > 50, "only {count} citations found: the search is broken");
+    assert_none("docs/notation.md does not know", faults);
+}
+
+#[test]
+fn names_in_the_notation_are_in_the_files_beside_them() {
+    let notation = fs::read_to_string(root().join("docs/notation.md")).expect("notation.md");
+    let mut faults = Vec::new();
+    let mut count = 0;
+    for row in notation.lines().filter(|line| line.starts_with("| ")) {
+        let quotes = || row.split('`').skip(1).step_by(2);
+        let texts: Vec<String> = quotes()
+            .filter(|q| q.ends_with(".rs"))
+            .filter_map(|path| fs::read_to_string(root().join(path)).ok())
+            .collect();
+        for quote in quotes().filter(|q| !looks_like_a_path(q)) {
+            for name in quote.split("::").filter_map(|part| part.split(['(', ' ']).next()) {
+                count += 1;
+                if !texts.iter().any(|text| text.contains(name)) && name != "fem" {
+                    faults.push(format!("{name}: {row}"));
+                }
+            }
+        }
+    }
+    assert!(count > 50, "only {count} names found in the tables: the search is broken");
+    assert_none("no file of the row has the name", faults);
+}
+
+#[test]
+fn no_file_names_a_place_on_one_machine() {
+    // Written in halves so that this file does not find itself.
+    let places = [
+        concat!("/ho", "me/"),
+        concat!("/ro", "ot/"),
+        concat!("/wo", "rk/"),
+        concat!("/Us", "ers/"),
+        concat!("C:", "\\"),
+    ];
+    let mut faults = Vec::new();
+    for file in text_files() {
+        for (i, line) in file.text.lines().enumerate() {
+            let found = places.iter().filter(|p| line.contains(**p));
+            faults.extend(found.map(|p| format!("{}:{}: {p}", file.path, i + 1)));
+        }
+    }
+    assert_none("absolute paths", faults);
+}
+
+#[test]
+fn ci_runs_the_test_command_of_the_readme() {
+    let command = "cargo test --workspace";
+    let read = |path: &str| fs::read_to_string(root().join(path)).expect("the file is there");
+    let has_line = |text: &str, line: &str| text.lines().any(|l| l.trim() == line);
+    assert!(has_line(&read(".ci/run"), &format!("step {command}")), ".ci/run");
+    let shown = read("README.md").lines().any(|l| l.starts_with(command));
+    assert!(shown, "README.md does not show `{command}`");
+}
