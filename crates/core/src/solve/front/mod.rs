@@ -7,6 +7,7 @@ mod etree;
 mod factor;
 mod real;
 mod solve;
+mod substitute;
 mod supernodes;
 #[cfg(test)]
 mod tests;

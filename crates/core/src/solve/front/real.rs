@@ -1,6 +1,6 @@
 //! The two precisions a factor can be kept in.
 
-use std::ops::{AddAssign, SubAssign};
+use std::ops::AddAssign;
 
 mod sealed {
     pub trait Sealed {}
@@ -10,12 +10,10 @@ mod sealed {
 
 /// Precision of a factor: `f64`, or `f32` at half the time and memory for use with refinement.
 pub trait Real:
-    faer::traits::RealField + Copy + Default + PartialOrd + AddAssign + SubAssign + sealed::Sealed
+    faer::traits::RealField + Copy + Default + PartialOrd + AddAssign + sealed::Sealed
 {
     /// Zero.
     const ZERO: Self;
-    /// One.
-    const ONE: Self;
     /// Minus one.
     const MINUS_ONE: Self;
 
@@ -31,7 +29,6 @@ pub trait Real:
 
 impl Real for f64 {
     const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
     const MINUS_ONE: Self = -1.0;
 
     #[inline]
@@ -52,7 +49,6 @@ impl Real for f64 {
 
 impl Real for f32 {
     const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
     const MINUS_ONE: Self = -1.0;
 
     #[inline]

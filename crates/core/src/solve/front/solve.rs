@@ -1,14 +1,10 @@
 //! Solves with a factor: down the tree to the roots and back, whole or on a few paths only.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::{
-    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
-};
-use faer::prelude::*;
-use faer::{Accum, Mat, Par};
+use faer::Mat;
 use rayon::prelude::*;
 
 use super::analysis::{Front, FrontAnalysis};
+use super::substitute::Panel;
 use super::{FrontFactor, Real};
 
 /// Subtrees whose panels times right-hand sides are below this are not split into tasks.
@@ -227,34 +223,31 @@ impl<T: Real> Solve<'_, T> {
         stack
     }
 
-    /// One front: `x1 ← L11⁻¹ x1`, and `x2 ← children − L21 x1` for the parent.
+    /// One front: adds what its children hand it and eliminates; the whole front, size × columns,
+    /// whose rest is for the parent.
     fn up_front(&self, v: usize, x1: &mut [T], handed: &[Vec<T>]) -> Vec<T> {
         let front = self.front(v);
-        let (k, pivots, rest) = (self.columns, front.pivots, front.rest());
-        let mut x2 = vec![T::ZERO; rest * k];
+        let (pivots, size) = (front.pivots, front.size);
+        let mut local = vec![T::ZERO; size * self.columns];
+        for (local, x1) in local.chunks_exact_mut(size).zip(x1.chunks_exact(pivots)) {
+            local[..pivots].copy_from_slice(x1);
+        }
         for (&child, values) in front.children.iter().zip(handed).filter(|(_, h)| !h.is_empty()) {
             let child = self.front(child as usize);
-            for (j, values) in values.chunks_exact(child.rest()).enumerate() {
+            for (local, values) in local.chunks_exact_mut(size).zip(values.chunks_exact(child.size))
+            {
                 for run in &child.runs {
-                    let (at, len) = (run.parent as usize, run.len as usize);
-                    let into = match at < pivots {
-                        true => &mut x1[j * pivots + at..][..len],
-                        false => &mut x2[j * rest + at - pivots..][..len],
-                    };
-                    for (slot, &value) in into.iter_mut().zip(&values[run.child as usize..]) {
-                        *slot += value;
-                    }
+                    let from = &values[child.pivots + run.child as usize..][..run.len as usize];
+                    let into = &mut local[run.parent as usize..];
+                    into.iter_mut().zip(from).for_each(|(slot, &value)| *slot += value);
                 }
             }
         }
-        let (l11, l21) = self.panel(v);
-        let mut x1 = MatMut::from_column_major_slice_mut(x1, pivots, k);
-        solve_lower_triangular_in_place(l11, x1.as_mut(), Par::Seq);
-        if rest > 0 {
-            let x2 = MatMut::from_column_major_slice_mut(&mut x2, rest, k);
-            matmul(x2, Accum::Add, l21, x1, T::MINUS_ONE, Par::Seq);
+        self.panel(v).forward(&mut local, self.columns);
+        for (local, x1) in local.chunks_exact(size).zip(x1.chunks_exact_mut(pivots)) {
+            x1.copy_from_slice(&local[..pivots]);
         }
-        x2
+        local
     }
 
     /// Backward substitution in sibling subtrees; `above` holds the parent's front.
@@ -310,38 +303,31 @@ impl<T: Real> Solve<'_, T> {
         }
     }
 
-    /// One front: `x1 ← L11⁻ᵀ (x1 − L21ᵀ x2)` with `x2` taken from the parent; the whole front,
+    /// One front: takes the rest from the parent's front `above` and substitutes; the whole front,
     /// size × columns, for the children.
     fn down_front(&self, v: usize, x1: &mut [T], above: &[T]) -> Vec<T> {
         let front = self.front(v);
-        let (k, pivots, rest, size) = (self.columns, front.pivots, front.rest(), front.size);
-        let mut local = vec![T::ZERO; size * k];
-        let above_size = above.len() / k;
-        for j in 0..k {
-            local[j * size..][..pivots].copy_from_slice(&x1[j * pivots..][..pivots]);
+        let (pivots, size) = (front.pivots, front.size);
+        let above_size = above.len() / self.columns;
+        let mut local = vec![T::ZERO; size * self.columns];
+        for (j, (local, x1)) in
+            local.chunks_exact_mut(size).zip(x1.chunks_exact(pivots)).enumerate()
+        {
+            local[..pivots].copy_from_slice(x1);
             for run in &front.runs {
                 let from = &above[j * above_size + run.parent as usize..][..run.len as usize];
-                let at = j * size + pivots + run.child as usize;
-                local[at..at + from.len()].copy_from_slice(from);
+                local[pivots + run.child as usize..][..from.len()].copy_from_slice(from);
             }
         }
-        let (l11, l21) = self.panel(v);
-        let whole = MatMut::from_column_major_slice_mut(&mut local, size, k);
-        let (mut top, below) = whole.split_at_row_mut(pivots);
-        if rest > 0 {
-            matmul(top.as_mut(), Accum::Add, l21.transpose(), below, T::MINUS_ONE, Par::Seq);
-        }
-        solve_upper_triangular_in_place(l11.transpose(), top, Par::Seq);
-        for j in 0..k {
-            x1[j * pivots..][..pivots].copy_from_slice(&local[j * size..][..pivots]);
+        self.panel(v).backward(&mut local, self.columns);
+        for (local, x1) in local.chunks_exact(size).zip(x1.chunks_exact_mut(pivots)) {
+            x1.copy_from_slice(&local[..pivots]);
         }
         local
     }
 
-    /// `L11` and `L21` of a front.
-    fn panel(&self, v: usize) -> (MatRef<'_, T>, MatRef<'_, T>) {
-        let front = self.front(v);
-        let panel = &self.factor.panels[v];
-        MatRef::from_column_major_slice(panel, front.size, front.pivots).split_at_row(front.pivots)
+    fn panel(&self, v: usize) -> Panel<'_, T> {
+        let Front { size, pivots, .. } = *self.front(v);
+        Panel { values: &self.factor.panels[v], size, pivots }
     }
 }

@@ -189,10 +189,9 @@ fn merge(tree: &EliminationTree, part_start: &[u32]) -> (Vec<Group>, Vec<u32>) {
 /// Closes the gaps that merged groups leave in the numbering.
 fn compact(groups: Vec<Option<Group>>) -> (Vec<Group>, Vec<u32>) {
     let mut number = vec![NONE; groups.len()];
-    let mut left = 0;
-    for (old, _) in groups.iter().enumerate().filter(|(_, g)| g.is_some()) {
-        number[old] = left;
-        left += 1;
+    let left = (0..groups.len()).filter(|&old| groups[old].is_some());
+    for (new, old) in left.enumerate() {
+        number[old] = new as u32;
     }
     let mut groups: Vec<Group> = groups.into_iter().flatten().collect();
     let mut parents = vec![NONE; groups.len()];

@@ -126,7 +126,7 @@ fn fill_is_close_to_that_of_an_exact_symbolic_factorisation() {
     // A diagonal pattern's worth of columns with no merging at all, under the same order.
     let exact = exact_fill(&stiffness, &partition, &order);
     assert!(exact <= analysis.fill(), "some entry of the factor has no place");
-    assert!(analysis.fill() < exact + exact / 2, "{} against {exact}", analysis.fill());
+    assert!(analysis.fill() < exact * 7 / 5, "{} against {exact}", analysis.fill());
     // faer merges too; the two must not be far apart.
     let metis = ordering::nested_dissection(&stiffness, &partition);
     let faer = Analysis::new(SparseK11::new(&stiffness, &partition), metis).ok().unwrap().fill();
@@ -207,6 +207,24 @@ fn same_bits_for_one_two_four_and_seven_threads() {
     for other in &answers[1..] {
         assert!(other == &answers[0], "the bits depend on the number of threads");
     }
+}
+
+#[test]
+fn chain_of_large_fronts_under_a_poor_order_is_factored_too() {
+    let mesh = boxes(&[[9, 9, 11], [300, 2, 2]]);
+    let stiffness = stiffness_of(&mesh, &[1.0, 2.0]);
+    let partition =
+        partition_of(&mesh, &[0, 1, 2, 25, 26, 242, 2673, 2674, 2675, 3573, 3574, 4474]);
+    let graph = ordering::NodeGraph::new(&stiffness, &partition);
+    let natural = (0..graph.len() as u32).collect();
+    let analysis = FrontAnalysis::with_order(&stiffness, &partition, &graph, natural);
+    let only_child = |f: &&super::analysis::Front| !f.is_serial() && f.children.len() == 1;
+    assert!(analysis.fronts.iter().filter(only_child).count() > 3);
+    let factor = FrontFactor::<f64>::try_new(&Arc::new(analysis), &stiffness).unwrap();
+    let b = right_hand_sides(partition.unknown().len(), 2);
+    let mut x = b.clone();
+    factor.solve_in_place(&mut x, 2);
+    assert!(residual(&stiffness, &partition, &x, &b) < 1e-8);
 }
 
 #[test]
