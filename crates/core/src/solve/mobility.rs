@@ -7,7 +7,7 @@ use std::fmt;
 
 use nalgebra::{Point3, Vector3};
 
-use super::zero_energy::{BodyMotions, nodes_and_dofs_of_body, rigid_parts};
+use super::zero_energy::{BodyMotions, nodes_and_dofs_by_body, rigid_parts};
 use crate::mesh::{Bodies, TetMesh};
 
 /// A body that can still move without deforming.
@@ -70,8 +70,8 @@ impl fmt::Display for FreeMotion {
 /// Source: thesis (3.43) presumes that `K11⁻¹` exists; this is the condition.
 pub fn find_free_motion(mesh: &TetMesh, bodies: &Bodies, known: &[u32]) -> Option<FreeMotion> {
     let parts = rigid_parts(mesh, bodies);
-    (0..bodies.count()).find_map(|body| {
-        let (nodes, held) = nodes_and_dofs_of_body(bodies, body, known);
+    let by_body = nodes_and_dofs_by_body(bodies, known);
+    by_body.into_iter().enumerate().find_map(|(body, (nodes, held))| {
         let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held)?;
         let motion = motions.basis.first()?.as_slice();
         let moving: Vec<f64> = motion.chunks(6).map(|m| m.iter().map(|x| x * x).sum()).collect();

@@ -98,7 +98,7 @@ impl BodyMotions {
             .map(|&n| (mesh.vertices()[n as usize] - centre).norm())
             .fold(f64::MIN_POSITIVE, f64::max);
         let mut motions = Self { parts: names, centre, size, basis: Vec::new() };
-        let mut rows: Vec<DVector<f64>> = Vec::new();
+        let mut rows = Rows::new(6 * motions.parts.len());
         for &dof in held {
             let (node, axis) = (dof / 3, dof as usize % 3);
             let part = parts.of_node[node as usize][0];
@@ -108,11 +108,11 @@ impl BodyMotions {
             if let Some((&first, others)) = parts.of_node[node as usize].split_first() {
                 for &other in others {
                     let joint = [(first, 1.0), (other, -1.0)];
-                    rows.extend((0..3).map(|axis| motions.row(mesh, node, axis, &joint)));
+                    (0..3).for_each(|axis| rows.push(motions.row(mesh, node, axis, &joint)));
                 }
             }
         }
-        motions.basis = null_space(&rows, 6 * motions.parts.len());
+        motions.basis = rows.null_space();
         Some(motions)
     }
 
@@ -150,33 +150,64 @@ impl BodyMotions {
     }
 }
 
-/// Nodes of a body and those of the given degrees of freedom that are on it.
-pub(super) fn nodes_and_dofs_of_body(
-    bodies: &Bodies,
-    body: usize,
-    dofs: &[u32],
-) -> (Vec<u32>, Vec<u32>) {
-    let is_on = |node: u32| bodies.of_node.get(node as usize) == Some(&Some(body as u32));
-    let nodes = (0..bodies.of_node.len() as u32).filter(|&n| is_on(n)).collect();
-    (nodes, dofs.iter().copied().filter(|&d| is_on(d / 3)).collect())
+/// Nodes of every body, and those of the given degrees of freedom that are on it, in one pass.
+pub(super) fn nodes_and_dofs_by_body(bodies: &Bodies, dofs: &[u32]) -> Vec<(Vec<u32>, Vec<u32>)> {
+    let mut parts = vec![(Vec::new(), Vec::new()); bodies.count()];
+    for (node, body) in bodies.of_node.iter().enumerate() {
+        if let Some(body) = body {
+            parts[*body as usize].0.push(node as u32);
+        }
+    }
+    for &dof in dofs {
+        if let Some(Some(body)) = bodies.of_node.get(dof as usize / 3) {
+            parts[*body as usize].1.push(dof);
+        }
+    }
+    parts
 }
 
-/// Orthonormal basis of what all rows annihilate to [`FREE_BELOW`], smallest singular value first.
-fn null_space(rows: &[DVector<f64>], columns: usize) -> Vec<DVector<f64>> {
-    // QR first: thousands of known nodes shrink to a square without squaring the condition.
-    let mut a = DMatrix::zeros(rows.len().max(columns), columns);
-    for (i, row) in rows.iter().enumerate() {
-        a.row_mut(i).copy_from(&row.transpose());
+/// Conditions on the motions, kept as a triangle: thousands of them take no more room than a few,
+/// and the condition is not squared.
+struct Rows {
+    columns: usize,
+    /// Rows not yet in the triangle, and the triangle itself in front of them.
+    waiting: Vec<DVector<f64>>,
+}
+
+impl Rows {
+    fn new(columns: usize) -> Self {
+        Self { columns, waiting: Vec::new() }
     }
-    let r = a.qr().r();
-    let svd = r.svd(false, true);
-    let Some(v_t) = svd.v_t else { return Vec::new() };
-    let largest = svd.singular_values.max();
-    let mut order: Vec<usize> = (0..columns).collect();
-    order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
-    order
-        .into_iter()
-        .take_while(|&i| svd.singular_values[i] <= FREE_BELOW * largest)
-        .map(|i| v_t.row(i).transpose())
-        .collect()
+
+    fn push(&mut self, row: DVector<f64>) {
+        self.waiting.push(row);
+        if self.waiting.len() >= 4 * self.columns {
+            let r = self.triangle();
+            self.waiting = r.row_iter().map(|row| row.transpose()).collect();
+        }
+    }
+
+    /// Square R of a QR decomposition of all rows so far.
+    fn triangle(&self) -> DMatrix<f64> {
+        let mut a = DMatrix::zeros(self.waiting.len().max(self.columns), self.columns);
+        for (i, row) in self.waiting.iter().enumerate() {
+            a.row_mut(i).copy_from(&row.transpose());
+        }
+        a.qr().r()
+    }
+
+    /// Orthonormal basis of what all rows annihilate to [`FREE_BELOW`], smallest singular value
+    /// first.
+    fn null_space(&self) -> Vec<DVector<f64>> {
+        let svd = self.triangle().svd(false, true);
+        let Some(v_t) = svd.v_t else { return Vec::new() };
+        let largest = svd.singular_values.max();
+        let mut order: Vec<usize> = (0..self.columns).collect();
+        order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
+        order
+            .into_iter()
+            .take_while(|&i| svd.singular_values[i] <= FREE_BELOW * largest)
+            .map(|i| v_t.row(i).transpose())
+            .collect()
+    }
 }

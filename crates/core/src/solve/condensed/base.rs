@@ -7,7 +7,7 @@ use crate::mesh::{Bodies, TetMesh};
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
 use crate::solve::partition::AXIS_NAMES;
 use crate::solve::pcg::norm;
-use crate::solve::zero_energy::{BodyMotions, nodes_and_dofs_of_body, rigid_parts};
+use crate::solve::zero_energy::{BodyMotions, nodes_and_dofs_by_body, rigid_parts};
 use crate::solve::{Partition, PartitionError, Stage};
 
 /// Base factor of one shape.
@@ -187,8 +187,7 @@ fn motions(
 ) -> Result<Vec<Vec<f64>>, CondensedError> {
     let parts = rigid_parts(mesh, bodies);
     let mut fields = Vec::new();
-    for body in 0..bodies.count() {
-        let (nodes, held) = nodes_and_dofs_of_body(bodies, body, fixed);
+    for (body, (nodes, held)) in nodes_and_dofs_by_body(bodies, fixed).into_iter().enumerate() {
         let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held)
             .ok_or(CondensedError::Hinges { body })?;
         for motion in &motions.basis {

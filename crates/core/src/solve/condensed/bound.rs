@@ -106,7 +106,7 @@ impl Base {
     }
 
     /// Rayleigh quotient after some steps of inverse iteration: an estimate from above.
-    fn estimate_eigenvalue_min(&self) -> Option<f64> {
+    pub(super) fn estimate_eigenvalue_min(&self) -> Option<f64> {
         let n = self.partition.unknown().len();
         // A fixed start without symmetry.
         let mut x: Vec<f64> = (0..n).map(|i| 1.0 + 0.5 * (1.7 * i as f64).sin()).collect();
