@@ -123,7 +123,7 @@ fn fill_is_close_to_that_of_an_exact_symbolic_factorisation() {
     let partition = partition_of(&mesh, &[0, 1, 2, 30, 31, 32, 900]);
     let analysis = FrontAnalysis::new(&stiffness, &partition);
     let order: Vec<usize> = analysis.order.iter().map(|&row| row as usize).collect();
-    // A diagonal pattern's worth of columns with no merging at all, under the same order.
+    // No merging at all, under the same order.
     let exact = exact_fill(&stiffness, &partition, &order);
     assert!(exact <= analysis.fill(), "some entry of the factor has no place");
     assert!(analysis.fill() < exact * 7 / 5, "{} against {exact}", analysis.fill());
