@@ -1,6 +1,9 @@
 //! Times of the parallel factor against the sequential one on cubes of growing size, each answer
 //! checked by its residual before a time is printed.
 //!
+//! faer has no refactoring and no wide solve here (NaN), and its solve includes the refinement and
+//! reactions of `Factored::solve`.
+//!
 //! `front_times [NODES_PER_EDGE…]`, default 10 15 22 28; run it on a quiet machine.
 #![allow(clippy::print_stdout, reason = "a table on standard output is what it is for")]
 

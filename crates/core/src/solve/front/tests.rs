@@ -123,7 +123,7 @@ fn fill_is_close_to_that_of_an_exact_symbolic_factorisation() {
     let partition = partition_of(&mesh, &[0, 1, 2, 30, 31, 32, 900]);
     let analysis = FrontAnalysis::new(&stiffness, &partition);
     let order: Vec<usize> = analysis.order.iter().map(|&row| row as usize).collect();
-    // A diagonal pattern's worth of columns with no merging at all, under the same order.
+    // No merging at all, under the same order.
     let exact = exact_fill(&stiffness, &partition, &order);
     assert!(exact <= analysis.fill(), "some entry of the factor has no place");
     assert!(analysis.fill() < exact * 7 / 5, "{} against {exact}", analysis.fill());
@@ -211,10 +211,10 @@ fn same_bits_for_one_two_four_and_seven_threads() {
 
 #[test]
 fn chain_of_large_fronts_under_a_poor_order_is_factored_too() {
-    let mesh = boxes(&[[9, 9, 11], [300, 2, 2]]);
+    let mesh = boxes(&[[9, 9, 11], [60, 2, 2]]);
     let stiffness = stiffness_of(&mesh, &[1.0, 2.0]);
     let partition =
-        partition_of(&mesh, &[0, 1, 2, 25, 26, 242, 2673, 2674, 2675, 3573, 3574, 4474]);
+        partition_of(&mesh, &[0, 1, 2, 25, 26, 242, 2673, 2674, 2675, 2853, 3033, 3034]);
     let graph = ordering::NodeGraph::new(&stiffness, &partition);
     let natural = (0..graph.len() as u32).collect();
     let analysis = FrontAnalysis::with_order(&stiffness, &partition, &graph, natural);
