@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::fem::{AssemblyError, Material, Stiffness, StiffnessPattern, assemble};
 use crate::mesh::{Bodies, TetMesh};
+use crate::solve::condensed::{Base, CondensedError};
 use crate::solve::{
     Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition, PartitionError,
     SolveError, Stage, find_free_motion,
@@ -18,7 +19,7 @@ pub struct Model {
     mesh: TetMesh,
     bodies: Bodies,
     used: Vec<bool>,
-    stiffness: Stiffness,
+    stiffness: Arc<Stiffness>,
     fixed: Vec<u32>,
 }
 
@@ -40,6 +41,9 @@ pub enum ModelError {
     /// The method failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The condensed engine failed.
+    #[error(transparent)]
+    Condensed(#[from] CondensedError),
 }
 
 /// A partition and the known displacements in its order.
@@ -71,7 +75,7 @@ impl Model {
         let used = mesh.used_nodes();
         Partition::try_new(&used, &fixed)?;
         let pattern = Arc::new(StiffnessPattern::new(&mesh));
-        let stiffness = assemble(&pattern, &mesh, materials)?;
+        let stiffness = Arc::new(assemble(&pattern, &mesh, materials)?);
         let bodies = Bodies::from_mesh(&mesh);
         Ok(Self { mesh, bodies, used, stiffness, fixed })
     }
@@ -94,6 +98,11 @@ impl Model {
     /// Degrees of freedom the scene holds at zero, ascending.
     pub fn fixed(&self) -> &[u32] {
         &self.fixed
+    }
+
+    /// Whether an element uses a node.
+    pub fn is_used(&self, node: usize) -> bool {
+        self.used.get(node).copied().unwrap_or(false)
     }
 
     /// Degrees of freedom of nodes that elements use.
@@ -125,6 +134,29 @@ impl Model {
         Ok(Known { dofs: known.dofs().to_vec(), q_known: known.values().to_vec() })
     }
 
+    /// Makes sure that known degrees of freedom exist and hold every body.
+    ///
+    /// Shapes: `dofs` ascending.
+    ///
+    /// # Errors
+    /// [`ModelError::Partition`], [`ModelError::Free`] naming the body and its motion.
+    pub fn check_held(&self, dofs: &[u32]) -> Result<Partition, ModelError> {
+        let partition = Partition::try_new(&self.used, dofs)?;
+        match find_free_motion(&self.mesh, &self.bodies, dofs) {
+            Some(free) => Err(ModelError::Free(free)),
+            None => Ok(partition),
+        }
+    }
+
+    /// Base of the condensed engine for this shape.
+    ///
+    /// # Errors
+    /// [`ModelError::Condensed`].
+    pub fn condense(&self, on_stage: &mut dyn FnMut(Stage)) -> Result<Base, ModelError> {
+        let Self { mesh, bodies, stiffness, fixed, .. } = self;
+        Ok(Base::try_new(mesh, bodies, stiffness, fixed, on_stage)?)
+    }
+
     /// Inverts or factors `K11` for a set of known degrees of freedom, after making sure that it
     /// holds every body.
     ///
@@ -139,10 +171,7 @@ impl Model {
         method: Method,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Factored, ModelError> {
-        let partition = Partition::try_new(&self.used, dofs)?;
-        if let Some(free) = find_free_motion(&self.mesh, &self.bodies, dofs) {
-            return Err(ModelError::Free(free));
-        }
+        let partition = self.check_held(dofs)?;
         Ok(Factored::try_new(&self.stiffness, partition, method, on_stage)?)
     }
 }

@@ -1,22 +1,25 @@
-//! The work on one request, on the rayon pool: from messages to the core and back.
+//! The work on one request, on the rayon pool: which model, which method, which way to the answer.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use nalgebra::Point3;
-use softgrasp_core::fem::{Material, summarise_strain};
+use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{TetMesh, signed_volume};
 use softgrasp_core::model::{Known, Model};
-use softgrasp_core::solve::{Factored, Loads, Method, Solution};
+use softgrasp_core::solve::Method;
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, ElementName, FrameRequest, MeshData, ModelHash, ModelReady,
-    NodeChoice, Question, SolveOnce, SolveReport, UploadModel, Want,
+    Answer, ElementName, FrameRequest, MeshData, ModelHash, ModelReady, Prefetch, SolveOnce,
+    UploadModel,
 };
 
-use crate::clock::{StageClock, ms_since, peak_rss_bytes};
+use crate::approach::Approach;
+use crate::clock::StageClock;
 use crate::config::ServerConfig;
+use crate::direct::Asked;
+use crate::question::{checked_forces, pairs};
 use crate::reject::Refusal;
 use crate::store::{ModelStore, StoredModel};
+use crate::{condensed, direct};
 
 /// What is the same for all requests of a server.
 pub(crate) struct Desk {
@@ -33,16 +36,34 @@ impl Desk {
     /// Mesh, known displacements and partition in one request (thesis 5.1.1).
     pub fn solve_once(&self, request: SolveOnce, mut clock: StageClock) -> Result<Answer, Refusal> {
         let SolveOnce { mesh, materials, element, question } = request;
+        let approach = Approach::for_once(&question)?;
         let model = self.model(mesh, &materials, element, Vec::new(), &mut clock)?;
         let known = model.known(pairs(&question.known))?;
-        let method = self.method(&question, &known, &model)?;
         let forces = checked_forces(&model, &known, &question)?;
-        let factored = model.factor(&known.dofs, method, &mut |stage| clock.begin(stage))?;
-        let asked = Asked { question: &question, known, forces, element, factor_reused: false };
-        answer(&model, &factored, asked, clock)
+        match approach {
+            Approach::Condensed { .. } => {
+                let stored = Arc::new(StoredModel::new(model, usize::MAX));
+                condensed::answer(&stored, &question, &known, &approach, clock)
+            }
+            Approach::Direct { method, because } => {
+                self.check_memory(method, &known, &model)?;
+                let factored =
+                    model.factor(&known.dofs, method, &mut |stage| clock.begin(stage))?;
+                let asked = Asked {
+                    question: &question,
+                    known,
+                    forces,
+                    element,
+                    factor_reused: false,
+                    chosen_because: because,
+                };
+                direct::answer(&model, &factored, asked, clock)
+            }
+        }
     }
 
-    /// Prepares a model and keeps it.
+    /// Prepares a model and keeps it; the base of the condensed engine is made with it, so that no
+    /// frame has to wait for it.
     pub fn upload(
         &self,
         upload: UploadModel,
@@ -56,7 +77,12 @@ impl Desk {
             None => {
                 let UploadModel { mesh, materials, element, fixed } = upload;
                 let model = self.model(mesh, &materials, element, fixed, &mut clock)?;
-                let stored = Arc::new(StoredModel::new(model));
+                let column_bytes = usize::try_from(self.config.column_cache).unwrap_or(usize::MAX);
+                let stored = Arc::new(StoredModel::new(model, column_bytes));
+                // A shape that cannot be condensed can still be solved by the other methods.
+                if let Err(error) = stored.base(&mut |stage| clock.begin(stage)) {
+                    tracing::info!(%error, "this shape is not condensed");
+                }
                 self.store.keep(hash, Arc::clone(&stored));
                 stored
             }
@@ -72,8 +98,16 @@ impl Desk {
         let stored = self.store.find(hash).ok_or(Refusal::UnknownModel(hash))?;
         let model = &stored.model;
         let known = model.known(pairs(&question.known))?;
-        let method = self.method(&question, &known, model)?;
         let forces = checked_forces(model, &known, &question)?;
+        let (method, because) = match Approach::for_frame(&question, &stored, &known)? {
+            approach @ Approach::Condensed { .. } => {
+                let answer = condensed::answer(&stored, &question, &known, &approach, clock);
+                self.store.trim();
+                return answer;
+            }
+            Approach::Direct { method, because } => (method, because),
+        };
+        self.check_memory(method, &known, model)?;
         let kept = stored.factor_for(&known.dofs, method);
         let factor_reused = kept.is_some();
         let factored = match kept {
@@ -87,8 +121,31 @@ impl Desk {
             }
         };
         let element = ElementName::T4;
-        let asked = Asked { question: &question, known, forces, element, factor_reused };
-        answer(model, &factored, asked, clock)
+        let asked = Asked {
+            question: &question,
+            known,
+            forces,
+            element,
+            factor_reused,
+            chosen_because: because,
+        };
+        direct::answer(model, &factored, asked, clock)
+    }
+
+    /// Computes the columns of nodes that may soon be touched; a hint, so nothing is answered.
+    pub fn prefetch(&self, hint: Prefetch) {
+        let Some(stored) = self.store.find(hint.model) else { return };
+        condensed::prefetch(&stored, &hint.nodes);
+        self.store.trim();
+    }
+
+    /// Proves the eigenvalue bound of a model, from which every later frame's error bound follows.
+    pub fn prove(&self, model: ModelHash) {
+        if let Some(stored) = self.store.find(model)
+            && let Ok(base) = stored.base(&mut |_| {})
+        {
+            base.prove_eigenvalue_min();
+        }
     }
 
     fn model(
@@ -120,17 +177,15 @@ impl Desk {
         Ok(Model::try_new(mesh, &materials, fixed, &mut |stage| clock.begin(stage))?)
     }
 
-    /// The method asked for, if its matrix fits into the memory limit.
-    fn method(&self, question: &Question, known: &Known, model: &Model) -> Result<Method, Refusal> {
-        let name = question.method.as_str();
-        let method = if name == "auto" { Method::SparseCholesky } else { name.parse()? };
+    /// Refuses a dense matrix that does not fit into the memory limit.
+    fn check_memory(&self, method: Method, known: &Known, model: &Model) -> Result<(), Refusal> {
         let unknown_dofs = model.modelled_dofs().saturating_sub(known.dofs.len());
         let limit = self.config.memory_limit;
         match method.dense_bytes(unknown_dofs) {
             Some(needed) if needed > limit => {
                 Err(Refusal::Memory { method: method.to_string(), unknown_dofs, needed, limit })
             }
-            _ => Ok(method),
+            _ => Ok(()),
         }
     }
 }
@@ -163,147 +218,4 @@ fn ranks(labels: &[u32], materials: usize) -> Result<Vec<u32>, Refusal> {
         return Err(Refusal::Regions { labels: known.len(), materials });
     }
     Ok(labels.iter().map(|label| known.partition_point(|k| k < label) as u32).collect())
-}
-
-struct Asked<'a> {
-    question: &'a Question,
-    known: Known,
-    forces: Vec<f64>,
-    element: ElementName,
-    factor_reused: bool,
-}
-
-fn pairs(known: &[DofValue]) -> Vec<(u32, f64)> {
-    known.iter().map(|k| (k.dof, k.value)).collect()
-}
-
-/// Solves and gathers what was asked for.
-fn answer(
-    model: &Model,
-    factored: &Factored,
-    asked: Asked<'_>,
-    mut clock: StageClock,
-) -> Result<Answer, Refusal> {
-    let Asked { question, known, forces, element, factor_reused } = asked;
-    let residual_rel = question.max_error.unwrap_or(0.0);
-    let loads = Loads { q_known: &known.q_known, forces: &forces, residual_rel };
-    let solution = factored
-        .solve(model.stiffness(), loads, &mut |stage| clock.begin(stage))
-        .map_err(|error| Refusal::Model(error.into()))?;
-    let strain = summarise_strain(model.mesh(), &solution.displacement);
-    let mut stage_ms = clock.finish();
-    let start = Instant::now();
-    let displacements = gather(&solution, &question.want);
-    let reactions = match question.want.reactions {
-        true => reactions(&known, &solution),
-        false => Vec::new(),
-    };
-    stage_ms.encode = ms_since(start);
-    let report = SolveReport {
-        method: factored.method().to_string(),
-        element,
-        unknown_dofs: factored.partition().unknown().len() as u64,
-        known_dofs: known.dofs.len() as u64,
-        stage_ms,
-        residual_rel: solution.residual_rel,
-        error_bound_rel: None,
-        error_bound_why: "no lower bound of the stiffness's smallest eigenvalue is computed yet"
-            .to_owned(),
-        refinement_steps: solution.refinement_steps,
-        max_rotation_deg: strain.rotation_max.to_degrees(),
-        max_strain: strain.strain_max,
-        precision: factored.method().precision().to_owned(),
-        condition_estimate: None,
-        warnings: warnings(strain.rotation_max.to_degrees(), strain.strain_max),
-        peak_rss_bytes: peak_rss_bytes(),
-        factor_reused,
-        chosen_because: match question.method.as_str() {
-            "auto" => "the fastest exact method here for any size".to_owned(),
-            _ => "asked for".to_owned(),
-        },
-    };
-    Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
-}
-
-/// Forces by degree of freedom, once all that a question names is seen to be there; before a factor
-/// is made, because that is what costs.
-fn checked_forces(model: &Model, known: &Known, question: &Question) -> Result<Vec<f64>, Refusal> {
-    check_nodes(&question.want, model)?;
-    scatter_forces(model, known, &question.forces)
-}
-
-fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {
-    let node_count = model.mesh().node_count();
-    let NodeChoice::Nodes(nodes) = &want.nodes else { return Ok(()) };
-    match nodes.iter().find(|&&n| n as usize >= node_count) {
-        Some(&node) => {
-            Err(Refusal::NoSuchNode { what: "the list of wanted nodes", node, node_count })
-        }
-        None => Ok(()),
-    }
-}
-
-/// Forces by degree of freedom; empty when there are none.
-fn scatter_forces(model: &Model, known: &Known, forces: &[DofValue]) -> Result<Vec<f64>, Refusal> {
-    if forces.is_empty() {
-        return Ok(Vec::new());
-    }
-    let node_count = model.mesh().node_count();
-    let mut scattered = vec![0.0; 3 * node_count];
-    for &DofValue { dof, value } in forces {
-        let node = dof / 3;
-        if !value.is_finite() {
-            return Err(Refusal::ForceNotFinite { node, value });
-        }
-        if value != 0.0 && known.dofs.binary_search(&dof).is_ok() {
-            return Err(Refusal::ForceOnKnown { node });
-        }
-        match scattered.get_mut(dof as usize) {
-            Some(force) => *force += value,
-            None => {
-                return Err(Refusal::NoSuchNode { what: "the list of forces", node, node_count });
-            }
-        }
-    }
-    Ok(scattered)
-}
-
-fn gather(solution: &Solution, want: &Want) -> Displacements {
-    let of = |n: usize| {
-        let u = &solution.displacement[3 * n..3 * n + 3];
-        [u[0], u[1], u[2]]
-    };
-    let rows = match &want.nodes {
-        NodeChoice::All => (0..solution.displacement.len() / 3).map(of).collect(),
-        NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| of(n as usize)).collect(),
-    };
-    Displacements::of(rows, want.precision)
-}
-
-fn reactions(known: &Known, solution: &Solution) -> Vec<DofValue> {
-    let pairs = known.dofs.iter().zip(&solution.reaction);
-    pairs.map(|(&dof, &value)| DofValue { dof, value }).collect()
-}
-
-/// Linear elasticity errs by the square of the rotation: 1.5 % at 10°.
-const ROTATION_WARNING_DEG: f64 = 10.0;
-/// Above this the small-strain measure itself is off by several per cent.
-const STRAIN_WARNING: f64 = 0.1;
-
-fn warnings(rotation_deg: f64, strain: f64) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if rotation_deg > ROTATION_WARNING_DEG {
-        warnings.push(format!(
-            "an element turns by {rotation_deg:.1} degrees; linear elasticity is off by about \
-             {:.0} % there",
-            50.0 * rotation_deg.to_radians().powi(2)
-        ));
-    }
-    if strain > STRAIN_WARNING {
-        warnings.push(format!(
-            "an element is strained by {:.0} %; linear elasticity is meant for small strains",
-            100.0 * strain
-        ));
-    }
-    warnings
 }

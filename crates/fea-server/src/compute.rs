@@ -16,8 +16,11 @@ use crate::reject::Refusal;
 pub(crate) struct Compute {
     pool: Arc<rayon::ThreadPool>,
     places: Arc<Semaphore>,
+    background: Arc<Semaphore>,
 }
 
+/// Background tasks that may wait or run at once.
+const BACKGROUND_MAX: usize = 8;
 /// Requests of all sessions that may wait or run at once.
 const QUEUE_DEPTH: usize = 32;
 
@@ -31,12 +34,31 @@ impl Compute {
             .num_threads(threads)
             .thread_name(|i| format!("solve-{i}"))
             .build()?;
-        Ok(Self { pool: Arc::new(pool), places: Arc::new(Semaphore::new(QUEUE_DEPTH)) })
+        Ok(Self {
+            pool: Arc::new(pool),
+            places: Arc::new(Semaphore::new(QUEUE_DEPTH)),
+            background: Arc::new(Semaphore::new(BACKGROUND_MAX)),
+        })
     }
 
     /// Number of threads.
     pub fn threads(&self) -> usize {
         self.pool.current_num_threads()
+    }
+
+    /// Runs `work` on the pool when it comes to it; nobody waits. What is over the bound is dropped:
+    /// this is for hints and for proofs, without which everything still works.
+    pub fn in_background(&self, work: impl FnOnce() + Send + 'static) {
+        let Ok(place) = Arc::clone(&self.background).try_acquire_owned() else {
+            tracing::debug!("a background task is dropped");
+            return;
+        };
+        self.pool.spawn(move || {
+            if std::panic::catch_unwind(AssertUnwindSafe(work)).is_err() {
+                tracing::error!("work in the background ended abnormally");
+            }
+            drop(place);
+        });
     }
 
     /// Runs `work` on the pool and waits for it without blocking the sockets.

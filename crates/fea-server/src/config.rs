@@ -19,6 +19,8 @@ pub struct ServerConfig {
     /// Bytes that models and factors kept between requests, or one request's dense matrix, may
     /// take.
     pub memory_limit: u64,
+    /// Bytes of compliance columns kept per model.
+    pub column_cache: u64,
     /// Shared secret a client must show, if any.
     pub token: Option<String>,
     /// A client that stops inside a frame for this long is given up.
@@ -57,6 +59,7 @@ impl Default for ServerConfig {
             max_nodes: Limits::default().node_count_max,
             max_sessions: 64,
             memory_limit: 8 << 30,
+            column_cache: 1 << 30,
             token: None,
             stall_limit: Duration::from_secs(30),
         }
@@ -79,6 +82,7 @@ impl ServerConfig {
             ("--max-nodes", self.max_nodes == 0),
             ("--max-sessions", self.max_sessions == 0),
             ("--memory-limit", self.memory_limit == 0),
+            ("--column-cache", self.column_cache == 0),
             ("the stall limit", self.stall_limit.is_zero()),
         ] {
             if zero {

@@ -1,13 +1,19 @@
 //! Finite element server of Softgrasp, as a library so that the client can embed it.
 //!
 //! The way of a request: [`session`] reads a frame from its socket and decodes it, [`compute`]
-//! takes it from tokio to the rayon pool through a bounded queue, [`answer`] does the work on a
-//! [`store`]d or a one-shot model, and the session writes the reply.
+//! takes it from tokio to the rayon pool through a bounded queue, [`answer`] finds the model (in the
+//! [`store`] or in the request) and the [`approach`], [`condensed`] or [`direct`] solves, and the
+//! session writes the reply.
 
 mod answer;
+mod approach;
 mod clock;
 mod compute;
+mod condensed;
 mod config;
+mod direct;
+mod question;
+mod range_warning;
 mod reject;
 mod server;
 mod session;

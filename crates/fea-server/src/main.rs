@@ -29,6 +29,9 @@ struct Arguments {
     /// Bytes for kept models and factors, and for one request's dense matrix.
     #[arg(long, value_name = "BYTES", default_value_t = ServerConfig::default().memory_limit)]
     memory_limit: u64,
+    /// Bytes of compliance columns kept per model.
+    #[arg(long, value_name = "BYTES", default_value_t = ServerConfig::default().column_cache)]
+    column_cache: u64,
     /// File whose first line is the token a client must show.
     #[arg(long, value_name = "F")]
     token_file: Option<PathBuf>,
@@ -109,6 +112,7 @@ fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
         max_nodes: arguments.max_nodes,
         max_sessions: arguments.max_sessions,
         memory_limit: arguments.memory_limit,
+        column_cache: arguments.column_cache,
         token,
         ..usual
     })

@@ -3,6 +3,7 @@
 use softgrasp_core::fem::MaterialError;
 use softgrasp_core::mesh::MeshError;
 use softgrasp_core::model::ModelError;
+use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::{SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
 
@@ -41,6 +42,10 @@ pub(crate) enum Refusal {
          server's --memory-limit of {limit}; sparse-cholesky needs far less"
     )]
     Memory { method: String, unknown_dofs: usize, needed: u64, limit: u64 },
+    #[error("condensed takes known displacements only, not forces; use front or auto")]
+    CondensedForces,
+    #[error("node {node} is fixed by the model and moved by the question; use front or auto")]
+    FixedMoved { node: u32 },
     #[error("the mesh has {node_count} nodes; this server takes {max} (--max-nodes)")]
     TooManyNodes { node_count: usize, max: u32 },
     #[error("this server does not know the element '{0}' yet; use t4")]
@@ -68,6 +73,14 @@ impl Refusal {
             Self::Model(ModelError::Solve(error)) => match error {
                 SolveError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
                 SolveError::OutOfMemory { .. } => RejectCode::MemoryLimit,
+                _ => RejectCode::BadRequest,
+            },
+            Self::Model(ModelError::Condensed(error)) => match error {
+                CondensedError::NotHeld => RejectCode::RigidMotionFree,
+                CondensedError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
+                CondensedError::OutOfMemory { .. } | CondensedError::CacheTooSmall { .. } => {
+                    RejectCode::MemoryLimit
+                }
                 _ => RejectCode::BadRequest,
             },
             Self::Method(_) => RejectCode::UnknownMethod,

@@ -189,13 +189,19 @@ impl Session {
                 hall.desk.store.forget(hash);
                 return Ok(None);
             }
-            // A hint; the direct methods have nothing to prepare.
-            Request::Prefetch(_) => return Ok(None),
+            Request::Prefetch(hint) => {
+                run.in_background(move || desk.prefetch(hint));
+                return Ok(None);
+            }
             Request::SolveOnce(once) => {
                 Reply::Answer(Box::new(run.run(move || desk.solve_once(*once, clock())).await?))
             }
             Request::UploadModel(upload) => {
-                Reply::ModelReady(run.run(move || desk.upload(upload, clock())).await?)
+                let later = Arc::clone(&desk);
+                let ready = run.run(move || desk.upload(upload, clock())).await?;
+                let model = ready.model;
+                run.in_background(move || later.prove(model));
+                Reply::ModelReady(ready)
             }
             Request::Frame(frame) => {
                 Reply::Answer(Box::new(run.run(move || desk.frame(frame, clock())).await?))

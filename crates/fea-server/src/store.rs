@@ -1,24 +1,81 @@
 //! Models kept between requests, and their factors, under one memory bound.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use softgrasp_core::model::Model;
-use softgrasp_core::solve::{Factored, Method};
+use softgrasp_core::fem::StrainSummary;
+use softgrasp_core::model::{Model, ModelError};
+use softgrasp_core::solve::condensed::{Base, Columns, ContactSet};
+use softgrasp_core::solve::{Factored, Method, Stage};
 use softgrasp_protocol::ModelHash;
 
-/// A model and the factors made for it.
+/// A model and what has been made for it.
 pub(crate) struct StoredModel {
     pub model: Model,
     factors: Mutex<Vec<(Vec<u32>, Arc<Factored>)>>,
+    base: OnceLock<Result<Arc<Base>, ModelError>>,
+    pub columns: Columns,
+    sets: Mutex<Vec<KeptSet>>,
+    strain: Mutex<StrainWatch>,
+}
+
+/// A contact set with the rows of the nodes that answers are wanted for.
+struct KeptSet {
+    nodes: Vec<u32>,
+    set: Arc<ContactSet>,
+}
+
+/// Strain of the newest frame it was worked out for; it is worked out beside the frames.
+#[derive(Default)]
+pub(crate) struct StrainWatch {
+    pub newest: StrainSummary,
+    pub running: bool,
 }
 
 /// Factors kept per model; a grasp needs one, a change of grip a second.
 const FACTORS_MAX: usize = 4;
+/// Contact sets kept per model.
+const SETS_MAX: usize = 8;
 
 impl StoredModel {
-    pub fn new(model: Model) -> Self {
-        Self { model, factors: Mutex::new(Vec::new()) }
+    /// A model without anything made for it yet; its columns may take `column_bytes`.
+    pub fn new(model: Model, column_bytes: usize) -> Self {
+        Self {
+            model,
+            factors: Mutex::default(),
+            base: OnceLock::new(),
+            columns: Columns::new(column_bytes),
+            sets: Mutex::default(),
+            strain: Mutex::default(),
+        }
+    }
+
+    /// The base of the condensed engine, made now if it is not there.
+    pub fn base(&self, on_stage: &mut dyn FnMut(Stage)) -> Result<Arc<Base>, ModelError> {
+        self.base.get_or_init(|| self.model.condense(on_stage).map(Arc::new)).clone()
+    }
+
+    /// A contact set with the rows of some nodes, if it is kept.
+    pub fn set_for(&self, dofs: &[u32], nodes: &[u32]) -> Option<Arc<ContactSet>> {
+        let mut sets = lock(&self.sets);
+        let at = sets.iter().position(|kept| kept.set.dofs() == dofs && kept.nodes == nodes)?;
+        let kept = sets.remove(at);
+        sets.push(kept);
+        sets.last().map(|kept| Arc::clone(&kept.set))
+    }
+
+    /// Keeps a contact set; the one unused for longest goes when there are too many.
+    pub fn keep_set(&self, nodes: Vec<u32>, set: Arc<ContactSet>) {
+        let mut sets = lock(&self.sets);
+        if sets.len() >= SETS_MAX {
+            sets.remove(0);
+        }
+        sets.push(KeptSet { nodes, set });
+    }
+
+    /// Strain of the newest frame it is known for.
+    pub fn strain(&self) -> MutexGuard<'_, StrainWatch> {
+        lock(&self.strain)
     }
 
     /// Factor for a set of known degrees of freedom by a method, if it is kept.
@@ -42,11 +99,17 @@ impl StoredModel {
 
     fn bytes(&self) -> u64 {
         let factors: usize = lock(&self.factors).iter().map(|(_, f)| f.bytes()).sum();
-        (self.model.bytes() + factors) as u64
+        let sets: usize = lock(&self.sets).iter().map(|kept| kept.set.bytes()).sum();
+        let base = match self.base.get() {
+            Some(Ok(base)) => base.bytes() + self.columns.bytes(base),
+            _ => 0,
+        };
+        (self.model.bytes() + factors + sets + base) as u64
     }
 
     fn drop_factors(&self) {
         lock(&self.factors).clear();
+        lock(&self.sets).clear();
     }
 }
 
@@ -134,7 +197,7 @@ mod tests {
         let mesh = generate(BuiltIn::Cube, 64).unwrap();
         let material = Material::try_new(1.0e5, 0.3).unwrap();
         let model = Model::try_new(mesh, &[material], vec![], &mut |_| {}).unwrap();
-        Arc::new(StoredModel::new(model))
+        Arc::new(StoredModel::new(model, 1 << 20))
     }
 
     #[test]

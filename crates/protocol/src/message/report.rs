@@ -27,7 +27,7 @@ pub struct StageMs {
 /// Report of one solve.
 ///
 /// Units: `…_ms` ms, `…_rel` relative, `…_deg` degrees, `…_bytes` bytes.
-#[derive(Clone, Debug, PartialEq, SchemaRead, SchemaWrite)]
+#[derive(Clone, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
 pub struct SolveReport {
     /// Method that was used.
     pub method: String,

@@ -133,6 +133,13 @@ impl Base {
         &self.fixed
     }
 
+    /// Nodal forces `K u` (3.36) of a displacement field.
+    ///
+    /// Shapes: 3N. Units: m, N.
+    pub fn forces_of(&self, displacement: &[f64]) -> Vec<f64> {
+        self.stiffness.mul(displacement)
+    }
+
     /// Whether the scene's fixed nodes hold every body.
     pub fn is_held_by_scene(&self) -> bool {
         self.held.is_empty()

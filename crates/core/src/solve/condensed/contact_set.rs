@@ -98,6 +98,12 @@ impl ContactSet {
         &self.dofs
     }
 
+    /// Bytes of the small system and the wanted rows; the columns are counted where they are kept.
+    pub fn bytes(&self) -> usize {
+        let rows = self.rows.as_ref().map_or(0, |r| r.matrix.nrows() * r.matrix.ncols());
+        8 * (rows + 2 * self.small.len())
+    }
+
     /// Condition of the small system in the Frobenius norm: how weakly the touched nodes hold.
     pub fn condition(&self) -> f64 {
         self.condition

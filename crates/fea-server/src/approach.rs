@@ -1,0 +1,78 @@
+//! Which way to the answer a request is given: the one asked for, or the one that fits it.
+
+use softgrasp_core::model::Known;
+use softgrasp_core::solve::Method;
+use softgrasp_protocol::Question;
+
+use crate::reject::Refusal;
+use crate::store::StoredModel;
+
+/// A way to the answer, and why it was taken.
+pub(crate) enum Approach {
+    /// Cached columns and a small system.
+    Condensed { because: String },
+    /// A factor or inverse of `K11`.
+    Direct { method: Method, because: String },
+}
+
+/// Name of the condensed engine on the wire.
+const CONDENSED: &str = "condensed";
+const ASKED: &str = "asked for";
+
+impl Approach {
+    /// For a request that brings its own mesh: nothing can be reused, so `auto` factors once.
+    pub fn for_once(question: &Question) -> Result<Self, Refusal> {
+        match question.method.as_str() {
+            CONDENSED if !question.forces.is_empty() => Err(Refusal::CondensedForces),
+            CONDENSED => Ok(Self::Condensed { because: ASKED.to_owned() }),
+            "auto" => Ok(Self::Direct {
+                method: Method::Front,
+                because: "one request: the parallel exact factor is the fastest".to_owned(),
+            }),
+            name => Ok(Self::Direct { method: name.parse()?, because: ASKED.to_owned() }),
+        }
+    }
+
+    /// For a frame on a kept model: `auto` condenses whatever can be condensed.
+    pub fn for_frame(
+        question: &Question,
+        stored: &StoredModel,
+        known: &Known,
+    ) -> Result<Self, Refusal> {
+        let name = question.method.as_str();
+        if name != "auto" && name != CONDENSED {
+            return Ok(Self::Direct { method: name.parse()?, because: ASKED.to_owned() });
+        }
+        let obstacle = match stored.base(&mut |_| {}) {
+            Err(error) => Some(Refusal::Model(error)),
+            Ok(_) if !question.forces.is_empty() => Some(Refusal::CondensedForces),
+            Ok(_) => moved_fixed_node(stored, known).map(|node| Refusal::FixedMoved { node }),
+        };
+        match obstacle {
+            None if name == "auto" => Ok(Self::Condensed {
+                because: "frames on a kept model: exact from cached columns".to_owned(),
+            }),
+            None => Ok(Self::Condensed { because: ASKED.to_owned() }),
+            Some(refusal) if name == CONDENSED => Err(refusal),
+            Some(refusal) => Ok(Self::Direct {
+                method: Method::Front,
+                because: format!("not condensed: {refusal}"),
+            }),
+        }
+    }
+
+    /// Why it was taken.
+    pub fn because(&self) -> &str {
+        match self {
+            Self::Condensed { because } | Self::Direct { because, .. } => because,
+        }
+    }
+}
+
+/// A node that the scene fixes and the question moves all the same.
+fn moved_fixed_node(stored: &StoredModel, known: &Known) -> Option<u32> {
+    let fixed = stored.model.fixed();
+    let moved = |(dof, q): (&u32, &f64)| *q != 0.0 && fixed.binary_search(dof).is_ok();
+    let mut pairs = known.dofs.iter().zip(&known.q_known);
+    pairs.find(|&pair| moved(pair)).map(|(dof, _)| dof / 3)
+}

@@ -1,0 +1,171 @@
+//! An answer from cached columns of the compliance: what a frame costs once a contact is known.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use softgrasp_core::fem::summarise_strain;
+use softgrasp_core::model::{Known, ModelError};
+use softgrasp_core::solve::Stage;
+use softgrasp_core::solve::condensed::{Base, Certificate, ContactAnswer, ContactSet};
+use softgrasp_protocol::{
+    Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport,
+};
+
+use crate::approach::Approach;
+use crate::clock::{StageClock, ms_since, peak_rss_bytes};
+use crate::range_warning::warnings;
+use crate::reject::Refusal;
+use crate::store::StoredModel;
+
+/// Above this condition of the small system the touched nodes hold the body weakly.
+const CONDITION_WARNING: f64 = 1e9;
+/// Nodes prefetched between two looks at what else is waiting.
+const PREFETCH_TOGETHER: usize = 2;
+
+/// Answers one question on a kept model.
+pub(crate) fn answer(
+    stored: &Arc<StoredModel>,
+    question: &Question,
+    known: &Known,
+    approach: &Approach,
+    mut clock: StageClock,
+) -> Result<Answer, Refusal> {
+    let base = stored.base(&mut |stage| clock.begin(stage))?;
+    let (dofs, q) = touched(known, base.fixed());
+    let nodes = match &question.want.nodes {
+        NodeChoice::All => (0..stored.model.mesh().node_count() as u32).collect(),
+        NodeChoice::Nodes(nodes) => nodes.clone(),
+    };
+    let kept = stored.set_for(&dofs, &nodes);
+    let factor_reused = kept.is_some();
+    let set = match kept {
+        Some(set) => set,
+        None => {
+            clock.begin(Stage::Factor);
+            stored.model.check_held(&known.dofs)?;
+            let columns = &stored.columns;
+            let mut set = ContactSet::try_new(&base, columns, &dofs).map_err(ModelError::from)?;
+            set.want(&base, &nodes);
+            let set = Arc::new(set);
+            stored.keep_set(nodes, Arc::clone(&set));
+            set
+        }
+    };
+    clock.begin(Stage::Solve);
+    let solved = set.solve(&q).map_err(ModelError::from)?;
+    let displacement = set.wanted_displacements(&solved);
+    let certificate = set.certify(&base, &q, &solved, &displacement);
+    let mut stage_ms = clock.finish();
+    let start = Instant::now();
+    let mut reactions = Vec::new();
+    if question.want.reactions {
+        reactions = reactions_of(known, &base, &set, &solved);
+    }
+    let displacements = Displacements::of(displacement, question.want.precision);
+    stage_ms.encode = ms_since(start);
+    let mut report = report(stored, &set, known, &certificate, approach);
+    report.stage_ms = stage_ms;
+    report.factor_reused = factor_reused;
+    watch_strain(stored, &base, set, solved);
+    Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
+}
+
+/// Degrees of freedom touched in this frame, without those the scene fixes, and their values.
+fn touched(known: &Known, fixed: &[u32]) -> (Vec<u32>, Vec<f64>) {
+    let pairs = known.dofs.iter().zip(&known.q_known);
+    pairs.filter(|(dof, _)| fixed.binary_search(dof).is_err()).map(|(d, q)| (*d, *q)).unzip()
+}
+
+fn report(
+    stored: &StoredModel,
+    set: &ContactSet,
+    known: &Known,
+    certificate: &Certificate,
+    approach: &Approach,
+) -> SolveReport {
+    // Worked out beside the frames: it belongs to the newest frame it is known for.
+    let strain = stored.strain().newest;
+    let mut warnings = warnings(strain);
+    if set.condition() > CONDITION_WARNING {
+        warnings.push(format!(
+            "the touched nodes hold the body weakly (condition {:.0e}); spread them",
+            set.condition()
+        ));
+    }
+    let known_dofs = known.dofs.len();
+    SolveReport {
+        method: "condensed".to_owned(),
+        element: ElementName::T4,
+        unknown_dofs: (stored.model.modelled_dofs() - known_dofs) as u64,
+        known_dofs: known_dofs as u64,
+        residual_rel: certificate.residual_rel,
+        error_bound_rel: certificate.error_bound_rel.ok(),
+        error_bound_why: certificate.error_bound_rel.err().unwrap_or_default().to_owned(),
+        max_rotation_deg: strain.rotation_max.to_degrees(),
+        max_strain: strain.strain_max,
+        precision: "f64".to_owned(),
+        condition_estimate: Some(set.condition()),
+        warnings,
+        peak_rss_bytes: peak_rss_bytes(),
+        chosen_because: approach.because().to_owned(),
+        ..SolveReport::default()
+    }
+}
+
+/// Forces at all known degrees of freedom (3.43b): λ where touched, `K u` where the scene fixes.
+fn reactions_of(
+    known: &Known,
+    base: &Base,
+    set: &ContactSet,
+    solved: &ContactAnswer,
+) -> Vec<DofValue> {
+    let fixed = base.fixed();
+    let at_fixed = match fixed.is_empty() {
+        true => Vec::new(),
+        false => base.forces_of(&set.full_displacement(base, solved)),
+    };
+    let force = |dof: &u32| match set.dofs().binary_search(dof) {
+        Ok(at) => solved.lambda[at],
+        Err(_) => at_fixed.get(*dof as usize).copied().unwrap_or(0.0),
+    };
+    known.dofs.iter().map(|dof| DofValue { dof: *dof, value: force(dof) }).collect()
+}
+
+/// Works out rotation and strain of a frame beside the frames that follow; one at a time, the
+/// newest that comes when the last is done.
+fn watch_strain(
+    stored: &Arc<StoredModel>,
+    base: &Arc<Base>,
+    set: Arc<ContactSet>,
+    solved: ContactAnswer,
+) {
+    if std::mem::replace(&mut stored.strain().running, true) {
+        return;
+    }
+    let (stored, base) = (Arc::clone(stored), Arc::clone(base));
+    rayon::spawn(move || {
+        let displacement = set.full_displacement(&base, &solved);
+        let newest = summarise_strain(stored.model.mesh(), &displacement);
+        let mut watch = stored.strain();
+        watch.newest = newest;
+        watch.running = false;
+    });
+}
+
+/// Computes the columns of nodes that may be touched soon, a few at a time, letting frames pass.
+pub(crate) fn prefetch(stored: &StoredModel, nodes: &[u32]) {
+    let Ok(base) = stored.base(&mut |_| {}) else { return };
+    let node_count = stored.model.mesh().node_count();
+    let used: Vec<u32> = nodes
+        .iter()
+        .copied()
+        .filter(|&n| (n as usize) < node_count && stored.model.is_used(n as usize))
+        .collect();
+    for some in used.chunks(PREFETCH_TOGETHER) {
+        if let Err(error) = stored.columns.of_nodes(&base, some) {
+            tracing::debug!(%error, "prefetch ends");
+            return;
+        }
+        rayon::yield_now();
+    }
+}

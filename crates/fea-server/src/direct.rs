@@ -1,0 +1,85 @@
+//! An answer by a factor or inverse of `K11`.
+
+use std::time::Instant;
+
+use softgrasp_core::fem::summarise_strain;
+use softgrasp_core::model::{Known, Model};
+use softgrasp_core::solve::{Factored, Loads, Solution};
+use softgrasp_protocol::{
+    Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
+};
+
+use crate::clock::{StageClock, ms_since, peak_rss_bytes};
+use crate::range_warning::warnings;
+use crate::reject::Refusal;
+
+/// A question with what has been worked out of it.
+pub(crate) struct Asked<'a> {
+    pub question: &'a Question,
+    pub known: Known,
+    pub forces: Vec<f64>,
+    pub element: ElementName,
+    pub factor_reused: bool,
+    pub chosen_because: String,
+}
+
+/// Solves and gathers what was asked for.
+pub(crate) fn answer(
+    model: &Model,
+    factored: &Factored,
+    asked: Asked<'_>,
+    mut clock: StageClock,
+) -> Result<Answer, Refusal> {
+    let Asked { question, known, forces, element, factor_reused, chosen_because } = asked;
+    let residual_rel = question.max_error.unwrap_or(0.0);
+    let loads = Loads { q_known: &known.q_known, forces: &forces, residual_rel };
+    let solution = factored
+        .solve(model.stiffness(), loads, &mut |stage| clock.begin(stage))
+        .map_err(|error| Refusal::Model(error.into()))?;
+    let strain = summarise_strain(model.mesh(), &solution.displacement);
+    let mut stage_ms = clock.finish();
+    let start = Instant::now();
+    let displacements = gather(&solution, &question.want);
+    let reactions = match question.want.reactions {
+        true => reactions(&known, &solution),
+        false => Vec::new(),
+    };
+    stage_ms.encode = ms_since(start);
+    let report = SolveReport {
+        method: factored.method().to_string(),
+        element,
+        unknown_dofs: factored.partition().unknown().len() as u64,
+        known_dofs: known.dofs.len() as u64,
+        stage_ms,
+        residual_rel: solution.residual_rel,
+        error_bound_rel: None,
+        error_bound_why: "a bound is proven for the method condensed only".to_owned(),
+        refinement_steps: solution.refinement_steps,
+        max_rotation_deg: strain.rotation_max.to_degrees(),
+        max_strain: strain.strain_max,
+        precision: factored.method().precision().to_owned(),
+        condition_estimate: None,
+        warnings: warnings(strain),
+        peak_rss_bytes: peak_rss_bytes(),
+        factor_reused,
+        chosen_because,
+    };
+    Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
+}
+
+fn gather(solution: &Solution, want: &Want) -> Displacements {
+    let of = |n: usize| {
+        let u = &solution.displacement[3 * n..3 * n + 3];
+        [u[0], u[1], u[2]]
+    };
+    let rows = match &want.nodes {
+        NodeChoice::All => (0..solution.displacement.len() / 3).map(of).collect(),
+        NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| of(n as usize)).collect(),
+    };
+    Displacements::of(rows, want.precision)
+}
+
+fn reactions(known: &Known, solution: &Solution) -> Vec<DofValue> {
+    let pairs = known.dofs.iter().zip(&solution.reaction);
+    pairs.map(|(&dof, &value)| DofValue { dof, value }).collect()
+}

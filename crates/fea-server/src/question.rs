@@ -1,0 +1,58 @@
+//! What a question names, checked before anything costly is done.
+
+use softgrasp_core::model::{Known, Model};
+use softgrasp_protocol::{DofValue, NodeChoice, Question, Want};
+
+use crate::reject::Refusal;
+
+/// Known displacements as the core takes them.
+pub(crate) fn pairs(known: &[DofValue]) -> Vec<(u32, f64)> {
+    known.iter().map(|k| (k.dof, k.value)).collect()
+}
+
+/// Forces by degree of freedom, once all that a question names is seen to be there; before a factor
+/// is made, because that is what costs.
+pub(crate) fn checked_forces(
+    model: &Model,
+    known: &Known,
+    question: &Question,
+) -> Result<Vec<f64>, Refusal> {
+    check_nodes(&question.want, model)?;
+    scatter_forces(model, known, &question.forces)
+}
+
+fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {
+    let node_count = model.mesh().node_count();
+    let NodeChoice::Nodes(nodes) = &want.nodes else { return Ok(()) };
+    match nodes.iter().find(|&&n| n as usize >= node_count) {
+        Some(&node) => {
+            Err(Refusal::NoSuchNode { what: "the list of wanted nodes", node, node_count })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Forces by degree of freedom; empty when there are none.
+fn scatter_forces(model: &Model, known: &Known, forces: &[DofValue]) -> Result<Vec<f64>, Refusal> {
+    if forces.is_empty() {
+        return Ok(Vec::new());
+    }
+    let node_count = model.mesh().node_count();
+    let mut scattered = vec![0.0; 3 * node_count];
+    for &DofValue { dof, value } in forces {
+        let node = dof / 3;
+        if !value.is_finite() {
+            return Err(Refusal::ForceNotFinite { node, value });
+        }
+        if value != 0.0 && known.dofs.binary_search(&dof).is_ok() {
+            return Err(Refusal::ForceOnKnown { node });
+        }
+        match scattered.get_mut(dof as usize) {
+            Some(force) => *force += value,
+            None => {
+                return Err(Refusal::NoSuchNode { what: "the list of forces", node, node_count });
+            }
+        }
+    }
+    Ok(scattered)
+}
