@@ -4,8 +4,6 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::tet10::EDGES;
-#[cfg(doc)]
-use super::tet10::MIRRORED;
 use crate::mesh::TetMesh;
 
 /// Straight-sided mesh of ten-node tetrahedra.
@@ -19,7 +17,7 @@ use crate::mesh::TetMesh;
 ///
 /// The order of the six edges is that of VTK (`VTK_QUADRATIC_TETRA`) and Abaqus/CalculiX (C3D10);
 /// Gmsh (type 11) has the last two exchanged. All of them count the volume positive that the
-/// thesis (3.23) counts negative, so an element is handed over through [`MIRRORED`].
+/// thesis (3.23) counts negative, so an element is handed over through [`super::tet10::MIRRORED`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct QuadraticMesh {
     corner_count: usize,

@@ -96,62 +96,74 @@ pub fn element_stiffness(corners: &[Point3<f64>; 4], material: &Material) -> Ele
     k
 }
 
-/// The ten blocks of row node `a` of [`element_stiffness`] in closed form, each
-/// `λ G + μ Gᵀ + μ tr(G) I` with `G = ∫ ∇N_a ∇N_bᵀ dV`, row-major.
+/// The ten blocks of row node `a` of [`element_stiffness`] in closed form, row-major.
+///
+/// Every gradient is a sum of `∇L₁ … ∇L₄` with weights `4Lᵢ − 1` or `4Lᵢ`, so every block is the
+/// sum of blocks of the linear tetrahedron with the mean products of those weights.
 ///
 /// Shapes: `a` < 10; ten times 3 × 3. Units: λ, μ Pa; result N/m.
 ///
-/// Source: thesis (3.32) multiplied out for the isotropic `D` of (3.15), as in
-/// [`tet4::stiffness_block`]; integrals of [`product`].
+/// Source: thesis (3.32) multiplied out for the isotropic `D` of (3.15) by
+/// [`tet4::stiffness_block`]; means from `∫ Lᵢ Lⱼ dV = V_e (1 + δᵢⱼ) / 20`.
 pub fn stiffness_row(g: &Gradients, a: usize, lambda: f64, mu: f64) -> [[f64; 9]; 10] {
-    let (l, m) = (lambda * g.volume, mu * g.volume);
+    let linear_row = |i| {
+        let mut blocks = [[0.0; 9]; 4];
+        for (j, block) in blocks.iter_mut().enumerate() {
+            *block = tet4::stiffness_block(g, i, j, lambda, mu);
+        }
+        blocks
+    };
     let mut row = [[0.0; 9]; 10];
+    let (at_corners, on_edges) = row.split_at_mut(4);
     if a < 4 {
-        for (b, block) in row.iter_mut().enumerate() {
-            add_block(block, &g.of_shape[a], &weighted(g, b, |j| reduced(a, j)), l, m);
+        let (of_a, weight) = (linear_row(a), REDUCED[a]);
+        for (b, block) in at_corners.iter_mut().enumerate() {
+            *block = combined([(weight[b], &of_a[b])]);
+        }
+        for (block, [k, l]) in on_edges.iter_mut().zip(EDGES) {
+            *block = combined([(weight[k], &of_a[l]), (weight[l], &of_a[k])]);
         }
     } else {
+        // ∇N_a = 4Lᵢ ∇Lⱼ + 4Lⱼ ∇Lᵢ.
         let [i, j] = EDGES[a - 4];
-        for (b, block) in row.iter_mut().enumerate() {
-            // ∇N_a = 4 Lᵢ ∇Lⱼ + 4 Lⱼ ∇Lᵢ; with a corner b the other factor is 4 L_b − 1.
-            let weight = if b < 4 { reduced } else { product };
-            add_block(block, &g.of_shape[j], &weighted(g, b, |k| weight(i, k)), l, m);
-            add_block(block, &g.of_shape[i], &weighted(g, b, |k| weight(j, k)), l, m);
+        let (of_i, of_j) = (linear_row(i), linear_row(j));
+        for (b, block) in at_corners.iter_mut().enumerate() {
+            *block = combined([(REDUCED[i][b], &of_j[b]), (REDUCED[j][b], &of_i[b])]);
+        }
+        let (with_i, with_j) = (PRODUCT[i], PRODUCT[j]);
+        for (block, [k, l]) in on_edges.iter_mut().zip(EDGES) {
+            *block = combined([
+                (with_i[k], &of_j[l]),
+                (with_i[l], &of_j[k]),
+                (with_j[k], &of_i[l]),
+                (with_j[l], &of_i[k]),
+            ]);
         }
     }
     row
 }
 
-/// Mean of `w ∇N_b` over an element for a weight function that is known by its means against the
-/// factors of `∇N_b`: `4Lᵢ − 1` at corner i, `4Lᵢ` on an edge at i.
-fn weighted(g: &Gradients, b: usize, mean: impl Fn(usize) -> f64) -> Vector3<f64> {
-    if b < 4 {
-        g.of_shape[b] * mean(b)
-    } else {
-        let [k, l] = EDGES[b - 4];
-        g.of_shape[l] * mean(k) + g.of_shape[k] * mean(l)
-    }
-}
+/// Means of `4Lᵢ · 4Lⱼ` over an element, from `∫ Lᵢ Lⱼ dV = V_e (1 + δᵢⱼ) / 20`.
+const PRODUCT: [[f64; 4]; 4] =
+    [[1.6, 0.8, 0.8, 0.8], [0.8, 1.6, 0.8, 0.8], [0.8, 0.8, 1.6, 0.8], [0.8, 0.8, 0.8, 1.6]];
 
-/// Mean of `4Lᵢ · 4Lⱼ` over an element, from `∫ Lᵢ Lⱼ dV = V_e (1 + δᵢⱼ) / 20`.
-fn product(i: usize, j: usize) -> f64 {
-    if i == j { 1.6 } else { 0.8 }
-}
+/// Means of `(4Lᵢ − 1) · 4Lⱼ`, and of `(4Lᵢ − 1)(4Lⱼ − 1)`: the mean of `4Lᵢ − 1` is zero.
+const REDUCED: [[f64; 4]; 4] = [
+    [0.6, -0.2, -0.2, -0.2],
+    [-0.2, 0.6, -0.2, -0.2],
+    [-0.2, -0.2, 0.6, -0.2],
+    [-0.2, -0.2, -0.2, 0.6],
+];
 
-/// Mean of `(4Lᵢ − 1) · 4Lⱼ`, and of `(4Lᵢ − 1)(4Lⱼ − 1)`: the mean of `4Lᵢ − 1` is zero.
-fn reduced(i: usize, j: usize) -> f64 {
-    if i == j { 0.6 } else { -0.2 }
-}
-
-/// Adds `λ G + μ Gᵀ + μ tr(G) I` for `G = p qᵀ`; `l` and `m` are λ and μ times the volume.
-fn add_block(block: &mut [f64; 9], p: &Vector3<f64>, q: &Vector3<f64>, l: f64, m: f64) {
-    let diagonal = m * p.dot(q);
-    for r in 0..3 {
-        for c in 0..3 {
-            block[3 * r + c] += l * p[r] * q[c] + m * q[r] * p[c];
+/// Weighted sum of blocks.
+fn combined<const T: usize>(terms: [(f64, &[f64; 9]); T]) -> [f64; 9] {
+    let mut sum = [0.0; 9];
+    for (weight, block) in terms {
+        for (entry, term) in sum.iter_mut().zip(block) {
+            *entry += weight * term;
         }
-        block[4 * r] += diagonal;
     }
+    sum
 }
 
 /// Displacement gradient `H = Σ u_a ∇N_aᵀ` at one point of an element.
