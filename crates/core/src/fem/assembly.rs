@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Material, StiffnessPattern, dof, tet4};
+use super::{Material, QuadraticMesh, StiffnessPattern, dof, tet4, tet10};
 use crate::mesh::TetMesh;
 
 /// Global stiffness `kᵍ` as 3 × 3 blocks on a [`StiffnessPattern`]; both triangles are stored.
@@ -35,7 +35,7 @@ pub enum AssemblyError {
 
 /// Assembles the stiffness of a mesh into a prepared pattern; rows in parallel, same bits always.
 ///
-/// Shapes: `materials` one for the whole mesh, or one per region label.
+/// Shapes: `pattern` that of the mesh; `materials` one for the whole mesh, or one per region label.
 /// Units: mesh m, materials Pa, result N/m.
 ///
 /// # Errors
@@ -47,9 +47,48 @@ pub fn assemble(
     mesh: &TetMesh,
     materials: &[Material],
 ) -> Result<Stiffness, AssemblyError> {
-    let lame = lame_by_region(mesh, materials)?;
+    let lame = LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
     let gradients: Vec<tet4::Gradients> =
         (0..mesh.tets().len()).into_par_iter().map(|t| tet4::gradients(&mesh.corners(t))).collect();
+    let blocks = assemble_rows(pattern, |tet, corner| {
+        let (lambda, mu) = lame.of(tet);
+        let block = |c| tet4::stiffness_block(&gradients[tet], corner, c, lambda, mu);
+        [block(0), block(1), block(2), block(3)]
+    });
+    Ok(Stiffness { pattern: Arc::clone(pattern), blocks })
+}
+
+/// [`assemble`] for ten-node tetrahedra, on the pattern of [`StiffnessPattern::quadratic`].
+///
+/// Shapes: 3 (N + E) × 3 (N + E) for N corners and E edges. Units: as there.
+///
+/// # Errors
+/// [`AssemblyError::NoMaterial`] if a region label has no material.
+///
+/// Source: thesis (3.39), section 3.5.2; element stiffness of [`tet10`].
+pub fn assemble_quadratic(
+    pattern: &Arc<StiffnessPattern>,
+    mesh: &QuadraticMesh,
+    materials: &[Material],
+) -> Result<Stiffness, AssemblyError> {
+    let lame = LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
+    let gradients: Vec<tet4::Gradients> =
+        (0..mesh.tets().len()).into_par_iter().map(|t| tet4::gradients(&mesh.corners(t))).collect();
+    let blocks = assemble_rows(pattern, |tet, local| {
+        let (lambda, mu) = lame.of(tet);
+        tet10::stiffness_row(&gradients[tet], local, lambda, mu)
+    });
+    Ok(Stiffness { pattern: Arc::clone(pattern), blocks })
+}
+
+/// Sums every block row over the elements around its node, in element order.
+///
+/// `element_row(tet, local)` gives the blocks of one row of an element's stiffness.
+fn assemble_rows<const K: usize>(
+    pattern: &StiffnessPattern,
+    element_row: impl Fn(usize, usize) -> [[f64; 9]; K] + Sync,
+) -> Vec<[f64; 9]> {
+    assert_eq!(pattern.nodes_per_tet(), K, "the pattern is that of another element");
     let mut blocks = vec![[0.0; 9]; pattern.block_count()];
     let mut rows = Vec::with_capacity(pattern.node_count());
     let mut rest = blocks.as_mut_slice();
@@ -59,40 +98,46 @@ pub fn assemble(
         rest = tail;
     }
     rows.into_par_iter().enumerate().with_min_len(64).for_each(|(node, row)| {
-        for around in pattern.around(node) {
-            let tet = around.tet as usize;
-            let (lambda, mu) = lame[mesh.regions().get(tet).map_or(0, |&r| r as usize)];
-            for corner in 0..4 {
-                let i = around.corner as usize;
-                let added = tet4::stiffness_block(&gradients[tet], i, corner, lambda, mu);
-                let block = &mut row[around.slots[corner] as usize];
-                for (entry, term) in block.iter_mut().zip(added) {
+        for c in pattern.around::<K>(node) {
+            for (&slot, added) in c.slots.iter().zip(element_row(c.tet, c.local)) {
+                for (entry, term) in row[slot as usize].iter_mut().zip(added) {
                     *entry += term;
                 }
             }
         }
     });
-    Ok(Stiffness { pattern: Arc::clone(pattern), blocks })
+    blocks
 }
 
-/// `(λ, μ)` per region label; one material serves every label.
-fn lame_by_region(
-    mesh: &TetMesh,
-    materials: &[Material],
-) -> Result<Vec<(f64, f64)>, AssemblyError> {
-    let label_max = mesh.regions().iter().copied().max().unwrap_or(0) as usize;
-    if materials.len() != 1
-        && let Some(tet) = (0..mesh.tets().len())
-            .find(|&t| mesh.regions().get(t).map_or(0, |&r| r as usize) >= materials.len())
-    {
-        let region = mesh.regions().get(tet).copied().unwrap_or(0);
-        return Err(AssemblyError::NoMaterial { tet, region, materials: materials.len() });
+/// `(λ, μ)` of every element; one material serves every label.
+struct LameByRegion<'a> {
+    regions: &'a [u32],
+    lame: Vec<(f64, f64)>,
+}
+
+impl<'a> LameByRegion<'a> {
+    fn try_new(
+        regions: &'a [u32],
+        tet_count: usize,
+        materials: &[Material],
+    ) -> Result<Self, AssemblyError> {
+        if materials.len() != 1 {
+            let region = |tet: usize| regions.get(tet).copied().unwrap_or(0);
+            if let Some(tet) = (0..tet_count).find(|&t| region(t) as usize >= materials.len()) {
+                let materials = materials.len();
+                return Err(AssemblyError::NoMaterial { tet, region: region(tet), materials });
+            }
+        }
+        let lame = materials.iter().map(|m| (m.lame_lambda(), m.shear_modulus())).collect();
+        Ok(Self { regions, lame })
     }
-    let lame = |m: &Material| (m.lame_lambda(), m.shear_modulus());
-    Ok(match materials {
-        [only] => vec![lame(only); label_max + 1],
-        several => several.iter().map(lame).collect(),
-    })
+
+    fn of(&self, tet: usize) -> (f64, f64) {
+        match self.lame.as_slice() {
+            [only] => *only,
+            several => several[self.regions.get(tet).map_or(0, |&r| r as usize)],
+        }
+    }
 }
 
 impl Stiffness {

@@ -1,15 +1,18 @@
-//! Finite elements (thesis chapter 3): material, linear tetrahedron, assembly, strain.
+//! Finite elements (thesis chapter 3): material, tetrahedra of four and ten nodes, assembly, strain.
 
 mod assembly;
 mod material;
 mod pattern;
+mod quadratic_mesh;
 mod strain;
+pub mod tet10;
 pub mod tet4;
 
-pub use assembly::{AssemblyError, Stiffness, assemble};
+pub use assembly::{AssemblyError, Stiffness, assemble, assemble_quadratic};
 pub use material::{Material, MaterialError};
 pub use pattern::StiffnessPattern;
-pub use strain::{StrainSummary, summarise_strain};
+pub use quadratic_mesh::{QuadraticMesh, TooManyNodes};
+pub use strain::{StrainSummary, summarise_strain, summarise_strain_quadratic};
 
 /// Degrees of freedom per node: displacements along x, y and z.
 pub const AXES: usize = 3;

@@ -2,13 +2,14 @@
 
 use rayon::prelude::*;
 
+use super::QuadraticMesh;
 use crate::mesh::TetMesh;
 
 /// Sparsity pattern of `kᵍ` by 3 × 3 node blocks, and for each block row the elements that add to
 /// it, in element order: rows can be summed in parallel with the same bits on any thread count.
 ///
 /// Shapes: N block rows; row n holds blocks `row_start[n] .. row_start[n + 1]`, their column nodes
-/// ascending in `columns`. Orphan nodes have empty rows.
+/// ascending in `columns`. Orphan nodes have empty rows. Elements have all four or all ten nodes.
 ///
 /// Source: thesis (3.46), section 3.5.2.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,47 +19,79 @@ pub struct StiffnessPattern {
     /// Elements around node n: entries `around_start[n] .. around_start[n + 1]`.
     around_start: Vec<usize>,
     around: Vec<Around>,
+    /// For each entry of `around`, the positions in the row of the blocks of the element's nodes.
+    slots: Vec<u32>,
+    nodes_per_tet: usize,
 }
 
 /// One element seen from one of its nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Around {
+struct Around {
     /// Element index.
-    pub tet: u32,
-    /// Which corner the row's node is.
-    pub corner: u8,
-    /// Position in the row of the blocks of corners 1 … 4.
-    pub slots: [u32; 4],
+    tet: u32,
+    /// Which of the element's nodes the row's node is.
+    local: u8,
+}
+
+/// One element that adds to a block row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contribution<'a, const K: usize> {
+    /// Element index.
+    pub tet: usize,
+    /// Which of the element's nodes the row's node is, from 0.
+    pub local: usize,
+    /// Position in the row of the blocks of the element's nodes 1 … K.
+    pub slots: &'a [u32; K],
 }
 
 impl StiffnessPattern {
-    /// Pattern of a mesh.
+    /// Pattern of a linear mesh.
     ///
     /// Shapes: N nodes give N block rows.
     pub fn new(mesh: &TetMesh) -> Self {
-        let (around_start, tets_around) = elements_around(mesh);
-        let rows: Vec<(Vec<u32>, Vec<Around>)> = (0..mesh.node_count())
+        Self::from_elements(mesh.node_count(), mesh.tets())
+    }
+
+    /// Pattern of a ten-node mesh.
+    ///
+    /// Shapes: N + E nodes give as many block rows.
+    pub fn quadratic(mesh: &QuadraticMesh) -> Self {
+        Self::from_elements(mesh.node_count(), mesh.tets())
+    }
+
+    /// Pattern of elements of K nodes each; every node index must be below `node_count`.
+    fn from_elements<const K: usize>(node_count: usize, tets: &[[u32; K]]) -> Self {
+        let (around_start, tets_around) = elements_around(node_count, tets);
+        let rows: Vec<BlockRow> = (0..node_count)
             .into_par_iter()
+            .with_min_len(64)
             .map(|node| {
-                let tets = &tets_around[around_start[node]..around_start[node + 1]];
-                block_row(mesh, node as u32, tets)
+                let around = &tets_around[around_start[node]..around_start[node + 1]];
+                block_row(tets, node as u32, around)
             })
             .collect();
         let mut row_start = Vec::with_capacity(rows.len() + 1);
         row_start.push(0);
-        let mut columns = Vec::with_capacity(rows.iter().map(|(c, _)| c.len()).sum());
+        let mut columns = Vec::with_capacity(rows.iter().map(|row| row.columns.len()).sum());
         let mut around = Vec::with_capacity(tets_around.len());
-        for (row_columns, row_around) in rows {
-            columns.extend_from_slice(&row_columns);
-            around.extend_from_slice(&row_around);
+        let mut slots = Vec::with_capacity(K * tets_around.len());
+        for row in rows {
+            columns.extend_from_slice(&row.columns);
+            around.extend_from_slice(&row.around);
+            slots.extend_from_slice(&row.slots);
             row_start.push(columns.len());
         }
-        Self { row_start, columns, around_start, around }
+        Self { row_start, columns, around_start, around, slots, nodes_per_tet: K }
     }
 
     /// Number of nodes, orphans included.
     pub fn node_count(&self) -> usize {
         self.row_start.len() - 1
+    }
+
+    /// Nodes of each element: 4 or 10.
+    pub fn nodes_per_tet(&self) -> usize {
+        self.nodes_per_tet
     }
 
     /// Number of stored 3 × 3 blocks.
@@ -76,53 +109,64 @@ impl StiffnessPattern {
         &self.columns[self.row(node)]
     }
 
-    pub(super) fn around(&self, node: usize) -> &[Around] {
-        &self.around[self.around_start[node]..self.around_start[node + 1]]
+    /// Elements that add to one block row, in element order; K must be [`Self::nodes_per_tet`].
+    pub(super) fn around<const K: usize>(
+        &self,
+        node: usize,
+    ) -> impl Iterator<Item = Contribution<'_, K>> {
+        let range = self.around_start[node]..self.around_start[node + 1];
+        let slots = &self.slots.as_chunks::<K>().0[range.clone()];
+        self.around[range].iter().zip(slots).map(|(around, slots)| Contribution {
+            tet: around.tet as usize,
+            local: around.local as usize,
+            slots,
+        })
     }
 }
 
 /// For each node the elements that use it, in element order (counting sort).
-fn elements_around(mesh: &TetMesh) -> (Vec<usize>, Vec<u32>) {
-    let mut start = vec![0usize; mesh.node_count() + 1];
-    for &n in mesh.tets().iter().flatten() {
+fn elements_around<const K: usize>(node_count: usize, tets: &[[u32; K]]) -> (Vec<usize>, Vec<u32>) {
+    let mut start = vec![0usize; node_count + 1];
+    for &n in tets.iter().flatten() {
         start[n as usize + 1] += 1;
     }
-    for n in 0..mesh.node_count() {
+    for n in 0..node_count {
         start[n + 1] += start[n];
     }
     let mut next = start.clone();
-    let mut tets = vec![0u32; 4 * mesh.tets().len()];
-    for (tet, corners) in mesh.tets().iter().enumerate() {
-        for &n in corners {
-            tets[next[n as usize]] = tet as u32;
+    let mut around = vec![0u32; K * tets.len()];
+    for (tet, nodes) in tets.iter().enumerate() {
+        for &n in nodes {
+            around[next[n as usize]] = tet as u32;
             next[n as usize] += 1;
         }
     }
-    (start, tets)
+    (start, around)
 }
 
 /// Columns and contributing elements of one block row.
-fn block_row(mesh: &TetMesh, node: u32, tets: &[u32]) -> (Vec<u32>, Vec<Around>) {
-    let mut columns: Vec<u32> =
-        tets.iter().flat_map(|&t| mesh.tets()[t as usize].iter().copied()).collect();
+struct BlockRow {
+    columns: Vec<u32>,
+    around: Vec<Around>,
+    slots: Vec<u32>,
+}
+
+fn block_row<const K: usize>(tets: &[[u32; K]], node: u32, tets_around: &[u32]) -> BlockRow {
+    let mut columns: Vec<u32> = tets_around.iter().flat_map(|&t| tets[t as usize]).collect();
     columns.sort_unstable();
     columns.dedup();
-    let slot = |n: u32| columns.partition_point(|&c| c < n) as u32;
-    let around = tets
-        .iter()
-        .flat_map(|&tet| {
-            let corners = mesh.tets()[tet as usize];
-            let slots = corners.map(slot);
-            // An element that names a node twice would be flat, so one corner matches; still,
-            // every matching corner is taken so that no contribution could be lost.
-            (0..4u8).filter(move |&c| corners[c as usize] == node).map(move |corner| Around {
-                tet,
-                corner,
-                slots,
-            })
-        })
-        .collect();
-    (columns, around)
+    let mut around = Vec::with_capacity(tets_around.len());
+    let mut slots = Vec::with_capacity(K * tets_around.len());
+    for &tet in tets_around {
+        let nodes = tets[tet as usize];
+        // An element that names a node twice would be flat, so one local node matches; still,
+        // every match is taken so that no contribution could be lost.
+        for local in (0..K as u8).filter(|&local| nodes[local as usize] == node) {
+            around.push(Around { tet, local });
+            slots.extend(nodes.map(|n| columns.partition_point(|&c| c < n) as u32));
+        }
+    }
+    BlockRow { columns, around, slots }
 }
 
 #[cfg(test)]
@@ -140,5 +184,28 @@ mod tests {
         assert!(pattern.columns(1).is_empty());
         assert_eq!(pattern.columns(3), [0, 2, 3, 4]);
         assert_eq!(pattern.block_count(), 16);
+    }
+
+    #[test]
+    fn ten_node_rows_couple_exactly_the_nodes_that_share_an_element() {
+        let linear = crate::mesh::generate(crate::mesh::BuiltIn::Sphere, 100).unwrap();
+        let mesh = QuadraticMesh::try_new(&linear).unwrap();
+        let pattern = StiffnessPattern::quadratic(&mesh);
+        let mut expected = vec![std::collections::BTreeSet::new(); mesh.node_count()];
+        for tet in mesh.tets() {
+            for &row in tet {
+                expected[row as usize].extend(tet);
+            }
+        }
+        assert_eq!(pattern.nodes_per_tet(), 10);
+        for (node, columns) in expected.iter().enumerate() {
+            assert!(pattern.columns(node).iter().eq(columns), "node {node}");
+            for c in pattern.around::<10>(node) {
+                assert_eq!(mesh.tets()[c.tet][c.local], node as u32);
+                for (slot, &column) in c.slots.iter().zip(&mesh.tets()[c.tet]) {
+                    assert_eq!(pattern.columns(node)[*slot as usize], column);
+                }
+            }
+        }
     }
 }

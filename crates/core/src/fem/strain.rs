@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::{dof, tet4};
+use super::{QuadraticMesh, dof, tet4, tet10};
 use crate::mesh::TetMesh;
 
 /// Largest element rotation and principal strain of a displacement field.
@@ -22,30 +22,74 @@ pub struct StrainSummary {
 /// Source: displacement gradient `H = Σ u_a ∇N_aᵀ` from thesis (3.28); rotation angle from the
 /// skew part and the trace of `I + H`, exact when `I + H` is a rotation.
 pub fn summarise_strain(mesh: &TetMesh, displacement: &[f64]) -> StrainSummary {
-    // `max` does not depend on the order, so a parallel reduction keeps the same bits.
-    (0..mesh.tets().len())
-        .into_par_iter()
-        .with_min_len(512)
-        .map(|t| element_strain(mesh, t, displacement))
-        .reduce(StrainSummary::default, |a, b| StrainSummary {
-            rotation_max: a.rotation_max.max(b.rotation_max),
-            strain_max: a.strain_max.max(b.strain_max),
-        })
+    largest(mesh.tets().len(), |tet| {
+        let g = tet4::gradients(&mesh.corners(tet));
+        let u = displacements_of(&mesh.tets()[tet], displacement);
+        let gradient = u
+            .iter()
+            .zip(&g.of_shape)
+            .fold(Matrix3::zeros(), |h, (u_a, gradient)| h + u_a * gradient.transpose());
+        StrainSummary::of_gradient(&gradient)
+    })
 }
 
-fn element_strain(mesh: &TetMesh, tet: usize, displacement: &[f64]) -> StrainSummary {
-    let g = tet4::gradients(&mesh.corners(tet));
-    let mut h = Matrix3::zeros();
-    for (a, &node) in mesh.tets()[tet].iter().enumerate() {
+/// [`summarise_strain`] for ten-node tetrahedra, over the four quadrature points of each.
+///
+/// The strain of an element is linear in space; at these points it is most exact, and it lies
+/// between that of the element's middle, which a linear tetrahedron has everywhere, and the
+/// extrapolated one of its corners.
+///
+/// Shapes: `displacement` 3 (N + E), mid-edge nodes included. Units: m.
+///
+/// Source: as there, with [`tet10::QUADRATURE`].
+pub fn summarise_strain_quadratic(mesh: &QuadraticMesh, displacement: &[f64]) -> StrainSummary {
+    largest(mesh.tets().len(), |tet| {
+        let g = tet4::gradients(&mesh.corners(tet));
+        let u = displacements_of(&mesh.tets()[tet], displacement);
+        tet10::QUADRATURE
+            .map(|l| StrainSummary::of_gradient(&tet10::displacement_gradient(&g, &u, l)))
+            .into_iter()
+            .fold(StrainSummary::default(), StrainSummary::max)
+    })
+}
+
+/// Largest summary over elements. `max` does not depend on the order, so a parallel reduction keeps
+/// the same bits.
+fn largest(
+    tet_count: usize,
+    of_tet: impl Fn(usize) -> StrainSummary + Sync + Send,
+) -> StrainSummary {
+    (0..tet_count)
+        .into_par_iter()
+        .with_min_len(512)
+        .map(of_tet)
+        .reduce(StrainSummary::default, StrainSummary::max)
+}
+
+/// Displacements of an element's nodes, in their order.
+fn displacements_of<const K: usize>(nodes: &[u32; K], displacement: &[f64]) -> [Vector3<f64>; K] {
+    nodes.map(|node| {
         let d = dof(node as usize, 0);
-        let u = Vector3::new(displacement[d], displacement[d + 1], displacement[d + 2]);
-        h += u * g.of_shape[a].transpose();
+        Vector3::new(displacement[d], displacement[d + 1], displacement[d + 2])
+    })
+}
+
+impl StrainSummary {
+    /// Rotation and principal strain of one displacement gradient.
+    fn of_gradient(h: &Matrix3<f64>) -> Self {
+        let skew =
+            Vector3::new(h[(2, 1)] - h[(1, 2)], h[(0, 2)] - h[(2, 0)], h[(1, 0)] - h[(0, 1)]) * 0.5;
+        let rotation_max = skew.norm().atan2(1.0 + 0.5 * h.trace());
+        let strain = (h + h.transpose()) * 0.5;
+        Self { rotation_max, strain_max: principal_max(&strain) }
     }
-    let skew =
-        Vector3::new(h[(2, 1)] - h[(1, 2)], h[(0, 2)] - h[(2, 0)], h[(1, 0)] - h[(0, 1)]) * 0.5;
-    let rotation_max = skew.norm().atan2(1.0 + 0.5 * h.trace());
-    let strain = (h + h.transpose()) * 0.5;
-    StrainSummary { rotation_max, strain_max: principal_max(&strain) }
+
+    fn max(self, other: Self) -> Self {
+        Self {
+            rotation_max: self.rotation_max.max(other.rotation_max),
+            strain_max: self.strain_max.max(other.strain_max),
+        }
+    }
 }
 
 /// Largest absolute eigenvalue of a symmetric 3 × 3 matrix, by the trigonometric formula.
@@ -93,5 +137,35 @@ mod tests {
         assert!((summarise_strain(&mesh, &stretched).strain_max - 0.03).abs() < 1e-15);
         let sheared = field(&mesh, |p| Vector3::new(0.02 * p.y, 0.0, 0.0));
         assert!((summarise_strain(&mesh, &sheared).strain_max - 0.01).abs() < 1e-15);
+    }
+
+    #[test]
+    fn ten_node_summary_of_a_linear_field_is_that_of_four_nodes() {
+        let linear = tet();
+        let mesh = QuadraticMesh::try_new(&linear).unwrap();
+        let map = |p: &Point3<f64>| Vector3::new(0.1 * p.y + 0.02 * p.x, -0.04 * p.z, 0.03 * p.y);
+        let u = field(&linear, map);
+        let u_quadratic: Vec<f64> =
+            mesh.vertices().iter().flat_map(|p| <[f64; 3]>::from(map(p))).collect();
+        let (four, ten) =
+            (summarise_strain(&linear, &u), summarise_strain_quadratic(&mesh, &u_quadratic));
+        assert!((four.rotation_max - ten.rotation_max).abs() < 1e-15);
+        assert!((four.strain_max - ten.strain_max).abs() < 1e-15);
+    }
+
+    #[test]
+    fn strain_of_a_bent_ten_node_element_is_that_of_the_field_at_its_quadrature_points() {
+        let linear = tet();
+        let mesh = QuadraticMesh::try_new(&linear).unwrap();
+        // u = (0.01 x², 0, 0): strain 0.02 x along x alone, no rotation.
+        let u: Vec<f64> =
+            mesh.vertices().iter().flat_map(|p| [0.01 * p.x * p.x, 0.0, 0.0]).collect();
+        let x_max = tet10::QUADRATURE
+            .iter()
+            .map(|l| linear.corners(0).iter().zip(l).map(|(c, l)| l * c.x).sum::<f64>())
+            .fold(0.0, f64::max);
+        let summary = summarise_strain_quadratic(&mesh, &u);
+        assert!((summary.strain_max - 0.02 * x_max).abs() < 1e-16);
+        assert!(summary.rotation_max < 1e-15);
     }
 }
