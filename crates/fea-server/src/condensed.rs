@@ -12,8 +12,8 @@ use softgrasp_protocol::{
 };
 
 use crate::approach::Approach;
+use crate::caution::{add_unmet_wishes, warnings};
 use crate::clock::{StageClock, ms_since, peak_rss_bytes};
-use crate::range_warning::warnings;
 use crate::reject::Refusal;
 use crate::store::StoredModel;
 
@@ -66,6 +66,7 @@ pub(crate) fn answer(
     let mut report = report(stored, &set, known, &certificate, approach);
     report.stage_ms = stage_ms;
     report.factor_reused = factor_reused;
+    add_unmet_wishes(question, &mut report);
     watch_strain(stored, &base, set, solved);
     Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
 }

@@ -9,8 +9,8 @@ use softgrasp_protocol::{
     Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
 };
 
+use crate::caution::{add_unmet_wishes, warnings};
 use crate::clock::{StageClock, ms_since, peak_rss_bytes};
-use crate::range_warning::warnings;
 use crate::reject::Refusal;
 
 /// A question with what has been worked out of it.
@@ -45,7 +45,7 @@ pub(crate) fn answer(
         false => Vec::new(),
     };
     stage_ms.encode = ms_since(start);
-    let report = SolveReport {
+    let mut report = SolveReport {
         method: factored.method().to_string(),
         element,
         unknown_dofs: factored.partition().unknown().len() as u64,
@@ -64,6 +64,7 @@ pub(crate) fn answer(
         factor_reused,
         chosen_because,
     };
+    add_unmet_wishes(question, &mut report);
     Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
 }
 

@@ -7,13 +7,13 @@
 
 mod answer;
 mod approach;
+mod caution;
 mod clock;
 mod compute;
 mod condensed;
 mod config;
 mod direct;
 mod question;
-mod range_warning;
 mod reject;
 mod server;
 mod session;

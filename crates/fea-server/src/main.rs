@@ -55,7 +55,7 @@ fn main() -> ExitCode {
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("fea-server: {error:#}");
+            eprintln!("fea-server: {}", one_line(&error));
             match error.downcast_ref() {
                 Some(StartError::Config(_)) => ExitCode::from(WRONG_USAGE),
                 _ => ExitCode::FAILURE,
@@ -150,4 +150,13 @@ async fn wait_for_signal() {
         // No signals here: serve until the process is ended from outside.
         std::future::pending::<()>().await;
     }
+}
+
+/// The error and its causes in one line; a cause that the line already tells is left out.
+fn one_line(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |line, cause| match cause.to_string() {
+        told if line.contains(&told) => line,
+        cause if line.is_empty() => cause,
+        cause => format!("{line}: {cause}"),
+    })
 }

@@ -36,7 +36,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("glove-client: {error:#}");
+            eprintln!("glove-client: {}", one_line(&error));
             ExitCode::FAILURE
         }
     }
@@ -47,4 +47,13 @@ fn start_log() {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+}
+
+/// The error and its causes in one line; a cause that the line already tells is left out.
+fn one_line(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |line, cause| match cause.to_string() {
+        told if line.contains(&told) => line,
+        cause if line.is_empty() => cause,
+        cause => format!("{line}: {cause}"),
+    })
 }

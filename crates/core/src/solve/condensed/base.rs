@@ -23,6 +23,8 @@ pub struct Base {
     /// Degrees of freedom held in addition so that `K_B` is definite; as many as modes.
     pub(super) held: Vec<u32>,
     pub(super) modes: Vec<Mode>,
+    /// Bound of the largest eigenvalue of `K`, N/m.
+    pub(super) stiffest: f64,
     /// Lower bound of the smallest eigenvalue of `K_B`, once somebody has proven one.
     pub(super) eigenvalue_min: OnceLock<Option<f64>>,
 }
@@ -33,8 +35,10 @@ pub(super) struct Mode {
     pub field: Vec<f64>,
     /// Norm of the field.
     pub norm: f64,
-    /// Bound on the norm of `K` times the field, which is rounding.
+    /// Norm of `K` times the field, as computed; it is all rounding.
     pub residual: f64,
+    /// Bound on the same norm, rounding of the computation included.
+    pub residual_bound: f64,
 }
 
 /// Why a shape cannot be condensed, or a question not be answered this way.
@@ -119,6 +123,7 @@ impl Base {
             fixed: fixed.to_vec(),
             held,
             modes,
+            stiffest: stiffness.row_sum_max(),
             eigenvalue_min: OnceLock::new(),
         })
     }
@@ -165,8 +170,9 @@ fn refuse(error: FrontError, partition: &Partition) -> CondensedError {
 
 impl Mode {
     fn new(stiffness: &Stiffness, field: Vec<f64>) -> Self {
-        let residual = norm(&stiffness.mul(&field)) + rounding_of_product(stiffness, &field);
-        Self { norm: norm(&field), residual, field }
+        let residual = norm(&stiffness.mul(&field));
+        let residual_bound = residual + rounding_of_product(stiffness, &field);
+        Self { norm: norm(&field), residual, residual_bound, field }
     }
 }
 

@@ -17,8 +17,10 @@ pub struct NodeColumns {
     /// Displacement of every degree of freedom under a unit force along x, y, z; 3 × 3N.
     pub(super) fields: [Vec<f64>; 3],
     pub(super) norms: [f64; 3],
-    /// Bounds on the norms of `e − K_B g` over the free degrees of freedom.
+    /// Norms of `e − K_B g` over the free degrees of freedom, as computed.
     pub(super) residuals: [f64; 3],
+    /// Bounds on the same norms, rounding of the computation included.
+    pub(super) residual_bounds: [f64; 3],
 }
 
 /// Cache of columns under a memory bound, least recently used out first.
@@ -160,7 +162,8 @@ fn compute_together(base: &Base, nodes: &[u32]) -> Vec<NodeColumns> {
             Some(NodeColumns {
                 node,
                 norms: [x.norm, y.norm, z.norm],
-                residuals: [x.residual_bound, y.residual_bound, z.residual_bound],
+                residuals: [norm(&x.residual), norm(&y.residual), norm(&z.residual)],
+                residual_bounds: [x.residual_bound, y.residual_bound, z.residual_bound],
                 fields: [x.field, y.field, z.field],
             })
         })
