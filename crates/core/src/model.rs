@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::fem::{AssemblyError, Material, Stiffness, StiffnessPattern, assemble};
+use crate::fem::{
+    AssemblyError, Material, QuadraticMesh, Stiffness, StiffnessPattern, StrainSummary,
+    TooManyNodes, assemble, assemble_quadratic, summarise_strain, summarise_strain_quadratic,
+};
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::condensed::{Base, CondensedError};
 use crate::solve::{
@@ -17,7 +20,10 @@ use crate::solve::{
 /// Source: thesis chapter 3 up to (3.39).
 pub struct Model {
     mesh: TetMesh,
+    /// The same elements with mid-edge nodes behind the corners, for ten-node elements.
+    quadratic: Option<QuadraticMesh>,
     bodies: Bodies,
+    /// For every node of the system (corners first), whether an element uses it.
     used: Vec<bool>,
     stiffness: Arc<Stiffness>,
     fixed: Vec<u32>,
@@ -41,9 +47,33 @@ pub enum ModelError {
     /// The method failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The mesh has too many edges for mid-edge nodes.
+    #[error(transparent)]
+    MidNodes(#[from] TooManyNodes),
+    /// A mid-edge node was named.
+    #[error("node {node} is given a displacement, but the mesh has {node_count} nodes (0-based)")]
+    NoSuchNode {
+        /// Node, from 0.
+        node: usize,
+        /// Nodes of the mesh.
+        node_count: usize,
+    },
+    /// The condensed engine does not know ten-node elements.
+    #[error("condensed works on linear tetrahedra; use front for ten-node ones")]
+    QuadraticCondensed,
     /// The condensed engine failed.
     #[error(transparent)]
     Condensed(#[from] CondensedError),
+}
+
+/// Which finite element a model is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Element {
+    /// Linear tetrahedron (thesis chapter 3).
+    #[default]
+    Tet4,
+    /// Ten-node tetrahedron; its mid-edge nodes are made from the linear mesh.
+    Tet10,
 }
 
 /// A partition and the known displacements in its order.
@@ -56,7 +86,7 @@ pub struct Known {
 }
 
 impl Model {
-    /// Assembles the stiffness of a mesh.
+    /// Assembles the stiffness of a mesh, with linear or ten-node elements.
     ///
     /// Shapes: `materials` one, or one per region; `fixed` degrees of freedom held at zero, in any
     /// order. Units: m, Pa.
@@ -65,6 +95,7 @@ impl Model {
     /// [`ModelError`] for regions without material and for fixed nodes that are not there.
     pub fn try_new(
         mesh: TetMesh,
+        element: Element,
         materials: &[Material],
         mut fixed: Vec<u32>,
         on_stage: &mut dyn FnMut(Stage),
@@ -72,12 +103,45 @@ impl Model {
         on_stage(Stage::Assemble);
         fixed.sort_unstable();
         fixed.dedup();
-        let used = mesh.used_nodes();
-        Partition::try_new(&used, &fixed)?;
-        let pattern = Arc::new(StiffnessPattern::new(&mesh));
-        let stiffness = Arc::new(assemble(&pattern, &mesh, materials)?);
+        Partition::try_new(&mesh.used_nodes(), &fixed)?;
         let bodies = Bodies::from_mesh(&mesh);
-        Ok(Self { mesh, bodies, used, stiffness, fixed })
+        let (quadratic, used, stiffness) = match element {
+            Element::Tet4 => {
+                let pattern = Arc::new(StiffnessPattern::new(&mesh));
+                (None, mesh.used_nodes(), assemble(&pattern, &mesh, materials)?)
+            }
+            Element::Tet10 => {
+                let quadratic = QuadraticMesh::try_new(&mesh)?;
+                let pattern = Arc::new(StiffnessPattern::quadratic(&quadratic));
+                let stiffness = assemble_quadratic(&pattern, &quadratic, materials)?;
+                let used = quadratic.used_nodes();
+                (Some(quadratic), used, stiffness)
+            }
+        };
+        Ok(Self { mesh, quadratic, bodies, used, stiffness: Arc::new(stiffness), fixed })
+    }
+
+    /// The element it is made of.
+    pub fn element(&self) -> Element {
+        match self.quadratic {
+            None => Element::Tet4,
+            Some(_) => Element::Tet10,
+        }
+    }
+
+    /// Number of nodes of the system, mid-edge nodes included.
+    pub fn system_node_count(&self) -> usize {
+        self.used.len()
+    }
+
+    /// Largest rotation and strain of a displacement field of the system.
+    ///
+    /// Shapes: `displacement` 3 per node of the system.
+    pub fn strain(&self, displacement: &[f64]) -> StrainSummary {
+        match &self.quadratic {
+            None => summarise_strain(&self.mesh, displacement),
+            Some(quadratic) => summarise_strain_quadratic(quadratic, displacement),
+        }
     }
 
     /// The mesh.
@@ -112,7 +176,7 @@ impl Model {
 
     /// Bytes held by mesh and stiffness, roughly.
     pub fn bytes(&self) -> usize {
-        self.mesh.node_count() * 40
+        self.used.len() * 40
             + self.mesh.tets().len() * (16 + 4 * 24)
             + self.stiffness.pattern().block_count() * 76
     }
@@ -125,6 +189,10 @@ impl Model {
     /// # Errors
     /// [`ModelError::Known`] for contradictions and values that are not numbers.
     pub fn known(&self, pairs: Vec<(u32, f64)>) -> Result<Known, ModelError> {
+        let node_count = self.mesh.node_count();
+        if let Some((dof, _)) = pairs.iter().find(|(dof, _)| *dof as usize >= 3 * node_count) {
+            return Err(ModelError::NoSuchNode { node: *dof as usize / 3, node_count });
+        }
         let mut dofs_given: Vec<u32> = pairs.iter().map(|p| p.0).collect();
         dofs_given.sort_unstable();
         let mut all = pairs;
@@ -153,7 +221,10 @@ impl Model {
     /// # Errors
     /// [`ModelError::Condensed`].
     pub fn condense(&self, on_stage: &mut dyn FnMut(Stage)) -> Result<Base, ModelError> {
-        let Self { mesh, bodies, stiffness, fixed, .. } = self;
+        let Self { mesh, bodies, stiffness, fixed, quadratic, .. } = self;
+        if quadratic.is_some() {
+            return Err(ModelError::QuadraticCondensed);
+        }
         Ok(Base::try_new(mesh, bodies, stiffness, fixed, on_stage)?)
     }
 
@@ -184,7 +255,7 @@ mod tests {
     fn cube() -> Model {
         let mesh = generate(BuiltIn::Cube, 64).unwrap();
         let material = Material::try_new(1.0e5, 0.3).unwrap();
-        Model::try_new(mesh, &[material], vec![5, 3, 4], &mut |_| {}).unwrap()
+        Model::try_new(mesh, Element::Tet4, &[material], vec![5, 3, 4], &mut |_| {}).unwrap()
     }
 
     #[test]
@@ -192,6 +263,27 @@ mod tests {
         let known = cube().known(vec![(4, 0.5), (0, 0.25)]).unwrap();
         assert_eq!(known.dofs, [0, 3, 4, 5]);
         assert_eq!(known.q_known, [0.25, 0.0, 0.5, 0.0]);
+    }
+
+    #[test]
+    fn ten_node_elements_answer_at_the_corners_and_are_softer() {
+        let material = Material::try_new(1.0e5, 0.3).unwrap();
+        let known = [0, 1, 2, 3, 15, 12].map(|n| 3 * n).into_iter().flat_map(|d| d..d + 3);
+        let known: Vec<(u32, f64)> = known.map(|d| (d, 0.0)).collect();
+        let pulled = |element: Element| {
+            let mesh = generate(BuiltIn::Cube, 64).unwrap();
+            let model = Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).unwrap();
+            let known = model.known(known.clone()).unwrap();
+            let factored = model.factor(&known.dofs, Method::Front, &mut |_| {}).unwrap();
+            let mut forces = vec![0.0; 3 * model.system_node_count()];
+            forces[3 * 63] = 1.0;
+            let loads =
+                crate::solve::Loads { q_known: &known.q_known, forces: &forces, residual_rel: 0.0 };
+            let solution = factored.solve(model.stiffness(), loads, &mut |_| {}).unwrap();
+            solution.displacement[3 * 63]
+        };
+        // More freedom, less energy stored for the same force: the loaded corner gives more.
+        assert!(pulled(Element::Tet10) > 1.05 * pulled(Element::Tet4));
     }
 
     #[test]

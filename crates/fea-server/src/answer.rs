@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{TetMesh, signed_volume};
-use softgrasp_core::model::{Known, Model};
+use softgrasp_core::model::{Element, Known, Model};
 use softgrasp_core::solve::Method;
 use softgrasp_protocol::{
     Answer, ElementName, FrameRequest, MeshData, ModelHash, ModelReady, Prefetch, SolveOnce,
@@ -120,7 +120,10 @@ impl Desk {
                 made
             }
         };
-        let element = ElementName::T4;
+        let element = match model.element() {
+            Element::Tet4 => ElementName::T4,
+            Element::Tet10 => ElementName::T10,
+        };
         let asked = Asked {
             question: &question,
             known,
@@ -156,9 +159,6 @@ impl Desk {
         fixed: Vec<u32>,
         clock: &mut StageClock,
     ) -> Result<Model, Refusal> {
-        if element != ElementName::T4 {
-            return Err(Refusal::Element(element.as_str()));
-        }
         let node_count = mesh.vertices.len();
         if node_count > self.config.max_nodes as usize {
             return Err(Refusal::TooManyNodes { node_count, max: self.config.max_nodes });
@@ -174,7 +174,11 @@ impl Desk {
         let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
         let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
         let mesh = TetMesh::try_new(vertices, tets, regions)?;
-        Ok(Model::try_new(mesh, &materials, fixed, &mut |stage| clock.begin(stage))?)
+        let element = match element {
+            ElementName::T4 => Element::Tet4,
+            ElementName::T10 => Element::Tet10,
+        };
+        Ok(Model::try_new(mesh, element, &materials, fixed, &mut |stage| clock.begin(stage))?)
     }
 
     /// Refuses a dense matrix that does not fit into the memory limit.

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use softgrasp_core::fem::summarise_strain;
 use softgrasp_core::model::{Known, ModelError};
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{Base, Certificate, ContactAnswer, ContactSet};
@@ -146,7 +145,7 @@ fn watch_strain(
     let (stored, base) = (Arc::clone(stored), Arc::clone(base));
     rayon::spawn(move || {
         let displacement = set.full_displacement(&base, &solved);
-        let newest = summarise_strain(stored.model.mesh(), &displacement);
+        let newest = stored.model.strain(&displacement);
         let mut watch = stored.strain();
         watch.newest = newest;
         watch.running = false;

@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use softgrasp_core::fem::summarise_strain;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Factored, Loads, Solution};
 use softgrasp_protocol::{
@@ -36,10 +35,10 @@ pub(crate) fn answer(
     let solution = factored
         .solve(model.stiffness(), loads, &mut |stage| clock.begin(stage))
         .map_err(|error| Refusal::Model(error.into()))?;
-    let strain = summarise_strain(model.mesh(), &solution.displacement);
+    let strain = model.strain(&solution.displacement);
     let mut stage_ms = clock.finish();
     let start = Instant::now();
-    let displacements = gather(&solution, &question.want);
+    let displacements = gather(model, &solution, &question.want);
     let reactions = match question.want.reactions {
         true => reactions(&known, &solution),
         false => Vec::new(),
@@ -68,13 +67,14 @@ pub(crate) fn answer(
     Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
 }
 
-fn gather(solution: &Solution, want: &Want) -> Displacements {
+/// Displacements of the nodes asked for; mid-edge nodes are the server's own and stay here.
+fn gather(model: &Model, solution: &Solution, want: &Want) -> Displacements {
     let of = |n: usize| {
         let u = &solution.displacement[3 * n..3 * n + 3];
         [u[0], u[1], u[2]]
     };
     let rows = match &want.nodes {
-        NodeChoice::All => (0..solution.displacement.len() / 3).map(of).collect(),
+        NodeChoice::All => (0..model.mesh().node_count()).map(of).collect(),
         NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| of(n as usize)).collect(),
     };
     Displacements::of(rows, want.precision)

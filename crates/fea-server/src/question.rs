@@ -38,7 +38,7 @@ fn scatter_forces(model: &Model, known: &Known, forces: &[DofValue]) -> Result<V
         return Ok(Vec::new());
     }
     let node_count = model.mesh().node_count();
-    let mut scattered = vec![0.0; 3 * node_count];
+    let mut scattered = vec![0.0; 3 * model.system_node_count()];
     for &DofValue { dof, value } in forces {
         let node = dof / 3;
         if !value.is_finite() {
@@ -47,7 +47,7 @@ fn scatter_forces(model: &Model, known: &Known, forces: &[DofValue]) -> Result<V
         if value != 0.0 && known.dofs.binary_search(&dof).is_ok() {
             return Err(Refusal::ForceOnKnown { node });
         }
-        match scattered.get_mut(dof as usize) {
+        match scattered[..3 * node_count].get_mut(dof as usize) {
             Some(force) => *force += value,
             None => {
                 return Err(Refusal::NoSuchNode { what: "the list of forces", node, node_count });

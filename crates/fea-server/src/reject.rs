@@ -48,8 +48,6 @@ pub(crate) enum Refusal {
     FixedMoved { node: u32 },
     #[error("the mesh has {node_count} nodes; this server takes {max} (--max-nodes)")]
     TooManyNodes { node_count: usize, max: u32 },
-    #[error("this server does not know the element '{0}' yet; use t4")]
-    Element(&'static str),
     #[error("this server wants a token (--token-file); say Hello with the right one first")]
     Token,
     #[error("the server is at fault: the work on this request ended abnormally")]

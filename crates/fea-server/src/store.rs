@@ -192,11 +192,12 @@ mod tests {
     use super::*;
     use softgrasp_core::fem::Material;
     use softgrasp_core::mesh::{BuiltIn, generate};
+    use softgrasp_core::model::Element;
 
     fn stored() -> Arc<StoredModel> {
         let mesh = generate(BuiltIn::Cube, 64).unwrap();
         let material = Material::try_new(1.0e5, 0.3).unwrap();
-        let model = Model::try_new(mesh, &[material], vec![], &mut |_| {}).unwrap();
+        let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
         Arc::new(StoredModel::new(model, 1 << 20))
     }
 

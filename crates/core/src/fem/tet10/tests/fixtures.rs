@@ -59,7 +59,9 @@ pub(super) fn solve(
     let q_known: Vec<f64> = known.iter().flat_map(|k| <[f64; 3]>::from(k.1)).collect();
     let partition = Partition::try_new(used, &dofs).unwrap();
     let factored = Factored::try_new(stiffness, partition, method, &mut |_| {}).unwrap();
-    factored.solve(stiffness, Loads { q_known: &q_known, forces }, &mut |_| {}).unwrap()
+    factored
+        .solve(stiffness, Loads { q_known: &q_known, forces, residual_rel: 0.0 }, &mut |_| {})
+        .unwrap()
 }
 
 /// Displacement of one node.
