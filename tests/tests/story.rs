@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 use fea_server::ServerConfig;
 use glove_client::commands::run::RunCommand;
+use glove_client::contact_model::ContactModel;
 use glove_client::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, TickOutcome};
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
@@ -154,6 +155,7 @@ impl Bench {
         let settings = SolveSettings {
             material: Material { young: 2.0e4, poisson: 0.4 },
             method: MethodName::auto(),
+            contact: ContactModel::Vertex,
         };
         let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
         let (reader, link) = (HandReader::new(setup), Link::start(address).unwrap());

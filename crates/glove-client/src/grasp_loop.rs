@@ -3,17 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use softgrasp_core::grasp::{
     Command, Grasp, GraspEvent, KnownNode, StateName, StepInput, StepOutput, sense,
 };
 use softgrasp_core::hand::{HandColliders, HandPose};
 use softgrasp_protocol::{
-    DofValue, ElementName, Material, MethodName, ModelHash, NodeChoice, Precision, Question,
-    UploadModel, Want,
+    ElementName, Material, MethodName, ModelHash, NodeChoice, Precision, Question, UploadModel,
+    Want,
 };
 
 use crate::commands::mesh_data;
+use crate::contact_model::{ContactModel, HeldNodes};
 use crate::hand_reader::HandReader;
 use crate::link::{Link, LinkEvent, ModelOrder};
 use crate::scripted::{Seen, Sent};
@@ -36,6 +37,8 @@ pub struct SolveSettings {
     pub material: Material,
     /// Method asked for.
     pub method: MethodName,
+    /// What a fingertip holds.
+    pub contact: ContactModel,
 }
 
 /// What happened, for the report; in the order it happened.
@@ -76,10 +79,17 @@ pub struct GraspLoop {
     pace: Pace,
     /// Tick of the last order, to tell answers of an earlier grasp from those of this one.
     deforming_since: Option<u64>,
+    held: HeldNodes,
+    /// Nodes whose columns the server has been asked to prepare, ascending.
+    prefetched: Vec<u32>,
     world_from_object: Isometry3<f64>,
     hand: Option<HandPose>,
 }
 
+/// Nodes nearer to a fingertip than this may be touched soon, m …
+const PREFETCH_DISTANCE: f64 = 0.012;
+/// … but no more than so many per rest shape are prepared.
+const PREFETCH_MAX: usize = 160;
 /// Longest wait of a lockstep tick; a server that takes longer is overtaken.
 const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
 
@@ -101,6 +111,8 @@ impl GraspLoop {
             settings,
             pace,
             deforming_since: None,
+            held: HeldNodes::default(),
+            prefetched: Vec::new(),
             world_from_object: Isometry3::identity(),
             hand: None,
         };
@@ -184,8 +196,10 @@ impl GraspLoop {
         let margin = self.grasp.release_margin();
         let (tree, normals) = (self.object.tree(), self.object.normals());
         let fingers = sense(tree, normals, &colliders, &world_from_object, margin);
+        let tips = fingers.map(|finger| finger.tip_in_object);
         outcome.seen.inside = std::array::from_fn(|i| fingers[i].tip_hits[0].is_some());
         outcome.tips = outcome.seen.inside;
+        self.prefetch(&tips);
         self.grasp.step(&StepInput {
             world_from_palm: hand.world_from_palm,
             world_from_segment: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
@@ -203,13 +217,16 @@ impl GraspLoop {
     ) -> Result<(), ObjectError> {
         if step.events.contains(&GraspEvent::ShapeKept) {
             self.object.keep_shape()?;
+            self.held.clear();
+            self.prefetched.clear();
             self.send_model();
         }
         match &step.known {
             Some(known) => {
                 outcome.tips = [true; 5];
                 self.deforming_since.get_or_insert(tick);
-                self.link.ask(tick, self.question(known));
+                let question = self.question(known);
+                self.link.ask(tick, question);
                 if self.pace == Pace::Lockstep {
                     self.link.wait_idle(LOCKSTEP_WAIT_MAX);
                     self.pick_up(outcome)?;
@@ -226,15 +243,12 @@ impl GraspLoop {
         Ok(())
     }
 
-    fn question(&self, known: &[KnownNode; 5]) -> Question {
-        let known = known.iter().flat_map(|k| {
-            (0..3u32).map(|axis| DofValue {
-                dof: 3 * k.node + axis,
-                value: k.displacement_in_object[axis as usize],
-            })
-        });
+    fn question(&mut self, known: &[KnownNode; 5]) -> Question {
+        let tip_radii = self.reader.setup().dimensions.tip_radii();
+        let contact = self.settings.contact;
+        let known = self.held.known(contact, &self.object, tip_radii, known);
         Question {
-            known: known.collect(),
+            known,
             forces: Vec::new(),
             method: self.settings.method.clone(),
             want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
@@ -269,6 +283,23 @@ impl GraspLoop {
             }
         }
         Ok(())
+    }
+
+    /// Lets the server prepare the columns of nodes that a fingertip is about to touch.
+    fn prefetch(&mut self, tips_in_object: &[Point3<f64>; 5]) {
+        let mut near = Vec::new();
+        for tip in tips_in_object {
+            self.object.tree().nodes_near(tip, PREFETCH_DISTANCE, &mut near);
+        }
+        near.sort_unstable();
+        near.dedup();
+        near.retain(|node| self.prefetched.binary_search(node).is_err());
+        near.truncate(PREFETCH_MAX.saturating_sub(self.prefetched.len()));
+        if !near.is_empty() {
+            self.prefetched.extend_from_slice(&near);
+            self.prefetched.sort_unstable();
+            self.link.prefetch(&near);
+        }
     }
 
     /// Gives the link the rest shape as the model of the frames to come.

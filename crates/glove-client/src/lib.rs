@@ -6,6 +6,7 @@
 
 pub mod commands;
 pub mod connection;
+pub mod contact_model;
 pub mod devices;
 pub mod displacement_table;
 pub mod grasp_loop;

@@ -10,8 +10,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
-    FrameRequest, ModelHash, ModelReady, Question, RejectCode, Reply, Request, SolveReport,
-    UploadModel,
+    FrameRequest, ModelHash, ModelReady, Prefetch, Question, RejectCode, Reply, Request,
+    SolveReport, UploadModel,
 };
 
 use crate::connection::{LinkError, ServerConnection, unexpected};
@@ -76,6 +76,8 @@ struct Desk {
     /// The model is to be made ready even if no frame is asked for yet.
     model_is_new: bool,
     frame: Option<FrameOrder>,
+    /// Nodes whose columns are to be prepared.
+    prefetch: Vec<u32>,
     /// Tick of the order that is being worked on.
     in_flight: Option<u64>,
     connected: bool,
@@ -118,12 +120,19 @@ impl Link {
         desk.model = Some(model);
         desk.model_is_new = true;
         desk.frame = None;
+        desk.prefetch.clear();
         self.desk.1.notify_all();
     }
 
     /// Asks for a frame; an order that has not been sent yet is replaced.
     pub fn ask(&self, tick: u64, question: Question) {
         lock(&self.desk).frame = Some(FrameOrder { tick, question });
+        self.desk.1.notify_all();
+    }
+
+    /// Hints at nodes that may be touched soon; there is no answer.
+    pub fn prefetch(&self, nodes: &[u32]) {
+        lock(&self.desk).prefetch.extend_from_slice(nodes);
         self.desk.1.notify_all();
     }
 
@@ -186,6 +195,7 @@ struct Worker {
 struct Job {
     model: ModelOrder,
     frame: Option<FrameOrder>,
+    prefetch: Vec<u32>,
 }
 
 impl Worker {
@@ -238,12 +248,13 @@ impl Worker {
                 return None;
             }
             if let Some(model) = desk.model.clone()
-                && (desk.model_is_new || desk.frame.is_some())
+                && (desk.model_is_new || desk.frame.is_some() || !desk.prefetch.is_empty())
             {
                 desk.model_is_new = false;
                 let frame = desk.frame.take();
+                let prefetch = std::mem::take(&mut desk.prefetch);
                 desk.in_flight = Some(frame.as_ref().map_or(0, |f| f.tick));
-                return Some(Job { model, frame });
+                return Some(Job { model, frame, prefetch });
             }
             desk = self.desk.1.wait(desk).unwrap_or_else(PoisonError::into_inner);
         }
@@ -272,6 +283,10 @@ impl Worker {
         if *on_server != Some(job.model.hash) {
             events.extend(offer_model(connection, &job.model)?);
             *on_server = Some(job.model.hash);
+        }
+        if !job.prefetch.is_empty() {
+            let nodes = job.prefetch.clone();
+            connection.send(&Request::Prefetch(Prefetch { model: job.model.hash, nodes }))?;
         }
         if let Some(frame) = &job.frame {
             let answer = match ask_frame(connection, &job.model, frame) {

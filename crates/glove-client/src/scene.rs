@@ -51,6 +51,8 @@ pub struct SceneFile {
     pub poisson: Option<f64>,
     /// Method's name, or auto.
     pub method: Option<String>,
+    /// vertex or patch.
+    pub contact: Option<String>,
 }
 
 /// Why there is no scene.

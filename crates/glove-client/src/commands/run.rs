@@ -15,6 +15,7 @@ use softgrasp_protocol::{Material, MethodName};
 
 use super::output::{print, write_file, write_json};
 use crate::connection::{Host, ServerChoice};
+use crate::contact_model::ContactModel;
 use crate::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, TickOutcome};
 use crate::hand_reader::{HandReader, HandSetup};
 use crate::link::Link;
@@ -52,6 +53,10 @@ pub struct RunCommand {
     /// Method, or auto.
     #[arg(long, value_name = "NAME|auto")]
     method: Option<MethodName>,
+    /// What a fingertip holds: vertex (the node it touched, as in the thesis) or patch (every
+    /// surface node under it) [default: vertex].
+    #[arg(long, value_name = "vertex|patch")]
+    contact: Option<ContactModel>,
     /// Young's modulus, Pa [default: 20000, a soft fruit].
     #[arg(long, value_name = "PA")]
     young: Option<f64>,
@@ -181,6 +186,11 @@ impl RunCommand {
             (None, Some(name)) => name.parse().context("the scene's method")?,
             (None, None) => MethodName::auto(),
         };
+        let contact = match (self.contact, &scene.contact) {
+            (Some(contact), _) => contact,
+            (None, Some(name)) => name.parse().context("the scene's contact")?,
+            (None, None) => ContactModel::default(),
+        };
         let period = match self.rate {
             Some(rate) if !(rate.is_finite() && rate > 0.0) => {
                 bail!("--rate is {rate}; it must be a number above 0 (ticks per second)")
@@ -202,6 +212,7 @@ impl RunCommand {
                     poisson: self.poisson.or(scene.poisson).unwrap_or(0.4),
                 },
                 method,
+                contact,
             },
             server: self.server.clone().unwrap_or(ServerChoice::Embedded),
             script,

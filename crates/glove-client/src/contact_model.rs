@@ -1,0 +1,152 @@
+//! How a fingertip's displacement is put on the object: on one node, or on the patch it covers.
+
+use std::fmt;
+use std::str::FromStr;
+
+use softgrasp_core::grasp::KnownNode;
+use softgrasp_protocol::DofValue;
+
+use crate::soft_object::SoftObject;
+
+/// What a fingertip holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ContactModel {
+    /// The single node it touched, as in the thesis. Its force goes to zero as the mesh is refined.
+    #[default]
+    Vertex,
+    /// Every surface node within the fingertip's radius of the one it touched: a force that
+    /// converges.
+    Patch,
+}
+
+/// A name that is no contact model's.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no contact model is called '{0}'; there are vertex and patch")]
+pub struct UnknownContact(String);
+
+impl FromStr for ContactModel {
+    type Err = UnknownContact;
+
+    fn from_str(name: &str) -> Result<Self, UnknownContact> {
+        match name {
+            "vertex" => Ok(Self::Vertex),
+            "patch" => Ok(Self::Patch),
+            _ => Err(UnknownContact(name.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for ContactModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Vertex => "vertex",
+            Self::Patch => "patch",
+        })
+    }
+}
+
+/// Nodes held by five fingertips, worked out once per set of touched nodes.
+#[derive(Clone, Debug, Default)]
+pub struct HeldNodes {
+    touched: [u32; 5],
+    /// Node and finger, ascending by node.
+    held: Vec<(u32, usize)>,
+}
+
+impl HeldNodes {
+    /// Known displacements of all held nodes.
+    ///
+    /// Units: `tip_radii` and displacements m. Frame: the object's, at rest: a patch is the part of
+    /// the rest surface that the tip covers, so it stays the same while the object deforms.
+    pub fn known(
+        &mut self,
+        model: ContactModel,
+        object: &SoftObject,
+        tip_radii: [f64; 5],
+        known: &[KnownNode; 5],
+    ) -> Vec<DofValue> {
+        let touched = known.map(|k| k.node);
+        if self.held.is_empty() || self.touched != touched {
+            self.touched = touched;
+            self.held = match model {
+                ContactModel::Vertex => {
+                    touched.into_iter().enumerate().map(|(finger, node)| (node, finger)).collect()
+                }
+                ContactModel::Patch => patches(object, tip_radii, &touched),
+            };
+            self.held.sort_unstable();
+        }
+        let values = self.held.iter().flat_map(|&(node, finger)| {
+            let u = known[finger].displacement_in_object;
+            (0..3u32).map(move |axis| DofValue { dof: 3 * node + axis, value: u[axis as usize] })
+        });
+        values.collect()
+    }
+
+    /// Forgets the nodes: the rest shape has changed.
+    pub fn clear(&mut self) {
+        self.held.clear();
+    }
+}
+
+/// Surface nodes within a tip's radius of its touched node; a node near two belongs to the nearer.
+fn patches(object: &SoftObject, tip_radii: [f64; 5], touched: &[u32; 5]) -> Vec<(u32, usize)> {
+    let rest = object.rest().vertices();
+    let finger_of = |node: u32| {
+        // A touched node is its own finger's, however near another tip is.
+        if let Some(finger) = touched.iter().position(|t| *t == node) {
+            return Some(finger);
+        }
+        let distance =
+            |finger: usize| (rest[node as usize] - rest[touched[finger] as usize]).norm();
+        (0..5)
+            .filter(|&finger| distance(finger) <= tip_radii[finger])
+            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+    };
+    let nodes = object.surface().nodes.iter();
+    nodes.filter_map(|&node| finger_of(node).map(|finger| (node, finger))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use softgrasp_core::mesh::{BuiltIn, generate};
+
+    fn sphere() -> SoftObject {
+        SoftObject::try_new(generate(BuiltIn::Sphere, 2000).unwrap()).unwrap()
+    }
+
+    fn known(object: &SoftObject) -> [KnownNode; 5] {
+        let nodes = &object.surface().nodes;
+        std::array::from_fn(|i| KnownNode {
+            node: nodes[i * nodes.len() / 5],
+            displacement_in_object: Vector3::new(0.001 * (i + 1) as f64, 0.0, -0.002),
+        })
+    }
+
+    #[test]
+    fn vertex_holds_the_touched_nodes_and_nothing_else() {
+        let object = sphere();
+        let known = known(&object);
+        let values = HeldNodes::default().known(ContactModel::Vertex, &object, [0.007; 5], &known);
+        assert_eq!(values.len(), 15);
+        let first = values.iter().find(|v| v.dof == 3 * known[2].node).unwrap();
+        assert_eq!(first.value, 0.003);
+    }
+
+    #[test]
+    fn patch_moves_every_covered_surface_node_with_its_nearest_tip() {
+        let object = sphere();
+        let known = known(&object);
+        let radii = [0.008; 5];
+        let values = HeldNodes::default().known(ContactModel::Patch, &object, radii, &known);
+        assert!(values.len() > 15 && values.windows(2).all(|w| w[0].dof < w[1].dof));
+        let rest = object.rest().vertices();
+        for &node in &object.surface().nodes {
+            let near = |k: &KnownNode| (rest[node as usize] - rest[k.node as usize]).norm();
+            let covered = known.iter().any(|k| near(k) <= 0.008);
+            assert_eq!(covered, values.iter().any(|v| v.dof == 3 * node));
+        }
+    }
+}
