@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(q.dihedral_histogram.iter().sum::<usize>(), 2);
         assert_eq!(q.dihedral_histogram[0], 1);
         assert!((q.volume - q.volume_min - q.volume_max).abs() < 1e-15);
-        assert!(q.dihedral_max > 3.0 && q.radius_ratio_min < 0.01);
+        assert!(q.dihedral_max > 3.0 && q.radius_ratio_min < 0.02);
     }
 
     proptest! {

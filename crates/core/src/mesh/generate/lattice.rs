@@ -116,3 +116,49 @@ impl Lattice {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Quality, TetMesh, signed_volume};
+
+    #[test]
+    fn tetrahedra_are_alike_and_fill_space() {
+        let low = Point3::origin();
+        let lattice = Lattice::around(low, low + Vector3::new(2.0, 1.0, 1.5), 0.5, [0.2, 0.0, 0.9]);
+        let mut tets = Vec::new();
+        lattice.for_each_tet(|corners| {
+            let mut nodes = corners.map(|c| c as u32);
+            if signed_volume(&corners.map(|c| lattice.position(c))) < 0.0 {
+                nodes.swap(0, 1);
+            }
+            tets.push(nodes);
+        });
+        let vertices = (0..lattice.point_count()).map(|p| lattice.position(p)).collect();
+        let inner = (0..lattice.point_count() / 2).filter(|p| !lattice.is_border(*p)).count();
+        assert_eq!(tets.len(), 12 * inner);
+        let mesh = TetMesh::try_new(vertices, tets, vec![]).unwrap();
+        let quality = Quality::from_mesh(&mesh, 0);
+        assert!((quality.dihedral_min.to_degrees() - 60.0).abs() < 1e-9);
+        assert!((quality.dihedral_max.to_degrees() - 90.0).abs() < 1e-9);
+        // Twelve tetrahedra a cell, each a twelfth of it.
+        assert!((quality.volume - inner as f64 * 0.125).abs() < 1e-12);
+    }
+
+    #[test]
+    fn neighbours_are_mutual_and_as_far_as_their_edge_says() {
+        let low = Point3::origin();
+        let lattice = Lattice::around(low, low + Vector3::repeat(3.0), 1.0, [0.5; 3]);
+        for point in (0..lattice.point_count()).filter(|p| !lattice.is_border(*p)) {
+            for (other, is_long) in lattice.neighbours(point) {
+                let distance = (lattice.position(other) - lattice.position(point)).norm();
+                let expected = if is_long { 1.0 } else { 0.75f64.sqrt() };
+                assert!((distance - expected).abs() < 1e-12);
+                assert!(!is_long || lattice.parity(other) != lattice.parity(point));
+                if !lattice.is_border(other) {
+                    assert!(lattice.neighbours(other).contains(&(point, is_long)));
+                }
+            }
+        }
+    }
+}

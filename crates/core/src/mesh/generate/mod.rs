@@ -11,4 +11,7 @@ mod strawberry;
 mod stuffing;
 mod toothpaste;
 
+#[cfg(test)]
+mod tests;
+
 pub use built_in::{BuiltIn, GenerateError, NODES_MAX, NODES_MIN, UnknownShape, generate};

@@ -73,3 +73,60 @@ impl Solid {
 
 /// Half the sphere's diameter of 7 cm.
 pub(super) const SPHERE_RADIUS: f64 = 0.035;
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn any_solid() -> impl Strategy<Value = Solid> {
+        prop::sample::select(vec![Solid::Sphere, Solid::Strawberry, Solid::Toothpaste])
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_lies_outside_the_bounds(
+            solid in any_solid(),
+            coords in prop::array::uniform3(-2.0f64..2.0),
+            spacing in 0.0005f64..0.04,
+        ) {
+            let (_, high) = solid.bounds(spacing);
+            prop_assume!(coords.iter().any(|c| c.abs() > 1.0));
+            let p = Point3::from(high.coords.component_mul(&Vector3::from(coords)));
+            prop_assert!(solid.depth(&p, spacing) <= 0.0);
+        }
+
+        #[test]
+        fn projected_points_lie_on_the_surface(
+            solid in any_solid(),
+            direction in prop::array::uniform3(-1.0f64..1.0),
+        ) {
+            let direction = Vector3::from(direction);
+            prop_assume!(direction.norm() > 0.1);
+            let spacing = 0.004;
+            // Walk out from the middle until just outside.
+            let step = direction.normalize() * 0.02 * spacing;
+            let mut p = Point3::origin();
+            while solid.depth(&p, spacing) > 0.0 {
+                p += step;
+            }
+            if let Some(on) = solid.project(&p, spacing) {
+                prop_assert!(solid.depth(&on, spacing).abs() < 1e-4 * spacing);
+                prop_assert!((on - p).norm() < 0.2 * spacing);
+            } else {
+                // Only the tube has edges.
+                prop_assert_eq!(solid, Solid::Toothpaste);
+            }
+        }
+    }
+
+    #[test]
+    fn middle_of_every_solid_is_inside() {
+        for solid in [Solid::Sphere, Solid::Strawberry, Solid::Toothpaste] {
+            for spacing in [0.0005, 0.002, 0.01, 0.03] {
+                assert!(solid.depth(&Point3::origin(), spacing) > 0.005);
+            }
+        }
+    }
+}

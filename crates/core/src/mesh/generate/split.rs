@@ -89,3 +89,34 @@ const SCATTER: u64 = 1_000_000_007;
 
 /// The six edges of an element by its corners.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{BuiltIn, Quality, Surface, TetMesh, generate};
+
+    #[test]
+    fn splits_keep_the_surface_and_the_volume() {
+        let mesh = generate(BuiltIn::Cube, 1000).unwrap();
+        let mut stuffing =
+            Stuffing { vertices: mesh.vertices().to_vec(), tets: mesh.tets().to_vec() };
+        assert_eq!(split_inner_edges(&mut stuffing, 50, 0.3), 50);
+        let split = TetMesh::try_new(stuffing.vertices, stuffing.tets, Vec::new()).unwrap();
+        assert_eq!(split.node_count(), 1050);
+        let volume = |m: &TetMesh| Quality::from_mesh(m, 0).volume;
+        assert!((volume(&split) - volume(&mesh)).abs() < 1e-15);
+        let triangles = |m: &TetMesh| Surface::from_mesh(m).triangles.len();
+        assert_eq!(triangles(&split), triangles(&mesh));
+        assert_eq!(Surface::overused_faces(&split), 0);
+        assert!(Quality::from_mesh(&split, 0).dihedral_min.sin() >= 0.3);
+    }
+
+    #[test]
+    fn nothing_is_split_where_no_edge_is_inside() {
+        let vertices = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]];
+        let mut stuffing =
+            Stuffing { vertices: vertices.map(Point3::from).to_vec(), tets: vec![[0, 1, 2, 3]] };
+        assert_eq!(split_inner_edges(&mut stuffing, 3, 0.0), 0);
+        assert_eq!(stuffing.vertices.len(), 4);
+    }
+}

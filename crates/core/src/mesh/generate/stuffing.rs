@@ -159,9 +159,15 @@ struct Pieces<'a> {
 impl Pieces<'_> {
     /// Adds what lies inside of one lattice tetrahedron.
     fn add(&mut self, corners: [usize; 4]) {
-        let mut inside = Vec::with_capacity(4);
-        let mut on = Vec::with_capacity(4);
-        let mut outside = Vec::with_capacity(4);
+        // Nearly all are whole or empty; they need no lists.
+        if corners.iter().all(|c| self.sides[*c] != Side::Inside) {
+            return;
+        }
+        if corners.iter().all(|c| self.sides[*c] != Side::Outside) {
+            self.tets.push(corners.map(Corner::Point));
+            return;
+        }
+        let (mut inside, mut on, mut outside) = (Vec::new(), Vec::new(), Vec::new());
         for c in corners {
             match self.sides[c] {
                 Side::Inside => inside.push(c),
@@ -170,8 +176,6 @@ impl Pieces<'_> {
             }
         }
         match (&inside[..], &on[..], &outside[..]) {
-            ([], _, _) => {}
-            (_, _, []) => self.tets.push(corners.map(Corner::Point)),
             (&[a], _, _) => {
                 let mut tet = [Corner::Point(a); 4];
                 let rest = on.iter().copied().chain(outside.iter().map(|o| self.cut(a, *o)));
@@ -192,7 +196,7 @@ impl Pieces<'_> {
                 [a, b, c].map(Corner::Point),
                 [self.cut(a, o), self.cut(b, o), self.cut(c, o)],
             ),
-            _ => unreachable!("a tetrahedron has four corners"),
+            _ => unreachable!("a cut tetrahedron has 1 to 3 corners inside, one or more outside"),
         }
     }
 
@@ -267,3 +271,42 @@ const WARP_LONG: f64 = 0.24999;
 
 /// The same for short edges.
 const WARP_SHORT: f64 = 0.41189;
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::mesh::{Quality, Surface, TetMesh};
+
+    #[test]
+    fn root_of_a_cubic_is_found() {
+        let f = |t: f64| 0.3 - t * t * t;
+        let t = find_root(f, f(0.0), f(1.0));
+        assert!((t - 0.3f64.cbrt()).abs() < 1e-8, "{t}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn cut_elements_fit_together_and_keep_the_published_angle(
+            shift in prop::array::uniform3(0.0f64..1.0),
+            spacing in 0.004f64..0.016,
+            solid in prop::sample::select(vec![Solid::Sphere, Solid::Strawberry, Solid::Toothpaste]),
+        ) {
+            let (low, high) = solid.bounds(spacing);
+            let stuffing = stuff(solid, &Lattice::around(low, high, spacing, shift));
+            let mesh = TetMesh::try_new(stuffing.vertices, stuffing.tets, Vec::new()).unwrap();
+            // 10.7° and 164.8° are what Labelle and Shewchuk prove for these thresholds.
+            let quality = Quality::from_mesh(&mesh, 0);
+            prop_assert!(quality.dihedral_min.to_degrees() > 10.7);
+            prop_assert!(quality.dihedral_max.to_degrees() < 164.8);
+            let surface = Surface::from_mesh(&mesh);
+            prop_assert_eq!(surface.non_manifold_edges(), 0);
+            for n in &surface.nodes {
+                let depth = solid.depth(&mesh.vertices()[*n as usize], spacing);
+                prop_assert!(depth.abs() < 1e-6 * spacing, "{depth:e}");
+            }
+        }
+    }
+}
