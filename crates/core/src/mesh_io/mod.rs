@@ -9,6 +9,7 @@ mod error;
 mod findings;
 mod format;
 mod gmsh;
+mod gmsh_header;
 mod medit;
 mod msh1;
 mod msh2;

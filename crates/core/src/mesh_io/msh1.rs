@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::cell_kind::{CellKind, Shape, gmsh_cell};
 use super::cursor::{Cursor, words};
 use super::error::MeshFileError;
-use super::gmsh::end_section;
+use super::gmsh_header::end_section;
 use super::number::parse_integer;
 use super::raw_mesh::RawMesh;
 

@@ -8,7 +8,7 @@ use super::byte_order::ByteOrder;
 use super::cell_kind::{CellKind, Shape, gmsh_cell};
 use super::cursor::Cursor;
 use super::error::MeshFileError;
-use super::gmsh::{Header, end_section};
+use super::gmsh_header::{Header, end_section};
 use super::msh1::read_integers;
 use super::raw_mesh::RawMesh;
 

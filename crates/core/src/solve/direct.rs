@@ -6,6 +6,7 @@ use super::front::{FrontAnalysis, FrontError, FrontFactor};
 use super::k11::{SparseK11, right_hand_side, visit_k11};
 use super::partition::AXIS_NAMES;
 use super::pcg::{self, PcgParams, norm};
+use super::pivot::NotPositive;
 use super::sparse::{Analysis, SparseFactor};
 use super::tiles::Tiles;
 use super::{Method, Partition, Stage, gauss_jordan, ordering};
@@ -61,12 +62,6 @@ pub struct Solution {
     pub residual_rel: f64,
     /// Refinement steps taken.
     pub refinement_steps: u32,
-}
-
-/// Row of `K11` where a pivot was not positive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct NotPositive {
-    pub row: usize,
 }
 
 /// Why there is no answer.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::direct::NotPositive;
+use super::pivot::NotPositive;
 
 /// Inverts a symmetric positive definite matrix in place by Gauss–Jordan elimination without
 /// pivoting; the inner loop over rows runs on the current rayon pool with the same bits for any

@@ -10,6 +10,7 @@ mod mobility;
 mod ordering;
 mod partition;
 mod pcg;
+mod pivot;
 mod sparse;
 mod stage;
 mod tiles;

@@ -10,8 +10,8 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Par, Side};
 
-use super::direct::NotPositive;
 use super::k11::SparseK11;
+use super::pivot::NotPositive;
 
 /// Order and symbolic analysis of `K11`.
 pub(super) struct Analysis {

@@ -15,7 +15,7 @@ use faer::prelude::*;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
 
-use super::direct::NotPositive;
+use super::pivot::NotPositive;
 
 /// Lower triangle of a symmetric matrix, or a lower triangular one, in square tiles.
 ///

@@ -18,23 +18,13 @@ use nalgebra::DMatrix;
 
 use super::base::{Base, CondensedError, gamma};
 use super::columns::NodeColumns;
-use super::contact_set::{ContactAnswer, ContactSet};
 use crate::solve::FrontFactor;
 use crate::solve::pcg::norm;
-
-/// How wrong an answer can be.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Certificate {
-    /// `‖r‖ / ‖b‖` by the triangle inequality over the columns' residuals as computed.
-    pub residual_rel: f64,
-    /// Proven bound on `‖e‖ / ‖u‖` over all nodes, or why there is none.
-    pub error_bound_rel: Result<f64, &'static str>,
-}
 
 /// What the bound needs of a contact set.
 pub(super) struct SmallBound {
     /// `‖M D‖² ‖(D S D)⁻¹‖`; zero when the scene's own nodes are the base.
-    compliance: f64,
+    pub compliance: f64,
 }
 
 impl SmallBound {
@@ -124,68 +114,5 @@ impl Base {
             x = y;
         }
         quotient
-    }
-}
-
-impl ContactSet {
-    /// How wrong an answer can be; costs no more than a few products of the size of the set.
-    ///
-    /// Shapes: `q` one per touched degree of freedom; `delivered` displacements of distinct nodes,
-    /// whose size makes the relative bound sharper (may be empty).
-    pub fn certify(
-        &self,
-        base: &Base,
-        q: &[f64],
-        answer: &ContactAnswer,
-        delivered: &[[f64; 3]],
-    ) -> Certificate {
-        let places = self.places.iter().map(|&(node, axis)| {
-            let columns = &self.columns[node];
-            [columns.norms[axis], columns.residuals[axis], columns.residual_bounds[axis]]
-        });
-        let modes = base.modes.iter().map(|m| [m.norm, m.residual, m.residual_bound]);
-        let amounts = answer.lambda.iter().chain(&answer.amounts);
-        let [mut moved, mut residual, mut residual_bound] = [0.0; 3];
-        for ([field, computed, bound], amount) in places.chain(modes).zip(amounts) {
-            moved += amount.abs() * field;
-            residual += amount.abs() * computed;
-            residual_bound += amount.abs() * bound;
-        }
-        // What the touched nodes are off moves their neighbours by at most so much force.
-        let off = base.stiffest * answer.mismatch;
-        residual += off;
-        residual_bound += off;
-        let b = norm(&self.load_of(base, q));
-        let residual_rel = if b > 0.0 { residual / b } else { residual };
-        let rounding = gamma(self.dofs().len() + base.modes.len() + 2) * moved;
-        // Part of the answer bounds the size of the whole from below.
-        let size = norm(q).max(norm(delivered.as_flattened()));
-        let error_bound_rel = match base.eigenvalue_min() {
-            None => Err("no lower bound of the smallest eigenvalue has been proven for this shape"),
-            Some(_) if size <= 0.0 => Err("nothing moves"),
-            Some(eigenvalue) => {
-                let compliance = 1.0 / eigenvalue + self.bound.compliance;
-                Ok((residual_bound * compliance + rounding + answer.mismatch) / size)
-            }
-        };
-        Certificate { residual_rel, error_bound_rel }
-    }
-
-    /// `b = −K12 q` of (3.42a), over the touched degrees of freedom's neighbours.
-    fn load_of(&self, base: &Base, q: &[f64]) -> Vec<f64> {
-        let mut load: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
-        for (&dof, &value) in self.dofs().iter().zip(q) {
-            let (node, axis) = (dof as usize / 3, dof as usize % 3);
-            for (other, block) in base.stiffness.row(node) {
-                for c in 0..3 {
-                    *load.entry(3 * other + c).or_default() -= block[3 * axis + c] * value;
-                }
-            }
-        }
-        let is_free = |dof: &usize| {
-            self.dofs().binary_search(&(*dof as u32)).is_err()
-                && base.fixed.binary_search(&(*dof as u32)).is_err()
-        };
-        load.into_iter().filter(|(dof, _)| is_free(dof)).map(|(_, value)| value).collect()
     }
 }

@@ -16,12 +16,13 @@
 
 mod base;
 mod bound;
+mod certificate;
 mod columns;
 mod contact_set;
 #[cfg(test)]
 mod tests;
 
 pub use base::{Base, CondensedError};
-pub use bound::Certificate;
+pub use certificate::Certificate;
 pub use columns::{Columns, NodeColumns};
 pub use contact_set::{ContactAnswer, ContactSet};

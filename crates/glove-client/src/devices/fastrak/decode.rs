@@ -1,7 +1,7 @@
 //! Decides what the bytes at the head of the tracker's stream are.
 
 use super::encode::NUMBER_LIMIT;
-use super::parser::FastrakFaultKind;
+use super::fault::FastrakFaultKind;
 use super::record::{Attitude, Encoding, FastrakFormat, FastrakRecord, OutputList, Station};
 
 /// What the head of the stream is.

@@ -2,13 +2,15 @@
 
 mod decode;
 mod encode;
+mod fault;
 mod flip;
 mod parser;
 mod record;
 
 pub use encode::{EncodeError, encode_record};
+pub use fault::{FastrakFault, FastrakFaultKind};
 pub use flip::{FlipWatch, HemisphereFlip};
-pub use parser::{FastrakEvent, FastrakFault, FastrakFaultKind, FastrakParser};
+pub use parser::{FastrakEvent, FastrakParser};
 pub use record::{
     Attitude, Encoding, FastrakFormat, FastrakRecord, LengthUnit, OutputList, Station,
     StationError, world_from_transmitter,
