@@ -7,8 +7,16 @@ use softgrasp_protocol::{
 };
 
 /// Names of all methods, slowest first.
-pub const METHODS: [&str; 4] =
-    ["gauss-jordan", "dense-inverse", "dense-cholesky", "sparse-cholesky"];
+pub const METHODS: [&str; 8] = [
+    "gauss-jordan",
+    "dense-inverse",
+    "dense-cholesky",
+    "sparse-cholesky",
+    "front",
+    "front-mixed",
+    "pcg",
+    "condensed",
+];
 
 /// Rubber-like.
 pub const MATERIAL: Material = Material { young: 1.0e5, poisson: 0.3 };

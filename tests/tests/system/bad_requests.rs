@@ -7,8 +7,7 @@ use softgrasp_protocol::RejectCode::{
     BadRequest, MemoryLimit, RigidMotionFree, TooLarge, UnknownMethod, UnknownModel,
 };
 use softgrasp_protocol::{
-    DofValue, ElementName, Material, MethodName, ModelHash, NodeChoice, RejectCode, Reply, Request,
-    SolveOnce,
+    DofValue, Material, MethodName, ModelHash, NodeChoice, RejectCode, Reply, Request, SolveOnce,
 };
 use softgrasp_tests::heard::AnswerBits;
 use softgrasp_tests::questions::{MATERIAL, cube, frame, once, question, upload};
@@ -98,7 +97,7 @@ fn meshes_that_cannot_be_modelled_are_refused_by_element_or_node() {
 }
 
 #[test]
-fn materials_and_elements_that_do_not_exist_are_refused() {
+fn materials_and_methods_that_do_not_exist_are_refused() {
     let mut bench = Bench::new(server(1));
     bench.refuses_changed(|r| r.materials.clear(), BadRequest, &["no material"]);
     bench.refuses_changed(|r| r.materials[0].poisson = 0.5, BadRequest, &["0.5", "0.49"]);
@@ -119,7 +118,6 @@ fn materials_and_elements_that_do_not_exist_are_refused() {
         &["2 materials", "3 region labels", "one for each"],
     );
     bench.refuses_changed(|r| r.materials.push(MATERIAL), BadRequest, &["2 materials", "0 region"]);
-    bench.refuses_changed(|r| r.element = ElementName::T10, BadRequest, &["t10", "use t4"]);
     bench.refuses_changed(
         |r| r.question.method = MethodName::try_new("cramers-rule").unwrap(),
         UnknownMethod,

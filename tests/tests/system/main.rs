@@ -9,6 +9,7 @@
 mod bad_requests;
 mod bad_streams;
 mod disturbed_links;
+mod engine;
 mod many_clients;
 mod same_bits;
 mod start;
