@@ -7,15 +7,21 @@
 
 mod axis;
 pub mod collision;
+pub mod echo;
+pub mod fit;
+pub mod frame;
 pub mod machine;
 pub mod methods;
 pub mod plot;
 pub mod reference;
 pub mod report;
 pub mod sample;
+pub mod scaling;
 pub mod scene;
 pub mod stages;
 pub mod table;
+pub mod thesis;
+pub mod threads;
 
 use std::path::PathBuf;
 
@@ -53,7 +59,8 @@ impl ReportName {
 pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>), ReportError> {
     let report = match name {
         ReportName::Methods => methods::measure(options)?,
-        _ => panic!(),
+        ReportName::Frame => frame::measure(options)?,
+        ReportName::Scaling => scaling::measure(options)?,
         ReportName::Collision => collision::measure(options)?,
     };
     let files = report.write(&options.out)?;

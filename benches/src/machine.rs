@@ -3,6 +3,8 @@
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use crate::threads::processors;
+
 /// Everything a reader needs to judge the figures of a report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
@@ -59,11 +61,6 @@ impl Machine {
             ("load before", load),
         ]
     }
-}
-
-/// Processors this process may use.
-pub fn processors() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 const BUILD: &str = if cfg!(debug_assertions) { "not optimised for measuring" } else { "release" };

@@ -1,16 +1,17 @@
 //! Report `methods`: time by stage of every method, its error beside it.
 
+use std::time::Duration;
+
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::Method;
 
-use crate::machine::processors;
 use crate::reference::Reference;
 use crate::report::{Options, Report, ReportError, check, progress};
 use crate::sample::{Competitor, Effort, Spread, take_turns};
 use crate::scene::Pressed;
 use crate::stages::StageTimes;
 use crate::table::{Cell, Table, three_digits};
-use std::time::Duration;
+use crate::threads::{pool, processors};
 
 /// Largest error, relative to the reference, with which a time is reported.
 const ERROR_ALLOWED: f64 = 1e-9;
@@ -86,17 +87,6 @@ fn effort(is_quick: bool) -> Effort {
             budget: Duration::from_secs(60),
         },
     }
-}
-
-/// A rayon pool of exactly so many threads.
-///
-/// # Errors
-/// [`ReportError::Threads`].
-pub(crate) fn pool(threads: usize) -> Result<rayon::ThreadPool, ReportError> {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|source| ReportError::Threads { threads, source })
 }
 
 fn add_rows(table: &mut Table, scene: &Pressed, runs: &[Vec<Run>]) {

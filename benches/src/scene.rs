@@ -5,6 +5,10 @@ use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Loads, Method, Solution};
+use softgrasp_protocol::{
+    DofValue, ElementName, MeshData, MethodName, NodeChoice, Precision, Question, SolveOnce,
+    UploadModel, Want,
+};
 
 use crate::report::ReportError;
 use crate::stages::{StageTimes, StageWatch};
@@ -89,6 +93,44 @@ impl Pressed {
         let loads = Loads { q_known: &known.q_known, forces: &[] };
         let solution = factored.solve(model.stiffness(), loads, &mut |s| watch.begin(s))?;
         Ok((watch.finish(), solution))
+    }
+
+    /// The same question for a server: mesh, material, partition and known displacements in one
+    /// (thesis 5.1.1).
+    pub fn solve_once(&self, method: Method) -> SolveOnce {
+        let (mesh, materials) = self.on_the_wire();
+        let question = self.question(method, 1.0, NodeChoice::All);
+        SolveOnce { mesh, materials, element: ElementName::T4, question }
+    }
+
+    /// The model for a server to keep.
+    pub fn upload(&self) -> UploadModel {
+        let (mesh, materials) = self.on_the_wire();
+        UploadModel { mesh, materials, element: ElementName::T4, fixed: Vec::new() }
+    }
+
+    /// Partition and known displacements, the latter times `scale`.
+    pub fn question(&self, method: Method, scale: f64, nodes: NodeChoice) -> Question {
+        let known = self.pairs.iter().map(|&(dof, u)| DofValue { dof, value: scale * u });
+        let method = MethodName::try_new(method.name());
+        Question {
+            known: known.collect(),
+            forces: Vec::new(),
+            method: method.expect("the names of all methods can be sent"),
+            want: Want { nodes, reactions: false, precision: Precision::F64 },
+            max_error: None,
+            deadline_ms: None,
+        }
+    }
+
+    fn on_the_wire(&self) -> (MeshData, Vec<softgrasp_protocol::Material>) {
+        let mesh = MeshData {
+            vertices: self.mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
+            tets: self.mesh.tets().to_vec(),
+            regions: Vec::new(),
+        };
+        let (young, poisson) = (self.material.young(), self.material.poisson());
+        (mesh, vec![softgrasp_protocol::Material { young, poisson }])
     }
 
     /// Number of unknown degrees of freedom.
