@@ -57,12 +57,13 @@ impl ReportName {
 /// # Errors
 /// [`ReportError`]; an answer that fails its check is one, and then nothing is written.
 pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>), ReportError> {
-    let report = match name {
+    let mut report = match name {
         ReportName::Methods => methods::measure(options)?,
         ReportName::Frame => frame::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,
         ReportName::Collision => collision::measure(options)?,
     };
+    report.end();
     let files = report.write(&options.out)?;
     Ok((report, files))
 }

@@ -22,8 +22,8 @@ pub struct Machine {
     pub commit: String,
     /// Day the measurement began, UTC.
     pub date: String,
-    /// Processes that were running or waiting in the minute before; above 0 others were at work.
-    pub load_before: Option<f64>,
+    /// Load when the measurement began, see [`load_text`].
+    pub load_before: String,
 }
 
 impl Machine {
@@ -42,14 +42,13 @@ impl Machine {
             date: SystemTime::now()
                 .duration_since(UNIX_EPOCH)
                 .map_or_else(|_| "unknown".to_owned(), |d| day(d.as_secs() / 86_400)),
-            load_before: read("/proc/loadavg").split(' ').next().and_then(|v| v.parse().ok()),
+            load_before: load_text(),
         }
     }
 
     /// The same as pairs of name and value, in the order of the head of a report.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let memory = format!("{:.0} GiB", self.memory_gib);
-        let load = self.load_before.map_or("unknown".to_owned(), |load| format!("{load:.1}"));
         vec![
             ("date", self.date.clone()),
             ("commit", self.commit.clone()),
@@ -58,12 +57,21 @@ impl Machine {
             ("memory", if self.memory_gib > 0.0 { memory } else { "unknown".to_owned() }),
             ("system", self.system.clone()),
             ("compiler", self.compiler.clone()),
-            ("load before", load),
+            ("load before", self.load_before.clone()),
         ]
     }
 }
 
 const BUILD: &str = if cfg!(debug_assertions) { "not optimised for measuring" } else { "release" };
+
+/// Processes that were running or waiting in the last minute, on average. Before a measurement, what
+/// is above 0 are others at work; after it, the measurement's own threads are among them.
+pub fn load_text() -> String {
+    match read("/proc/loadavg").split_once(' ') {
+        Some((load, _)) => load.to_owned(),
+        None => "unknown".to_owned(),
+    }
+}
 
 fn read(path: &str) -> String {
     std::fs::read_to_string(path).unwrap_or_default()

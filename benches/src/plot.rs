@@ -75,7 +75,8 @@ pub enum PlotError {
     },
 }
 
-const SIZE: (u32, u32) = (860, 540);
+const SIZE: (u32, u32) = (1040, 540);
+const LEGEND_WIDTH: u32 = 250;
 const FONT: &str = "sans-serif";
 /// Told apart with any kind of colour vision (Okabe and Ito).
 const COLOURS: [RGBColor; 7] = [
@@ -125,6 +126,7 @@ impl Plot {
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, (FONT, 20))
             .margin(12)
+            .margin_right(LEGEND_WIDTH + 12)
             .x_label_area_size(44)
             .y_label_area_size(66)
             .build_cartesian_2d(x_axis, y_axis)?;
@@ -139,12 +141,7 @@ impl Plot {
         for (index, series) in self.series.iter().enumerate() {
             self.draw_series(&mut chart, series, COLOURS[index % COLOURS.len()])?;
         }
-        chart
-            .configure_series_labels()
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .label_font((FONT, 13))
-            .draw()?;
+        self.draw_legend(area)?;
         area.present()
     }
 
@@ -153,19 +150,11 @@ impl Plot {
             self.shown().filter(|(s, _)| std::ptr::eq(*s, series)).map(|(_, p)| p).collect();
         let line = points.iter().map(|p| (p.x, p.y));
         let style = colour.stroke_width(2);
-        let drawn = match series.mark {
-            Mark::Line => chart.draw_series(LineSeries::new(line, style))?,
-            Mark::Dashed => chart.draw_series(DashedLineSeries::new(line, 6, 5, style))?,
-            Mark::Points => chart.draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?,
-        };
-        let is_line = series.mark != Mark::Points;
-        drawn.label(&series.label).legend(move |(x, y)| {
-            let from = if is_line { x } else { x + 9 };
-            PathElement::new(
-                [(from, y), (x + if is_line { 18 } else { 12 }, y)],
-                colour.stroke_width(3),
-            )
-        });
+        match series.mark {
+            Mark::Line => drop(chart.draw_series(LineSeries::new(line, style))?),
+            Mark::Dashed => drop(chart.draw_series(DashedLineSeries::new(line, 6, 5, style))?),
+            Mark::Points => {}
+        }
         if series.mark != Mark::Dashed {
             let dot = |p: &PlotPoint| Circle::new((p.x, p.y), 4, colour.filled());
             chart.draw_series(points.iter().map(dot))?;
@@ -176,6 +165,27 @@ impl Plot {
             Some(PathElement::new(ends, colour.stroke_width(1)))
         });
         chart.draw_series(bars)?;
+        Ok(())
+    }
+
+    /// Names of the series beside the plot, where they hide nothing.
+    fn draw_legend(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Drawn {
+        let left = SIZE.0.saturating_sub(LEGEND_WIDTH) as i32;
+        for ((series, colour), line) in self.series.iter().zip(COLOURS.iter().cycle()).zip(0i32..) {
+            let y = 60 + 22 * line;
+            if series.mark == Mark::Points {
+                area.draw(&Circle::new((left + 12, y), 4, colour.filled()))?;
+            } else {
+                let step = if series.mark == Mark::Dashed { 9 } else { 24 };
+                let mut x = left;
+                while x < left + 24 {
+                    let ends = [(x, y), ((x + step - step / 3).min(left + 24), y)];
+                    area.draw(&PathElement::new(ends, colour.stroke_width(3)))?;
+                    x += step;
+                }
+            }
+            area.draw(&Text::new(series.label.as_str(), (left + 32, y - 6), (FONT, 14)))?;
+        }
         Ok(())
     }
 

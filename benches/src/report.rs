@@ -9,7 +9,7 @@ use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::SolveError;
 use softgrasp_core::sphere_tree::TreeError;
 
-use crate::machine::Machine;
+use crate::machine::{Machine, load_text};
 use crate::plot::PlotError;
 use crate::table::Table;
 
@@ -129,6 +129,11 @@ impl Report {
             head.push(("note", options.note.clone()));
         }
         Self { stem: stem.to_owned(), title: title.to_owned(), head, sections: Vec::new() }
+    }
+
+    /// Notes the load at the end of the measurement.
+    pub fn end(&mut self) {
+        self.head.push(("load after", load_text()));
     }
 
     /// Adds a paragraph.

@@ -57,7 +57,7 @@ pub fn timed_ms<T>(work: impl FnOnce() -> T) -> (f64, T) {
 }
 
 /// Median and extremes of a list of numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spread {
     /// Middle value, or the mean of the two.
     pub median: f64,
@@ -65,6 +65,10 @@ pub struct Spread {
     pub min: f64,
     /// Largest.
     pub max: f64,
+    /// Value that about a tenth is below.
+    pub p10: f64,
+    /// Value that about a tenth is above.
+    pub p90: f64,
     /// How many there were.
     pub count: usize,
 }
@@ -76,10 +80,11 @@ impl Spread {
         sorted.sort_by(f64::total_cmp);
         let count = sorted.len();
         let (Some(&min), Some(&max)) = (sorted.first(), sorted.last()) else {
-            return Self { median: 0.0, min: 0.0, max: 0.0, count };
+            return Self::default();
         };
         let median = 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
-        Self { median, min, max, count }
+        let (p10, p90) = (sorted[(count - 1) / 10], sorted[count - 1 - (count - 1) / 10]);
+        Self { median, min, max, p10, p90, count }
     }
 
     /// Of the quotients of two competitors, round by round.
@@ -154,6 +159,9 @@ mod tests {
             let above = values.iter().filter(|&&v| v > spread.median).count();
             prop_assert!(2 * below <= values.len() && 2 * above <= values.len());
             prop_assert!(values.iter().all(|v| (spread.min..=spread.max).contains(v)));
+            prop_assert!(spread.p10 <= spread.median && spread.median <= spread.p90);
+            let outside = values.iter().filter(|&&v| v < spread.p10 || v > spread.p90).count();
+            prop_assert!(outside <= 2 * (values.len() / 10));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Brute force: every vertex against every collider. What it finds must not be missed.
 
 use nalgebra::{Point3, Vector3};
-use softgrasp_core::hand::HandColliders;
+use softgrasp_core::hand::{FingerColliders, HandColliders};
 use softgrasp_core::shape::{Cylinder, Sphere};
 
 /// What really is inside a hand.
@@ -9,8 +9,7 @@ use softgrasp_core::shape::{Cylinder, Sphere};
 pub(super) struct Inside {
     /// Vertices inside each of the fifteen cylinders and then the five tips, ascending.
     pub by_collider: Vec<Vec<u32>>,
-    /// For each tip the vertex it certainly touches: the one nearest to its contact point of the
-    /// whole surface, if that is in the tip's sphere and the contact point is behind it (4.10).
+    /// The vertex that each tip certainly touches, see [`contact`].
     pub contacts: [Option<u32>; 5],
 }
 
@@ -30,15 +29,7 @@ impl Inside {
             .collect();
         by_collider
             .extend(hand.fingers.iter().map(|finger| inside(&|p| is_in_sphere(&finger.tip, p))));
-        let contacts = hand.fingers.map(|finger| {
-            let distance = |p: &Point3<f64>| (p - finger.contact_point).norm_squared();
-            let nearest = (0..points.len())
-                .min_by(|&a, &b| distance(&points[a]).total_cmp(&distance(&points[b])))?;
-            let d = finger.contact_point - points[nearest];
-            let touches =
-                is_in_sphere(&finger.tip, &points[nearest]) && d.dot(&normals[nearest]) <= 0.0;
-            touches.then(|| u32::try_from(nearest).expect("vertices are counted in u32"))
-        });
+        let contacts = hand.fingers.map(|finger| contact(&finger, points, normals));
         Self { by_collider, contacts }
     }
 
@@ -46,6 +37,23 @@ impl Inside {
     pub fn count(&self) -> usize {
         self.by_collider.iter().map(Vec::len).sum()
     }
+}
+
+/// Vertex that a fingertip certainly touches: the one nearest to its contact point of the whole
+/// surface, if it lies in the tip's sphere and the contact point is not outside its tangent plane.
+///
+/// Source: thesis (4.10).
+pub(super) fn contact(
+    finger: &FingerColliders,
+    points: &[Point3<f64>],
+    normals: &[Vector3<f64>],
+) -> Option<u32> {
+    let distance = |p: &Point3<f64>| (p - finger.contact_point).norm_squared();
+    let (node, nearest) =
+        (0..).zip(points).min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+    let d = finger.contact_point - nearest;
+    let is_behind = d.dot(&normals[node as usize]) <= 0.0;
+    (is_behind && is_in_sphere(&finger.tip, nearest)).then_some(node)
 }
 
 fn is_in_sphere(sphere: &Sphere, point: &Point3<f64>) -> bool {

@@ -186,7 +186,8 @@ fn on_twenty_seven(series: &[Series], laws: &[SizeLaw]) -> String {
          out there is an assumption: a part that does not get faster is invisible in it, and \
          Amdahl's law, which has one, gives another number from the same measurements. The thesis \
          extrapolates in the same way from four processors, with a slope below −1 at about 200 \
-         vertices, which no law without cache effects keeps up.\n",
+         vertices: faster than in proportion to the processors, as growing caches can make a few \
+         of them, but not ever more.\n",
         (PROCESSORS_1998 as f64).ln() / (most.max(2) as f64).ln()
     ));
     text
@@ -214,8 +215,8 @@ fn shape_table(shapes: &[Series]) -> Table {
             s.unknown_dofs.into(),
             spread.median.into(),
             ratio.median.into(),
-            ratio.min.into(),
-            ratio.max.into(),
+            ratio.p10.into(),
+            ratio.p90.into(),
             s.error_rel.into(),
         ];
         table.push(row);
@@ -307,8 +308,8 @@ const SHAPE_COLUMNS: [&str; 9] = [
     "unknown_dofs",
     "median_s",
     "over_cube",
-    "over_cube_min",
-    "over_cube_max",
+    "over_cube_p10",
+    "over_cube_p90",
     "error_rel",
 ];
 
