@@ -62,3 +62,34 @@ fn collision_is_timed_and_nothing_is_missed() {
     let contacts = numbers(folder.path(), "collision-ratios.csv", "contacts_checked");
     assert!(contacts.iter().all(|&c| c > 0.0), "{contacts:?}");
 }
+
+#[test]
+fn frames_are_timed_beside_their_echo_with_small_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Frame, folder.path());
+    for name in ["error_rel", "residual_rel"] {
+        let errors = numbers(folder.path(), "frame.csv", name);
+        assert!(errors.iter().all(|&e| e < 1e-11) && errors.len() >= 8, "{name}: {errors:?}");
+    }
+    let (frames, echoes) = (
+        numbers(folder.path(), "frame.csv", "p50_ms"),
+        numbers(folder.path(), "frame.csv", "echo_p50_ms"),
+    );
+    assert!(frames.iter().chain(&echoes).all(|&ms| ms > 0.0));
+    // Warm frames reuse the factor of the first.
+    assert!(numbers(folder.path(), "frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
+}
+
+#[test]
+fn scaling_is_timed_fitted_and_drawn_with_small_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Scaling, folder.path());
+    for file in
+        ["scaling.csv", "scaling-shapes.csv", "scaling-procedures.csv", "scaling-stages.csv"]
+    {
+        let errors = numbers(folder.path(), file, "error_rel");
+        assert!(errors.iter().all(|&e| e < 1e-11) && !errors.is_empty(), "{file}: {errors:?}");
+    }
+    let vertices = std::fs::read_to_string(folder.path().join("scaling-vertices.svg")).unwrap();
+    assert!(vertices.contains("gauss-jordan") && vertices.contains("1998"));
+}
