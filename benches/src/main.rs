@@ -1,3 +1,52 @@
 //! `softgrasp-bench REPORT`: measured figures, each with its error.
 
-fn main() {}
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Parser;
+use softgrasp_bench::{Options, ReportName, run};
+
+/// Measure a report and write it as CSV, Markdown and SVG.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// Which report.
+    report: ReportName,
+    /// A small form of it, to see that it works; its figures mean little.
+    #[arg(long)]
+    quick: bool,
+    /// Folder for the files.
+    #[arg(long, default_value = "reports", value_name = "DIR")]
+    out: PathBuf,
+    /// A remark for the head of the report, for example what else the machine was doing.
+    #[arg(long, default_value = "", value_name = "TEXT", hide_default_value = true)]
+    note: String,
+}
+
+fn main() -> anyhow::Result<()> {
+    let arguments = Arguments::parse();
+    let options = Options {
+        is_quick: arguments.quick,
+        command: command(&arguments),
+        out: arguments.out,
+        note: arguments.note,
+    };
+    let (report, files) = run(arguments.report, &options)?;
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", report.markdown())?;
+    for file in files {
+        writeln!(out, "wrote {}", file.display())?;
+    }
+    Ok(())
+}
+
+/// The command to type to get this report again; the remark is not part of it.
+fn command(arguments: &Arguments) -> String {
+    let quick = if arguments.quick { " --quick" } else { "" };
+    let out = match arguments.out.to_str() {
+        Some("reports") | None => String::new(),
+        Some(folder) => format!(" --out {folder}"),
+    };
+    let name = arguments.report.name();
+    format!("cargo run --release --bin softgrasp-bench -- {name}{quick}{out}")
+}

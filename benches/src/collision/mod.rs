@@ -1,0 +1,9 @@
+//! Report `collision`: the sphere tree against parry3d's tree of boxes, and against brute force.
+
+mod brute;
+mod hand_poses;
+mod peer;
+mod report;
+mod skin;
+
+pub use report::measure;

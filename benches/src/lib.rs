@@ -1,0 +1,69 @@
+//! Reports of Softgrasp: measured figures, each beside its error.
+//!
+//! The way of a report: a [`scene`] is set up and its answer known ([`reference`]); competitors
+//! take turns ([`sample`]), and none's time counts before its answer was compared; [`table`] and
+//! [`plot`] give it a form, and [`report`] writes it under the head that [`machine`] knows.
+//! A further report is one more file, one more [`ReportName`] and one more arm of [`run`].
+
+mod axis;
+pub mod collision;
+pub mod echo;
+pub mod fit;
+pub mod frame;
+pub mod machine;
+pub mod methods;
+pub mod plot;
+pub mod reference;
+pub mod report;
+pub mod sample;
+pub mod scaling;
+pub mod scene;
+pub mod stages;
+pub mod table;
+pub mod thesis;
+pub mod threads;
+
+use std::path::PathBuf;
+
+pub use report::{Options, Report, ReportError};
+
+/// A report by its name on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ReportName {
+    /// Time by stage and error of every method.
+    Methods,
+    /// Round trip of a frame over loopback TCP against an echo of the same bytes.
+    Frame,
+    /// Figures 5.1, 5.2 and 6.13 to 6.16 of the thesis, measured again.
+    Scaling,
+    /// Tree build, refit and search against parry3d and brute force.
+    Collision,
+}
+
+impl ReportName {
+    /// The name, which is also that of its files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Methods => "methods",
+            Self::Frame => "frame",
+            Self::Scaling => "scaling",
+            Self::Collision => "collision",
+        }
+    }
+}
+
+/// Measures one report and writes its files.
+///
+/// # Errors
+/// [`ReportError`]; an answer that fails its check is one, and then nothing is written.
+pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>), ReportError> {
+    let mut report = match name {
+        ReportName::Methods => methods::measure(options)?,
+        ReportName::Frame => frame::measure(options)?,
+        ReportName::Scaling => scaling::measure(options)?,
+        ReportName::Collision => collision::measure(options)?,
+    };
+    report.end();
+    let files = report.write(&options.out)?;
+    Ok((report, files))
+}

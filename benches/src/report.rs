@@ -1,0 +1,269 @@
+//! A report: its head, its text, tables and figures, and how it is written.
+
+use std::path::{Path, PathBuf};
+
+use glove_client::connection::LinkError;
+use softgrasp_core::fem::MaterialError;
+use softgrasp_core::mesh::GenerateError;
+use softgrasp_core::model::ModelError;
+use softgrasp_core::solve::SolveError;
+use softgrasp_core::sphere_tree::TreeError;
+
+use crate::machine::{Machine, load_text};
+use crate::plot::PlotError;
+use crate::table::Table;
+
+/// What is asked of a report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Small sizes and few rounds: to see that it works.
+    pub is_quick: bool,
+    /// Folder for the files.
+    pub out: PathBuf,
+    /// Command that makes the report, for its head.
+    pub command: String,
+    /// Remark for the head; empty for none.
+    pub note: String,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// An object could not be made.
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    /// A material that is none.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    /// A model could not be made or held.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A method failed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// A sphere tree could not be built or refitted.
+    #[error(transparent)]
+    Tree(#[from] TreeError),
+    /// Client and server did not come together.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The echo that frames are compared with failed.
+    #[error("the echo over loopback failed: {0}")]
+    Echo(std::io::Error),
+    /// No threads.
+    #[error("no pool of {threads} threads: {source}")]
+    Threads {
+        /// Threads asked for.
+        threads: usize,
+        /// The system's reason.
+        source: rayon::ThreadPoolBuildError,
+    },
+    /// An answer failed its check, so its time means nothing.
+    #[error("{what}: error {error:e}, allowed is {allowed:e}; its time is not reported")]
+    Wrong {
+        /// What was checked.
+        what: String,
+        /// Its error.
+        error: f64,
+        /// What is allowed.
+        allowed: f64,
+    },
+    /// Nothing to fit a law to.
+    #[error("{what}: {count} measurements are too few for a fit")]
+    TooFew {
+        /// What was to be fitted.
+        what: String,
+        /// Measurements there are.
+        count: usize,
+    },
+    /// A figure could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// A file could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+}
+
+/// Part of a report, in the order of the page.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Section {
+    /// Markdown.
+    Text(String),
+    /// A table, also written as CSV.
+    Table(Table),
+    /// A figure, written as SVG.
+    Figure {
+        /// Name of its file, without `.svg`.
+        stem: String,
+        /// What it shows.
+        caption: String,
+        /// The drawing.
+        svg: String,
+    },
+}
+
+/// A finished report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    stem: String,
+    title: String,
+    head: Vec<(&'static str, String)>,
+    sections: Vec<Section>,
+}
+
+impl Report {
+    /// An empty report with its head; looks at the machine, so call it before measuring.
+    pub fn begin(stem: &str, title: &str, threads: &str, options: &Options) -> Self {
+        let mut head = vec![("command", options.command.clone())];
+        head.extend(Machine::look().lines());
+        head.push(("threads", threads.to_owned()));
+        if options.is_quick {
+            head.push(("form", "quick: small sizes, few rounds; not to be quoted".to_owned()));
+        }
+        if !options.note.is_empty() {
+            head.push(("note", options.note.clone()));
+        }
+        Self { stem: stem.to_owned(), title: title.to_owned(), head, sections: Vec::new() }
+    }
+
+    /// Notes the load at the end of the measurement.
+    pub fn end(&mut self) {
+        self.head.push(("load after", load_text()));
+    }
+
+    /// Adds a paragraph.
+    pub fn text(&mut self, markdown: impl Into<String>) {
+        self.sections.push(Section::Text(markdown.into()));
+    }
+
+    /// Adds a table.
+    pub fn table(&mut self, table: Table) {
+        self.sections.push(Section::Table(table));
+    }
+
+    /// Adds a figure.
+    pub fn figure(&mut self, stem: &str, caption: &str, svg: String) {
+        let (stem, caption) = (stem.to_owned(), caption.to_owned());
+        self.sections.push(Section::Figure { stem, caption, svg });
+    }
+
+    /// The tables, in order.
+    pub fn tables(&self) -> impl Iterator<Item = &Table> {
+        self.sections.iter().filter_map(|section| match section {
+            Section::Table(table) => Some(table),
+            _ => None,
+        })
+    }
+
+    /// The page.
+    pub fn markdown(&self) -> String {
+        let mut text = format!("# {}\n\n", self.title);
+        for (name, value) in &self.head {
+            let value = if *name == "command" { format!("`{value}`") } else { value.clone() };
+            text.push_str(&format!("- {name}: {value}\n"));
+        }
+        for section in &self.sections {
+            text.push('\n');
+            match section {
+                Section::Text(markdown) => text.push_str(&format!("{}\n", markdown.trim_end())),
+                Section::Table(table) => {
+                    text.push_str(&table.markdown());
+                    text.push_str(&format!("\n[{0}.csv]({0}.csv)\n", table.stem));
+                }
+                Section::Figure { stem, caption, .. } => {
+                    text.push_str(&format!("![{caption}]({stem}.svg)\n\n{caption}\n"));
+                }
+            }
+        }
+        text
+    }
+
+    /// Writes the page, a CSV per table and an SVG per figure; the paths.
+    ///
+    /// # Errors
+    /// [`ReportError::Write`] names the file.
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
+        let write = |path: PathBuf, text: String| match std::fs::write(&path, text) {
+            Ok(()) => Ok(path),
+            Err(source) => Err(ReportError::Write { path, source }),
+        };
+        std::fs::create_dir_all(folder)
+            .map_err(|source| ReportError::Write { path: folder.to_owned(), source })?;
+        let head: Vec<String> =
+            self.head.iter().map(|(name, value)| format!("{name}: {value}")).collect();
+        let mut paths = vec![write(folder.join(format!("{}.md", self.stem)), self.markdown())?];
+        for section in &self.sections {
+            let (name, text) = match section {
+                Section::Text(_) => continue,
+                Section::Table(table) => (format!("{}.csv", table.stem), table.csv(&head)),
+                Section::Figure { stem, svg, .. } => (format!("{stem}.svg"), svg.clone()),
+            };
+            paths.push(write(folder.join(name), text)?);
+        }
+        Ok(paths)
+    }
+}
+
+/// Refuses an error above what is allowed, NaN too.
+///
+/// # Errors
+/// [`ReportError::Wrong`].
+pub fn check(what: impl FnOnce() -> String, error: f64, allowed: f64) -> Result<(), ReportError> {
+    if error <= allowed {
+        return Ok(());
+    }
+    Err(ReportError::Wrong { what: what(), error, allowed })
+}
+
+/// Says on standard error what is being measured, since a report takes minutes.
+pub fn progress(report: &str, what: &str) {
+    eprintln!("{report}: {what}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_is_written_under_the_head() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options {
+            is_quick: true,
+            out: folder.path().to_owned(),
+            command: "bench --quick".to_owned(),
+            note: "shared".to_owned(),
+        };
+        let mut report = Report::begin("r", "Title", "2", &options);
+        report.text("Words.");
+        let mut table = Table::new("r-table", "T", &["x"]);
+        table.push([1usize.into()]);
+        report.table(table);
+        report.figure("r-figure", "A line.", "<svg/>".to_owned());
+        let paths = report.write(&options.out).unwrap();
+        let names: Vec<_> = paths.iter().map(|p| p.file_name().unwrap().to_owned()).collect();
+        assert_eq!(names, ["r.md", "r-table.csv", "r-figure.svg"]);
+        let page = std::fs::read_to_string(&paths[0]).unwrap();
+        for part in ["`bench --quick`", "- commit: ", "- note: shared", "Words.", "(r-figure.svg)"]
+        {
+            assert!(page.contains(part), "{part} is not in {page}");
+        }
+        let csv = std::fs::read_to_string(&paths[1]).unwrap();
+        assert!(
+            csv.starts_with("# command: bench --quick\n") && csv.ends_with("\nx\n1\n"),
+            "{csv}"
+        );
+    }
+
+    #[test]
+    fn a_time_without_a_right_answer_is_refused() {
+        assert!(check(|| "a".to_owned(), 1e-12, 1e-9).is_ok());
+        for error in [1e-8, f64::NAN, f64::INFINITY] {
+            assert!(matches!(check(String::new, error, 1e-9), Err(ReportError::Wrong { .. })));
+        }
+    }
+}

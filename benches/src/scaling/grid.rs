@@ -1,0 +1,99 @@
+//! Times over sizes, shapes, methods and processors.
+
+use std::time::Duration;
+
+use softgrasp_core::mesh::BuiltIn;
+use softgrasp_core::solve::Method;
+
+use crate::reference::Reference;
+use crate::report::{ReportError, check, progress};
+use crate::sample::{Competitor, Effort, Spread, take_turns};
+use crate::scene::Pressed;
+use crate::threads::pool;
+
+/// All rounds of one method on one object with one number of threads.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Series {
+    pub shape: BuiltIn,
+    pub nodes: usize,
+    pub unknown_dofs: usize,
+    pub method: Method,
+    pub threads: usize,
+    /// Time of the whole analysis in each round, s.
+    pub seconds: Vec<f64>,
+    /// Worst error of all rounds against the reference.
+    pub error_rel: f64,
+}
+
+/// The thesis's method and the one that replaces it; further ones join here.
+pub(super) const METHODS: [Method; 2] = [Method::GaussJordan, Method::DenseInverse];
+const ERROR_ALLOWED: f64 = 1e-9;
+
+impl Series {
+    pub fn spread(&self) -> Spread {
+        Spread::of(self.seconds.iter().copied())
+    }
+}
+
+/// Measures objects of one size: every method with every number of threads, in turns.
+pub(super) fn measure_objects(
+    objects: &[(BuiltIn, usize)],
+    thread_counts: &[usize],
+    is_quick: bool,
+) -> Result<Vec<Series>, ReportError> {
+    let mut scenes = Vec::new();
+    for &(shape, nodes) in objects {
+        progress("scaling", &format!("{shape}, {nodes} nodes"));
+        let scene = Pressed::try_new(shape, nodes)?;
+        let (model, known) = scene.model()?;
+        scenes.push((Reference::of(&model, &known)?, scene));
+    }
+    let pools = thread_counts.iter().map(|&t| pool(t)).collect::<Result<Vec<_>, _>>()?;
+    let mut series = Vec::new();
+    let mut competitors: Vec<Competitor<'_, (f64, f64), ReportError>> = Vec::new();
+    for (reference, scene) in &scenes {
+        for method in METHODS {
+            for (pool, &threads) in pools.iter().zip(thread_counts) {
+                series.push(Series {
+                    shape: scene.shape,
+                    nodes: scene.mesh.node_count(),
+                    unknown_dofs: scene.unknown_dofs(),
+                    method,
+                    threads,
+                    seconds: Vec::new(),
+                    error_rel: 0.0,
+                });
+                competitors.push(Box::new(move || {
+                    let (times, solution) = pool.install(|| scene.analyse(method))?;
+                    let error = reference.error_of(solution.displacement.iter().copied(), 1.0);
+                    check(|| format!("{method} on the {}", scene.shape), error, ERROR_ALLOWED)?;
+                    Ok((1e-3 * times.total, error))
+                }));
+            }
+        }
+    }
+    let results = take_turns(&effort(is_quick), &mut competitors)?;
+    for (series, runs) in series.iter_mut().zip(results) {
+        series.seconds = runs.iter().map(|run| run.0).collect();
+        series.error_rel = Spread::of(runs.iter().map(|run| run.1)).max;
+    }
+    Ok(series)
+}
+
+fn effort(is_quick: bool) -> Effort {
+    match is_quick {
+        true => Effort {
+            warm_up_rounds: 1,
+            rounds_min: 3,
+            rounds_max: 6,
+            budget: Duration::from_secs(1),
+        },
+        // At 1000 nodes a round takes half a minute.
+        false => Effort {
+            warm_up_rounds: 1,
+            rounds_min: 3,
+            rounds_max: 40,
+            budget: Duration::from_secs(20),
+        },
+    }
+}

@@ -1,0 +1,164 @@
+//! What is solved in every report: an object held and pressed by five fingertips.
+
+use nalgebra::{Point3, Vector3};
+use softgrasp_core::fem::Material;
+use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
+use softgrasp_core::model::{Known, Model};
+use softgrasp_core::solve::{Loads, Method, Solution};
+use softgrasp_protocol::{
+    DofValue, ElementName, MeshData, MethodName, NodeChoice, Precision, Question, SolveOnce,
+    UploadModel, Want,
+};
+
+use crate::report::ReportError;
+use crate::stages::{StageTimes, StageWatch};
+
+/// An object with five known nodes: four on top pushed down, one below pushed up.
+///
+/// Units: m, Pa. Frame: the object's.
+#[derive(Clone, Debug)]
+pub struct Pressed {
+    /// Which object.
+    pub shape: BuiltIn,
+    /// Its mesh.
+    pub mesh: TetMesh,
+    /// Its boundary.
+    pub surface: Surface,
+    /// What it is made of.
+    pub material: Material,
+    /// Known displacements, by degree of freedom; fifteen of them.
+    pub pairs: Vec<(u32, f64)>,
+}
+
+/// Soft rubber.
+const YOUNG: f64 = 1.0e5;
+const POISSON: f64 = 0.3;
+
+/// How far the tips press, as a share of the object's size, and where they touch: shares of half
+/// the extents of the bounding box.
+const TOUCHES: [([f64; 3], [f64; 3]); 5] = [
+    ([-0.5, 1.0, -0.5], [0.002, -0.02, 0.001]),
+    ([0.5, 1.0, -0.5], [-0.002, -0.02, 0.001]),
+    ([-0.5, 1.0, 0.5], [0.001, -0.015, -0.002]),
+    ([0.5, 1.0, 0.5], [-0.001, -0.015, -0.002]),
+    ([0.0, -1.0, 0.0], [0.0, 0.02, 0.0]),
+];
+
+impl Pressed {
+    /// A built-in object of about `nodes` nodes; each tip takes the surface node nearest to it
+    /// that no other has.
+    ///
+    /// # Errors
+    /// [`ReportError::Generate`], [`ReportError::Material`].
+    pub fn try_new(shape: BuiltIn, nodes: usize) -> Result<Self, ReportError> {
+        let mesh = generate(shape, nodes)?;
+        let surface = Surface::from_mesh(&mesh);
+        let material = Material::try_new(YOUNG, POISSON)?;
+        let (low, high) = mesh.bounds();
+        let (centre, half) = (nalgebra::center(&low, &high), (high - low) / 2.0);
+        let mut taken: Vec<u32> = Vec::new();
+        let mut pairs = Vec::new();
+        for (place, push) in TOUCHES {
+            let place = centre + half.component_mul(&Vector3::from(place));
+            let Some(node) = nearest(&mesh, &surface, &place, &taken) else { continue };
+            taken.push(node);
+            pairs.extend((0..3).zip(push).map(|(axis, u)| (3 * node + axis, u * mesh.size())));
+        }
+        pairs.sort_by_key(|&(dof, _)| dof);
+        Ok(Self { shape, mesh, surface, material, pairs })
+    }
+
+    /// Model with its stiffness, and the partition.
+    ///
+    /// # Errors
+    /// [`ReportError::Model`].
+    pub fn model(&self) -> Result<(Model, Known), ReportError> {
+        let model = Model::try_new(self.mesh.clone(), &[self.material], Vec::new(), &mut |_| {})?;
+        let known = model.known(self.pairs.clone())?;
+        Ok((model, known))
+    }
+
+    /// The whole finite element analysis by one method, from the mesh to the displacements, on the
+    /// current rayon pool.
+    ///
+    /// # Errors
+    /// [`ReportError::Model`], [`ReportError::Solve`].
+    pub fn analyse(&self, method: Method) -> Result<(StageTimes, Solution), ReportError> {
+        let (mesh, pairs) = (self.mesh.clone(), self.pairs.clone());
+        let mut watch = StageWatch::start();
+        let model = Model::try_new(mesh, &[self.material], Vec::new(), &mut |s| watch.begin(s))?;
+        watch.end();
+        let known = model.known(pairs)?;
+        let factored = model.factor(&known.dofs, method, &mut |s| watch.begin(s))?;
+        let loads = Loads { q_known: &known.q_known, forces: &[] };
+        let solution = factored.solve(model.stiffness(), loads, &mut |s| watch.begin(s))?;
+        Ok((watch.finish(), solution))
+    }
+
+    /// The same question for a server: mesh, material, partition and known displacements in one
+    /// (thesis 5.1.1).
+    pub fn solve_once(&self, method: Method) -> SolveOnce {
+        let (mesh, materials) = self.on_the_wire();
+        let question = self.question(method, 1.0, NodeChoice::All);
+        SolveOnce { mesh, materials, element: ElementName::T4, question }
+    }
+
+    /// The model for a server to keep.
+    pub fn upload(&self) -> UploadModel {
+        let (mesh, materials) = self.on_the_wire();
+        UploadModel { mesh, materials, element: ElementName::T4, fixed: Vec::new() }
+    }
+
+    /// Partition and known displacements, the latter times `scale`.
+    pub fn question(&self, method: Method, scale: f64, nodes: NodeChoice) -> Question {
+        let known = self.pairs.iter().map(|&(dof, u)| DofValue { dof, value: scale * u });
+        let method = MethodName::try_new(method.name());
+        Question {
+            known: known.collect(),
+            forces: Vec::new(),
+            method: method.expect("the names of all methods can be sent"),
+            want: Want { nodes, reactions: false, precision: Precision::F64 },
+            max_error: None,
+            deadline_ms: None,
+        }
+    }
+
+    fn on_the_wire(&self) -> (MeshData, Vec<softgrasp_protocol::Material>) {
+        let mesh = MeshData {
+            vertices: self.mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
+            tets: self.mesh.tets().to_vec(),
+            regions: Vec::new(),
+        };
+        let (young, poisson) = (self.material.young(), self.material.poisson());
+        (mesh, vec![softgrasp_protocol::Material { young, poisson }])
+    }
+
+    /// Number of unknown degrees of freedom.
+    pub fn unknown_dofs(&self) -> usize {
+        (3 * self.mesh.node_count()).saturating_sub(self.pairs.len())
+    }
+}
+
+fn nearest(mesh: &TetMesh, surface: &Surface, place: &Point3<f64>, taken: &[u32]) -> Option<u32> {
+    let distance = |node: u32| (mesh.vertices()[node as usize] - place).norm_squared();
+    let free = surface.nodes.iter().copied().filter(|n| !taken.contains(n));
+    free.min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_object_is_held_at_five_different_surface_nodes() {
+        for shape in BuiltIn::ALL {
+            let scene = Pressed::try_new(shape, 100).unwrap();
+            let mut nodes: Vec<u32> = scene.pairs.iter().map(|p| p.0 / 3).collect();
+            nodes.dedup();
+            assert_eq!(nodes.len(), 5, "{shape}");
+            assert!(nodes.iter().all(|n| scene.surface.nodes.binary_search(n).is_ok()), "{shape}");
+            let (_, solution) = scene.analyse(Method::SparseCholesky).unwrap();
+            assert!(solution.residual_rel < 1e-12, "{shape}");
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Small forms of the reports: files are there, rows are there, errors are small.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+use std::path::Path;
+
+use softgrasp_bench::{Options, ReportName, run};
+
+/// Values of one column of a CSV file.
+fn column(folder: &Path, file: &str, name: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.join(file)).unwrap();
+    assert!(text.starts_with("# command: "), "{file} does not say how it was made");
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+    let at = reader.headers().unwrap().iter().position(|h| h == name).unwrap();
+    reader.records().map(|row| row.unwrap()[at].to_owned()).collect()
+}
+
+fn numbers(folder: &Path, file: &str, name: &str) -> Vec<f64> {
+    column(folder, file, name).iter().map(|v| v.parse().unwrap()).collect()
+}
+
+/// Runs the small form of a report into a folder.
+fn run_quick(name: ReportName, folder: &Path) {
+    let options = Options {
+        is_quick: true,
+        out: folder.to_owned(),
+        command: "smoke test".to_owned(),
+        note: String::new(),
+    };
+    let (_, files) = run(name, &options).unwrap();
+    assert!(files.iter().all(|file| file.is_file()), "{files:?}");
+    let page = std::fs::read_to_string(folder.join(format!("{}.md", name.name()))).unwrap();
+    for part in ["- command: ", "- commit: ", "- date: ", "- processor: ", "- threads: "] {
+        assert!(page.contains(part), "{part} is not in the head of {}", name.name());
+    }
+}
+
+#[test]
+fn methods_are_timed_with_small_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Methods, folder.path());
+    let methods = column(folder.path(), "methods.csv", "method");
+    assert!(methods.iter().any(|m| m == "gauss-jordan") && methods.len() >= 8);
+    for name in ["error_rel", "residual_rel"] {
+        let errors = numbers(folder.path(), "methods.csv", name);
+        assert!(errors.iter().all(|&e| e < 1e-11), "{name}: {errors:?}");
+    }
+    assert!(numbers(folder.path(), "methods.csv", "total_ms").iter().all(|&ms| ms > 0.0));
+}
+
+#[test]
+fn collision_is_timed_and_nothing_is_missed() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Collision, folder.path());
+    let competitors = column(folder.path(), "collision.csv", "competitor");
+    assert!(competitors.iter().any(|c| c == "sphere tree"));
+    assert!(competitors.iter().any(|c| c.starts_with("parry3d")));
+    assert!(numbers(folder.path(), "collision.csv", "missed").iter().all(|&m| m == 0.0));
+    // The check is worth something only if something was there to be missed.
+    let inside = column(folder.path(), "collision.csv", "inside_per_hand");
+    assert!(inside.iter().filter(|v| !v.is_empty()).all(|v| v.parse::<f64>().unwrap() > 5.0));
+    let contacts = numbers(folder.path(), "collision-ratios.csv", "contacts_checked");
+    assert!(contacts.iter().all(|&c| c > 0.0), "{contacts:?}");
+}
+
+#[test]
+fn frames_are_timed_beside_their_echo_with_small_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Frame, folder.path());
+    for name in ["error_rel", "residual_rel"] {
+        let errors = numbers(folder.path(), "frame.csv", name);
+        assert!(errors.iter().all(|&e| e < 1e-11) && errors.len() >= 8, "{name}: {errors:?}");
+    }
+    let (frames, echoes) = (
+        numbers(folder.path(), "frame.csv", "p50_ms"),
+        numbers(folder.path(), "frame.csv", "echo_p50_ms"),
+    );
+    assert!(frames.iter().chain(&echoes).all(|&ms| ms > 0.0));
+    // Warm frames reuse the factor of the first.
+    assert!(numbers(folder.path(), "frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
+}
+
+#[test]
+fn scaling_is_timed_fitted_and_drawn_with_small_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Scaling, folder.path());
+    for file in
+        ["scaling.csv", "scaling-shapes.csv", "scaling-procedures.csv", "scaling-stages.csv"]
+    {
+        let errors = numbers(folder.path(), file, "error_rel");
+        assert!(errors.iter().all(|&e| e < 1e-11) && !errors.is_empty(), "{file}: {errors:?}");
+    }
+    let vertices = std::fs::read_to_string(folder.path().join("scaling-vertices.svg")).unwrap();
+    assert!(vertices.contains("gauss-jordan") && vertices.contains("1998"));
+}
