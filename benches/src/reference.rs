@@ -34,7 +34,7 @@ impl Reference {
     pub fn of(model: &Model, known: &Known) -> Result<Self, ReportError> {
         let factored = model.factor(&known.dofs, Method::SparseCholesky, &mut |_| {})?;
         let stiffness = model.stiffness();
-        let loads = Loads { q_known: &known.q_known, forces: &[] };
+        let loads = Loads { q_known: &known.q_known, ..Loads::default() };
         let mut high = factored.solve(stiffness, loads, &mut |_| {})?.displacement;
         let mut low = vec![0.0; high.len()];
         let largest = amax(&high);
@@ -94,7 +94,7 @@ fn correction(
         forces[dof as usize] = -nodal_force[dof as usize];
     }
     let zeros = vec![0.0; partition.known().len()];
-    let loads = Loads { q_known: &zeros, forces: &forces };
+    let loads = Loads { q_known: &zeros, forces: &forces, residual_rel: 0.0 };
     Ok(factored.solve(stiffness, loads, &mut |_| {})?.displacement)
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
-use softgrasp_core::model::{Known, Model};
+use softgrasp_core::model::{Element, Known, Model};
 use softgrasp_core::solve::{Loads, Method, Solution};
 use softgrasp_protocol::{
     DofValue, ElementName, MeshData, MethodName, NodeChoice, Precision, Question, SolveOnce,
@@ -73,7 +73,13 @@ impl Pressed {
     /// # Errors
     /// [`ReportError::Model`].
     pub fn model(&self) -> Result<(Model, Known), ReportError> {
-        let model = Model::try_new(self.mesh.clone(), &[self.material], Vec::new(), &mut |_| {})?;
+        let model = Model::try_new(
+            self.mesh.clone(),
+            Element::Tet4,
+            &[self.material],
+            Vec::new(),
+            &mut |_| {},
+        )?;
         let known = model.known(self.pairs.clone())?;
         Ok((model, known))
     }
@@ -86,11 +92,13 @@ impl Pressed {
     pub fn analyse(&self, method: Method) -> Result<(StageTimes, Solution), ReportError> {
         let (mesh, pairs) = (self.mesh.clone(), self.pairs.clone());
         let mut watch = StageWatch::start();
-        let model = Model::try_new(mesh, &[self.material], Vec::new(), &mut |s| watch.begin(s))?;
+        let model = Model::try_new(mesh, Element::Tet4, &[self.material], Vec::new(), &mut |s| {
+            watch.begin(s)
+        })?;
         watch.end();
         let known = model.known(pairs)?;
         let factored = model.factor(&known.dofs, method, &mut |s| watch.begin(s))?;
-        let loads = Loads { q_known: &known.q_known, forces: &[] };
+        let loads = Loads { q_known: &known.q_known, ..Loads::default() };
         let solution = factored.solve(model.stiffness(), loads, &mut |s| watch.begin(s))?;
         Ok((watch.finish(), solution))
     }

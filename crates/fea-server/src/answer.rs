@@ -14,6 +14,7 @@ use softgrasp_protocol::{
 
 use crate::approach::Approach;
 use crate::clock::StageClock;
+use crate::condensed::StrainOf;
 use crate::config::ServerConfig;
 use crate::direct::Asked;
 use crate::question::{checked_forces, pairs};
@@ -43,7 +44,8 @@ impl Desk {
         match approach {
             Approach::Condensed { .. } => {
                 let stored = Arc::new(StoredModel::new(model, usize::MAX));
-                condensed::answer(&stored, &question, &known, &approach, clock)
+                let watch = StrainOf::ThisAnswer;
+                condensed::answer(&stored, &question, &known, &approach, watch, clock)
             }
             Approach::Direct { method, because } => {
                 self.check_memory(method, &known, &model)?;
@@ -101,7 +103,8 @@ impl Desk {
         let forces = checked_forces(model, &known, &question)?;
         let (method, because) = match Approach::for_frame(&question, &stored, &known)? {
             approach @ Approach::Condensed { .. } => {
-                let answer = condensed::answer(&stored, &question, &known, &approach, clock);
+                let watch = StrainOf::NewestFrame;
+                let answer = condensed::answer(&stored, &question, &known, &approach, watch, clock);
                 self.store.trim();
                 return answer;
             }

@@ -18,6 +18,8 @@ pub(crate) enum Approach {
 /// Name of the condensed engine on the wire.
 const CONDENSED: &str = "condensed";
 const ASKED: &str = "asked for";
+/// Above so many touched degrees of freedom the small system is not small any more.
+const TOUCHED_DOFS_MAX: usize = 600;
 
 impl Approach {
     /// For a request that brings its own mesh: nothing can be reused, so `auto` factors once.
@@ -48,6 +50,13 @@ impl Approach {
             Ok(_) if !question.forces.is_empty() => Some(Refusal::CondensedForces),
             Ok(_) => moved_fixed_node(stored, known).map(|node| Refusal::FixedMoved { node }),
         };
+        let touched = known.dofs.len() - stored.model.fixed().len().min(known.dofs.len());
+        if name == "auto" && touched > TOUCHED_DOFS_MAX {
+            return Ok(Self::Direct {
+                method: Method::Front,
+                because: format!("not condensed: {touched} degrees of freedom are held at once"),
+            });
+        }
         match obstacle {
             None if name == "auto" => Ok(Self::Condensed {
                 because: "frames on a kept model: exact from cached columns".to_owned(),

@@ -21,12 +21,22 @@ const CONDITION_WARNING: f64 = 1e9;
 /// Nodes prefetched between two looks at what else is waiting.
 const PREFETCH_TOGETHER: usize = 2;
 
+/// Which answer the reported strain and rotation belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StrainOf {
+    /// The answer itself has to wait for it.
+    ThisAnswer,
+    /// Worked out beside the frames; no frame waits.
+    NewestFrame,
+}
+
 /// Answers one question on a kept model.
 pub(crate) fn answer(
     stored: &Arc<StoredModel>,
     question: &Question,
     known: &Known,
     approach: &Approach,
+    watch: StrainOf,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
     let base = stored.base(&mut |stage| clock.begin(stage))?;
@@ -62,11 +72,16 @@ pub(crate) fn answer(
     }
     let displacements = Displacements::of(displacement, question.want.precision);
     stage_ms.encode = ms_since(start);
+    if watch == StrainOf::ThisAnswer {
+        stored.strain().newest = stored.model.strain(&set.full_displacement(&base, &solved));
+    }
     let mut report = report(stored, &set, known, &certificate, approach);
     report.stage_ms = stage_ms;
     report.factor_reused = factor_reused;
     add_unmet_wishes(question, &mut report);
-    watch_strain(stored, &base, set, solved);
+    if watch == StrainOf::NewestFrame {
+        watch_strain(stored, &base, set, solved);
+    }
     Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
 }
 
@@ -144,10 +159,15 @@ fn watch_strain(
     }
     let (stored, base) = (Arc::clone(stored), Arc::clone(base));
     rayon::spawn(move || {
-        let displacement = set.full_displacement(&base, &solved);
-        let newest = stored.model.strain(&displacement);
+        // A panic here would end the process: nobody waits for this task.
+        let newest = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            stored.model.strain(&set.full_displacement(&base, &solved))
+        }));
         let mut watch = stored.strain();
-        watch.newest = newest;
+        match newest {
+            Ok(newest) => watch.newest = newest,
+            Err(_) => tracing::error!("the strain of a frame could not be worked out"),
+        }
         watch.running = false;
     });
 }

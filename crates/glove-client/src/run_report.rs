@@ -88,7 +88,7 @@ pub struct RunSummary {
     pub round_trip_ms_p50: Option<f64>,
     /// 99 % of the round trips took no longer, ms.
     pub round_trip_ms_p99: Option<f64>,
-    /// Longest round trip, ms: the first of a grasp, which makes the factor.
+    /// Longest round trip, ms: the first of a grasp, which computes what the grip needs.
     pub round_trip_ms_max: Option<f64>,
     /// Largest rotation of an element, degrees.
     pub max_rotation_deg: f64,
@@ -215,7 +215,7 @@ impl RunReport {
         if let Some(solve) = method {
             text.push_str(&format!(
                 "  equations           {} unknown, {} known, by {}\n  \
-                 answer came after   {} (median), {} (99 %), {} (slowest: a new factor)\n  \
+                 answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
                  residual            {:.1e} at most\n  \
                  shape               turned by {:.1} degrees, strained by {:.0} % at most\n",
                 solve.unknown_dofs,

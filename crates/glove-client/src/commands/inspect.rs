@@ -145,7 +145,7 @@ fn inspect(file: String, read: MeshFile) -> Inspection {
             dense_inverse_bytes: Method::DenseInverse.dense_bytes(dofs).unwrap_or(0),
             // Thesis (C.5) with one processor.
             gauss_jordan_operations: 2.0 * (dofs as f64).powi(2) * (3.0 * dofs as f64 - 1.0),
-            recommended_method: Method::SparseCholesky.name(),
+            recommended_method: Method::Front.name(),
         },
         skipped_sections: findings.skipped_sections,
         notes: findings.notes,
