@@ -5,14 +5,14 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{TetMesh, signed_volume};
-use softgrasp_core::model::{Element, Known, Model};
+use softgrasp_core::model::{Element, Known, Model, ModelError};
 use softgrasp_core::solve::Method;
 use softgrasp_protocol::{
     Answer, ElementName, FrameRequest, MeshData, ModelHash, ModelReady, Prefetch, SolveOnce,
     UploadModel,
 };
 
-use crate::approach::Approach;
+use crate::approach::{Approach, is_auto};
 use crate::clock::StageClock;
 use crate::condensed::StrainOf;
 use crate::config::ServerConfig;
@@ -103,10 +103,16 @@ impl Desk {
         let forces = checked_forces(model, &known, &question)?;
         let (method, because) = match Approach::for_frame(&question, &stored, &known)? {
             approach @ Approach::Condensed { .. } => {
-                let watch = StrainOf::NewestFrame;
+                let (watch, clock) = (StrainOf::NewestFrame, clock.clone());
                 let answer = condensed::answer(&stored, &question, &known, &approach, watch, clock);
                 self.store.trim();
-                return answer;
+                match answer {
+                    // What the small system cannot do, a factor of its own may.
+                    Err(Refusal::Model(ModelError::Condensed(error))) if is_auto(&question) => {
+                        (Method::Front, format!("not condensed: {error}"))
+                    }
+                    answered => return answered,
+                }
             }
             Approach::Direct { method, because } => (method, because),
         };

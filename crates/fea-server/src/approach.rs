@@ -42,7 +42,7 @@ impl Approach {
         known: &Known,
     ) -> Result<Self, Refusal> {
         let name = question.method.as_str();
-        if name != "auto" && name != CONDENSED {
+        if !is_auto(question) && name != CONDENSED {
             return Ok(Self::Direct { method: name.parse()?, because: ASKED.to_owned() });
         }
         let obstacle = match stored.base(&mut |_| {}) {
@@ -76,6 +76,11 @@ impl Approach {
             Self::Condensed { because } | Self::Direct { because, .. } => because,
         }
     }
+}
+
+/// Whether the choice is left to the server.
+pub(crate) fn is_auto(question: &Question) -> bool {
+    question.method.as_str() == "auto"
 }
 
 /// A node that the scene fixes and the question moves all the same.

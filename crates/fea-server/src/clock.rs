@@ -6,6 +6,7 @@ use softgrasp_core::solve::Stage;
 use softgrasp_protocol::StageMs;
 
 /// Takes the time between the stages that the core announces.
+#[derive(Clone)]
 pub(crate) struct StageClock {
     stage_ms: StageMs,
     running: Option<(Stage, Instant)>,

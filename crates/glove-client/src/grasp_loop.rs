@@ -287,6 +287,10 @@ impl GraspLoop {
 
     /// Lets the server prepare the columns of nodes that a fingertip is about to touch.
     fn prefetch(&mut self, tips_in_object: &[Point3<f64>; 5]) {
+        // Only condensed frames are made of columns.
+        if !matches!(self.settings.method.as_str(), "auto" | "condensed") {
+            return;
+        }
         let mut near = Vec::new();
         for tip in tips_in_object {
             self.object.tree().nodes_near(tip, PREFETCH_DISTANCE, &mut near);

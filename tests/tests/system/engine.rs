@@ -149,6 +149,9 @@ fn column_cache_smaller_than_one_grip_is_told_and_the_session_lives() {
     let (code, text) = refusal(&mut scene.connection, &request);
     assert_eq!(code, RejectCode::MemoryLimit);
     assert!(text.contains("100000") && text.contains("front"), "{text}");
+    let left_to_the_server = scene.all("auto", 1.0).report;
+    assert_eq!(left_to_the_server.method, "front");
+    assert!(left_to_the_server.chosen_because.contains("cache"));
     assert_eq!(scene.all("front", 1.0).report.method, "front");
 }
 
