@@ -107,7 +107,7 @@ impl Pressed {
     /// (thesis 5.1.1).
     pub fn solve_once(&self, method: Method) -> SolveOnce {
         let (mesh, materials) = self.on_the_wire();
-        let question = self.question(method, 1.0, NodeChoice::All);
+        let question = self.question(method.name(), 1.0, NodeChoice::All);
         SolveOnce { mesh, materials, element: ElementName::T4, question }
     }
 
@@ -118,9 +118,9 @@ impl Pressed {
     }
 
     /// Partition and known displacements, the latter times `scale`.
-    pub fn question(&self, method: Method, scale: f64, nodes: NodeChoice) -> Question {
+    pub fn question(&self, method: &str, scale: f64, nodes: NodeChoice) -> Question {
         let known = self.pairs.iter().map(|&(dof, u)| DofValue { dof, value: scale * u });
-        let method = MethodName::try_new(method.name());
+        let method = MethodName::try_new(method);
         Question {
             known: known.collect(),
             forces: Vec::new(),

@@ -12,7 +12,7 @@ use softgrasp_protocol::{
 
 use crate::approach::Approach;
 use crate::caution::{add_unmet_wishes, warnings};
-use crate::clock::{StageClock, ms_since, peak_rss_bytes};
+use crate::clock::{StageClock, last_peak_rss_bytes, ms_since, peak_rss_bytes};
 use crate::reject::Refusal;
 use crate::store::StoredModel;
 
@@ -82,6 +82,10 @@ pub(crate) fn answer(
     let mut report = report(stored, &set, known, &certificate, approach);
     report.stage_ms = stage_ms;
     report.factor_reused = factor_reused;
+    report.peak_rss_bytes = match factor_reused {
+        true => last_peak_rss_bytes(),
+        false => peak_rss_bytes(),
+    };
     add_unmet_wishes(question, &mut report);
     if watch == StrainOf::NewestFrame {
         watch_strain(stored, &base, set, solved);
@@ -125,7 +129,6 @@ fn report(
         precision: "f64".to_owned(),
         condition_estimate: Some(set.condition()),
         warnings,
-        peak_rss_bytes: peak_rss_bytes(),
         chosen_because: approach.because().to_owned(),
         ..SolveReport::default()
     }
