@@ -14,6 +14,7 @@ use softgrasp_protocol::{
 
 use crate::approach::{Approach, is_auto};
 use crate::clock::StageClock;
+use crate::compute::Compute;
 use crate::condensed::StrainOf;
 use crate::config::ServerConfig;
 use crate::direct::Asked;
@@ -26,12 +27,16 @@ use crate::{condensed, direct};
 pub(crate) struct Desk {
     pub config: ServerConfig,
     pub store: ModelStore,
+    compute: Compute,
 }
 
+/// Numbers multiplied for a frame that is done sooner than handed to another thread.
+const QUICK_PRODUCTS: usize = 1 << 18;
+
 impl Desk {
-    pub fn new(config: ServerConfig) -> Self {
+    pub fn new(config: ServerConfig, compute: Compute) -> Self {
         let store = ModelStore::new(config.memory_limit);
-        Self { config, store }
+        Self { config, store, compute }
     }
 
     /// Mesh, known displacements and partition in one request (thesis 5.1.1).
@@ -94,6 +99,13 @@ impl Desk {
         Ok(ModelReady { model: hash, unknown_dofs, fixed_dofs, reused, stage_ms: clock.finish() })
     }
 
+    /// Whether a frame is a small product with what is kept: known contacts, nothing to factor.
+    pub fn is_quick(&self, request: &FrameRequest) -> bool {
+        let FrameRequest { model, question } = request;
+        let Some(stored) = self.store.find(*model) else { return false };
+        condensed::products(&stored, question).is_some_and(|products| products <= QUICK_PRODUCTS)
+    }
+
     /// One frame on a kept model.
     pub fn frame(&self, request: FrameRequest, mut clock: StageClock) -> Result<Answer, Refusal> {
         let FrameRequest { model: hash, question } = request;
@@ -103,7 +115,7 @@ impl Desk {
         let forces = checked_forces(model, &known, &question)?;
         let (method, because) = match Approach::for_frame(&question, &stored, &known)? {
             approach @ Approach::Condensed { .. } => {
-                let (watch, clock) = (StrainOf::NewestFrame, clock.clone());
+                let (watch, clock) = (StrainOf::NewestFrame(&self.compute), clock.clone());
                 let answer = condensed::answer(&stored, &question, &known, &approach, watch, clock);
                 self.store.trim();
                 match answer {

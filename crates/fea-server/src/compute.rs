@@ -61,6 +61,17 @@ impl Compute {
         });
     }
 
+    /// Runs `work` on the pool when it comes to it, whatever waits there. For one task per model that
+    /// bounds itself.
+    pub fn beside(&self, work: impl FnOnce() + Send + 'static) {
+        self.pool.spawn(move || {
+            // A panic here would end the process: nobody waits for this task.
+            if std::panic::catch_unwind(AssertUnwindSafe(work)).is_err() {
+                tracing::error!("work beside the frames ended abnormally");
+            }
+        });
+    }
+
     /// Runs `work` on the pool and waits for it without blocking the sockets.
     ///
     /// # Errors
@@ -73,22 +84,35 @@ impl Compute {
             Arc::clone(&self.places).acquire_owned().await.map_err(|_| Refusal::Internal)?;
         let (sender, receiver) = oneshot::channel();
         self.pool.spawn(move || {
-            let outcome = std::panic::catch_unwind(AssertUnwindSafe(work));
-            let outcome = outcome.unwrap_or_else(|panic| {
-                let text = panic
-                    .downcast_ref::<String>()
-                    .map(String::as_str)
-                    .or_else(|| panic.downcast_ref::<&str>().copied())
-                    .unwrap_or("no text");
-                tracing::error!(panic = text, "work on a request ended abnormally");
-                Err(Refusal::Internal)
-            });
+            let outcome = caught(work);
             drop(place);
             // The session may have gone in the meantime; then nobody waits for this.
             let _ = sender.send(outcome);
         });
         receiver.await.unwrap_or(Err(Refusal::Internal))
     }
+
+    /// Does `work` at once on the calling thread of the sockets: for what is done sooner than handed
+    /// over, and must not wait behind a factor either.
+    ///
+    /// # Errors
+    /// [`Refusal::Internal`] if the work panicked; the panic is logged.
+    pub fn run_here<T>(work: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
+        caught(work)
+    }
+}
+
+/// What `work` comes to; a panic is logged and is the server's fault.
+fn caught<T>(work: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
+    std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let text = panic
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| panic.downcast_ref::<&str>().copied())
+            .unwrap_or("no text");
+        tracing::error!(panic = text, "work on a request ended abnormally");
+        Err(Refusal::Internal)
+    })
 }
 
 #[cfg(test)]
@@ -99,6 +123,8 @@ mod tests {
     async fn panic_in_one_request_is_answered_and_the_pool_lives_on() {
         let compute = Compute::new(1).unwrap();
         let broken: Result<(), Refusal> = compute.run(|| panic!("a fault")).await;
+        assert!(matches!(broken, Err(Refusal::Internal)));
+        let broken: Result<(), Refusal> = Compute::run_here(|| panic!("a fault"));
         assert!(matches!(broken, Err(Refusal::Internal)));
         assert_eq!(compute.run(|| Ok(7)).await.unwrap(), 7);
         assert_eq!(compute.threads(), 1);

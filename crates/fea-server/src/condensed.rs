@@ -13,6 +13,8 @@ use softgrasp_protocol::{
 use crate::approach::Approach;
 use crate::caution::{add_unmet_wishes, warnings};
 use crate::clock::{StageClock, last_peak_rss_bytes, ms_since, peak_rss_bytes};
+use crate::compute::Compute;
+use crate::question::pairs;
 use crate::reject::Refusal;
 use crate::store::StoredModel;
 
@@ -20,14 +22,16 @@ use crate::store::StoredModel;
 const CONDITION_WARNING: f64 = 1e9;
 /// Nodes prefetched between two looks at what else is waiting.
 const PREFETCH_TOGETHER: usize = 2;
+/// Share of one thread that the strain beside the frames may take.
+const STRAIN_SHARE: f64 = 0.1;
 
 /// Which answer the reported strain and rotation belong to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum StrainOf {
+#[derive(Clone, Copy)]
+pub(crate) enum StrainOf<'a> {
     /// The answer itself has to wait for it.
     ThisAnswer,
     /// Worked out beside the frames; no frame waits.
-    NewestFrame,
+    NewestFrame(&'a Compute),
 }
 
 /// Answers one question on a kept model.
@@ -36,7 +40,7 @@ pub(crate) fn answer(
     question: &Question,
     known: &Known,
     approach: &Approach,
-    watch: StrainOf,
+    watch: StrainOf<'_>,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
     let base = stored.base(&mut |stage| clock.begin(stage))?;
@@ -63,7 +67,8 @@ pub(crate) fn answer(
     clock.begin(Stage::Solve);
     let solved = set.solve(&q).map_err(ModelError::from)?;
     let displacement = set.wanted_displacements(&solved);
-    if watch == StrainOf::ThisAnswer {
+    let is_one_request = matches!(watch, StrainOf::ThisAnswer);
+    if is_one_request {
         // One request has no later frames that a proof in the background could serve.
         base.prove_eigenvalue_min();
     }
@@ -76,7 +81,7 @@ pub(crate) fn answer(
     }
     let displacements = Displacements::of(displacement, question.want.precision);
     stage_ms.encode = ms_since(start);
-    if watch == StrainOf::ThisAnswer {
+    if is_one_request {
         stored.strain().newest = stored.model.strain(&set.full_displacement(&base, &solved));
     }
     let mut report = report(stored, &set, known, &certificate, approach);
@@ -87,10 +92,25 @@ pub(crate) fn answer(
         false => peak_rss_bytes(),
     };
     add_unmet_wishes(question, &mut report);
-    if watch == StrainOf::NewestFrame {
-        watch_strain(stored, &base, set, solved);
+    if let StrainOf::NewestFrame(compute) = watch {
+        watch_strain(compute, stored, &base, set, solved);
     }
     Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
+}
+
+/// Numbers multiplied for an answer from a kept contact set; `None` where something has to be made.
+pub(crate) fn products(stored: &StoredModel, question: &Question) -> Option<usize> {
+    let base = stored.ready_base()?;
+    let NodeChoice::Nodes(nodes) = &question.want.nodes else { return None };
+    let is_condensed = matches!(question.method.as_str(), "auto" | "condensed");
+    // Forces at nodes that the scene fixes take a product with the whole stiffness.
+    let has_large_product = question.want.reactions && !base.fixed().is_empty();
+    if !is_condensed || !question.forces.is_empty() || has_large_product {
+        return None;
+    }
+    let known = stored.model.known(pairs(&question.known)).ok()?;
+    let (dofs, _) = touched(&known, base.fixed());
+    stored.set_for(&dofs, nodes).map(|set| set.products())
 }
 
 /// Degrees of freedom touched in this frame, without those the scene fixes, and their values.
@@ -153,29 +173,24 @@ fn reactions_of(
     known.dofs.iter().map(|dof| DofValue { dof: *dof, value: force(dof) }).collect()
 }
 
-/// Works out rotation and strain of a frame beside the frames that follow; one at a time, the
-/// newest that comes when the last is done.
+/// Works out rotation and strain of a frame beside the frames that follow: one at a time, on one
+/// thread, for at most a share of [`STRAIN_SHARE`] of its time.
 fn watch_strain(
+    compute: &Compute,
     stored: &Arc<StoredModel>,
     base: &Arc<Base>,
     set: Arc<ContactSet>,
     solved: ContactAnswer,
 ) {
-    if std::mem::replace(&mut stored.strain().running, true) {
+    if !stored.strain().begin(Instant::now()) {
         return;
     }
     let (stored, base) = (Arc::clone(stored), Arc::clone(base));
-    rayon::spawn(move || {
-        // A panic here would end the process: nobody waits for this task.
-        let newest = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            stored.model.strain(&set.full_displacement(&base, &solved))
-        }));
-        let mut watch = stored.strain();
-        match newest {
-            Ok(newest) => watch.newest = newest,
-            Err(_) => tracing::error!("the strain of a frame could not be worked out"),
-        }
-        watch.running = false;
+    compute.beside(move || {
+        let start = Instant::now();
+        let newest = stored.model.strain(&set.full_displacement(&base, &solved));
+        let pause = start.elapsed().div_f64(STRAIN_SHARE);
+        stored.strain().end(newest, start + pause);
     });
 }
 

@@ -67,7 +67,8 @@ pub async fn serve(
         Compute::new(threads).map_err(|source| StartError::Threads { threads, source })?;
     on_ready(listener.local_addr().map_err(listen_error)?);
     let places = Arc::new(Semaphore::new(config.max_sessions));
-    let hall = Hall { desk: Arc::new(Desk::new(config)), compute, stop: stop.clone() };
+    let desk = Arc::new(Desk::new(config, compute.clone()));
+    let hall = Hall { desk, compute, places: Arc::clone(&places), stop: stop.clone() };
     let mut sessions = JoinSet::new();
     accept_until_stopped(&listener, &hall, &places, stop, &mut sessions).await;
     drop(listener);

@@ -10,7 +10,7 @@ use softgrasp_protocol::{
     Welcome,
 };
 use tokio::net::TcpStream;
-use tokio::sync::watch;
+use tokio::sync::{Semaphore, watch};
 use tokio::time::timeout;
 
 use crate::answer::Desk;
@@ -23,8 +23,20 @@ use crate::reject::Refusal;
 pub(crate) struct Hall {
     pub desk: Arc<Desk>,
     pub compute: Compute,
+    /// Places for sessions that are still free.
+    pub places: Arc<Semaphore>,
     pub stop: watch::Receiver<bool>,
 }
+
+impl Hall {
+    /// Whether so few sessions are there that one may use the sockets' thread for a moment.
+    fn is_quiet(&self) -> bool {
+        self.desk.config.max_sessions.saturating_sub(self.places.available_permits()) <= QUIET_MAX
+    }
+}
+
+/// With more sessions, frames are shared out among the solving threads however small they are.
+const QUIET_MAX: usize = 4;
 
 /// A client that does not take its reply for this long is given up.
 const WRITE_MAX: Duration = Duration::from_secs(60);
@@ -202,6 +214,9 @@ impl Session {
                 let model = ready.model;
                 run.in_background(move || later.prove(model));
                 Reply::ModelReady(ready)
+            }
+            Request::Frame(frame) if hall.is_quiet() && desk.is_quick(&frame) => {
+                Reply::Answer(Box::new(Compute::run_here(|| desk.frame(frame, clock()))?))
             }
             Request::Frame(frame) => {
                 Reply::Answer(Box::new(run.run(move || desk.frame(frame, clock())).await?))

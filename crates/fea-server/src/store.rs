@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
 
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Model, ModelError};
@@ -29,7 +30,22 @@ struct KeptSet {
 #[derive(Default)]
 pub(crate) struct StrainWatch {
     pub newest: StrainSummary,
-    pub running: bool,
+    running: bool,
+    not_before: Option<Instant>,
+}
+
+impl StrainWatch {
+    /// Whether another strain may be worked out now; if so it counts as running.
+    pub fn begin(&mut self, now: Instant) -> bool {
+        let may = !self.running && self.not_before.is_none_or(|earliest| now >= earliest);
+        self.running |= may;
+        may
+    }
+
+    /// Takes the strain that was worked out; the next one not before an instant.
+    pub fn end(&mut self, newest: StrainSummary, not_before: Instant) {
+        *self = Self { newest, running: false, not_before: Some(not_before) };
+    }
 }
 
 /// Factors kept per model; a grasp needs one, a change of grip a second.
@@ -53,6 +69,11 @@ impl StoredModel {
     /// The base of the condensed engine, made now if it is not there.
     pub fn base(&self, on_stage: &mut dyn FnMut(Stage)) -> Result<Arc<Base>, ModelError> {
         self.base.get_or_init(|| self.model.condense(on_stage).map(Arc::new)).clone()
+    }
+
+    /// The base, if it has been made.
+    pub fn ready_base(&self) -> Option<&Arc<Base>> {
+        self.base.get()?.as_ref().ok()
     }
 
     /// A contact set with the rows of some nodes, if it is kept.

@@ -71,11 +71,35 @@ const TRUE_EVERY: u32 = 20;
 
 /// Euclidean norm, scaled so that tiny and huge units neither vanish nor overflow.
 pub(super) fn norm(v: &[f64]) -> f64 {
+    let square = sum_of_squares(v, 1.0);
+    if SAFE_SQUARES.contains(&square) {
+        return square.sqrt();
+    }
+    // Too small or too large to square as they are.
     let scale = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if scale == 0.0 || !scale.is_finite() {
         return scale;
     }
-    scale * v.iter().map(|x| (x / scale) * (x / scale)).sum::<f64>().sqrt()
+    scale * sum_of_squares(v, scale).sqrt()
+}
+
+/// Sums of squares in which nothing that matters was lost below or above the range of a double.
+const SAFE_SQUARES: std::ops::Range<f64> = 1e-200..1e200;
+/// Sums that run beside each other: always as many, so that the bits are always the same.
+const SUMS: usize = 8;
+
+fn sum_of_squares(v: &[f64], divisor: f64) -> f64 {
+    let mut sums = [0.0; SUMS];
+    let chunks = v.chunks_exact(SUMS);
+    for (sum, x) in sums.iter_mut().zip(chunks.remainder()) {
+        *sum = (x / divisor) * (x / divisor);
+    }
+    for chunk in chunks {
+        for (sum, x) in sums.iter_mut().zip(chunk) {
+            *sum += (x / divisor) * (x / divisor);
+        }
+    }
+    sums.iter().sum()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
+
 use super::base::{Base, gamma};
 use super::contact_set::{ContactAnswer, ContactSet};
 use crate::solve::pcg::norm;
@@ -43,7 +45,7 @@ impl ContactSet {
         let off = base.stiffest * answer.mismatch;
         residual += off;
         residual_bound += off;
-        let b = norm(&self.load_of(base, q));
+        let b = self.load.size(q);
         let residual_rel = if b > 0.0 { residual / b } else { residual };
         let rounding = gamma(self.dofs().len() + base.modes.len() + 2) * moved;
         // Part of the answer bounds the size of the whole from below.
@@ -58,22 +60,43 @@ impl ContactSet {
         };
         Certificate { residual_rel, error_bound_rel }
     }
+}
 
-    /// `b = −K12 q` of (3.42a), over the touched degrees of freedom's neighbours.
-    fn load_of(&self, base: &Base, q: &[f64]) -> Vec<f64> {
-        let mut load: BTreeMap<usize, f64> = BTreeMap::new();
-        for (&dof, &value) in self.dofs().iter().zip(q) {
+/// Size of `b = −K12 q` of (3.42a) for any `q`, from the products of the columns of `K12`.
+pub(super) struct LoadSize {
+    /// `K12ᵀ K12`.
+    products: DMatrix<f64>,
+}
+
+impl LoadSize {
+    /// Shapes: `dofs` ascending touched degrees of freedom.
+    pub fn new(base: &Base, dofs: &[u32]) -> Self {
+        // Rows of K12: for each free degree of freedom what it shares with the touched ones.
+        let mut rows: BTreeMap<usize, Vec<(usize, f64)>> = BTreeMap::new();
+        for (column, &dof) in dofs.iter().enumerate() {
             let (node, axis) = (dof as usize / 3, dof as usize % 3);
             for (other, block) in base.stiffness.row(node) {
                 for c in 0..3 {
-                    *load.entry(3 * other + c).or_default() -= block[3 * axis + c] * value;
+                    let k = block[3 * axis + c];
+                    rows.entry(3 * other + c).or_default().push((column, k));
                 }
             }
         }
-        let is_free = |dof: &usize| {
-            self.dofs().binary_search(&(*dof as u32)).is_err()
-                && base.fixed.binary_search(&(*dof as u32)).is_err()
-        };
-        load.into_iter().filter(|(dof, _)| is_free(dof)).map(|(_, value)| value).collect()
+        let is_known = |set: &[u32], row: usize| set.binary_search(&(row as u32)).is_ok();
+        rows.retain(|&row, _| !is_known(dofs, row) && !is_known(&base.fixed, row));
+        let mut products = DMatrix::zeros(dofs.len(), dofs.len());
+        for row in rows.values() {
+            for &(i, k_i) in row {
+                row.iter().for_each(|&(j, k_j)| products[(i, j)] += k_i * k_j);
+            }
+        }
+        Self { products }
+    }
+
+    /// `‖K12 q‖`.
+    pub fn size(&self, q: &[f64]) -> f64 {
+        let columns = self.products.column_iter().zip(q);
+        let along = |column: &[f64]| column.iter().zip(q).map(|(p, q)| p * q).sum::<f64>();
+        columns.map(|(p, q_j)| along(p.as_slice()) * q_j).sum::<f64>().max(0.0).sqrt()
     }
 }

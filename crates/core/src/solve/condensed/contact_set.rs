@@ -2,14 +2,12 @@
 
 use std::sync::Arc;
 
-use faer::linalg::matmul::matmul;
-use faer::prelude::*;
-use faer::{Accum, Mat, Par};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use rayon::prelude::*;
 
 use super::base::{Base, CondensedError};
 use super::bound::SmallBound;
+use super::certificate::LoadSize;
 use super::columns::{Columns, NodeColumns};
 
 /// A set of touched degrees of freedom, ready to answer any displacements of them.
@@ -27,13 +25,17 @@ pub struct ContactSet {
     scale: f64,
     condition: f64,
     pub(super) bound: SmallBound,
+    pub(super) load: LoadSize,
     rows: Option<WantedRows>,
 }
 
 /// Rows of `[G_C R]` at the nodes asked for, gathered once per set of nodes.
+///
+/// Shapes: blocks of [`ROWS_TOGETHER`] rows (the last may be shorter), one behind the other, the
+/// columns of a block one behind the other: the product runs once through this memory.
 struct WantedRows {
     nodes: Vec<u32>,
-    matrix: Mat<f64>,
+    blocks: Vec<f64>,
 }
 
 /// Forces and motions that answer one set of displacements.
@@ -49,8 +51,10 @@ pub struct ContactAnswer {
 
 /// Above this condition the last digits of the small system are all rounding.
 const CONDITION_MAX: f64 = 1e14;
-/// Rows multiplied as one task, always the same, so that the bits do not depend on the threads.
+/// Rows multiplied together: as many as stay in the nearest cache, a multiple of three.
 const ROWS_TOGETHER: usize = 1536;
+/// A product of more numbers is shared out among the threads; a smaller one is sooner done.
+const SHARED_PRODUCT: usize = 1 << 20;
 
 impl ContactSet {
     /// Gathers (or computes) the columns of the touched nodes and factors the small system.
@@ -89,8 +93,10 @@ impl ContactSet {
             return Err(CondensedError::NotHeld);
         }
         let bound = SmallBound::new(base, &columns, &places, &inverse, scale)?;
+        let load = LoadSize::new(base, dofs);
         let dofs = dofs.to_vec();
-        Ok(Self { dofs, columns, places, small, small_lu, scale, condition, bound, rows: None })
+        let rows = None;
+        Ok(Self { dofs, columns, places, small, small_lu, scale, condition, bound, load, rows })
     }
 
     /// The touched degrees of freedom, ascending.
@@ -100,8 +106,13 @@ impl ContactSet {
 
     /// Bytes of the small system and the wanted rows; the columns are counted where they are kept.
     pub fn bytes(&self) -> usize {
-        let rows = self.rows.as_ref().map_or(0, |r| r.matrix.nrows() * r.matrix.ncols());
+        let rows = self.rows.as_ref().map_or(0, |rows| rows.blocks.len());
         8 * (rows + 2 * self.small.len())
+    }
+
+    /// Numbers multiplied for one answer at the wanted nodes.
+    pub fn products(&self) -> usize {
+        self.rows.as_ref().map_or(0, |rows| rows.blocks.len()) + 6 * self.small.len()
     }
 
     /// Condition of the small system in the Frobenius norm: how weakly the touched nodes hold.
@@ -115,17 +126,15 @@ impl ContactSet {
         if self.rows.as_ref().is_some_and(|rows| rows.nodes == nodes) {
             return;
         }
-        let c = self.dofs.len();
-        let matrix = Mat::from_fn(3 * nodes.len(), c + base.modes.len(), |i, j| {
-            let dof = 3 * nodes[i / 3] as usize + i % 3;
-            if j < c {
-                let (node, axis) = self.places[j];
-                self.columns[node].fields[axis][dof]
-            } else {
-                base.modes[j - c].field[dof]
+        let columns = self.places.iter().map(|&(node, axis)| &self.columns[node].fields[axis]);
+        let fields: Vec<&Vec<f64>> = columns.chain(base.modes.iter().map(|m| &m.field)).collect();
+        let mut blocks = Vec::with_capacity(3 * nodes.len() * fields.len());
+        for nodes in nodes.chunks(ROWS_TOGETHER / 3) {
+            for field in &fields {
+                blocks.extend(nodes.iter().flat_map(|&node| &field[3 * node as usize..][..3]));
             }
-        });
-        self.rows = Some(WantedRows { nodes: nodes.to_vec(), matrix });
+        }
+        self.rows = Some(WantedRows { nodes: nodes.to_vec(), blocks });
     }
 
     /// Forces and motions for displacements of the touched degrees of freedom.
@@ -158,14 +167,13 @@ impl ContactSet {
     pub fn wanted_displacements(&self, answer: &ContactAnswer) -> Vec<[f64; 3]> {
         let Some(rows) = &self.rows else { return Vec::new() };
         let x: Vec<f64> = answer.lambda.iter().chain(&answer.amounts).copied().collect();
-        let x = MatRef::from_column_major_slice(&x, x.len(), 1);
         let mut u = vec![[0.0; 3]; rows.nodes.len()];
-        u.par_chunks_mut(ROWS_TOGETHER / 3).enumerate().for_each(|(chunk, u)| {
-            let count = 3 * u.len();
-            let part = rows.matrix.subrows(chunk * ROWS_TOGETHER, count);
-            let u = MatMut::from_column_major_slice_mut(u.as_flattened_mut(), count, 1);
-            matmul(u, Accum::Replace, part, x, 1.0, Par::Seq);
-        });
+        let parts = u.chunks_mut(ROWS_TOGETHER / 3).map(|part| part.as_flattened_mut());
+        let blocks = rows.blocks.chunks((ROWS_TOGETHER * x.len()).max(1));
+        match rows.blocks.len() < SHARED_PRODUCT {
+            true => parts.zip(blocks).for_each(|(u, block)| multiply(block, &x, u)),
+            false => parts.zip(blocks).par_bridge().for_each(|(u, block)| multiply(block, &x, u)),
+        }
         u
     }
 
@@ -181,5 +189,22 @@ impl ContactSet {
             }
         }
         u
+    }
+}
+
+/// `u += M x` for a block of columns, four at a time; the order of the sums is always the same.
+fn multiply(block: &[f64], x: &[f64], u: &mut [f64]) {
+    let rows = u.len().max(1);
+    let mut fours = block.chunks_exact(4 * rows);
+    let mut amounts = x.chunks_exact(4);
+    for (four, x) in fours.by_ref().zip(amounts.by_ref()) {
+        let (ab, cd) = four.split_at(2 * rows);
+        let ((a, b), (c, d)) = (ab.split_at(rows), cd.split_at(rows));
+        for ((((u, a), b), c), d) in u.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            *u += (a * x[0] + b * x[1]) + (c * x[2] + d * x[3]);
+        }
+    }
+    for (column, x) in fours.remainder().chunks_exact(rows).zip(amounts.remainder()) {
+        u.iter_mut().zip(column).for_each(|(u, g)| *u += g * x);
     }
 }
