@@ -12,7 +12,9 @@ use clap::Parser;
 use fea_server::ServerConfig;
 use glove_client::commands::run::RunCommand;
 use glove_client::contact_model::ContactModel;
-use glove_client::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, TickOutcome};
+use glove_client::grasp_loop::{
+    GraspLoop, LoopEvent, Pace, SolveSettings, Subscription, TickOutcome,
+};
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
 use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
@@ -156,6 +158,7 @@ impl Bench {
             material: Material { young: 2.0e4, poisson: 0.4 },
             method: MethodName::auto(),
             contact: ContactModel::Vertex,
+            subscription: Subscription::Surface,
         };
         let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
         let (reader, link) = (HandReader::new(setup), Link::start(address).unwrap());

@@ -39,6 +39,17 @@ pub struct SolveSettings {
     pub method: MethodName,
     /// What a fingertip holds.
     pub contact: ContactModel,
+    /// Nodes that frames are asked for.
+    pub subscription: Subscription,
+}
+
+/// Nodes that frames are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Subscription {
+    /// What is seen and touched; the inside is asked for when a shape is to be kept.
+    Surface,
+    /// Every node: the whole object is written down.
+    Whole,
 }
 
 /// What happened, for the report; in the order it happened.
@@ -80,6 +91,8 @@ pub struct GraspLoop {
     /// Tick of the last order, to tell answers of an earlier grasp from those of this one.
     deforming_since: Option<u64>,
     held: HeldNodes,
+    /// A shape is to be kept as soon as its inside is known.
+    keep_wanted: bool,
     /// Nodes whose columns the server has been asked to prepare, ascending.
     prefetched: Vec<u32>,
     world_from_object: Isometry3<f64>,
@@ -112,6 +125,7 @@ impl GraspLoop {
             pace,
             deforming_since: None,
             held: HeldNodes::default(),
+            keep_wanted: false,
             prefetched: Vec::new(),
             world_from_object: Isometry3::identity(),
             hand: None,
@@ -174,15 +188,24 @@ impl GraspLoop {
         Ok(outcome)
     }
 
-    /// A command, unless the shape that is to be kept cannot be.
-    fn allowed(&self, command: Option<Command>, outcome: &mut TickOutcome) -> Option<Command> {
-        if command == Some(Command::KeepShape)
-            && let Err(error) = self.object.check_shape()
-        {
-            outcome.events.push(LoopEvent::KeepRefused(error.to_string()));
+    /// A command, unless the shape that is to be kept cannot be, or not yet.
+    fn allowed(&mut self, command: Option<Command>, outcome: &mut TickOutcome) -> Option<Command> {
+        let other = command.filter(|c| *c != Command::KeepShape);
+        if other.is_some() || (command.is_none() && !self.keep_wanted) {
+            return other;
+        }
+        // Frames bring the surface; the next one is asked for whole.
+        self.keep_wanted = !self.object.is_whole();
+        if self.keep_wanted {
             return None;
         }
-        command
+        match self.object.check_shape() {
+            Ok(()) => Some(Command::KeepShape),
+            Err(error) => {
+                outcome.events.push(LoopEvent::KeepRefused(error.to_string()));
+                None
+            }
+        }
     }
 
     fn step(
@@ -236,6 +259,7 @@ impl GraspLoop {
             None if step.state == StateName::Deforming => {}
             None => {
                 self.deforming_since = None;
+                self.keep_wanted = false;
                 self.link.cancel();
                 self.object.relax()?;
             }
@@ -247,11 +271,17 @@ impl GraspLoop {
         let tip_radii = self.reader.setup().dimensions.tip_radii();
         let contact = self.settings.contact;
         let known = self.held.known(contact, &self.object, tip_radii, known);
+        let nodes = match self.settings.subscription {
+            Subscription::Surface if !self.keep_wanted => {
+                NodeChoice::Nodes(self.object.surface().nodes.clone())
+            }
+            _ => NodeChoice::All,
+        };
         Question {
             known,
             forces: Vec::new(),
             method: self.settings.method.clone(),
-            want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+            want: Want { nodes, reactions: false, precision: Precision::F64 },
             max_error: None,
             deadline_ms: None,
         }
@@ -261,13 +291,15 @@ impl GraspLoop {
     fn pick_up(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
         for event in self.link.take_events() {
             match event {
-                LinkEvent::Answer { tick, rest_shape, displacement, report, round_trip } => {
+                LinkEvent::Answer { tick, rest_shape, nodes, displacement, report, round_trip } => {
                     let ms = round_trip.as_secs_f64() * 1e3;
                     outcome.answers.push((tick, SolveSummary::new(&report, ms)));
                     let current = rest_shape == self.object.rest_shapes()
                         && self.deforming_since.is_some_and(|since| tick >= since);
-                    if current {
-                        self.object.apply(displacement)?;
+                    match nodes {
+                        _ if !current => {}
+                        NodeChoice::All => self.object.apply(displacement)?,
+                        NodeChoice::Nodes(_) => self.object.apply_to_surface(&displacement)?,
                     }
                 }
                 LinkEvent::Connected { server } => {

@@ -10,8 +10,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
-    FrameRequest, ModelHash, ModelReady, Prefetch, Question, RejectCode, Reply, Request,
-    SolveReport, UploadModel,
+    FrameRequest, ModelHash, ModelReady, NodeChoice, Prefetch, Question, RejectCode, Reply,
+    Request, SolveReport, UploadModel,
 };
 
 use crate::connection::{LinkError, ServerConnection, unexpected};
@@ -32,7 +32,9 @@ pub enum LinkEvent {
         tick: u64,
         /// Which rest shape it belongs to.
         rest_shape: u64,
-        /// Displacement of every node, m.
+        /// Nodes that `displacement` belongs to.
+        nodes: NodeChoice,
+        /// Displacement of these nodes, m.
         displacement: Vec<[f64; 3]>,
         /// What it cost and how wrong it can be.
         report: Box<SolveReport>,
@@ -332,6 +334,7 @@ fn ask_frame(
             tick: frame.tick,
             rest_shape: model.rest_shape,
             round_trip: start.elapsed(),
+            nodes: answer.nodes,
             displacement: answer.displacements.into_f64(),
             report: Box::new(answer.report),
         }),

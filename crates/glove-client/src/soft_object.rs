@@ -15,6 +15,8 @@ pub struct SoftObject {
     shape: Vec<Point3<f64>>,
     displacement: Vec<[f64; 3]>,
     deformed: bool,
+    /// Whether the nodes inside are where the last answer has them, and not only the surface.
+    whole: bool,
     tree: SphereTree,
     normals: Vec<Vector3<f64>>,
     rest_shapes: u64,
@@ -30,11 +32,11 @@ pub enum ObjectError {
     #[error("the shape cannot be kept: {0}")]
     Shape(#[from] MeshError),
     /// An answer for another mesh.
-    #[error("the answer holds {got} displacements, the object has {expected} nodes")]
+    #[error("the answer holds {got} displacements, {expected} nodes were asked for")]
     Count {
         /// Displacements in the answer.
         got: usize,
-        /// Nodes of the object.
+        /// Nodes of the object, or of its surface.
         expected: usize,
     },
 }
@@ -57,6 +59,7 @@ impl SoftObject {
             shape,
             displacement,
             deformed: false,
+            whole: true,
             tree,
             normals,
             rest_shapes: 1,
@@ -111,8 +114,36 @@ impl SoftObject {
         let moved = self.rest.vertices().iter().zip(&displacement);
         self.follow(moved.map(|(p, u)| p + Vector3::from(*u)).collect())?;
         self.displacement = displacement;
-        self.deformed = true;
+        (self.deformed, self.whole) = (true, true);
         Ok(())
+    }
+
+    /// The same for the surface alone, which is all that is seen and touched; the nodes inside stay
+    /// where they are until [`SoftObject::apply`] comes.
+    ///
+    /// Shapes: `displacement` one per node of [`Surface::nodes`], in their order.
+    ///
+    /// # Errors
+    /// As [`SoftObject::apply`].
+    pub fn apply_to_surface(&mut self, displacement: &[[f64; 3]]) -> Result<(), ObjectError> {
+        let expected = self.surface.nodes.len();
+        if displacement.len() != expected {
+            return Err(ObjectError::Count { got: displacement.len(), expected });
+        }
+        let mut shape = self.shape.clone();
+        for (&node, u) in self.surface.nodes.iter().zip(displacement) {
+            let node = node as usize;
+            shape[node] = self.rest.vertices()[node] + Vector3::from(*u);
+            self.displacement[node] = *u;
+        }
+        self.follow(shape)?;
+        (self.deformed, self.whole) = (true, false);
+        Ok(())
+    }
+
+    /// Whether every node is where the last answer has it, so that the shape can be kept.
+    pub fn is_whole(&self) -> bool {
+        self.whole
     }
 
     /// Back to the rest shape (the fingers have let go).
@@ -123,7 +154,7 @@ impl SoftObject {
         if self.deformed {
             self.follow(self.rest.vertices().to_vec())?;
             self.displacement.fill([0.0; 3]);
-            self.deformed = false;
+            (self.deformed, self.whole) = (false, true);
         }
         Ok(())
     }
@@ -176,6 +207,24 @@ mod tests {
         object.relax().unwrap();
         assert!(object.shape() == object.rest().vertices());
         assert!(object.displacement().iter().flatten().all(|&u| u == 0.0));
+    }
+
+    #[test]
+    fn surface_answer_moves_the_surface_and_nothing_inside() {
+        let mut object = cube();
+        let nodes = object.surface().nodes.clone();
+        let u = |node: u32| [1e-4 * f64::from(node), 0.0, -1e-4];
+        let answer: Vec<_> = nodes.iter().map(|&node| u(node)).collect();
+        object.apply_to_surface(&answer).unwrap();
+        assert!(!object.is_whole());
+        for node in 0..64u32 {
+            let moved = object.shape()[node as usize] - object.rest().vertices()[node as usize];
+            let expected = if nodes.contains(&node) { u(node) } else { [0.0; 3] };
+            assert!((moved - Vector3::from(expected)).norm() < 1e-15, "node {node}");
+        }
+        assert!(object.apply_to_surface(&answer[1..]).is_err());
+        object.apply((0..64).map(u).collect()).unwrap();
+        assert!(object.is_whole());
     }
 
     #[test]

@@ -16,7 +16,7 @@ use softgrasp_protocol::{Material, MethodName};
 use super::output::{print, write_file, write_json};
 use crate::connection::{Host, ServerChoice};
 use crate::contact_model::ContactModel;
-use crate::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, TickOutcome};
+use crate::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, Subscription, TickOutcome};
 use crate::hand_reader::{HandReader, HandSetup};
 use crate::link::Link;
 use crate::progress::Progress;
@@ -213,6 +213,10 @@ impl RunCommand {
                 },
                 method,
                 contact,
+                subscription: match self.out_dir {
+                    Some(_) => Subscription::Whole,
+                    None => Subscription::Surface,
+                },
             },
             server: self.server.clone().unwrap_or(ServerChoice::Embedded),
             script,
