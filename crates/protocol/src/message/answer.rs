@@ -53,16 +53,17 @@ impl Displacements {
     /// largest is not a finite number or its inverse is not, nothing is divided that would only
     /// hide this: the values travel as they are.
     pub fn of(displacements: Vec<[f64; 3]>, precision: Precision) -> Self {
+        if precision == Precision::F64 {
+            return Self::F64(displacements);
+        }
         let scale = displacements.iter().flatten().fold(0.0, |most: f64, u| most.max(u.abs()));
         let finite = displacements.iter().flatten().all(|u| u.is_finite());
-        match precision {
-            Precision::F32Quantised if finite && (scale == 0.0 || scale.recip().is_finite()) => {
-                let divisor = if scale == 0.0 { 1.0 } else { scale };
-                let values = displacements.iter().map(|u| u.map(|c| (c / divisor) as f32));
-                Self::F32Quantised { scale, values: values.collect() }
-            }
-            _ => Self::F64(displacements),
+        if !finite || (scale != 0.0 && !scale.recip().is_finite()) {
+            return Self::F64(displacements);
         }
+        let divisor = if scale == 0.0 { 1.0 } else { scale };
+        let values = displacements.iter().map(|u| u.map(|c| (c / divisor) as f32));
+        Self::F32Quantised { scale, values: values.collect() }
     }
 
     /// Number of nodes.
