@@ -3,6 +3,7 @@
 //! No I/O, no clock, no threads of its own: bytes come in as slices, time as an argument, and
 //! parallel loops run on the rayon pool of whoever calls.
 
+pub mod contact;
 pub mod fem;
 pub mod grasp;
 pub mod hand;

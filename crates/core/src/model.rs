@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::contact::{Mask, MaskError};
 use crate::fem::{
     AssemblyError, Material, QuadraticMesh, Stiffness, StiffnessPattern, StrainSummary,
     TooManyNodes, assemble, assemble_quadratic, summarise_strain, summarise_strain_quadratic,
@@ -57,6 +58,14 @@ pub enum ModelError {
         node: usize,
         /// Nodes of the mesh.
         node_count: usize,
+    },
+    /// A mask that does not fit the mesh.
+    #[error("mask {mask} (from 0): {reason}")]
+    Mask {
+        /// Which one, in the order given.
+        mask: usize,
+        /// What is wrong with it.
+        reason: MaskError,
     },
     /// The condensed engine does not know ten-node elements.
     #[error("condensed works on linear tetrahedra; use front for ten-node ones")]
@@ -202,15 +211,47 @@ impl Model {
         Ok(Known { dofs: known.dofs().to_vec(), q_known: known.values().to_vec() })
     }
 
-    /// Makes sure that known degrees of freedom exist and hold every body.
+    /// Masks of `(node, weight)` lists, once their nodes are seen to be there and each on one body.
     ///
-    /// Shapes: `dofs` ascending.
+    /// # Errors
+    /// [`ModelError::Mask`] naming the mask and what is wrong with it.
+    pub fn masks(
+        &self,
+        entries: impl IntoIterator<Item = Vec<(u32, f64)>>,
+    ) -> Result<Vec<Mask>, ModelError> {
+        let made = |(mask, entries): (usize, Vec<(u32, f64)>)| {
+            let checked =
+                Mask::try_new(entries).and_then(|made| self.check_mask(&made).map(|()| made));
+            checked.map_err(|reason| ModelError::Mask { mask, reason })
+        };
+        entries.into_iter().enumerate().map(made).collect()
+    }
+
+    fn check_mask(&self, mask: &Mask) -> Result<(), MaskError> {
+        let node_count = self.mesh.node_count();
+        let mut on: Option<(u32, u32)> = None;
+        for &(node, _) in mask.entries() {
+            let Some(body) = self.bodies.of_node.get(node as usize) else {
+                return Err(MaskError::NoSuchNode { node, node_count });
+            };
+            let body = body.ok_or(MaskError::Orphan { node })?;
+            let (first, first_body) = *on.get_or_insert((node, body));
+            if first_body != body {
+                return Err(MaskError::SeveralBodies { first, second: node });
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes sure that known degrees of freedom exist and, with the masks, hold every body.
+    ///
+    /// Shapes: `dofs` ascending; `masks` of this model.
     ///
     /// # Errors
     /// [`ModelError::Partition`], [`ModelError::Free`] naming the body and its motion.
-    pub fn check_held(&self, dofs: &[u32]) -> Result<Partition, ModelError> {
+    pub fn check_held(&self, dofs: &[u32], masks: &[Mask]) -> Result<Partition, ModelError> {
         let partition = Partition::try_new(&self.used, dofs)?;
-        match find_free_motion(&self.mesh, &self.bodies, dofs) {
+        match find_free_motion(&self.mesh, &self.bodies, dofs, masks) {
             Some(free) => Err(ModelError::Free(free)),
             None => Ok(partition),
         }
@@ -242,7 +283,7 @@ impl Model {
         method: Method,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Factored, ModelError> {
-        let partition = self.check_held(dofs)?;
+        let partition = self.check_held(dofs, &[])?;
         Ok(Factored::try_new(&self.stiffness, partition, method, on_stage)?)
     }
 }
@@ -263,6 +304,31 @@ mod tests {
         let known = cube().known(vec![(4, 0.5), (0, 0.25)]).unwrap();
         assert_eq!(known.dofs, [0, 3, 4, 5]);
         assert_eq!(known.q_known, [0.25, 0.0, 0.5, 0.0]);
+    }
+
+    #[test]
+    fn masks_that_do_not_fit_the_mesh_are_named() {
+        let one = generate(BuiltIn::Cube, 27).unwrap();
+        let moved = one.vertices().iter().map(|p| p + nalgebra::Vector3::new(0.2, 0.0, 0.0));
+        let orphan = [nalgebra::Point3::new(9.0, 9.0, 9.0)];
+        let vertices = one.vertices().iter().copied().chain(moved).chain(orphan).collect();
+        let tets = one.tets().iter().copied().chain(one.tets().iter().map(|t| t.map(|n| n + 27)));
+        let two = TetMesh::try_new(vertices, tets.collect(), vec![]).unwrap();
+        let material = Material::try_new(1.0e5, 0.3).unwrap();
+        let model = Model::try_new(two, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
+        let error = |nodes: &[u32]| {
+            let good = vec![(0, 1.0), (1, 1.0)];
+            let bad: Vec<(u32, f64)> = nodes.iter().map(|&n| (n, 1.0)).collect();
+            match model.masks([good, bad]) {
+                Err(ModelError::Mask { mask: 1, reason }) => reason,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(error(&[3, 55]), MaskError::NoSuchNode { node: 55, node_count: 55 });
+        assert_eq!(error(&[u32::MAX]), MaskError::NoSuchNode { node: u32::MAX, node_count: 55 });
+        assert_eq!(error(&[54]), MaskError::Orphan { node: 54 });
+        assert_eq!(error(&[26, 27]), MaskError::SeveralBodies { first: 26, second: 27 });
+        assert_eq!(error(&[]), MaskError::Empty);
     }
 
     #[test]

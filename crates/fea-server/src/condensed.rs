@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use softgrasp_core::model::{Known, ModelError};
 use softgrasp_core::solve::Stage;
-use softgrasp_core::solve::condensed::{Base, Certificate, ContactAnswer, ContactSet};
+use softgrasp_core::solve::condensed::{
+    Base, Certificate, Contact, ContactAnswer, ContactSet, Touched,
+};
 use softgrasp_protocol::{
     Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport,
 };
@@ -44,20 +46,21 @@ pub(crate) fn answer(
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
     let base = stored.base(&mut |stage| clock.begin(stage))?;
-    let (dofs, q) = touched(known, base.fixed());
+    let (touched, q) = touched(known, base.fixed());
     let nodes = match &question.want.nodes {
         NodeChoice::All => (0..stored.model.mesh().node_count() as u32).collect(),
         NodeChoice::Nodes(nodes) => nodes.clone(),
     };
-    let kept = stored.set_for(&dofs, &nodes);
+    let kept = stored.set_for(&touched, &nodes);
     let factor_reused = kept.is_some();
     let set = match kept {
         Some(set) => set,
         None => {
             clock.begin(Stage::Factor);
-            stored.model.check_held(&known.dofs)?;
+            stored.model.check_held(&known.dofs, &touched.masks)?;
             let columns = &stored.columns;
-            let mut set = ContactSet::try_new(&base, columns, &dofs).map_err(ModelError::from)?;
+            let mut set =
+                ContactSet::try_new(&base, columns, &touched).map_err(ModelError::from)?;
             set.want(&base, &nodes);
             let set = Arc::new(set);
             stored.keep_set(nodes, Arc::clone(&set));
@@ -109,14 +112,16 @@ pub(crate) fn products(stored: &StoredModel, question: &Question) -> Option<usiz
         return None;
     }
     let known = stored.model.known(pairs(&question.known)).ok()?;
-    let (dofs, _) = touched(&known, base.fixed());
-    stored.set_for(&dofs, nodes).map(|set| set.products())
+    let (touched, _) = touched(&known, base.fixed());
+    stored.set_for(&touched, nodes).map(|set| set.products())
 }
 
-/// Degrees of freedom touched in this frame, without those the scene fixes, and their values.
-fn touched(known: &Known, fixed: &[u32]) -> (Vec<u32>, Vec<f64>) {
+/// What is touched in this frame, without the degrees of freedom the scene fixes, and the values.
+fn touched(known: &Known, fixed: &[u32]) -> (Touched, Vec<f64>) {
     let pairs = known.dofs.iter().zip(&known.q_known);
-    pairs.filter(|(dof, _)| fixed.binary_search(dof).is_err()).map(|(d, q)| (*d, *q)).unzip()
+    let free = pairs.filter(|(dof, _)| fixed.binary_search(dof).is_err());
+    let (dofs, q) = free.map(|(d, q)| (*d, *q)).unzip();
+    (Touched { dofs, masks: Vec::new() }, q)
 }
 
 fn report(
@@ -198,13 +203,10 @@ fn watch_strain(
 pub(crate) fn prefetch(stored: &StoredModel, nodes: &[u32]) {
     let Ok(base) = stored.base(&mut |_| {}) else { return };
     let node_count = stored.model.mesh().node_count();
-    let used: Vec<u32> = nodes
-        .iter()
-        .copied()
-        .filter(|&n| (n as usize) < node_count && stored.model.is_used(n as usize))
-        .collect();
-    for some in used.chunks(PREFETCH_TOGETHER) {
-        if let Err(error) = stored.columns.of_nodes(&base, some) {
+    let used = |n: &&u32| (**n as usize) < node_count && stored.model.is_used(**n as usize);
+    let contacts: Vec<Contact> = nodes.iter().filter(used).map(|&n| Contact::Node(n)).collect();
+    for some in contacts.chunks(PREFETCH_TOGETHER) {
+        if let Err(error) = stored.columns.of_contacts(&base, some) {
             tracing::debug!(%error, "prefetch ends");
             return;
         }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Model, ModelError};
-use softgrasp_core::solve::condensed::{Base, Columns, ContactSet};
+use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Touched};
 use softgrasp_core::solve::{Factored, Method, Stage};
 use softgrasp_protocol::ModelHash;
 
@@ -77,9 +77,10 @@ impl StoredModel {
     }
 
     /// A contact set with the rows of some nodes, if it is kept.
-    pub fn set_for(&self, dofs: &[u32], nodes: &[u32]) -> Option<Arc<ContactSet>> {
+    pub fn set_for(&self, touched: &Touched, nodes: &[u32]) -> Option<Arc<ContactSet>> {
         let mut sets = lock(&self.sets);
-        let at = sets.iter().position(|kept| kept.set.dofs() == dofs && kept.nodes == nodes)?;
+        let is_it = |kept: &KeptSet| kept.set.touched() == touched && kept.nodes == nodes;
+        let at = sets.iter().position(is_it)?;
         let kept = sets.remove(at);
         sets.push(kept);
         sets.last().map(|kept| Arc::clone(&kept.set))

@@ -8,6 +8,7 @@ use std::fmt;
 use nalgebra::{Point3, Vector3};
 
 use super::zero_energy::{BodyMotions, nodes_and_dofs_by_body, rigid_parts};
+use crate::contact::Mask;
 use crate::mesh::{Bodies, TetMesh};
 
 /// A body that can still move without deforming.
@@ -21,6 +22,8 @@ pub struct FreeMotion {
     pub node_count: usize,
     /// Known degrees of freedom on the body.
     pub known_dofs: usize,
+    /// Masks on the body.
+    pub masks: usize,
     /// The motion left free.
     pub motion: Motion,
     /// The motion moves a part of the body about a hinge and leaves the rest where it is.
@@ -46,10 +49,14 @@ pub enum Motion {
 
 impl fmt::Display for FreeMotion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { body, first_node, node_count, known_dofs, motion, hinged } = self;
+        let Self { body, first_node, node_count, known_dofs, masks, motion, hinged } = self;
         let part = if *hinged { "a part of body" } else { "body" };
         write!(f, "{part} {body} ({node_count} nodes, the first is node {first_node}; ")?;
-        write!(f, "{known_dofs} known degrees of freedom) can still ")?;
+        write!(f, "{known_dofs} known degrees of freedom")?;
+        if *masks > 0 {
+            write!(f, ", {masks} masks")?;
+        }
+        f.write_str(") can still ")?;
         match motion {
             Motion::Translation { direction: d } => {
                 write!(f, "move along ({:.3}, {:.3}, {:.3})", d.x, d.y, d.z)?;
@@ -59,20 +66,31 @@ impl fmt::Display for FreeMotion {
                 write!(f, "along ({:.3}, {:.3}, {:.3})", a.x, a.y, a.z)?;
             }
         }
-        f.write_str("; prescribe all three axes of at least three nodes of it that are not in line")
+        f.write_str("; prescribe all three axes of at least three nodes ")?;
+        f.write_str(if *masks > 0 { "or masks " } else { "" })?;
+        f.write_str("of it that are not in line")
     }
 }
 
 /// First body that can move without deforming, if any.
 ///
-/// Shapes: `known` ascending degrees of freedom. Units: those of the mesh.
+/// Shapes: `known` ascending degrees of freedom; each mask on nodes of one body. Units: those of the
+/// mesh.
 ///
 /// Source: thesis (3.43) presumes that `K11⁻¹` exists; this is the condition.
-pub fn find_free_motion(mesh: &TetMesh, bodies: &Bodies, known: &[u32]) -> Option<FreeMotion> {
+pub fn find_free_motion(
+    mesh: &TetMesh,
+    bodies: &Bodies,
+    known: &[u32],
+    masks: &[Mask],
+) -> Option<FreeMotion> {
     let parts = rigid_parts(mesh, bodies);
     let by_body = nodes_and_dofs_by_body(bodies, known);
+    let body_of = |mask: &Mask| bodies.of_node[mask.entries().first()?.0 as usize];
     by_body.into_iter().enumerate().find_map(|(body, (nodes, held))| {
-        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held)?;
+        let is_on_body = |mask: &&Mask| body_of(mask).is_some_and(|of| of as usize == body);
+        let on_body: Vec<&Mask> = masks.iter().filter(is_on_body).collect();
+        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held, &on_body)?;
         let motion = motions.basis.first()?.as_slice();
         let moving: Vec<f64> = motion.chunks(6).map(|m| m.iter().map(|x| x * x).sum()).collect();
         let part = (0..moving.len()).max_by(|&a, &b| moving[a].total_cmp(&moving[b]))?;
@@ -81,6 +99,7 @@ pub fn find_free_motion(mesh: &TetMesh, bodies: &Bodies, known: &[u32]) -> Optio
             first_node: nodes.first().map_or(0, |&n| n as usize),
             node_count: nodes.len(),
             known_dofs: held.len(),
+            masks: on_body.len(),
             motion: motion_from(&motion[6 * part..6 * part + 6], motions.centre, motions.size),
             hinged: moving.iter().any(|&m| m < 1e-12 * moving[part]),
         })
@@ -124,7 +143,7 @@ mod tests {
     }
 
     fn free(mesh: &TetMesh, known: &[u32]) -> Option<FreeMotion> {
-        find_free_motion(mesh, &Bodies::from_mesh(mesh), known)
+        find_free_motion(mesh, &Bodies::from_mesh(mesh), known, &[])
     }
 
     #[test]
@@ -141,6 +160,24 @@ mod tests {
         assert!((axis - Vector3::x()).norm() < 1e-9);
         assert!(point.y.abs() < 1e-9 && point.z.abs() < 1e-9);
         assert!(found.to_string().contains("turn about the axis through"));
+    }
+
+    /// Masks on three edges hold by their means; two hold as two nodes at their means do.
+    #[test]
+    fn masks_hold_a_body_by_their_means() {
+        let mesh = unit_tet();
+        let bodies = Bodies::from_mesh(&mesh);
+        let edge = |a: u32, b: u32| Mask::try_new(vec![(a, 1.0), (b, 3.0)]).unwrap();
+        let three = [edge(0, 1), edge(1, 2), edge(2, 3)];
+        assert_eq!(find_free_motion(&mesh, &bodies, &[], &three), None);
+        assert_eq!(find_free_motion(&mesh, &bodies, &all_axes(&[0]), &three[1..]), None);
+        let found = find_free_motion(&mesh, &bodies, &[], &three[..2]).unwrap();
+        let Motion::Rotation { axis, .. } = found.motion else { panic!("{found:?}") };
+        // Means (1, 3, 0)/4 and (0, 1, 3)/4.
+        let line = Vector3::new(1.0, 2.0, -3.0).normalize();
+        assert!((axis - line).norm() < 1e-9, "{axis}");
+        let text = found.to_string();
+        assert!(text.contains("2 masks") && text.contains("nodes or masks of it"), "{text}");
     }
 
     #[test]

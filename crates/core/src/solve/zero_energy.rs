@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
+use crate::contact::Mask;
 use crate::mesh::{Bodies, TetMesh};
 
 /// Relative singular value below which a motion counts as free. Above it the support may be weak,
@@ -79,9 +80,15 @@ pub(super) struct BodyMotions {
 }
 
 impl BodyMotions {
-    /// Motions of the body made of `nodes` when `held` degrees of freedom of it are in place;
-    /// `None` if it has too many hinged parts to tell.
-    pub fn of_body(mesh: &TetMesh, parts: &Parts, nodes: &[u32], held: &[u32]) -> Option<Self> {
+    /// Motions of the body made of `nodes` when `held` degrees of freedom of it and the means of
+    /// `masks` on it are in place; `None` if it has too many hinged parts to tell.
+    pub fn of_body(
+        mesh: &TetMesh,
+        parts: &Parts,
+        nodes: &[u32],
+        held: &[u32],
+        masks: &[&Mask],
+    ) -> Option<Self> {
         let mut names: Vec<u32> =
             nodes.iter().flat_map(|&n| parts.of_node[n as usize].iter().copied()).collect();
         names.sort_unstable();
@@ -103,6 +110,16 @@ impl BodyMotions {
             let (node, axis) = (dof / 3, dof as usize % 3);
             let part = parts.of_node[node as usize][0];
             rows.push(motions.row(mesh, node, axis, &[(part, 1.0)]));
+        }
+        for mask in masks {
+            for axis in 0..3 {
+                let mut mean = DVector::zeros(6 * motions.parts.len());
+                for &(node, weight) in mask.entries() {
+                    let part = parts.of_node[node as usize][0];
+                    mean += motions.row(mesh, node, axis, &[(part, weight)]);
+                }
+                rows.push(mean);
+            }
         }
         for &node in nodes {
             if let Some((&first, others)) = parts.of_node[node as usize].split_first() {

@@ -72,12 +72,12 @@ pub enum CondensedError {
     },
     /// A contact set that alone is larger than the cache may be.
     #[error(
-        "condensed: {nodes} touched nodes need {needed} bytes of columns, more than the cache \
-         bound of {bound}; raise the bound or use front"
+        "condensed: {contacts} touched nodes or masks need {needed} bytes of columns, more than the \
+         cache bound of {bound}; raise the bound or, for nodes, use front"
     )]
     CacheTooSmall {
-        /// Touched nodes.
-        nodes: usize,
+        /// Touched nodes and masks.
+        contacts: usize,
         /// Bytes of their columns.
         needed: usize,
         /// The bound.
@@ -86,6 +86,29 @@ pub enum CondensedError {
     /// The touched nodes leave a motion free or nearly so.
     #[error("condensed: the touched nodes do not hold the body")]
     NotHeld,
+    /// A mask whose mean displacement follows from what else is held.
+    #[error(
+        "condensed: along {axis}, mask {mask} (from 0) says what other masks, touched nodes or fixed \
+         nodes say already, so its force is not determined; leave it out or move it"
+    )]
+    Dependent {
+        /// The mask, in the order given.
+        mask: usize,
+        /// Axis name.
+        axis: char,
+    },
+    /// A mask of a node that is not there.
+    #[error(
+        "condensed: mask {mask} names node {node}, but the mesh has {node_count} nodes (0-based)"
+    )]
+    NoSuchNode {
+        /// The mask, in the order given.
+        mask: usize,
+        /// The node.
+        node: u32,
+        /// Nodes of the mesh.
+        node_count: usize,
+    },
     /// The answer is not finite.
     #[error("condensed: the answer is not finite; the known displacements are too large")]
     NotFinite,
@@ -201,7 +224,7 @@ fn motions(
     let parts = rigid_parts(mesh, bodies);
     let mut fields = Vec::new();
     for (body, (nodes, held)) in nodes_and_dofs_by_body(bodies, fixed).into_iter().enumerate() {
-        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held)
+        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held, &[])
             .ok_or(CondensedError::Hinges { body })?;
         for motion in &motions.basis {
             let mut field = vec![0.0; 3 * mesh.node_count()];

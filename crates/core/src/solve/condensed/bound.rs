@@ -1,13 +1,21 @@
 //! A proven bound on the error of every answer, from numbers worked out once per contact set.
 //!
-//! With the known displacements C in place, the error e of an answer with residual r obeys
-//! `K_C e = r`, so `‖e‖ ≤ ‖K_C⁻¹‖ ‖r‖`. Two facts make this cheap:
+//! What is held are means `Eᵀu = q`; a touched degree of freedom is a column of E with a single one.
+//! With `Eᵀu = q` in place, the error e of an answer with residual r lies in the space V of fields
+//! with `Eᵀv = 0`, and `vᵀK e = vᵀr` for all v in V; so `‖e‖ ≤ ‖K_V⁻¹‖ ‖r‖`, with K_V the
+//! stiffness on V. Two facts make this cheap:
 //!
 //! * `r` is a combination of the columns' residuals, bounded by the triangle inequality.
-//! * If the scene's own fixed nodes are the base, `K_C` is a principal submatrix of `K_B` and
-//!   `λ_min(K_C) ≥ λ_min(K_B)` (Cauchy interlacing). If the base is artificial, any load f moves
-//!   the touched body by `u = K_B⁻¹ f + M y` with `S y = −Mᵀ f`, where `M = [G_C R]` and S is the
-//!   small matrix; hence `‖K_C⁻¹‖ ≤ 1/λ_min(K_B) + ‖M D‖² ‖(D S D)⁻¹‖` for any diagonal D.
+//! * If the scene's own fixed nodes are the base, V is a part of the space of `K_B`, and a form is
+//!   nowhere smaller on a part than on the whole: `λ_min(K_V) ≥ λ_min(K_B)` (for single nodes this
+//!   is Cauchy's interlacing). If the base is artificial, any load f moves the touched body by
+//!   `u = K_B⁻¹ f + M y` with `S y = −Mᵀ f`, where `M = [G R]`, `G = K_B⁻¹ E`, and S is the small
+//!   matrix: `Eᵀu` is then zero, and the contacts' forces balance f. Only `G = K_B⁻¹ E` is used, so
+//!   it holds for every E; hence `‖K_V⁻¹‖ ≤ 1/λ_min(K_B) + ‖M D‖² ‖(D S D)⁻¹‖` for any diagonal D.
+//!
+//! If the means are off by d, the smallest field that has them is `E (EᵀE)⁻¹ d`; it is added to the
+//! error, and its forces to the residual. The forces of the contacts that do not balance are a load
+//! on the base, as large as their imbalance.
 //!
 //! `λ_min(K_B)` is bounded from below by a Cholesky factor of `K_B − s I`: if it exists, the
 //! smallest eigenvalue is at least s less a rounding margin.
@@ -17,7 +25,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::base::{Base, CondensedError, gamma};
-use super::columns::NodeColumns;
+use super::columns::ContactColumns;
 use crate::solve::FrontFactor;
 use crate::solve::pcg::norm;
 
@@ -31,7 +39,7 @@ impl SmallBound {
     /// Shapes: `inverse` of the scaled small matrix, (c + z)².
     pub fn new(
         base: &Base,
-        columns: &[Arc<NodeColumns>],
+        columns: &[Arc<ContactColumns>],
         places: &[(usize, usize)],
         inverse: &DMatrix<f64>,
         scale: f64,
@@ -42,7 +50,7 @@ impl SmallBound {
         if base.is_held_by_scene() {
             return Ok(Self { compliance: 0.0 });
         }
-        let column_norms = places.iter().map(|&(node, axis)| columns[node].norms[axis]);
+        let column_norms = places.iter().map(|&(at, axis)| columns[at].norms[axis]);
         let norms: Vec<f64> = column_norms.chain(base.modes.iter().map(|m| m.norm)).collect();
         // D makes every column of M a unit vector; a zero column (a held node) keeps its place.
         let largest = norms.iter().copied().fold(0.0, f64::max);

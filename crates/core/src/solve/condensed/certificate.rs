@@ -11,7 +11,8 @@ use crate::solve::pcg::norm;
 /// How wrong an answer can be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
-    /// `‖r‖ / ‖b‖` by the triangle inequality over the columns' residuals as computed.
+    /// `‖r‖ / ‖b‖` by the triangle inequality over the columns' residuals as computed; b is that of
+    /// (3.42a), or, where masks are held, the forces of the contacts on the nodes.
     pub residual_rel: f64,
     /// Proven bound on `‖e‖ / ‖u‖` over all nodes, or why there is none.
     pub error_bound_rel: Result<f64, &'static str>,
@@ -20,8 +21,8 @@ pub struct Certificate {
 impl ContactSet {
     /// How wrong an answer can be; costs no more than a few products of the size of the set.
     ///
-    /// Shapes: `q` one per touched degree of freedom; `delivered` displacements of distinct nodes,
-    /// whose size makes the relative bound sharper (may be empty).
+    /// Shapes: `q` as in [`ContactSet::solve`]; `delivered` displacements of distinct nodes, whose
+    /// size makes the relative bound sharper (may be empty).
     pub fn certify(
         &self,
         base: &Base,
@@ -29,8 +30,8 @@ impl ContactSet {
         answer: &ContactAnswer,
         delivered: &[[f64; 3]],
     ) -> Certificate {
-        let places = self.places.iter().map(|&(node, axis)| {
-            let columns = &self.columns[node];
+        let places = self.places.iter().map(|&(at, axis)| {
+            let columns = &self.columns[at];
             [columns.norms[axis], columns.residuals[axis], columns.residual_bounds[axis]]
         });
         let modes = base.modes.iter().map(|m| [m.norm, m.residual, m.residual_bound]);
@@ -41,21 +42,26 @@ impl ContactSet {
             residual += amount.abs() * computed;
             residual_bound += amount.abs() * bound;
         }
-        // What the touched nodes are off moves their neighbours by at most so much force.
-        let off = base.stiffest * answer.mismatch;
-        residual += off;
-        residual_bound += off;
-        let b = self.load.size(q);
+        // What the contacts are off moves their neighbours by at most so much force.
+        let stiffest = (base.stiffest * self.overlap.lift).max(self.scale);
+        residual += stiffest * answer.mismatch;
+        let b = self.overlap.force_norm(&answer.lambda).unwrap_or_else(|| self.load.size(q));
         let residual_rel = if b > 0.0 { residual / b } else { residual };
-        let rounding = gamma(self.dofs().len() + base.modes.len() + 2) * moved;
+        let terms = answer.lambda.len() + base.modes.len() + 2;
+        let rounding = gamma(terms) * moved;
+        // The mismatch is itself computed: products of the means of the columns.
+        let rows = (terms as f64).sqrt();
+        let mismatch = answer.mismatch + rows * gamma(terms + self.touched().longest()) * moved;
+        residual_bound += stiffest * mismatch;
         // Part of the answer bounds the size of the whole from below.
-        let size = norm(q).max(norm(delivered.as_flattened()));
+        let size = (norm(q) / self.overlap.stretch).max(norm(delivered.as_flattened()));
         let error_bound_rel = match base.eigenvalue_min() {
             None => Err("no lower bound of the smallest eigenvalue has been proven for this shape"),
             Some(_) if size <= 0.0 => Err("nothing moves"),
             Some(eigenvalue) => {
                 let compliance = 1.0 / eigenvalue + self.bound.compliance;
-                Ok((residual_bound * compliance + rounding + answer.mismatch) / size)
+                let lifted = self.overlap.lift * mismatch;
+                Ok((residual_bound * compliance + rounding + lifted) / size)
             }
         };
         Certificate { residual_rel, error_bound_rel }

@@ -1,4 +1,4 @@
-//! Columns of the compliance, computed when a node is first asked for and kept under a bound.
+//! Columns of the compliance, computed when a contact is first asked for and kept under a bound.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -6,14 +6,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use rayon::prelude::*;
 
 use super::base::{Base, CondensedError, rounding_of_product};
+use super::touched::Contact;
 use crate::solve::pcg::norm;
 
-/// Responses of the held shape to unit forces at one node.
+/// Responses of the held shape to unit forces at one contact: on one node, or spread by a mask.
 ///
 /// Units: m/N; residuals 1.
-pub struct NodeColumns {
-    /// The node.
-    pub node: u32,
+pub struct ContactColumns {
+    /// The node or mask.
+    pub contact: Contact,
     /// Displacement of every degree of freedom under a unit force along x, y, z; 3 × 3N.
     pub(super) fields: [Vec<f64>; 3],
     pub(super) norms: [f64; 3],
@@ -31,12 +32,12 @@ pub struct Columns {
 
 #[derive(Default)]
 struct Kept {
-    columns: BTreeMap<u32, (u64, Arc<NodeColumns>)>,
+    columns: BTreeMap<Contact, (u64, Arc<ContactColumns>)>,
     uses: u64,
     computed: u64,
 }
 
-/// A column whose relative residual is above this is refined once.
+/// A column whose residual, relative to its load, is above this is refined once.
 const RESIDUAL_GOOD: f64 = 1e-11;
 
 impl Columns {
@@ -47,60 +48,60 @@ impl Columns {
         Self { bound, kept: Mutex::default() }
     }
 
-    /// Bytes the columns of one node take.
-    pub fn bytes_per_node(base: &Base) -> usize {
+    /// Bytes the columns of one contact take.
+    pub fn bytes_per_contact(base: &Base) -> usize {
         3 * 8 * base.dof_count()
     }
 
     /// Bytes held now.
     pub fn bytes(&self, base: &Base) -> usize {
-        self.lock().columns.len() * Self::bytes_per_node(base)
+        bytes_of(base, self.lock().columns.keys())
     }
 
-    /// Nodes whose columns have been computed so far, repetitions counted.
+    /// Contacts whose columns have been computed so far, repetitions counted.
     pub fn computed(&self) -> u64 {
         self.lock().computed
     }
 
-    /// Columns of some nodes, from the cache or computed now on the current rayon pool.
+    /// Columns of some nodes or masks, from the cache or computed now on the current rayon pool.
     ///
     /// # Errors
     /// [`CondensedError::CacheTooSmall`] if they alone are larger than the bound.
-    pub fn of_nodes(
+    pub fn of_contacts(
         &self,
         base: &Base,
-        nodes: &[u32],
-    ) -> Result<Vec<Arc<NodeColumns>>, CondensedError> {
-        let needed = nodes.len() * Self::bytes_per_node(base);
+        contacts: &[Contact],
+    ) -> Result<Vec<Arc<ContactColumns>>, CondensedError> {
+        let needed = bytes_of(base, contacts);
         if needed > self.bound {
-            let (nodes, bound) = (nodes.len(), self.bound);
-            return Err(CondensedError::CacheTooSmall { nodes, needed, bound });
+            let (contacts, bound) = (contacts.len(), self.bound);
+            return Err(CondensedError::CacheTooSmall { contacts, needed, bound });
         }
-        let missing: Vec<u32> = {
+        let missing: Vec<Contact> = {
             let kept = self.lock();
-            nodes.iter().copied().filter(|n| !kept.columns.contains_key(n)).collect()
+            contacts.iter().filter(|c| !kept.columns.contains_key(c)).cloned().collect()
         };
         // Computed without the lock: others may answer from the cache meanwhile.
         let made = compute(base, &missing);
         let mut kept = self.lock();
         kept.computed += missing.len() as u64;
         for columns in made {
-            kept.columns.insert(columns.node, (0, Arc::new(columns)));
+            kept.columns.insert(columns.contact.clone(), (0, Arc::new(columns)));
         }
         kept.uses += 1;
         let now = kept.uses;
-        let mut found = Vec::with_capacity(nodes.len());
-        for node in nodes {
-            if let Some((used, columns)) = kept.columns.get_mut(node) {
+        let mut found = Vec::with_capacity(contacts.len());
+        for contact in contacts {
+            if let Some((used, columns)) = kept.columns.get_mut(contact) {
                 *used = now;
                 found.push(Arc::clone(columns));
             }
         }
-        trim(&mut kept, self.bound / Self::bytes_per_node(base));
+        trim(&mut kept, base, self.bound);
         drop(kept);
         // Another thread may have trimmed what this one counted on; then it is computed again.
-        if found.len() < nodes.len() {
-            return Ok(compute(base, nodes).into_iter().map(Arc::new).collect());
+        if found.len() < contacts.len() {
+            return Ok(compute(base, contacts).into_iter().map(Arc::new).collect());
         }
         Ok(found)
     }
@@ -110,57 +111,63 @@ impl Columns {
     }
 }
 
-/// Drops the columns unused for longest until at most `count_max` nodes are left.
-fn trim(kept: &mut Kept, count_max: usize) {
-    let over = kept.columns.len().saturating_sub(count_max);
-    if over == 0 {
+fn bytes_of<'a>(base: &Base, contacts: impl IntoIterator<Item = &'a Contact>) -> usize {
+    let each = Columns::bytes_per_contact(base);
+    contacts.into_iter().map(|contact| each + contact.bytes()).sum()
+}
+
+/// Drops the columns unused for longest until no more than `bound` bytes are left.
+fn trim(kept: &mut Kept, base: &Base, bound: usize) {
+    let mut bytes = bytes_of(base, kept.columns.keys());
+    if bytes <= bound {
         return;
     }
-    let mut order: Vec<(u64, u32)> =
-        kept.columns.iter().map(|(&n, &(used, _))| (used, n)).collect();
+    let mut order: Vec<(u64, Contact)> =
+        kept.columns.iter().map(|(contact, &(used, _))| (used, contact.clone())).collect();
     order.sort_unstable();
-    for (_, node) in order.into_iter().take(over) {
-        kept.columns.remove(&node);
+    for (_, contact) in order {
+        if bytes <= bound {
+            return;
+        }
+        kept.columns.remove(&contact);
+        bytes -= bytes_of(base, [&contact]);
     }
 }
 
-/// Nodes solved together: enough right-hand sides for matrix products, few enough for the cache.
-const NODES_TOGETHER: usize = 8;
+/// Contacts solved together: enough right-hand sides for matrix products, few enough for the cache.
+const CONTACTS_TOGETHER: usize = 8;
 
-fn compute(base: &Base, nodes: &[u32]) -> Vec<NodeColumns> {
-    nodes.chunks(NODES_TOGETHER).flat_map(|some| compute_together(base, some)).collect()
+fn compute(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
+    contacts.chunks(CONTACTS_TOGETHER).flat_map(|some| compute_together(base, some)).collect()
 }
 
-fn compute_together(base: &Base, nodes: &[u32]) -> Vec<NodeColumns> {
+fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
     let unknown = base.partition.unknown();
     let n = unknown.len();
     let rows_wanted: Vec<usize> = (0..n).collect();
-    let dofs: Vec<u32> = nodes.iter().flat_map(|&node| 3 * node..3 * node + 3).collect();
-    // A degree of freedom of the base itself does not move under its own force: a zero column.
-    let unit = |dof: &u32| base.partition.row_of(*dof as usize).map(|row| (row, 1.0));
-    let unit_forces: Vec<Vec<(usize, f64)>> =
-        dofs.iter().map(|dof| unit(dof).into_iter().collect()).collect();
-    let solved = base.factor.solve_partial(&unit_forces, &rows_wanted);
-    let mut fields: Vec<Field> = (0..dofs.len())
+    let loads: Vec<Load> = contacts.iter().flat_map(|c| unit_loads(base, c)).collect();
+    let solved = base.factor.solve_partial(&loads, &rows_wanted);
+    let mut fields: Vec<Field> = loads
         .into_par_iter()
-        .map(|column| {
+        .enumerate()
+        .map(|(column, load)| {
             let mut field = vec![0.0; base.dof_count()];
             for (row, &dof) in unknown.iter().enumerate() {
                 field[dof as usize] = solved[(row, column)];
             }
-            Field::check(base, dofs[column], field)
+            Field::check(base, load, field)
         })
         .collect();
     for field in &mut fields {
         field.refine(base);
     }
     let mut fields = fields.into_iter();
-    nodes
+    contacts
         .iter()
-        .filter_map(|&node| {
+        .filter_map(|contact| {
             let [x, y, z] = [fields.next()?, fields.next()?, fields.next()?];
-            Some(NodeColumns {
-                node,
+            Some(ContactColumns {
+                contact: contact.clone(),
                 norms: [x.norm, y.norm, z.norm],
                 residuals: [norm(&x.residual), norm(&y.residual), norm(&z.residual)],
                 residual_bounds: [x.residual_bound, y.residual_bound, z.residual_bound],
@@ -170,9 +177,22 @@ fn compute_together(base: &Base, nodes: &[u32]) -> Vec<NodeColumns> {
         .collect()
 }
 
+/// A load by rows of `K_B`.
+type Load = Vec<(usize, f64)>;
+
+/// Unit forces at a contact along x, y and z. What acts on a degree of freedom of the base itself
+/// moves nothing: it has no row.
+fn unit_loads(base: &Base, contact: &Contact) -> [Load; 3] {
+    let entries = contact.entries();
+    [0, 1, 2].map(|axis| {
+        let row = |node: u32| base.partition.row_of(3 * node as usize + axis);
+        entries.iter().filter_map(|&(node, w)| row(node).map(|row| (row, w))).collect()
+    })
+}
+
 /// One column and how well it solves its equations.
 struct Field {
-    dof: u32,
+    load: Load,
     field: Vec<f64>,
     norm: f64,
     residual: Vec<f64>,
@@ -180,18 +200,21 @@ struct Field {
 }
 
 impl Field {
-    fn check(base: &Base, dof: u32, field: Vec<f64>) -> Self {
+    fn check(base: &Base, load: Load, field: Vec<f64>) -> Self {
         let f = base.stiffness.mul(&field);
         let unknown = base.partition.unknown();
-        let residual: Vec<f64> =
-            unknown.iter().map(|&d| f64::from(u8::from(d == dof)) - f[d as usize]).collect();
+        let mut residual: Vec<f64> = unknown.iter().map(|&d| -f[d as usize]).collect();
+        for &(row, weight) in &load {
+            residual[row] += weight;
+        }
         let rounding = rounding_of_product(&base.stiffness, &field);
         let residual_bound = norm(&residual) + rounding;
-        Self { dof, norm: norm(&field), field, residual, residual_bound }
+        Self { load, norm: norm(&field), field, residual, residual_bound }
     }
 
     fn refine(&mut self, base: &Base) {
-        if norm(&self.residual) <= RESIDUAL_GOOD {
+        let size = self.load.iter().map(|entry| entry.1 * entry.1).sum::<f64>().sqrt();
+        if norm(&self.residual) <= RESIDUAL_GOOD * size {
             return;
         }
         let mut correction = self.residual.clone();
@@ -200,7 +223,7 @@ impl Field {
         for (&dof, c) in base.partition.unknown().iter().zip(&correction) {
             field[dof as usize] += c;
         }
-        let refined = Self::check(base, self.dof, field);
+        let refined = Self::check(base, self.load.clone(), field);
         if refined.residual_bound < self.residual_bound {
             *self = refined;
         }

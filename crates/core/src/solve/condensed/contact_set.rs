@@ -1,4 +1,4 @@
-//! One set of touched degrees of freedom: the small system, and answers from it.
+//! One set of contacts (touched degrees of freedom and masks): the small system, and answers from it.
 
 use std::sync::Arc;
 
@@ -8,28 +8,32 @@ use rayon::prelude::*;
 use super::base::{Base, CondensedError};
 use super::bound::SmallBound;
 use super::certificate::LoadSize;
-use super::columns::{Columns, NodeColumns};
+use super::columns::{Columns, ContactColumns};
+use super::overlap::Overlap;
+use super::touched::Touched;
 
-/// A set of touched degrees of freedom, ready to answer any displacements of them.
+/// A set of contacts, ready to answer any displacements of them.
 ///
-/// Shapes: c touched degrees of freedom, z modes; small system (c + z)².
+/// Shapes: c unknown forces, z modes; small system (c + z)².
 pub struct ContactSet {
-    dofs: Vec<u32>,
-    pub(super) columns: Vec<Arc<NodeColumns>>,
-    /// Position in `columns` and axis of every touched degree of freedom.
+    touched: Touched,
+    pub(super) columns: Vec<Arc<ContactColumns>>,
+    /// Position in `columns` and axis of every unknown force.
     pub(super) places: Vec<(usize, usize)>,
-    /// Scaled `[ G_C R_C ; R_Cᵀ 0 ]`, so that both kinds of unknowns have size one.
+    /// Scaled `[ EᵀG EᵀR ; (EᵀR)ᵀ 0 ]`, so that both kinds of unknowns have size one.
     small: DMatrix<f64>,
+    /// Factor of the same with `EᵀG` made symmetric: the two triangles differ by rounding.
     small_lu: LU<f64, Dyn, Dyn>,
     /// Scale of λ.
-    scale: f64,
+    pub(super) scale: f64,
     condition: f64,
+    pub(super) overlap: Overlap,
     pub(super) bound: SmallBound,
     pub(super) load: LoadSize,
     rows: Option<WantedRows>,
 }
 
-/// Rows of `[G_C R]` at the nodes asked for, gathered once per set of nodes.
+/// Rows of `[G R]` at the nodes asked for, gathered once per set of nodes.
 ///
 /// Shapes: blocks of [`ROWS_TOGETHER`] rows (the last may be shorter), one behind the other, the
 /// columns of a block one behind the other: the product runs once through this memory.
@@ -41,11 +45,12 @@ struct WantedRows {
 /// Forces and motions that answer one set of displacements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactAnswer {
-    /// Force at every touched degree of freedom, N: the reactions of (3.43b).
+    /// Force of every contact, N: the reactions of (3.43b) at the touched degrees of freedom, then
+    /// the three components of each mask.
     pub lambda: Vec<f64>,
     /// Amounts of the modes.
     pub amounts: Vec<f64>,
-    /// How far the touched degrees of freedom are from what was asked, as a norm, m.
+    /// How far the contacts are from what was asked, as a norm, m.
     pub mismatch: f64,
 }
 
@@ -57,35 +62,34 @@ const ROWS_TOGETHER: usize = 1536;
 const SHARED_PRODUCT: usize = 1 << 20;
 
 impl ContactSet {
-    /// Gathers (or computes) the columns of the touched nodes and factors the small system.
-    ///
-    /// Shapes: `dofs` ascending touched degrees of freedom, none of them fixed by the scene.
+    /// Gathers (or computes) the columns of the contacts and factors the small system.
     ///
     /// # Errors
+    /// [`CondensedError::Dependent`] if a mask follows from other contacts;
     /// [`CondensedError::CacheTooSmall`]; [`CondensedError::NotHeld`] if a motion is left free.
-    pub fn try_new(base: &Base, columns: &Columns, dofs: &[u32]) -> Result<Self, CondensedError> {
-        let mut nodes: Vec<u32> = dofs.iter().map(|d| d / 3).collect();
-        nodes.dedup();
-        let columns = columns.of_nodes(base, &nodes)?;
-        let places: Vec<(usize, usize)> = dofs
-            .iter()
-            .map(|d| (nodes.partition_point(|n| n < &(d / 3)), *d as usize % 3))
-            .collect();
-        let (c, z) = (dofs.len(), base.modes.len());
-        let g = |i: usize, j: usize| {
-            let (node, axis) = places[j];
-            columns[node].fields[axis][dofs[i] as usize]
-        };
-        let trace: f64 = (0..c).map(|i| g(i, i)).sum();
-        let scale = if trace > 0.0 { c as f64 / trace } else { 1.0 };
-        let small = DMatrix::from_fn(c + z, c + z, |i, j| match (i < c, j < c) {
-            // Symmetrised: the two triangles differ by rounding of two different solves.
-            (true, true) => 0.5 * scale * (g(i, j) + g(j, i)),
-            (true, false) => base.modes[j - c].field[dofs[i] as usize],
-            (false, true) => base.modes[i - c].field[dofs[j] as usize],
-            (false, false) => 0.0,
+    pub fn try_new(
+        base: &Base,
+        columns: &Columns,
+        touched: &Touched,
+    ) -> Result<Self, CondensedError> {
+        touched.check(base.dof_count() / 3)?;
+        let overlap = Overlap::try_new(touched, &base.fixed, base.dof_count())?;
+        let columns = columns.of_contacts(base, &touched.contacts())?;
+        let places = touched.places();
+        let (c, z) = (places.len(), base.modes.len());
+        let compliance = DMatrix::from_fn(c, c, |i, j| {
+            let (at, axis) = places[j];
+            touched.mean(i, &columns[at].fields[axis])
         });
-        let small_lu = small.clone().lu();
+        let moved = DMatrix::from_fn(c, z, |i, k| touched.mean(i, &base.modes[k].field));
+        let trace = compliance.trace();
+        let scale = if trace > 0.0 { c as f64 / trace } else { 1.0 };
+        let mut small = DMatrix::zeros(c + z, c + z);
+        small.view_mut((0, 0), (c, c)).copy_from(&(&compliance * scale));
+        small.view_mut((0, c), (c, z)).copy_from(&moved);
+        small.view_mut((c, 0), (z, c)).copy_from(&moved.transpose());
+        let symmetric = 0.5 * (&small + small.transpose());
+        let small_lu = symmetric.lu();
         let inverse = small_lu.try_inverse().ok_or(CondensedError::NotHeld)?;
         let condition = small.norm() * inverse.norm();
         // Written so that a NaN is refused too.
@@ -93,21 +97,37 @@ impl ContactSet {
             return Err(CondensedError::NotHeld);
         }
         let bound = SmallBound::new(base, &columns, &places, &inverse, scale)?;
-        let load = LoadSize::new(base, dofs);
-        let dofs = dofs.to_vec();
-        let rows = None;
-        Ok(Self { dofs, columns, places, small, small_lu, scale, condition, bound, load, rows })
+        let load = LoadSize::new(base, &touched.dofs);
+        let (touched, rows) = (touched.clone(), None);
+        Ok(Self {
+            touched,
+            columns,
+            places,
+            small,
+            small_lu,
+            scale,
+            condition,
+            overlap,
+            bound,
+            load,
+            rows,
+        })
+    }
+
+    /// What is touched.
+    pub fn touched(&self) -> &Touched {
+        &self.touched
     }
 
     /// The touched degrees of freedom, ascending.
     pub fn dofs(&self) -> &[u32] {
-        &self.dofs
+        &self.touched.dofs
     }
 
     /// Bytes of the small system and the wanted rows; the columns are counted where they are kept.
     pub fn bytes(&self) -> usize {
         let rows = self.rows.as_ref().map_or(0, |rows| rows.blocks.len());
-        8 * (rows + 2 * self.small.len())
+        8 * (rows + 2 * self.small.len() + self.overlap.len())
     }
 
     /// Numbers multiplied for one answer at the wanted nodes.
@@ -115,7 +135,7 @@ impl ContactSet {
         self.rows.as_ref().map_or(0, |rows| rows.blocks.len()) + 6 * self.small.len()
     }
 
-    /// Condition of the small system in the Frobenius norm: how weakly the touched nodes hold.
+    /// Condition of the small system in the Frobenius norm: how weakly the contacts hold.
     pub fn condition(&self) -> f64 {
         self.condition
     }
@@ -126,7 +146,7 @@ impl ContactSet {
         if self.rows.as_ref().is_some_and(|rows| rows.nodes == nodes) {
             return;
         }
-        let columns = self.places.iter().map(|&(node, axis)| &self.columns[node].fields[axis]);
+        let columns = self.places.iter().map(|&(at, axis)| &self.columns[at].fields[axis]);
         let fields: Vec<&Vec<f64>> = columns.chain(base.modes.iter().map(|m| &m.field)).collect();
         let mut blocks = Vec::with_capacity(3 * nodes.len() * fields.len());
         for nodes in nodes.chunks(ROWS_TOGETHER / 3) {
@@ -137,17 +157,17 @@ impl ContactSet {
         self.rows = Some(WantedRows { nodes: nodes.to_vec(), blocks });
     }
 
-    /// Forces and motions for displacements of the touched degrees of freedom.
+    /// Forces and motions for displacements of the contacts.
     ///
-    /// Shapes: `q` one per touched degree of freedom, m.
+    /// Shapes: `q` one per touched degree of freedom, then three per mask, m.
     ///
     /// # Errors
     /// [`CondensedError::NotHeld`], [`CondensedError::NotFinite`].
     pub fn solve(&self, q: &[f64]) -> Result<ContactAnswer, CondensedError> {
-        let c = self.dofs.len();
+        let c = self.places.len();
         let right = DVector::from_fn(self.small.nrows(), |i, _| q.get(i).copied().unwrap_or(0.0));
         let mut x = self.small_lu.solve(&right).ok_or(CondensedError::NotHeld)?;
-        // One step of refinement takes out the rounding of the elimination.
+        // One step of refinement takes out the rounding of the elimination and of the symmetry.
         let miss = &right - &self.small * &x;
         x += self.small_lu.solve(&miss).ok_or(CondensedError::NotHeld)?;
         let mismatch = (&right - &self.small * &x).norm();
@@ -180,7 +200,7 @@ impl ContactSet {
     /// Displacement of every degree of freedom, 3N, m.
     pub fn full_displacement(&self, base: &Base, answer: &ContactAnswer) -> Vec<f64> {
         let mut u = vec![0.0; base.dof_count()];
-        let columns = self.places.iter().map(|&(node, axis)| &self.columns[node].fields[axis]);
+        let columns = self.places.iter().map(|&(at, axis)| &self.columns[at].fields[axis]);
         let modes = base.modes.iter().map(|mode| &mode.field);
         let amounts = answer.lambda.iter().chain(&answer.amounts);
         for (field, amount) in columns.chain(modes).zip(amounts) {

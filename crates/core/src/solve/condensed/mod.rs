@@ -3,16 +3,19 @@
 //! Lineage: condensation (Bro-Nielsen and Cotin 1996), Green's functions and capacitance matrices
 //! (James and Pai 1999). A base of degrees of freedom is held once per shape and `K_B` factored
 //! ([`Base`]). The response to a unit force at a node is a column of `G = K_B⁻¹`, computed when
-//! the node is first touched and kept ([`Columns`]). For a set of touched degrees of freedom C
-//! ([`ContactSet`]) the forces λ and the motions without energy `a` follow from
+//! the node is first touched and kept ([`Columns`]). A contact is one node, or a mask of nodes with
+//! weights whose mean is held ([`Touched`]); E has a column for each of their directions, and
+//! `G = K_B⁻¹ E`. For a set of contacts ([`ContactSet`]) the forces λ and the motions without energy
+//! `a` follow from
 //!
 //! ```text
-//! [ G_C   R_C ] [λ]   [ q ]
-//! [ R_Cᵀ   0  ] [a] = [ 0 ]        u = G λ + R a
+//! [ EᵀG    EᵀR ] [λ]   [ q ]
+//! [ (EᵀR)ᵀ  0  ] [a] = [ 0 ]        u = G λ + R a
 //! ```
 //!
-//! λ balances itself, so the artificial base carries nothing and `u` solves (3.43a) exactly; λ are
-//! the reactions (3.43b). Nodes that the scene fixes are a true base and need no R.
+//! λ balances itself, so the artificial base carries nothing and `K u = E λ`, `Eᵀu = q` hold exactly;
+//! for single nodes that is (3.43a), and λ are the reactions (3.43b). Nodes that the scene fixes are
+//! a true base and need no R.
 
 mod base;
 mod bound;
@@ -20,9 +23,14 @@ mod certificate;
 mod columns;
 mod contact_set;
 #[cfg(test)]
+mod mask_tests;
+mod overlap;
+#[cfg(test)]
 mod tests;
+mod touched;
 
 pub use base::{Base, CondensedError};
 pub use certificate::Certificate;
-pub use columns::{Columns, NodeColumns};
+pub use columns::{Columns, ContactColumns};
 pub use contact_set::{ContactAnswer, ContactSet};
+pub use touched::{Contact, Touched};

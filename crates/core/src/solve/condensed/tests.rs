@@ -10,15 +10,15 @@ use crate::mesh::{Bodies, BuiltIn, TetMesh, generate};
 use crate::solve::{Factored, Loads, Method, Partition};
 use nalgebra::Point3;
 
-struct Shape {
-    mesh: TetMesh,
-    stiffness: Arc<Stiffness>,
-    base: Base,
-    columns: Columns,
+pub(super) struct Shape {
+    pub mesh: TetMesh,
+    pub stiffness: Arc<Stiffness>,
+    pub base: Base,
+    pub columns: Columns,
 }
 
 impl Shape {
-    fn new(mesh: TetMesh, poisson: f64, fixed: &[u32]) -> Self {
+    pub fn new(mesh: TetMesh, poisson: f64, fixed: &[u32]) -> Self {
         let pattern = Arc::new(StiffnessPattern::new(&mesh));
         let material = Material::try_new(1.0e5, poisson).unwrap();
         let stiffness = Arc::new(assemble(&pattern, &mesh, &[material]).unwrap());
@@ -29,7 +29,7 @@ impl Shape {
 
     /// Displacements, reactions and certificate of the condensed answer.
     fn answer(&self, dofs: &[u32], q: &[f64]) -> (Vec<f64>, Vec<f64>, Certificate) {
-        let set = ContactSet::try_new(&self.base, &self.columns, dofs).unwrap();
+        let set = ContactSet::try_new(&self.base, &self.columns, &Touched::of_dofs(dofs)).unwrap();
         let answer = set.solve(q).unwrap();
         let certificate = set.certify(&self.base, q, &answer, &[]);
         (set.full_displacement(&self.base, &answer), answer.lambda, certificate)
@@ -64,22 +64,22 @@ impl Shape {
     }
 }
 
-fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     let largest = b.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest
 }
 
-fn touched(nodes: &[u32]) -> Vec<u32> {
+pub(super) fn touched(nodes: &[u32]) -> Vec<u32> {
     let mut nodes = nodes.to_vec();
     nodes.sort_unstable();
     nodes.iter().flat_map(|n| 3 * n..3 * n + 3).collect()
 }
 
-fn pushes(count: usize) -> Vec<f64> {
+pub(super) fn pushes(count: usize) -> Vec<f64> {
     (0..count).map(|i| 1e-3 * (1.3 * i as f64 + 0.4).sin()).collect()
 }
 
-fn cube(nodes: usize) -> TetMesh {
+pub(super) fn cube(nodes: usize) -> TetMesh {
     generate(BuiltIn::Cube, nodes).unwrap()
 }
 
@@ -149,7 +149,8 @@ fn several_bodies_and_hinged_pieces_equal_the_direct_factor() {
 fn wanted_rows_are_those_of_the_whole_answer() {
     let shape = Shape::new(cube(343), 0.3, &[]);
     let dofs = touched(&[0, 6, 340, 300, 25]);
-    let mut set = ContactSet::try_new(&shape.base, &shape.columns, &dofs).unwrap();
+    let mut set =
+        ContactSet::try_new(&shape.base, &shape.columns, &Touched::of_dofs(&dofs)).unwrap();
     let q = pushes(dofs.len());
     let answer = set.solve(&q).unwrap();
     let full = set.full_displacement(&shape.base, &answer);
@@ -172,7 +173,9 @@ fn same_bits_for_one_two_four_and_seven_threads() {
                 let shape = Shape::new(cube(1000), 0.3, &[]);
                 let dofs = touched(&[0, 9, 990, 500, 755]);
                 let q = pushes(dofs.len());
-                let mut set = ContactSet::try_new(&shape.base, &shape.columns, &dofs).unwrap();
+                let mut set =
+                    ContactSet::try_new(&shape.base, &shape.columns, &Touched::of_dofs(&dofs))
+                        .unwrap();
                 set.want(&shape.base, &(0..1000).collect::<Vec<u32>>());
                 let answer = set.solve(&q).unwrap();
                 let bits = |x: &f64| x.to_bits();
@@ -187,25 +190,30 @@ fn same_bits_for_one_two_four_and_seven_threads() {
 #[test]
 fn columns_are_kept_and_the_least_recently_used_go_first() {
     let shape = Shape::new(cube(125), 0.3, &[]);
-    let two = 2 * Columns::bytes_per_node(&shape.base);
+    let two = 2 * Columns::bytes_per_contact(&shape.base);
     let columns = Columns::new(two);
-    columns.of_nodes(&shape.base, &[3]).unwrap();
-    columns.of_nodes(&shape.base, &[4]).unwrap();
-    columns.of_nodes(&shape.base, &[3]).unwrap();
-    columns.of_nodes(&shape.base, &[5]).unwrap();
+    let of = |nodes: &[u32]| {
+        let contacts: Vec<Contact> = nodes.iter().map(|&n| Contact::Node(n)).collect();
+        columns.of_contacts(&shape.base, &contacts)
+    };
+    of(&[3]).unwrap();
+    of(&[4]).unwrap();
+    of(&[3]).unwrap();
+    of(&[5]).unwrap();
     assert_eq!((columns.computed(), columns.bytes(&shape.base)), (3, two));
-    columns.of_nodes(&shape.base, &[3]).unwrap();
+    of(&[3]).unwrap();
     assert_eq!(columns.computed(), 3, "node 3 was used last and must still be there");
-    columns.of_nodes(&shape.base, &[4]).unwrap();
+    of(&[4]).unwrap();
     assert_eq!(columns.computed(), 4);
-    let error = columns.of_nodes(&shape.base, &[1, 2, 3]).err().unwrap();
-    assert!(matches!(error, CondensedError::CacheTooSmall { nodes: 3, .. }));
+    let error = of(&[1, 2, 3]).err().unwrap();
+    assert!(matches!(error, CondensedError::CacheTooSmall { contacts: 3, .. }));
 }
 
 #[test]
 fn contacts_that_do_not_hold_the_body_are_refused() {
     let shape = Shape::new(cube(125), 0.3, &[]);
-    let set = ContactSet::try_new(&shape.base, &shape.columns, &touched(&[0, 1]));
+    let set =
+        ContactSet::try_new(&shape.base, &shape.columns, &Touched::of_dofs(&touched(&[0, 1])));
     assert!(matches!(set.err(), Some(CondensedError::NotHeld)));
 }
 
@@ -233,7 +241,11 @@ fn proven_bound_is_above_the_true_error_on_ten_thousand_random_frames() {
                 all
             };
             let partition = Partition::try_new(&shape.mesh.used_nodes(), &known).unwrap();
-            let Ok(set) = ContactSet::try_new(&shape.base, &shape.columns, &dofs) else { continue };
+            let Ok(set) =
+                ContactSet::try_new(&shape.base, &shape.columns, &Touched::of_dofs(&dofs))
+            else {
+                continue;
+            };
             let factored =
                 Factored::try_new(&shape.stiffness, partition, Method::SparseCholesky, &mut |_| {});
             let Ok(factored) = factored else { continue };
@@ -272,12 +284,12 @@ proptest! {
         let mut known = [fixed.as_slice(), dofs.as_slice()].concat();
         known.sort_unstable();
         let bodies = Bodies::from_mesh(&shape.mesh);
-        prop_assume!(crate::solve::find_free_motion(&shape.mesh, &bodies, &known).is_none());
+        prop_assume!(crate::solve::find_free_motion(&shape.mesh, &bodies, &known, &[]).is_none());
         let q = &q[..dofs.len()];
         let (u, _, _) = shape.answer(&dofs, q);
         let (expected, _) = shape.direct(&dofs, q);
         // A base or a set of contacts that holds the body weakly costs digits in any method.
-        let set = ContactSet::try_new(&shape.base, &shape.columns, &dofs).unwrap();
+        let set = ContactSet::try_new(&shape.base, &shape.columns, &Touched::of_dofs(&dofs)).unwrap();
         let eigenvalue = shape.base.estimate_eigenvalue_min().unwrap();
         let base = shape.stiffness.row_sum_max() / eigenvalue;
         let allowed = 1e-11f64.max(1e-15 * base) * (1.0 + 1e-4 * set.condition());

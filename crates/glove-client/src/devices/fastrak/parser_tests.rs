@@ -162,6 +162,10 @@ proptest! {
     ) {
         let bytes = bytes_of(&sent, format);
         let cut = 1 + cut.index(format.record_length() - 1);
+        // Floats whose bytes are CR LF and a header make a third record out of the ends of two; the
+        // format has no checksum, so nobody could tell.
+        let is_decoy = |at: usize| matches!(head(&bytes[at..], format), Head::Record(_));
+        prop_assume!(!(cut..format.record_length()).any(is_decoy));
         let found = records(&events_in_pieces(format, &bytes[cut..], &[9]));
         prop_assert!(is_subsequence(&sent[1..], &found));
     }

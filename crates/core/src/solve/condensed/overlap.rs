@@ -1,0 +1,125 @@
+//! How the contacts of a set overlap: whether one says what others say, and how large E is.
+//!
+//! Single nodes are orthonormal columns of E, so nothing has to be looked at. Masks are shorter than
+//! one and may overlap; then EᵀE over the degrees of freedom that the scene leaves free decides. If
+//! it is singular, no forces belong to the displacements, or infinitely many do.
+
+use nalgebra::DMatrix;
+
+use super::base::CondensedError;
+use super::touched::Touched;
+use crate::solve::partition::AXIS_NAMES;
+
+/// Sizes of E.
+///
+/// Units: 1.
+pub(super) struct Overlap {
+    /// `EᵀE`, c × c; `None` for single nodes, where it is the identity.
+    gram: Option<DMatrix<f64>>,
+    /// Bound of `‖E (EᵀE)⁻¹‖`: the smallest field that has some means is at most so much larger.
+    pub lift: f64,
+    /// Bound of `‖E‖`: means are at most so much larger than the field.
+    pub stretch: f64,
+}
+
+/// A mask whose part outside the span of the others is shorter than this, relative to itself,
+/// counts as dependent: its force would be all rounding.
+const INDEPENDENT_MIN: f64 = 1e-6;
+/// What rounding may add to the two bounds.
+const MARGIN: f64 = 1.01;
+
+impl Overlap {
+    /// Shapes: `fixed` ascending degrees of freedom held by the scene, of `dof_count` in all.
+    ///
+    /// # Errors
+    /// [`CondensedError::Dependent`] naming the first mask that follows from the rest.
+    pub fn try_new(
+        touched: &Touched,
+        fixed: &[u32],
+        dof_count: usize,
+    ) -> Result<Self, CondensedError> {
+        let Some(last) = touched.masks.len().checked_sub(1) else {
+            return Ok(Self { gram: None, lift: 1.0, stretch: 1.0 });
+        };
+        let dependent = CondensedError::Dependent { mask: last, axis: AXIS_NAMES[0] };
+        // So many columns cannot be independent; this bounds the matrix.
+        if touched.force_count() + fixed.len() > dof_count {
+            return Err(dependent);
+        }
+        let free = free_columns(touched, fixed);
+        let c = free.len();
+        let gram = DMatrix::from_fn(c, c, |i, j| product(&free[i], &free[j]));
+        let inverse = factor(&gram, touched)?.solve_lower_triangular(&DMatrix::identity(c, c));
+        let inverse = inverse.filter(|l| l.iter().all(|x| x.is_finite())).ok_or(dependent)?;
+        let row_sum = |i: usize| gram.row(i).iter().map(|x| x.abs()).sum::<f64>();
+        let stretch = MARGIN * (0..c).map(row_sum).fold(0.0, f64::max).sqrt();
+        // ‖E (EᵀE)⁻¹‖² = ‖(EᵀE)⁻¹‖ = ‖L⁻¹‖².
+        Ok(Self { gram: Some(gram), lift: MARGIN * inverse.norm(), stretch })
+    }
+
+    /// Norm of the nodal forces `E λ` on free degrees of freedom; `None` for single nodes.
+    ///
+    /// Units: N.
+    pub fn force_norm(&self, lambda: &[f64]) -> Option<f64> {
+        let gram = self.gram.as_ref()?;
+        let c = lambda.len();
+        let row = |i: usize| (0..c).map(|j| gram[(i, j)] * lambda[j]).sum::<f64>();
+        Some((0..c).map(|i| lambda[i] * row(i)).sum::<f64>().max(0.0).sqrt())
+    }
+
+    /// Numbers kept.
+    pub fn len(&self) -> usize {
+        self.gram.as_ref().map_or(0, DMatrix::len)
+    }
+}
+
+/// Columns of E by degree of freedom, ascending, without those that the scene fixes.
+fn free_columns(touched: &Touched, fixed: &[u32]) -> Vec<Vec<(u32, f64)>> {
+    let mut columns: Vec<Vec<(u32, f64)>> = touched.dofs.iter().map(|&d| vec![(d, 1.0)]).collect();
+    for mask in &touched.masks {
+        for axis in 0..3 {
+            let dofs = mask.entries().iter().map(|&(node, weight)| (3 * node + axis, weight));
+            columns.push(dofs.filter(|(dof, _)| fixed.binary_search(dof).is_err()).collect());
+        }
+    }
+    columns
+}
+
+fn product(a: &[(u32, f64)], b: &[(u32, f64)]) -> f64 {
+    let (mut i, mut j, mut sum) = (0, 0, 0.0);
+    while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
+        match x.0.cmp(&y.0) {
+            std::cmp::Ordering::Less => i += 1,
+            std::cmp::Ordering::Greater => j += 1,
+            std::cmp::Ordering::Equal => {
+                sum += x.1 * y.1;
+                (i, j) = (i + 1, j + 1);
+            }
+        }
+    }
+    sum
+}
+
+/// Cholesky factor of EᵀE; each pivot is what a column adds to the span of those before it.
+fn factor(gram: &DMatrix<f64>, touched: &Touched) -> Result<DMatrix<f64>, CondensedError> {
+    let c = gram.nrows();
+    let mut l = DMatrix::zeros(c, c);
+    for j in 0..c {
+        let dot = |l: &DMatrix<f64>, i: usize| (0..j).map(|k| l[(i, k)] * l[(j, k)]).sum::<f64>();
+        let pivot = gram[(j, j)] - dot(&l, j);
+        if j >= touched.dofs.len() {
+            let (mask, axis) = touched.mask_and_axis(j);
+            let whole: f64 = touched.masks[mask].entries().iter().map(|e| e.1 * e.1).sum();
+            // Written so that a NaN is refused too.
+            let independent = pivot > INDEPENDENT_MIN * INDEPENDENT_MIN * whole;
+            if !independent {
+                return Err(CondensedError::Dependent { mask, axis: AXIS_NAMES[axis] });
+            }
+        }
+        l[(j, j)] = pivot.sqrt();
+        for i in j + 1..c {
+            l[(i, j)] = (gram[(i, j)] - dot(&l, i)) / l[(j, j)];
+        }
+    }
+    Ok(l)
+}
