@@ -10,8 +10,11 @@ pub mod collision;
 pub mod echo;
 pub mod fit;
 pub mod frame;
+pub mod frontier;
+pub mod hold;
 pub mod machine;
 pub mod methods;
+pub mod onset;
 pub mod plot;
 pub mod reference;
 pub mod report;
@@ -20,6 +23,7 @@ pub mod scaling;
 pub mod scene;
 pub mod stages;
 pub mod table;
+pub mod tail;
 pub mod thesis;
 pub mod threads;
 
@@ -34,6 +38,12 @@ pub enum ReportName {
     Methods,
     /// Round trip of a frame over loopback TCP against an echo of the same bytes.
     Frame,
+    /// Time against error of every method, precision and element.
+    Frontier,
+    /// The first frame of a new grip, with and without prefetch.
+    Onset,
+    /// A request every millisecond for a minute.
+    Hold,
     /// Figures 5.1, 5.2 and 6.13 to 6.16 of the thesis, measured again.
     Scaling,
     /// Tree build, refit and search against parry3d and brute force.
@@ -46,6 +56,9 @@ impl ReportName {
         match self {
             Self::Methods => "methods",
             Self::Frame => "frame",
+            Self::Frontier => "frontier",
+            Self::Onset => "onset",
+            Self::Hold => "hold",
             Self::Scaling => "scaling",
             Self::Collision => "collision",
         }
@@ -60,6 +73,9 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
     let mut report = match name {
         ReportName::Methods => methods::measure(options)?,
         ReportName::Frame => frame::measure(options)?,
+        ReportName::Frontier => frontier::measure(options)?,
+        ReportName::Onset => onset::measure(options)?,
+        ReportName::Hold => hold::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,
         ReportName::Collision => collision::measure(options)?,
     };

@@ -1,7 +1,7 @@
 //! `softgrasp-bench REPORT`: measured figures, each with its error.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use softgrasp_bench::{Options, ReportName, run};
@@ -21,7 +21,13 @@ struct Arguments {
     /// A remark for the head of the report, for example what else the machine was doing.
     #[arg(long, default_value = "", value_name = "TEXT", hide_default_value = true)]
     note: String,
+    /// Folder with mesh files of others, for `frontier`; what is not there is left out.
+    #[arg(long, default_value = MESHES, value_name = "DIR")]
+    meshes: PathBuf,
 }
+
+/// Beside the repository.
+const MESHES: &str = "../shared/meshes";
 
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
@@ -30,6 +36,7 @@ fn main() -> anyhow::Result<()> {
         command: command(&arguments),
         out: arguments.out,
         note: arguments.note,
+        meshes: arguments.meshes,
     };
     let (report, files) = run(arguments.report, &options)?;
     let mut out = std::io::stdout().lock();
@@ -43,10 +50,12 @@ fn main() -> anyhow::Result<()> {
 /// The command to type to get this report again; the remark is not part of it.
 fn command(arguments: &Arguments) -> String {
     let quick = if arguments.quick { " --quick" } else { "" };
-    let out = match arguments.out.to_str() {
-        Some("reports") | None => String::new(),
-        Some(folder) => format!(" --out {folder}"),
+    let folder = |option: &str, given: &Path, usual: &str| match given.to_str() {
+        Some(given) if given != usual => format!(" --{option} {given}"),
+        _ => String::new(),
     };
+    let out = folder("out", &arguments.out, "reports");
+    let meshes = folder("meshes", &arguments.meshes, MESHES);
     let name = arguments.report.name();
-    format!("cargo run --release --bin softgrasp-bench -- {name}{quick}{out}")
+    format!("cargo run --release --bin softgrasp-bench -- {name}{quick}{out}{meshes}")
 }

@@ -77,9 +77,9 @@ pub enum PlotError {
 
 const SIZE: (u32, u32) = (1040, 540);
 const LEGEND_WIDTH: u32 = 250;
-const FONT: &str = "sans-serif";
+pub(crate) const FONT: &str = "sans-serif";
 /// Told apart with any kind of colour vision (Okabe and Ito).
-const COLOURS: [RGBColor; 7] = [
+pub(crate) const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -90,7 +90,8 @@ const COLOURS: [RGBColor; 7] = [
 ];
 
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
-type Drawn = Result<(), DrawingAreaErrorKind<<SVGBackend<'static> as DrawingBackend>::ErrorType>>;
+pub(crate) type Drawn =
+    Result<(), DrawingAreaErrorKind<<SVGBackend<'static> as DrawingBackend>::ErrorType>>;
 
 impl Plot {
     /// The figure as the text of an SVG file; equal data give equal text.

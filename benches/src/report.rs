@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glove_client::connection::LinkError;
 use softgrasp_core::fem::MaterialError;
-use softgrasp_core::mesh::GenerateError;
+use softgrasp_core::mesh::{GenerateError, MeshError};
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::SolveError;
 use softgrasp_core::sphere_tree::TreeError;
@@ -24,6 +24,8 @@ pub struct Options {
     pub command: String,
     /// Remark for the head; empty for none.
     pub note: String,
+    /// Folder with mesh files of others; what is not there is left out, and the report says so.
+    pub meshes: PathBuf,
 }
 
 /// Why there is no report.
@@ -32,6 +34,9 @@ pub enum ReportError {
     /// An object could not be made.
     #[error(transparent)]
     Generate(#[from] GenerateError),
+    /// Elements that make no mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// A material that is none.
     #[error(transparent)]
     Material(#[from] MaterialError),
@@ -50,6 +55,11 @@ pub enum ReportError {
     /// The echo that frames are compared with failed.
     #[error("the echo over loopback failed: {0}")]
     Echo(std::io::Error),
+    /// The factor that times are set beside could not be made.
+    #[error(
+        "the stiffness of the held object could not be factored, so there is no sparse solve to compare with"
+    )]
+    NoFactor,
     /// No threads.
     #[error("no pool of {threads} threads: {source}")]
     Threads {
@@ -237,6 +247,7 @@ mod tests {
             out: folder.path().to_owned(),
             command: "bench --quick".to_owned(),
             note: "shared".to_owned(),
+            meshes: PathBuf::new(),
         };
         let mut report = Report::begin("r", "Title", "2", &options);
         report.text("Words.");

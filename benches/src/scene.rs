@@ -36,13 +36,21 @@ const POISSON: f64 = 0.3;
 
 /// How far the tips press, as a share of the object's size, and where they touch: shares of half
 /// the extents of the bounding box.
-const TOUCHES: [([f64; 3], [f64; 3]); 5] = [
+pub(crate) const TOUCHES: [([f64; 3], [f64; 3]); 5] = [
     ([-0.5, 1.0, -0.5], [0.002, -0.02, 0.001]),
     ([0.5, 1.0, -0.5], [-0.002, -0.02, 0.001]),
     ([-0.5, 1.0, 0.5], [0.001, -0.015, -0.002]),
     ([0.5, 1.0, 0.5], [-0.001, -0.015, -0.002]),
     ([0.0, -1.0, 0.0], [0.0, 0.02, 0.0]),
 ];
+
+/// What every object is made of.
+///
+/// # Errors
+/// [`ReportError::Material`].
+pub(crate) fn rubber() -> Result<Material, ReportError> {
+    Ok(Material::try_new(YOUNG, POISSON)?)
+}
 
 impl Pressed {
     /// A built-in object of about `nodes` nodes; each tip takes the surface node nearest to it
@@ -53,7 +61,7 @@ impl Pressed {
     pub fn try_new(shape: BuiltIn, nodes: usize) -> Result<Self, ReportError> {
         let mesh = generate(shape, nodes)?;
         let surface = Surface::from_mesh(&mesh);
-        let material = Material::try_new(YOUNG, POISSON)?;
+        let material = rubber()?;
         let (low, high) = mesh.bounds();
         let (centre, half) = (nalgebra::center(&low, &high), (high - low) / 2.0);
         let mut taken: Vec<u32> = Vec::new();
@@ -147,7 +155,13 @@ impl Pressed {
     }
 }
 
-fn nearest(mesh: &TetMesh, surface: &Surface, place: &Point3<f64>, taken: &[u32]) -> Option<u32> {
+/// The surface node nearest to a place that is not among those taken.
+pub(crate) fn nearest(
+    mesh: &TetMesh,
+    surface: &Surface,
+    place: &Point3<f64>,
+    taken: &[u32],
+) -> Option<u32> {
     let distance = |node: u32| (mesh.vertices()[node as usize] - place).norm_squared();
     let free = surface.nodes.iter().copied().filter(|n| !taken.contains(n));
     free.min_by(|&a, &b| distance(a).total_cmp(&distance(b)))

@@ -26,6 +26,7 @@ fn run_quick(name: ReportName, folder: &Path) {
         out: folder.to_owned(),
         command: "smoke test".to_owned(),
         note: String::new(),
+        meshes: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
     };
     let (_, files) = run(name, &options).unwrap();
     assert!(files.iter().all(|file| file.is_file()), "{files:?}");
@@ -92,4 +93,55 @@ fn scaling_is_timed_fitted_and_drawn_with_small_errors() {
     }
     let vertices = std::fs::read_to_string(folder.path().join("scaling-vertices.svg")).unwrap();
     assert!(vertices.contains("gauss-jordan") && vertices.contains("1998"));
+}
+
+#[test]
+fn frontier_marks_what_is_worth_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Frontier, folder.path());
+    let of = |name| numbers(folder.path(), "frontier.csv", name);
+    let (algebraic, total) = (of("algebraic_error_rel"), of("total_error_rel"));
+    assert!(algebraic.len() > 80 && algebraic.iter().all(|&e| e < 2e-3), "{algebraic:?}");
+    assert!(total.iter().all(|&e| e > 1e-3 && e < 0.5), "{total:?}");
+    assert!(of("warm_ms").iter().chain(&of("cold_ms")).all(|&ms| ms > 0.0));
+    for name in ["best_by_algebraic_error", "best_by_total_error"] {
+        let best = column(folder.path(), "frontier.csv", name);
+        for time in ["warm", "cold"] {
+            assert!(best.iter().any(|b| b.contains(time)), "no row is best {time}, {name}");
+        }
+        assert!(best.iter().any(String::is_empty), "every row is best: {name}");
+    }
+    let meshes = |name| numbers(folder.path(), "frontier-meshes.csv", name);
+    for (t4, t10) in meshes("t4_error_rel").iter().zip(meshes("t10_error_rel")) {
+        assert!(*t4 > 2.0 * t10, "{t4} {t10}");
+    }
+    for figure in ["frontier.svg", "frontier-cold.svg"] {
+        let svg = std::fs::read_to_string(folder.path().join(figure)).unwrap();
+        assert!(svg.contains("condensed") && svg.contains("toothpaste"), "{figure}");
+    }
+}
+
+#[test]
+fn first_frames_of_grips_are_right_with_and_without_prefetch() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Onset, folder.path());
+    let of = |name| numbers(folder.path(), "onset.csv", name);
+    for name in ["error_rel", "residual_rel"] {
+        assert!(of(name).iter().all(|&e| e < 1e-10) && of(name).len() == 4, "{:?}", of(name));
+    }
+    assert!(of("compared").iter().chain(&of("sparse_solve_ms")).all(|&x| x > 0.0));
+    assert!(folder.path().join("onset.svg").is_file());
+}
+
+#[test]
+fn a_held_pace_is_counted_and_every_answer_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Hold, folder.path());
+    let of = |name| numbers(folder.path(), "hold.csv", name)[0];
+    assert_eq!(of("ticks"), 500.0);
+    assert!((0.0..=100.0).contains(&of("late_percent")) && of("missed") <= 500.0);
+    assert!(of("error_rel") < 1e-10 && of("residual_rel") < 1e-10);
+    // Without a bound the pace would be held without the certificate.
+    assert_eq!(of("with_bound_percent"), 100.0);
+    assert!(of("error_bound_rel") > 0.0 && of("error_bound_rel") < 1e-4);
 }

@@ -25,8 +25,10 @@ pub(super) struct Series {
     pub error_rel: f64,
 }
 
-/// The thesis's method and the one that replaces it; further ones join here.
-pub(super) const METHODS: [Method; 2] = [Method::GaussJordan, Method::DenseInverse];
+/// The thesis's method, the dense one that replaces it, and the sparse one that replaces both.
+pub(super) const METHODS: [Method; 3] = [Method::GaussJordan, Method::DenseInverse, Method::Front];
+/// From so many nodes on a round takes so long that what the first one warms up does not show.
+const LONG_NODES: usize = 700;
 const ERROR_ALLOWED: f64 = 1e-9;
 
 impl Series {
@@ -72,7 +74,8 @@ pub(super) fn measure_objects(
             }
         }
     }
-    let results = take_turns(&effort(is_quick), &mut competitors)?;
+    let nodes = scenes.iter().map(|(_, scene)| scene.mesh.node_count()).max().unwrap_or(0);
+    let results = take_turns(&effort(nodes, is_quick), &mut competitors)?;
     for (series, runs) in series.iter_mut().zip(results) {
         series.seconds = runs.iter().map(|run| run.0).collect();
         series.error_rel = Spread::of(runs.iter().map(|run| run.1)).max;
@@ -80,20 +83,12 @@ pub(super) fn measure_objects(
     Ok(series)
 }
 
-fn effort(is_quick: bool) -> Effort {
-    match is_quick {
-        true => Effort {
-            warm_up_rounds: 1,
-            rounds_min: 3,
-            rounds_max: 6,
-            budget: Duration::from_secs(1),
-        },
-        // At 1000 nodes a round takes half a minute.
-        false => Effort {
-            warm_up_rounds: 1,
-            rounds_min: 3,
-            rounds_max: 40,
-            budget: Duration::from_secs(20),
-        },
-    }
+fn effort(nodes: usize, is_quick: bool) -> Effort {
+    let (warm_up_rounds, rounds_min, rounds_max, seconds) = match (is_quick, nodes >= LONG_NODES) {
+        (true, _) => (1, 3, 6, 1),
+        (false, false) => (1, 5, 40, 15),
+        (false, true) => (0, 3, 40, 15),
+    };
+    let budget = Duration::from_secs(seconds);
+    Effort { warm_up_rounds, rounds_min, rounds_max, budget }
 }

@@ -54,6 +54,9 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     let shapes = measure_objects(&objects, &counts[counts.len() - 1..], options.is_quick)?;
     report.table(shape_table(&shapes));
     report.table(beside_1998(&series));
+    if !laws.is_empty() {
+        report.table(slopes_beside_1998(&series, &laws));
+    }
     report.text(NOTE_1998);
     Ok(report)
 }
@@ -272,6 +275,35 @@ fn beside_1998(series: &[Series]) -> Table {
     table
 }
 
+/// Slopes m of the thesis (6.4), each beside ours at the nearest number of vertices.
+fn slopes_beside_1998(series: &[Series], laws: &[SizeLaw]) -> Table {
+    let title = "Slopes m of T = k Nᵐ: the 1998 figures beside ours";
+    let mut table = Table::new("scaling-slopes-1998", title, &SLOPE_COLUMNS);
+    for (vertices, m_1998) in thesis::SLOPES {
+        for method in METHODS {
+            let of_method = laws.iter().filter(|l| l.method == method);
+            let Some(SizeLaw { nodes, law, .. }) =
+                of_method.min_by_key(|l| l.nodes.abs_diff(vertices))
+            else {
+                continue;
+            };
+            let of = series.iter().filter(|s| s.method == method && s.nodes == *nodes);
+            let row: [Cell; 8] = [
+                vertices.into(),
+                m_1998.into(),
+                method.name().into(),
+                (*nodes).into(),
+                law.m.into(),
+                law.m_error.into(),
+                (100.0 * law.residual).into(),
+                Spread::of(of.map(|s| s.error_rel)).max.into(),
+            ];
+            table.push(row);
+        }
+    }
+    table
+}
+
 const TIME_COLUMNS: [&str; 9] = [
     "method",
     "vertices",
@@ -325,13 +357,26 @@ const COLUMNS_1998: [&str; 9] = [
     "error_rel",
 ];
 
+const SLOPE_COLUMNS: [&str; 8] = [
+    "vertices_1998",
+    "m_1998",
+    "our_method",
+    "our_vertices",
+    "m",
+    "m_std_error",
+    "residual_percent",
+    "error_rel",
+];
+
 const INTRODUCTION: &str = "\
 Times are of the whole analysis, from the mesh to the displacements, of an object with five known \
 nodes. All methods and numbers of processors take turns at each size; each number of processors is \
 a rayon pool of exactly so many threads. `error_rel` is the worst error of all rounds against a \
 reference refined in twice the working precision; above 1e-9 the report ends. Laws are straight \
 lines through logarithms of all rounds (least squares); `residual_percent` is the standard deviation \
-of ln T about the line, in per cent.";
+of ln T about the line, in per cent. The operation count of the thesis, 2n²(3n − 1)/N (C.5), is a law \
+with p = 3 over vertices and m = −1 over processors; `front` counts about as the square of the \
+vertices.";
 
 const NOTE_1998: &str = "\
 The thesis prints its slopes without signs: 0.18 at about 50 vertices, 1.5 at 200, 0.9 from 400 up \
