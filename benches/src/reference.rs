@@ -33,14 +33,25 @@ impl Reference {
     /// Source: thesis (3.43a); Higham, Accuracy and Stability of Numerical Algorithms, chapter 12.
     pub fn of(model: &Model, known: &Known) -> Result<Self, ReportError> {
         let factored = model.factor(&known.dofs, Method::SparseCholesky, &mut |_| {})?;
-        let stiffness = model.stiffness();
         let loads = Loads { q_known: &known.q_known, ..Loads::default() };
+        Self::refined(model.stiffness(), &factored, loads)
+    }
+
+    /// The same by a factor that is there already, for further loads of one partition.
+    ///
+    /// # Errors
+    /// [`ReportError::Solve`].
+    pub fn refined(
+        stiffness: &Stiffness,
+        factored: &Factored,
+        loads: Loads<'_>,
+    ) -> Result<Self, ReportError> {
         let mut high = factored.solve(stiffness, loads, &mut |_| {})?.displacement;
         let mut low = vec![0.0; high.len()];
         let largest = amax(&high);
         let mut last_correction_rel = f64::INFINITY;
         for _ in 0..STEPS_MAX {
-            let correction = correction(stiffness, &factored, &high, &low)?;
+            let correction = correction(stiffness, factored, loads.forces, &high, &low)?;
             for ((high, low), step) in high.iter_mut().zip(&mut low).zip(&correction) {
                 let (sum, rest) = two_sum(*high, *step);
                 (*high, *low) = two_sum(sum, rest + *low);
@@ -80,30 +91,33 @@ pub fn error_rel(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     if largest > 0.0 { difference / largest } else { difference }
 }
 
-/// `K11⁻¹` of the residual of `high + low`, over all degrees of freedom.
+/// `K11⁻¹` of the residual of `high + low`, over all degrees of freedom; `given` forces are empty
+/// or one per degree of freedom.
 fn correction(
     stiffness: &Stiffness,
     factored: &Factored,
+    given: &[f64],
     high: &[f64],
     low: &[f64],
 ) -> Result<Vec<f64>, ReportError> {
     let partition = factored.partition();
-    let nodal_force = exact_product(stiffness, high, low);
+    let residual = exact_residual(stiffness, given, high, low);
     let mut forces = vec![0.0; high.len()];
     for &dof in partition.unknown() {
-        forces[dof as usize] = -nodal_force[dof as usize];
+        forces[dof as usize] = residual[dof as usize];
     }
     let zeros = vec![0.0; partition.known().len()];
     let loads = Loads { q_known: &zeros, forces: &forces, residual_rel: 0.0 };
     Ok(factored.solve(stiffness, loads, &mut |_| {})?.displacement)
 }
 
-/// `K (high + low)`, each row summed in twice the working precision and rounded once.
-fn exact_product(stiffness: &Stiffness, high: &[f64], low: &[f64]) -> Vec<f64> {
-    let mut product = vec![0.0; high.len()];
+/// `f − K (high + low)`, each row summed in twice the working precision and rounded once.
+fn exact_residual(stiffness: &Stiffness, given: &[f64], high: &[f64], low: &[f64]) -> Vec<f64> {
+    let mut residual = vec![0.0; high.len()];
     for node in 0..stiffness.node_count() {
         for axis in 0..3 {
-            let (mut sum, mut rest) = (0.0, 0.0);
+            let force = given.get(3 * node + axis).copied().unwrap_or(0.0);
+            let (mut sum, mut rest) = (-force, 0.0);
             for (column, block) in stiffness.row(node) {
                 for other in 0..3 {
                     let (k, dof) = (block[3 * axis + other], 3 * column + other);
@@ -113,10 +127,10 @@ fn exact_product(stiffness: &Stiffness, high: &[f64], low: &[f64]) -> Vec<f64> {
                     rest += lost + term_rest + k * low[dof];
                 }
             }
-            product[3 * node + axis] = sum + rest;
+            residual[3 * node + axis] = -(sum + rest);
         }
     }
-    product
+    residual
 }
 
 /// Rounded sum and what rounding lost.
@@ -155,6 +169,24 @@ mod tests {
             let exact = (i128::from(a) * (1 << 20) + 1) * 4096 * 1024 + (1 << e) + 1;
             prop_assert_eq!((sum * 1024.0) as i128 + (rest * 1024.0) as i128, exact);
         }
+    }
+
+    #[test]
+    fn forces_are_answered_as_exactly_as_known_displacements() {
+        let scene = Pressed::try_new(BuiltIn::Sphere, 120).unwrap();
+        let (model, known) = scene.model().unwrap();
+        let mut forces = vec![0.0; 3 * scene.mesh.node_count()];
+        for dof in (1..forces.len() as u32).step_by(3).filter(|d| !known.dofs.contains(d)) {
+            forces[dof as usize] = -1e-3;
+        }
+        let q_known = vec![0.0; known.dofs.len()];
+        let loads = Loads { q_known: &q_known, forces: &forces, ..Loads::default() };
+        let factored = model.factor(&known.dofs, Method::Front, &mut |_| {}).unwrap();
+        let reference = Reference::refined(model.stiffness(), &factored, loads).unwrap();
+        assert!(reference.last_correction_rel < 1e-17, "{:e}", reference.last_correction_rel);
+        let answer = factored.solve(model.stiffness(), loads, &mut |_| {}).unwrap().displacement;
+        let error = reference.error_of(answer.into_iter(), 1.0);
+        assert!(error > 0.0 && error < 1e-11, "{error:e}");
     }
 
     #[test]

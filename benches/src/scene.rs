@@ -53,8 +53,7 @@ pub(crate) fn rubber() -> Result<Material, ReportError> {
 }
 
 impl Pressed {
-    /// A built-in object of about `nodes` nodes; each tip takes the surface node nearest to it
-    /// that no other has.
+    /// A built-in object of about `nodes` nodes, pressed as [`presses`] says.
     ///
     /// # Errors
     /// [`ReportError::Generate`], [`ReportError::Material`].
@@ -62,17 +61,7 @@ impl Pressed {
         let mesh = generate(shape, nodes)?;
         let surface = Surface::from_mesh(&mesh);
         let material = rubber()?;
-        let (low, high) = mesh.bounds();
-        let (centre, half) = (nalgebra::center(&low, &high), (high - low) / 2.0);
-        let mut taken: Vec<u32> = Vec::new();
-        let mut pairs = Vec::new();
-        for (place, push) in TOUCHES {
-            let place = centre + half.component_mul(&Vector3::from(place));
-            let Some(node) = nearest(&mesh, &surface, &place, &taken) else { continue };
-            taken.push(node);
-            pairs.extend((0..3).zip(push).map(|(axis, u)| (3 * node + axis, u * mesh.size())));
-        }
-        pairs.sort_by_key(|&(dof, _)| dof);
+        let pairs = presses(&mesh, &surface);
         Ok(Self { shape, mesh, surface, material, pairs })
     }
 
@@ -153,6 +142,25 @@ impl Pressed {
     pub fn unknown_dofs(&self) -> usize {
         (3 * self.mesh.node_count()).saturating_sub(self.pairs.len())
     }
+}
+
+/// Known displacements of five fingertips on any object, by degree of freedom, ascending.
+///
+/// Each tip takes the surface node nearest to its place that no other has; a surface of fewer than
+/// five nodes leaves tips out. Units: m.
+pub fn presses(mesh: &TetMesh, surface: &Surface) -> Vec<(u32, f64)> {
+    let (low, high) = mesh.bounds();
+    let (centre, half) = (nalgebra::center(&low, &high), (high - low) / 2.0);
+    let mut taken: Vec<u32> = Vec::new();
+    let mut pairs = Vec::new();
+    for (place, push) in TOUCHES {
+        let place = centre + half.component_mul(&Vector3::from(place));
+        let Some(node) = nearest(mesh, surface, &place, &taken) else { continue };
+        taken.push(node);
+        pairs.extend((0..3).zip(push).map(|(axis, u)| (3 * node + axis, u * mesh.size())));
+    }
+    pairs.sort_by_key(|&(dof, _)| dof);
+    pairs
 }
 
 /// The surface node nearest to a place that is not among those taken.

@@ -1,0 +1,72 @@
+//! Our methods on a whole problem: order, factor, one right-hand side, all of them.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use softgrasp_bench::sample::timed_ms;
+use softgrasp_core::solve::{Factored, FrontAnalysis, FrontFactor, Loads, Method, Stage};
+
+use crate::problem::{COLUMNS, Problem};
+
+/// Runs one method by its name; `front` answers through its factor alone, without refinement, as
+/// the peers do, the others through `Factored::solve`.
+pub fn run(problem: &Problem, method: &str) -> anyhow::Result<serde_json::Value> {
+    match method.parse()? {
+        Method::Front => front(problem),
+        other => factored(problem, other),
+    }
+}
+
+fn front(problem: &Problem) -> anyhow::Result<serde_json::Value> {
+    let stiffness = problem.model.stiffness();
+    let n = problem.partition.unknown().len();
+    let (order_ms, analysis) =
+        timed_ms(|| Arc::new(FrontAnalysis::new(stiffness, &problem.partition)));
+    let (factor_ms, factor) = timed_ms(|| FrontFactor::<f64>::try_new(&analysis, stiffness));
+    let factor = factor?;
+    let mut answers = problem.b[..n].to_vec();
+    let (solve_ms, ()) = timed_ms(|| factor.solve_in_place(&mut answers, 1));
+    let mut wide = problem.b.clone();
+    let (solve_wide_ms, ()) = timed_ms(|| factor.solve_in_place(&mut wide, COLUMNS));
+    answers.extend(wide);
+    problem.write_answers(&answers)?;
+    Ok(times(order_ms, factor_ms, solve_ms, solve_wide_ms))
+}
+
+fn factored(problem: &Problem, method: Method) -> anyhow::Result<serde_json::Value> {
+    let stiffness = problem.model.stiffness();
+    let partition = problem.partition.clone();
+    let start = Instant::now();
+    let mut factor_began = start;
+    let factored = Factored::try_new(stiffness, partition, method, &mut |stage| {
+        if stage == Stage::Factor {
+            factor_began = Instant::now();
+        }
+    })?;
+    let factor_ms = factor_began.elapsed().as_secs_f64() * 1e3;
+    let order_ms = (factor_began - start).as_secs_f64() * 1e3;
+    let mut answers = Vec::new();
+    let mut solve = |q_known: &[f64]| -> anyhow::Result<()> {
+        let loads = Loads { q_known, ..Loads::default() };
+        let solution = factored.solve(stiffness, loads, &mut |_| {})?;
+        answers.push(solution.displacement);
+        Ok(())
+    };
+    let (solve_ms, done) = timed_ms(|| solve(&problem.q_known[0]));
+    done?;
+    let (solve_wide_ms, done) =
+        timed_ms(|| problem.q_known.iter().try_for_each(|q_known| solve(q_known)));
+    done?;
+    let unknown: Vec<f64> = answers.iter().flat_map(|u| problem.unknown_of(u)).collect();
+    problem.write_answers(&unknown)?;
+    Ok(times(order_ms, factor_ms, solve_ms, solve_wide_ms))
+}
+
+fn times(order_ms: f64, factor_ms: f64, solve_ms: f64, solve_wide_ms: f64) -> serde_json::Value {
+    serde_json::json!({
+        "order_ms": order_ms,
+        "factor_ms": factor_ms,
+        "solve_ms": solve_ms,
+        "solve_wide_ms": solve_wide_ms,
+    })
+}
