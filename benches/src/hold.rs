@@ -242,11 +242,14 @@ fn times(held: &Held, scene: &Pressed) -> Table {
     table
 }
 
+/// Name of a share of a tick's time, and the share, ms.
+type Part = (&'static str, fn(&Tick) -> f64);
+
 fn stages(held: &Held) -> Table {
     let title = "Where the time of a tick goes";
     let mut table = Table::new("hold-stages", title, &STAGE_COLUMNS);
     let worst = Spread::of(held.of(|t| t.error_rel)).max;
-    let parts: [(&str, fn(&Tick) -> f64); 7] = [
+    let parts: [Part; 7] = [
         ("late in sending", |t| t.from_tick - t.round_trip),
         ("decode", |t| t.stages.decode),
         ("queue", |t| t.stages.queue),
