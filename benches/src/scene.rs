@@ -6,8 +6,8 @@ use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_core::model::{Element, Known, Model};
 use softgrasp_core::solve::{Loads, Method, Solution};
 use softgrasp_protocol::{
-    DofValue, ElementName, MeshData, MethodName, NodeChoice, Precision, Question, SolveOnce,
-    UploadModel, Want,
+    DofValue, ElementChoice, ElementName, MeshData, MethodName, NodeChoice, Precision, Question,
+    SolveOnce, UploadModel, Want,
 };
 
 use crate::report::ReportError;
@@ -105,7 +105,7 @@ impl Pressed {
     pub fn solve_once(&self, method: Method) -> SolveOnce {
         let (mesh, materials) = self.on_the_wire();
         let question = self.question(method.name(), 1.0, NodeChoice::All);
-        SolveOnce { mesh, materials, element: ElementName::T4, question }
+        SolveOnce { mesh, materials, element: ElementChoice::T4, question }
     }
 
     /// The model for a server to keep.

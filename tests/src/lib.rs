@@ -1,6 +1,7 @@
 //! What the system tests share: questions to ask, ways to ask them, and ways to disturb the asking.
 
 pub mod conversation;
+pub mod fake_server;
 pub mod faulty_proxy;
 pub mod heard;
 pub mod questions;

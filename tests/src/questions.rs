@@ -2,8 +2,8 @@
 
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_protocol::{
-    DofValue, ElementName, FrameRequest, Material, MeshData, MethodName, ModelHash, NodeChoice,
-    Precision, Question, SolveOnce, UploadModel, Want,
+    DofValue, ElementChoice, ElementName, FrameRequest, Material, MeshData, MethodName, ModelHash,
+    NodeChoice, Precision, Question, SolveOnce, UploadModel, Want,
 };
 
 /// Names of all methods, slowest first.
@@ -88,7 +88,7 @@ pub fn once(mesh: &TetMesh, method: &str) -> SolveOnce {
     SolveOnce {
         mesh: mesh_data(mesh),
         materials: vec![MATERIAL],
-        element: ElementName::T4,
+        element: ElementChoice::T4,
         question: question(squeeze(mesh, 1.0), method),
     }
 }

@@ -2,7 +2,7 @@
 
 use softgrasp_bench::reference::error_rel;
 use softgrasp_bench::sample::{Spread, timed_ms};
-use softgrasp_core::solve::condensed::{Columns, ContactSet};
+use softgrasp_core::solve::condensed::{Columns, ContactSet, Touched};
 
 use crate::problem::Problem;
 
@@ -19,7 +19,7 @@ pub fn run(problem: &Problem) -> anyhow::Result<serde_json::Value> {
     let columns = Columns::new(COLUMN_BYTES);
     let (known, right) = (&problem.known, &problem.reference[0].displacement);
     let (grip_ms, contact) = timed_ms(|| {
-        ContactSet::try_new(&base, &columns, &known.dofs).map(|mut contact| {
+        ContactSet::try_new(&base, &columns, &Touched::of_dofs(&known.dofs)).map(|mut contact| {
             contact.want(&base, &problem.surface.nodes);
             contact
         })

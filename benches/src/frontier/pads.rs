@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn refinement_keeps_volume_surface_patches_and_numbers() {
         for shape in BuiltIn::ALL {
-            let coarse = PaddedMesh::new(generate(shape, 150).unwrap());
+            let coarse = PaddedMesh::new(generate(shape, 400).unwrap());
             let fine = coarse.refined().unwrap();
             assert_eq!(fine.mesh.tets().len(), 8 * coarse.mesh.tets().len());
             let (before, after) = (volume(&coarse.mesh), volume(&fine.mesh));

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::contact::{Mask, MaskError};
+pub use crate::fem::Element;
 use crate::fem::{
     AssemblyError, Material, QuadraticMesh, Stiffness, StiffnessPattern, StrainSummary,
     TooManyNodes, assemble, assemble_quadratic, summarise_strain, summarise_strain_quadratic,
@@ -10,8 +11,8 @@ use crate::fem::{
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::condensed::{Base, CondensedError};
 use crate::solve::{
-    Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition, PartitionError,
-    SolveError, Stage, find_free_motion,
+    Analysed, Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition,
+    PartitionError, SolveError, Stage, find_free_motion,
 };
 
 /// Everything about a shape that does not depend on which nodes are touched.
@@ -73,16 +74,6 @@ pub enum ModelError {
     /// The condensed engine failed.
     #[error(transparent)]
     Condensed(#[from] CondensedError),
-}
-
-/// Which finite element a model is made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Element {
-    /// Linear tetrahedron (thesis chapter 3).
-    #[default]
-    Tet4,
-    /// Ten-node tetrahedron; its mid-edge nodes are made from the linear mesh.
-    Tet10,
 }
 
 /// A partition and the known displacements in its order.
@@ -267,6 +258,20 @@ impl Model {
             return Err(ModelError::QuadraticCondensed);
         }
         Ok(Base::try_new(mesh, bodies, stiffness, fixed, on_stage)?)
+    }
+
+    /// Orders and analyses `K11` for a set of known degrees of freedom, after making sure that it
+    /// holds every body; what a factor will cost is known then, and none is made yet.
+    ///
+    /// # Errors
+    /// [`ModelError::Partition`], [`ModelError::Free`].
+    pub fn analyse(
+        &self,
+        dofs: &[u32],
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Analysed, ModelError> {
+        let partition = self.check_held(dofs, &[])?;
+        Ok(Analysed::new(&self.stiffness, partition, on_stage))
     }
 
     /// Inverts or factors `K11` for a set of known degrees of freedom, after making sure that it

@@ -8,8 +8,8 @@ use softgrasp_core::mesh::{TetMesh, signed_volume};
 use softgrasp_core::model::{Element, Known, Model, ModelError};
 use softgrasp_core::solve::Method;
 use softgrasp_protocol::{
-    Answer, ElementName, FrameRequest, MeshData, ModelHash, ModelReady, Prefetch, SolveOnce,
-    UploadModel,
+    Answer, ElementChoice, ElementName, FrameRequest, MeshData, ModelHash, ModelReady, Prefetch,
+    Question, SolveOnce, UploadModel,
 };
 
 use crate::approach::{Approach, is_auto};
@@ -18,7 +18,9 @@ use crate::compute::Compute;
 use crate::condensed::StrainOf;
 use crate::config::ServerConfig;
 use crate::direct::Asked;
-use crate::question::{checked_forces, pairs};
+use crate::planned::add_locking;
+use crate::question::{check_wishes, checked_forces, pairs};
+use crate::rates::MeasuredRates;
 use crate::reject::Refusal;
 use crate::store::{ModelStore, StoredModel};
 use crate::{condensed, direct};
@@ -28,6 +30,7 @@ pub(crate) struct Desk {
     pub config: ServerConfig,
     pub store: ModelStore,
     compute: Compute,
+    pub rates: MeasuredRates,
 }
 
 /// Numbers multiplied for a frame that is done sooner than handed to another thread.
@@ -36,31 +39,55 @@ const QUICK_PRODUCTS: usize = 1 << 18;
 impl Desk {
     pub fn new(config: ServerConfig, compute: Compute) -> Self {
         let store = ModelStore::new(config.memory_limit);
-        Self { config, store, compute }
+        Self { config, store, compute, rates: MeasuredRates::default() }
     }
 
     /// Mesh, known displacements and partition in one request (thesis 5.1.1).
     pub fn solve_once(&self, request: SolveOnce, mut clock: StageClock) -> Result<Answer, Refusal> {
         let SolveOnce { mesh, materials, element, question } = request;
-        let approach = Approach::for_once(&question)?;
-        let model = self.model(mesh, &materials, element, Vec::new(), &mut clock)?;
+        check_wishes(&question)?;
+        let plan = self.plan(&mesh, &materials, element, &question, &clock)?;
+        let mut answer = match plan {
+            Some(plan) => self.solve_planned(&plan, mesh, &materials, &question, clock)?,
+            None => {
+                // What is left to choose here goes by methods that know linear elements only.
+                let element = match element {
+                    ElementChoice::T10 => ElementName::T10,
+                    ElementChoice::T4 | ElementChoice::Auto => ElementName::T4,
+                };
+                let model = self.model(mesh, &materials, element, Vec::new(), &mut clock)?;
+                self.solve_as_asked(model, &question, clock)?
+            }
+        };
+        add_locking(element, &materials, &mut answer.report);
+        Ok(answer)
+    }
+
+    /// A one-shot request that names its method, or leaves it to the server without a wish.
+    fn solve_as_asked(
+        &self,
+        model: Model,
+        question: &Question,
+        mut clock: StageClock,
+    ) -> Result<Answer, Refusal> {
+        let approach = Approach::for_once(question)?;
         let known = model.known(pairs(&question.known))?;
-        let forces = checked_forces(&model, &known, &question)?;
+        let forces = checked_forces(&model, &known, question)?;
         match approach {
             Approach::Condensed { .. } => {
                 let stored = Arc::new(StoredModel::new(model, usize::MAX));
                 let watch = StrainOf::ThisAnswer;
-                condensed::answer(&stored, &question, &known, &approach, watch, clock)
+                condensed::answer(&stored, question, &known, &approach, watch, clock)
             }
             Approach::Direct { method, because } => {
                 self.check_memory(method, &known, &model)?;
                 let factored =
                     model.factor(&known.dofs, method, &mut |stage| clock.begin(stage))?;
                 let asked = Asked {
-                    question: &question,
+                    question,
                     known,
                     forces,
-                    element,
+                    element: name_of(model.element()),
                     factor_reused: false,
                     chosen_because: because,
                 };
@@ -141,15 +168,11 @@ impl Desk {
                 made
             }
         };
-        let element = match model.element() {
-            Element::Tet4 => ElementName::T4,
-            Element::Tet10 => ElementName::T10,
-        };
         let asked = Asked {
             question: &question,
             known,
             forces,
-            element,
+            element: name_of(model.element()),
             factor_reused,
             chosen_because: because,
         };
@@ -172,7 +195,8 @@ impl Desk {
         }
     }
 
-    fn model(
+    /// A model from what has been sent, with all that is checked of it.
+    pub(crate) fn model(
         &self,
         mesh: MeshData,
         materials: &[softgrasp_protocol::Material],
@@ -203,7 +227,12 @@ impl Desk {
     }
 
     /// Refuses a dense matrix that does not fit into the memory limit.
-    fn check_memory(&self, method: Method, known: &Known, model: &Model) -> Result<(), Refusal> {
+    pub(crate) fn check_memory(
+        &self,
+        method: Method,
+        known: &Known,
+        model: &Model,
+    ) -> Result<(), Refusal> {
         let unknown_dofs = model.modelled_dofs().saturating_sub(known.dofs.len());
         let limit = self.config.memory_limit;
         match method.dense_bytes(unknown_dofs) {
@@ -212,6 +241,14 @@ impl Desk {
             }
             _ => Ok(()),
         }
+    }
+}
+
+/// Name of an element on the wire.
+pub(crate) fn name_of(element: Element) -> ElementName {
+    match element {
+        Element::Tet4 => ElementName::T4,
+        Element::Tet10 => ElementName::T10,
     }
 }
 

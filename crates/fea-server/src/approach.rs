@@ -22,7 +22,8 @@ const ASKED: &str = "asked for";
 const TOUCHED_DOFS_MAX: usize = 600;
 
 impl Approach {
-    /// For a request that brings its own mesh: nothing can be reused, so `auto` factors once.
+    /// For a request that brings its own mesh: nothing can be reused, so `auto` without a wish
+    /// factors once; wishes are weighed in `planned.rs`.
     pub fn for_once(question: &Question) -> Result<Self, Refusal> {
         match question.method.as_str() {
             CONDENSED if !question.forces.is_empty() => Err(Refusal::CondensedForces),

@@ -9,6 +9,7 @@ use softgrasp_protocol::StageMs;
 /// Takes the time between the stages that the core announces.
 #[derive(Clone)]
 pub(crate) struct StageClock {
+    decoded: Instant,
     stage_ms: StageMs,
     running: Option<(Stage, Instant)>,
 }
@@ -17,7 +18,8 @@ impl StageClock {
     /// Starts with what was measured before the core was called.
     pub fn new(decode_ms: f64, queued: Instant) -> Self {
         let queue = ms_since(queued);
-        Self { stage_ms: StageMs { decode: decode_ms, queue, ..StageMs::default() }, running: None }
+        let stage_ms = StageMs { decode: decode_ms, queue, ..StageMs::default() };
+        Self { decoded: queued, stage_ms, running: None }
     }
 
     /// Ends the running stage and begins another.
@@ -37,6 +39,11 @@ impl StageClock {
                 Stage::Solve => self.stage_ms.solve += ms,
             }
         }
+    }
+
+    /// Milliseconds since the request came.
+    pub fn elapsed_ms(&self) -> f64 {
+        self.stage_ms.decode + ms_since(self.decoded)
     }
 
     /// The times so far.

@@ -23,6 +23,9 @@ pub struct ServerConfig {
     pub column_cache: u64,
     /// Shared secret a client must show, if any.
     pub token: Option<String>,
+    /// Whether the machine's speed is measured at once, beside the first requests, and not by the
+    /// first request that needs it.
+    pub measure_at_start: bool,
     /// A client that stops inside a frame for this long is given up.
     pub stall_limit: Duration,
 }
@@ -61,6 +64,7 @@ impl Default for ServerConfig {
             memory_limit: 8 << 30,
             column_cache: 1 << 30,
             token: None,
+            measure_at_start: false,
             stall_limit: Duration::from_secs(30),
         }
     }

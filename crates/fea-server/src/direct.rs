@@ -29,18 +29,39 @@ pub(crate) fn answer(
     asked: Asked<'_>,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    let Asked { question, known, forces, element, factor_reused, chosen_because } = asked;
-    let residual_rel = question.max_error.unwrap_or(0.0);
-    let loads = Loads { q_known: &known.q_known, forces: &forces, residual_rel };
-    let solution = factored
+    let solution = solve(model, factored, &asked, &mut clock)?;
+    Ok(gather(model, factored, asked, &solution, clock))
+}
+
+/// Displacements of the whole system, refined or stopped as the question allows.
+pub(crate) fn solve(
+    model: &Model,
+    factored: &Factored,
+    asked: &Asked<'_>,
+    clock: &mut StageClock,
+) -> Result<Solution, Refusal> {
+    let residual_rel = asked.question.max_error.unwrap_or(0.0);
+    let loads = Loads { q_known: &asked.known.q_known, forces: &asked.forces, residual_rel };
+    factored
         .solve(model.stiffness(), loads, &mut |stage| clock.begin(stage))
-        .map_err(|error| Refusal::Model(error.into()))?;
+        .map_err(|error| Refusal::Model(error.into()))
+}
+
+/// What was asked for, out of a solution, and what it cost.
+pub(crate) fn gather(
+    model: &Model,
+    factored: &Factored,
+    asked: Asked<'_>,
+    solution: &Solution,
+    clock: StageClock,
+) -> Answer {
+    let Asked { question, known, element, factor_reused, chosen_because, .. } = asked;
     let strain = model.strain(&solution.displacement);
     let mut stage_ms = clock.finish();
     let start = Instant::now();
-    let displacements = gather(model, &solution, &question.want);
+    let displacements = displacements(model, solution, &question.want);
     let reactions = match question.want.reactions {
-        true => reactions(&known, &solution),
+        true => reactions(&known, solution),
         false => Vec::new(),
     };
     stage_ms.encode = ms_since(start);
@@ -52,7 +73,7 @@ pub(crate) fn answer(
         stage_ms,
         residual_rel: solution.residual_rel,
         error_bound_rel: None,
-        error_bound_why: "a bound is proven for the method condensed only".to_owned(),
+        error_bound_why: no_bound(solution.error_estimate_rel),
         refinement_steps: solution.refinement_steps,
         max_rotation_deg: strain.rotation_max.to_degrees(),
         max_strain: strain.strain_max,
@@ -64,11 +85,19 @@ pub(crate) fn answer(
         chosen_because,
     };
     add_unmet_wishes(question, &mut report);
-    Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
+    Answer { report, nodes: question.want.nodes.clone(), displacements, reactions }
+}
+
+fn no_bound(error_estimate_rel: Option<f64>) -> String {
+    let none = "a bound is proven for the method condensed only";
+    match error_estimate_rel {
+        Some(error) => format!("{none}; estimated, not proven, is an error of {error:.1e}"),
+        None => none.to_owned(),
+    }
 }
 
 /// Displacements of the nodes asked for; mid-edge nodes are the server's own and stay here.
-fn gather(model: &Model, solution: &Solution, want: &Want) -> Displacements {
+fn displacements(model: &Model, solution: &Solution, want: &Want) -> Displacements {
     let of = |n: usize| {
         let u = &solution.displacement[3 * n..3 * n + 3];
         [u[0], u[1], u[2]]

@@ -114,6 +114,7 @@ fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
         memory_limit: arguments.memory_limit,
         column_cache: arguments.column_cache,
         token,
+        measure_at_start: true,
         ..usual
     })
 }

@@ -17,8 +17,21 @@ pub(crate) fn checked_forces(
     known: &Known,
     question: &Question,
 ) -> Result<Vec<f64>, Refusal> {
+    check_wishes(question)?;
     check_nodes(&question.want, model)?;
     scatter_forces(model, known, &question.forces)
+}
+
+/// Deadline and error budget are numbers that can be compared with.
+pub(crate) fn check_wishes(question: &Question) -> Result<(), Refusal> {
+    for (what, value) in
+        [("the deadline", question.deadline_ms), ("the error budget", question.max_error)]
+    {
+        if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            return Err(Refusal::Wish { what, value });
+        }
+    }
+    Ok(())
 }
 
 fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {

@@ -31,7 +31,10 @@ pub(crate) enum Refusal {
     Regions { labels: usize, materials: usize },
     #[error("no model {0} is known here; upload it")]
     UnknownModel(ModelHash),
-    #[error("{what} names node {node}, but the mesh has {node_count} nodes (0-based)")]
+    #[error(
+        "{what} names node {node}, but the mesh has {node_count} nodes (0-based); name nodes \
+         below {node_count}"
+    )]
     NoSuchNode { what: &'static str, node: u32, node_count: usize },
     #[error("a force at node {node} is {value} N; it must be a finite number")]
     ForceNotFinite { node: u32, value: f64 },
@@ -42,6 +45,14 @@ pub(crate) enum Refusal {
          server's --memory-limit of {limit}; sparse-cholesky needs far less"
     )]
     Memory { method: String, unknown_dofs: usize, needed: u64, limit: u64 },
+    #[error(
+        "the factor of {unknown_dofs} unknowns needs up to {needed} bytes while it is made, and \
+         this machine has {available} to spare; use linear elements, fewer nodes, or pcg, which \
+         needs half"
+    )]
+    FactorMemory { unknown_dofs: usize, needed: u64, available: u64 },
+    #[error("{what} is {value}; it must be a finite number above 0, or be left out")]
+    Wish { what: &'static str, value: f64 },
     #[error("condensed takes known displacements only, not forces; use front or auto")]
     CondensedForces,
     #[error("node {node} is fixed by the model and moved by the question; use front or auto")]
@@ -82,7 +93,7 @@ impl Refusal {
                 _ => RejectCode::BadRequest,
             },
             Self::Method(_) => RejectCode::UnknownMethod,
-            Self::Memory { .. } => RejectCode::MemoryLimit,
+            Self::Memory { .. } | Self::FactorMemory { .. } => RejectCode::MemoryLimit,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
             Self::Token => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,

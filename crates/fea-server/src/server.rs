@@ -67,8 +67,15 @@ pub async fn serve(
         Compute::new(threads).map_err(|source| StartError::Threads { threads, source })?;
     on_ready(listener.local_addr().map_err(listen_error)?);
     let places = Arc::new(Semaphore::new(config.max_sessions));
+    let measure_at_start = config.measure_at_start;
     let desk = Arc::new(Desk::new(config, compute.clone()));
     let hall = Hall { desk, compute, places: Arc::clone(&places), stop: stop.clone() };
+    if measure_at_start {
+        let desk = Arc::clone(&hall.desk);
+        hall.compute.in_background(move || {
+            desk.rates.get();
+        });
+    }
     let mut sessions = JoinSet::new();
     accept_until_stopped(&listener, &hall, &places, stop, &mut sessions).await;
     drop(listener);

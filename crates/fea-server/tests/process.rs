@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementName, Hello, Kind, Limits, Material, MeshData, MethodName, Question,
+    Answer, DofValue, ElementChoice, Hello, Kind, Limits, Material, MeshData, MethodName, Question,
     RejectCode, Reply, Request, SolveOnce, Want,
 };
 
@@ -148,7 +148,7 @@ fn pulled_cube(nodes: usize, method: &str) -> SolveOnce {
             regions: Vec::new(),
         },
         materials: vec![Material { young: 1.0e5, poisson: 0.3 }],
-        element: ElementName::T4,
+        element: ElementChoice::T4,
         question: Question {
             known,
             forces: Vec::new(),

@@ -8,6 +8,7 @@ pub mod commands;
 pub mod connection;
 pub mod contact_model;
 pub mod devices;
+pub mod discretisation;
 pub mod displacement_table;
 pub mod grasp_loop;
 pub mod hand_reader;

@@ -1,7 +1,7 @@
 //! The object in the hand: rest shape, deformed shape, surface, and the sphere tree that follows.
 
 use nalgebra::{Point3, Vector3};
-use softgrasp_core::mesh::{MeshError, Surface, TetMesh};
+use softgrasp_core::mesh::{Inversion, MeshError, Surface, TetMesh};
 use softgrasp_core::sphere_tree::{SphereTree, TreeError, vertex_normals};
 
 /// A soft object as the client knows it.
@@ -28,9 +28,12 @@ pub enum ObjectError {
     /// The surface gives no tree or no normals.
     #[error("the object's surface cannot be searched: {0}")]
     Tree(#[from] TreeError),
-    /// A shape that cannot be kept.
-    #[error("the shape cannot be kept: {0}")]
+    /// A shape that is no mesh any more.
+    #[error("the shape cannot be kept: {0}; let go and grasp again")]
     Shape(#[from] MeshError),
+    /// A shape with elements turned inside out.
+    #[error("the shape cannot be kept: {0}; open the hand a little and keep it then")]
+    Inverted(Inversion),
     /// An answer for another mesh.
     #[error("the answer holds {got} displacements, {expected} nodes were asked for")]
     Count {
@@ -162,17 +165,17 @@ impl SoftObject {
     /// Whether the shape as it is now could become the rest shape.
     ///
     /// # Errors
-    /// [`ObjectError::Shape`] names the first element that is turned inside out.
+    /// [`ObjectError::Inverted`] says which elements are turned inside out and how far.
     pub fn check_shape(&self) -> Result<(), ObjectError> {
-        self.rest.with_vertices(self.shape.clone())?;
-        Ok(())
+        Inversion::of(&self.rest, &self.shape).map_or(Ok(()), |i| Err(ObjectError::Inverted(i)))
     }
 
     /// Makes the shape as it is now the rest shape and rebuilds the tree (thesis 4.6, 6.1.2).
     ///
     /// # Errors
-    /// [`ObjectError::Shape`] if an element is turned inside out; nothing is changed then.
+    /// [`ObjectError::Inverted`] if elements are turned inside out; nothing is changed then.
     pub fn keep_shape(&mut self) -> Result<(), ObjectError> {
+        self.check_shape()?;
         let rest = self.rest.with_vertices(self.shape.clone())?;
         let rest_shapes = self.rest_shapes + 1;
         *self = Self { rest_shapes, ..Self::try_new(rest)? };
@@ -243,7 +246,10 @@ mod tests {
         let mut displacement = vec![[0.0; 3]; 64];
         displacement[0] = [0.5, 0.5, 0.5];
         object.apply(displacement).unwrap();
-        assert!(matches!(object.check_shape(), Err(ObjectError::Shape(_))));
+        let refused = object.check_shape().unwrap_err();
+        let ObjectError::Inverted(inversion) = &refused else { panic!("{refused}") };
+        assert!(inversion.volume_rel_min < 0.0 && inversion.count > 0);
+        assert!(refused.to_string().contains("open the hand"), "{refused}");
         assert!(object.keep_shape().is_err());
         assert_eq!(object.rest_shapes(), 1);
     }

@@ -177,7 +177,7 @@ fn ten_node_elements_answer_for_the_corners_and_are_softer() {
     let mesh = cube(125);
     let mut solve = |element: ElementName| {
         let mut request = once(&mesh, "front");
-        request.element = element;
+        request.element = element.into();
         answer(&mut connection, &Request::SolveOnce(Box::new(request)))
     };
     let (linear, quadratic) = (solve(ElementName::T4), solve(ElementName::T10));

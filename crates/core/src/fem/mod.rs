@@ -1,6 +1,7 @@
 //! Finite elements (thesis chapter 3): material, tetrahedra of four and ten nodes, assembly, strain.
 
 mod assembly;
+mod element;
 mod material;
 mod pattern;
 mod quadratic_mesh;
@@ -9,6 +10,7 @@ pub mod tet10;
 pub mod tet4;
 
 pub use assembly::{AssemblyError, Stiffness, assemble, assemble_quadratic};
+pub use element::Element;
 pub use material::{Material, MaterialError};
 pub use pattern::StiffnessPattern;
 pub use quadratic_mesh::{QuadraticMesh, TooManyNodes};

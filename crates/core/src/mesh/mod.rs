@@ -3,12 +3,14 @@
 mod bodies;
 mod faces;
 mod generate;
+mod inversion;
 mod quality;
 mod surface;
 mod tet_mesh;
 
 pub use bodies::Bodies;
 pub use generate::{BuiltIn, GenerateError, NODES_MAX, NODES_MIN, UnknownShape, generate};
+pub use inversion::Inversion;
 pub use quality::{Quality, TetQuality, tet_quality};
 pub use surface::Surface;
 pub use tet_mesh::{MeshError, TetMesh, signed_volume};

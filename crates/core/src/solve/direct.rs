@@ -1,8 +1,6 @@
 //! One interface to all direct methods: factor a partition once, then answer known displacements.
 
-use std::sync::Arc;
-
-use super::front::{FrontAnalysis, FrontError, FrontFactor};
+use super::front::FrontFactor;
 use super::k11::{SparseK11, right_hand_side, visit_k11};
 use super::partition::AXIS_NAMES;
 use super::pcg::{self, PcgParams, norm};
@@ -11,6 +9,10 @@ use super::sparse::{Analysis, SparseFactor};
 use super::tiles::Tiles;
 use super::{Method, Partition, Stage, gauss_jordan, ordering};
 use crate::fem::Stiffness;
+
+mod analysed;
+
+pub use analysed::{Analysed, FrontMethod};
 
 /// `K11` of one partition, inverted or factored by one method.
 ///
@@ -36,6 +38,12 @@ enum Kernel {
     FrontSingle(FrontFactor<f32>),
 }
 
+fn not_positive(method: Method, partition: &Partition, row: usize) -> SolveError {
+    let dof = partition.unknown().get(row).map_or(0, |&d| d as usize);
+    let (node, axis) = (dof / 3, AXIS_NAMES[dof % 3]);
+    SolveError::NotPositiveDefinite { method, node, axis }
+}
+
 /// Known displacements and external forces of one answer.
 ///
 /// Shapes: `q_known` one per known degree of freedom of the partition, in its order; `forces`
@@ -46,8 +54,8 @@ pub struct Loads<'a> {
     pub q_known: &'a [f64],
     /// `f₁` of (3.7), scattered over all degrees of freedom.
     pub forces: &'a [f64],
-    /// Relative residual that is good enough for a method that can stop early
-    /// ([`Method::Pcg`]); zero asks for all there is.
+    /// Relative residual and estimated relative error that are good enough, both, for a method that
+    /// can stop early ([`Method::Pcg`]); zero asks for all there is.
     pub residual_rel: f64,
 }
 
@@ -60,6 +68,8 @@ pub struct Solution {
     pub reaction: Vec<f64>,
     /// `‖K11 Q_u − b‖₂ / ‖b‖₂`, zero when `b` is.
     pub residual_rel: f64,
+    /// Estimate of `‖error‖ / ‖Q_u‖` where a method stops by it ([`Method::Pcg`]); no bound.
+    pub error_estimate_rel: Option<f64>,
     /// Refinement steps taken.
     pub refinement_steps: u32,
 }
@@ -134,11 +144,7 @@ impl Factored {
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Self, SolveError> {
         let n = partition.unknown().len();
-        let not_positive = |error: NotPositive| {
-            let dof = partition.unknown().get(error.row).map_or(0, |&d| d as usize);
-            let (node, axis) = (dof / 3, AXIS_NAMES[dof % 3]);
-            SolveError::NotPositiveDefinite { method, node, axis }
-        };
+        let not_positive = |error: NotPositive| not_positive(method, &partition, error.row);
         let out_of_memory = || SolveError::OutOfMemory { method, unknown_dofs: n };
         let kernel = match method {
             Method::GaussJordan => {
@@ -170,21 +176,13 @@ impl Factored {
                 Kernel::Sparse(Box::new(analysis.factor().map_err(not_positive)?))
             }
             Method::Front | Method::FrontMixed | Method::Pcg => {
-                on_stage(Stage::Order);
-                let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
-                on_stage(Stage::Factor);
-                let failed = |error| match error {
-                    FrontError::NotPositive { row } => not_positive(NotPositive { row }),
-                    _ => out_of_memory(),
+                let front = match method {
+                    Method::Front => FrontMethod::Double,
+                    Method::FrontMixed => FrontMethod::Mixed,
+                    _ => FrontMethod::Pcg,
                 };
-                match method {
-                    Method::Front => {
-                        Kernel::Front(FrontFactor::try_new(&analysis, stiffness).map_err(failed)?)
-                    }
-                    _ => Kernel::FrontSingle(
-                        FrontFactor::try_new(&analysis, stiffness).map_err(failed)?,
-                    ),
-                }
+                let analysed = Analysed::new(stiffness, partition, on_stage);
+                return analysed.factor(stiffness, front, on_stage);
             }
         };
         Ok(Self { method, partition, kernel })
@@ -241,6 +239,7 @@ impl Factored {
             _ => self.apply_inverse(b.clone()),
         };
         let mut refinement_steps = 0;
+        let mut error_estimate_rel = None;
         let apply = |x: &[f64]| self.apply_k11(stiffness, x);
         let mut residual = subtract(&b, &apply(&x));
         if self.method != Method::Pcg {
@@ -251,12 +250,15 @@ impl Factored {
         if single && norm(&residual) > RESIDUAL_GOOD.max(loads.residual_rel) * b_norm {
             let params = PcgParams {
                 residual_rel: RESIDUAL_GOOD.max(loads.residual_rel),
+                // Without an error to reach the residual decides alone.
+                error_rel: Some(loads.residual_rel).filter(|e| *e > 0.0).unwrap_or(f64::INFINITY),
                 steps_max: PCG_STEPS_MAX,
             };
             let precondition = |r: &[f64]| self.apply_inverse(r.to_vec());
-            let (reached, steps) = pcg::solve(&apply, &precondition, &b, &mut x, params);
-            residual = reached;
-            refinement_steps += steps;
+            let reached = pcg::solve(&apply, &precondition, &b, &mut x, params);
+            residual = reached.residual;
+            refinement_steps += reached.steps;
+            error_estimate_rel = Some(reached.error_estimate_rel);
         }
         for (&dof, x) in partition.unknown().iter().zip(&x) {
             q[dof as usize] = *x;
@@ -267,7 +269,13 @@ impl Factored {
         }
         let reaction = partition.known().iter().map(|&dof| f[dof as usize]).collect();
         let residual_rel = if b_norm > 0.0 { norm(&residual) / b_norm } else { norm(&residual) };
-        Ok(Solution { displacement: q, reaction, residual_rel, refinement_steps })
+        Ok(Solution {
+            displacement: q,
+            reaction,
+            residual_rel,
+            error_estimate_rel,
+            refinement_steps,
+        })
     }
 
     /// Improves `x` while the residual falls by half a step or more; the number of steps.

@@ -25,7 +25,8 @@ pub enum Method {
 /// A method name that is none of [`Method::ALL`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "no method is called '{name}'; there are gauss-jordan, dense-inverse, dense-cholesky and sparse-cholesky"
+    "no method is called '{name}'; there are gauss-jordan, dense-inverse, dense-cholesky, \
+     sparse-cholesky, front, front-mixed, pcg, condensed and auto"
 )]
 pub struct UnknownMethod {
     /// The name given.
@@ -63,6 +64,11 @@ impl Method {
             Self::FrontMixed | Self::Pcg => "f32 factor, f64 residual",
             _ => "f64",
         }
+    }
+
+    /// Whether it makes use of the zeros of `K11`, and so orders it first.
+    pub const fn is_sparse(self) -> bool {
+        matches!(self, Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg)
     }
 
     /// Bytes of the factor or inverse at its peak, for `n` unknowns; `None` where it depends on

@@ -1,5 +1,6 @@
 //! Known and unknown degrees of freedom, and the methods that answer for them (thesis 3.4).
 
+pub mod choose;
 pub mod condensed;
 mod direct;
 mod front;
@@ -11,12 +12,14 @@ mod ordering;
 mod partition;
 mod pcg;
 mod pivot;
+pub mod rates;
 mod sparse;
 mod stage;
 mod tiles;
+pub mod work;
 mod zero_energy;
 
-pub use direct::{Factored, Loads, Solution, SolveError};
+pub use direct::{Analysed, Factored, FrontMethod, Loads, Solution, SolveError};
 pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};
 pub use method::{Method, UnknownMethod};
 pub use mobility::{FreeMotion, Motion, find_free_motion};

@@ -9,12 +9,13 @@ use serde::Serialize;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::mesh_io::{MeshFile, PointField, write_vtu};
 use softgrasp_protocol::{
-    DofValue, ElementName, Material, MeshData, MethodName, NodeChoice, Precision, Question, Reply,
-    Request, SolveOnce, Want,
+    Answer, Displacements, DofValue, ElementChoice, Material, MeshData, MethodName, NodeChoice,
+    Precision, Question, Reply, Request, SolveOnce, Want,
 };
 
 use super::output::{print, write_file, write_json};
-use crate::connection::{Host, ServerChoice, unexpected};
+use crate::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
+use crate::discretisation::DiscretisationEstimate;
 use crate::displacement_table::{
     DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError, read_table, write_displacements,
 };
@@ -45,21 +46,26 @@ pub struct SolveCommand {
     /// condensed or auto.
     #[arg(long, default_value = "auto", value_name = "NAME|auto")]
     method: MethodName,
-    /// Finite element.
-    #[arg(long, default_value = "t4", value_name = "t4|t10", value_parser = parse_element)]
-    element: ElementName,
+    /// Finite element; auto takes ten nodes where linear elements lock (Poisson's ratio from 0.45
+    /// on) and deadline and memory allow.
+    #[arg(long, default_value = "t4", value_name = "t4|t10|auto")]
+    element: ElementChoice,
     /// Young's modulus, Pa (in the mesh's unit of length).
     #[arg(long, default_value_t = 1.0e5, value_name = "PA")]
     young: f64,
     /// Poisson's ratio.
     #[arg(long, default_value_t = 0.3, value_name = "NU")]
     poisson: f64,
-    /// Largest relative error wanted; a worse answer is warned of.
+    /// Largest relative error of the solution wanted: auto takes the fastest method within it.
     #[arg(long, value_name = "REL", value_parser = parse_positive)]
     max_error: Option<f64>,
-    /// Time wanted, ms; a later answer is warned of.
+    /// Time wanted, ms: auto takes the most exact method that is predicted to be in time.
     #[arg(long, value_name = "MS", value_parser = parse_positive)]
     deadline: Option<f64>,
+    /// Solve once more with the other element and report the difference: an estimate of the
+    /// mesh's own error.
+    #[arg(long)]
+    estimate_discretisation: bool,
     /// File for the displacements: .csv or .vtu.
     #[arg(long, value_name = "U.csv|U.vtu", value_parser = parse_out)]
     out: PathBuf,
@@ -76,6 +82,10 @@ struct Report {
     server: String,
     #[serde(flatten)]
     solve: SolveSummary,
+    /// Difference between linear and ten-node elements over the answer, or null.
+    discretisation_estimate_rel: Option<f64>,
+    /// What the estimate is, or why there is none.
+    discretisation_why: String,
     out: String,
 }
 
@@ -88,14 +98,6 @@ struct MeshSummary {
     flipped: usize,
     degenerate_dropped: usize,
     orphans: usize,
-}
-
-fn parse_element(text: &str) -> Result<ElementName, String> {
-    match text {
-        "t4" => Ok(ElementName::T4),
-        "t10" => Ok(ElementName::T10),
-        _ => Err("there are t4 and t10".to_owned()),
-    }
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {
@@ -126,30 +128,40 @@ impl SolveCommand {
         let host = Host::open(&self.server, self.threads)?;
         let mut connection = host.connect(None)?;
         progress.now(&format!("solving for {} nodes", file.mesh.node_count()));
-        let request = Request::SolveOnce(Box::new(SolveOnce {
+        let request = SolveOnce {
             mesh: mesh_data(&file.mesh),
             materials: vec![Material { young: self.young, poisson: self.poisson }],
             element: self.element,
             question,
-        }));
-        let start = Instant::now();
-        let answer = match connection.ask(&request)? {
-            Reply::Answer(answer) => answer,
-            other => return Err(unexpected("SolveOnce", &other).into()),
         };
+        let start = Instant::now();
+        let mut answer = ask(&mut connection, &request)?;
         let round_trip_ms = start.elapsed().as_secs_f64() * 1e3;
         progress.now("writing");
         let summary = SolveSummary::new(&answer.report, round_trip_ms);
-        let displacements = answer.displacements.into_f64();
+        let displacements =
+            std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
+        let displacements = displacements.into_f64();
         write_file(&self.out, &encode(&self.out, &file.mesh, &displacements)?)?;
+        let discretisation = match self.estimate_discretisation {
+            true => {
+                progress.now("solving again with the other element");
+                DiscretisationEstimate::of(&mut connection, &request, &answer, &displacements)
+            }
+            false => DiscretisationEstimate::not_asked(),
+        };
         if let Some(path) = &self.report {
-            write_json(path, &self.report(&file, &host, summary.clone()))?;
+            write_json(path, &self.report(&file, &host, summary.clone(), discretisation.clone()))?;
         }
         drop(progress);
         for warning in &summary.warnings {
             eprintln!("glove-client: warning: {warning}");
         }
-        print(&describe(&file, &summary, &self.out))
+        let mut told = describe(&file, &summary, &self.out);
+        if self.estimate_discretisation {
+            told.push_str(&describe_discretisation(&discretisation));
+        }
+        print(&told)
     }
 
     fn question(&self, mesh: &TetMesh) -> anyhow::Result<Question> {
@@ -172,7 +184,13 @@ impl SolveCommand {
         })
     }
 
-    fn report(&self, file: &MeshFile, host: &Host, solve: SolveSummary) -> Report {
+    fn report(
+        &self,
+        file: &MeshFile,
+        host: &Host,
+        solve: SolveSummary,
+        discretisation: DiscretisationEstimate,
+    ) -> Report {
         Report {
             schema: SCHEMA,
             command: "solve",
@@ -190,8 +208,28 @@ impl SolveCommand {
                 ServerChoice::At(_) => host.address().to_owned(),
             },
             solve,
+            discretisation_estimate_rel: discretisation.rel,
+            discretisation_why: discretisation.why,
             out: self.out.display().to_string(),
         }
+    }
+}
+
+fn ask(connection: &mut ServerConnection, request: &SolveOnce) -> Result<Box<Answer>, LinkError> {
+    match connection.ask(&Request::SolveOnce(Box::new(request.clone())))? {
+        Reply::Answer(answer) => Ok(answer),
+        other => Err(unexpected("SolveOnce", &other)),
+    }
+}
+
+fn describe_discretisation(estimate: &DiscretisationEstimate) -> String {
+    match estimate.rel {
+        Some(rel) => format!(
+            "discretisation: about {:.2} % between linear and ten-node elements (an estimate, not \
+             a bound)\n",
+            100.0 * rel
+        ),
+        None => format!("discretisation: no estimate: {}\n", estimate.why),
     }
 }
 
@@ -226,12 +264,13 @@ fn encode(path: &Path, mesh: &TetMesh, displacements: &[[f64; 3]]) -> anyhow::Re
 
 fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
     let mut text = format!(
-        "{}: {} nodes, {} tetrahedra\n{}: {} unknown and {} known degrees of freedom, \
+        "{}: {} nodes, {} tetrahedra\n{} on {}: {} unknown and {} known degrees of freedom, \
          {:.1} ms, residual {:.1e}\nlargest element rotation {:.2} degrees, strain {:.2} %\n",
         file.format,
         file.mesh.node_count(),
         file.mesh.tets().len(),
         summary.method,
+        summary.element,
         summary.unknown_dofs,
         summary.known_dofs,
         summary.round_trip_ms,

@@ -51,7 +51,7 @@ fn check(folder: &Folder, mesh: &str, known: &str, poisson: &str) {
 }
 
 /// The lowest fifth held, the highest tenth pushed down by 5 mm and left free along x.
-fn pushed(shape: BuiltIn, nodes: usize) -> String {
+pub fn pushed(shape: BuiltIn, nodes: usize) -> String {
     let mesh = generate(shape, nodes).unwrap();
     let (low, high) = mesh.bounds();
     let mut table = "node,ux,uy,uz\n".to_owned();

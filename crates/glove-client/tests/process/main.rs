@@ -8,5 +8,6 @@
 
 mod agreement;
 mod commands;
+mod discretisation;
 mod references;
 mod start;

@@ -14,7 +14,7 @@ mod session;
 pub use answer::{Answer, Displacements};
 pub use mesh::{Material, MeshData};
 pub use model::{FrameRequest, ModelHash, ModelHashError, ModelReady, Prefetch, UploadModel};
-pub use names::{ElementName, MethodName, MethodNameError};
+pub use names::{ElementChoice, ElementChoiceError, ElementName, MethodName, MethodNameError};
 pub use question::{DofValue, NodeChoice, Precision, Question, SolveOnce, Want};
 pub use reject::{RejectCode, Rejected};
 pub use reply::Reply;

@@ -81,6 +81,48 @@ impl ElementName {
     }
 }
 
+/// Element wanted for one self-contained request; the answer tells which was used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub enum ElementChoice {
+    /// [`ElementName::T4`].
+    #[default]
+    T4,
+    /// [`ElementName::T10`].
+    T10,
+    /// The server chooses by material, deadline and memory.
+    Auto,
+}
+
+impl From<ElementName> for ElementChoice {
+    fn from(name: ElementName) -> Self {
+        match name {
+            ElementName::T4 => Self::T4,
+            ElementName::T10 => Self::T10,
+        }
+    }
+}
+
+/// A text that names no element.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no element is called {name:?}; there are t4, t10 and auto")]
+pub struct ElementChoiceError {
+    /// The text.
+    pub name: String,
+}
+
+impl FromStr for ElementChoice {
+    type Err = ElementChoiceError;
+
+    fn from_str(name: &str) -> Result<Self, ElementChoiceError> {
+        match name {
+            "t4" => Ok(Self::T4),
+            "t10" => Ok(Self::T10),
+            "auto" => Ok(Self::Auto),
+            _ => Err(ElementChoiceError { name: name.to_owned() }),
+        }
+    }
+}
+
 impl fmt::Display for ElementName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.as_str())
@@ -92,6 +134,17 @@ const NAME_LEN_MAX: usize = 32;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn chosen_elements_travel_like_the_elements_they_name() {
+        for name in [ElementName::T4, ElementName::T10] {
+            let choice: ElementChoice = name.as_str().parse().unwrap();
+            assert_eq!(choice, name.into());
+            assert_eq!(wincode::serialize(&choice).unwrap(), wincode::serialize(&name).unwrap());
+        }
+        assert_eq!("auto".parse(), Ok(ElementChoice::Auto));
+        assert!("T4".parse::<ElementChoice>().unwrap_err().to_string().contains("t10 and auto"));
+    }
 
     #[test]
     fn method_names_are_short_lower_case_words() {

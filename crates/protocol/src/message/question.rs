@@ -3,7 +3,7 @@
 use wincode::{SchemaRead, SchemaWrite};
 
 use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
-use super::names::{ElementName, MethodName};
+use super::names::{ElementChoice, MethodName};
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
@@ -76,8 +76,8 @@ pub struct SolveOnce {
     pub mesh: MeshData,
     /// One material, or one for each region.
     pub materials: Vec<Material>,
-    /// Which element.
-    pub element: ElementName,
+    /// Which element, or the server's choice.
+    pub element: ElementChoice,
     /// What is known and asked.
     pub question: Question,
 }
@@ -104,7 +104,7 @@ enum NodeChoicePart {
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 struct SolveOncePart {
     mesh: MeshPart,
-    element: ElementName,
+    element: ElementChoice,
     question: QuestionPart,
 }
 

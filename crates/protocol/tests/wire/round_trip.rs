@@ -46,7 +46,7 @@ fn numbers_that_are_not_finite_keep_their_bits() {
         deadline_ms: Some(f64::NEG_INFINITY),
     };
     let mesh = MeshData { vertices: odd.map(|x| [x; 3]).to_vec(), ..MeshData::default() };
-    let (materials, element) = (vec![], ElementName::T4);
+    let (materials, element) = (vec![], ElementChoice::T4);
     let solve = SolveOnce { mesh, materials, element, question };
     let mut bytes = Vec::new();
     let request = Request::SolveOnce(Box::new(solve));

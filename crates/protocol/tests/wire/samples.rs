@@ -74,7 +74,7 @@ fn requests() -> Vec<Message> {
         deadline_ms: Some(16.5),
         ..question.clone()
     };
-    let element = ElementName::T4;
+    let element = ElementChoice::T4;
     [
         Request::Hello(Hello { client: "sample 1".to_owned(), token: Some("secret".to_owned()) }),
         Request::SolveOnce(Box::new(SolveOnce {
@@ -170,7 +170,7 @@ fn any_request() -> impl Strategy<Value = Request> {
         let one = (number(), number()).prop_map(|(young, poisson)| Material { young, poisson });
         vec(one, 0..4)
     };
-    let solve = (mesh(), materials(), element(), question()).prop_map(
+    let solve = (mesh(), materials(), element_choice(), question()).prop_map(
         |(mesh, materials, element, question)| {
             Box::new(SolveOnce { mesh, materials, element, question })
         },
@@ -334,6 +334,10 @@ fn stage_ms() -> impl Strategy<Value = StageMs> {
 
 fn element() -> impl Strategy<Value = ElementName> {
     prop::sample::select(vec![ElementName::T4, ElementName::T10])
+}
+
+fn element_choice() -> impl Strategy<Value = ElementChoice> {
+    prop::sample::select(vec![ElementChoice::T4, ElementChoice::T10, ElementChoice::Auto])
 }
 
 fn point() -> impl Strategy<Value = [f64; 3]> {

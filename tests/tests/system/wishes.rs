@@ -1,0 +1,237 @@
+//! Deadline, error budget and choice of the element: what `auto` makes of them, and what is said
+//! when they cannot be met.
+
+use fea_server::ServerConfig;
+use glove_client::connection::ServerConnection;
+use softgrasp_core::mesh::{BuiltIn, TetMesh};
+use softgrasp_protocol::RejectCode::BadRequest;
+use softgrasp_protocol::{
+    Answer, ElementChoice, ElementName, Material, Request, SolveOnce, UploadModel,
+};
+use softgrasp_tests::questions::{METHODS, cube, frame, object, once, upload};
+
+use crate::start::{answer, client, config, refusal, server};
+
+fn ask(
+    connection: &mut ServerConnection,
+    change: impl Fn(&mut SolveOnce),
+    mesh: &TetMesh,
+) -> Answer {
+    let mut request = once(mesh, "auto");
+    change(&mut request);
+    answer(connection, &Request::SolveOnce(Box::new(request)))
+}
+
+fn norm(u: &[[f64; 3]]) -> f64 {
+    u.iter().flatten().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn error_rel(found: Answer, exact: &[[f64; 3]]) -> f64 {
+    let found = found.displacements.into_f64();
+    let difference: Vec<[f64; 3]> =
+        found.iter().zip(exact).map(|(a, b)| [a[0] - b[0], a[1] - b[1], a[2] - b[2]]).collect();
+    norm(&difference) / norm(exact)
+}
+
+fn warned(answer: &Answer, text: &str) -> bool {
+    answer.report.warnings.iter().any(|warning| warning.contains(text))
+}
+
+#[test]
+fn error_budget_is_kept_and_may_cost_less_than_exactness() {
+    let server = server(2);
+    let mut connection = client(&server);
+    for mesh in [cube(216), object(BuiltIn::Strawberry, 1000)] {
+        let exact = ask(&mut connection, |_| {}, &mesh);
+        assert_eq!(exact.report.method, "front");
+        let exact = exact.displacements.into_f64();
+        for budget in [1e-2, 1e-4, 1e-8, 1e-12] {
+            let found = ask(&mut connection, |r| r.question.max_error = Some(budget), &mesh);
+            let report = &found.report;
+            assert!(report.residual_rel <= budget, "{budget:e}: {:e}", report.residual_rel);
+            assert!(report.chosen_because.contains("predicted"), "{}", report.chosen_because);
+            assert!(!warned(&found, "given up"));
+            let error = error_rel(found, &exact);
+            assert!(error <= budget.max(1e-11), "{budget:e}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn deadline_that_is_far_gets_the_exact_answer() {
+    let server = server(2);
+    let mut connection = client(&server);
+    let mesh = cube(216);
+    let exact = ask(&mut connection, |_| {}, &mesh).displacements.into_f64();
+    let found = ask(&mut connection, |r| r.question.deadline_ms = Some(1e7), &mesh);
+    assert!(found.report.warnings.iter().all(|w| !w.contains("given up") && !w.contains("wanted")));
+    assert!(error_rel(found, &exact) <= 1e-12);
+}
+
+#[test]
+fn deadline_and_budget_that_cannot_be_met_are_answered_and_told() {
+    let server = server(1);
+    let mut connection = client(&server);
+    let mesh = cube(343);
+    let exact = ask(&mut connection, |_| {}, &mesh).displacements.into_f64();
+    let late = ask(&mut connection, |r| r.question.deadline_ms = Some(1e-3), &mesh);
+    assert!(warned(&late, "the deadline was given up") && warned(&late, "wanted within 0.001 ms"));
+    assert!(late.report.chosen_because.contains("the deadline was given up"));
+    assert!(error_rel(late, &exact) <= 1e-5, "late, but right");
+    let rough = ask(&mut connection, |r| r.question.max_error = Some(1e-30), &mesh);
+    assert!(warned(&rough, "the error budget was given up") && warned(&rough, "wanted"));
+    assert!(error_rel(rough, &exact) <= 1e-11);
+    let wish = |r: &mut SolveOnce| {
+        (r.question.deadline_ms, r.question.max_error) = (Some(1e-3), Some(1e-30));
+    };
+    let neither = ask(&mut connection, wish, &mesh);
+    assert!(warned(&neither, "deadline and error budget were given up"));
+    // The session lives.
+    assert_eq!(ask(&mut connection, |_| {}, &mesh).report.method, "front");
+}
+
+#[test]
+fn frames_tell_of_wishes_they_miss_and_stay_exact() {
+    let server = server(1);
+    let mut connection = client(&server);
+    let mesh = cube(216);
+    connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
+    let mut asked = frame(&mesh, 1.0, "auto");
+    asked.question.deadline_ms = Some(1e-6);
+    asked.question.max_error = Some(1e-30);
+    let missed = answer(&mut connection, &Request::Frame(asked));
+    assert!(warned(&missed, "wanted within") && warned(&missed, "wanted"));
+    assert!(missed.report.residual_rel < 1e-11);
+}
+
+#[test]
+fn wishes_that_are_no_numbers_are_refused_and_the_session_lives() {
+    let server = server(1);
+    let mut connection = client(&server);
+    let mesh = cube(64);
+    for value in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
+        let mut late = once(&mesh, "auto");
+        late.question.deadline_ms = Some(value);
+        let request = Request::SolveOnce(Box::new(late));
+        let (code, text) = refusal(&mut connection, &request);
+        assert!(code == BadRequest && text.contains("the deadline is"), "{text}");
+        let mut rough = frame(&mesh, 1.0, "front");
+        rough.question.max_error = Some(value);
+        connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
+        let (code, text) = refusal(&mut connection, &Request::Frame(rough));
+        assert!(code == BadRequest && text.contains("the error budget is"), "{text}");
+    }
+    assert_eq!(ask(&mut connection, |_| {}, &mesh).report.method, "front");
+}
+
+fn of_poisson(poisson: f64) -> impl Fn(&mut SolveOnce) {
+    move |request| {
+        request.element = ElementChoice::Auto;
+        request.materials = vec![Material { young: 1.0e5, poisson }];
+    }
+}
+
+#[test]
+fn auto_takes_ten_nodes_where_linear_elements_lock_and_says_so() {
+    let server = server(2);
+    let mut connection = client(&server);
+    let mesh = cube(125);
+    let soft = ask(&mut connection, of_poisson(0.3), &mesh);
+    assert_eq!(soft.report.element, ElementName::T4);
+    assert!(soft.report.chosen_because.contains("linear elements"));
+    let rubber = ask(&mut connection, of_poisson(0.49), &mesh);
+    assert_eq!((rubber.report.element, rubber.report.method.as_str()), (ElementName::T10, "front"));
+    assert!(rubber.report.chosen_because.contains("lock"), "{}", rubber.report.chosen_because);
+    assert!(!warned(&rubber, "lock"));
+    // The same answer as when ten nodes are asked for.
+    let asked_for = ask(
+        &mut connection,
+        |r| {
+            of_poisson(0.49)(r);
+            r.element = ElementChoice::T10;
+        },
+        &mesh,
+    );
+    assert_eq!(rubber.displacements, asked_for.displacements);
+    // Methods that are asked for keep their name.
+    for method in METHODS.iter().filter(|m| **m != "condensed") {
+        let mut request = once(&mesh, method);
+        of_poisson(0.49)(&mut request);
+        let found = answer(&mut connection, &Request::SolveOnce(Box::new(request)));
+        assert_eq!((found.report.element, &*found.report.method), (ElementName::T10, *method));
+    }
+}
+
+#[test]
+fn linear_elements_that_lock_are_warned_of() {
+    let small = ServerConfig { memory_limit: 1 << 20, ..config(1) };
+    let server = fea_server::start(small).unwrap();
+    let mut connection = client(&server);
+    let mesh = cube(343);
+    let no_memory = ask(&mut connection, of_poisson(0.49), &mesh);
+    assert_eq!(no_memory.report.element, ElementName::T4);
+    assert!(warned(&no_memory, "more memory than is allowed"));
+    let no_time = ask(
+        &mut connection,
+        |r| {
+            of_poisson(0.49)(r);
+            r.question.deadline_ms = Some(1e-3);
+        },
+        &cube(27),
+    );
+    assert_eq!(no_time.report.element, ElementName::T4);
+    assert!(warned(&no_time, "the deadline was given up") && warned(&no_time, "lock"));
+    let asked_for = ask(
+        &mut connection,
+        |r| {
+            of_poisson(0.49)(r);
+            r.element = ElementChoice::T4;
+        },
+        &mesh,
+    );
+    assert!(warned(&asked_for, "linear elements lock at a Poisson's ratio of 0.49"));
+}
+
+/// Conjugate gradients and single precision on a body of hard and soft parts, nearly
+/// incompressible: the budget holds all the same.
+#[test]
+fn error_budget_holds_on_hard_materials() {
+    let server = server(2);
+    let mut connection = client(&server);
+    let mesh = cube(343);
+    let hard = |r: &mut SolveOnce| {
+        r.mesh.regions = (0..r.mesh.tets.len() as u32).map(|t| t % 2).collect();
+        r.materials = vec![
+            Material { young: 1.0e9, poisson: 0.3 },
+            Material { young: 1.0e3, poisson: 0.499 },
+        ];
+    };
+    let exact = ask(&mut connection, hard, &mesh).displacements.into_f64();
+    for budget in [1e-3, 1e-6] {
+        let found = ask(
+            &mut connection,
+            |r| {
+                hard(r);
+                r.question.max_error = Some(budget);
+            },
+            &mesh,
+        );
+        let told = warned(&found, "wanted");
+        let error = error_rel(found, &exact);
+        assert!(error <= budget || told, "{budget:e}: {error:e}");
+    }
+}
+
+#[test]
+fn kept_models_are_made_of_the_element_they_name() {
+    let server = server(1);
+    let mut connection = client(&server);
+    let quadratic = UploadModel { element: ElementName::T10, ..upload(&cube(64)) };
+    let hash = softgrasp_protocol::ModelHash::of(&quadratic);
+    connection.ask(&Request::UploadModel(quadratic)).unwrap();
+    let mut asked = frame(&cube(64), 1.0, "auto");
+    asked.model = hash;
+    let found = answer(&mut connection, &Request::Frame(asked));
+    assert_eq!((found.report.element, &*found.report.method), (ElementName::T10, "front"));
+    assert!(found.report.chosen_because.contains("ten-node"));
+}
