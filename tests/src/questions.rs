@@ -7,7 +7,8 @@ use softgrasp_protocol::{
 };
 
 /// Names of all methods, slowest first.
-pub const METHODS: [&str; 8] = [
+pub const METHODS: [&str; 9] = [
+    "gauss-jordan-plain",
     "gauss-jordan",
     "dense-inverse",
     "dense-cholesky",

@@ -84,7 +84,7 @@ fn stop_does_not_wait_for_long_work_beyond_its_grace_time() {
         let server = server(1);
         let mut connection = client(&server);
         // Longer on one thread than the grace time, on a fast machine too.
-        let long = Request::SolveOnce(Box::new(once(&cube(1000), "gauss-jordan")));
+        let long = Request::SolveOnce(Box::new(once(&cube(1000), "gauss-jordan-plain")));
         connection.send(&long).unwrap();
         // By the time this one is answered the long one has been read.
         assert!(matches!(client(&server).ask(&Request::Ping { nonce: 2 }), Ok(Reply::Pong { .. })));

@@ -7,7 +7,7 @@ use super::pcg::{self, PcgParams, norm};
 use super::pivot::NotPositive;
 use super::sparse::{Analysis, SparseFactor};
 use super::tiles::Tiles;
-use super::{Method, Partition, Stage, gauss_jordan, ordering};
+use super::{Method, Partition, Stage, gauss_jordan, gauss_jordan_plain, ordering};
 use crate::fem::Stiffness;
 
 mod analysed;
@@ -136,7 +136,7 @@ impl Factored {
     /// # Errors
     /// [`SolveError::NotPositiveDefinite`] with the node, [`SolveError::OutOfMemory`].
     ///
-    /// Source: thesis (3.43a), Appendix A for `gauss-jordan`.
+    /// Source: thesis (3.43a), Appendix A for the Gauss–Jordan methods.
     pub fn try_new(
         stiffness: &Stiffness,
         partition: Partition,
@@ -147,24 +147,33 @@ impl Factored {
         let not_positive = |error: NotPositive| not_positive(method, &partition, error.row);
         let out_of_memory = || SolveError::OutOfMemory { method, unknown_dofs: n };
         let kernel = match method {
-            Method::GaussJordan => {
+            Method::GaussJordan | Method::GaussJordanPlain => {
                 on_stage(Stage::Factor);
                 let entries = n.checked_mul(n).ok_or_else(out_of_memory)?;
                 let mut inverse = Vec::new();
                 inverse.try_reserve_exact(entries).map_err(|_| out_of_memory())?;
                 inverse.resize(entries, 0.0);
                 visit_k11(stiffness, &partition, |i, j, value| inverse[i * n + j] = value);
-                gauss_jordan::invert(&mut inverse, n).map_err(not_positive)?;
+                match method {
+                    Method::GaussJordanPlain => gauss_jordan_plain::invert(&mut inverse, n),
+                    _ => gauss_jordan::invert(&mut inverse, n),
+                }
+                .map_err(not_positive)?;
                 Kernel::Inverse(inverse)
             }
             Method::DenseInverse | Method::DenseCholesky => {
                 on_stage(Stage::Factor);
                 let mut tiles = Tiles::zeros(n);
                 visit_k11(stiffness, &partition, |i, j, value| tiles.add(i, j, value));
-                tiles.factor().map_err(not_positive)?;
                 match method {
-                    Method::DenseInverse => Kernel::TiledInverse(tiles.inverse()),
-                    _ => Kernel::TiledFactor(tiles),
+                    Method::DenseInverse => {
+                        tiles.invert().map_err(not_positive)?;
+                        Kernel::TiledInverse(tiles)
+                    }
+                    _ => {
+                        tiles.factor().map_err(not_positive)?;
+                        Kernel::TiledFactor(tiles)
+                    }
                 }
             }
             Method::SparseCholesky => {

@@ -6,9 +6,12 @@ use std::str::FromStr;
 /// How `K11` is inverted or factored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Method {
-    /// Gauss–Jordan elimination of Appendix A, rows in parallel: the thesis's own method.
+    /// Gauss–Jordan elimination of Appendix A pivot by pivot, rows in parallel: the thesis's own
+    /// loop.
+    GaussJordanPlain,
+    /// The same elimination by panels of pivots, as products of matrices.
     GaussJordan,
-    /// Explicit inverse through a tiled Cholesky factor.
+    /// Explicit inverse in tiles, by symmetric sweeps.
     DenseInverse,
     /// Tiled dense Cholesky factor.
     DenseCholesky,
@@ -25,8 +28,8 @@ pub enum Method {
 /// A method name that is none of [`Method::ALL`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "no method is called '{name}'; there are gauss-jordan, dense-inverse, dense-cholesky, \
-     sparse-cholesky, front, front-mixed, pcg, condensed and auto"
+    "no method is called '{name}'; there are {}, condensed and auto",
+    Method::ALL.map(Method::name).join(", ")
 )]
 pub struct UnknownMethod {
     /// The name given.
@@ -35,7 +38,8 @@ pub struct UnknownMethod {
 
 impl Method {
     /// All methods, slowest first.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
+        Self::GaussJordanPlain,
         Self::GaussJordan,
         Self::DenseInverse,
         Self::DenseCholesky,
@@ -48,6 +52,7 @@ impl Method {
     /// Name on the command line, on the wire and in reports.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::GaussJordanPlain => "gauss-jordan-plain",
             Self::GaussJordan => "gauss-jordan",
             Self::DenseInverse => "dense-inverse",
             Self::DenseCholesky => "dense-cholesky",
@@ -71,12 +76,12 @@ impl Method {
         matches!(self, Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg)
     }
 
-    /// Bytes of the factor or inverse at its peak, for `n` unknowns; `None` where it depends on
-    /// the sparsity.
+    /// Bytes that the factor or inverse of `n` unknowns stays below, but for a few rows of the
+    /// matrix; `None` where it depends on the sparsity.
     pub fn dense_bytes(self, n: usize) -> Option<u64> {
         let square = 8 * (n as u64) * (n as u64);
         match self {
-            Self::GaussJordan | Self::DenseInverse => Some(square),
+            Self::GaussJordanPlain | Self::GaussJordan | Self::DenseInverse => Some(square),
             Self::DenseCholesky => Some(square / 2),
             Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg => None,
         }

@@ -5,6 +5,7 @@ pub mod condensed;
 mod direct;
 mod front;
 mod gauss_jordan;
+mod gauss_jordan_plain;
 mod k11;
 mod method;
 mod mobility;

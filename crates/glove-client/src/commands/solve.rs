@@ -42,8 +42,8 @@ pub struct SolveCommand {
     /// Threads of the embedded server [default: one per processor].
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// gauss-jordan, dense-inverse, dense-cholesky, sparse-cholesky, front, front-mixed, pcg,
-    /// condensed or auto.
+    /// gauss-jordan-plain, gauss-jordan, dense-inverse, dense-cholesky, sparse-cholesky, front,
+    /// front-mixed, pcg, condensed or auto.
     #[arg(long, default_value = "auto", value_name = "NAME|auto")]
     method: MethodName,
     /// Finite element; auto takes ten nodes where linear elements lock (Poisson's ratio from 0.45
