@@ -64,7 +64,8 @@ pub(crate) fn answer(
         chosen_because,
     };
     add_unmet_wishes(question, &mut report);
-    Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
+    let (nodes, mask_forces) = (question.want.nodes.clone(), Vec::new());
+    Ok(Answer { report, nodes, displacements, reactions, mask_forces })
 }
 
 /// Displacements of the nodes asked for; mid-edge nodes are the server's own and stay here.

@@ -11,6 +11,7 @@ mod bad_streams;
 mod disturbed_links;
 mod engine;
 mod many_clients;
+mod masks;
 mod same_bits;
 mod start;
 mod stopping;
