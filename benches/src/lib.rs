@@ -7,6 +7,7 @@
 
 mod axis;
 pub mod collision;
+pub mod contact;
 pub mod echo;
 pub mod fit;
 pub mod frame;
@@ -36,6 +37,8 @@ pub enum ReportName {
     Frame,
     /// Figures 5.1, 5.2 and 6.13 to 6.16 of the thesis, measured again.
     Scaling,
+    /// Force of one press on finer meshes by each contact model, and its frame time.
+    Contact,
     /// Tree build, refit and search against parry3d and brute force.
     Collision,
 }
@@ -47,6 +50,7 @@ impl ReportName {
             Self::Methods => "methods",
             Self::Frame => "frame",
             Self::Scaling => "scaling",
+            Self::Contact => "contact",
             Self::Collision => "collision",
         }
     }
@@ -61,6 +65,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Methods => methods::measure(options)?,
         ReportName::Frame => frame::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,
+        ReportName::Contact => contact::measure(options)?,
         ReportName::Collision => collision::measure(options)?,
     };
     report.end();
