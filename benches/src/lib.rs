@@ -7,6 +7,7 @@
 
 mod axis;
 pub mod collision;
+pub mod contact;
 pub mod echo;
 pub mod fit;
 pub mod frame;
@@ -46,6 +47,8 @@ pub enum ReportName {
     Hold,
     /// Figures 5.1, 5.2 and 6.13 to 6.16 of the thesis, measured again.
     Scaling,
+    /// Force of one press on finer meshes by each contact model, and its frame time.
+    Contact,
     /// Tree build, refit and search against parry3d and brute force.
     Collision,
 }
@@ -60,6 +63,7 @@ impl ReportName {
             Self::Onset => "onset",
             Self::Hold => "hold",
             Self::Scaling => "scaling",
+            Self::Contact => "contact",
             Self::Collision => "collision",
         }
     }
@@ -77,6 +81,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Onset => onset::measure(options)?,
         ReportName::Hold => hold::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,
+        ReportName::Contact => contact::measure(options)?,
         ReportName::Collision => collision::measure(options)?,
     };
     report.end();

@@ -120,11 +120,9 @@ impl Pressed {
         let method = MethodName::try_new(method);
         Question {
             known: known.collect(),
-            forces: Vec::new(),
             method: method.expect("the names of all methods can be sent"),
             want: Want { nodes, reactions: false, precision: Precision::F64 },
-            max_error: None,
-            deadline_ms: None,
+            ..Question::default()
         }
     }
 

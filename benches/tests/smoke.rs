@@ -65,6 +65,21 @@ fn collision_is_timed_and_nothing_is_missed() {
 }
 
 #[test]
+fn contacts_are_pressed_and_timed_with_small_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Contact, folder.path());
+    let contacts = column(folder.path(), "contact.csv", "contact");
+    assert_eq!(contacts, ["vertex", "vertex", "patch", "patch", "mask", "mask"]);
+    assert!(numbers(folder.path(), "contact.csv", "force_N").iter().all(|&force| force > 0.0));
+    for file in ["contact.csv", "contact-frames.csv"] {
+        let errors = numbers(folder.path(), file, "error_rel");
+        assert!(errors.iter().all(|&e| e < 1e-9) && errors.len() >= 3, "{file}: {errors:?}");
+    }
+    assert_eq!(column(folder.path(), "contact-frames.csv", "unknown_forces")[2], "15");
+    assert!(folder.path().join("contact.svg").is_file());
+}
+
+#[test]
 fn frames_are_timed_beside_their_echo_with_small_errors() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Frame, folder.path());

@@ -64,6 +64,7 @@ fn reply_to(request: &Request, displacements: &[[f64; 3]]) -> Option<Reply> {
                 nodes,
                 displacements: Displacements::F64(wanted),
                 reactions: Vec::new(),
+                mask_forces: Vec::new(),
             })))
         }
         Request::Ping { nonce } => Some(Reply::Pong { nonce: *nonce }),

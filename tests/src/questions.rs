@@ -76,11 +76,9 @@ pub fn squeeze(mesh: &TetMesh, push: f64) -> Vec<DofValue> {
 pub fn question(known: Vec<DofValue>, method: &str) -> Question {
     Question {
         known,
-        forces: Vec::new(),
         method: MethodName::try_new(method).expect("a method's name"),
         want: Want { nodes: NodeChoice::All, reactions: true, precision: Precision::F64 },
-        max_error: None,
-        deadline_ms: None,
+        ..Question::default()
     }
 }
 

@@ -78,8 +78,8 @@ impl<'a> Toucher<'a> {
     ) -> Result<(Trial, Vec<f64>), ReportError> {
         self.rest();
         if is_prefetched {
-            let (model, nodes) = (self.model, grip.fresh.clone());
-            self.connection.send(&Request::Prefetch(Prefetch { model, nodes }))?;
+            let (model, nodes, masks) = (self.model, grip.fresh.clone(), Default::default());
+            self.connection.send(&Request::Prefetch(Prefetch { model, nodes, masks }))?;
             self.rest();
         }
         let (ms, answer) = self.ask(grip)?;
@@ -114,15 +114,13 @@ impl<'a> Toucher<'a> {
     fn question(&self, grip: &Grip) -> Question {
         Question {
             known: grip.known.clone(),
-            forces: Vec::new(),
             method: MethodName::try_new("condensed").expect("the name can be sent"),
             want: Want {
                 nodes: NodeChoice::Nodes(self.scene.surface.nodes.clone()),
                 reactions: false,
                 precision: Precision::F64,
             },
-            max_error: None,
-            deadline_ms: None,
+            ..Question::default()
         }
     }
 

@@ -147,7 +147,9 @@ impl Desk {
                 self.store.trim();
                 match answer {
                     // What the small system cannot do, a factor of its own may.
-                    Err(Refusal::Model(ModelError::Condensed(error))) if is_auto(&question) => {
+                    Err(Refusal::Model(ModelError::Condensed(error)))
+                        if is_auto(&question) && question.masks.is_empty() =>
+                    {
                         (Method::Front, format!("not condensed: {error}"))
                     }
                     answered => return answered,
@@ -182,7 +184,7 @@ impl Desk {
     /// Computes the columns of nodes that may soon be touched; a hint, so nothing is answered.
     pub fn prefetch(&self, hint: Prefetch) {
         let Some(stored) = self.store.find(hint.model) else { return };
-        condensed::prefetch(&stored, &hint.nodes);
+        condensed::prefetch(&stored, &hint);
         self.store.trim();
     }
 

@@ -25,7 +25,12 @@ impl Approach {
     /// For a request that brings its own mesh: nothing can be reused, so `auto` without a wish
     /// factors once; wishes are weighed in `planned.rs`.
     pub fn for_once(question: &Question) -> Result<Self, Refusal> {
-        match question.method.as_str() {
+        let name = question.method.as_str();
+        if !question.masks.is_empty() {
+            let forces = !question.forces.is_empty();
+            return for_masks(name, forces.then_some(Refusal::CondensedForces));
+        }
+        match name {
             CONDENSED if !question.forces.is_empty() => Err(Refusal::CondensedForces),
             CONDENSED => Ok(Self::Condensed { because: ASKED.to_owned() }),
             "auto" => Ok(Self::Direct {
@@ -43,7 +48,8 @@ impl Approach {
         known: &Known,
     ) -> Result<Self, Refusal> {
         let name = question.method.as_str();
-        if !is_auto(question) && name != CONDENSED {
+        let has_masks = !question.masks.is_empty();
+        if !is_auto(question) && name != CONDENSED && !has_masks {
             return Ok(Self::Direct { method: name.parse()?, because: ASKED.to_owned() });
         }
         let obstacle = match stored.base(&mut |_| {}) {
@@ -51,6 +57,9 @@ impl Approach {
             Ok(_) if !question.forces.is_empty() => Some(Refusal::CondensedForces),
             Ok(_) => moved_fixed_node(stored, known).map(|node| Refusal::FixedMoved { node }),
         };
+        if has_masks {
+            return for_masks(name, obstacle);
+        }
         let touched = known.dofs.len() - stored.model.fixed().len().min(known.dofs.len());
         if name == "auto" && touched > TOUCHED_DOFS_MAX {
             return Ok(Self::Direct {
@@ -76,6 +85,23 @@ impl Approach {
         match self {
             Self::Condensed { because } | Self::Direct { because, .. } => because,
         }
+    }
+}
+
+/// For a question with masks there is one way, or none.
+fn for_masks(name: &str, obstacle: Option<Refusal>) -> Result<Approach, Refusal> {
+    let because = match name {
+        CONDENSED => ASKED,
+        "auto" => "masks: only condensed answers them",
+        // A name that does not exist is told as such.
+        name => {
+            let method: Method = name.parse()?;
+            return Err(Refusal::MasksDirect { method: method.to_string() });
+        }
+    };
+    match obstacle {
+        None => Ok(Approach::Condensed { because: because.to_owned() }),
+        Some(refusal) => Err(Refusal::MasksNotCondensed(Box::new(refusal))),
     }
 }
 

@@ -9,20 +9,20 @@ use softgrasp_core::solve::condensed::{
     Base, Certificate, Contact, ContactAnswer, ContactSet, Touched,
 };
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport,
+    Answer, Displacements, DofValue, ElementName, NodeChoice, Prefetch, Question, SolveReport,
 };
 
 use crate::approach::Approach;
 use crate::caution::{add_unmet_wishes, warnings};
 use crate::clock::{StageClock, last_peak_rss_bytes, ms_since, peak_rss_bytes};
 use crate::compute::Compute;
-use crate::question::pairs;
+use crate::question::{checked_masks, paired, pairs};
 use crate::reject::Refusal;
 use crate::store::StoredModel;
 
 /// Above this condition of the small system the touched nodes hold the body weakly.
 const CONDITION_WARNING: f64 = 1e9;
-/// Nodes prefetched between two looks at what else is waiting.
+/// Nodes or masks prefetched between two looks at what else is waiting.
 const PREFETCH_TOGETHER: usize = 2;
 /// Share of one thread that the strain beside the frames may take.
 const STRAIN_SHARE: f64 = 0.1;
@@ -46,7 +46,7 @@ pub(crate) fn answer(
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
     let base = stored.base(&mut |stage| clock.begin(stage))?;
-    let (touched, q) = touched(known, base.fixed());
+    let (touched, q) = touched(stored, question, known, base.fixed())?;
     let nodes = match &question.want.nodes {
         NodeChoice::All => (0..stored.model.mesh().node_count() as u32).collect(),
         NodeChoice::Nodes(nodes) => nodes.clone(),
@@ -78,9 +78,11 @@ pub(crate) fn answer(
     let certificate = set.certify(&base, &q, &solved, &displacement);
     let mut stage_ms = clock.finish();
     let start = Instant::now();
-    let mut reactions = Vec::new();
+    let (mut reactions, mut mask_forces) = (Vec::new(), Vec::new());
     if question.want.reactions {
         reactions = reactions_of(known, &base, &set, &solved);
+        let (of_masks, _) = solved.lambda[set.dofs().len()..].as_chunks();
+        mask_forces = of_masks.to_vec();
     }
     let displacements = Displacements::of(displacement, question.want.precision);
     stage_ms.encode = ms_since(start);
@@ -98,7 +100,8 @@ pub(crate) fn answer(
     if let StrainOf::NewestFrame(compute) = watch {
         watch_strain(compute, stored, &base, set, solved);
     }
-    Ok(Answer { report, nodes: question.want.nodes.clone(), displacements, reactions })
+    let nodes = question.want.nodes.clone();
+    Ok(Answer { report, nodes, displacements, reactions, mask_forces })
 }
 
 /// Numbers multiplied for an answer from a kept contact set; `None` where something has to be made.
@@ -112,16 +115,23 @@ pub(crate) fn products(stored: &StoredModel, question: &Question) -> Option<usiz
         return None;
     }
     let known = stored.model.known(pairs(&question.known)).ok()?;
-    let (touched, _) = touched(&known, base.fixed());
+    let (touched, _) = touched(stored, question, &known, base.fixed()).ok()?;
     stored.set_for(&touched, nodes).map(|set| set.products())
 }
 
 /// What is touched in this frame, without the degrees of freedom the scene fixes, and the values.
-fn touched(known: &Known, fixed: &[u32]) -> (Touched, Vec<f64>) {
+fn touched(
+    stored: &StoredModel,
+    question: &Question,
+    known: &Known,
+    fixed: &[u32],
+) -> Result<(Touched, Vec<f64>), Refusal> {
+    let (masks, of_masks) = checked_masks(&stored.model, question)?;
     let pairs = known.dofs.iter().zip(&known.q_known);
     let free = pairs.filter(|(dof, _)| fixed.binary_search(dof).is_err());
-    let (dofs, q) = free.map(|(d, q)| (*d, *q)).unzip();
-    (Touched { dofs, masks: Vec::new() }, q)
+    let (dofs, mut q): (Vec<u32>, Vec<f64>) = free.map(|(d, q)| (*d, *q)).unzip();
+    q.extend(of_masks);
+    Ok((Touched { dofs, masks }, q))
 }
 
 fn report(
@@ -140,7 +150,8 @@ fn report(
             set.condition()
         ));
     }
-    let known_dofs = known.dofs.len();
+    // The mean of a mask is one equation along each axis, as a known degree of freedom is.
+    let known_dofs = known.dofs.len() + 3 * set.touched().masks.len();
     SolveReport {
         method: "condensed".to_owned(),
         element: ElementName::T4,
@@ -167,10 +178,21 @@ fn reactions_of(
     solved: &ContactAnswer,
 ) -> Vec<DofValue> {
     let fixed = base.fixed();
-    let at_fixed = match fixed.is_empty() {
+    let mut at_fixed = match fixed.is_empty() {
         true => Vec::new(),
         false => base.forces_of(&set.full_displacement(base, solved)),
     };
+    // What a mask presses onto a fixed node is not the support's force.
+    if !at_fixed.is_empty() {
+        let (of_masks, _) = solved.lambda[set.dofs().len()..].as_chunks::<3>();
+        for (mask, force) in set.touched().masks.iter().zip(of_masks) {
+            for &(node, weight) in mask.entries() {
+                for (axis, force) in force.iter().enumerate() {
+                    at_fixed[3 * node as usize + axis] -= weight * force;
+                }
+            }
+        }
+    }
     let force = |dof: &u32| match set.dofs().binary_search(dof) {
         Ok(at) => solved.lambda[at],
         Err(_) => at_fixed.get(*dof as usize).copied().unwrap_or(0.0),
@@ -199,12 +221,18 @@ fn watch_strain(
     });
 }
 
-/// Computes the columns of nodes that may be touched soon, a few at a time, letting frames pass.
-pub(crate) fn prefetch(stored: &StoredModel, nodes: &[u32]) {
+/// Computes the columns of nodes and masks that may be touched soon, a few at a time, letting frames
+/// pass; what does not fit the model is passed over.
+pub(crate) fn prefetch(stored: &StoredModel, hint: &Prefetch) {
     let Ok(base) = stored.base(&mut |_| {}) else { return };
     let node_count = stored.model.mesh().node_count();
     let used = |n: &&u32| (**n as usize) < node_count && stored.model.is_used(**n as usize);
-    let contacts: Vec<Contact> = nodes.iter().filter(used).map(|&n| Contact::Node(n)).collect();
+    let nodes = hint.nodes.iter().filter(used).map(|&n| Contact::Node(n));
+    let masks = hint.masks.iter().filter_map(|mask| {
+        let made = stored.model.masks([paired(mask)]).ok()?;
+        made.into_iter().next().map(Contact::Mask)
+    });
+    let contacts: Vec<Contact> = nodes.chain(masks).collect();
     for some in contacts.chunks(PREFETCH_TOGETHER) {
         if let Err(error) = stored.columns.of_contacts(&base, some) {
             tracing::debug!(%error, "prefetch ends");

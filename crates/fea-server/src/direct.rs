@@ -85,7 +85,8 @@ pub(crate) fn gather(
         chosen_because,
     };
     add_unmet_wishes(question, &mut report);
-    Answer { report, nodes: question.want.nodes.clone(), displacements, reactions }
+    let (nodes, mask_forces) = (question.want.nodes.clone(), Vec::new());
+    Answer { report, nodes, displacements, reactions, mask_forces }
 }
 
 fn no_bound(error_estimate_rel: Option<f64>) -> String {

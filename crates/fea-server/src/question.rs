@@ -1,13 +1,39 @@
 //! What a question names, checked before anything costly is done.
 
+use softgrasp_core::contact::Mask;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_protocol::{DofValue, NodeChoice, Question, Want};
 
 use crate::reject::Refusal;
 
+/// With masks so many unknown forces at most: above it the small system is not small any more, and
+/// there is no other method to go to.
+const MASK_FORCES_MAX: usize = 600;
+
 /// Known displacements as the core takes them.
 pub(crate) fn pairs(known: &[DofValue]) -> Vec<(u32, f64)> {
     known.iter().map(|k| (k.dof, k.value)).collect()
+}
+
+/// Nodes of a mask with their weights.
+pub(crate) fn paired((nodes, weights): (&[u32], &[f64])) -> Vec<(u32, f64)> {
+    nodes.iter().copied().zip(weights.iter().copied()).collect()
+}
+
+/// Masks and their displacements, three each, once they are seen to fit the model.
+pub(crate) fn checked_masks(
+    model: &Model,
+    question: &Question,
+) -> Result<(Vec<Mask>, Vec<f64>), Refusal> {
+    let q = question.mask_displacements.as_flattened();
+    if let Some(at) = q.iter().position(|value| !value.is_finite()) {
+        return Err(Refusal::MaskNotFinite { mask: at / 3, value: q[at] });
+    }
+    let forces = q.len() + question.known.len();
+    if !q.is_empty() && forces > MASK_FORCES_MAX {
+        return Err(Refusal::TooManyTouched { forces, max: MASK_FORCES_MAX });
+    }
+    Ok((model.masks(question.masks.iter().map(paired))?, q.to_vec()))
 }
 
 /// Forces by degree of freedom, once all that a question names is seen to be there; before a factor

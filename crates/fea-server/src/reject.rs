@@ -55,6 +55,17 @@ pub(crate) enum Refusal {
     Wish { what: &'static str, value: f64 },
     #[error("condensed takes known displacements only, not forces; use front or auto")]
     CondensedForces,
+    #[error("mask {mask} (from 0) is given the displacement {value} m; it must be a finite number")]
+    MaskNotFinite { mask: usize, value: f64 },
+    #[error(
+        "{forces} forces are unknown at masks and touched nodes, at most {max} can be with masks; \
+         hold nodes that never move by fixing them in the model"
+    )]
+    TooManyTouched { forces: usize, max: usize },
+    #[error("{method} does not answer masks; ask for condensed or auto")]
+    MasksDirect { method: String },
+    #[error("masks are answered by condensed only, and not here: {0}")]
+    MasksNotCondensed(Box<Refusal>),
     #[error("node {node} is fixed by the model and moved by the question; use front or auto")]
     FixedMoved { node: u32 },
     #[error("the mesh has {node_count} nodes; this server takes {max} (--max-nodes)")]
@@ -92,6 +103,7 @@ impl Refusal {
                 }
                 _ => RejectCode::BadRequest,
             },
+            Self::MasksNotCondensed(reason) => reason.code(),
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::Memory { .. } | Self::FactorMemory { .. } => RejectCode::MemoryLimit,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,

@@ -151,11 +151,9 @@ fn pulled_cube(nodes: usize, method: &str) -> SolveOnce {
         element: ElementChoice::T4,
         question: Question {
             known,
-            forces: Vec::new(),
             method: MethodName::try_new(method).unwrap(),
             want: Want::default(),
-            max_error: None,
-            deadline_ms: None,
+            ..Question::default()
         },
     }
 }

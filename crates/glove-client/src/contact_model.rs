@@ -1,10 +1,11 @@
-//! How a fingertip's displacement is put on the object: on one node, or on the patch it covers.
+//! How a fingertip's displacement is put on the object: on one node, on every node it covers, or on
+//! their mean under its pressure.
 
 use std::fmt;
 use std::str::FromStr;
 
 use softgrasp_core::grasp::KnownNode;
-use softgrasp_protocol::DofValue;
+use softgrasp_protocol::{DofValue, Masks};
 
 use crate::soft_object::SoftObject;
 
@@ -14,14 +15,15 @@ pub enum ContactModel {
     /// The single node it touched, as in the thesis. Its force goes to zero as the mesh is refined.
     #[default]
     Vertex,
-    /// Every surface node within the fingertip's radius of the one it touched: a force that
-    /// converges.
+    /// Every surface node within the fingertip's radius of the one it touched.
     Patch,
+    /// The mean of the surface under the fingertip, weighted by its pressure, with one force.
+    Mask,
 }
 
 /// A name that is no contact model's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no contact model is called '{0}'; there are vertex and patch")]
+#[error("no contact model is called '{0}'; there are vertex, patch and mask")]
 pub struct UnknownContact(String);
 
 impl FromStr for ContactModel {
@@ -31,6 +33,7 @@ impl FromStr for ContactModel {
         match name {
             "vertex" => Ok(Self::Vertex),
             "patch" => Ok(Self::Patch),
+            "mask" => Ok(Self::Mask),
             _ => Err(UnknownContact(name.to_owned())),
         }
     }
@@ -41,51 +44,76 @@ impl fmt::Display for ContactModel {
         f.write_str(match self {
             Self::Vertex => "vertex",
             Self::Patch => "patch",
+            Self::Mask => "mask",
         })
     }
 }
 
-/// Nodes held by five fingertips, worked out once per set of touched nodes.
+/// What five fingertips hold, worked out once per set of touched nodes.
 #[derive(Clone, Debug, Default)]
 pub struct HeldNodes {
-    touched: [u32; 5],
+    touched: Option<[u32; 5]>,
     /// Node and finger, ascending by node.
     held: Vec<(u32, usize)>,
+    /// One per finger, thumb first, or none.
+    masks: Masks,
+}
+
+/// What five fingertips ask of the object.
+///
+/// Units: m. Frame: the object's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Prescribed {
+    /// Known displacements.
+    pub known: Vec<DofValue>,
+    /// Masks, and the mean displacement of each.
+    pub masks: Masks,
+    /// See `masks`.
+    pub mask_displacements: Vec<[f64; 3]>,
 }
 
 impl HeldNodes {
-    /// Known displacements of all held nodes.
+    /// What the tips ask.
     ///
-    /// Units: `tip_radii` and displacements m. Frame: the object's, at rest: a patch is the part of
-    /// the rest surface that the tip covers, so it stays the same while the object deforms.
-    pub fn known(
+    /// Units: `tip_radii` and displacements m. Frame: the object's, at rest: what a tip covers is a
+    /// part of the rest surface, so it stays the same while the object deforms.
+    pub fn prescribed(
         &mut self,
         model: ContactModel,
         object: &SoftObject,
         tip_radii: [f64; 5],
         known: &[KnownNode; 5],
-    ) -> Vec<DofValue> {
+    ) -> Prescribed {
         let touched = known.map(|k| k.node);
-        if self.held.is_empty() || self.touched != touched {
-            self.touched = touched;
-            self.held = match model {
+        if self.touched != Some(touched) {
+            *self = Self { touched: Some(touched), ..Self::default() };
+            let fingers = touched.into_iter().enumerate();
+            match model {
                 ContactModel::Vertex => {
-                    touched.into_iter().enumerate().map(|(finger, node)| (node, finger)).collect()
+                    self.held = fingers.map(|(finger, node)| (node, finger)).collect();
                 }
-                ContactModel::Patch => patches(object, tip_radii, &touched),
-            };
+                ContactModel::Patch => self.held = patches(object, tip_radii, &touched),
+                ContactModel::Mask => fingers.for_each(|(finger, node)| {
+                    self.masks.push(object.tip_mask(node, tip_radii[finger]).entries());
+                }),
+            }
             self.held.sort_unstable();
         }
         let values = self.held.iter().flat_map(|&(node, finger)| {
             let u = known[finger].displacement_in_object;
             (0..3u32).map(move |axis| DofValue { dof: 3 * node + axis, value: u[axis as usize] })
         });
-        values.collect()
+        let of_masks = known.iter().map(|k| k.displacement_in_object.into());
+        Prescribed {
+            known: values.collect(),
+            masks: self.masks.clone(),
+            mask_displacements: of_masks.take(self.masks.len()).collect(),
+        }
     }
 
     /// Forgets the nodes: the rest shape has changed.
     pub fn clear(&mut self) {
-        self.held.clear();
+        self.touched = None;
     }
 }
 
@@ -129,7 +157,9 @@ mod tests {
     fn vertex_holds_the_touched_nodes_and_nothing_else() {
         let object = sphere();
         let known = known(&object);
-        let values = HeldNodes::default().known(ContactModel::Vertex, &object, [0.007; 5], &known);
+        let values = HeldNodes::default()
+            .prescribed(ContactModel::Vertex, &object, [0.007; 5], &known)
+            .known;
         assert_eq!(values.len(), 15);
         let first = values.iter().find(|v| v.dof == 3 * known[2].node).unwrap();
         assert_eq!(first.value, 0.003);
@@ -140,7 +170,8 @@ mod tests {
         let object = sphere();
         let known = known(&object);
         let radii = [0.008; 5];
-        let values = HeldNodes::default().known(ContactModel::Patch, &object, radii, &known);
+        let values =
+            HeldNodes::default().prescribed(ContactModel::Patch, &object, radii, &known).known;
         assert!(values.len() > 15 && values.windows(2).all(|w| w[0].dof < w[1].dof));
         let rest = object.rest().vertices();
         for &node in &object.surface().nodes {
@@ -148,5 +179,26 @@ mod tests {
             let covered = known.iter().any(|k| near(k) <= 0.008);
             assert_eq!(covered, values.iter().any(|v| v.dof == 3 * node));
         }
+    }
+
+    #[test]
+    fn mask_gives_each_finger_one_mean_around_its_node() {
+        let object = sphere();
+        let mut known = known(&object);
+        let mut held = HeldNodes::default();
+        let asked = held.prescribed(ContactModel::Mask, &object, [0.008; 5], &known);
+        assert!(asked.known.is_empty() && asked.masks.len() == 5);
+        for ((nodes, weights), touched) in asked.masks.iter().zip(&known) {
+            let at = nodes.binary_search(&touched.node).unwrap();
+            assert!(nodes.len() > 3 && weights.iter().all(|w| *w <= weights[at]));
+        }
+        assert_eq!(asked.mask_displacements[4], [0.005, 0.0, -0.002]);
+        // The next frame holds the same; another node is another mask.
+        known[0].displacement_in_object.x = 0.5;
+        let next = held.prescribed(ContactModel::Mask, &object, [0.008; 5], &known);
+        assert!(next.masks == asked.masks && next.mask_displacements[0][0] == 0.5);
+        known[0].node = object.surface().nodes[7];
+        let other = held.prescribed(ContactModel::Mask, &object, [0.008; 5], &known);
+        assert!(other.masks != asked.masks);
     }
 }

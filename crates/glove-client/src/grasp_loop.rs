@@ -14,9 +14,10 @@ use softgrasp_protocol::{
 };
 
 use crate::commands::mesh_data;
-use crate::contact_model::{ContactModel, HeldNodes};
+use crate::contact_model::{ContactModel, HeldNodes, Prescribed};
 use crate::hand_reader::HandReader;
 use crate::link::{Link, LinkEvent, ModelOrder};
+use crate::prefetch::Prefetched;
 use crate::scripted::{Seen, Sent};
 use crate::soft_object::{ObjectError, SoftObject};
 use crate::solve_report::SolveSummary;
@@ -93,16 +94,11 @@ pub struct GraspLoop {
     held: HeldNodes,
     /// A shape is to be kept as soon as its inside is known.
     keep_wanted: bool,
-    /// Nodes whose columns the server has been asked to prepare, ascending.
-    prefetched: Vec<u32>,
+    prefetched: Prefetched,
     world_from_object: Isometry3<f64>,
     hand: Option<HandPose>,
 }
 
-/// Nodes nearer to a fingertip than this may be touched soon, m …
-const PREFETCH_DISTANCE: f64 = 0.012;
-/// … but no more than so many per rest shape are prepared.
-const PREFETCH_MAX: usize = 160;
 /// Longest wait of a lockstep tick; a server that takes longer is overtaken.
 const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
 
@@ -126,7 +122,7 @@ impl GraspLoop {
             deforming_since: None,
             held: HeldNodes::default(),
             keep_wanted: false,
-            prefetched: Vec::new(),
+            prefetched: Prefetched::default(),
             world_from_object: Isometry3::identity(),
             hand: None,
         };
@@ -270,7 +266,8 @@ impl GraspLoop {
     fn question(&mut self, known: &[KnownNode; 5]) -> Question {
         let tip_radii = self.reader.setup().dimensions.tip_radii();
         let contact = self.settings.contact;
-        let known = self.held.known(contact, &self.object, tip_radii, known);
+        let Prescribed { known, masks, mask_displacements } =
+            self.held.prescribed(contact, &self.object, tip_radii, known);
         let nodes = match self.settings.subscription {
             Subscription::Surface if !self.keep_wanted => {
                 NodeChoice::Nodes(self.object.surface().nodes.clone())
@@ -279,11 +276,11 @@ impl GraspLoop {
         };
         Question {
             known,
-            forces: Vec::new(),
+            masks,
+            mask_displacements,
             method: self.settings.method.clone(),
             want: Want { nodes, reactions: false, precision: Precision::F64 },
-            max_error: None,
-            deadline_ms: None,
+            ..Question::default()
         }
     }
 
@@ -317,24 +314,17 @@ impl GraspLoop {
         Ok(())
     }
 
-    /// Lets the server prepare the columns of nodes that a fingertip is about to touch.
+    /// Lets the server prepare the columns of what a fingertip is about to touch.
     fn prefetch(&mut self, tips_in_object: &[Point3<f64>; 5]) {
         // Only condensed frames are made of columns.
         if !matches!(self.settings.method.as_str(), "auto" | "condensed") {
             return;
         }
-        let mut near = Vec::new();
-        for tip in tips_in_object {
-            self.object.tree().nodes_near(tip, PREFETCH_DISTANCE, &mut near);
-        }
-        near.sort_unstable();
-        near.dedup();
-        near.retain(|node| self.prefetched.binary_search(node).is_err());
-        near.truncate(PREFETCH_MAX.saturating_sub(self.prefetched.len()));
-        if !near.is_empty() {
-            self.prefetched.extend_from_slice(&near);
-            self.prefetched.sort_unstable();
-            self.link.prefetch(&near);
+        let tip_radii = self.reader.setup().dimensions.tip_radii();
+        let contact = self.settings.contact;
+        let hint = self.prefetched.next(contact, &self.object, tip_radii, tips_in_object);
+        if !hint.is_empty() {
+            self.link.prefetch(hint);
         }
     }
 

@@ -14,6 +14,7 @@ pub mod grasp_loop;
 pub mod hand_reader;
 pub mod link;
 pub mod mesh_file;
+pub mod prefetch;
 pub mod progress;
 pub mod run_report;
 pub mod scene;

@@ -15,6 +15,7 @@ use softgrasp_protocol::{
 };
 
 use crate::connection::{LinkError, ServerConnection, unexpected};
+use crate::prefetch::Hint;
 
 /// What has come from the server, or happened to it.
 #[derive(Debug)]
@@ -78,8 +79,8 @@ struct Desk {
     /// The model is to be made ready even if no frame is asked for yet.
     model_is_new: bool,
     frame: Option<FrameOrder>,
-    /// Nodes whose columns are to be prepared.
-    prefetch: Vec<u32>,
+    /// Contacts whose columns are to be prepared.
+    prefetch: Hint,
     /// Tick of the order that is being worked on.
     in_flight: Option<u64>,
     connected: bool,
@@ -122,7 +123,7 @@ impl Link {
         desk.model = Some(model);
         desk.model_is_new = true;
         desk.frame = None;
-        desk.prefetch.clear();
+        desk.prefetch = Hint::default();
         self.desk.1.notify_all();
     }
 
@@ -132,9 +133,12 @@ impl Link {
         self.desk.1.notify_all();
     }
 
-    /// Hints at nodes that may be touched soon; there is no answer.
-    pub fn prefetch(&self, nodes: &[u32]) {
-        lock(&self.desk).prefetch.extend_from_slice(nodes);
+    /// Hints at contacts that may be made soon; there is no answer.
+    pub fn prefetch(&self, hint: Hint) {
+        let mut desk = lock(&self.desk);
+        desk.prefetch.nodes.extend_from_slice(&hint.nodes);
+        desk.prefetch.masks.append(&hint.masks);
+        drop(desk);
         self.desk.1.notify_all();
     }
 
@@ -197,7 +201,7 @@ struct Worker {
 struct Job {
     model: ModelOrder,
     frame: Option<FrameOrder>,
-    prefetch: Vec<u32>,
+    prefetch: Hint,
 }
 
 impl Worker {
@@ -287,8 +291,9 @@ impl Worker {
             *on_server = Some(job.model.hash);
         }
         if !job.prefetch.is_empty() {
-            let nodes = job.prefetch.clone();
-            connection.send(&Request::Prefetch(Prefetch { model: job.model.hash, nodes }))?;
+            let Hint { nodes, masks } = job.prefetch.clone();
+            let hint = Prefetch { model: job.model.hash, nodes, masks };
+            connection.send(&Request::Prefetch(hint))?;
         }
         if let Some(frame) = &job.frame {
             let answer = match ask_frame(connection, &job.model, frame) {

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use softgrasp_core::grasp::{GraspEvent, StateName};
 
+use crate::contact_model::ContactModel;
 use crate::grasp_loop::{LoopEvent, TickOutcome};
 use crate::hand_reader::DeviceFaults;
 use crate::solve_report::{SCHEMA, SolveSummary};
@@ -20,6 +21,8 @@ pub struct RunReport {
     pub server: String,
     /// `lockstep` or `free`.
     pub pace: &'static str,
+    /// What a fingertip holds: `vertex`, `patch` or `mask`.
+    pub contact: String,
     /// Ticks played.
     pub ticks: u64,
     /// Whether the user ended it.
@@ -106,7 +109,13 @@ pub struct RunSummary {
 
 impl RunReport {
     /// An empty report.
-    pub fn new(object: ObjectSummary, hand: String, server: String, pace: &'static str) -> Self {
+    pub fn new(
+        object: ObjectSummary,
+        hand: String,
+        server: String,
+        pace: &'static str,
+        contact: ContactModel,
+    ) -> Self {
         Self {
             schema: SCHEMA,
             command: "run",
@@ -114,6 +123,7 @@ impl RunReport {
             hand,
             server,
             pace,
+            contact: contact.to_string(),
             ticks: 0,
             interrupted: false,
             states_reached: Vec::new(),
@@ -194,12 +204,13 @@ impl RunReport {
         let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
         let method = self.frames.iter().rev().find_map(|f| f.solve.as_ref());
         let mut text = format!(
-            "\n{} ({} nodes, {} tetrahedra, {:.0} mm) in the {} hand, solved by {}\n",
+            "\n{} ({} nodes, {} tetrahedra, {:.0} mm) in the {} hand, held by {}, solved by {}\n",
             self.object.name,
             self.object.nodes,
             self.object.tets,
             1e3 * self.object.size_m,
             self.hand,
+            self.contact,
             self.server
         );
         text.push_str("\nWhat happened:\n");

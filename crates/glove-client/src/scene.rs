@@ -51,7 +51,7 @@ pub struct SceneFile {
     pub poisson: Option<f64>,
     /// Method's name, or auto.
     pub method: Option<String>,
-    /// vertex or patch.
+    /// vertex, patch or mask.
     pub contact: Option<String>,
 }
 

@@ -1,6 +1,7 @@
 //! The object in the hand: rest shape, deformed shape, surface, and the sphere tree that follows.
 
 use nalgebra::{Point3, Vector3};
+use softgrasp_core::contact::{Mask, SurfaceStars};
 use softgrasp_core::mesh::{Inversion, MeshError, Surface, TetMesh};
 use softgrasp_core::sphere_tree::{SphereTree, TreeError, vertex_normals};
 
@@ -12,6 +13,7 @@ use softgrasp_core::sphere_tree::{SphereTree, TreeError, vertex_normals};
 pub struct SoftObject {
     rest: TetMesh,
     surface: Surface,
+    stars: SurfaceStars,
     shape: Vec<Point3<f64>>,
     displacement: Vec<[f64; 3]>,
     deformed: bool,
@@ -51,6 +53,7 @@ impl SoftObject {
     /// [`ObjectError::Tree`].
     pub fn try_new(rest: TetMesh) -> Result<Self, ObjectError> {
         let surface = Surface::from_mesh(&rest);
+        let stars = SurfaceStars::new(&surface, rest.node_count());
         let shape = rest.vertices().to_vec();
         let tree = SphereTree::try_build(&shape, &surface.nodes)?;
         let mut normals = Vec::new();
@@ -59,6 +62,7 @@ impl SoftObject {
         Ok(Self {
             rest,
             surface,
+            stars,
             shape,
             displacement,
             deformed: false,
@@ -77,6 +81,13 @@ impl SoftObject {
     /// Boundary triangles and nodes.
     pub fn surface(&self) -> &Surface {
         &self.surface
+    }
+
+    /// Mask of a tip that touches a node of the rest surface.
+    ///
+    /// Units: m.
+    pub fn tip_mask(&self, node: u32, radius: f64) -> Mask {
+        self.stars.tip_mask(self.rest.vertices(), &self.surface, node, radius)
     }
 
     /// Vertices as they are now.

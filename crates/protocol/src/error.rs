@@ -116,6 +116,14 @@ pub enum DecodeError {
         /// Bytes left in the payload.
         there: usize,
     },
+    /// Masks announce other lengths than there are nodes in all of them.
+    #[error("the masks are {lens_sum} nodes long in all, {entry_count} are announced")]
+    MaskLengths {
+        /// Sum of their lengths.
+        lens_sum: u64,
+        /// Announced nodes of all masks.
+        entry_count: u32,
+    },
     /// The bytes that fill up to the next multiple of eight are not zero.
     #[error("padding before byte {position} of the payload is not zero")]
     Padding {

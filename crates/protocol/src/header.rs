@@ -5,7 +5,7 @@ use crate::{FrameError, Limits};
 /// First bytes of every frame.
 pub const MAGIC: [u8; 4] = *b"SGRP";
 /// Version of the format this crate reads and writes.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Bytes of a header.
 pub const HEADER_LEN: usize = 32;
 
@@ -164,7 +164,7 @@ mod tests {
             Header::decode(&raw, &limits).unwrap_err()
         };
         assert_eq!(fault(2, b'X', true), FrameError::Magic { found: b"SGX".to_vec() });
-        assert_eq!(fault(4, 2, true), FrameError::Version { found: 2 });
+        assert_eq!(fault(4, 1, true), FrameError::Version { found: 1 });
         assert!(matches!(fault(6, 9, false), FrameError::HeaderChecksum { .. }));
         assert_eq!(fault(9, 1, true), FrameError::ReservedFlags { flags: 0x100 });
         let too_long = FrameError::PayloadTooLong { payload_len: 101, payload_len_max: 100 };

@@ -6,7 +6,7 @@ use fea_server::{RunningServer, ServerConfig};
 use glove_client::connection::ServerConnection;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementName, FrameRequest, ModelHash, NodeChoice, Precision, Prefetch,
+    Answer, DofValue, ElementName, FrameRequest, Masks, ModelHash, NodeChoice, Precision, Prefetch,
     Question, RejectCode, Reply, Request,
 };
 use softgrasp_tests::questions::{cube, once, question, upload};
@@ -135,7 +135,9 @@ fn prefetched_columns_change_no_bit() {
     let server = server(2);
     let mut scene = Scene::new(&server, 343);
     let nodes = (0..343).step_by(3).chain([9999]).collect();
-    scene.connection.send(&Request::Prefetch(Prefetch { model: scene.model, nodes })).unwrap();
+    let masks = Masks::default();
+    let hint = Prefetch { model: scene.model, nodes, masks };
+    scene.connection.send(&Request::Prefetch(hint)).unwrap();
     assert!(bits(scene.all("condensed", 1.0)) == plain);
 }
 

@@ -12,6 +12,7 @@ mod disturbed_links;
 mod engine;
 mod keep_shape;
 mod many_clients;
+mod masks;
 mod same_bits;
 mod start;
 mod stopping;

@@ -54,7 +54,7 @@ impl fmt::Display for FreeMotion {
         write!(f, "{part} {body} ({node_count} nodes, the first is node {first_node}; ")?;
         write!(f, "{known_dofs} known degrees of freedom")?;
         if *masks > 0 {
-            write!(f, ", {masks} masks")?;
+            write!(f, ", {masks} mask{}", if *masks == 1 { "" } else { "s" })?;
         }
         f.write_str(") can still ")?;
         match motion {

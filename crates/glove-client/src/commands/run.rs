@@ -53,9 +53,9 @@ pub struct RunCommand {
     /// Method, or auto.
     #[arg(long, value_name = "NAME|auto")]
     method: Option<MethodName>,
-    /// What a fingertip holds: vertex (the node it touched, as in the thesis) or patch (every
-    /// surface node under it) [default: vertex].
-    #[arg(long, value_name = "vertex|patch")]
+    /// What a fingertip holds: vertex (the node it touched, as in the thesis), patch (every surface
+    /// node under it) or mask (their mean, weighted by the tip's pressure) [default: vertex].
+    #[arg(long, value_name = "vertex|patch|mask")]
     contact: Option<ContactModel>,
     /// Young's modulus, Pa [default: 20000, a soft fruit].
     #[arg(long, value_name = "PA")]
@@ -156,6 +156,7 @@ impl RunCommand {
             format!("scripted:{}", plan.script),
             plan.server.to_string(),
             pace_name,
+            plan.settings.contact,
         );
         let mut grasp_loop =
             GraspLoop::new(HandReader::new(setup), soft, grasp, link, plan.settings, plan.pace);

@@ -181,6 +181,7 @@ impl SolveCommand {
             want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
             max_error: self.max_error,
             deadline_ms: self.deadline,
+            ..Question::default()
         })
     }
 

@@ -33,6 +33,8 @@ pub struct Answer {
     pub displacements: Displacements,
     /// Forces at the known degrees of freedom, N; empty if not asked for.
     pub reactions: Vec<DofValue>,
+    /// Force of each mask, N, in the order of the question; empty if not asked for.
+    pub mask_forces: Vec<[f64; 3]>,
 }
 
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
@@ -43,6 +45,7 @@ struct AnswerPart {
     scale: f64,
     node_count: u32,
     reaction_count: u32,
+    mask_force_count: u32,
 }
 
 impl Displacements {
@@ -108,6 +111,7 @@ impl Answer {
             scale,
             node_count: count_of("displacements", expected)?,
             reaction_count: count_of("reaction forces", self.reactions.len())?,
+            mask_force_count: count_of("forces of masks", self.mask_forces.len())?,
         })?;
         if let NodeChoice::Nodes(nodes) = &self.nodes {
             writer.array(nodes);
@@ -117,6 +121,7 @@ impl Answer {
             Displacements::F32Quantised { values, .. } => writer.array(values),
         }
         writer.dof_values(&self.reactions);
+        writer.array(&self.mask_forces);
         Ok(())
     }
 
@@ -129,6 +134,8 @@ impl Answer {
         let count = check_count("displacements", part.node_count, limits.node_count_max)?;
         let what = "reaction forces";
         let reaction_count = check_count(what, part.reaction_count, limits.dof_count_max)?;
+        let of_masks = "forces of masks";
+        let mask_force_count = check_count(of_masks, part.mask_force_count, limits.dof_count_max)?;
         let nodes = if part.listed {
             NodeChoice::Nodes(reader.array("answered nodes", count)?)
         } else {
@@ -142,7 +149,8 @@ impl Answer {
             }
         };
         let reactions = reader.dof_values(what, reaction_count)?;
-        Ok(Self { report: part.report, nodes, displacements, reactions })
+        let mask_forces = reader.array(of_masks, mask_force_count)?;
+        Ok(Self { report: part.report, nodes, displacements, reactions, mask_forces })
     }
 }
 

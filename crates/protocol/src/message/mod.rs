@@ -1,6 +1,7 @@
 //! Typed messages: what the client asks and what the server answers.
 
 mod answer;
+mod masks;
 mod mesh;
 mod model;
 mod names;
@@ -12,6 +13,7 @@ mod request;
 mod session;
 
 pub use answer::{Answer, Displacements};
+pub use masks::Masks;
 pub use mesh::{Material, MeshData};
 pub use model::{FrameRequest, ModelHash, ModelHashError, ModelReady, Prefetch, UploadModel};
 pub use names::{ElementChoice, ElementChoiceError, ElementName, MethodName, MethodNameError};

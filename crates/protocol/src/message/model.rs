@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use wincode::{SchemaRead, SchemaWrite};
 
+use super::masks::{Masks, MasksPart};
 use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
 use super::names::ElementName;
 use super::question::{Question, QuestionPart};
@@ -102,13 +103,15 @@ impl ModelHash {
 /// First bytes of every hashed model; changes when the same upload would give other answers.
 const MODEL_FORMAT: &str = "softgrasp model 1";
 
-/// Hint which nodes will be touched or asked about soon.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Hint which nodes or masks will be touched soon.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Prefetch {
     /// Which model.
     pub model: ModelHash,
     /// The nodes.
     pub nodes: Vec<u32>,
+    /// The masks.
+    pub masks: Masks,
 }
 
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
@@ -128,6 +131,7 @@ struct FramePart {
 struct PrefetchPart {
     model: ModelHash,
     node_count: u32,
+    masks: MasksPart,
 }
 
 impl UploadModel {
@@ -177,8 +181,10 @@ impl FrameRequest {
 impl Prefetch {
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
         let node_count = count_of("prefetched nodes", self.nodes.len())?;
-        writer.part(&PrefetchPart { model: self.model, node_count })?;
+        let masks = self.masks.part()?;
+        writer.part(&PrefetchPart { model: self.model, node_count, masks })?;
         writer.array(&self.nodes);
+        self.masks.write_arrays(writer);
         Ok(())
     }
 
@@ -189,7 +195,9 @@ impl Prefetch {
         let part: PrefetchPart = reader.part()?;
         let what = "prefetched nodes";
         let count = check_count(what, part.node_count, limits.node_count_max)?;
-        Ok(Self { model: part.model, nodes: reader.array(what, count)? })
+        part.masks.check(limits)?;
+        let nodes = reader.array(what, count)?;
+        Ok(Self { model: part.model, nodes, masks: Masks::read_arrays(reader, part.masks)? })
     }
 }
 

@@ -47,6 +47,12 @@ impl MethodName {
     }
 }
 
+impl Default for MethodName {
+    fn default() -> Self {
+        Self::auto()
+    }
+}
+
 impl fmt::Display for MethodName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&self.0)

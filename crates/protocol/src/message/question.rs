@@ -2,6 +2,7 @@
 
 use wincode::{SchemaRead, SchemaWrite};
 
+use super::masks::{Masks, MasksPart};
 use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
 use super::names::{ElementChoice, MethodName};
 use crate::limits::check_count;
@@ -50,15 +51,20 @@ pub struct Want {
 
 /// Partition, load, and how well and how soon the answer is needed.
 ///
-/// Units: `known` m, `forces` N, `max_error` relative, `deadline_ms` ms from the arrival.
+/// Units: `known` and `mask_displacements` m, `forces` N, `max_error` relative, `deadline_ms` ms from
+/// the arrival.
 ///
 /// Source: thesis (3.41) to (3.43) for the partition, 4.5.1 for where known displacements come from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Question {
     /// Known displacements.
     pub known: Vec<DofValue>,
     /// Forces at free degrees of freedom; those not named are zero.
     pub forces: Vec<DofValue>,
+    /// Nodes held together by their weighted mean, with one force each.
+    pub masks: Masks,
+    /// The mean displacement of each mask.
+    pub mask_displacements: Vec<[f64; 3]>,
     /// How to solve.
     pub method: MethodName,
     /// What to answer.
@@ -93,6 +99,7 @@ pub(super) struct QuestionPart {
     deadline_ms: Option<f64>,
     known_count: u32,
     force_count: u32,
+    masks: MasksPart,
 }
 
 #[derive(Clone, Copy, Debug, SchemaRead, SchemaWrite)]
@@ -116,6 +123,11 @@ impl Question {
                 NodeChoicePart::Nodes { count: count_of("wanted nodes", nodes.len())? }
             }
         };
+        let (count, expected) = (self.mask_displacements.len(), self.masks.len());
+        if count != expected {
+            let what = "displacements of masks";
+            return Err(EncodeError::CountMismatch { what, count, expected });
+        }
         Ok(QuestionPart {
             method: self.method.as_str().to_owned(),
             nodes,
@@ -125,16 +137,19 @@ impl Question {
             deadline_ms: self.deadline_ms,
             known_count: count_of("known displacements", self.known.len())?,
             force_count: count_of("forces", self.forces.len())?,
+            masks: self.masks.part()?,
         })
     }
 
-    /// Arrays: known displacements, forces, wanted nodes if listed.
+    /// Arrays: known displacements, forces, wanted nodes if listed, masks and their displacements.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         writer.dof_values(&self.known);
         writer.dof_values(&self.forces);
         if let NodeChoice::Nodes(nodes) = &self.want.nodes {
             writer.array(nodes);
         }
+        self.masks.write_arrays(writer);
+        writer.array(&self.mask_displacements);
     }
 
     /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
@@ -152,8 +167,10 @@ impl Question {
             }
         };
         let want = Want { nodes, reactions: part.reactions, precision: part.precision };
+        let masks = Masks::read_arrays(reader, part.masks)?;
+        let mask_displacements = reader.array("displacements of masks", masks.len())?;
         let (max_error, deadline_ms) = (part.max_error, part.deadline_ms);
-        Ok(Self { known, forces, method, want, max_error, deadline_ms })
+        Ok(Self { known, forces, masks, mask_displacements, method, want, max_error, deadline_ms })
     }
 }
 
@@ -162,6 +179,7 @@ impl QuestionPart {
         limits.check_text("method", &self.method)?;
         check_count("known displacements", self.known_count, limits.dof_count_max)?;
         check_count("forces", self.force_count, limits.dof_count_max)?;
+        self.masks.check(limits)?;
         if let NodeChoicePart::Nodes { count } = self.nodes {
             check_count("wanted nodes", count, limits.node_count_max)?;
         }

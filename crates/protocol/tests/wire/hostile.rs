@@ -114,6 +114,31 @@ fn counts_over_a_limit_are_named() {
 }
 
 #[test]
+fn masks_that_say_other_lengths_than_they_have_are_refused() {
+    let (kind, payload) = samples().swap_remove(5);
+    // Prefetch: part of 44 bytes, two nodes, then the length of the one mask.
+    let at = 48 + 8;
+    assert_eq!(payload[at..at + 4], 2_u32.to_le_bytes());
+    for lie in [0, 1, 3, u32::MAX] {
+        let mut hostile = payload.clone();
+        hostile[at..at + 4].copy_from_slice(&u32::to_le_bytes(lie));
+        let error = decode(kind, &hostile).unwrap_err();
+        let expected = DecodeError::MaskLengths { lens_sum: u64::from(lie), entry_count: 2 };
+        assert_eq!(error.to_string(), expected.to_string());
+    }
+}
+
+#[test]
+fn displacements_that_do_not_fit_the_masks_are_not_sent() {
+    let question = Question { mask_displacements: vec![[0.0; 3]], ..Question::default() };
+    let frame = Request::Frame(FrameRequest { model: ModelHash([7; 32]), question });
+    let mut out = vec![9];
+    let error = frame.encode_into(1, &Limits::default(), &mut out).unwrap_err();
+    assert!(matches!(error, EncodeError::CountMismatch { count: 1, expected: 0, .. }));
+    assert_eq!(out, [9]);
+}
+
+#[test]
 fn a_long_list_of_empty_texts_takes_no_more_than_a_part() {
     let mut report = vec![];
     report.extend(0_u64.to_le_bytes()); // method

@@ -39,11 +39,9 @@ fn numbers_that_are_not_finite_keep_their_bits() {
     let known = odd.iter().map(|&value| DofValue { dof: 1, value }).collect();
     let question = Question {
         known,
-        forces: vec![],
-        method: MethodName::auto(),
-        want: Want::default(),
         max_error: Some(f64::NAN),
         deadline_ms: Some(f64::NEG_INFINITY),
+        ..Question::default()
     };
     let mesh = MeshData { vertices: odd.map(|x| [x; 3]).to_vec(), ..MeshData::default() };
     let (materials, element) = (vec![], ElementChoice::T4);

@@ -58,6 +58,8 @@ fn requests() -> Vec<Message> {
     let question = Question {
         known: vec![DofValue { dof: 9, value: 0.0 }, DofValue { dof: 2, value: -0.001 }],
         forces: vec![DofValue { dof: 4, value: 0.5 }],
+        masks: masks_of(&[&[(0, 0.25), (2, 0.75)], &[(1, 1.0)]]),
+        mask_displacements: vec![[0.0, -0.001, 0.0], [0.0005, 0.0, 0.0]],
         method: MethodName::auto(),
         want: Want {
             nodes: NodeChoice::Nodes(vec![0, 2, 3]),
@@ -68,6 +70,8 @@ fn requests() -> Vec<Message> {
         deadline_ms: None,
     };
     let everything = Question {
+        masks: Masks::default(),
+        mask_displacements: vec![],
         method: "gauss-jordan".parse().unwrap(),
         want: Want::default(),
         max_error: None,
@@ -91,7 +95,11 @@ fn requests() -> Vec<Message> {
             fixed: vec![9, 10, 11],
         }),
         Request::Frame(FrameRequest { model: hash(), question }),
-        Request::Prefetch(Prefetch { model: hash(), nodes: vec![1, 3] }),
+        Request::Prefetch(Prefetch {
+            model: hash(),
+            nodes: vec![1, 3],
+            masks: masks_of(&[&[(3, 1.0), (1, 2.0)]]),
+        }),
         Request::Drop(hash()),
         Request::Ping { nonce: 0x0123_4567_89ab_cdef },
     ]
@@ -128,6 +136,7 @@ fn replies() -> Vec<Message> {
         nodes: NodeChoice::Nodes(vec![0, 2, 3]),
         displacements: Displacements::of(displacements, Precision::F32Quantised),
         reactions: vec![DofValue { dof: 2, value: -1.25 }],
+        mask_forces: vec![[0.0, -0.75, 0.125], [0.5, 0.0, 0.0]],
     };
     let ready =
         ModelReady { model: hash(), unknown_dofs: 9, fixed_dofs: 3, reused: false, stage_ms };
@@ -150,6 +159,12 @@ fn replies() -> Vec<Message> {
         Message::Reply(5, Reply::Rejected(rejected)),
         Message::Reply(8, Reply::Pong { nonce: 0x0123_4567_89ab_cdef }),
     ]
+}
+
+fn masks_of(lists: &[&[(u32, f64)]]) -> Masks {
+    let mut masks = Masks::default();
+    lists.iter().for_each(|list| masks.push(list));
+    masks
 }
 
 fn hash() -> ModelHash {
@@ -180,8 +195,8 @@ fn any_request() -> impl Strategy<Value = Request> {
     );
     let frame =
         (model(), question()).prop_map(|(model, question)| FrameRequest { model, question });
-    let prefetch = (model(), vec(any::<u32>(), 0..9))
-        .prop_map(|(model, nodes)| Request::Prefetch(Prefetch { model, nodes }));
+    let prefetch = (model(), vec(any::<u32>(), 0..9), masks())
+        .prop_map(|(model, nodes, masks)| Request::Prefetch(Prefetch { model, nodes, masks }));
     prop_oneof![
         hello.prop_map(Request::Hello),
         solve.prop_map(Request::SolveOnce),
@@ -237,15 +252,15 @@ fn answer() -> impl Strategy<Value = Answer> {
             Displacements::F32Quantised { scale, values }
         });
     let displacements = prop_oneof![double, single];
-    let parts = (report(), displacements, any::<bool>(), dof_values());
-    parts.prop_map(|(report, displacements, all, reactions)| {
+    let parts = (report(), displacements, any::<bool>(), dof_values(), vec(point(), 0..4));
+    parts.prop_map(|(report, displacements, all, reactions, mask_forces)| {
         let count = u32::try_from(displacements.node_count()).unwrap();
         let nodes = if all {
             NodeChoice::All
         } else {
             NodeChoice::Nodes((0..count).map(|node| node.wrapping_mul(0x9e37_79b9)).collect())
         };
-        Answer { report, nodes, displacements, reactions }
+        Answer { report, nodes, displacements, reactions, mask_forces }
     })
 }
 
@@ -302,16 +317,23 @@ fn question() -> impl Strategy<Value = Question> {
     let method = prop::sample::select(vec!["auto", "gauss-jordan", "pcg", "a_b-9"])
         .prop_map(|name| name.parse().unwrap());
     let bounds = (option::of(number()), option::of(number()));
-    (dof_values(), dof_values(), method, want, bounds).prop_map(
-        |(known, forces, method, want, (max_error, deadline_ms))| Question {
+    (dof_values(), dof_values(), masks(), method, want, bounds).prop_map(
+        |(known, forces, masks, method, want, (max_error, deadline_ms))| Question {
             known,
             forces,
+            mask_displacements: (0..masks.len()).map(|i| [i as f64, -0.5, 1e-3]).collect(),
+            masks,
             method,
             want,
             max_error,
             deadline_ms,
         },
     )
+}
+
+fn masks() -> impl Strategy<Value = Masks> {
+    vec(vec((any::<u32>(), number()), 0..5), 0..4)
+        .prop_map(|lists| masks_of(&lists.iter().map(Vec::as_slice).collect::<Vec<_>>()))
 }
 
 fn dof_values() -> impl Strategy<Value = Vec<DofValue>> {
