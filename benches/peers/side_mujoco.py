@@ -20,8 +20,9 @@ MODEL = """
   </worldbody>
 </mujoco>
 """
-# Explicit steps are short for the smallest tetrahedra's sake; implicit ones as long as Rapier's.
-INTEGRATORS = {"explicit": ("Euler", 1e-3, 1e-3), "implicit": ("discrete", 1 / 60, 0.1)}
+# Explicit steps are short for the smallest tetrahedra's sake. Implicit ones of 1/60 s would do, but
+# from 3375 nodes on MuJoCo then warns that its linear solve does not converge.
+INTEGRATORS = {"explicit": ("Euler", 1e-3, 1e-3), "implicit": ("discrete", 4e-3, 2e-2)}
 
 
 def text(values):
