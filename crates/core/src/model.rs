@@ -138,9 +138,18 @@ impl Model {
     ///
     /// Shapes: `displacement` 3 per node of the system.
     pub fn strain(&self, displacement: &[f64]) -> StrainSummary {
+        self.strain_with_pauses(displacement, &mut || {})
+    }
+
+    /// The same, with a call of `pause` every 50 µs or so.
+    pub fn strain_with_pauses(
+        &self,
+        displacement: &[f64],
+        pause: &mut dyn FnMut(),
+    ) -> StrainSummary {
         match &self.quadratic {
-            None => summarise_strain(&self.mesh, displacement),
-            Some(quadratic) => summarise_strain_quadratic(quadratic, displacement),
+            None => summarise_strain(&self.mesh, displacement, pause),
+            Some(quadratic) => summarise_strain_quadratic(quadratic, displacement, pause),
         }
     }
 

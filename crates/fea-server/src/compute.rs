@@ -1,7 +1,8 @@
 //! The one place where tokio and rayon meet: a bounded queue of work for a pool of exact size.
 
 use std::panic::AssertUnwindSafe;
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
+use std::time::Instant;
 
 use tokio::sync::{Semaphore, oneshot};
 
@@ -17,7 +18,11 @@ pub(crate) struct Compute {
     pool: Arc<rayon::ThreadPool>,
     places: Arc<Semaphore>,
     background: Arc<Semaphore>,
+    beside: mpsc::Sender<Task>,
 }
+
+/// Work for the thread beside the frames.
+type Task = Box<dyn FnOnce() + Send>;
 
 /// Background tasks that may wait or run at once.
 const BACKGROUND_MAX: usize = 8;
@@ -29,15 +34,17 @@ impl Compute {
     ///
     /// # Errors
     /// The system's, when it gives no threads.
-    pub fn new(threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub fn new(threads: usize) -> std::io::Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|i| format!("solve-{i}"))
-            .build()?;
+            .build()
+            .map_err(std::io::Error::other)?;
         Ok(Self {
             pool: Arc::new(pool),
             places: Arc::new(Semaphore::new(QUEUE_DEPTH)),
             background: Arc::new(Semaphore::new(BACKGROUND_MAX)),
+            beside: start_beside()?,
         })
     }
 
@@ -61,15 +68,12 @@ impl Compute {
         });
     }
 
-    /// Runs `work` on the pool when it comes to it, whatever waits there. For one task per model that
-    /// bounds itself.
+    /// Runs `work` on a thread of its own, one such after the other. For what rests most of the time
+    /// ([`Rest`]) and must keep neither the pool nor a core from the frames.
     pub fn beside(&self, work: impl FnOnce() + Send + 'static) {
-        self.pool.spawn(move || {
-            // A panic here would end the process: nobody waits for this task.
-            if std::panic::catch_unwind(AssertUnwindSafe(work)).is_err() {
-                tracing::error!("work beside the frames ended abnormally");
-            }
-        });
+        if self.beside.send(Box::new(work)).is_err() {
+            tracing::error!("the thread beside the frames has ended");
+        }
     }
 
     /// Runs `work` on the pool and waits for it without blocking the sockets.
@@ -99,6 +103,41 @@ impl Compute {
     /// [`Refusal::Internal`] if the work panicked; the panic is logged.
     pub fn run_here<T>(work: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
         caught(work)
+    }
+}
+
+/// Starts the thread beside the frames; it ends when the last [`Compute`] has gone.
+fn start_beside() -> std::io::Result<mpsc::Sender<Task>> {
+    let (sender, tasks) = mpsc::channel::<Task>();
+    std::thread::Builder::new().name("beside".to_owned()).spawn(move || {
+        for work in tasks {
+            if std::panic::catch_unwind(AssertUnwindSafe(work)).is_err() {
+                tracing::error!("work beside the frames ended abnormally");
+            }
+        }
+    })?;
+    Ok(sender)
+}
+
+/// Lets a thread rest so that it works for a tenth of its time, in pieces far shorter than the
+/// slices in which a system hands out its cores: nothing that is urgent ever waits for it.
+pub(crate) struct Rest {
+    worked_since: Instant,
+}
+
+/// Time at rest per time at work.
+const REST_PER_WORK: u32 = 9;
+
+impl Rest {
+    /// Work begins.
+    pub fn new() -> Self {
+        Self { worked_since: Instant::now() }
+    }
+
+    /// Rests for what has been worked since the last rest.
+    pub fn rest(&mut self) {
+        std::thread::sleep(REST_PER_WORK * self.worked_since.elapsed());
+        self.worked_since = Instant::now();
     }
 }
 

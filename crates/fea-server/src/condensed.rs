@@ -15,17 +15,15 @@ use softgrasp_protocol::{
 use crate::approach::Approach;
 use crate::caution::{add_unmet_wishes, warnings};
 use crate::clock::{StageClock, last_peak_rss_bytes, ms_since, peak_rss_bytes};
-use crate::compute::Compute;
+use crate::compute::{Compute, Rest};
 use crate::question::{checked_masks, paired, pairs};
 use crate::reject::Refusal;
-use crate::store::StoredModel;
+use crate::store::{StoredModel, StrainWatch};
 
 /// Above this condition of the small system the touched nodes hold the body weakly.
 const CONDITION_WARNING: f64 = 1e9;
 /// Nodes or masks prefetched between two looks at what else is waiting.
 const PREFETCH_TOGETHER: usize = 2;
-/// Share of one thread that the strain beside the frames may take.
-const STRAIN_SHARE: f64 = 0.1;
 
 /// Which answer the reported strain and rotation belong to.
 #[derive(Clone, Copy)]
@@ -200,8 +198,8 @@ fn reactions_of(
     known.dofs.iter().map(|dof| DofValue { dof: *dof, value: force(dof) }).collect()
 }
 
-/// Works out rotation and strain of a frame beside the frames that follow: one at a time, on one
-/// thread, for at most a share of [`STRAIN_SHARE`] of its time.
+/// Works out rotation and strain of a frame beside the frames that follow, one at a time, resting
+/// for nine tenths of the time.
 fn watch_strain(
     compute: &Compute,
     stored: &Arc<StoredModel>,
@@ -209,15 +207,15 @@ fn watch_strain(
     set: Arc<ContactSet>,
     solved: ContactAnswer,
 ) {
-    if !stored.strain().begin(Instant::now()) {
+    if std::mem::replace(&mut stored.strain().running, true) {
         return;
     }
     let (stored, base) = (Arc::clone(stored), Arc::clone(base));
     compute.beside(move || {
-        let start = Instant::now();
-        let newest = stored.model.strain(&set.full_displacement(&base, &solved));
-        let pause = start.elapsed().div_f64(STRAIN_SHARE);
-        stored.strain().end(newest, start + pause);
+        let mut rest = Rest::new();
+        let displacement = set.full_displacement(&base, &solved);
+        let newest = stored.model.strain_with_pauses(&displacement, &mut || rest.rest());
+        *stored.strain() = StrainWatch { newest, running: false };
     });
 }
 

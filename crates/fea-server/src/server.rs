@@ -37,7 +37,7 @@ pub enum StartError {
         /// Threads asked for.
         threads: usize,
         /// The system's reason.
-        source: rayon::ThreadPoolBuildError,
+        source: std::io::Error,
     },
     /// No runtime.
     #[error("cannot start the server's sockets: {0}")]

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Instant;
 
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Model, ModelError};
@@ -30,22 +29,7 @@ struct KeptSet {
 #[derive(Default)]
 pub(crate) struct StrainWatch {
     pub newest: StrainSummary,
-    running: bool,
-    not_before: Option<Instant>,
-}
-
-impl StrainWatch {
-    /// Whether another strain may be worked out now; if so it counts as running.
-    pub fn begin(&mut self, now: Instant) -> bool {
-        let may = !self.running && self.not_before.is_none_or(|earliest| now >= earliest);
-        self.running |= may;
-        may
-    }
-
-    /// Takes the strain that was worked out; the next one not before an instant.
-    pub fn end(&mut self, newest: StrainSummary, not_before: Instant) {
-        *self = Self { newest, running: false, not_before: Some(not_before) };
-    }
+    pub running: bool,
 }
 
 /// Factors kept per model; a grasp needs one, a change of grip a second.

@@ -16,12 +16,17 @@ pub struct StrainSummary {
 
 /// Largest rotation and principal strain over all elements.
 ///
-/// Shapes: `displacement` 3N. Units: m.
+/// Shapes: `displacement` 3N. Units: m. `pause` is called every 50 µs or so: who works this out beside
+/// something more urgent can let that pass.
 ///
 /// Source: displacement gradient `H = Σ u_a ∇N_aᵀ` from thesis (3.28); rotation angle from the
 /// skew part and the trace of `I + H`, exact when `I + H` is a rotation.
-pub fn summarise_strain(mesh: &TetMesh, displacement: &[f64]) -> StrainSummary {
-    largest(mesh.tets().len(), |tet, most| most.see(&gradient_of(mesh, tet, displacement)))
+pub fn summarise_strain(
+    mesh: &TetMesh,
+    displacement: &[f64],
+    pause: &mut dyn FnMut(),
+) -> StrainSummary {
+    largest(mesh.tets().len(), pause, |tet, most| most.see(&gradient_of(mesh, tet, displacement)))
 }
 
 /// Displacement gradient of a linear element.
@@ -42,8 +47,12 @@ fn gradient_of(mesh: &TetMesh, tet: usize, displacement: &[f64]) -> Matrix3<f64>
 /// Shapes: `displacement` 3 (N + E), mid-edge nodes included. Units: m.
 ///
 /// Source: as there, with [`tet10::QUADRATURE`].
-pub fn summarise_strain_quadratic(mesh: &QuadraticMesh, displacement: &[f64]) -> StrainSummary {
-    largest(mesh.tets().len(), |tet, most| {
+pub fn summarise_strain_quadratic(
+    mesh: &QuadraticMesh,
+    displacement: &[f64],
+    pause: &mut dyn FnMut(),
+) -> StrainSummary {
+    largest(mesh.tets().len(), pause, |tet, most| {
         let g = tet4::gradients(&mesh.corners(tet));
         let u = displacements_of(&mesh.tets()[tet], displacement);
         for l in tet10::QUADRATURE {
@@ -52,12 +61,24 @@ pub fn summarise_strain_quadratic(mesh: &QuadraticMesh, displacement: &[f64]) ->
     })
 }
 
+/// Elements between two pauses.
+const ELEMENTS_TOGETHER: usize = 1024;
+
 /// Largest summary over elements, one after the other, so that most are dismissed by the largest so
 /// far. A thread alone: next to a factor it costs nothing, and beside frames it leaves the other
 /// processors to them.
-fn largest(tet_count: usize, see_tet: impl Fn(usize, &mut Largest)) -> StrainSummary {
+fn largest(
+    tet_count: usize,
+    pause: &mut dyn FnMut(),
+    see_tet: impl Fn(usize, &mut Largest),
+) -> StrainSummary {
     let mut most = Largest::default();
-    (0..tet_count).for_each(|tet| see_tet(tet, &mut most));
+    for tet in 0..tet_count {
+        see_tet(tet, &mut most);
+        if tet % ELEMENTS_TOGETHER == ELEMENTS_TOGETHER - 1 {
+            pause();
+        }
+    }
     most.summary
 }
 
@@ -140,7 +161,7 @@ mod tests {
         let mesh = tet();
         let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), 30f64.to_radians());
         let u = field(&mesh, |p| rotation * p.coords - p.coords);
-        let summary = summarise_strain(&mesh, &u);
+        let summary = summarise_strain(&mesh, &u, &mut || {});
         assert!((summary.rotation_max - 30f64.to_radians()).abs() < 1e-14);
     }
 
@@ -148,9 +169,9 @@ mod tests {
     fn stretch_and_shear_give_their_principal_strains() {
         let mesh = tet();
         let stretched = field(&mesh, |p| Vector3::new(0.01 * p.x, -0.03 * p.y, 0.02 * p.z));
-        assert!((summarise_strain(&mesh, &stretched).strain_max - 0.03).abs() < 1e-15);
+        assert!((summarise_strain(&mesh, &stretched, &mut || {}).strain_max - 0.03).abs() < 1e-15);
         let sheared = field(&mesh, |p| Vector3::new(0.02 * p.y, 0.0, 0.0));
-        assert!((summarise_strain(&mesh, &sheared).strain_max - 0.01).abs() < 1e-15);
+        assert!((summarise_strain(&mesh, &sheared, &mut || {}).strain_max - 0.01).abs() < 1e-15);
     }
 
     #[test]
@@ -161,8 +182,10 @@ mod tests {
         let u = field(&linear, map);
         let u_quadratic: Vec<f64> =
             mesh.vertices().iter().flat_map(|p| <[f64; 3]>::from(map(p))).collect();
-        let (four, ten) =
-            (summarise_strain(&linear, &u), summarise_strain_quadratic(&mesh, &u_quadratic));
+        let (four, ten) = (
+            summarise_strain(&linear, &u, &mut || {}),
+            summarise_strain_quadratic(&mesh, &u_quadratic, &mut || {}),
+        );
         assert!((four.rotation_max - ten.rotation_max).abs() < 1e-15);
         assert!((four.strain_max - ten.strain_max).abs() < 1e-15);
     }
@@ -178,7 +201,7 @@ mod tests {
             .iter()
             .map(|l| linear.corners(0).iter().zip(l).map(|(c, l)| l * c.x).sum::<f64>())
             .fold(0.0, f64::max);
-        let summary = summarise_strain_quadratic(&mesh, &u);
+        let summary = summarise_strain_quadratic(&mesh, &u, &mut || {});
         assert!((summary.strain_max - 0.02 * x_max).abs() < 1e-16);
         assert!(summary.rotation_max < 1e-15);
     }
@@ -200,7 +223,7 @@ mod tests {
                 all.rotation_max = all.rotation_max.max(alone.summary.rotation_max);
                 all.strain_max = all.strain_max.max(alone.summary.strain_max);
             }
-            assert_eq!(summarise_strain(&mesh, &u), all, "seed {seed}");
+            assert_eq!(summarise_strain(&mesh, &u, &mut || {}), all, "seed {seed}");
         }
     }
 }

@@ -54,7 +54,7 @@ pub struct RunCommand {
     #[arg(long, value_name = "NAME|auto")]
     method: Option<MethodName>,
     /// What a fingertip holds: vertex (the node it touched, as in the thesis), patch (every surface
-    /// node under it) or mask (their mean, weighted by the tip's pressure) [default: vertex].
+    /// node under it) or mask (their mean, weighted by the tip's pressure) [default: mask].
     #[arg(long, value_name = "vertex|patch|mask")]
     contact: Option<ContactModel>,
     /// Young's modulus, Pa [default: 20000, a soft fruit].

@@ -79,7 +79,7 @@ fn pure_bending_has_its_strain_and_rotation() {
     let mesh = cube();
     let u: Vec<f64> =
         mesh.vertices().iter().flat_map(|p| [p.x * p.y * 2.0, -p.x * p.x, 0.0]).collect();
-    let summary = summarise_strain_quadratic(&mesh, &u);
+    let summary = summarise_strain_quadratic(&mesh, &u, &mut || {});
     // ν = 0: ε_x = 2 y and no other strain, rotation 2 x about z; both at most 2 · 0.03.
     assert!((0.9..1.0).contains(&(summary.strain_max / 0.06)), "{summary:?}");
     assert!((0.9..1.0).contains(&(summary.rotation_max / 0.06)), "{summary:?}");
