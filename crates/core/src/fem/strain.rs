@@ -112,7 +112,8 @@ impl Largest {
         let strain = (h + h.transpose()) * 0.5;
         // No eigenvalue is larger than the Frobenius norm.
         let most = self.summary.strain_max;
-        if !(strain.norm_squared() * DISMISSAL_MARGIN < most * most) {
+        let is_less = strain.norm_squared() * DISMISSAL_MARGIN < most * most;
+        if !is_less {
             self.summary.strain_max = most.max(principal_max(&strain));
         }
     }
