@@ -6,13 +6,15 @@ use nalgebra::DMatrix;
 
 use super::base::{Base, gamma};
 use super::contact_set::{ContactAnswer, ContactSet};
+use super::overlap::Overlap;
+use super::touched::Touched;
 use crate::solve::pcg::norm;
 
 /// How wrong an answer can be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
     /// `‖r‖ / ‖b‖` by the triangle inequality over the columns' residuals as computed; b is that of
-    /// (3.42a), or, where masks are held, the forces of the contacts on the nodes.
+    /// (3.42a), or, where masks are held, `K` times the smallest field that has the means asked for.
     pub residual_rel: f64,
     /// Proven bound on `‖e‖ / ‖u‖` over all nodes, or why there is none.
     pub error_bound_rel: Result<f64, &'static str>,
@@ -45,7 +47,7 @@ impl ContactSet {
         // What the contacts are off moves their neighbours by at most so much force.
         let stiffest = (base.stiffest * self.overlap.lift).max(self.scale);
         residual += stiffest * answer.mismatch;
-        let b = self.overlap.force_norm(&answer.lambda).unwrap_or_else(|| self.load.size(q));
+        let b = self.load.size(q);
         let residual_rel = if b > 0.0 { residual / b } else { residual };
         let terms = answer.lambda.len() + base.modes.len() + 2;
         let rounding = gamma(terms) * moved;
@@ -68,38 +70,48 @@ impl ContactSet {
     }
 }
 
-/// Size of `b = −K12 q` of (3.42a) for any `q`, from the products of the columns of `K12`.
+/// Size of `b = −K12 q` of (3.42a) for any `q`, from the products of the columns of `K12`; with masks
+/// of `K E (EᵀE)⁻¹ q`, which is the same for single nodes but for the rows of the touched.
 pub(super) struct LoadSize {
-    /// `K12ᵀ K12`.
+    /// Products of the columns with each other.
     products: DMatrix<f64>,
 }
 
 impl LoadSize {
-    /// Shapes: `dofs` ascending touched degrees of freedom.
-    pub fn new(base: &Base, dofs: &[u32]) -> Self {
-        // Rows of K12: for each free degree of freedom what it shares with the touched ones.
+    /// Shapes: `overlap` that of `touched`.
+    pub fn new(base: &Base, touched: &Touched, overlap: &Overlap) -> Self {
+        // For each free degree of freedom what it shares with the unknown forces.
         let mut rows: BTreeMap<usize, Vec<(usize, f64)>> = BTreeMap::new();
-        for (column, &dof) in dofs.iter().enumerate() {
-            let (node, axis) = (dof as usize / 3, dof as usize % 3);
-            for (other, block) in base.stiffness.row(node) {
-                for c in 0..3 {
-                    let k = block[3 * axis + c];
-                    rows.entry(3 * other + c).or_default().push((column, k));
+        for (column, entries) in touched.columns().into_iter().enumerate() {
+            for (dof, weight) in entries {
+                let (node, axis) = (dof as usize / 3, dof as usize % 3);
+                for (other, block) in base.stiffness.row(node) {
+                    for c in 0..3 {
+                        let k = weight * block[3 * axis + c];
+                        rows.entry(3 * other + c).or_default().push((column, k));
+                    }
                 }
             }
         }
         let is_known = |set: &[u32], row: usize| set.binary_search(&(row as u32)).is_ok();
-        rows.retain(|&row, _| !is_known(dofs, row) && !is_known(&base.fixed, row));
-        let mut products = DMatrix::zeros(dofs.len(), dofs.len());
+        let has_masks = !touched.masks.is_empty();
+        rows.retain(|&row, _| {
+            (has_masks || !is_known(&touched.dofs, row)) && !is_known(&base.fixed, row)
+        });
+        let count = touched.force_count();
+        let mut products = DMatrix::zeros(count, count);
         for row in rows.values() {
             for &(i, k_i) in row {
                 row.iter().for_each(|&(j, k_j)| products[(i, j)] += k_i * k_j);
             }
         }
-        Self { products }
+        match overlap.inverse() {
+            Some(inverse) => Self { products: &inverse * products * &inverse },
+            None => Self { products },
+        }
     }
 
-    /// `‖K12 q‖`.
+    /// `‖b‖`.
     pub fn size(&self, q: &[f64]) -> f64 {
         let columns = self.products.column_iter().zip(q);
         let along = |column: &[f64]| column.iter().zip(q).map(|(p, q)| p * q).sum::<f64>();

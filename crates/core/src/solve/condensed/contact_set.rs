@@ -97,7 +97,7 @@ impl ContactSet {
             return Err(CondensedError::NotHeld);
         }
         let bound = SmallBound::new(base, &columns, &places, &inverse, scale)?;
-        let load = LoadSize::new(base, &touched.dofs);
+        let load = LoadSize::new(base, touched, &overlap);
         let (touched, rows) = (touched.clone(), None);
         Ok(Self {
             touched,

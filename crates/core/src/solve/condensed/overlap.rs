@@ -57,14 +57,9 @@ impl Overlap {
         Ok(Self { gram: Some(gram), lift: MARGIN * inverse.norm(), stretch })
     }
 
-    /// Norm of the nodal forces `E λ` on free degrees of freedom; `None` for single nodes.
-    ///
-    /// Units: N.
-    pub fn force_norm(&self, lambda: &[f64]) -> Option<f64> {
-        let gram = self.gram.as_ref()?;
-        let c = lambda.len();
-        let row = |i: usize| (0..c).map(|j| gram[(i, j)] * lambda[j]).sum::<f64>();
-        Some((0..c).map(|i| lambda[i] * row(i)).sum::<f64>().max(0.0).sqrt())
+    /// `(EᵀE)⁻¹`; `None` for single nodes, where it is the identity.
+    pub fn inverse(&self) -> Option<DMatrix<f64>> {
+        self.gram.clone()?.cholesky().map(|factor| factor.inverse())
     }
 
     /// Numbers kept.
@@ -75,12 +70,9 @@ impl Overlap {
 
 /// Columns of E by degree of freedom, ascending, without those that the scene fixes.
 fn free_columns(touched: &Touched, fixed: &[u32]) -> Vec<Vec<(u32, f64)>> {
-    let mut columns: Vec<Vec<(u32, f64)>> = touched.dofs.iter().map(|&d| vec![(d, 1.0)]).collect();
-    for mask in &touched.masks {
-        for axis in 0..3 {
-            let dofs = mask.entries().iter().map(|&(node, weight)| (3 * node + axis, weight));
-            columns.push(dofs.filter(|(dof, _)| fixed.binary_search(dof).is_err()).collect());
-        }
+    let mut columns = touched.columns();
+    for column in &mut columns {
+        column.retain(|(dof, _)| fixed.binary_search(dof).is_err());
     }
     columns
 }

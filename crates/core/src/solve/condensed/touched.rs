@@ -75,6 +75,16 @@ impl Touched {
         (behind / 3, behind % 3)
     }
 
+    /// Columns of E by degree of freedom.
+    pub(super) fn columns(&self) -> Vec<Vec<(u32, f64)>> {
+        let dofs = self.dofs.iter().map(|&dof| vec![(dof, 1.0)]);
+        let of_mask = |mask: &Mask, axis: u32| {
+            mask.entries().iter().map(|&(node, weight)| (3 * node + axis, weight)).collect()
+        };
+        let masks = self.masks.iter().flat_map(|mask| (0..3).map(move |axis| of_mask(mask, axis)));
+        dofs.chain(masks).collect()
+    }
+
     /// Most entries a column of E has.
     pub(super) fn longest(&self) -> usize {
         self.masks.iter().map(|m| m.entries().len()).max().unwrap_or(0).max(1)
