@@ -173,7 +173,7 @@ lost_server_ends_solve_with_one_line() {
     known_corners 10 | put_into_volume /out/known-large.csv
     start_server
     SOFTGRASP_CLIENT_COMMAND="solve --mesh /out/large.msh --known /out/known-large.csv \
-        --method gauss-jordan --server server:7878 --out /out/never.csv" \
+        --method gauss-jordan-plain --server server:7878 --out /out/never.csv" \
         quietly 60 "${compose[@]}" up -d client
     wait_until 30 server_has_sessions 1 || fail "no session within 30 s"
     docker kill "$(container_of server)" >/dev/null
