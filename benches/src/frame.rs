@@ -142,7 +142,7 @@ impl<'a> Asker<'a> {
         // Another load each time; the displacements are proportional to it.
         let scale = 1.0 + 0.25 * f64::from(self.asked).sin();
         let request = self.request(scale);
-        let (ms, reply) = timed_ms(|| self.connection.ask(&request));
+        let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
         let answer = match reply? {
             Reply::Answer(answer) => *answer,
             other => return Err(unexpected("Frame", &other).into()),

@@ -149,7 +149,7 @@ impl<'a> Holder<'a> {
     }
 
     fn ask(&mut self, request: &Request) -> Result<Answer, ReportError> {
-        match self.connection.ask(request)? {
+        match self.connection.ask_awake(request)? {
             Reply::Answer(answer) => Ok(*answer),
             other => Err(unexpected("Frame", &other).into()),
         }

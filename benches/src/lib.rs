@@ -5,6 +5,7 @@
 //! [`plot`] give it a form, and [`report`] writes it under the head that [`machine`] knows.
 //! A further report is one more file, one more [`ReportName`] and one more arm of [`run`].
 
+pub mod accuracy;
 mod axis;
 pub mod collision;
 pub mod contact;
@@ -12,6 +13,7 @@ pub mod echo;
 pub mod fit;
 pub mod frame;
 pub mod frontier;
+pub mod hard_cases;
 pub mod hold;
 pub mod machine;
 pub mod methods;
@@ -49,8 +51,12 @@ pub enum ReportName {
     Scaling,
     /// Force of one press on finer meshes by each contact model, and its frame time.
     Contact,
+    /// Every element against closed forms and published values.
+    Accuracy,
     /// Tree build, refit and search against parry3d and brute force.
     Collision,
+    /// Every way through hard cases, against what was promised.
+    HardCases,
 }
 
 impl ReportName {
@@ -64,7 +70,9 @@ impl ReportName {
             Self::Hold => "hold",
             Self::Scaling => "scaling",
             Self::Contact => "contact",
+            Self::Accuracy => "accuracy",
             Self::Collision => "collision",
+            Self::HardCases => "hard-cases",
         }
     }
 }
@@ -72,7 +80,8 @@ impl ReportName {
 /// Measures one report and writes its files.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that fails its check is one, and then nothing is written.
+/// [`ReportError`]; an answer that fails its check is one, and then nothing is written, except that
+/// [`ReportError::Failed`] comes after the files.
 pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>), ReportError> {
     let mut report = match name {
         ReportName::Methods => methods::measure(options)?,
@@ -82,9 +91,12 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Hold => hold::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,
         ReportName::Contact => contact::measure(options)?,
+        ReportName::Accuracy => accuracy::measure(options)?,
         ReportName::Collision => collision::measure(options)?,
+        ReportName::HardCases => hard_cases::measure(options)?,
     };
     report.end();
     let files = report.write(&options.out)?;
+    report.check_faults()?;
     Ok((report, files))
 }

@@ -86,6 +86,12 @@ pub enum ReportError {
         /// Measurements there are.
         count: usize,
     },
+    /// Rows that did not keep what was promised; the files are written.
+    #[error("{} of the report's rows failed:\n  {}", rows.len(), rows.join("\n  "))]
+    Failed {
+        /// What failed, and how.
+        rows: Vec<String>,
+    },
     /// A figure could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -106,6 +112,8 @@ pub enum Section {
     Text(String),
     /// A table, also written as CSV.
     Table(Table),
+    /// A table too long for the page: written as CSV, the page names it.
+    Records(Table),
     /// A figure, written as SVG.
     Figure {
         /// Name of its file, without `.svg`.
@@ -124,6 +132,7 @@ pub struct Report {
     title: String,
     head: Vec<(&'static str, String)>,
     sections: Vec<Section>,
+    faults: Vec<String>,
 }
 
 impl Report {
@@ -138,7 +147,13 @@ impl Report {
         if !options.note.is_empty() {
             head.push(("note", options.note.clone()));
         }
-        Self { stem: stem.to_owned(), title: title.to_owned(), head, sections: Vec::new() }
+        Self {
+            stem: stem.to_owned(),
+            title: title.to_owned(),
+            head,
+            sections: Vec::new(),
+            faults: Vec::new(),
+        }
     }
 
     /// Notes the load at the end of the measurement.
@@ -156,6 +171,27 @@ impl Report {
         self.sections.push(Section::Table(table));
     }
 
+    /// Adds a table that only its file shows.
+    pub fn records(&mut self, table: Table) {
+        self.sections.push(Section::Records(table));
+    }
+
+    /// Notes that a row did not keep what was promised: the report is written and then an error.
+    pub fn fault(&mut self, row: impl Into<String>) {
+        self.faults.push(row.into());
+    }
+
+    /// Makes sure that no row failed.
+    ///
+    /// # Errors
+    /// [`ReportError::Failed`] naming the rows.
+    pub fn check_faults(&self) -> Result<(), ReportError> {
+        match self.faults.is_empty() {
+            true => Ok(()),
+            false => Err(ReportError::Failed { rows: self.faults.clone() }),
+        }
+    }
+
     /// Adds a figure.
     pub fn figure(&mut self, stem: &str, caption: &str, svg: String) {
         let (stem, caption) = (stem.to_owned(), caption.to_owned());
@@ -165,7 +201,7 @@ impl Report {
     /// The tables, in order.
     pub fn tables(&self) -> impl Iterator<Item = &Table> {
         self.sections.iter().filter_map(|section| match section {
-            Section::Table(table) => Some(table),
+            Section::Table(table) | Section::Records(table) => Some(table),
             _ => None,
         })
     }
@@ -184,6 +220,10 @@ impl Report {
                 Section::Table(table) => {
                     text.push_str(&table.markdown());
                     text.push_str(&format!("\n[{0}.csv]({0}.csv)\n", table.stem));
+                }
+                Section::Records(table) => {
+                    let (title, rows) = (&table.title, table.rows.len());
+                    text.push_str(&format!("{title} ({rows}): [{0}.csv]({0}.csv)\n", table.stem));
                 }
                 Section::Figure { stem, caption, .. } => {
                     text.push_str(&format!("![{caption}]({stem}.svg)\n\n{caption}\n"));
@@ -210,7 +250,9 @@ impl Report {
         for section in &self.sections {
             let (name, text) = match section {
                 Section::Text(_) => continue,
-                Section::Table(table) => (format!("{}.csv", table.stem), table.csv(&head)),
+                Section::Table(table) | Section::Records(table) => {
+                    (format!("{}.csv", table.stem), table.csv(&head))
+                }
                 Section::Figure { stem, svg, .. } => (format!("{stem}.svg"), svg.clone()),
             };
             paths.push(write(folder.join(name), text)?);
@@ -268,6 +310,29 @@ mod tests {
             csv.starts_with("# command: bench --quick\n") && csv.ends_with("\nx\n1\n"),
             "{csv}"
         );
+    }
+
+    #[test]
+    fn faults_are_an_error_that_names_them_and_long_tables_are_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options {
+            is_quick: true,
+            out: folder.path().to_owned(),
+            command: String::new(),
+            note: String::new(),
+            meshes: PathBuf::new(),
+        };
+        let mut report = Report::begin("r", "Title", "2", &options);
+        let mut table = Table::new("r-rows", "Every row", &["x"]);
+        table.push([7usize.into()]);
+        report.records(table);
+        assert!(report.check_faults().is_ok());
+        report.fault("rod by front: no number");
+        let error = report.check_faults().unwrap_err();
+        assert!(error.to_string().contains("1 of") && error.to_string().contains("rod by front"));
+        assert!(report.markdown().contains("Every row (1): [r-rows.csv](r-rows.csv)"));
+        let paths = report.write(&options.out).unwrap();
+        assert!(std::fs::read_to_string(&paths[1]).unwrap().ends_with("\nx\n7\n"));
     }
 
     #[test]

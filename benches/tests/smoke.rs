@@ -65,6 +65,31 @@ fn collision_is_timed_and_nothing_is_missed() {
 }
 
 #[test]
+fn every_element_comes_nearer_to_closed_forms_on_finer_meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Accuracy, folder.path());
+    let of = |name| column(folder.path(), "accuracy.csv", name);
+    let (cases, elements, orders) = (of("case"), of("element"), of("order"));
+    let errors = numbers(folder.path(), "accuracy.csv", "error_rel");
+    for case in ["patch", "bar", "mirror"] {
+        let of_case = cases.iter().zip(&errors).filter(|(c, _)| *c == case);
+        let errors: Vec<f64> = of_case.map(|(_, e)| *e).collect();
+        assert!(errors.len() >= 4 && errors.iter().all(|&e| e < 1e-11), "{case}: {errors:?}");
+    }
+    for case in ["cantilever", "membrane", "thick sphere", "indentation", "waves"] {
+        for element in ["t4", "t10"] {
+            let rows = cases.iter().zip(&elements).zip(&orders);
+            let of_both = rows.filter(|((c, e), o)| *c == case && *e == element && !o.is_empty());
+            let orders: Vec<f64> = of_both.map(|(_, o)| o.parse().unwrap()).collect();
+            assert!(!orders.is_empty() && orders.iter().all(|&o| o > 0.0), "{case} {element}");
+        }
+    }
+    for figure in ["accuracy-waves.svg", "accuracy-sphere.svg", "accuracy-cases.svg"] {
+        assert!(folder.path().join(figure).is_file(), "{figure}");
+    }
+}
+
+#[test]
 fn contacts_are_pressed_and_timed_with_small_errors() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Contact, folder.path());

@@ -23,7 +23,7 @@ use nalgebra::Isometry3;
 use serde_json::Value;
 use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_core::mesh::{BuiltIn, generate};
-use softgrasp_protocol::{Material, MethodName};
+use softgrasp_protocol::{ElementName, Material, MethodName};
 
 #[derive(Parser)]
 struct Arguments {
@@ -156,6 +156,7 @@ impl Bench {
         let hand = ScriptedHand::try_new(ScriptName::Squeeze, setup.clone(), &object).unwrap();
         let settings = SolveSettings {
             material: Material { young: 2.0e4, poisson: 0.4 },
+            element: ElementName::T4,
             method: MethodName::auto(),
             contact: ContactModel::Vertex,
             subscription: Subscription::Surface,

@@ -52,7 +52,7 @@ impl Problem {
         let material = Material::try_new(YOUNG, POISSON)?;
         let model = Model::try_new(mesh, Element::Tet4, &[material], Vec::new(), &mut |_| {})?;
         let known = model.known(pairs)?;
-        let partition = model.check_held(&known.dofs, &[])?;
+        let partition = model.held_partition(&known.dofs)?;
         let count = known.dofs.len();
         let other = |column: usize| -> Vec<f64> {
             (0..count).map(|i| push * (0.37 * (count * column + i) as f64).sin()).collect()

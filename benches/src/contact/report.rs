@@ -93,7 +93,7 @@ impl<'a> Asker<'a> {
 
     fn ask(&mut self, question: Question) -> Result<(f64, Answer), ReportError> {
         let request = Request::Frame(FrameRequest { model: self.model, question });
-        let (ms, reply) = timed_ms(|| self.connection.ask(&request));
+        let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
         match reply? {
             Reply::Answer(answer) => Ok((ms, *answer)),
             other => Err(unexpected("Frame", &other).into()),

@@ -106,7 +106,7 @@ impl Kept {
             }
             Way::Condensed => {
                 let base = model.condense(&mut |_| {})?;
-                model.check_held(&known.dofs, &[])?;
+                model.held_partition(&known.dofs)?;
                 let columns = Columns::new(usize::MAX);
                 let mut set = ContactSet::try_new(&base, &columns, &Touched::of_dofs(&known.dofs))
                     .map_err(ModelError::from)?;

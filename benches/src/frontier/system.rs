@@ -101,7 +101,9 @@ pub(super) enum Held {
 /// Partition and known displacements of the patches.
 fn known(model: &Model, padded: &PaddedMesh, held: Held) -> Result<Known, ReportError> {
     match (held, model.element()) {
-        (Held::Corners, _) | (_, Element::Tet4) => Ok(model.known(padded.corner_pairs())?),
+        (Held::Corners, _) | (_, Element::Tet4 | Element::Tet4Anp) => {
+            Ok(model.known(padded.corner_pairs())?)
+        }
         (Held::Whole, Element::Tet10) => {
             let known =
                 KnownDisplacements::try_new(padded.whole_pairs()?).map_err(ModelError::from)?;
@@ -123,7 +125,7 @@ pub(super) fn quadratic_answer(
     let model = assembled(padded.mesh.clone(), Element::Tet10)?;
     let known = known(&model, padded, held)?;
     let stiffness = model.stiffness();
-    let partition = model.check_held(&known.dofs, &[])?;
+    let partition = model.held_partition(&known.dofs)?;
     let bytes = FrontAnalysis::new(stiffness, &partition).peak_bytes::<f64>();
     if bytes > bytes_max {
         return Ok(Err(bytes));

@@ -282,7 +282,7 @@ surface nodes with random displacements; either one of them or all five have nev
 before, the others are random nodes whose columns are kept. Timed is the first frame of the grip, \
 from sending it to having the displacements of all surface nodes in double precision. With prefetch \
 the new nodes are named first, as the client does when a fingertip comes near, and the frame follows \
-after a rest of at least three times the slowest touch so far; the same rest is before every touch, \
+after a rest of at least three times the slowest of the latest eight touches; the same rest is before every touch, \
 so that nothing else is worked on. The four kinds take turns. When the surface is used up the model \
 is dropped and sent anew, and its proof waited for.
 

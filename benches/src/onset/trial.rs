@@ -1,5 +1,6 @@
 //! One touch after the other, with and without prefetch, and the checks of their answers.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -25,6 +26,8 @@ const PROOF_MAX: Duration = Duration::from_secs(120);
 const REST: Duration = Duration::from_millis(5);
 /// A finger comes near a surface for many times as long as its columns take.
 const REST_TOUCHES: f64 = 3.0;
+/// Touches that say how long one takes.
+const RECENT: usize = 8;
 
 /// The first frame of one grip.
 pub(super) struct Trial {
@@ -38,8 +41,8 @@ pub(super) struct Toucher<'a> {
     scene: &'a Pressed,
     connection: ServerConnection,
     model: ModelHash,
-    /// Longest a touch without prefetch has taken, ms.
-    slowest_ms: f64,
+    /// How long the latest touches without prefetch took, ms.
+    recent_ms: VecDeque<f64>,
 }
 
 impl<'a> Toucher<'a> {
@@ -55,7 +58,7 @@ impl<'a> Toucher<'a> {
             Reply::ModelReady(ready) => ready.model,
             other => return Err(unexpected("UploadModel", &other).into()),
         };
-        Ok(Self { scene, connection, model, slowest_ms: 0.0 })
+        Ok(Self { scene, connection, model, recent_ms: VecDeque::new() })
     }
 
     /// Touches until the proof of the error bound, which is made after an upload, is done.
@@ -84,7 +87,8 @@ impl<'a> Toucher<'a> {
         }
         let (ms, answer) = self.ask(grip)?;
         if !is_prefetched {
-            self.slowest_ms = self.slowest_ms.max(ms);
+            self.recent_ms.truncate(RECENT - 1);
+            self.recent_ms.push_front(ms);
         }
         let report = answer.report;
         check(|| "the residual of a first frame".to_owned(), report.residual_rel, ERROR_ALLOWED)?;
@@ -98,13 +102,14 @@ impl<'a> Toucher<'a> {
 
     /// Longer than the columns of a grip take, so that prefetch and strain are done.
     fn rest(&self) {
-        std::thread::sleep(REST + Duration::from_secs_f64(1e-3 * REST_TOUCHES * self.slowest_ms));
+        let slowest_ms = self.recent_ms.iter().copied().fold(0.0, f64::max);
+        std::thread::sleep(REST + Duration::from_secs_f64(1e-3 * REST_TOUCHES * slowest_ms));
     }
 
     fn ask(&mut self, grip: &Grip) -> Result<(f64, Answer), ReportError> {
         let request =
             Request::Frame(FrameRequest { model: self.model, question: self.question(grip) });
-        let (ms, reply) = timed_ms(|| self.connection.ask(&request));
+        let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
         match reply? {
             Reply::Answer(answer) => Ok((ms, *answer)),
             other => Err(unexpected("Frame", &other).into()),
@@ -173,7 +178,7 @@ impl SparseSolve {
     /// Factors the shape with its five touched nodes held, as the base holds two of them.
     pub fn try_new(scene: &Pressed, model: &Model) -> Result<Self, ReportError> {
         let dofs: Vec<u32> = scene.pairs.iter().map(|&(dof, _)| dof).collect();
-        let partition = model.check_held(&dofs, &[])?;
+        let partition = model.held_partition(&dofs)?;
         let analysis = Arc::new(FrontAnalysis::new(model.stiffness(), &partition));
         let rows = analysis.row_count();
         let factor = FrontFactor::try_new(&analysis, model.stiffness())
@@ -181,12 +186,14 @@ impl SparseSolve {
         Ok(Self { factor, rows })
     }
 
-    /// Time of one solve with a unit force, on the current pool, ms.
+    /// Time of one solve with a unit force, on the current pool, ms; the factor is in the caches as
+    /// far as it fits, for one solve goes before.
     pub fn once(&self, row: usize) -> f64 {
-        let mut b = vec![0.0; self.rows];
-        if let Some(b) = b.get_mut(row % self.rows.max(1)) {
+        let mut load = vec![0.0; self.rows];
+        if let Some(b) = load.get_mut(row % self.rows.max(1)) {
             *b = 1.0;
         }
-        timed_ms(|| self.factor.solve_in_place(&mut b, 1)).0
+        self.factor.solve_in_place(&mut load.clone(), 1);
+        timed_ms(|| self.factor.solve_in_place(&mut load, 1)).0
     }
 }

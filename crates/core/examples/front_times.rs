@@ -167,6 +167,7 @@ fn main() {
         let partition = Partition::try_new(&mesh.used_nodes(), &known).expect("contacts exist");
         let rows = partition.unknown().len();
         let b: Vec<f64> = (0..rows * COLUMNS).map(|i| (i as f64 * 0.37).sin()).collect();
+        let mut assembly = [Vec::new(), Vec::new()];
         let pools = [1, 2].map(|threads| {
             rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
         });
@@ -178,6 +179,10 @@ fn main() {
         for _ in 0..RUNS {
             pools[0].install(|| run_faer(&stiffness, &partition, &mut faer));
             for (k, pool) in pools.iter().enumerate() {
+                let clock = Instant::now();
+                let again = pool.install(|| assemble(&pattern, &mesh, &[material]));
+                assembly[k].push(ms(clock));
+                assert_eq!(again.expect("one material").amax(), stiffness.amax());
                 analysis = Some(pool.install(|| {
                     run_front::<f32>(&stiffness, &partition, &b, 1e-2, &mut single[k]);
                     run_front::<f64>(&stiffness, &partition, &b, 1e-10, &mut front[k])
@@ -194,6 +199,8 @@ fn main() {
             analysis.factor_bytes::<f64>() >> 20,
             analysis.peak_bytes::<f64>() >> 20,
         );
+        let [one, two] = assembly.each_mut().map(|times| median(times));
+        println!("  assembly into the pattern: 1 thread {one:.1}, 2 threads {two:.1} ms");
         print("faer", 1, &mut faer);
         for k in 0..2 {
             print("front f64", k + 1, &mut front[k]);

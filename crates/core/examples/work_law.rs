@@ -15,9 +15,11 @@ fn main() {
     println!(
         "shape       element   nodes  tets  blocks/node  flops/N^2  entries/N^4/3  peak/entries"
     );
-    for shape in [BuiltIn::Cube, BuiltIn::Strawberry, BuiltIn::Toothpaste] {
+    for shape in [BuiltIn::Cube, BuiltIn::Sphere, BuiltIn::Strawberry, BuiltIn::Toothpaste] {
         for &size in &sizes {
-            for element in [Element::Tet4, Element::Tet10] {
+            // Ten-node systems are eight times as large.
+            let all = Element::ALL.into_iter();
+            for element in all.filter(|e| *e == Element::Tet4 || size <= 8000) {
                 let mesh = generate(shape, size).expect("a size in range");
                 let material = Material::try_new(1.0, 0.3).expect("in range");
                 let tets = mesh.tets().len();

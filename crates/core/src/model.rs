@@ -5,14 +5,15 @@ use std::sync::Arc;
 use crate::contact::{Mask, MaskError};
 pub use crate::fem::Element;
 use crate::fem::{
-    AssemblyError, Material, QuadraticMesh, Stiffness, StiffnessPattern, StrainSummary,
-    TooManyNodes, assemble, assemble_quadratic, summarise_strain, summarise_strain_quadratic,
+    AssemblyError, Material, NodalPatches, QuadraticMesh, Stiffness, StiffnessPattern,
+    StrainSummary, TooManyNodes, assemble, assemble_nodal_pressure, assemble_quadratic,
+    summarise_strain, summarise_strain_quadratic,
 };
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::condensed::{Base, CondensedError};
 use crate::solve::{
     Analysed, Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition,
-    PartitionError, SolveError, Stage, find_free_motion,
+    PartitionError, RigidBodies, SolveError, Stage, find_free_motion,
 };
 
 /// Everything about a shape that does not depend on which nodes are touched.
@@ -22,9 +23,11 @@ use crate::solve::{
 /// Source: thesis chapter 3 up to (3.39).
 pub struct Model {
     mesh: TetMesh,
+    element: Element,
     /// The same elements with mid-edge nodes behind the corners, for ten-node elements.
     quadratic: Option<QuadraticMesh>,
     bodies: Bodies,
+    rigid: RigidBodies,
     /// For every node of the system (corners first), whether an element uses it.
     used: Vec<bool>,
     stiffness: Arc<Stiffness>,
@@ -86,7 +89,7 @@ pub struct Known {
 }
 
 impl Model {
-    /// Assembles the stiffness of a mesh, with linear or ten-node elements.
+    /// Assembles the stiffness of a mesh with one of the elements.
     ///
     /// Shapes: `materials` one, or one per region; `fixed` degrees of freedom held at zero, in any
     /// order. Units: m, Pa.
@@ -105,10 +108,17 @@ impl Model {
         fixed.dedup();
         Partition::try_new(&mesh.used_nodes(), &fixed)?;
         let bodies = Bodies::from_mesh(&mesh);
+        let rigid = RigidBodies::new(&mesh, &bodies);
         let (quadratic, used, stiffness) = match element {
             Element::Tet4 => {
                 let pattern = Arc::new(StiffnessPattern::new(&mesh));
                 (None, mesh.used_nodes(), assemble(&pattern, &mesh, materials)?)
+            }
+            Element::Tet4Anp => {
+                let patches = NodalPatches::new(&mesh);
+                let pattern = Arc::new(StiffnessPattern::nodal_pressure(&mesh, &patches));
+                let stiffness = assemble_nodal_pressure(&pattern, &mesh, &patches, materials)?;
+                (None, mesh.used_nodes(), stiffness)
             }
             Element::Tet10 => {
                 let quadratic = QuadraticMesh::try_new(&mesh)?;
@@ -118,15 +128,13 @@ impl Model {
                 (Some(quadratic), used, stiffness)
             }
         };
-        Ok(Self { mesh, quadratic, bodies, used, stiffness: Arc::new(stiffness), fixed })
+        let stiffness = Arc::new(stiffness);
+        Ok(Self { mesh, element, quadratic, bodies, rigid, used, stiffness, fixed })
     }
 
     /// The element it is made of.
     pub fn element(&self) -> Element {
-        match self.quadratic {
-            None => Element::Tet4,
-            Some(_) => Element::Tet10,
-        }
+        self.element
     }
 
     /// Number of nodes of the system, mid-edge nodes included.
@@ -185,8 +193,13 @@ impl Model {
 
     /// Bytes held by mesh and stiffness, roughly.
     pub fn bytes(&self) -> usize {
+        // Corners; and for each node of an element the row it adds to, with a place per node.
+        let per_tet = match &self.quadratic {
+            None => 16 + 4 * (8 + 4 * 4),
+            Some(_) => 16 + 40 + 10 * (8 + 4 * 10),
+        };
         self.used.len() * 40
-            + self.mesh.tets().len() * (16 + 4 * 24)
+            + self.mesh.tets().len() * per_tet
             + self.stiffness.pattern().block_count() * 76
     }
 
@@ -249,12 +262,21 @@ impl Model {
     ///
     /// # Errors
     /// [`ModelError::Partition`], [`ModelError::Free`] naming the body and its motion.
-    pub fn check_held(&self, dofs: &[u32], masks: &[Mask]) -> Result<Partition, ModelError> {
-        let partition = Partition::try_new(&self.used, dofs)?;
-        match find_free_motion(&self.mesh, &self.bodies, dofs, masks) {
+    pub fn check_held(&self, dofs: &[u32], masks: &[Mask]) -> Result<(), ModelError> {
+        Partition::check(&self.used, dofs)?;
+        match find_free_motion(&self.mesh, &self.bodies, &self.rigid, dofs, masks) {
             Some(free) => Err(ModelError::Free(free)),
-            None => Ok(partition),
+            None => Ok(()),
         }
+    }
+
+    /// The same for known degrees of freedom alone, and their partition.
+    ///
+    /// # Errors
+    /// As [`Model::check_held`].
+    pub fn held_partition(&self, dofs: &[u32]) -> Result<Partition, ModelError> {
+        self.check_held(dofs, &[])?;
+        Ok(Partition::try_new(&self.used, dofs)?)
     }
 
     /// Base of the condensed engine for this shape.
@@ -262,11 +284,25 @@ impl Model {
     /// # Errors
     /// [`ModelError::Condensed`].
     pub fn condense(&self, on_stage: &mut dyn FnMut(Stage)) -> Result<Base, ModelError> {
-        let Self { mesh, bodies, stiffness, fixed, quadratic, .. } = self;
+        self.condense_within(u64::MAX, on_stage)
+    }
+
+    /// The same where the base's factor may take so much memory only.
+    ///
+    /// Units: `limit` bytes.
+    ///
+    /// # Errors
+    /// [`ModelError::Condensed`].
+    pub fn condense_within(
+        &self,
+        limit: u64,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Base, ModelError> {
+        let Self { mesh, bodies, rigid, stiffness, fixed, quadratic, .. } = self;
         if quadratic.is_some() {
             return Err(ModelError::QuadraticCondensed);
         }
-        Ok(Base::try_new(mesh, bodies, stiffness, fixed, on_stage)?)
+        Ok(Base::try_within(mesh, bodies, rigid, stiffness, fixed, limit, on_stage)?)
     }
 
     /// Orders and analyses `K11` for a set of known degrees of freedom, after making sure that it
@@ -279,7 +315,7 @@ impl Model {
         dofs: &[u32],
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Analysed, ModelError> {
-        let partition = self.check_held(dofs, &[])?;
+        let partition = self.held_partition(dofs)?;
         Ok(Analysed::new(&self.stiffness, partition, on_stage))
     }
 
@@ -297,8 +333,24 @@ impl Model {
         method: Method,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Factored, ModelError> {
-        let partition = self.check_held(dofs, &[])?;
-        Ok(Factored::try_new(&self.stiffness, partition, method, on_stage)?)
+        self.factor_within(dofs, method, u64::MAX, on_stage)
+    }
+
+    /// The same where the factor or inverse may take so much memory only.
+    ///
+    /// Units: `limit` bytes.
+    ///
+    /// # Errors
+    /// Those of [`Model::factor`]; [`SolveError::OverLimit`] with both numbers.
+    pub fn factor_within(
+        &self,
+        dofs: &[u32],
+        method: Method,
+        limit: u64,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Factored, ModelError> {
+        let partition = self.held_partition(dofs)?;
+        Ok(Factored::try_within(&self.stiffness, partition, method, limit, on_stage)?)
     }
 }
 

@@ -5,30 +5,33 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{TetMesh, signed_volume};
-use softgrasp_core::model::{Element, Known, Model, ModelError};
+use softgrasp_core::model::{Element, Model, ModelError};
 use softgrasp_core::solve::Method;
+use softgrasp_core::solve::memory::Way;
 use softgrasp_protocol::{
-    Answer, ElementChoice, ElementName, FrameRequest, MeshData, ModelHash, ModelReady, Prefetch,
-    Question, SolveOnce, UploadModel,
+    Answer, ElementName, FrameRequest, MeshData, ModelHash, ModelReady, Prefetch, Question,
+    SolveOnce, UploadModel,
 };
 
+use crate::admission::{Asking, Ledger, Room};
 use crate::approach::{Approach, is_auto};
 use crate::clock::StageClock;
 use crate::compute::Compute;
 use crate::condensed::StrainOf;
 use crate::config::ServerConfig;
 use crate::direct::Asked;
-use crate::planned::add_locking;
+use crate::planned::{add_locking, given_or_cheapest};
 use crate::question::{check_wishes, checked_forces, pairs};
 use crate::rates::MeasuredRates;
 use crate::reject::Refusal;
-use crate::store::{ModelStore, StoredModel};
+use crate::store::{Allowed, ModelStore, StoredModel};
 use crate::{condensed, direct};
 
 /// What is the same for all requests of a server.
 pub(crate) struct Desk {
     pub config: ServerConfig,
     pub store: ModelStore,
+    pub ledger: Ledger,
     compute: Compute,
     pub rates: MeasuredRates,
 }
@@ -39,24 +42,32 @@ const QUICK_PRODUCTS: usize = 1 << 18;
 impl Desk {
     pub fn new(config: ServerConfig, compute: Compute) -> Self {
         let store = ModelStore::new(config.memory_limit);
-        Self { config, store, compute, rates: MeasuredRates::default() }
+        let ledger = Ledger::new(config.memory_limit);
+        Self { config, store, ledger, compute, rates: MeasuredRates::default() }
     }
 
     /// Mesh, known displacements and partition in one request (thesis 5.1.1).
-    pub fn solve_once(&self, request: SolveOnce, mut clock: StageClock) -> Result<Answer, Refusal> {
+    pub fn solve_once(&self, request: SolveOnce, clock: StageClock) -> Result<Answer, Refusal> {
         let SolveOnce { mesh, materials, element, question } = request;
         check_wishes(&question)?;
-        let plan = self.plan(&mesh, &materials, element, &question, &clock)?;
+        self.check_node_count(&mesh)?;
+        let asking = Asking::once(&mesh, question.known.len());
+        let mut room = self.ledger.room();
+        let plan = self.plan(&asking, &mut room, &materials, element, &question, &clock)?;
         let mut answer = match plan {
-            Some(plan) => self.solve_planned(&plan, mesh, &materials, &question, clock)?,
+            Some(plan) => {
+                self.solve_planned(&plan, &mut room, mesh, &materials, &question, clock)?
+            }
             None => {
-                // What is left to choose here goes by methods that know linear elements only.
-                let element = match element {
-                    ElementChoice::T10 => ElementName::T10,
-                    ElementChoice::T4 | ElementChoice::Auto => ElementName::T4,
-                };
-                let model = self.model(mesh, &materials, element, Vec::new(), &mut clock)?;
-                self.solve_as_asked(model, &question, clock)?
+                let element = given_or_cheapest(element, &materials);
+                self.solve_as_asked(
+                    asking,
+                    &mut room,
+                    (mesh, element),
+                    &materials,
+                    &question,
+                    clock,
+                )?
             }
         };
         add_locking(element, &materials, &mut answer.report);
@@ -66,34 +77,61 @@ impl Desk {
     /// A one-shot request that names its method, or leaves it to the server without a wish.
     fn solve_as_asked(
         &self,
-        model: Model,
+        asking: Asking,
+        room: &mut Room,
+        (mesh, element): (MeshData, ElementName),
+        materials: &[softgrasp_protocol::Material],
         question: &Question,
         mut clock: StageClock,
     ) -> Result<Answer, Refusal> {
         let approach = Approach::for_once(question)?;
+        let ways = approach.ways(question);
+        self.admit(room, &asking.predict(element_of(element), &ways), &asking)?;
+        let model = self.model(mesh, materials, element, Vec::new(), &mut clock)?;
         let known = model.known(pairs(&question.known))?;
         let forces = checked_forces(&model, &known, question)?;
         match approach {
             Approach::Condensed { .. } => {
-                let stored = Arc::new(StoredModel::new(model, usize::MAX));
-                let watch = StrainOf::ThisAnswer;
+                let stored = Arc::new(self.stored(room, model, &mut clock));
+                let watch = StrainOf::ThisAnswer { may_prove: self.may_prove(room, &stored) };
                 condensed::answer(&stored, question, &known, &approach, watch, clock)
             }
-            Approach::Direct { method, because } => {
-                self.check_memory(method, &known, &model)?;
+            Approach::Direct { because, .. } => {
+                let asking = Asking::about(&model, known.dofs.len(), None);
+                let methods: Vec<Method> = ways.iter().filter_map(|way| way.method()).collect();
+                let held = (&asking, model.bytes() as u64);
                 let factored =
-                    model.factor(&known.dofs, method, &mut |stage| clock.begin(stage))?;
+                    self.factor(room, &model, &known.dofs, &methods, held, &mut clock)?;
                 let asked = Asked {
                     question,
                     known,
                     forces,
                     element: name_of(model.element()),
                     factor_reused: false,
-                    chosen_because: because,
+                    chosen_because: because_of(because, &methods, factored.method()),
                 };
                 direct::answer(&model, &factored, asked, clock)
             }
         }
+    }
+
+    /// A model with its base, within the memory that others leave.
+    fn stored(&self, room: &mut Room, model: Model, clock: &mut StageClock) -> StoredModel {
+        let allowed = Allowed { bytes: room.free(), column_cache: self.config.column_cache };
+        let stored = StoredModel::new(model, allowed, &mut |stage| clock.begin(stage));
+        room.settle(stored.lasting_bytes());
+        stored
+    }
+
+    /// Whether there is memory for the second factor that a proof takes.
+    fn may_prove(&self, room: &mut Room, stored: &StoredModel) -> bool {
+        let proof = stored.ready_base().map_or(0, |base| base.proof_bytes());
+        let held = stored.lasting_bytes();
+        let fits = room.take(held.saturating_add(proof), 0);
+        if !fits {
+            tracing::info!(proof, "no memory for the proof of the error bound");
+        }
+        fits
     }
 
     /// Prepares a model and keeps it; the base of the condensed engine is made with it, so that no
@@ -110,11 +148,15 @@ impl Desk {
             Some(stored) => stored,
             None => {
                 let UploadModel { mesh, materials, element, fixed } = upload;
+                self.check_node_count(&mesh)?;
+                let asking = Asking::once(&mesh, fixed.len());
+                let mut room = self.ledger.room();
+                let needs = asking.predict(element_of(element), &Way::SENSIBLE);
+                self.admit(&mut room, &needs, &asking)?;
                 let model = self.model(mesh, &materials, element, fixed, &mut clock)?;
-                let column_bytes = usize::try_from(self.config.column_cache).unwrap_or(usize::MAX);
-                let stored = Arc::new(StoredModel::new(model, column_bytes));
+                let stored = Arc::new(self.stored(&mut room, model, &mut clock));
                 // A shape that cannot be condensed can still be solved by the other methods.
-                if let Err(error) = stored.base(&mut |stage| clock.begin(stage)) {
+                if let Err(error) = stored.base() {
                     tracing::info!(%error, "this shape is not condensed");
                 }
                 self.store.keep(hash, Arc::clone(&stored));
@@ -157,19 +199,34 @@ impl Desk {
             }
             Approach::Direct { method, because } => (method, because),
         };
-        self.check_memory(method, &known, model)?;
-        let kept = stored.factor_for(&known.dofs, method);
+        let methods = match is_auto(&question) {
+            true => vec![method, Method::FrontMixed],
+            false => vec![method],
+        };
+        let kept = |method: &Method| {
+            let is_way = *method == methods[0] || stored.single_only.is_set();
+            is_way.then(|| stored.factor_for(&known.dofs, *method)).flatten()
+        };
+        let kept = methods.iter().find_map(kept);
         let factor_reused = kept.is_some();
         let factored = match kept {
             Some(factored) => factored,
             None => {
-                let made = model.factor(&known.dofs, method, &mut |stage| clock.begin(stage))?;
+                let asking = Asking::about(model, known.dofs.len(), Some(hash));
+                let mut room = self.ledger.room();
+                let held = (&asking, stored.lasting_bytes());
+                let made =
+                    self.factor(&mut room, model, &known.dofs, &methods, held, &mut clock)?;
                 let made = Arc::new(made);
+                if made.method() != methods[0] {
+                    stored.single_only.set();
+                }
                 stored.keep_factor(known.dofs.clone(), Arc::clone(&made));
                 self.store.trim();
                 made
             }
         };
+        let because = because_of(because, &methods, factored.method());
         let asked = Asked {
             question: &question,
             known,
@@ -190,9 +247,13 @@ impl Desk {
 
     /// Proves the eigenvalue bound of a model, from which every later frame's error bound follows.
     pub fn prove(&self, model: ModelHash) {
-        if let Some(stored) = self.store.find(model)
-            && let Ok(base) = stored.base(&mut |_| {})
+        let Some(stored) = self.store.find(model) else { return };
+        let mut room = self.ledger.room();
+        if let Ok(base) = stored.base()
+            && base.eigenvalue_min().is_none()
+            && room.take(base.proof_bytes(), stored.lasting_bytes())
         {
+            base.estimate_condition();
             base.prove_eigenvalue_min();
         }
     }
@@ -206,10 +267,6 @@ impl Desk {
         fixed: Vec<u32>,
         clock: &mut StageClock,
     ) -> Result<Model, Refusal> {
-        let node_count = mesh.vertices.len();
-        if node_count > self.config.max_nodes as usize {
-            return Err(Refusal::TooManyNodes { node_count, max: self.config.max_nodes });
-        }
         if materials.is_empty() {
             return Err(Refusal::NoMaterial);
         }
@@ -221,27 +278,15 @@ impl Desk {
         let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
         let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
         let mesh = TetMesh::try_new(vertices, tets, regions)?;
-        let element = match element {
-            ElementName::T4 => Element::Tet4,
-            ElementName::T10 => Element::Tet10,
-        };
+        let element = element_of(element);
         Ok(Model::try_new(mesh, element, &materials, fixed, &mut |stage| clock.begin(stage))?)
     }
 
-    /// Refuses a dense matrix that does not fit into the memory limit.
-    pub(crate) fn check_memory(
-        &self,
-        method: Method,
-        known: &Known,
-        model: &Model,
-    ) -> Result<(), Refusal> {
-        let unknown_dofs = model.modelled_dofs().saturating_sub(known.dofs.len());
-        let limit = self.config.memory_limit;
-        match method.dense_bytes(unknown_dofs) {
-            Some(needed) if needed > limit => {
-                Err(Refusal::Memory { method: method.to_string(), unknown_dofs, needed, limit })
-            }
-            _ => Ok(()),
+    fn check_node_count(&self, mesh: &MeshData) -> Result<(), Refusal> {
+        let (node_count, max) = (mesh.vertices.len(), self.config.max_nodes);
+        match node_count > max as usize {
+            true => Err(Refusal::TooManyNodes { node_count, max }),
+            false => Ok(()),
         }
     }
 }
@@ -251,6 +296,26 @@ pub(crate) fn name_of(element: Element) -> ElementName {
     match element {
         Element::Tet4 => ElementName::T4,
         Element::Tet10 => ElementName::T10,
+        Element::Tet4Anp => ElementName::T4Anp,
+    }
+}
+
+/// The element behind a name on the wire.
+fn element_of(name: ElementName) -> Element {
+    match name {
+        ElementName::T4 => Element::Tet4,
+        ElementName::T10 => Element::Tet10,
+        ElementName::T4Anp => Element::Tet4Anp,
+    }
+}
+
+/// Why a method was taken, where its like in double precision was larger than allowed.
+fn because_of(because: String, methods: &[Method], taken: Method) -> String {
+    match methods.first() {
+        Some(first) if *first != taken => format!(
+            "{because}; {taken}, because the factor of {first} is larger than the memory allowed"
+        ),
+        _ => because,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use softgrasp_core::model::Known;
 use softgrasp_core::solve::Method;
+use softgrasp_core::solve::memory::Way;
 use softgrasp_protocol::Question;
 
 use crate::reject::Refusal;
@@ -52,7 +53,7 @@ impl Approach {
         if !is_auto(question) && name != CONDENSED && !has_masks {
             return Ok(Self::Direct { method: name.parse()?, because: ASKED.to_owned() });
         }
-        let obstacle = match stored.base(&mut |_| {}) {
+        let obstacle = match stored.base() {
             Err(error) => Some(Refusal::Model(error)),
             Ok(_) if !question.forces.is_empty() => Some(Refusal::CondensedForces),
             Ok(_) => moved_fixed_node(stored, known).map(|node| Refusal::FixedMoved { node }),
@@ -77,6 +78,18 @@ impl Approach {
                 method: Method::Front,
                 because: format!("not condensed: {refusal}"),
             }),
+        }
+    }
+
+    /// Ways that may be gone for one request, the first that fits in memory: a factor that the
+    /// server chose may be one in single precision, refined.
+    pub fn ways(&self, question: &Question) -> Vec<Way> {
+        match *self {
+            Self::Condensed { .. } => vec![Way::Condensed],
+            Self::Direct { method, .. } if is_auto(question) => {
+                [method, Method::FrontMixed].map(Way::Direct).to_vec()
+            }
+            Self::Direct { method, .. } => vec![Way::Direct(method)],
         }
     }
 

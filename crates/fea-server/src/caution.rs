@@ -2,7 +2,10 @@
 //! of the wishes it does not meet.
 
 use softgrasp_core::fem::StrainSummary;
-use softgrasp_protocol::{Question, SolveReport};
+use softgrasp_core::solve::{Certainty, ERROR_SERIOUS, ERROR_UNREMARKABLE};
+use softgrasp_protocol::{Question, SolveReport, WarningLevel};
+
+use crate::reject::Refusal;
 
 /// Linear elasticity errs by the square of the rotation: 1.5 % at 10°.
 const ROTATION_WARNING_DEG: f64 = 10.0;
@@ -27,6 +30,36 @@ pub(crate) fn warnings(summary: StrainSummary) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// Writes into the report how certain the digits are, and refuses an answer without any.
+pub(crate) fn add_certainty(
+    certainty: Certainty,
+    question: &Question,
+    report: &mut SolveReport,
+) -> Result<(), Refusal> {
+    let Certainty { condition, error_rel } = certainty;
+    if certainty.is_none() {
+        return Err(Refusal::Uncertain { method: report.method.clone(), error_rel, condition });
+    }
+    report.condition_estimate = Some(condition);
+    report.error_estimate_rel = Some(error_rel);
+    // Who asks for few digits is not warned of having few.
+    let unremarkable = ERROR_UNREMARKABLE.max(question.max_error.unwrap_or(0.0));
+    if error_rel <= unremarkable {
+        return Ok(());
+    }
+    let (level, few) = match error_rel > ERROR_SERIOUS {
+        true => (WarningLevel::Serious, "few digits are certain"),
+        false => (WarningLevel::Caution, "digits are lost"),
+    };
+    report.warning_level = level;
+    report.warnings.push(format!(
+        "{few}: the displacements are estimated to be off by up to {error_rel:.0e} of the largest \
+         (condition {condition:.0e}); hold nodes further apart, or use a material less near to \
+         incompressible"
+    ));
+    Ok(())
 }
 
 /// Adds a sentence for each wish of the question that the answer does not meet.

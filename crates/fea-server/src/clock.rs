@@ -1,10 +1,39 @@
 //! Stage times of one request, and the memory this process has used at most.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::Instant;
 
 use softgrasp_core::solve::Stage;
 use softgrasp_protocol::StageMs;
+
+/// The stage that the newest request is in, to be looked at from outside.
+#[derive(Clone, Debug, Default)]
+pub struct StageWatch(Arc<AtomicU8>);
+
+impl StageWatch {
+    /// What is being done, in a word; empty while nothing is.
+    pub fn now(&self) -> &'static str {
+        match self.0.load(Ordering::Relaxed) {
+            1 => "assembling",
+            2 => "ordering",
+            3 => "factoring",
+            4 => "solving",
+            _ => "",
+        }
+    }
+
+    fn set(&self, stage: Option<Stage>) {
+        let number = match stage {
+            None => 0,
+            Some(Stage::Assemble) => 1,
+            Some(Stage::Order) => 2,
+            Some(Stage::Factor) => 3,
+            Some(Stage::Solve) => 4,
+        };
+        self.0.store(number, Ordering::Relaxed);
+    }
+}
 
 /// Takes the time between the stages that the core announces.
 #[derive(Clone)]
@@ -12,25 +41,28 @@ pub(crate) struct StageClock {
     decoded: Instant,
     stage_ms: StageMs,
     running: Option<(Stage, Instant)>,
+    watch: StageWatch,
 }
 
 impl StageClock {
     /// Starts with what was measured before the core was called.
-    pub fn new(decode_ms: f64, queued: Instant) -> Self {
+    pub fn new(decode_ms: f64, queued: Instant, watch: StageWatch) -> Self {
         let queue = ms_since(queued);
         let stage_ms = StageMs { decode: decode_ms, queue, ..StageMs::default() };
-        Self { decoded: queued, stage_ms, running: None }
+        Self { decoded: queued, stage_ms, running: None, watch }
     }
 
     /// Ends the running stage and begins another.
     pub fn begin(&mut self, stage: Stage) {
         self.end();
+        self.watch.set(Some(stage));
         self.running = Some((stage, Instant::now()));
     }
 
     /// Ends the running stage.
     pub fn end(&mut self) {
         if let Some((stage, start)) = self.running.take() {
+            self.watch.set(None);
             let ms = ms_since(start);
             match stage {
                 Stage::Assemble => self.stage_ms.assemble += ms,

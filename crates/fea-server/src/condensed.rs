@@ -9,11 +9,12 @@ use softgrasp_core::solve::condensed::{
     Base, Certificate, Contact, ContactAnswer, ContactSet, Touched,
 };
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, ElementName, NodeChoice, Prefetch, Question, SolveReport,
+    Answer, Displacements, DofValue, NodeChoice, Prefetch, Question, SolveReport,
 };
 
+use crate::answer::name_of;
 use crate::approach::Approach;
-use crate::caution::{add_unmet_wishes, warnings};
+use crate::caution::{add_certainty, add_unmet_wishes, warnings};
 use crate::clock::{StageClock, last_peak_rss_bytes, ms_since, peak_rss_bytes};
 use crate::compute::{Compute, Rest};
 use crate::question::{checked_masks, paired, pairs};
@@ -28,8 +29,11 @@ const PREFETCH_TOGETHER: usize = 2;
 /// Which answer the reported strain and rotation belong to.
 #[derive(Clone, Copy)]
 pub(crate) enum StrainOf<'a> {
-    /// The answer itself has to wait for it.
-    ThisAnswer,
+    /// The answer itself has to wait for it, and for the proof if there is memory for one.
+    ThisAnswer {
+        /// Whether there is.
+        may_prove: bool,
+    },
     /// Worked out beside the frames; no frame waits.
     NewestFrame(&'a Compute),
 }
@@ -43,7 +47,7 @@ pub(crate) fn answer(
     watch: StrainOf<'_>,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    let base = stored.base(&mut |stage| clock.begin(stage))?;
+    let base = stored.base()?;
     let (touched, q) = touched(stored, question, known, base.fixed())?;
     let nodes = match &question.want.nodes {
         NodeChoice::All => (0..stored.model.mesh().node_count() as u32).collect(),
@@ -68,9 +72,10 @@ pub(crate) fn answer(
     clock.begin(Stage::Solve);
     let solved = set.solve(&q).map_err(ModelError::from)?;
     let displacement = set.wanted_displacements(&solved);
-    let is_one_request = matches!(watch, StrainOf::ThisAnswer);
-    if is_one_request {
+    let is_one_request = matches!(watch, StrainOf::ThisAnswer { .. });
+    if let StrainOf::ThisAnswer { may_prove: true } = watch {
         // One request has no later frames that a proof in the background could serve.
+        base.estimate_condition();
         base.prove_eigenvalue_min();
     }
     let certificate = set.certify(&base, &q, &solved, &displacement);
@@ -94,6 +99,9 @@ pub(crate) fn answer(
         true => last_peak_rss_bytes(),
         false => peak_rss_bytes(),
     };
+    if let Some(certainty) = set.certainty(&base) {
+        add_certainty(certainty, question, &mut report)?;
+    }
     add_unmet_wishes(question, &mut report);
     if let StrainOf::NewestFrame(compute) = watch {
         watch_strain(compute, stored, &base, set, solved);
@@ -152,7 +160,7 @@ fn report(
     let known_dofs = known.dofs.len() + 3 * set.touched().masks.len();
     SolveReport {
         method: "condensed".to_owned(),
-        element: ElementName::T4,
+        element: name_of(stored.model.element()),
         unknown_dofs: (stored.model.modelled_dofs() - known_dofs) as u64,
         known_dofs: known_dofs as u64,
         residual_rel: certificate.residual_rel,
@@ -222,7 +230,7 @@ fn watch_strain(
 /// Computes the columns of nodes and masks that may be touched soon, a few at a time, letting frames
 /// pass; what does not fit the model is passed over.
 pub(crate) fn prefetch(stored: &StoredModel, hint: &Prefetch) {
-    let Ok(base) = stored.base(&mut |_| {}) else { return };
+    let Ok(base) = stored.base() else { return };
     let node_count = stored.model.mesh().node_count();
     let used = |n: &&u32| (**n as usize) < node_count && stored.model.is_used(**n as usize);
     let nodes = hint.nodes.iter().filter(used).map(|&n| Contact::Node(n));

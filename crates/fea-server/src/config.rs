@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use softgrasp_protocol::Limits;
 
+use crate::clock::StageWatch;
+
 /// Settings of one server.
 #[derive(Clone, Debug)]
 pub struct ServerConfig {
@@ -16,8 +18,7 @@ pub struct ServerConfig {
     pub max_nodes: u32,
     /// Sessions at the same time; one more is turned away.
     pub max_sessions: usize,
-    /// Bytes that models and factors kept between requests, or one request's dense matrix, may
-    /// take.
+    /// Bytes that all that is kept between requests and all that requests under way make may take.
     pub memory_limit: u64,
     /// Bytes of compliance columns kept per model.
     pub column_cache: u64,
@@ -28,6 +29,8 @@ pub struct ServerConfig {
     pub measure_at_start: bool,
     /// A client that stops inside a frame for this long is given up.
     pub stall_limit: Duration,
+    /// Where the stage of the newest request can be read, for whoever started the server.
+    pub stage: StageWatch,
 }
 
 /// Settings that make no sense.
@@ -66,6 +69,7 @@ impl Default for ServerConfig {
             token: None,
             measure_at_start: false,
             stall_limit: Duration::from_secs(30),
+            stage: StageWatch::default(),
         }
     }
 }

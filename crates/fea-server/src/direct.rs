@@ -3,12 +3,12 @@
 use std::time::Instant;
 
 use softgrasp_core::model::{Known, Model};
-use softgrasp_core::solve::{Factored, Loads, Solution};
+use softgrasp_core::solve::{Certainty, Factored, Loads, Solution};
 use softgrasp_protocol::{
     Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
 };
 
-use crate::caution::{add_unmet_wishes, warnings};
+use crate::caution::{add_certainty, add_unmet_wishes, warnings};
 use crate::clock::{StageClock, ms_since, peak_rss_bytes};
 use crate::reject::Refusal;
 
@@ -30,7 +30,7 @@ pub(crate) fn answer(
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
     let solution = solve(model, factored, &asked, &mut clock)?;
-    Ok(gather(model, factored, asked, &solution, clock))
+    gather(model, factored, asked, &solution, clock)
 }
 
 /// Displacements of the whole system, refined or stopped as the question allows.
@@ -54,7 +54,12 @@ pub(crate) fn gather(
     asked: Asked<'_>,
     solution: &Solution,
     clock: StageClock,
-) -> Answer {
+) -> Result<Answer, Refusal> {
+    // A few solves more, once per factor: not where somebody is in a hurry.
+    let certainty = match asked.question.deadline_ms {
+        None => Some(certainty(model, factored, solution)),
+        Some(_) => None,
+    };
     let Asked { question, known, element, factor_reused, chosen_because, .. } = asked;
     let strain = model.strain(&solution.displacement);
     let mut stage_ms = clock.finish();
@@ -78,15 +83,29 @@ pub(crate) fn gather(
         max_rotation_deg: strain.rotation_max.to_degrees(),
         max_strain: strain.strain_max,
         precision: factored.method().precision().to_owned(),
-        condition_estimate: None,
         warnings: warnings(strain),
         peak_rss_bytes: peak_rss_bytes(),
         factor_reused,
         chosen_because,
+        ..SolveReport::default()
     };
+    if let Some(certainty) = certainty {
+        add_certainty(certainty, question, &mut report)?;
+    }
     add_unmet_wishes(question, &mut report);
     let (nodes, mask_forces) = (question.want.nodes.clone(), Vec::new());
-    Answer { report, nodes, displacements, reactions, mask_forces }
+    Ok(Answer { report, nodes, displacements, reactions, mask_forces })
+}
+
+/// How certain the digits are; a method that stops early has an estimate of its own beside rounding.
+pub(crate) fn certainty(model: &Model, factored: &Factored, solution: &Solution) -> Certainty {
+    match solution.error_estimate_rel {
+        None => factored.certainty(model.stiffness(), solution.backward_error),
+        Some(stopped_at) => {
+            let rounding = factored.certainty(model.stiffness(), 0.0);
+            Certainty { error_rel: rounding.error_rel.max(stopped_at), ..rounding }
+        }
+    }
 }
 
 fn no_bound(error_estimate_rel: Option<f64>) -> String {

@@ -5,6 +5,7 @@
 //! [`store`] or in the request) and the [`approach`], [`condensed`] or [`direct`] solves, and the
 //! session writes the reply.
 
+mod admission;
 mod answer;
 mod approach;
 mod caution;
@@ -22,5 +23,8 @@ mod server;
 mod session;
 mod store;
 
+pub use clock::StageWatch;
 pub use config::{ConfigError, ServerConfig};
+pub use memory::available_bytes;
+pub use rates::measure_rates;
 pub use server::{RunningServer, StartError, serve, start};

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
 use fea_server::{ServerConfig, StartError};
+use softgrasp_core::solve::memory::Bytes;
 use tokio::sync::watch;
 
 /// Finite element server of Softgrasp: solves deformations over TCP, once per frame.
@@ -26,12 +27,13 @@ struct Arguments {
     /// Sessions at the same time.
     #[arg(long, value_name = "N", default_value_t = ServerConfig::default().max_sessions)]
     max_sessions: usize,
-    /// Bytes for kept models and factors, and for one request's dense matrix.
-    #[arg(long, value_name = "BYTES", default_value_t = ServerConfig::default().memory_limit)]
-    memory_limit: u64,
-    /// Bytes of compliance columns kept per model.
-    #[arg(long, value_name = "BYTES", default_value_t = ServerConfig::default().column_cache)]
-    column_cache: u64,
+    /// Memory for everything that is kept and worked on: bytes, or 8GiB, 512MiB. What needs more is
+    /// refused before it is made.
+    #[arg(long, value_name = "BYTES", default_value = "8GiB")]
+    memory_limit: Bytes,
+    /// Memory for the compliance columns kept per model: bytes, or 1GiB, 512MiB.
+    #[arg(long, value_name = "BYTES", default_value = "1GiB")]
+    column_cache: Bytes,
     /// File whose first line is the token a client must show.
     #[arg(long, value_name = "F")]
     token_file: Option<PathBuf>,
@@ -76,20 +78,20 @@ fn start_log(form: LogForm) {
 
 fn run(arguments: Arguments) -> anyhow::Result<()> {
     let config = config(&arguments)?;
+    let (stop, stopped) = watch::channel(false);
+    // Before the first thread: all of them leave these signals to the one that waits.
+    softgrasp_signals::on_end_signal(false, move |signal| {
+        tracing::info!(signal = signal.name, "asked to end");
+        let _ = stop.send(true);
+    })
+    .context("cannot wait for the signals that end the server")?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .thread_name("sockets")
         .enable_all()
         .build()
         .context("cannot start the server's sockets")?;
-    runtime.block_on(async {
-        let (stop, stopped) = watch::channel(false);
-        tokio::spawn(async move {
-            wait_for_signal().await;
-            let _ = stop.send(true);
-        });
-        fea_server::serve(config, announce, stopped).await
-    })?;
+    runtime.block_on(fea_server::serve(config, announce, stopped))?;
     tracing::info!("stopped");
     Ok(())
 }
@@ -111,8 +113,8 @@ fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
         threads: arguments.threads.unwrap_or(usual.threads),
         max_nodes: arguments.max_nodes,
         max_sessions: arguments.max_sessions,
-        memory_limit: arguments.memory_limit,
-        column_cache: arguments.column_cache,
+        memory_limit: arguments.memory_limit.0,
+        column_cache: arguments.column_cache.0,
         token,
         measure_at_start: true,
         ..usual
@@ -132,25 +134,6 @@ fn announce(address: SocketAddr) {
     // A closed standard output is no reason not to serve.
     let _ = writeln!(out, "listening on {address}").and_then(|()| out.flush());
     tracing::info!(%address, "ready");
-}
-
-/// Ctrl-C, or the signal that `docker stop` sends.
-async fn wait_for_signal() {
-    #[cfg(unix)]
-    {
-        use tokio::signal::unix::{SignalKind, signal};
-        if let Ok(mut terminate) = signal(SignalKind::terminate()) {
-            tokio::select! {
-                _ = tokio::signal::ctrl_c() => {}
-                _ = terminate.recv() => {}
-            }
-            return;
-        }
-    }
-    if tokio::signal::ctrl_c().await.is_err() {
-        // No signals here: serve until the process is ended from outside.
-        std::future::pending::<()>().await;
-    }
 }
 
 /// The error and its causes in one line; a cause that the line already tells is left out.

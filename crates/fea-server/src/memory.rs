@@ -1,8 +1,56 @@
-//! How much memory the machine has to spare.
+//! How much memory there is to spare, on the machine and in the container.
 
-/// Bytes that can be had without ending somebody's program; `None` where the system does not tell.
-pub(crate) fn available_bytes() -> Option<u64> {
-    let told = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let kib = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    Some(kib.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
+use std::fs::read_to_string;
+use std::path::Path;
+
+/// Bytes that can be had without ending somebody's program: what the machine has available, or what
+/// a container's limit leaves, if that is less; `None` where the system does not tell.
+pub fn available_bytes() -> Option<u64> {
+    let machine = read_to_string("/proc/meminfo").ok();
+    let machine = machine.and_then(|told| bytes_of_line(&told, "MemAvailable:", 1024));
+    let container = ["/sys/fs/cgroup"].iter().find_map(|root| left_in(Path::new(root)));
+    match (machine, container) {
+        (Some(machine), Some(container)) => Some(machine.min(container)),
+        (machine, container) => machine.or(container),
+    }
+}
+
+/// What the limit of a control group (version 2) leaves; pages of files count as free.
+fn left_in(group: &Path) -> Option<u64> {
+    let number = |name: &str| read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
+    let (max, current) = (number("memory.max")?, number("memory.current")?);
+    let stat = read_to_string(group.join("memory.stat")).unwrap_or_default();
+    let files = bytes_of_line(&stat, "inactive_file", 1).unwrap_or(0);
+    Some(max.saturating_sub(current.saturating_sub(files)))
+}
+
+/// The number behind a word at the beginning of a line.
+fn bytes_of_line(text: &str, word: &str, unit: u64) -> Option<u64> {
+    let rest = text.lines().find_map(|line| line.strip_prefix(word))?;
+    rest.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limit_of_a_container_leaves_what_is_not_used_but_by_files() {
+        let group = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(group.path().join(name), text).unwrap();
+        assert_eq!(left_in(group.path()), None);
+        write("memory.max", "max\n");
+        write("memory.current", "700\n");
+        assert_eq!(left_in(group.path()), None, "no limit");
+        write("memory.max", "1000\n");
+        assert_eq!(left_in(group.path()), Some(300));
+        write("memory.stat", "anon 500\ninactive_file 150\n");
+        assert_eq!(left_in(group.path()), Some(450));
+    }
+
+    #[test]
+    fn kibibytes_of_the_machine_become_bytes() {
+        let told = "MemTotal: 9 kB\nMemAvailable:    2048 kB\n";
+        assert_eq!(bytes_of_line(told, "MemAvailable:", 1024), Some(2 << 20));
+    }
 }

@@ -58,6 +58,13 @@ impl MeasuredRates {
     }
 }
 
+/// The speed of this machine with so many threads, for predictions without a server; takes some
+/// hundredths of a second. `None` where it cannot be measured.
+pub fn measure_rates(threads: usize) -> Option<Rates> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;
+    pool.install(measure)
+}
+
 /// Seconds of one run and what it gave.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = Instant::now();

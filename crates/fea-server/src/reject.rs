@@ -7,6 +7,8 @@ use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::{SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
 
+use crate::admission::Shortage;
+
 /// Why a request is refused, before it becomes a message.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Refusal {
@@ -40,17 +42,8 @@ pub(crate) enum Refusal {
     ForceNotFinite { node: u32, value: f64 },
     #[error("a force acts on node {node} along an axis whose displacement is known")]
     ForceOnKnown { node: u32 },
-    #[error(
-        "{method} on {unknown_dofs} unknowns needs {needed} bytes for its matrix, more than the \
-         server's --memory-limit of {limit}; sparse-cholesky needs far less"
-    )]
-    Memory { method: String, unknown_dofs: usize, needed: u64, limit: u64 },
-    #[error(
-        "the factor of {unknown_dofs} unknowns needs up to {needed} bytes while it is made, and \
-         this machine has {available} to spare; use linear elements, fewer nodes, or pcg, which \
-         needs half"
-    )]
-    FactorMemory { unknown_dofs: usize, needed: u64, available: u64 },
+    #[error("{0}")]
+    Memory(Box<Shortage>),
     #[error("{what} is {value}; it must be a finite number above 0, or be left out")]
     Wish { what: &'static str, value: f64 },
     #[error("condensed takes known displacements only, not forces; use front or auto")]
@@ -70,6 +63,13 @@ pub(crate) enum Refusal {
     FixedMoved { node: u32 },
     #[error("the mesh has {node_count} nodes; this server takes {max} (--max-nodes)")]
     TooManyNodes { node_count: usize, max: u32 },
+    #[error(
+        "{method}: no digit of the answer would be certain (estimated error {error_rel:.0e} of the \
+         largest displacement, condition {condition:.0e}): what is known holds the body too weakly, \
+         or the material is too near to incompressible; hold nodes further apart and not in line, or \
+         lower Poisson's ratio"
+    )]
+    Uncertain { method: String, error_rel: f64, condition: f64 },
     #[error("this server wants a token (--token-file); say Hello with the right one first")]
     Token,
     #[error("the server is at fault: the work on this request ended abnormally")]
@@ -92,21 +92,24 @@ impl Refusal {
             Self::Model(ModelError::Free(_)) => RejectCode::RigidMotionFree,
             Self::Model(ModelError::Solve(error)) => match error {
                 SolveError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
-                SolveError::OutOfMemory { .. } => RejectCode::MemoryLimit,
+                SolveError::OutOfMemory { .. } | SolveError::OverLimit { .. } => {
+                    RejectCode::MemoryLimit
+                }
                 _ => RejectCode::BadRequest,
             },
             Self::Model(ModelError::Condensed(error)) => match error {
                 CondensedError::NotHeld => RejectCode::RigidMotionFree,
                 CondensedError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
-                CondensedError::OutOfMemory { .. } | CondensedError::CacheTooSmall { .. } => {
-                    RejectCode::MemoryLimit
-                }
+                CondensedError::OutOfMemory { .. }
+                | CondensedError::OverLimit { .. }
+                | CondensedError::CacheTooSmall { .. } => RejectCode::MemoryLimit,
                 _ => RejectCode::BadRequest,
             },
             Self::MasksNotCondensed(reason) => reason.code(),
             Self::Method(_) => RejectCode::UnknownMethod,
-            Self::Memory { .. } | Self::FactorMemory { .. } => RejectCode::MemoryLimit,
+            Self::Memory(_) => RejectCode::MemoryLimit,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
+            Self::Uncertain { .. } => RejectCode::Uncertain,
             Self::Token => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,
             Self::Limit(_) => RejectCode::TooLarge,
@@ -116,6 +119,10 @@ impl Refusal {
 
     /// The message for the client.
     pub fn to_message(&self) -> Rejected {
-        Rejected { code: self.code(), text: self.to_string(), detail: String::new() }
+        let detail = match self {
+            Self::Memory(shortage) => shortage.detail(),
+            _ => String::new(),
+        };
+        Rejected { code: self.code(), text: self.to_string(), detail }
     }
 }

@@ -189,7 +189,8 @@ impl Session {
         }
         let desk = Arc::clone(&hall.desk);
         let queued = Instant::now();
-        let clock = move || StageClock::new(decode_ms, queued);
+        let watch = hall.desk.config.stage.clone();
+        let clock = move || StageClock::new(decode_ms, queued, watch);
         let run = &hall.compute;
         Ok(Some(match request {
             Request::Hello(hello) => self.welcome(&hello, hall)?,

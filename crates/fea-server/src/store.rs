@@ -1,7 +1,8 @@
 //! Models kept between requests, and their factors, under one memory bound.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Model, ModelError};
@@ -13,10 +14,35 @@ use softgrasp_protocol::ModelHash;
 pub(crate) struct StoredModel {
     pub model: Model,
     factors: Mutex<Vec<(Vec<u32>, Arc<Factored>)>>,
-    base: OnceLock<Result<Arc<Base>, ModelError>>,
+    base: Result<Arc<Base>, ModelError>,
     pub columns: Columns,
+    /// Whether a factor in double precision was larger than allowed.
+    pub single_only: SingleOnly,
     sets: Mutex<Vec<KeptSet>>,
     strain: Mutex<StrainWatch>,
+}
+
+/// Set once a factor in double precision was larger than allowed.
+#[derive(Default)]
+pub(crate) struct SingleOnly(AtomicBool);
+
+impl SingleOnly {
+    pub fn set(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Bytes that a model and what is made for it may take.
+#[derive(Clone, Copy)]
+pub(crate) struct Allowed {
+    /// All of it.
+    pub bytes: u64,
+    /// Columns of the compliance.
+    pub column_cache: u64,
 }
 
 /// A contact set with the rows of the nodes that answers are wanted for.
@@ -38,26 +64,32 @@ const FACTORS_MAX: usize = 4;
 const SETS_MAX: usize = 8;
 
 impl StoredModel {
-    /// A model without anything made for it yet; its columns may take `column_bytes`.
-    pub fn new(model: Model, column_bytes: usize) -> Self {
+    /// A model with the base of the condensed engine, or the reason why it has none; columns get
+    /// what the base leaves.
+    pub fn new(model: Model, allowed: Allowed, on_stage: &mut dyn FnMut(Stage)) -> Self {
+        let left = allowed.bytes.saturating_sub(model.bytes() as u64);
+        let base = model.condense_within(left, on_stage).map(Arc::new);
+        let base_bytes = base.as_ref().map_or(0, |base| base.bytes()) as u64;
+        let column_bytes = allowed.column_cache.min(left.saturating_sub(base_bytes));
         Self {
             model,
             factors: Mutex::default(),
-            base: OnceLock::new(),
-            columns: Columns::new(column_bytes),
+            base,
+            columns: Columns::new(usize::try_from(column_bytes).unwrap_or(usize::MAX)),
+            single_only: SingleOnly::default(),
             sets: Mutex::default(),
             strain: Mutex::default(),
         }
     }
 
-    /// The base of the condensed engine, made now if it is not there.
-    pub fn base(&self, on_stage: &mut dyn FnMut(Stage)) -> Result<Arc<Base>, ModelError> {
-        self.base.get_or_init(|| self.model.condense(on_stage).map(Arc::new)).clone()
+    /// The base of the condensed engine, or why there is none.
+    pub fn base(&self) -> Result<Arc<Base>, ModelError> {
+        self.base.clone()
     }
 
     /// The base, if it has been made.
     pub fn ready_base(&self) -> Option<&Arc<Base>> {
-        self.base.get()?.as_ref().ok()
+        self.base.as_ref().ok()
     }
 
     /// A contact set with the rows of some nodes, if it is kept.
@@ -103,14 +135,19 @@ impl StoredModel {
         factors.push((dofs, factor));
     }
 
+    /// Bytes of the model, the base and its columns: what cannot be dropped without the model.
+    pub fn lasting_bytes(&self) -> u64 {
+        let base = match &self.base {
+            Ok(base) => base.bytes() + self.columns.bytes(base),
+            Err(_) => 0,
+        };
+        (self.model.bytes() + base) as u64
+    }
+
     fn bytes(&self) -> u64 {
         let factors: usize = lock(&self.factors).iter().map(|(_, f)| f.bytes()).sum();
         let sets: usize = lock(&self.sets).iter().map(|kept| kept.set.bytes()).sum();
-        let base = match self.base.get() {
-            Some(Ok(base)) => base.bytes() + self.columns.bytes(base),
-            _ => 0,
-        };
-        (self.model.bytes() + factors + sets + base) as u64
+        self.lasting_bytes() + (factors + sets) as u64
     }
 
     fn drop_factors(&self) {
@@ -164,19 +201,38 @@ impl ModelStore {
     /// Makes room until the bound holds: factors of the models unused for longest, then the
     /// models. The one used last always stays.
     pub fn trim(&self) {
-        let mut kept = lock(&self.kept);
+        let kept = lock(&self.kept);
+        let last = kept.models.iter().max_by_key(|(_, (used, _))| *used).map(|(&hash, _)| hash);
+        Self::trim_to(kept, self.memory_limit, last, false);
+    }
+
+    /// Makes room for what is `promised` to requests under way, in the same order; nothing stays
+    /// for certain but the model `keep`, of which the factors may go.
+    pub fn make_room(&self, promised: u64, keep: Option<ModelHash>) {
+        let bound = self.memory_limit.saturating_sub(promised);
+        Self::trim_to(lock(&self.kept), bound, keep, true);
+    }
+
+    fn trim_to(
+        mut kept: MutexGuard<'_, Kept>,
+        bound: u64,
+        keep: Option<ModelHash>,
+        may_drop_its_factors: bool,
+    ) {
         let mut order: Vec<(u64, ModelHash)> =
             kept.models.iter().map(|(&hash, &(used, _))| (used, hash)).collect();
         order.sort_unstable();
-        order.pop();
         for drop_model in [false, true] {
             for (_, hash) in &order {
                 let total: u64 = kept.models.values().map(|(_, m)| m.bytes()).sum();
-                if total <= self.memory_limit {
+                if total <= bound {
                     return;
                 }
+                let is_kept = keep == Some(*hash);
                 match drop_model {
+                    true if is_kept => {}
                     true => drop(kept.models.remove(hash)),
+                    false if is_kept && !may_drop_its_factors => {}
                     false => {
                         if let Some((_, model)) = kept.models.get(hash) {
                             model.drop_factors();
@@ -204,7 +260,8 @@ mod tests {
         let mesh = generate(BuiltIn::Cube, 64).unwrap();
         let material = Material::try_new(1.0e5, 0.3).unwrap();
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
-        Arc::new(StoredModel::new(model, 1 << 20))
+        let allowed = Allowed { bytes: u64::MAX, column_cache: 1 << 20 };
+        Arc::new(StoredModel::new(model, allowed, &mut |_| {}))
     }
 
     #[test]

@@ -12,7 +12,11 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use softgrasp_core::fem::Material as CoreMaterial;
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
+use softgrasp_core::model::{Element, Model};
+use softgrasp_core::solve::Method;
+use softgrasp_core::solve::memory::{Need, Way};
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
     Answer, DofValue, ElementChoice, Hello, Kind, Limits, Material, MeshData, MethodName, Question,
@@ -110,11 +114,15 @@ struct Client {
 }
 
 impl Client {
-    fn ask(&mut self, request: &Request) -> Reply {
+    fn send(&mut self, request: &Request) {
         self.id += 1;
         let mut bytes = Vec::new();
         request.encode_into(self.id, &Limits::default(), &mut bytes).unwrap();
         self.connection.write_bytes(&bytes).unwrap();
+    }
+
+    fn ask(&mut self, request: &Request) -> Reply {
+        self.send(request);
         let frame = self.connection.read_frame().unwrap().expect("an answer");
         assert_eq!(frame.request_id(), self.id);
         Reply::decode(&frame, &Limits::default()).unwrap()
@@ -128,15 +136,35 @@ impl Client {
     }
 }
 
+/// What the server counts for a request before it makes the factor.
+fn counted(request: &SolveOnce, method: Method) -> Need {
+    let vertices = request.mesh.vertices.iter().copied().map(Into::into).collect();
+    let mesh = TetMesh::try_new(vertices, request.mesh.tets.clone(), vec![]).unwrap();
+    let material = CoreMaterial::try_new(1.0e5, 0.3).unwrap();
+    let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
+    let mut dofs: Vec<u32> = request.question.known.iter().map(|known| known.dof).collect();
+    dofs.sort_unstable();
+    let analysed = model.analyse(&dofs, &mut |_| {}).unwrap();
+    let blocks = model.stiffness().pattern().block_count();
+    let way = Way::Direct(method);
+    Need::counted(Element::Tet4, way, model.bytes() as u64, blocks, analysed.analysis())
+}
+
 /// A cube whose lowest layer is held and one of whose upper corners is pulled.
 fn pulled_cube(nodes: usize, method: &str) -> SolveOnce {
-    let mesh: TetMesh = generate(BuiltIn::Cube, nodes).unwrap();
+    pulled(BuiltIn::Cube, nodes, method)
+}
+
+/// An object whose lowest tenth is held and whose highest node is pulled.
+fn pulled(shape: BuiltIn, nodes: usize, method: &str) -> SolveOnce {
+    let mesh: TetMesh = generate(shape, nodes).unwrap();
     let (low, high) = mesh.bounds();
     let mut known = Vec::new();
+    let top = mesh.vertices().iter().position(|p| p.y >= high.y);
     for (node, p) in mesh.vertices().iter().enumerate() {
         let value = match p.y {
-            y if y <= low.y => 0.0,
-            _ if *p == high => 0.002,
+            y if y <= low.y + 0.1 * (high.y - low.y) => 0.0,
+            _ if Some(node) == top => 0.002,
             _ => continue,
         };
         known.extend((0..3).map(|axis| DofValue { dof: 3 * node as u32 + axis, value }));
@@ -169,6 +197,26 @@ fn first_line_names_the_address_and_both_signals_end_with_exit_code_0() {
         assert_eq!(server.end(), (Some(0), String::new()), "SIG{signal}");
         assert!(TcpStream::connect(server.address).is_err());
     }
+}
+
+/// METIS takes SIGTERM over while it orders: a server that was stopped then died of SIGSEGV.
+#[test]
+fn a_stop_while_metis_orders_does_not_crash() {
+    // Start-up measures this machine on cubes, which are ordered: the signals fall at other
+    // moments of that each time.
+    for turn in 0..12 {
+        let mut server = ServerProcess::start(&["--threads", "1"]);
+        std::thread::sleep(Duration::from_millis(3 * turn));
+        server.signal("TERM");
+        assert_eq!(server.end(), (Some(0), String::new()), "turn {turn}");
+    }
+    // One long ordering, with a session that waits for it.
+    let mut server = ServerProcess::start(&["--threads", "1"]);
+    let mut client = server.connect();
+    client.send(&Request::SolveOnce(Box::new(pulled_cube(8000, "front"))));
+    std::thread::sleep(Duration::from_millis(150));
+    server.signal("TERM");
+    assert_eq!(server.end(), (Some(0), String::new()));
 }
 
 #[test]
@@ -214,6 +262,8 @@ fn wrong_usage_ends_with_exit_code_2() {
         &["--max-nodes", "-5"],
         &["--max-sessions", "0"],
         &["--memory-limit", "0"],
+        &["--memory-limit", "lots"],
+        &["--memory-limit", "0GiB"],
         &["--log", "xml"],
         &["stray"],
     ] {
@@ -295,6 +345,35 @@ fn announced_sizes_take_no_memory() {
     assert!(matches!(client.ask(&sound()), Reply::Answer(_)));
     let grown = server.peak_bytes().unwrap() - before;
     assert!(grown < 16 * MIB, "grown by {} MiB", grown / MIB);
+}
+
+/// Growth of a fresh process over one solve, against what was counted before the factor was made.
+fn check_counted_memory(method: Method, shape: BuiltIn, nodes: usize) {
+    let server = ServerProcess::start(&["--threads", "2", "--memory-limit", "1GiB"]);
+    let mut client = server.connect();
+    client.solve(pulled_cube(64, method.name()));
+    let Some(before) = server.peak_bytes() else {
+        println!("skipped: this system does not tell a process's memory");
+        return;
+    };
+    let request = pulled(shape, nodes, method.name());
+    let need = counted(&request, method).bytes();
+    let grown = {
+        assert_eq!(client.solve(request).report.method, method.name());
+        server.peak_bytes().unwrap().saturating_sub(before)
+    };
+    println!("{method}, {nodes} nodes: grown by {} of {} MiB", grown / MIB, need / MIB);
+    // The count is an upper bound for any number of threads and knows whole squares of which a
+    // triangle is touched; the process has a few MiB of its own beside it.
+    assert!(grown <= need + need / 4 + 24 * MIB, "{grown} of {need}");
+    assert!(grown >= need / 4, "{grown} of {need}: the count is far too large");
+}
+
+#[test]
+fn counted_memory_is_that_which_is_taken() {
+    check_counted_memory(Method::Front, BuiltIn::Sphere, 6000);
+    check_counted_memory(Method::FrontMixed, BuiltIn::Cube, 8000);
+    check_counted_memory(Method::Front, BuiltIn::Toothpaste, 8000);
 }
 
 /// Peak of one dense solve in a fresh process: 2.2 n² × 8 bytes and 64 MiB.

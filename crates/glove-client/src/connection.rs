@@ -3,12 +3,14 @@
 use std::fmt;
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
 use std::str::FromStr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use fea_server::{RunningServer, ServerConfig, StartError};
+use fea_server::{RunningServer, ServerConfig, StageWatch, StartError};
+use softgrasp_core::solve::rates::Rates;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
-    ConnectionError, DecodeError, EncodeError, Hello, Limits, Rejected, Reply, Request, Welcome,
+    ConnectionError, DecodeError, EncodeError, Frame, Hello, Limits, Rejected, Reply, Request,
+    Welcome,
 };
 
 /// Where the finite element server is.
@@ -101,12 +103,15 @@ pub struct ServerConnection {
 /// An address to connect to, and the server behind it if it is this process's own.
 pub struct Host {
     address: String,
+    stage: StageWatch,
     // Stops when dropped.
     _embedded: Option<RunningServer>,
 }
 
 /// A server that does not accept within this time is not there.
 const CONNECT_MAX: Duration = Duration::from_secs(5);
+/// A reply that has not begun to come by then is slept for.
+const AWAKE_MAX: Duration = Duration::from_micros(300);
 
 impl Host {
     /// Starts the embedded server, or takes the address as given.
@@ -114,16 +119,45 @@ impl Host {
     /// # Errors
     /// [`LinkError::Start`].
     pub fn open(choice: &ServerChoice, threads: Option<usize>) -> Result<Self, LinkError> {
+        Self::open_within(choice, threads, None)
+    }
+
+    /// The same with a memory limit for the embedded server; another server has its own.
+    ///
+    /// Units: `memory_limit` bytes.
+    ///
+    /// # Errors
+    /// [`LinkError::Start`].
+    pub fn open_within(
+        choice: &ServerChoice,
+        threads: Option<usize>,
+        memory_limit: Option<u64>,
+    ) -> Result<Self, LinkError> {
+        let stage = StageWatch::default();
         match choice {
-            ServerChoice::At(address) => Ok(Self { address: address.clone(), _embedded: None }),
+            ServerChoice::At(address) => {
+                Ok(Self { address: address.clone(), stage, _embedded: None })
+            }
             ServerChoice::Embedded => {
                 let usual = ServerConfig::default();
-                let threads = threads.unwrap_or(usual.threads);
-                let listen = SocketAddr::from(([127, 0, 0, 1], 0));
-                let server = fea_server::start(ServerConfig { listen, threads, ..usual })?;
-                Ok(Self { address: server.address().to_string(), _embedded: Some(server) })
+                let config = ServerConfig {
+                    listen: SocketAddr::from(([127, 0, 0, 1], 0)),
+                    threads: threads.unwrap_or(usual.threads),
+                    memory_limit: memory_limit.unwrap_or(usual.memory_limit),
+                    stage: stage.clone(),
+                    ..usual
+                };
+                let server = fea_server::start(config)?;
+                Ok(Self { address: server.address().to_string(), stage, _embedded: Some(server) })
             }
         }
+    }
+
+    /// What the embedded server is doing now, in a word; empty while it does nothing, and for a
+    /// server elsewhere.
+    pub fn stage(&self) -> impl Fn() -> &'static str + Send + Sync + Clone + 'static {
+        let stage = self.stage.clone();
+        move || stage.now()
     }
 
     /// Connects and introduces this client.
@@ -187,16 +221,44 @@ impl ServerConnection {
     pub fn ask(&mut self, request: &Request) -> Result<Reply, LinkError> {
         let request_id = self.send(request)?;
         loop {
-            let frame = self.connection.read_frame()?.ok_or(LinkError::Closed)?;
-            // Id 0 is the server speaking on its own: turned away, stopping, bad stream.
-            if frame.request_id() != request_id && frame.request_id() != 0 {
-                continue;
+            let frame = self.connection.read_frame()?;
+            if let Some(reply) = reply_in(frame, request_id)? {
+                return Ok(reply);
             }
-            return match Reply::decode(&frame, &Limits::default())? {
-                Reply::Rejected(rejected) => Err(LinkError::Rejected(rejected)),
-                reply => Ok(reply),
-            };
         }
+    }
+
+    /// The same for what is answered within a tick: looks for the reply without sleeping for a
+    /// moment, because waking a thread takes as long as solving a frame.
+    ///
+    /// # Errors
+    /// As [`Self::ask`].
+    pub fn ask_awake(&mut self, request: &Request) -> Result<Reply, LinkError> {
+        let request_id = self.send(request)?;
+        loop {
+            let frame = self.read_frame_awake()?;
+            if let Some(reply) = reply_in(frame, request_id)? {
+                return Ok(reply);
+            }
+        }
+    }
+
+    /// Next frame; sleeps only for one that has not come after [`AWAKE_MAX`].
+    fn read_frame_awake(&mut self) -> Result<Option<Frame>, ConnectionError> {
+        let start = Instant::now();
+        self.connection.stream().set_nonblocking(true)?;
+        let early = loop {
+            match self.connection.read_frame() {
+                Err(ConnectionError::ReadTimedOut { .. }) if start.elapsed() < AWAKE_MAX => {
+                    // Whoever is to answer may need this processor.
+                    std::thread::yield_now();
+                }
+                Err(ConnectionError::ReadTimedOut { .. }) => break None,
+                frame => break Some(frame),
+            }
+        };
+        self.connection.stream().set_nonblocking(false)?;
+        early.unwrap_or_else(|| self.connection.read_frame())
     }
 
     /// Sends a request without waiting; the id its reply will carry.
@@ -209,6 +271,44 @@ impl ServerConnection {
         request.encode_into(self.request_id, &self.limits, &mut self.out)?;
         self.connection.write_bytes(&self.out)?;
         Ok(self.request_id)
+    }
+}
+
+/// The reply in a frame; `None` for one to an abandoned request.
+fn reply_in(frame: Option<Frame>, request_id: u64) -> Result<Option<Reply>, LinkError> {
+    let frame = frame.ok_or(LinkError::Closed)?;
+    // Id 0 is the server speaking on its own: turned away, stopping, bad stream.
+    if frame.request_id() != request_id && frame.request_id() != 0 {
+        return Ok(None);
+    }
+    match Reply::decode(&frame, &Limits::default())? {
+        Reply::Rejected(rejected) => Err(LinkError::Rejected(rejected)),
+        reply => Ok(Some(reply)),
+    }
+}
+
+/// What this machine is like for a server in this process.
+pub struct OwnMachine {
+    /// Speeds of its threads; `None` where they cannot be measured.
+    pub rates: Option<Rates>,
+    /// Threads of an embedded server.
+    pub threads: usize,
+    /// Bytes it has to spare; `None` where the system does not tell.
+    pub available_bytes: Option<u64>,
+    /// Memory limit of a server that was not told another, bytes.
+    pub usual_limit_bytes: u64,
+}
+
+impl OwnMachine {
+    /// Measures for some hundredths of a second.
+    pub fn measure() -> Self {
+        let ServerConfig { threads, memory_limit, .. } = ServerConfig::default();
+        Self {
+            rates: fea_server::measure_rates(threads),
+            threads,
+            available_bytes: fea_server::available_bytes(),
+            usual_limit_bytes: memory_limit,
+        }
     }
 }
 

@@ -40,7 +40,7 @@ impl DiscretisationEstimate {
     ) -> Self {
         let first = answer.report.element;
         let other = match first {
-            ElementName::T4 => ElementChoice::T10,
+            ElementName::T4 | ElementName::T4Anp => ElementChoice::T10,
             ElementName::T10 => ElementChoice::T4,
         };
         let mut second = request.clone();
@@ -58,7 +58,7 @@ impl DiscretisationEstimate {
             }
         };
         let (linear, quadratic) = match first {
-            ElementName::T4 => (displacements, second.as_slice()),
+            ElementName::T4 | ElementName::T4Anp => (displacements, second.as_slice()),
             ElementName::T10 => (second.as_slice(), displacements),
         };
         match difference_rel(linear, quadratic) {

@@ -36,6 +36,8 @@ pub enum Pace {
 pub struct SolveSettings {
     /// Its material.
     pub material: Material,
+    /// Element of the model.
+    pub element: ElementName,
     /// Method asked for.
     pub method: MethodName,
     /// What a fingertip holds.
@@ -333,7 +335,7 @@ impl GraspLoop {
         let upload = UploadModel {
             mesh: mesh_data(self.object.rest()),
             materials: vec![self.settings.material],
-            element: ElementName::T4,
+            element: self.settings.element,
             fixed: Vec::new(),
         };
         self.link.set_model(ModelOrder {

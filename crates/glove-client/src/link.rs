@@ -334,7 +334,7 @@ fn ask_frame(
     let question = frame.question.clone();
     let start = Instant::now();
     let asked = Request::Frame(FrameRequest { model: model.hash, question });
-    match connection.ask(&asked)? {
+    match connection.ask_awake(&asked)? {
         Reply::Answer(answer) => Ok(LinkEvent::Answer {
             tick: frame.tick,
             rest_shape: model.rest_shape,

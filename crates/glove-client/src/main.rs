@@ -7,6 +7,7 @@ use glove_client::commands::inspect::InspectCommand;
 use glove_client::commands::mesh::MeshCommand;
 use glove_client::commands::run::RunCommand;
 use glove_client::commands::solve::SolveCommand;
+use glove_client::interruption;
 
 /// Grasp and squeeze a soft object with an instrumented glove.
 #[derive(Parser)]
@@ -27,6 +28,7 @@ enum Command {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     start_log();
+    interruption::watch();
     let outcome = match arguments.command.unwrap_or_else(|| Command::Run(RunCommand::default())) {
         Command::Run(command) => command.run(),
         Command::Solve(command) => command.run(),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 /// Shows what is being done until it is dropped.
 pub struct Progress {
@@ -19,6 +19,18 @@ impl Progress {
         bar.set_message(what.to_owned());
         bar.enable_steady_tick(Duration::from_millis(120));
         Self { bar }
+    }
+
+    /// Says behind the message, and anew with every sign of life, what `now` tells at that moment.
+    pub fn watch(&self, now: impl Fn() -> &'static str + Send + Sync + Clone + 'static) {
+        let template = ProgressStyle::with_template("{spinner} {msg} {now} ({elapsed})");
+        if let Ok(style) = template {
+            let write = move |_: &ProgressState, text: &mut dyn std::fmt::Write| {
+                // A bar that cannot be drawn is no reason to stop.
+                let _ = text.write_str(now());
+            };
+            self.bar.set_style(style.with_key("now", write));
+        }
     }
 
     /// Says what is done now.

@@ -51,6 +51,8 @@ pub struct SceneFile {
     pub poisson: Option<f64>,
     /// Method's name, or auto.
     pub method: Option<String>,
+    /// t4, t4-anp or auto.
+    pub element: Option<String>,
     /// vertex, patch or mask.
     pub contact: Option<String>,
 }
@@ -157,6 +159,13 @@ pub fn load_object(
             ));
             if !findings.flipped.is_empty() {
                 notes.push(format!("{} inverted tetrahedra were turned", findings.flipped.len()));
+            }
+            let dropped = findings.degenerate.len() + findings.repeated.len();
+            if dropped > 0 {
+                notes.push(format!(
+                    "{dropped} tetrahedra without volume, or repeated, were dropped; `glove-client \
+                     inspect` lists them"
+                ));
             }
             largest_piece(&file.mesh, &mut notes)
         }

@@ -25,6 +25,12 @@ pub struct SolveSummary {
     pub residual_rel: f64,
     /// Proven bound on the relative error, or null.
     pub error_bound_rel: Option<f64>,
+    /// Estimate of the largest error over the largest displacement, or null where none was made.
+    pub error_estimate_rel: Option<f64>,
+    /// Estimate of how much errors of rounding can grow, or null.
+    pub condition_estimate: Option<f64>,
+    /// `none`, `caution` (digits are lost) or `serious` (few are left), by the estimate.
+    pub warning_level: &'static str,
     /// Why there is no bound; null when there is one.
     pub why: Option<String>,
     /// Refinement steps taken.
@@ -81,6 +87,9 @@ impl SolveSummary {
             round_trip_ms,
             residual_rel: report.residual_rel,
             error_bound_rel: report.error_bound_rel,
+            error_estimate_rel: report.error_estimate_rel,
+            condition_estimate: report.condition_estimate,
+            warning_level: report.warning_level.as_str(),
             why,
             refinement_steps: report.refinement_steps,
             max_rotation_deg: report.max_rotation_deg,

@@ -5,7 +5,7 @@ use crate::{FrameError, Limits};
 /// First bytes of every frame.
 pub const MAGIC: [u8; 4] = *b"SGRP";
 /// Version of the format this crate reads and writes.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Bytes of a header.
 pub const HEADER_LEN: usize = 32;
 

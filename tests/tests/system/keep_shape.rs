@@ -10,7 +10,7 @@ use glove_client::soft_object::SoftObject;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::{Command, Grasp, StateName};
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_protocol::{Material, MethodName, ModelHash, Reply, Request};
+use softgrasp_protocol::{ElementName, Material, MethodName, ModelHash, Reply, Request};
 use softgrasp_tests::fake_server::start_fake_server;
 use softgrasp_tests::questions::{cube, frame, upload};
 use softgrasp_tests::raw_session::{RawSession, request_frame};
@@ -70,6 +70,7 @@ fn shape_with_elements_inside_out_is_not_kept_and_the_grasp_goes_on() {
     let mut hand = ScriptedHand::try_new(ScriptName::Squeeze, setup.clone(), &object).unwrap();
     let settings = SolveSettings {
         material: Material { young: 2.0e4, poisson: 0.4 },
+        element: ElementName::T4,
         method: MethodName::auto(),
         contact: ContactModel::Vertex,
         subscription: Subscription::Surface,

@@ -13,6 +13,7 @@ mod engine;
 mod keep_shape;
 mod many_clients;
 mod masks;
+mod memory;
 mod same_bits;
 mod start;
 mod stopping;

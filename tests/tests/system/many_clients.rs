@@ -99,8 +99,8 @@ fn two_clients_share_a_model_and_its_factor() {
 
 #[test]
 fn model_that_had_to_make_room_is_unknown_and_may_be_uploaded_again() {
-    // Two cubes of 216 nodes take about 1 MB each with their factors.
-    let limit = ServerConfig { memory_limit: 1_000_000, ..config(1) };
+    // The cubes take about 3, 6 and 13 MB with what is made for them.
+    let limit = ServerConfig { memory_limit: 12_000_000, ..config(1) };
     let server = fea_server::start(limit).unwrap();
     let mut connection = client(&server);
     let meshes = [cube(216), cube(343), cube(512)];

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Material, QuadraticMesh, StiffnessPattern, dof, tet4, tet10};
+use super::{Material, NodalPatches, QuadraticMesh, StiffnessPattern, dof, tet4, tet10};
 use crate::mesh::TetMesh;
 
 /// Global stiffness `kᵍ` as 3 × 3 blocks on a [`StiffnessPattern`]; both triangles are stored.
@@ -48,8 +48,7 @@ pub fn assemble(
     materials: &[Material],
 ) -> Result<Stiffness, AssemblyError> {
     let lame = LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
-    let gradients: Vec<tet4::Gradients> =
-        (0..mesh.tets().len()).into_par_iter().map(|t| tet4::gradients(&mesh.corners(t))).collect();
+    let gradients = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
     let blocks = assemble_rows(pattern, |tet, corner| {
         let (lambda, mu) = lame.of(tet);
         let block = |c| tet4::stiffness_block(&gradients[tet], corner, c, lambda, mu);
@@ -72,14 +71,59 @@ pub fn assemble_quadratic(
     materials: &[Material],
 ) -> Result<Stiffness, AssemblyError> {
     let lame = LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
-    let gradients: Vec<tet4::Gradients> =
-        (0..mesh.tets().len()).into_par_iter().map(|t| tet4::gradients(&mesh.corners(t))).collect();
+    let gradients = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
     let blocks = assemble_rows(pattern, |tet, local| {
         let (lambda, mu) = lame.of(tet);
         tet10::stiffness_row(&gradients[tet], local, lambda, mu)
     });
     Ok(Stiffness { pattern: Arc::clone(pattern), blocks })
 }
+
+/// [`assemble`] with the pressure averaged around each node, on the pattern of
+/// [`StiffnessPattern::nodal_pressure`]: the change of shape by elements, then
+/// `V_a κ gᵢ gⱼᵀ` of every patch.
+///
+/// Shapes and units: as there; `patches` those of the mesh.
+///
+/// # Errors
+/// [`AssemblyError::NoMaterial`] if a region label has no material.
+///
+/// Source: [`NodalPatches`].
+pub fn assemble_nodal_pressure(
+    pattern: &Arc<StiffnessPattern>,
+    mesh: &TetMesh,
+    patches: &NodalPatches,
+    materials: &[Material],
+) -> Result<Stiffness, AssemblyError> {
+    let lame = LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
+    let gradients = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
+    let mut blocks = assemble_rows(pattern, |tet, corner| {
+        // The deviator's energy is that of λ = −2μ/3.
+        let (_, mu) = lame.of(tet);
+        let block = |c| tet4::stiffness_block(&gradients[tet], corner, c, -2.0 / 3.0 * mu, mu);
+        [block(0), block(1), block(2), block(3)]
+    });
+    for_each_row(pattern, &mut blocks, |node, row| {
+        let columns = pattern.columns(node);
+        for patch in patches.of_node(node) {
+            let (lambda, mu) = lame.of(patch.tet);
+            let bulk = lambda + 2.0 / 3.0 * mu;
+            let own = patch.nodes.partition_point(|&n| (n as usize) < node);
+            let of_own = patch.gradients[own] * (bulk * patch.volume);
+            for (other, gradient) in patch.nodes.iter().zip(patch.gradients) {
+                let block = &mut row[columns.partition_point(|c| c < other)];
+                for (entry, (r, c)) in block.iter_mut().zip(ROWS_AND_COLUMNS) {
+                    *entry += of_own[r] * gradient[c];
+                }
+            }
+        }
+    });
+    Ok(Stiffness { pattern: Arc::clone(pattern), blocks })
+}
+
+/// Row and column of the nine entries of a block.
+const ROWS_AND_COLUMNS: [(usize, usize); 9] =
+    [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)];
 
 /// Sums every block row over the elements around its node, in element order.
 ///
@@ -90,14 +134,7 @@ fn assemble_rows<const K: usize>(
 ) -> Vec<[f64; 9]> {
     assert_eq!(pattern.nodes_per_tet(), K, "the pattern is that of another element");
     let mut blocks = vec![[0.0; 9]; pattern.block_count()];
-    let mut rows = Vec::with_capacity(pattern.node_count());
-    let mut rest = blocks.as_mut_slice();
-    for node in 0..pattern.node_count() {
-        let (row, tail) = rest.split_at_mut(pattern.row(node).len());
-        rows.push(row);
-        rest = tail;
-    }
-    rows.into_par_iter().enumerate().with_min_len(64).for_each(|(node, row)| {
+    for_each_row(pattern, &mut blocks, |node, row| {
         for c in pattern.around::<K>(node) {
             for (&slot, added) in c.slots.iter().zip(element_row(c.tet, c.local)) {
                 for (entry, term) in row[slot as usize].iter_mut().zip(added) {
@@ -107,6 +144,22 @@ fn assemble_rows<const K: usize>(
         }
     });
     blocks
+}
+
+/// Calls `fill(node, blocks of its row)` for every row, rows in parallel.
+fn for_each_row(
+    pattern: &StiffnessPattern,
+    blocks: &mut [[f64; 9]],
+    fill: impl Fn(usize, &mut [[f64; 9]]) + Sync,
+) {
+    let mut rows = Vec::with_capacity(pattern.node_count());
+    let mut rest = blocks;
+    for node in 0..pattern.node_count() {
+        let (row, tail) = rest.split_at_mut(pattern.row(node).len());
+        rows.push(row);
+        rest = tail;
+    }
+    rows.into_par_iter().enumerate().with_min_len(64).for_each(|(node, row)| fill(node, row));
 }
 
 /// `(λ, μ)` of every element; one material serves every label.

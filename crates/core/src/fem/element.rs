@@ -1,20 +1,34 @@
 //! The finite elements there are.
 
-/// Which finite element a model is made of.
+/// Which finite element a model is made of, in the order of what they cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Element {
     /// Linear tetrahedron (thesis chapter 3).
     #[default]
     Tet4,
+    /// Linear tetrahedron whose pressure is averaged around each node: it does not lock.
+    Tet4Anp,
     /// Ten-node tetrahedron; its mid-edge nodes are made from the linear mesh.
     Tet10,
 }
 
 impl Element {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Tet4, Self::Tet4Anp, Self::Tet10];
+
+    /// Name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tet4 => "t4",
+            Self::Tet4Anp => "t4-anp",
+            Self::Tet10 => "t10",
+        }
+    }
+
     /// Nodes of one element.
     pub const fn node_count(self) -> usize {
         match self {
-            Self::Tet4 => 4,
+            Self::Tet4 | Self::Tet4Anp => 4,
             Self::Tet10 => 10,
         }
     }

@@ -71,6 +71,11 @@ impl Material {
         self.young * self.poisson / ((1.0 + self.poisson) * (1.0 - 2.0 * self.poisson))
     }
 
+    /// Bulk modulus `κ = E / (3 (1 − 2ν))`, Pa.
+    pub fn bulk_modulus(&self) -> f64 {
+        self.young / (3.0 * (1.0 - 2.0 * self.poisson))
+    }
+
     /// Stress from strain, `σ = D ε`, order `x y z yz zx xy` with engineering shear.
     ///
     /// Shapes: 6 × 6. Units: Pa.

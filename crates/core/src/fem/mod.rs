@@ -3,15 +3,19 @@
 mod assembly;
 mod element;
 mod material;
+mod nodal_patches;
 mod pattern;
 mod quadratic_mesh;
 mod strain;
 pub mod tet10;
 pub mod tet4;
 
-pub use assembly::{AssemblyError, Stiffness, assemble, assemble_quadratic};
+pub use assembly::{
+    AssemblyError, Stiffness, assemble, assemble_nodal_pressure, assemble_quadratic,
+};
 pub use element::Element;
 pub use material::{Material, MaterialError};
+pub use nodal_patches::NodalPatches;
 pub use pattern::StiffnessPattern;
 pub use quadratic_mesh::{QuadraticMesh, TooManyNodes};
 pub use strain::{StrainSummary, summarise_strain, summarise_strain_quadratic};

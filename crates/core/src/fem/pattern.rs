@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::QuadraticMesh;
+use super::{NodalPatches, QuadraticMesh};
 use crate::mesh::TetMesh;
 
 /// Sparsity pattern of `kᵍ` by 3 × 3 node blocks, and for each block row the elements that add to
@@ -49,25 +49,39 @@ impl StiffnessPattern {
     ///
     /// Shapes: N nodes give N block rows.
     pub fn new(mesh: &TetMesh) -> Self {
-        Self::from_elements(mesh.node_count(), mesh.tets())
+        Self::from_elements(mesh.node_count(), mesh.tets(), None)
+    }
+
+    /// Pattern of a linear mesh with averaged nodal pressure: nodes of one patch see each other, so a
+    /// row reaches as far as two elements.
+    ///
+    /// Shapes: N nodes give N block rows.
+    pub fn nodal_pressure(mesh: &TetMesh, patches: &NodalPatches) -> Self {
+        Self::from_elements(mesh.node_count(), mesh.tets(), Some(patches))
     }
 
     /// Pattern of a ten-node mesh.
     ///
     /// Shapes: N + E nodes give as many block rows.
     pub fn quadratic(mesh: &QuadraticMesh) -> Self {
-        Self::from_elements(mesh.node_count(), mesh.tets())
+        Self::from_elements(mesh.node_count(), mesh.tets(), None)
     }
 
     /// Pattern of elements of K nodes each; every node index must be below `node_count`.
-    fn from_elements<const K: usize>(node_count: usize, tets: &[[u32; K]]) -> Self {
+    fn from_elements<const K: usize>(
+        node_count: usize,
+        tets: &[[u32; K]],
+        patches: Option<&NodalPatches>,
+    ) -> Self {
         let (around_start, tets_around) = elements_around(node_count, tets);
         let rows: Vec<BlockRow> = (0..node_count)
             .into_par_iter()
             .with_min_len(64)
             .map(|node| {
                 let around = &tets_around[around_start[node]..around_start[node + 1]];
-                block_row(tets, node as u32, around)
+                let patches = patches.into_iter().flat_map(|p| p.of_node(node));
+                let further = patches.flat_map(|patch| patch.nodes.iter().copied());
+                block_row(tets, node as u32, around, further)
             })
             .collect();
         let mut row_start = Vec::with_capacity(rows.len() + 1);
@@ -125,7 +139,10 @@ impl StiffnessPattern {
 }
 
 /// For each node the elements that use it, in element order (counting sort).
-fn elements_around<const K: usize>(node_count: usize, tets: &[[u32; K]]) -> (Vec<usize>, Vec<u32>) {
+pub(super) fn elements_around<const K: usize>(
+    node_count: usize,
+    tets: &[[u32; K]],
+) -> (Vec<usize>, Vec<u32>) {
     let mut start = vec![0usize; node_count + 1];
     for &n in tets.iter().flatten() {
         start[n as usize + 1] += 1;
@@ -151,8 +168,14 @@ struct BlockRow {
     slots: Vec<u32>,
 }
 
-fn block_row<const K: usize>(tets: &[[u32; K]], node: u32, tets_around: &[u32]) -> BlockRow {
+fn block_row<const K: usize>(
+    tets: &[[u32; K]],
+    node: u32,
+    tets_around: &[u32],
+    further: impl Iterator<Item = u32>,
+) -> BlockRow {
     let mut columns: Vec<u32> = tets_around.iter().flat_map(|&t| tets[t as usize]).collect();
+    columns.extend(further);
     columns.sort_unstable();
     columns.dedup();
     let mut around = Vec::with_capacity(tets_around.len());

@@ -5,6 +5,7 @@
 //! needs no 6 × 12 matrices. A test holds them together.
 
 use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
+use rayon::prelude::*;
 
 use super::Material;
 
@@ -67,6 +68,14 @@ pub fn gradients(corners: &[Point3<f64>; 4]) -> Gradients {
         (a.column(0).into_owned(), a.column(1).into_owned(), a.column(2).into_owned());
     let g4 = -(g1 + g2 + g3);
     Gradients { of_shape: [g1, g2, g3, g4], volume: j.determinant().abs() / 6.0 }
+}
+
+/// [`gradients`] of all elements of a mesh, in parallel.
+pub(super) fn gradients_of(
+    tet_count: usize,
+    corners: impl Fn(usize) -> [Point3<f64>; 4] + Sync,
+) -> Vec<Gradients> {
+    (0..tet_count).into_par_iter().map(|tet| gradients(&corners(tet))).collect()
 }
 
 /// Strain–displacement matrix `B`, so that `ε = B q`; strain order `x y z yz zx xy`.

@@ -31,18 +31,25 @@ pub struct Bodies {
 impl Bodies {
     /// Labels the parts of a mesh.
     pub fn from_mesh(mesh: &TetMesh) -> Self {
-        let mut nodes = DisjointSets::new(mesh.node_count());
-        for t in mesh.tets() {
+        Self::from_tets(mesh.node_count(), mesh.tets())
+    }
+
+    /// The same for elements that are no mesh yet, some of them perhaps flat or repeated.
+    ///
+    /// Shapes: `tets` corner indices below `node_count`.
+    pub(crate) fn from_tets(node_count: usize, tets: &[[u32; 4]]) -> Self {
+        let mut nodes = DisjointSets::new(node_count);
+        for t in tets {
             for c in 1..4 {
                 nodes.join(t[0] as usize, t[c] as usize);
             }
         }
-        let roots = mesh.tets().iter().map(|t| nodes.root(t[0] as usize));
-        let (of_tet, tet_counts) = label(roots, mesh.node_count());
+        let roots = tets.iter().map(|t| nodes.root(t[0] as usize));
+        let (of_tet, tet_counts) = label(roots, node_count);
 
-        let mut of_node = vec![None; mesh.node_count()];
+        let mut of_node = vec![None; node_count];
         let mut node_counts = vec![0; tet_counts.len()];
-        for (t, &body) in mesh.tets().iter().zip(&of_tet) {
+        for (t, &body) in tets.iter().zip(&of_tet) {
             for &n in t {
                 if of_node[n as usize].replace(body).is_none() {
                     node_counts[body as usize] += 1;
@@ -50,14 +57,14 @@ impl Bodies {
             }
         }
 
-        let mut elements = DisjointSets::new(mesh.tets().len());
-        Faces::from_mesh(mesh).for_each_triangle(|same| {
+        let mut elements = DisjointSets::new(tets.len());
+        Faces::from_tets(node_count, tets).for_each_triangle(|same| {
             for pair in same.windows(2) {
                 elements.join(pair[0].1 / 4, pair[1].1 / 4);
             }
         });
-        let roots = (0..mesh.tets().len()).map(|t| elements.root(t));
-        let (piece_of_tet, piece_tet_counts) = label(roots, mesh.tets().len());
+        let roots = (0..tets.len()).map(|t| elements.root(t));
+        let (piece_of_tet, piece_tet_counts) = label(roots, tets.len());
         Self { of_tet, of_node, tet_counts, node_counts, piece_of_tet, piece_tet_counts }
     }
 

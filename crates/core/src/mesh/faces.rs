@@ -21,8 +21,13 @@ pub(super) struct Faces {
 impl Faces {
     /// Groups the faces by a counting sort on the smallest corner, then a short sort per group.
     pub(super) fn from_mesh(mesh: &TetMesh) -> Self {
-        let mut starts = vec![0; mesh.node_count() + 1];
-        for corners in mesh.tets() {
+        Self::from_tets(mesh.node_count(), mesh.tets())
+    }
+
+    /// The same for elements that are no mesh yet.
+    pub(super) fn from_tets(node_count: usize, tets: &[[u32; 4]]) -> Self {
+        let mut starts = vec![0; node_count + 1];
+        for corners in tets {
             for [low, _, _] in sorted_faces(corners) {
                 starts[low as usize + 1] += 1;
             }
@@ -31,8 +36,8 @@ impl Faces {
             starts[n] += starts[n - 1];
         }
         let mut next = starts.clone();
-        let mut faces = vec![(0, 0); 4 * mesh.tets().len()];
-        for (tet, corners) in mesh.tets().iter().enumerate() {
+        let mut faces = vec![(0, 0); 4 * tets.len()];
+        for (tet, corners) in tets.iter().enumerate() {
             for (face, [low, mid, high]) in sorted_faces(corners).into_iter().enumerate() {
                 let slot = &mut next[low as usize];
                 faces[*slot] = (u64::from(mid) << 32 | u64::from(high), 4 * tet + face);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::mesh::TetMesh;
-use crate::mesh_io::Format;
+use crate::mesh_io::{Format, Mending};
 
 /// A mesh file after reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct MeshFile {
 }
 
 /// What was put right, left out or skipped while a file was read.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
     /// Node records in the file.
     pub file_nodes: usize,
@@ -28,6 +28,12 @@ pub struct Findings {
     pub flipped: Vec<usize>,
     /// Tetrahedra (record numbers from 0) without volume; they were dropped.
     pub degenerate: Vec<usize>,
+    /// Tetrahedra (record numbers from 0) with the four corners of an earlier one; they were
+    /// dropped.
+    pub repeated: Vec<usize>,
+    /// The same tetrahedra one by one, and how putting them right changed the object; `None` if
+    /// there was nothing to put right.
+    pub mending: Option<Mending>,
     /// Nodes that are no corner of a kept tetrahedron; they keep their number.
     pub orphans: usize,
     /// Tetrahedra of second or higher order; their corners are used, mid nodes become orphans.

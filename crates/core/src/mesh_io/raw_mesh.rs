@@ -6,12 +6,22 @@ use nalgebra::Point3;
 
 use super::cell_kind::{CellKind, Shape};
 use super::error::{Fault, MeshFileError};
+use super::mending::repeated;
 use super::node_labels::NodeLabels;
 use crate::mesh::{MeshError, TetMesh};
-use crate::mesh_io::{Findings, Format, MeshFile};
+use crate::mesh_io::{BadTet, Findings, Format, Mending, MeshFile, TetFault};
 
 /// A volume below this fraction of the cube of the longest edge is rounding, not volume.
 const DEGENERATE: f64 = 1e-14;
+
+/// Tetrahedra that can be modelled, their record numbers, and those that could not as they stood.
+struct Sound {
+    tets: Vec<[u32; 4]>,
+    kept: Vec<usize>,
+    /// Ascending by record number.
+    bad: Vec<BadTet>,
+    volume_in_file: f64,
+}
 
 /// What a reader collects from a file, labels and all.
 #[derive(Debug, Default)]
@@ -55,7 +65,7 @@ impl RawMesh {
         *self.other_cells.entry(kind).or_default() += count;
     }
 
-    /// Maps labels, turns inverted tetrahedra, drops flat ones, numbers the regions.
+    /// Maps labels, turns inverted tetrahedra, drops flat and repeated ones, numbers the regions.
     ///
     /// # Errors
     /// [`MeshFileError`] for file `name`: labels that fit nothing, or no tetrahedra left.
@@ -86,32 +96,25 @@ impl RawMesh {
             given => NodeLabels::try_new(given).map_err(refuse)?,
         };
         self.findings.labels_mapped = labels.mapped();
-        let (tets, kept) = self.kept_tets(&labels, format).map_err(|fault| MeshFileError {
+        let all = self.corner_indices(&labels).map_err(|fault| MeshFileError {
             file: self.tets_file.clone().unwrap_or_else(|| name.to_owned()),
             fault,
         })?;
+        let Sound { tets, kept, bad, volume_in_file } = self.sound_tets(&all, format);
         if tets.is_empty() {
             return Err(refuse(self.nothing_to_model()));
         }
         let regions = self.dense_regions(&kept);
         let mesh =
             TetMesh::try_new(self.points, tets, regions).map_err(|e| refuse(Fault::Mesh(e)))?;
+        self.findings.mending = Mending::new(bad, volume_in_file, &all, &kept, &mesh);
         self.findings.orphans = mesh.used_nodes().iter().filter(|&&used| !used).count();
         Ok(MeshFile { format, mesh, findings: self.findings })
     }
 
-    /// Corner indices of the tetrahedra that have volume, ordered as [`TetMesh`] wants them, with
-    /// their record numbers.
-    fn kept_tets(
-        &mut self,
-        labels: &NodeLabels,
-        format: Format,
-    ) -> Result<(Vec<[u32; 4]>, Vec<usize>), Fault> {
-        // The mesh counts volume from corner 4 (thesis 3.23), every format but the thesis lists
-        // from corner 1: what is right there is mirrored here.
-        let format_sign = if format == Format::ThesisLists { 1.0 } else { -1.0 };
-        let mut tets = Vec::with_capacity(self.tets.len());
-        let mut kept = Vec::with_capacity(self.tets.len());
+    /// Corner indices of all tetrahedra of the file.
+    fn corner_indices(&self, labels: &NodeLabels) -> Result<Vec<[u32; 4]>, Fault> {
+        let mut all = Vec::with_capacity(self.tets.len());
         for (tet, corner_labels) in self.tets.iter().enumerate() {
             let mut corners = [0_u32; 4];
             for (corner, &label) in corners.iter_mut().zip(corner_labels) {
@@ -121,27 +124,71 @@ impl RawMesh {
                     nodes: labels.describe(),
                 })?;
             }
+            all.push(corners);
+        }
+        Ok(all)
+    }
+
+    /// The tetrahedra that have volume, each once, ordered as [`TetMesh`] wants them.
+    fn sound_tets(&mut self, all: &[[u32; 4]], format: Format) -> Sound {
+        // The mesh counts volume from corner 4 (thesis 3.23), every format but the thesis lists
+        // from corner 1: what is right there is mirrored here.
+        let format_sign = if format == Format::ThesisLists { 1.0 } else { -1.0 };
+        let mut bad = Vec::new();
+        let mut volumes = Vec::with_capacity(all.len());
+        for (tet, &corners) in all.iter().enumerate() {
             let (volume, least) = self.volume_and_least(corners);
-            if volume.abs() <= least || volume.is_nan() {
-                self.findings.degenerate.push(tet);
+            let in_file = volume * format_sign;
+            match volume.abs() <= least || volume.is_nan() {
+                true => bad.push(BadTet { tet, fault: TetFault::Flat, volume: in_file }),
+                false => volumes.push((tet, volume)),
+            }
+        }
+        // What has the four corners of an earlier one would count twice in the stiffness, and its
+        // faces would hide the surface.
+        let mut repeated = repeated(all, volumes.iter().map(|v| v.0)).into_iter().peekable();
+        let mut sound = Sound { tets: Vec::new(), kept: Vec::new(), bad, volume_in_file: 0.0 };
+        for &(tet, volume) in &volumes {
+            let in_file = volume * format_sign;
+            sound.volume_in_file += in_file;
+            if let Some((_, of)) = repeated.next_if(|&(again, _)| again == tet) {
+                let fault = TetFault::Repeated { of };
+                sound.bad.push(BadTet { tet, fault, volume: in_file });
                 continue;
             }
-            if volume * format_sign < 0.0 {
-                self.findings.flipped.push(tet);
+            if in_file < 0.0 {
+                sound.bad.push(BadTet { tet, fault: TetFault::Inverted, volume: in_file });
             }
-            tets.push(if volume > 0.0 { corners } else { mirrored(corners) });
-            kept.push(tet);
+            sound.tets.push(if volume > 0.0 { all[tet] } else { mirrored(all[tet]) });
+            sound.kept.push(tet);
         }
-        if self.findings.flipped.len() == kept.len() && kept.len() > 1 {
-            self.findings.note("every tetrahedron is ordered the other way round than usual");
+        sound.bad.sort_unstable_by_key(|bad| bad.tet);
+        let with = |name: &str| {
+            let bad = sound.bad.iter().filter(|bad| bad.fault.name() == name);
+            bad.map(|bad| bad.tet).collect::<Vec<_>>()
+        };
+        let findings = &mut self.findings;
+        findings.flipped = with("inverted");
+        findings.degenerate = with("flat");
+        findings.repeated = with("repeated");
+        if findings.flipped.len() == sound.kept.len() && sound.kept.len() > 1 {
+            findings.note("every tetrahedron is ordered the other way round than usual");
         }
-        Ok((tets, kept))
+        sound
     }
 
     /// Signed volume (3.33 without the absolute value) and the least volume that is not rounding.
+    ///
+    /// Computed from the corners in ascending order, so that the same four give the same two numbers
+    /// but for the sign, however a file orders them.
     fn volume_and_least(&self, corners: [u32; 4]) -> (f64, f64) {
-        let [c1, c2, c3, c4] = corners.map(|node| self.points[node as usize]);
-        let volume = (c1 - c4).dot(&(c2 - c4).cross(&(c3 - c4))) / 6.0;
+        let mut ascending = corners;
+        ascending.sort_unstable();
+        let pairs = (0..4).flat_map(|i| (0..i).map(move |j| (j, i)));
+        let swapped = pairs.filter(|&(j, i)| corners[j] > corners[i]).count();
+        let sign = if swapped % 2 == 0 { 1.0 } else { -1.0 };
+        let [c1, c2, c3, c4] = ascending.map(|node| self.points[node as usize]);
+        let volume = sign * (c1 - c4).dot(&(c2 - c4).cross(&(c3 - c4))) / 6.0;
         let edges = [c1 - c2, c1 - c3, c1 - c4, c2 - c3, c2 - c4, c3 - c4];
         let longest = edges.iter().map(|edge| edge.norm_squared()).fold(0.0, f64::max).sqrt();
         (volume, DEGENERATE * longest * longest * longest)
@@ -220,17 +267,17 @@ mod tests {
 
     #[test]
     fn inverted_is_turned_and_flat_is_dropped() {
-        let raw = raw(&[[0, 1, 2, 3], [0, 2, 1, 3], [0, 1, 2, 4], [1, 1, 2, 3]], &[[0; 2]; 4]);
+        let raw = raw(&[[0, 1, 2, 3], [1, 2, 4, 3], [0, 1, 2, 4], [1, 1, 2, 3]], &[[0; 2]; 4]);
         let file = raw.finish("f", Format::Medit).unwrap();
         assert_eq!(file.findings.flipped, [1]);
         assert_eq!(file.findings.degenerate, [2, 3]);
-        assert_eq!(file.findings.orphans, 1);
-        assert_eq!(file.mesh.tets(), [[0, 1, 3, 2], [0, 2, 1, 3]]);
+        assert_eq!(file.findings.orphans, 0);
+        assert_eq!(file.mesh.tets(), [[0, 1, 3, 2], [1, 2, 4, 3]]);
     }
 
     #[test]
     fn regions_are_numbered_by_appearance_with_their_labels_kept() {
-        let tets = [[0, 1, 2, 3], [4, 2, 1, 3], [0, 1, 2, 3]];
+        let tets = [[0, 1, 2, 3], [4, 2, 1, 3], [0, 1, 4, 3]];
         let file = raw(&tets, &[[7, 1], [-2, 1], [7, 1]]).finish("f", Format::Vega).unwrap();
         assert_eq!(file.mesh.regions(), [0, 1, 0]);
         assert_eq!(file.findings.region_labels, ["7", "-2"]);

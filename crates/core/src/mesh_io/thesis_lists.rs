@@ -8,6 +8,7 @@ use super::cell_kind::{CellKind, Shape};
 use super::cursor::Cursor;
 use super::error::MeshFileError;
 use super::raw_mesh::RawMesh;
+use super::region_numbers::RegionNumbers;
 use super::write_error::WriteError;
 use crate::mesh::TetMesh;
 
@@ -16,15 +17,18 @@ pub(super) const MAGIC: &str = "softgrasp-lists";
 
 /// Writes vertices, elements, regions if there are several, and the display list.
 ///
-/// Shapes: `display_list` P × 3 vertex indices from 0, counter-clockwise seen from outside.
+/// Shapes: `labels` empty or one per region, which is written where all of them are whole numbers,
+/// else regions are numbered from 0; `display_list` P × 3 vertex indices from 0, counter-clockwise
+/// seen from outside.
 /// Units: the mesh's own.
 ///
 /// # Errors
 /// [`WriteError::DisplayNode`] when a triangle names a vertex that is not there.
 ///
 /// Source: thesis Table 3.1; section 6.1.3 for what is saved. Format: `docs/files.md`.
-pub fn write_thesis_lists(
+pub fn write_thesis_lists_labelled(
     mesh: &TetMesh,
+    labels: &[String],
     display_list: &[[u32; 3]],
 ) -> Result<Vec<u8>, WriteError> {
     let node_count = mesh.node_count();
@@ -34,14 +38,26 @@ pub fn write_thesis_lists(
         }
     }
     let mut out = Vec::new();
-    let written = write_lists(&mut out, mesh, display_list);
+    let written = write_lists(&mut out, mesh, labels, display_list);
     written.expect("writing to memory cannot fail");
     Ok(out)
+}
+
+/// The same with regions numbered from 0.
+///
+/// # Errors
+/// As [`write_thesis_lists_labelled`].
+pub fn write_thesis_lists(
+    mesh: &TetMesh,
+    display_list: &[[u32; 3]],
+) -> Result<Vec<u8>, WriteError> {
+    write_thesis_lists_labelled(mesh, &[], display_list)
 }
 
 fn write_lists(
     out: &mut Vec<u8>,
     mesh: &TetMesh,
+    labels: &[String],
     display_list: &[[u32; 3]],
 ) -> std::io::Result<()> {
     writeln!(out, "{MAGIC} 1\n# thesis Table 3.1; indices count from 0")?;
@@ -56,8 +72,9 @@ fn write_lists(
     }
     if !mesh.regions().is_empty() {
         writeln!(out, "regions {}", mesh.regions().len())?;
-        for region in mesh.regions() {
-            writeln!(out, "{region}")?;
+        let numbers = RegionNumbers::new(mesh, labels);
+        for &region in mesh.regions() {
+            writeln!(out, "{}", numbers.of(region))?;
         }
     }
     writeln!(out, "display {}", display_list.len())?;

@@ -12,6 +12,8 @@ pub(super) struct VtkCells {
     /// For each cell, the end of its nodes in `connectivity`.
     pub(super) ends: Vec<i64>,
     pub(super) types: Vec<i64>,
+    /// Region label of each cell; empty when there are none.
+    pub(super) regions: Vec<i64>,
 }
 
 impl VtkCells {
@@ -50,7 +52,8 @@ impl VtkCells {
             }
             shifted.clear();
             shifted.extend(nodes.iter().map(|node| node.saturating_add(first_node as i64)));
-            raw.add_cell(kind, &shifted, [0, 0]);
+            let region = self.regions.get(cell).copied().unwrap_or(0);
+            raw.add_cell(kind, &shifted, [region, 0]);
         }
         if start != self.connectivity.len() {
             let found = self.connectivity.len().to_string();

@@ -20,6 +20,8 @@ struct Piece<'a> {
     connectivity: Option<DataArray<'a>>,
     offsets: Option<DataArray<'a>>,
     types: Option<DataArray<'a>>,
+    /// Cell data of whole numbers called `region`.
+    regions: Option<DataArray<'a>>,
 }
 
 /// Everything found in the document, before any array is decoded.
@@ -31,7 +33,7 @@ struct Document<'a> {
     skipped: Vec<&'static str>,
 }
 
-/// Reads a VTU file; data on points and cells is not looked into.
+/// Reads a VTU file; of the data on points and cells only the cell data `region` is looked into.
 ///
 /// # Errors
 /// [`MeshFileError`]: not an unstructured grid, or the arrays are not as announced.
@@ -70,12 +72,13 @@ fn read_document<'a>(cursor: &mut Cursor<'a>) -> Result<Document<'a>, MeshFileEr
                 section = if empty { Section::Other } else { Section::Data(data_name(name)) };
             }
             Event::Open { name: b"DataArray", attributes, empty } => {
+                let array = read_array(cursor, attributes, empty)?;
                 if let Section::Data(name) = section
                     && !document.skipped.contains(&name)
+                    && !is_region(section, &array)
                 {
                     document.skipped.push(name);
                 }
-                let array = read_array(cursor, attributes, empty)?;
                 if let Some(piece) = document.pieces.last_mut() {
                     piece.place(section, array);
                 }
@@ -100,6 +103,15 @@ enum Section {
     Cells,
     Data(&'static str),
     Other,
+}
+
+/// Whether an array holds a region label per cell, as [`super::write_vtu`] writes it.
+fn is_region(section: Section, array: &DataArray) -> bool {
+    let is_whole = attribute(array.attributes, "type")
+        .is_some_and(|kind| kind.starts_with(b"Int") || kind.starts_with(b"UInt"));
+    section == Section::Data("CellData")
+        && is_whole
+        && attribute(array.attributes, "Name") == Some(b"region")
 }
 
 fn data_name(name: &[u8]) -> &'static str {
@@ -201,6 +213,7 @@ impl<'a> Piece<'a> {
             connectivity: None,
             offsets: None,
             types: None,
+            regions: None,
         })
     }
 
@@ -210,6 +223,7 @@ impl<'a> Piece<'a> {
             (Section::Cells, Some(b"connectivity")) => &mut self.connectivity,
             (Section::Cells, Some(b"offsets")) => &mut self.offsets,
             (Section::Cells, Some(b"types")) => &mut self.types,
+            _ if is_region(section, &array) => &mut self.regions,
             _ => return,
         };
         *slot = Some(array);
@@ -246,7 +260,14 @@ fn read_piece(
         connectivity: connectivity.integers(rules, appended, budget)?,
         ends: offsets.integers(rules, appended, budget)?,
         types: types.integers(rules, appended, budget)?,
+        regions: match &piece.regions {
+            Some(array) => array.integers(rules, appended, budget)?,
+            None => Vec::new(),
+        },
     };
+    if let Some(array) = &piece.regions {
+        check_length(array, "region", cells.types.len(), cells.regions.len())?;
+    }
     if let Some(count) = piece.cells {
         check_length(offsets, "offsets", count, cells.ends.len())?;
         check_length(types, "types", count, cells.types.len())?;

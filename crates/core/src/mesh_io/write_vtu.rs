@@ -4,6 +4,7 @@ use std::io::Write;
 
 use super::base64;
 use super::raw_mesh::mirrored;
+use super::region_numbers::RegionNumbers;
 use super::write_error::WriteError;
 use crate::mesh::TetMesh;
 
@@ -16,7 +17,10 @@ pub struct PointField<'a> {
     pub values: &'a [[f64; 3]],
 }
 
-/// The mesh as VTU; regions, if there are several, become the cell data `region`.
+/// The mesh as VTU; regions, if there are several, become the cell data `region`, by their labels
+/// where all of `labels` are whole numbers, else numbered from 0.
+///
+/// Shapes: `labels` empty or one per region.
 ///
 /// Corners are reordered to VTK's orientation, so that a file that was read comes out as it was.
 ///
@@ -24,7 +28,11 @@ pub struct PointField<'a> {
 /// [`WriteError::FieldLength`] when a field has not one vector per node.
 ///
 /// Source: VTK user's guide, section "XML file formats".
-pub fn write_vtu(mesh: &TetMesh, fields: &[PointField]) -> Result<Vec<u8>, WriteError> {
+pub fn write_vtu_labelled(
+    mesh: &TetMesh,
+    labels: &[String],
+    fields: &[PointField],
+) -> Result<Vec<u8>, WriteError> {
     for field in fields {
         if field.values.len() != mesh.node_count() {
             return Err(WriteError::FieldLength {
@@ -35,11 +43,24 @@ pub fn write_vtu(mesh: &TetMesh, fields: &[PointField]) -> Result<Vec<u8>, Write
         }
     }
     let mut out = Vec::new();
-    write_document(&mut out, mesh, fields).expect("writing to memory cannot fail");
+    write_document(&mut out, mesh, labels, fields).expect("writing to memory cannot fail");
     Ok(out)
 }
 
-fn write_document(out: &mut Vec<u8>, mesh: &TetMesh, fields: &[PointField]) -> std::io::Result<()> {
+/// The same with regions numbered from 0.
+///
+/// # Errors
+/// As [`write_vtu_labelled`].
+pub fn write_vtu(mesh: &TetMesh, fields: &[PointField]) -> Result<Vec<u8>, WriteError> {
+    write_vtu_labelled(mesh, &[], fields)
+}
+
+fn write_document(
+    out: &mut Vec<u8>,
+    mesh: &TetMesh,
+    labels: &[String],
+    fields: &[PointField],
+) -> std::io::Result<()> {
     let (nodes, cells) = (mesh.node_count(), mesh.tets().len());
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     writeln!(
@@ -60,7 +81,9 @@ fn write_document(out: &mut Vec<u8>, mesh: &TetMesh, fields: &[PointField]) -> s
     }
     writeln!(out, "</PointData>\n<CellData>")?;
     if !mesh.regions().is_empty() {
-        write_array(out, "UInt32", "region", 1, mesh.regions().iter().map(|r| r.to_le_bytes()))?;
+        let numbers = RegionNumbers::new(mesh, labels);
+        let labels = mesh.regions().iter().map(|&region| numbers.of(region).to_le_bytes());
+        write_array(out, "Int64", "region", 1, labels)?;
     }
     writeln!(out, "</CellData>\n<Points>")?;
     let coordinates = mesh.vertices().iter().flat_map(|p| [p.x, p.y, p.z]);

@@ -30,7 +30,8 @@ pub struct Wish {
 pub enum ElementWish {
     /// This one.
     Given(Element),
-    /// Ten nodes where linear elements lock and time and memory allow, else four.
+    /// Ten nodes where linear elements lock and time and memory allow, else averaged nodal pressure,
+    /// else plain linear ones.
     Auto {
         /// Largest Poisson's ratio of the materials.
         poisson_max: f64,
@@ -81,14 +82,19 @@ pub struct Choice {
 /// Why linear elements are used on a material on which they lock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Locks {
-    /// Ten-node elements are predicted to be too late.
+    /// Elements that do not lock are predicted to be too late.
     NoTime,
-    /// Ten-node elements are predicted to need too much memory.
+    /// Elements that do not lock are predicted to need too much memory.
     NoMemory,
 }
 
 /// Linear tetrahedra lock visibly from this Poisson's ratio on.
 pub const LOCKING_POISSON: f64 = 0.45;
+/// The cheapest element that does not lock.
+pub fn cheapest_element(poisson: f64) -> Element {
+    if poisson < LOCKING_POISSON { Element::Tet4 } else { Element::Tet4Anp }
+}
+
 /// A prediction may be this much too short and the deadline is still kept.
 const PREDICTION_MARGIN: f64 = 1.25;
 /// Where an iterative method stops if only a deadline was named.
@@ -107,11 +113,12 @@ impl Wish {
     fn elements(&self) -> &'static [Element] {
         match self.element {
             ElementWish::Given(Element::Tet4) => &[Element::Tet4],
+            ElementWish::Given(Element::Tet4Anp) => &[Element::Tet4Anp],
             ElementWish::Given(Element::Tet10) => &[Element::Tet10],
             ElementWish::Auto { poisson_max, .. } if poisson_max < LOCKING_POISSON => {
                 &[Element::Tet4]
             }
-            ElementWish::Auto { .. } => &[Element::Tet4, Element::Tet10],
+            ElementWish::Auto { .. } => &Element::ALL,
         }
     }
 
@@ -173,8 +180,8 @@ pub fn offers_after_order(
 /// With an error budget the fastest that is within it and in time, else the most exact in time.
 /// Where not all can be met, a deadline that can be kept goes before the budget, because a late
 /// answer is of no use; a deadline that nothing keeps is given up first, and then the fastest within
-/// the budget is taken. Ten-node elements, where offered beside linear ones, are taken if they meet
-/// all wishes within the memory allowed.
+/// the budget is taken. Of several elements the most exact is taken that meets all wishes within the
+/// memory allowed; what is late or inexact anyhow gets the cheapest that does not lock.
 pub fn choose(wish: &Wish, offers: &[Offer]) -> Option<Choice> {
     let memory_limit = match wish.element {
         ElementWish::Auto { memory_limit, .. } => memory_limit as f64,
@@ -196,18 +203,21 @@ pub fn choose(wish: &Wish, offers: &[Offer]) -> Option<Choice> {
     let best = |allowed: &dyn Fn(&Offer) -> bool, by: &dyn Fn(&Offer, &Offer) -> Ordering| {
         offers.iter().filter(|o| fits(o) && allowed(o)).copied().min_by(|a, b| by(a, b))
     };
-    let quadratic_first =
+    let finest_first =
         |a: &Offer, b: &Offer| b.element.cmp(&a.element).then_with(|| preferred(a, b));
-    let linear_first = |a: &Offer, b: &Offer| a.element.cmp(&b.element).then_with(|| faster(a, b));
-    let linear_exact = |a: &Offer, b: &Offer| a.element.cmp(&b.element).then_with(|| exacter(a, b));
-    let (offer, gave_up) = best(&|o| in_time(o) && exact(o), &quadratic_first)
+    let locks = |o: &Offer| mixed && o.element == Element::Tet4;
+    let cheapest =
+        |a: &Offer, b: &Offer| locks(a).cmp(&locks(b)).then_with(|| a.element.cmp(&b.element));
+    let cheap_fast = |a: &Offer, b: &Offer| cheapest(a, b).then_with(|| faster(a, b));
+    let cheap_exact = |a: &Offer, b: &Offer| cheapest(a, b).then_with(|| exacter(a, b));
+    let (offer, gave_up) = best(&|o| in_time(o) && exact(o), &finest_first)
         .map(|offer| (offer, None))
-        .or_else(|| best(&in_time, &linear_exact).map(|offer| (offer, Some(GaveUp::ErrorBudget))))
-        .or_else(|| best(&exact, &linear_first).map(|offer| (offer, Some(GaveUp::Deadline))))
-        .or_else(|| best(&|_| true, &linear_first).map(|offer| (offer, Some(GaveUp::Both))))?;
-    let locks = (mixed && offer.element == Element::Tet4).then(|| {
-        let quadratic = |o: &&Offer| o.element == Element::Tet10;
-        match offers.iter().filter(quadratic).any(fits) {
+        .or_else(|| best(&in_time, &cheap_exact).map(|offer| (offer, Some(GaveUp::ErrorBudget))))
+        .or_else(|| best(&exact, &cheap_fast).map(|offer| (offer, Some(GaveUp::Deadline))))
+        .or_else(|| best(&|_| true, &cheap_fast).map(|offer| (offer, Some(GaveUp::Both))))?;
+    let locks = locks(&offer).then(|| {
+        let does_not_lock = |o: &&Offer| o.element != Element::Tet4;
+        match offers.iter().filter(does_not_lock).any(fits) {
             true => Locks::NoTime,
             false => Locks::NoMemory,
         }
@@ -256,7 +266,7 @@ impl fmt::Display for Locks {
         write!(
             f,
             "linear elements were taken though they lock from a Poisson's ratio of \
-             {LOCKING_POISSON} on, because ten-node elements {reason}"
+             {LOCKING_POISSON} on, because elements that do not lock {reason}"
         )
     }
 }

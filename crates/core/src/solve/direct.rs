@@ -1,5 +1,8 @@
 //! One interface to all direct methods: factor a partition once, then answer known displacements.
 
+use std::sync::OnceLock;
+
+use super::certainty::backward_error;
 use super::front::FrontFactor;
 use super::k11::{SparseK11, right_hand_side, visit_k11};
 use super::partition::AXIS_NAMES;
@@ -11,8 +14,10 @@ use super::{Method, Partition, Stage, gauss_jordan, gauss_jordan_plain, ordering
 use crate::fem::Stiffness;
 
 mod analysed;
+mod refinement;
 
 pub use analysed::{Analysed, FrontMethod};
+use refinement::Judged;
 
 /// `K11` of one partition, inverted or factored by one method.
 ///
@@ -21,6 +26,8 @@ pub struct Factored {
     method: Method,
     partition: Partition,
     kernel: Kernel,
+    /// Skeel's condition number, once somebody has asked for it.
+    pub(super) condition: OnceLock<f64>,
 }
 
 enum Kernel {
@@ -68,6 +75,8 @@ pub struct Solution {
     pub reaction: Vec<f64>,
     /// `‖K11 Q_u − b‖₂ / ‖b‖₂`, zero when `b` is.
     pub residual_rel: f64,
+    /// Componentwise backward error of the free rows: see [`Factored::certainty`].
+    pub backward_error: f64,
     /// Estimate of `‖error‖ / ‖Q_u‖` where a method stops by it ([`Method::Pcg`]); no bound.
     pub error_estimate_rel: Option<f64>,
     /// Refinement steps taken.
@@ -98,6 +107,21 @@ pub enum SolveError {
         /// Size of `K11`.
         unknown_dofs: usize,
     },
+    /// The factor or inverse is larger than it may be.
+    #[error(
+        "{method}: the factor or inverse of {unknown_dofs} unknowns takes up to {needed} bytes while \
+         it is made, and may take {limit}"
+    )]
+    OverLimit {
+        /// Method that asked.
+        method: Method,
+        /// Size of `K11`.
+        unknown_dofs: usize,
+        /// Bytes it would take at most.
+        needed: u64,
+        /// Bytes it may take.
+        limit: u64,
+    },
     /// The answer holds NaN or infinity.
     #[error(
         "{method}: the answer is not finite; the numbers of the mesh, the material or the known \
@@ -119,12 +143,10 @@ pub enum SolveError {
     },
 }
 
-/// Refinement stops at this relative residual; one step more would only move the last bits.
+/// Refinement and conjugate gradients stop at this relative residual.
 const RESIDUAL_GOOD: f64 = 1e-13;
-/// Refinement stops after this many steps in any case.
-const REFINEMENT_STEPS_MAX: u32 = 3;
-/// The same with a single-precision factor, which gains four to seven digits a step.
-const REFINEMENT_STEPS_SINGLE_MAX: u32 = 8;
+/// Refinement stops at this backward error; one step more would only move the last bits.
+const BACKWARD_ERROR_GOOD: f64 = 1e-13;
 /// Conjugate gradients stop after this many steps in any case.
 const PCG_STEPS_MAX: u32 = 500;
 
@@ -143,7 +165,29 @@ impl Factored {
         method: Method,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Self, SolveError> {
+        Self::try_within(stiffness, partition, method, u64::MAX, on_stage)
+    }
+
+    /// The same where the factor or inverse may take so much memory only, which is looked at before
+    /// it is allocated.
+    ///
+    /// Units: `limit` bytes.
+    ///
+    /// # Errors
+    /// Those of [`Factored::try_new`], and [`SolveError::OverLimit`] with both numbers.
+    pub fn try_within(
+        stiffness: &Stiffness,
+        partition: Partition,
+        method: Method,
+        limit: u64,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Self, SolveError> {
         let n = partition.unknown().len();
+        let check = |needed: u64| match needed > limit {
+            true => Err(SolveError::OverLimit { method, unknown_dofs: n, needed, limit }),
+            false => Ok(()),
+        };
+        check(method.dense_bytes(n).unwrap_or(0))?;
         let not_positive = |error: NotPositive| not_positive(method, &partition, error.row);
         let out_of_memory = || SolveError::OutOfMemory { method, unknown_dofs: n };
         let kernel = match method {
@@ -181,6 +225,7 @@ impl Factored {
                 let order = ordering::nested_dissection(stiffness, &partition);
                 let k11 = SparseK11::new(stiffness, &partition);
                 let analysis = Analysis::new(k11, order).map_err(|_| out_of_memory())?;
+                check(analysis.bytes())?;
                 on_stage(Stage::Factor);
                 Kernel::Sparse(Box::new(analysis.factor().map_err(not_positive)?))
             }
@@ -191,10 +236,11 @@ impl Factored {
                     _ => FrontMethod::Pcg,
                 };
                 let analysed = Analysed::new(stiffness, partition, on_stage);
+                check(analysed.peak_bytes(front))?;
                 return analysed.factor(stiffness, front, on_stage);
             }
         };
-        Ok(Self { method, partition, kernel })
+        Ok(Self { method, partition, kernel, condition: OnceLock::new() })
     }
 
     /// The method used.
@@ -251,8 +297,17 @@ impl Factored {
         let mut error_estimate_rel = None;
         let apply = |x: &[f64]| self.apply_k11(stiffness, x);
         let mut residual = subtract(&b, &apply(&x));
+        let mut judge = |x: &[f64], residual: &[f64]| {
+            scatter(partition, x, &mut q);
+            let backward_error = backward_error(stiffness, partition, &q, residual, loads.forces);
+            let (backward, size) = (backward_error / BACKWARD_ERROR_GOOD, norm(residual));
+            let off = if size > 0.0 { backward.max(size / (RESIDUAL_GOOD * b_norm)) } else { 0.0 };
+            Judged { backward_error, off }
+        };
+        let mut judged = None;
         if self.method != Method::Pcg {
-            refinement_steps = self.refine(&apply, &b, &mut x, &mut residual);
+            let (steps, last) = self.refine(&apply, &mut judge, &b, &mut x, &mut residual);
+            (refinement_steps, judged) = (steps, Some(last));
         }
         // A single-precision factor that refinement cannot use any more still preconditions well.
         let single = matches!(self.kernel, Kernel::FrontSingle(_));
@@ -268,10 +323,11 @@ impl Factored {
             residual = reached.residual;
             refinement_steps += reached.steps;
             error_estimate_rel = Some(reached.error_estimate_rel);
+            judged = None;
         }
-        for (&dof, x) in partition.unknown().iter().zip(&x) {
-            q[dof as usize] = *x;
-        }
+        let Judged { backward_error, .. } = judged.unwrap_or_else(|| judge(&x, &residual));
+        // What was judged last need not be what was taken.
+        scatter(partition, &x, &mut q);
         let f = stiffness.mul(&q);
         if !q.iter().all(|x| x.is_finite()) {
             return Err(SolveError::NotFinite { method: self.method });
@@ -282,48 +338,17 @@ impl Factored {
             displacement: q,
             reaction,
             residual_rel,
+            backward_error,
             error_estimate_rel,
             refinement_steps,
         })
-    }
-
-    /// Improves `x` while the residual falls by half a step or more; the number of steps.
-    fn refine(
-        &self,
-        apply: &dyn Fn(&[f64]) -> Vec<f64>,
-        b: &[f64],
-        x: &mut Vec<f64>,
-        residual: &mut Vec<f64>,
-    ) -> u32 {
-        let steps_max = match self.kernel {
-            Kernel::FrontSingle(_) => REFINEMENT_STEPS_SINGLE_MAX,
-            _ => REFINEMENT_STEPS_MAX,
-        };
-        for step in 0..steps_max {
-            let before = norm(residual);
-            if before <= RESIDUAL_GOOD * norm(b) {
-                return step;
-            }
-            let correction = self.apply_inverse(residual.clone());
-            let refined: Vec<f64> = x.iter().zip(&correction).map(|(x, c)| x + c).collect();
-            let refined_residual = subtract(b, &apply(&refined));
-            let after = norm(&refined_residual);
-            // A NaN ends the loop too.
-            if after >= before || after.is_nan() {
-                return step;
-            }
-            (*x, *residual) = (refined, refined_residual);
-        }
-        steps_max
     }
 
     /// `K11 x`, through the whole stiffness with zeros at the known degrees of freedom.
     fn apply_k11(&self, stiffness: &Stiffness, x: &[f64]) -> Vec<f64> {
         let unknown = self.partition.unknown();
         let mut q = vec![0.0; self.partition.dof_count()];
-        for (&dof, x) in unknown.iter().zip(x) {
-            q[dof as usize] = *x;
-        }
+        scatter(&self.partition, x, &mut q);
         let f = stiffness.mul(&q);
         unknown.iter().map(|&dof| f[dof as usize]).collect()
     }
@@ -340,6 +365,20 @@ impl Factored {
             return Err(SolveError::LoadCount { what: "external forces", given, expected });
         }
         Ok(())
+    }
+
+    /// `K11⁻¹ B` for columns of n, one behind the other.
+    pub(super) fn apply_inverse_to_columns(&self, mut b: Vec<f64>, columns: usize) -> Vec<f64> {
+        match &self.kernel {
+            Kernel::Front(factor) => {
+                factor.solve_in_place(&mut b, columns);
+                b
+            }
+            _ => {
+                let n = self.partition.unknown().len().max(1);
+                b.chunks(n).flat_map(|b| self.apply_inverse(b.to_vec())).collect()
+            }
+        }
     }
 
     /// `K11⁻¹ b`.
@@ -370,6 +409,13 @@ impl Factored {
                 b
             }
         }
+    }
+}
+
+/// Writes the unknown displacements to their places among all.
+fn scatter(partition: &Partition, x: &[f64], q: &mut [f64]) {
+    for (&dof, x) in partition.unknown().iter().zip(x) {
+        q[dof as usize] = *x;
     }
 }
 

@@ -7,7 +7,7 @@ use std::fmt;
 
 use nalgebra::{Point3, Vector3};
 
-use super::zero_energy::{BodyMotions, nodes_and_dofs_by_body, rigid_parts};
+use super::zero_energy::{BodyMotions, RigidBodies, dofs_by_body};
 use crate::contact::Mask;
 use crate::mesh::{Bodies, TetMesh};
 
@@ -74,33 +74,33 @@ impl fmt::Display for FreeMotion {
 
 /// First body that can move without deforming, if any.
 ///
-/// Shapes: `known` ascending degrees of freedom; each mask on nodes of one body. Units: those of the
-/// mesh.
+/// Shapes: `rigid` that of `mesh` and `bodies`; `known` ascending degrees of freedom; each mask on
+/// nodes of one body. Units: those of the mesh.
 ///
 /// Source: thesis (3.43) presumes that `K11⁻¹` exists; this is the condition.
 pub fn find_free_motion(
     mesh: &TetMesh,
     bodies: &Bodies,
+    rigid: &RigidBodies,
     known: &[u32],
     masks: &[Mask],
 ) -> Option<FreeMotion> {
-    let parts = rigid_parts(mesh, bodies);
-    let by_body = nodes_and_dofs_by_body(bodies, known);
     let body_of = |mask: &Mask| bodies.of_node[mask.entries().first()?.0 as usize];
-    by_body.into_iter().enumerate().find_map(|(body, (nodes, held))| {
+    dofs_by_body(bodies, known).into_iter().enumerate().find_map(|(body, held)| {
         let is_on_body = |mask: &&Mask| body_of(mask).is_some_and(|of| of as usize == body);
         let on_body: Vec<&Mask> = masks.iter().filter(is_on_body).collect();
-        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held, &on_body)?;
+        let motions = BodyMotions::of_body(mesh, rigid, body, &held, &on_body)?;
         let motion = motions.basis.first()?.as_slice();
         let moving: Vec<f64> = motion.chunks(6).map(|m| m.iter().map(|x| x * x).sum()).collect();
         let part = (0..moving.len()).max_by(|&a, &b| moving[a].total_cmp(&moving[b]))?;
+        let of_part = &motion[6 * part..6 * part + 6];
         Some(FreeMotion {
             body,
-            first_node: nodes.first().map_or(0, |&n| n as usize),
-            node_count: nodes.len(),
+            first_node: motions.body.nodes.first().map_or(0, |&n| n as usize),
+            node_count: motions.body.nodes.len(),
             known_dofs: held.len(),
             masks: on_body.len(),
-            motion: motion_from(&motion[6 * part..6 * part + 6], motions.centre, motions.size),
+            motion: motion_from(of_part, motions.body.centre, motions.body.size),
             hinged: moving.iter().any(|&m| m < 1e-12 * moving[part]),
         })
     })
@@ -143,7 +143,8 @@ mod tests {
     }
 
     fn free(mesh: &TetMesh, known: &[u32]) -> Option<FreeMotion> {
-        find_free_motion(mesh, &Bodies::from_mesh(mesh), known, &[])
+        let bodies = Bodies::from_mesh(mesh);
+        find_free_motion(mesh, &bodies, &RigidBodies::new(mesh, &bodies), known, &[])
     }
 
     #[test]
@@ -167,11 +168,12 @@ mod tests {
     fn masks_hold_a_body_by_their_means() {
         let mesh = unit_tet();
         let bodies = Bodies::from_mesh(&mesh);
+        let rigid = RigidBodies::new(&mesh, &bodies);
         let edge = |a: u32, b: u32| Mask::try_new(vec![(a, 1.0), (b, 3.0)]).unwrap();
         let three = [edge(0, 1), edge(1, 2), edge(2, 3)];
-        assert_eq!(find_free_motion(&mesh, &bodies, &[], &three), None);
-        assert_eq!(find_free_motion(&mesh, &bodies, &all_axes(&[0]), &three[1..]), None);
-        let found = find_free_motion(&mesh, &bodies, &[], &three[..2]).unwrap();
+        assert_eq!(find_free_motion(&mesh, &bodies, &rigid, &[], &three), None);
+        assert_eq!(find_free_motion(&mesh, &bodies, &rigid, &all_axes(&[0]), &three[1..]), None);
+        let found = find_free_motion(&mesh, &bodies, &rigid, &[], &three[..2]).unwrap();
         let Motion::Rotation { axis, .. } = found.motion else { panic!("{found:?}") };
         // Means (1, 3, 0)/4 and (0, 1, 3)/4.
         let line = Vector3::new(1.0, 2.0, -3.0).normalize();

@@ -1,5 +1,6 @@
 //! Known and unknown degrees of freedom, and the methods that answer for them (thesis 3.4).
 
+mod certainty;
 pub mod choose;
 pub mod condensed;
 mod direct;
@@ -7,6 +8,7 @@ mod front;
 mod gauss_jordan;
 mod gauss_jordan_plain;
 mod k11;
+pub mod memory;
 mod method;
 mod mobility;
 mod ordering;
@@ -20,9 +22,11 @@ mod tiles;
 pub mod work;
 mod zero_energy;
 
+pub use certainty::{Certainty, ERROR_REFUSED, ERROR_SERIOUS, ERROR_UNREMARKABLE};
 pub use direct::{Analysed, Factored, FrontMethod, Loads, Solution, SolveError};
 pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};
 pub use method::{Method, UnknownMethod};
 pub use mobility::{FreeMotion, Motion, find_free_motion};
 pub use partition::{KnownDisplacements, KnownError, Partition, PartitionError};
 pub use stage::Stage;
+pub use zero_energy::RigidBodies;

@@ -133,17 +133,7 @@ impl Partition {
     ///
     /// Source: thesis (3.41).
     pub fn try_new(used: &[bool], known: &[u32]) -> Result<Self, PartitionError> {
-        if let Some(position) = known.windows(2).position(|w| w[0] >= w[1]) {
-            return Err(PartitionError::NotSorted { position: position + 1 });
-        }
-        for &dof in known {
-            let node = dof as usize / 3;
-            match used.get(node) {
-                None => return Err(PartitionError::NoSuchNode { node, node_count: used.len() }),
-                Some(false) => return Err(PartitionError::Orphan { node }),
-                Some(true) => {}
-            }
-        }
+        Self::check(used, known)?;
         let mut position = vec![NOT_UNKNOWN; 3 * used.len()];
         let mut unknown = Vec::with_capacity(3 * used.len() - known.len());
         let mut next_known = known.iter().peekable();
@@ -156,6 +146,24 @@ impl Partition {
             }
         }
         Ok(Self { unknown, known: known.to_vec(), position })
+    }
+
+    /// Whether known degrees of freedom fit the mesh, without splitting them.
+    ///
+    /// Shapes and errors as for [`Partition::try_new`].
+    pub fn check(used: &[bool], known: &[u32]) -> Result<(), PartitionError> {
+        if let Some(position) = known.windows(2).position(|w| w[0] >= w[1]) {
+            return Err(PartitionError::NotSorted { position: position + 1 });
+        }
+        for &dof in known {
+            let node = dof as usize / 3;
+            match used.get(node) {
+                None => return Err(PartitionError::NoSuchNode { node, node_count: used.len() }),
+                Some(false) => return Err(PartitionError::Orphan { node }),
+                Some(true) => {}
+            }
+        }
+        Ok(())
     }
 
     /// Unknown degrees of freedom, ascending.

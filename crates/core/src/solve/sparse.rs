@@ -53,6 +53,15 @@ impl Analysis {
         Ok(Self { k11, symbolic })
     }
 
+    /// Bytes of the copy of `K11`, of the factor's values and of what they are computed in.
+    pub fn bytes(&self) -> u64 {
+        let k11 = self.k11.rows.len() * (size_of::<usize>() + size_of::<f64>());
+        let values = self.symbolic.len_val() * size_of::<f64>();
+        let scratch =
+            self.symbolic.factorize_numeric_llt_scratch::<f64>(PAR, faer::Spec::default());
+        (k11 + values + scratch.unaligned_bytes_required()) as u64
+    }
+
     /// Number of stored entries of the factor.
     #[cfg(test)]
     pub fn fill(&self) -> usize {

@@ -115,12 +115,16 @@ impl Tiles {
     pub fn invert(&mut self) -> Result<(), NotPositive> {
         // What the tiles of column k were before its sweep.
         let mut before = vec![Mat::zeros(self.side, self.side); self.count().saturating_sub(1)];
+        let side = self.side;
+        let fails = |k: usize| move |row: usize| NotPositive { row: k * side + row };
+        if let Some(first) = self.tiles.first_mut() {
+            invert_tile(first).map_err(fails(0))?;
+        }
         for k in 0..self.count() {
-            invert_tile(&mut self.tiles[at(k, k)])
-                .map_err(|row| NotPositive { row: k * self.side + row })?;
-            let (mut column, mut others) = (Vec::new(), Vec::new());
+            let (mut column, mut others, mut next) = (Vec::new(), Vec::new(), None);
             for (i, j, tile) in self.iter_mut() {
                 match (i == k, j == k) {
+                    (false, false) if i == k + 1 && j == k + 1 => next = Some(tile),
                     (false, false) => others.push((i, j, tile)),
                     _ => column.push((i, j, tile)),
                 }
@@ -146,9 +150,28 @@ impl Tiles {
                     before[j - 1].get(..column[j - 1].2.nrows(), ..inverse.nrows()).transpose()
                 }
             };
-            others.into_par_iter().with_max_len(1).for_each(|(i, j, tile)| {
-                matmul(tile, Accum::Add, left(i), right(j), -1.0, Par::Seq);
-            });
+            // The next inverse is on the way of everything after it, so it is made beside the rest.
+            let (inverted, ()) = rayon::join(
+                || match next {
+                    Some(tile) => {
+                        subtract_symmetric(tile, left(k + 1), right(k + 1));
+                        invert_tile(tile)
+                    }
+                    None => Ok(()),
+                },
+                || {
+                    others.into_par_iter().with_max_len(1).for_each(|(i, j, tile)| match i == j {
+                        true => subtract_symmetric(tile, left(i), right(j)),
+                        false => {
+                            matmul(tile, Accum::Add, left(i), right(j), -1.0, Par::Seq);
+                        }
+                    });
+                },
+            );
+            inverted.map_err(fails(k + 1))?;
+        }
+        for (_, _, tile) in self.iter_mut().filter(|&(i, j, _)| i == j) {
+            mirror(tile);
         }
         Ok(())
     }
@@ -215,12 +238,23 @@ fn invert_tile(tile: &mut Mat<f64>) -> Result<(), usize> {
     let (lower, upper) = (BlockStructure::TriangularLower, BlockStructure::TriangularUpper);
     let (accum, transposed) = (Accum::Replace, w.transpose());
     triangular::matmul(&mut *tile, lower, accum, transposed, upper, &w, lower, 1.0, Par::Seq);
+    mirror(tile);
+    Ok(())
+}
+
+/// `tile −= left · right` in the lower triangle, where the product is symmetric.
+fn subtract_symmetric(tile: &mut Mat<f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>) {
+    let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    triangular::matmul(&mut *tile, lower, Accum::Add, left, whole, right, whole, -1.0, Par::Seq);
+}
+
+/// Copies the lower triangle to the upper one.
+fn mirror(tile: &mut Mat<f64>) {
     for j in 0..tile.ncols() {
         for i in 0..j {
             tile[(i, j)] = tile[(j, i)];
         }
     }
-    Ok(())
 }
 
 /// Factors a diagonal tile and clears what is above its diagonal; `Err` is the failing row.

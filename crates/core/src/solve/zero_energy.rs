@@ -18,13 +18,67 @@ pub(super) const FREE_BELOW: f64 = 1e-10;
 /// Hinged bodies with more parts than this are left to the pivots of the factor.
 const PARTS_MAX: usize = 100;
 
-/// For every node the rigid parts that meet there, ascending.
-pub(super) struct Parts {
-    of_node: Vec<Vec<u32>>,
+/// The rigid parts of every body: what of the motions depends on the shape alone.
+///
+/// Shapes: one part per node, one body per body of the mesh.
+pub struct RigidBodies {
+    /// The first of the parts that meet at a node.
+    part_of_node: Vec<u32>,
+    bodies: Vec<RigidBody>,
 }
 
-/// Face-connected pieces, joined further where two share three nodes that are not in line.
-pub(super) fn rigid_parts(mesh: &TetMesh, bodies: &Bodies) -> Parts {
+/// One body and the parts it is made of.
+pub(super) struct RigidBody {
+    /// Its nodes, ascending.
+    pub nodes: Vec<u32>,
+    /// Names of its rigid parts, ascending.
+    parts: Vec<u32>,
+    /// Nodes where parts meet, and the parts, ascending.
+    joints: Vec<(u32, Vec<u32>)>,
+    /// Centre of its nodes.
+    pub centre: Point3<f64>,
+    /// Distance of its furthest node from the centre.
+    pub size: f64,
+}
+
+impl RigidBodies {
+    /// Finds the parts of a mesh.
+    pub fn new(mesh: &TetMesh, bodies: &Bodies) -> Self {
+        let parts_of_node = rigid_parts(mesh, bodies);
+        let mut nodes_of_body = vec![Vec::new(); bodies.count()];
+        for (node, body) in bodies.of_node.iter().enumerate() {
+            if let Some(body) = body {
+                nodes_of_body[*body as usize].push(node as u32);
+            }
+        }
+        let of_nodes = |nodes| RigidBody::new(mesh, &parts_of_node, nodes);
+        let bodies = nodes_of_body.into_iter().map(of_nodes).collect();
+        // Orphans have none and are never asked for.
+        let first = |parts: &Vec<u32>| parts.first().copied().unwrap_or(0);
+        Self { part_of_node: parts_of_node.iter().map(first).collect(), bodies }
+    }
+}
+
+impl RigidBody {
+    fn new(mesh: &TetMesh, parts_of_node: &[Vec<u32>], nodes: Vec<u32>) -> Self {
+        let parts_at = |node: u32| &parts_of_node[node as usize];
+        let mut parts: Vec<u32> = nodes.iter().flat_map(|&n| parts_at(n)).copied().collect();
+        parts.sort_unstable();
+        parts.dedup();
+        let at = |node: &u32| mesh.vertices()[*node as usize];
+        let sum: Vector3<f64> = nodes.iter().map(|n| at(n).coords).sum();
+        let centre = Point3::from(sum / nodes.len() as f64);
+        let arms = nodes.iter().map(|n| (at(n) - centre).norm());
+        let size = arms.fold(f64::MIN_POSITIVE, f64::max);
+        let meets = |&&node: &&u32| parts_at(node).len() > 1;
+        let joints = nodes.iter().filter(meets).map(|&n| (n, parts_at(n).clone())).collect();
+        Self { nodes, parts, joints, centre, size }
+    }
+}
+
+/// For every node the rigid parts that meet there, ascending: face-connected pieces, joined further
+/// where two share three nodes that are not in line.
+fn rigid_parts(mesh: &TetMesh, bodies: &Bodies) -> Vec<Vec<u32>> {
     let mut of_node: Vec<Vec<u32>> = vec![Vec::new(); mesh.node_count()];
     for (tet, &piece) in mesh.tets().iter().zip(&bodies.piece_of_tet) {
         for &n in tet {
@@ -44,7 +98,7 @@ pub(super) fn rigid_parts(mesh: &TetMesh, bodies: &Bodies) -> Parts {
             }
         }
         let joined = shared.into_iter().find(|(_, nodes)| spans_a_plane(mesh, nodes));
-        let Some(((kept, gone), _)) = joined else { return Parts { of_node } };
+        let Some(((kept, gone), _)) = joined else { return of_node };
         for list in &mut of_node {
             if let Ok(at) = list.binary_search(&gone) {
                 list.remove(at);
@@ -68,64 +122,49 @@ fn spans_a_plane(mesh: &TetMesh, nodes: &[u32]) -> bool {
 }
 
 /// The motions of one body that cost no energy and leave its held degrees of freedom in place.
-pub(super) struct BodyMotions {
-    /// Names of its rigid parts, ascending.
-    parts: Vec<u32>,
-    /// Centre of its nodes.
-    pub centre: Point3<f64>,
-    /// Distance of its furthest node from the centre.
-    pub size: f64,
-    /// Orthonormal basis: (t, ω) per part, ω per `size`.
+pub(super) struct BodyMotions<'a> {
+    mesh: &'a TetMesh,
+    part_of_node: &'a [u32],
+    pub body: &'a RigidBody,
+    /// Orthonormal basis: (t, ω) per part, ω per size of the body.
     pub basis: Vec<DVector<f64>>,
 }
 
-impl BodyMotions {
-    /// Motions of the body made of `nodes` when `held` degrees of freedom of it and the means of
-    /// `masks` on it are in place; `None` if it has too many hinged parts to tell.
+impl<'a> BodyMotions<'a> {
+    /// Motions of a body when `held` degrees of freedom of it and the means of `masks` on it are in
+    /// place; `None` if it has too many hinged parts to tell.
     pub fn of_body(
-        mesh: &TetMesh,
-        parts: &Parts,
-        nodes: &[u32],
+        mesh: &'a TetMesh,
+        rigid: &'a RigidBodies,
+        body: usize,
         held: &[u32],
         masks: &[&Mask],
     ) -> Option<Self> {
-        let mut names: Vec<u32> =
-            nodes.iter().flat_map(|&n| parts.of_node[n as usize].iter().copied()).collect();
-        names.sort_unstable();
-        names.dedup();
-        if names.len() > PARTS_MAX {
+        let body = rigid.bodies.get(body)?;
+        if body.parts.len() > PARTS_MAX {
             return None;
         }
-        let centre = Point3::from(
-            nodes.iter().map(|&n| mesh.vertices()[n as usize].coords).sum::<Vector3<f64>>()
-                / nodes.len() as f64,
-        );
-        let size = nodes
-            .iter()
-            .map(|&n| (mesh.vertices()[n as usize] - centre).norm())
-            .fold(f64::MIN_POSITIVE, f64::max);
-        let mut motions = Self { parts: names, centre, size, basis: Vec::new() };
-        let mut rows = Rows::new(6 * motions.parts.len());
+        let part_of_node = rigid.part_of_node.as_slice();
+        let mut motions = Self { mesh, part_of_node, body, basis: Vec::new() };
+        let mut rows = Rows::new(6 * body.parts.len());
         for &dof in held {
             let (node, axis) = (dof / 3, dof as usize % 3);
-            let part = parts.of_node[node as usize][0];
-            rows.push(motions.row(mesh, node, axis, &[(part, 1.0)]));
+            rows.push(motions.row(node, axis, &[(motions.part_of(node), 1.0)]));
         }
         for mask in masks {
             for axis in 0..3 {
-                let mut mean = DVector::zeros(6 * motions.parts.len());
+                let mut mean = DVector::zeros(6 * body.parts.len());
                 for &(node, weight) in mask.entries() {
-                    let part = parts.of_node[node as usize][0];
-                    mean += motions.row(mesh, node, axis, &[(part, weight)]);
+                    mean += motions.row(node, axis, &[(motions.part_of(node), weight)]);
                 }
                 rows.push(mean);
             }
         }
-        for &node in nodes {
-            if let Some((&first, others)) = parts.of_node[node as usize].split_first() {
+        for (node, parts) in &body.joints {
+            if let Some((&first, others)) = parts.split_first() {
                 for &other in others {
                     let joint = [(first, 1.0), (other, -1.0)];
-                    (0..3).for_each(|axis| rows.push(motions.row(mesh, node, axis, &joint)));
+                    (0..3).for_each(|axis| rows.push(motions.row(*node, axis, &joint)));
                 }
             }
         }
@@ -133,12 +172,17 @@ impl BodyMotions {
         Some(motions)
     }
 
+    fn part_of(&self, node: u32) -> u32 {
+        self.part_of_node[node as usize]
+    }
+
     /// Displacement of a node along an axis, as a row on the motions of some parts.
-    fn row(&self, mesh: &TetMesh, node: u32, axis: usize, parts: &[(u32, f64)]) -> DVector<f64> {
-        let mut row = DVector::zeros(6 * self.parts.len());
-        let r = (mesh.vertices()[node as usize] - self.centre) / self.size;
+    fn row(&self, node: u32, axis: usize, parts: &[(u32, f64)]) -> DVector<f64> {
+        let names = &self.body.parts;
+        let mut row = DVector::zeros(6 * names.len());
+        let r = (self.mesh.vertices()[node as usize] - self.body.centre) / self.body.size;
         for &(part, sign) in parts {
-            let c = 6 * self.parts.partition_point(|&p| p < part);
+            let c = 6 * names.partition_point(|&p| p < part);
             row[c + axis] += sign;
             // (ω × r)_axis = ω_{axis+1} r_{axis+2} − ω_{axis+2} r_{axis+1}.
             let (next, after) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -149,38 +193,25 @@ impl BodyMotions {
     }
 
     /// Adds one motion of the basis to a displacement field.
-    pub fn add_field(
-        &self,
-        mesh: &TetMesh,
-        parts: &Parts,
-        nodes: &[u32],
-        motion: &DVector<f64>,
-        field: &mut [f64],
-    ) {
-        for &node in nodes {
-            let part = parts.of_node[node as usize][0];
+    pub fn add_field(&self, motion: &DVector<f64>, field: &mut [f64]) {
+        for &node in &self.body.nodes {
             for axis in 0..3 {
-                field[3 * node as usize + axis] +=
-                    self.row(mesh, node, axis, &[(part, 1.0)]).dot(motion);
+                let row = self.row(node, axis, &[(self.part_of(node), 1.0)]);
+                field[3 * node as usize + axis] += row.dot(motion);
             }
         }
     }
 }
 
-/// Nodes of every body, and those of the given degrees of freedom that are on it, in one pass.
-pub(super) fn nodes_and_dofs_by_body(bodies: &Bodies, dofs: &[u32]) -> Vec<(Vec<u32>, Vec<u32>)> {
-    let mut parts = vec![(Vec::new(), Vec::new()); bodies.count()];
-    for (node, body) in bodies.of_node.iter().enumerate() {
-        if let Some(body) = body {
-            parts[*body as usize].0.push(node as u32);
-        }
-    }
+/// The given degrees of freedom of every body, in the order given.
+pub(super) fn dofs_by_body(bodies: &Bodies, dofs: &[u32]) -> Vec<Vec<u32>> {
+    let mut by_body = vec![Vec::new(); bodies.count()];
     for &dof in dofs {
         if let Some(Some(body)) = bodies.of_node.get(dof as usize / 3) {
-            parts[*body as usize].1.push(dof);
+            by_body[*body as usize].push(dof);
         }
     }
-    parts
+    by_body
 }
 
 /// Conditions on the motions, kept as a triangle: thousands of them take no more room than a few,

@@ -2,22 +2,23 @@
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::Isometry3;
+use softgrasp_core::fem::Element;
 use softgrasp_core::grasp::{Grasp, GraspEvent, StateName};
 use softgrasp_core::mesh_io::{PointField, write_vtu};
-use softgrasp_protocol::{Material, MethodName};
+use softgrasp_core::solve::choose::cheapest_element;
+use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
 use super::output::{print, write_file, write_json};
 use crate::connection::{Host, ServerChoice};
 use crate::contact_model::ContactModel;
 use crate::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, Subscription, TickOutcome};
 use crate::hand_reader::{HandReader, HandSetup};
+use crate::interruption;
 use crate::link::Link;
 use crate::progress::Progress;
 use crate::run_report::{ObjectSummary, RunReport};
@@ -53,6 +54,10 @@ pub struct RunCommand {
     /// Method, or auto.
     #[arg(long, value_name = "NAME|auto")]
     method: Option<MethodName>,
+    /// Element: t4, t4-anp (does not lock when Poisson's ratio nears 0.5), or auto: t4 below 0.45,
+    /// t4-anp from there on [default: auto].
+    #[arg(long, value_name = "t4|t4-anp|auto")]
+    element: Option<ElementChoice>,
     /// What a fingertip holds: vertex (the node it touched, as in the thesis), patch (every surface
     /// node under it) or mask (their mean, weighted by the tip's pressure) [default: mask].
     #[arg(long, value_name = "vertex|patch|mask")]
@@ -107,6 +112,23 @@ const START_WAIT_MAX: Duration = Duration::from_secs(60);
 /// Factor by which an imported object grows while the hand finds no grip, and where it ends, m.
 const ENLARGE: f64 = 1.25;
 const ENLARGED_MAX_M: f64 = 0.2;
+
+/// The element that frames are solved with; frames need one whose system is condensed.
+fn element_for_frames(choice: ElementChoice, poisson: f64) -> anyhow::Result<ElementName> {
+    match choice {
+        ElementChoice::T4 => Ok(ElementName::T4),
+        ElementChoice::T4Anp => Ok(ElementName::T4Anp),
+        ElementChoice::Auto => Ok(match cheapest_element(poisson) {
+            Element::Tet4 => ElementName::T4,
+            Element::Tet4Anp => ElementName::T4Anp,
+            Element::Tet10 => ElementName::T10,
+        }),
+        ElementChoice::T10 => bail!(
+            "run has no ten-node elements: a frame would take as long as a whole solve; take t4, \
+             t4-anp or auto, or solve one request with `glove-client solve --element t10`"
+        ),
+    }
+}
 
 /// A scene after flags and file have been put together.
 struct Plan {
@@ -187,6 +209,12 @@ impl RunCommand {
             (None, Some(name)) => name.parse().context("the scene's method")?,
             (None, None) => MethodName::auto(),
         };
+        let element = match (self.element, &scene.element) {
+            (Some(element), _) => element,
+            (None, Some(name)) => name.parse().context("the scene's element")?,
+            (None, None) => ElementChoice::Auto,
+        };
+        let poisson = self.poisson.or(scene.poisson).unwrap_or(0.4);
         let contact = match (self.contact, &scene.contact) {
             (Some(contact), _) => contact,
             (None, Some(name)) => name.parse().context("the scene's contact")?,
@@ -210,8 +238,9 @@ impl RunCommand {
             settings: SolveSettings {
                 material: Material {
                     young: self.young.or(scene.young_pa).unwrap_or(2.0e4),
-                    poisson: self.poisson.or(scene.poisson).unwrap_or(0.4),
+                    poisson,
                 },
+                element: element_for_frames(element, poisson)?,
                 method,
                 contact,
                 subscription: match self.out_dir {
@@ -233,14 +262,14 @@ impl RunCommand {
         period: Option<Duration>,
         report: &mut RunReport,
     ) -> anyhow::Result<()> {
-        let interrupted = interrupt_flag();
+        interruption::hear();
         let mut status = StatusLine::start();
         let mut seen = Seen::default();
         let start = Instant::now();
         // With `--frames` as many ticks as asked for; else until the script is over.
         for tick in 0..self.frames.unwrap_or(u64::MAX) {
             let sent = hand.next(&seen, grasp_loop.object());
-            if interrupted.load(Ordering::Relaxed) || (sent.over && self.frames.is_none()) {
+            if interruption::asked() || (sent.over && self.frames.is_none()) {
                 report.interrupted = !sent.over;
                 break;
             }
@@ -301,17 +330,6 @@ fn wait_until(then: Instant) {
 fn console_is_watched() -> bool {
     use std::io::IsTerminal as _;
     std::io::stderr().is_terminal()
-}
-
-/// Set by Ctrl-C: the run ends with its summary and its report.
-fn interrupt_flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
-    // Without a handler Ctrl-C still ends the program, only without a summary.
-    if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
-        tracing::debug!(%error, "Ctrl-C cannot be caught");
-    }
-    flag
 }
 
 /// Writes the object when it starts to deform, just before its shape is kept or let go, and after.

@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::mesh_io::{MeshFile, PointField, write_vtu};
+use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::{
     Answer, Displacements, DofValue, ElementChoice, Material, MeshData, MethodName, NodeChoice,
     Precision, Question, Reply, Request, SolveOnce, Want,
@@ -42,13 +43,17 @@ pub struct SolveCommand {
     /// Threads of the embedded server [default: one per processor].
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
+    /// Memory for the embedded server: bytes, or 8GiB, 512MiB [default: 8GiB]. What needs more is
+    /// refused before it is made; auto takes single precision where only that fits.
+    #[arg(long, value_name = "BYTES")]
+    memory_limit: Option<Bytes>,
     /// gauss-jordan-plain, gauss-jordan, dense-inverse, dense-cholesky, sparse-cholesky, front,
     /// front-mixed, pcg, condensed or auto.
     #[arg(long, default_value = "auto", value_name = "NAME|auto")]
     method: MethodName,
-    /// Finite element; auto takes ten nodes where linear elements lock (Poisson's ratio from 0.45
-    /// on) and deadline and memory allow.
-    #[arg(long, default_value = "t4", value_name = "t4|t10|auto")]
+    /// Finite element; auto takes t4 below a Poisson's ratio of 0.45, from where on it locks, else
+    /// t10 where deadline and memory allow, else t4-anp.
+    #[arg(long, default_value = "t4", value_name = "t4|t4-anp|t10|auto")]
     element: ElementChoice,
     /// Young's modulus, Pa (in the mesh's unit of length).
     #[arg(long, default_value_t = 1.0e5, value_name = "PA")]
@@ -97,6 +102,7 @@ struct MeshSummary {
     tets: usize,
     flipped: usize,
     degenerate_dropped: usize,
+    repeated_dropped: usize,
     orphans: usize,
 }
 
@@ -125,9 +131,21 @@ impl SolveCommand {
         let file = read_mesh_file(&self.mesh)?;
         let question = self.question(&file.mesh)?;
         progress.now("starting");
-        let host = Host::open(&self.server, self.threads)?;
+        if self.memory_limit.is_some() && self.server != ServerChoice::Embedded {
+            bail!(
+                "--memory-limit is for the embedded server; {} has its own, set where it is started",
+                self.server
+            );
+        }
+        let limit = self.memory_limit.map(|Bytes(bytes)| bytes);
+        let host = Host::open_within(&self.server, self.threads, limit)?;
         let mut connection = host.connect(None)?;
-        progress.now(&format!("solving for {} nodes", file.mesh.node_count()));
+        let nodes = file.mesh.node_count();
+        progress.now(&match &self.server {
+            ServerChoice::Embedded => format!("{nodes} nodes:"),
+            ServerChoice::At(address) => format!("solving for {nodes} nodes at {address}"),
+        });
+        progress.watch(host.stage());
         let request = SolveOnce {
             mesh: mesh_data(&file.mesh),
             materials: vec![Material { young: self.young, poisson: self.poisson }],
@@ -202,6 +220,7 @@ impl SolveCommand {
                 tets: file.mesh.tets().len(),
                 flipped: file.findings.flipped.len(),
                 degenerate_dropped: file.findings.degenerate.len(),
+                repeated_dropped: file.findings.repeated.len(),
                 orphans: file.findings.orphans,
             },
             server: match &self.server {
@@ -283,6 +302,7 @@ fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
     for (count, what) in [
         (findings.flipped.len(), "inverted tetrahedra were turned"),
         (findings.degenerate.len(), "tetrahedra without volume were dropped"),
+        (findings.repeated.len(), "tetrahedra that repeat an earlier one were dropped"),
         (findings.orphans, "nodes belong to no tetrahedron and stay where they are"),
     ] {
         if count > 0 {

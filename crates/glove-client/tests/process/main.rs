@@ -6,8 +6,10 @@
     reason = "helpers of tests fail and speak like tests"
 )]
 
+mod admission;
 mod agreement;
 mod commands;
 mod discretisation;
+mod interruption;
 mod references;
 mod start;

@@ -20,6 +20,6 @@ pub use names::{ElementChoice, ElementChoiceError, ElementName, MethodName, Meth
 pub use question::{DofValue, NodeChoice, Precision, Question, SolveOnce, Want};
 pub use reject::{RejectCode, Rejected};
 pub use reply::Reply;
-pub use report::{SolveReport, StageMs};
+pub use report::{SolveReport, StageMs, WarningLevel};
 pub use request::Request;
 pub use session::{Hello, Welcome};

@@ -75,6 +75,8 @@ pub enum ElementName {
     T4,
     /// Quadratic tetrahedron, ten nodes; its mid-edge nodes are made by the server.
     T10,
+    /// Linear tetrahedron whose pressure is averaged around each node.
+    T4Anp,
 }
 
 impl ElementName {
@@ -83,6 +85,7 @@ impl ElementName {
         match self {
             Self::T4 => "t4",
             Self::T10 => "t10",
+            Self::T4Anp => "t4-anp",
         }
     }
 }
@@ -95,6 +98,8 @@ pub enum ElementChoice {
     T4,
     /// [`ElementName::T10`].
     T10,
+    /// [`ElementName::T4Anp`].
+    T4Anp,
     /// The server chooses by material, deadline and memory.
     Auto,
 }
@@ -104,13 +109,14 @@ impl From<ElementName> for ElementChoice {
         match name {
             ElementName::T4 => Self::T4,
             ElementName::T10 => Self::T10,
+            ElementName::T4Anp => Self::T4Anp,
         }
     }
 }
 
 /// A text that names no element.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no element is called {name:?}; there are t4, t10 and auto")]
+#[error("no element is called {name:?}; there are t4, t4-anp, t10 and auto")]
 pub struct ElementChoiceError {
     /// The text.
     pub name: String,
@@ -123,6 +129,7 @@ impl FromStr for ElementChoice {
         match name {
             "t4" => Ok(Self::T4),
             "t10" => Ok(Self::T10),
+            "t4-anp" => Ok(Self::T4Anp),
             "auto" => Ok(Self::Auto),
             _ => Err(ElementChoiceError { name: name.to_owned() }),
         }
@@ -143,7 +150,7 @@ mod tests {
 
     #[test]
     fn chosen_elements_travel_like_the_elements_they_name() {
-        for name in [ElementName::T4, ElementName::T10] {
+        for name in [ElementName::T4, ElementName::T10, ElementName::T4Anp] {
             let choice: ElementChoice = name.as_str().parse().unwrap();
             assert_eq!(choice, name.into());
             assert_eq!(wincode::serialize(&choice).unwrap(), wincode::serialize(&name).unwrap());

@@ -50,11 +50,14 @@ pub enum RejectCode {
     /// The server does not speak the client's protocol version.
     #[wincode(tag = 13)]
     UnsupportedVersion = 13,
+    /// The answer would have no certain digit: what is known holds the body too weakly.
+    #[wincode(tag = 14)]
+    Uncertain = 14,
 }
 
 impl RejectCode {
     /// All codes, in the order of their numbers.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::BadRequest,
         Self::UnknownModel,
         Self::RigidMotionFree,
@@ -68,6 +71,7 @@ impl RejectCode {
         Self::ShuttingDown,
         Self::Internal,
         Self::UnsupportedVersion,
+        Self::Uncertain,
     ];
 
     /// Number on the wire.

@@ -24,6 +24,29 @@ pub struct StageMs {
     pub queue: f64,
 }
 
+/// How much of an answer rounding has left, by the estimate of its error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub enum WarningLevel {
+    /// Nothing is known to be amiss.
+    #[default]
+    None,
+    /// Digits are lost: the estimate is above 1e-9, or above the error that was asked for.
+    Caution,
+    /// Few digits are left: the estimate is above 1e-3.
+    Serious,
+}
+
+impl WarningLevel {
+    /// Name used in reports.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Caution => "caution",
+            Self::Serious => "serious",
+        }
+    }
+}
+
 /// Report of one solve.
 ///
 /// Units: `…_ms` ms, `…_rel` relative, `…_deg` degrees, `…_bytes` bytes.
@@ -53,8 +76,12 @@ pub struct SolveReport {
     pub max_strain: f64,
     /// Arithmetic that was used.
     pub precision: String,
-    /// Estimate of the condition number, if one was made.
+    /// Estimate of the condition number, if one was made: how much errors of rounding can grow.
     pub condition_estimate: Option<f64>,
+    /// Estimate of the largest error over the largest displacement, if one was made; no bound.
+    pub error_estimate_rel: Option<f64>,
+    /// What the estimate means.
+    pub warning_level: WarningLevel,
     /// What the user should know.
     pub warnings: Vec<String>,
     /// Largest resident memory of the server so far.

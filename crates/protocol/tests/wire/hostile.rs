@@ -142,7 +142,7 @@ fn displacements_that_do_not_fit_the_masks_are_not_sent() {
 fn a_long_list_of_empty_texts_takes_no_more_than_a_part() {
     let mut report = vec![];
     report.extend(0_u64.to_le_bytes()); // method
-    report.extend([0; 4 + 16 + 56 + 8 + 1 + 8 + 4 + 16 + 8 + 1]); // up to condition_estimate
+    report.extend([0; 4 + 16 + 56 + 8 + 1 + 8 + 4 + 16 + 8 + 1 + 1 + 4]); // up to warning_level
     for count in [u64::MAX, 1 << 40, 65_536, 2730] {
         let mut payload = report.clone();
         payload.extend(count.to_le_bytes());

@@ -5,7 +5,7 @@ use softgrasp_protocol::{Frame, FrameBuffer, Limits};
 /// A sound frame around any payload, written without the crate's own encoder.
 pub fn raw_frame(kind: u16, request_id: u64, payload: &[u8]) -> Vec<u8> {
     let mut bytes = b"SGRP".to_vec();
-    bytes.extend(2_u16.to_le_bytes());
+    bytes.extend(3_u16.to_le_bytes());
     bytes.extend(kind.to_le_bytes());
     bytes.extend(0_u32.to_le_bytes());
     bytes.extend(u32::try_from(payload.len()).unwrap().to_le_bytes());

@@ -125,6 +125,8 @@ fn replies() -> Vec<Message> {
         max_strain: 0.0625,
         precision: "f64".to_owned(),
         condition_estimate: None,
+        error_estimate_rel: Some(1e-13),
+        warning_level: WarningLevel::Caution,
         warnings: vec!["large rotation".to_owned(), String::new()],
         peak_rss_bytes: 1 << 24,
         factor_reused: false,
@@ -287,6 +289,8 @@ fn report() -> impl Strategy<Value = SolveReport> {
                 max_strain,
                 precision,
                 condition_estimate: condition,
+                error_estimate_rel: condition.map(|c| 1e-16 * c),
+                warning_level: [WarningLevel::None, WarningLevel::Serious][steps as usize % 2],
                 warnings,
                 peak_rss_bytes,
                 factor_reused,
@@ -355,7 +359,7 @@ fn stage_ms() -> impl Strategy<Value = StageMs> {
 }
 
 fn element() -> impl Strategy<Value = ElementName> {
-    prop::sample::select(vec![ElementName::T4, ElementName::T10])
+    prop::sample::select(vec![ElementName::T4, ElementName::T10, ElementName::T4Anp])
 }
 
 fn element_choice() -> impl Strategy<Value = ElementChoice> {

@@ -7,7 +7,8 @@ use crate::mesh_io::{Format, MeshFile, parse};
 
 /// What must hold of every mesh that comes out, whatever went in.
 fn check(file: &MeshFile) {
-    let kept = file.findings.file_tets - file.findings.degenerate.len();
+    let findings = &file.findings;
+    let kept = findings.file_tets - findings.degenerate.len() - findings.repeated.len();
     assert_eq!(file.mesh.tets().len(), kept);
     assert_eq!(file.mesh.node_count(), file.findings.file_nodes);
     for tet in 0..kept {

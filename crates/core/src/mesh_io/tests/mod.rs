@@ -3,6 +3,7 @@
 mod foreign_files;
 mod gmsh_quirks;
 mod hostile_bytes;
+mod mending;
 mod other_quirks;
 mod real_files;
 mod round_trips;

@@ -75,14 +75,16 @@ fn auto(poisson_max: f64, deadline_ms: Option<f64>) -> Wish {
     Wish { element, ..wish(deadline_ms, None) }
 }
 
-/// Linear offers as in the table, ten-node ones seventy times as costly.
-fn both_elements(wish: &Wish) -> Vec<Offer> {
-    [table(wish, Element::Tet4, 1.0), table(wish, Element::Tet10, 70.0)].concat()
+/// Linear offers as in the table, with nodal pressure eight times, ten-node ones seventy times as
+/// costly.
+fn all_elements(wish: &Wish) -> Vec<Offer> {
+    let of = |(element, factor)| table(wish, element, factor);
+    [(Element::Tet4, 1.0), (Element::Tet4Anp, 8.0), (Element::Tet10, 70.0)].map(of).concat()
 }
 
 #[test]
-fn ten_nodes_are_taken_where_linear_elements_lock_and_time_and_memory_allow() {
-    let size = MeshSize { nodes: 1000, tets: 4500 };
+fn elements_that_do_not_lock_are_taken_where_time_and_memory_allow() {
+    let size = MeshSize { nodes: 1500, tets: 6750 };
     let element_of = |wish: &Wish| {
         let offers = offers(wish, size, &Rates::ASSUMED);
         choose(wish, &offers).map(|choice| (choice.offer.element, choice.locks)).unwrap()
@@ -90,20 +92,30 @@ fn ten_nodes_are_taken_where_linear_elements_lock_and_time_and_memory_allow() {
     assert_eq!(element_of(&auto(0.3, None)), (Element::Tet4, None));
     let roomy = ElementWish::Auto { poisson_max: 0.49, memory_limit: 1 << 40 };
     assert_eq!(element_of(&Wish { element: roomy, ..auto(0.49, None) }), (Element::Tet10, None));
-    assert_eq!(element_of(&auto(0.49, None)), (Element::Tet4, Some(Locks::NoMemory)));
+    assert_eq!(element_of(&auto(0.49, None)), (Element::Tet4Anp, None));
+    let tight = ElementWish::Auto { poisson_max: 0.49, memory_limit: 1 << 23 };
+    let tight = Wish { element: tight, ..auto(0.49, None) };
+    assert_eq!(element_of(&tight), (Element::Tet4, Some(Locks::NoMemory)));
 
-    let wish = auto(0.45, Some(4500.0));
-    let choice = choose(&wish, &both_elements(&wish)).unwrap();
-    assert_eq!((choice.offer.element, choice.offer.method), (Element::Tet10, Method::Pcg));
-    let wish = auto(0.45, Some(1000.0));
-    let choice = choose(&wish, &both_elements(&wish)).unwrap();
-    assert_eq!((choice.offer.element, choice.offer.method), (Element::Tet4, Method::Front));
+    let chosen = |deadline_ms, max_error| {
+        let wish = Wish { max_error, ..auto(0.45, Some(deadline_ms)) };
+        choose(&wish, &all_elements(&wish)).unwrap()
+    };
+    let what = |choice: &Choice| (choice.offer.element, choice.offer.method);
+    assert_eq!(what(&chosen(4500.0, None)), (Element::Tet10, Method::Pcg));
+    assert_eq!(what(&chosen(1000.0, None)), (Element::Tet4Anp, Method::Front));
+    let choice = chosen(300.0, None);
+    assert_eq!(what(&choice), (Element::Tet4, Method::Front));
     assert_eq!((choice.gave_up, choice.locks), (None, Some(Locks::NoTime)));
     assert!(choice.locks.unwrap().to_string().contains("too late"));
-    // What cannot be in time anyhow is not made slower still.
-    let wish = auto(0.45, Some(1.0));
-    let choice = choose(&wish, &both_elements(&wish)).unwrap();
-    assert_eq!((choice.offer.element, choice.gave_up), (Element::Tet4, Some(GaveUp::Deadline)));
+    // What cannot be in time, or not exact, still does not lock.
+    let choice = chosen(1.0, None);
+    assert_eq!((choice.offer.element, choice.gave_up), (Element::Tet4Anp, Some(GaveUp::Deadline)));
+    let choice = chosen(1000.0, Some(1e-15));
+    assert_eq!(
+        (choice.offer.element, choice.gave_up),
+        (Element::Tet4Anp, Some(GaveUp::ErrorBudget))
+    );
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::mesh::{Bodies, TetMesh};
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
 use crate::solve::partition::AXIS_NAMES;
 use crate::solve::pcg::norm;
-use crate::solve::zero_energy::{BodyMotions, nodes_and_dofs_by_body, rigid_parts};
+use crate::solve::zero_energy::{BodyMotions, RigidBodies, dofs_by_body};
 use crate::solve::{Partition, PartitionError, Stage};
 
 /// Base factor of one shape.
@@ -25,6 +25,8 @@ pub struct Base {
     pub(super) modes: Vec<Mode>,
     /// Bound of the largest eigenvalue of `K`, N/m.
     pub(super) stiffest: f64,
+    /// Skeel's condition number of `K_B`, once somebody has asked for it.
+    pub(super) condition: OnceLock<f64>,
     /// Lower bound of the smallest eigenvalue of `K_B`, once somebody has proven one.
     pub(super) eigenvalue_min: OnceLock<Option<f64>>,
 }
@@ -63,6 +65,17 @@ pub enum CondensedError {
         node: usize,
         /// Axis of the pivot.
         axis: char,
+    },
+    /// The base factor is larger than it may be.
+    #[error(
+        "condensed: the base factor takes up to {needed} bytes while it is made, and may take \
+         {limit}; allow more memory, or use front-mixed, which takes half"
+    )]
+    OverLimit {
+        /// Bytes it would take at most.
+        needed: u64,
+        /// Bytes it may take.
+        limit: u64,
     },
     /// No memory.
     #[error("condensed: no memory for the base factor ({bytes} bytes)")]
@@ -117,24 +130,49 @@ pub enum CondensedError {
 impl Base {
     /// Chooses the base of a shape and factors it on the current rayon pool.
     ///
-    /// Shapes: `fixed` ascending degrees of freedom held at zero by the scene.
+    /// Shapes: `rigid` that of `mesh` and `bodies`; `fixed` ascending degrees of freedom held at
+    /// zero by the scene.
     ///
     /// # Errors
     /// [`CondensedError`].
     pub fn try_new(
         mesh: &TetMesh,
         bodies: &Bodies,
+        rigid: &RigidBodies,
         stiffness: &Arc<Stiffness>,
         fixed: &[u32],
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Self, CondensedError> {
-        let fields = motions(mesh, bodies, fixed)?;
+        Self::try_within(mesh, bodies, rigid, stiffness, fixed, u64::MAX, on_stage)
+    }
+
+    /// The same where the factor may take so much memory only, which is looked at before it is
+    /// allocated.
+    ///
+    /// Units: `limit` bytes.
+    ///
+    /// # Errors
+    /// Those of [`Base::try_new`], and [`CondensedError::OverLimit`] with both numbers.
+    pub fn try_within(
+        mesh: &TetMesh,
+        bodies: &Bodies,
+        rigid: &RigidBodies,
+        stiffness: &Arc<Stiffness>,
+        fixed: &[u32],
+        limit: u64,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Self, CondensedError> {
+        let fields = motions(mesh, bodies, rigid, fixed)?;
         let held = hold(&fields, fixed);
         let mut known = [fixed, held.as_slice()].concat();
         known.sort_unstable();
         let partition = Partition::try_new(&mesh.used_nodes(), &known)?;
         on_stage(Stage::Order);
         let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
+        let needed = analysis.peak_bytes::<f64>() as u64;
+        if needed > limit {
+            return Err(CondensedError::OverLimit { needed, limit });
+        }
         on_stage(Stage::Factor);
         let factor = FrontFactor::try_new(&analysis, stiffness)
             .map_err(|error| refuse(error, &partition))?;
@@ -147,6 +185,7 @@ impl Base {
             held,
             modes,
             stiffest: stiffness.row_sum_max(),
+            condition: OnceLock::new(),
             eigenvalue_min: OnceLock::new(),
         })
     }
@@ -171,6 +210,11 @@ impl Base {
     /// Whether the scene's fixed nodes hold every body.
     pub fn is_held_by_scene(&self) -> bool {
         self.held.is_empty()
+    }
+
+    /// Bytes that the proof of the smallest eigenvalue takes for the moment: a second factor.
+    pub fn proof_bytes(&self) -> u64 {
+        self.factor.analysis().peak_bytes::<f64>() as u64
     }
 
     /// Bytes of the factor and the modes.
@@ -219,16 +263,16 @@ pub(super) fn gamma(n: usize) -> f64 {
 fn motions(
     mesh: &TetMesh,
     bodies: &Bodies,
+    rigid: &RigidBodies,
     fixed: &[u32],
 ) -> Result<Vec<Vec<f64>>, CondensedError> {
-    let parts = rigid_parts(mesh, bodies);
     let mut fields = Vec::new();
-    for (body, (nodes, held)) in nodes_and_dofs_by_body(bodies, fixed).into_iter().enumerate() {
-        let motions = BodyMotions::of_body(mesh, &parts, &nodes, &held, &[])
+    for (body, held) in dofs_by_body(bodies, fixed).into_iter().enumerate() {
+        let motions = BodyMotions::of_body(mesh, rigid, body, &held, &[])
             .ok_or(CondensedError::Hinges { body })?;
         for motion in &motions.basis {
             let mut field = vec![0.0; 3 * mesh.node_count()];
-            motions.add_field(mesh, &parts, &nodes, motion, &mut field);
+            motions.add_field(motion, &mut field);
             for &dof in fixed {
                 field[dof as usize] = 0.0;
             }

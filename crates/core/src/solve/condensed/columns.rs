@@ -37,9 +37,6 @@ struct Kept {
     computed: u64,
 }
 
-/// A column whose residual, relative to its load, is above this is refined once.
-const RESIDUAL_GOOD: f64 = 1e-11;
-
 impl Columns {
     /// An empty cache.
     ///
@@ -147,7 +144,10 @@ fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
     let rows_wanted: Vec<usize> = (0..n).collect();
     let loads: Vec<Load> = contacts.iter().flat_map(|c| unit_loads(base, c)).collect();
     let solved = base.factor.solve_partial(&loads, &rows_wanted);
-    let mut fields: Vec<Field> = loads
+    // Not refined: as they come, all columns are those of one matrix very near to K_B, so their
+    // errors cancel in an answer; refined one by one they would be errors of their own, up to a
+    // hundred times as large (docs/decisions.md).
+    let fields: Vec<Field> = loads
         .into_par_iter()
         .enumerate()
         .map(|(column, load)| {
@@ -155,12 +155,9 @@ fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
             for (row, &dof) in unknown.iter().enumerate() {
                 field[dof as usize] = solved[(row, column)];
             }
-            Field::check(base, load, field)
+            Field::check(base, &load, field)
         })
         .collect();
-    for field in &mut fields {
-        field.refine(base);
-    }
     let mut fields = fields.into_iter();
     contacts
         .iter()
@@ -169,7 +166,7 @@ fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
             Some(ContactColumns {
                 contact: contact.clone(),
                 norms: [x.norm, y.norm, z.norm],
-                residuals: [norm(&x.residual), norm(&y.residual), norm(&z.residual)],
+                residuals: [x.residual, y.residual, z.residual],
                 residual_bounds: [x.residual_bound, y.residual_bound, z.residual_bound],
                 fields: [x.field, y.field, z.field],
             })
@@ -192,40 +189,22 @@ fn unit_loads(base: &Base, contact: &Contact) -> [Load; 3] {
 
 /// One column and how well it solves its equations.
 struct Field {
-    load: Load,
     field: Vec<f64>,
     norm: f64,
-    residual: Vec<f64>,
+    residual: f64,
     residual_bound: f64,
 }
 
 impl Field {
-    fn check(base: &Base, load: Load, field: Vec<f64>) -> Self {
+    fn check(base: &Base, load: &Load, field: Vec<f64>) -> Self {
         let f = base.stiffness.mul(&field);
         let unknown = base.partition.unknown();
         let mut residual: Vec<f64> = unknown.iter().map(|&d| -f[d as usize]).collect();
-        for &(row, weight) in &load {
+        for &(row, weight) in load {
             residual[row] += weight;
         }
-        let rounding = rounding_of_product(&base.stiffness, &field);
-        let residual_bound = norm(&residual) + rounding;
-        Self { load, norm: norm(&field), field, residual, residual_bound }
-    }
-
-    fn refine(&mut self, base: &Base) {
-        let size = self.load.iter().map(|entry| entry.1 * entry.1).sum::<f64>().sqrt();
-        if norm(&self.residual) <= RESIDUAL_GOOD * size {
-            return;
-        }
-        let mut correction = self.residual.clone();
-        base.factor.solve_in_place(&mut correction, 1);
-        let mut field = self.field.clone();
-        for (&dof, c) in base.partition.unknown().iter().zip(&correction) {
-            field[dof as usize] += c;
-        }
-        let refined = Self::check(base, self.load.clone(), field);
-        if refined.residual_bound < self.residual_bound {
-            *self = refined;
-        }
+        let residual = norm(&residual);
+        let residual_bound = residual + rounding_of_product(&base.stiffness, &field);
+        Self { norm: norm(&field), field, residual, residual_bound }
     }
 }

@@ -148,12 +148,16 @@ impl ContactSet {
         }
         let columns = self.places.iter().map(|&(at, axis)| &self.columns[at].fields[axis]);
         let fields: Vec<&Vec<f64>> = columns.chain(base.modes.iter().map(|m| &m.field)).collect();
-        let mut blocks = Vec::with_capacity(3 * nodes.len() * fields.len());
-        for nodes in nodes.chunks(ROWS_TOGETHER / 3) {
-            for field in &fields {
-                blocks.extend(nodes.iter().flat_map(|&node| &field[3 * node as usize..][..3]));
+        let mut blocks = vec![0.0; 3 * nodes.len() * fields.len()];
+        let of_nodes = nodes.par_chunks(ROWS_TOGETHER / 3);
+        let in_blocks = blocks.par_chunks_mut((ROWS_TOGETHER * fields.len()).max(1));
+        of_nodes.zip(in_blocks).for_each(|(nodes, block)| {
+            for (field, column) in fields.iter().zip(block.chunks_exact_mut(3 * nodes.len())) {
+                for (row, &node) in column.as_chunks_mut::<3>().0.iter_mut().zip(nodes) {
+                    row.copy_from_slice(&field[3 * node as usize..][..3]);
+                }
             }
-        }
+        });
         self.rows = Some(WantedRows { nodes: nodes.to_vec(), blocks });
     }
 

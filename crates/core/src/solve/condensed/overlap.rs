@@ -77,7 +77,8 @@ fn free_columns(touched: &Touched, fixed: &[u32]) -> Vec<Vec<(u32, f64)>> {
     columns
 }
 
-fn product(a: &[(u32, f64)], b: &[(u32, f64)]) -> f64 {
+/// Product of two sparse columns.
+pub(super) fn product(a: &[(u32, f64)], b: &[(u32, f64)]) -> f64 {
     let (mut i, mut j, mut sum) = (0, 0, 0.0);
     while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
         match x.0.cmp(&y.0) {

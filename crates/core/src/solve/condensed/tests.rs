@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::fem::{Material, Stiffness, StiffnessPattern, assemble};
 use crate::mesh::{Bodies, BuiltIn, TetMesh, generate};
-use crate::solve::{Factored, Loads, Method, Partition};
+use crate::solve::{Factored, Loads, Method, Partition, RigidBodies, find_free_motion};
 use nalgebra::Point3;
 
 pub(super) struct Shape {
@@ -23,7 +23,8 @@ impl Shape {
         let material = Material::try_new(1.0e5, poisson).unwrap();
         let stiffness = Arc::new(assemble(&pattern, &mesh, &[material]).unwrap());
         let bodies = Bodies::from_mesh(&mesh);
-        let base = Base::try_new(&mesh, &bodies, &stiffness, fixed, &mut |_| {}).unwrap();
+        let rigid = RigidBodies::new(&mesh, &bodies);
+        let base = Base::try_new(&mesh, &bodies, &rigid, &stiffness, fixed, &mut |_| {}).unwrap();
         Self { mesh, stiffness, base, columns: Columns::new(1 << 30) }
     }
 
@@ -284,7 +285,8 @@ proptest! {
         let mut known = [fixed.as_slice(), dofs.as_slice()].concat();
         known.sort_unstable();
         let bodies = Bodies::from_mesh(&shape.mesh);
-        prop_assume!(crate::solve::find_free_motion(&shape.mesh, &bodies, &known, &[]).is_none());
+        let rigid = RigidBodies::new(&shape.mesh, &bodies);
+        prop_assume!(find_free_motion(&shape.mesh, &bodies, &rigid, &known, &[]).is_none());
         let q = &q[..dofs.len()];
         let (u, _, _) = shape.answer(&dofs, q);
         let (expected, _) = shape.direct(&dofs, q);

@@ -1,6 +1,6 @@
 //! Between order and factor: what a factor over the tree of fronts will cost is known.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::{Factored, Kernel, SolveError, not_positive};
 use crate::fem::Stiffness;
@@ -55,6 +55,14 @@ impl Analysed {
         &self.analysis
     }
 
+    /// Bytes held at most while a factor is made, the factor included.
+    pub fn peak_bytes(&self, front: FrontMethod) -> u64 {
+        (match front {
+            FrontMethod::Double => self.analysis.peak_bytes::<f64>(),
+            FrontMethod::Mixed | FrontMethod::Pcg => self.analysis.peak_bytes::<f32>(),
+        }) as u64
+    }
+
     /// Factors on the current rayon pool; `on_stage` hears [`Stage::Factor`].
     ///
     /// `stiffness` must be the one this was analysed from.
@@ -83,6 +91,6 @@ impl Analysed {
                 Kernel::FrontSingle(FrontFactor::try_new(&analysis, stiffness).map_err(failed)?)
             }
         };
-        Ok(Factored { method, partition, kernel })
+        Ok(Factored { method, partition, kernel, condition: OnceLock::new() })
     }
 }

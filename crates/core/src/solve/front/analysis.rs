@@ -307,22 +307,24 @@ impl FrontAnalysis {
         self.stored() * size_of::<T>()
     }
 
-    /// Upper bound of the bytes held while factoring: the factor and all contribution blocks
-    /// that can be waiting at once, on any number of threads.
+    /// Upper bound of the bytes held while factoring, on any number of threads: panels and
+    /// contribution blocks that can be there at once. Panels are allocated as their fronts are come
+    /// to, so what waits deep in the tree waits before the panels above are there.
     pub fn peak_bytes<T>(&self) -> usize {
-        let mut waiting = vec![0usize; self.fronts.len()];
+        let mut most = vec![0usize; self.fronts.len()];
         for (v, front) in self.fronts.iter().enumerate() {
-            if front.is_serial() {
-                waiting[v] = front.arena;
+            most[v] = if front.is_serial() {
+                front.subtree_entries + front.arena
             } else {
-                let below: usize = front.children.iter().map(|&c| waiting[c as usize]).sum();
+                // All children at their most at once; or all done, and this front beside them.
+                let below: usize = front.children.iter().map(|&c| most[c as usize]).sum();
                 let blocks: usize =
                     front.children.iter().map(|&c| self.fronts[c as usize].rest().pow(2)).sum();
-                waiting[v] = below.max(blocks + front.rest().pow(2));
-            }
+                below.max(front.subtree_entries + blocks + front.rest().pow(2))
+            };
         }
-        let waiting: usize = self.roots.iter().map(|&v| waiting[v as usize]).sum();
-        (self.stored() + waiting) * size_of::<T>()
+        let most: usize = self.roots.iter().map(|&v| most[v as usize]).sum();
+        most * size_of::<T>()
     }
 }
 

@@ -1,0 +1,88 @@
+//! What a case gives for one element on one mesh.
+
+use softgrasp_core::fem::Element;
+
+/// A quantity beside its closed form or published value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Name of the case.
+    pub case: &'static str,
+    /// The element.
+    pub element: Element,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// Boxes or layers along the length that the case names.
+    pub cells: usize,
+    /// Nodes, mid-edge nodes among them.
+    pub nodes: usize,
+    /// Unknown degrees of freedom.
+    pub unknown: usize,
+    /// What is compared.
+    pub quantity: &'static str,
+    /// As computed; none where a whole field is compared.
+    pub computed: Option<f64>,
+    /// As it should be.
+    pub expected: Option<f64>,
+    /// Relative error.
+    pub error_rel: f64,
+}
+
+/// What was solved: everything of an [`Outcome`] but what came out.
+pub struct Solved {
+    /// Name of the case.
+    pub case: &'static str,
+    /// The element.
+    pub element: Element,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// Boxes or layers along the length that the case names.
+    pub cells: usize,
+    /// Nodes, mid-edge nodes among them.
+    pub nodes: usize,
+    /// Unknown degrees of freedom.
+    pub unknown: usize,
+}
+
+impl Solved {
+    /// One number beside what it should be.
+    pub fn with_number(self, quantity: &'static str, computed: f64, expected: f64) -> Outcome {
+        let outcome = self.with_error(quantity, (computed / expected - 1.0).abs());
+        Outcome { computed: Some(computed), expected: Some(expected), ..outcome }
+    }
+
+    /// The error of a whole field.
+    pub fn with_error(self, quantity: &'static str, error_rel: f64) -> Outcome {
+        let Self { case, element, poisson, cells, nodes, unknown } = self;
+        let (computed, expected) = (None, None);
+        Outcome {
+            case,
+            element,
+            poisson,
+            cells,
+            nodes,
+            unknown,
+            quantity,
+            computed,
+            expected,
+            error_rel,
+        }
+    }
+}
+
+impl Outcome {
+    /// The order of convergence from a coarser mesh of the same case to this one.
+    pub fn order_from(&self, coarser: &Self) -> f64 {
+        (coarser.error_rel / self.error_rel).ln() / (self.cells as f64 / coarser.cells as f64).ln()
+    }
+
+    /// Whether the other is the same case, element, material and quantity on another mesh.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let same = |o: &Self| (o.case, o.element, o.poisson.to_bits(), o.quantity);
+        same(self) == same(other)
+    }
+}
+
+/// What rounding may leave of an answer that the element holds exactly, relative to the largest
+/// displacement: ε times the condition of `K11`, below 1e5 on the small meshes these cases have.
+#[cfg(test)]
+pub const ROUNDING: f64 = 1e-11;

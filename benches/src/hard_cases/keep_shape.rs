@@ -1,0 +1,116 @@
+//! Shapes that are kept again and again: every answer is the next question's shape.
+
+use nalgebra::Vector3;
+use softgrasp_core::mesh::Inversion;
+
+use super::case::{Allowed, Case, Family, Form, Question, Reach, Repeats, plain};
+use super::outcome::{Judged, Outcome};
+use super::row::THREADS;
+use super::shapes::block;
+use super::truth::{Errors, Truth};
+use super::ways::{Answer, Way};
+use crate::report::ReportError;
+
+/// How often a shape is kept.
+const TIMES: usize = 200;
+/// Of these answers one is compared with a reference.
+const COMPARED_EVERY: usize = 10;
+
+/// Two hundred shapes kept, to and fro and always onwards.
+///
+/// # Errors
+/// [`ReportError`] where a case cannot be set up.
+pub(super) fn family(form: Form) -> Result<Family, ReportError> {
+    let mesh = block([2; 3], [1.0; 3])?;
+    let question = Question::held(mesh, plain()?);
+    // Two hundred questions each: fewer runs where time is short.
+    let runs = if form.is_quick { 2 } else { THREADS.len() };
+    let to_and_fro = Case {
+        reach: Reach::OfEachKind,
+        repeats: Repeats::ToAndFro(TIMES),
+        runs,
+        ..Case::new("200 times, to and fro", question.clone(), 1.0)
+    };
+    let onwards = Case {
+        reach: Reach::OfEachKind,
+        repeats: Repeats::Onwards(TIMES),
+        runs,
+        ..Case::new("200 times, always onwards", question, 1.0).allowing(Allowed::EXACT_OR_REFUSED)
+    };
+    Ok(Family {
+        name: "keep shape",
+        reasoning: "Every kept shape is a mesh like any other, so its answers are as exact as the \
+                    first; a step that turns an element inside out is refused, and the shape before \
+                    it stays.",
+        advice: "When keeping is refused, open the hand a little and keep again, or mesh the kept \
+                 surface anew.",
+        cases: vec![to_and_fro, onwards],
+    })
+}
+
+/// What became of a question that is asked again and again.
+pub(super) enum Walk {
+    /// The last answer, and the largest errors of those that were compared.
+    Answered(Answer, Option<Errors>),
+    /// No answer, or a shape that cannot be kept.
+    Refused(String),
+    /// An answer on the way that was wrong beyond its threshold and beyond what it said.
+    Failed(String),
+}
+
+/// Asks, keeps the shape, asks again.
+pub(super) fn walk(way: Way, case: &Case, compare: bool) -> Walk {
+    let (times, and_fro) = match case.repeats {
+        Repeats::Once => (1, false),
+        Repeats::ToAndFro(times) => (times, true),
+        Repeats::Onwards(times) => (times, false),
+    };
+    let mut question = case.question.clone();
+    let mut worst: Option<Errors> = None;
+    let mut last = None;
+    for time in 0..times {
+        let answer = match way.answer(&question) {
+            Ok(answer) => answer,
+            Err(reason) => return Walk::Refused(format!("time {}: {reason}", time + 1)),
+        };
+        if compare && (time % COMPARED_EVERY == 0 || time + 1 == times) {
+            let errors = Truth::of(&question, way.element(), None).errors_of(&answer.displacement);
+            let Answer { stated_rel, bound_rel, .. } = answer;
+            let judged = Judged { errors, stated_rel, bound_rel };
+            if let (Outcome::Failed, text) =
+                Outcome::of_answer(&judged, case.threshold, Allowed::ANY)
+            {
+                return Walk::Failed(format!("time {}: {text}", time + 1));
+            }
+            worst = larger(worst, errors);
+        }
+        let mesh = &question.mesh;
+        let steps = answer.displacement.as_chunks::<3>().0.iter();
+        let moved: Vec<_> =
+            mesh.vertices().iter().zip(steps).map(|(p, u)| p + Vector3::from(*u)).collect();
+        if let Some(inversion) = Inversion::of(mesh, &moved) {
+            return Walk::Refused(format!("time {}: {inversion}", time + 1));
+        }
+        question.mesh = match mesh.with_vertices(moved) {
+            Ok(mesh) => mesh,
+            Err(error) => return Walk::Refused(format!("time {}: {error}", time + 1)),
+        };
+        if and_fro {
+            question = question.scaled(-1.0);
+        }
+        last = Some(answer);
+    }
+    match last {
+        Some(answer) => Walk::Answered(answer, worst),
+        None => Walk::Refused("it was not asked".to_owned()),
+    }
+}
+
+/// Whichever is larger.
+fn larger(a: Option<Errors>, b: Option<Errors>) -> Option<Errors> {
+    match (a, b) {
+        (Some(a), Some(b)) if a.largest_rel > b.largest_rel => Some(a),
+        (a, None) => a,
+        (_, b) => b,
+    }
+}

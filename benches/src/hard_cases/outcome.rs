@@ -1,0 +1,115 @@
+//! What became of a question: exact, degraded as stated, refused with reason, or failed.
+
+use softgrasp_core::solve::ERROR_UNREMARKABLE;
+
+use super::case::Allowed;
+use super::truth::Errors;
+
+/// Of one row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// The error is at most the case's threshold.
+    Exact,
+    /// The error is larger, at most what the answer states, and what it states is warned of.
+    Degraded,
+    /// There is no answer, and a sentence why.
+    Refused,
+    /// Anything else, and whatever the case does not allow.
+    Failed,
+}
+
+/// What an answer says and how wrong it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Judged {
+    pub errors: Option<Errors>,
+    pub stated_rel: f64,
+    pub bound_rel: Option<f64>,
+}
+
+impl Outcome {
+    pub const ALL: [Self; 4] = [Self::Exact, Self::Degraded, Self::Refused, Self::Failed];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Degraded => "degraded as stated",
+            Self::Refused => "refused with reason",
+            Self::Failed => "FAILED",
+        }
+    }
+
+    /// Outcome of a refusal, and what is to be said about it.
+    pub fn of_refusal(reason: &str, allowed: Allowed) -> (Self, String) {
+        match (allowed.refused, reason.trim().is_empty()) {
+            (_, true) => (Self::Failed, "refused without a reason".to_owned()),
+            (true, _) => (Self::Refused, reason.to_owned()),
+            (false, _) => (Self::Failed, format!("refused, which was not to be: {reason}")),
+        }
+    }
+
+    /// Outcome of an answer, and what is to be said about it.
+    pub fn of_answer(judged: &Judged, threshold: f64, allowed: Allowed) -> (Self, String) {
+        let failed = |text: String| (Self::Failed, text);
+        let Judged { errors: Some(errors), stated_rel, bound_rel } = *judged else {
+            return failed("there is no right answer to compare with".to_owned());
+        };
+        let error = errors.largest_rel;
+        if !error.is_finite() {
+            return failed("the answer is not finite".to_owned());
+        }
+        if let (Some(bound), Some(norm)) = (bound_rel, errors.norm_rel)
+            && norm > bound.max(ROUNDED)
+        {
+            return failed(format!("the error {norm:.1e} is above its proven bound {bound:.1e}"));
+        }
+        let is_warned = stated_rel > ERROR_UNREMARKABLE;
+        if error <= threshold && allowed.exact {
+            return (Self::Exact, String::new());
+        }
+        if error <= stated_rel && is_warned && allowed.degraded {
+            return (Self::Degraded, format!("states an error of about {stated_rel:.1e}"));
+        }
+        if error <= threshold || error <= stated_rel && is_warned {
+            return failed(format!("answered with an error of {error:.1e}, which was not to be"));
+        }
+        failed(format!("the error is {error:.1e}, stated is {stated_rel:.1e}"))
+    }
+}
+
+/// The right answer is itself rounded to double precision.
+const ROUNDED: f64 = 4.0 * f64::EPSILON;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(error: f64, stated_rel: f64, bound_rel: Option<f64>, allowed: Allowed) -> Outcome {
+        let errors = Some(Errors { largest_rel: error, norm_rel: Some(error) });
+        Outcome::of_answer(&Judged { errors, stated_rel, bound_rel }, 1e-11, allowed).0
+    }
+
+    #[test]
+    fn an_error_is_below_the_threshold_or_stated_or_a_failure() {
+        let any = Allowed::ANY;
+        assert_eq!(outcome(1e-12, 1e-14, None, any), Outcome::Exact);
+        assert_eq!(outcome(1e-8, 1e-7, None, any), Outcome::Degraded);
+        // Beyond what it states, below what is warned of, not allowed, above its bound, no number.
+        assert_eq!(outcome(1e-6, 1e-7, None, any), Outcome::Failed);
+        assert_eq!(outcome(1e-10, 5e-10, None, any), Outcome::Failed);
+        assert_eq!(outcome(1e-8, 1e-7, None, Allowed::EXACT), Outcome::Failed);
+        assert_eq!(outcome(1e-12, 1e-14, None, Allowed::REFUSED), Outcome::Failed);
+        assert_eq!(outcome(1e-12, 1e-14, Some(1e-13), any), Outcome::Failed);
+        assert_eq!(outcome(f64::INFINITY, f64::INFINITY, None, any), Outcome::Failed);
+        assert_eq!(outcome(1e-12, f64::NAN, None, any), Outcome::Exact);
+        let nothing = Judged { errors: None, stated_rel: 1.0, bound_rel: None };
+        assert_eq!(Outcome::of_answer(&nothing, 1.0, any).0, Outcome::Failed);
+    }
+
+    #[test]
+    fn a_refusal_needs_a_reason_and_leave() {
+        let of = |reason, allowed| Outcome::of_refusal(reason, allowed).0;
+        assert_eq!(of("body 1 can still move", Allowed::REFUSED), Outcome::Refused);
+        assert_eq!(of("", Allowed::ANY), Outcome::Failed);
+        assert_eq!(of("body 1 can still move", Allowed::ANSWERED), Outcome::Failed);
+    }
+}

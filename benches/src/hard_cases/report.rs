@@ -1,0 +1,294 @@
+//! The report: every way through every case, what became of it, and what a user should do.
+
+use super::case::{Case, Family, Form};
+use super::outcome::Outcome;
+use super::row::{Numbers, Pools, Row, rows_of};
+use super::{families, locking};
+use crate::axis::Scale;
+use crate::plot::{Mark, Plot, PlotError, PlotPoint, Series};
+use crate::report::{Options, Report, ReportError, progress};
+use crate::table::{Cell, Table, three_digits};
+
+/// Asks every case and judges every answer.
+///
+/// # Errors
+/// [`ReportError`] where a case cannot be set up; rows that failed are faults of the report, which
+/// is written all the same.
+pub fn measure(options: &Options) -> Result<Report, ReportError> {
+    let form = match options.is_quick {
+        true => Form { is_quick: true, cells: 2 },
+        false => Form { is_quick: false, cells: 3 },
+    };
+    let title = "Hard cases: what every way does where numbers get difficult";
+    let threads = "1, 2, 4 and 7, and 2 again; times with 2";
+    let mut report = Report::begin("hard-cases", title, threads, options);
+    let pools = Pools::new()?;
+    let families = families::all(form)?;
+    let mut rows = Vec::new();
+    for family in &families {
+        for case in &family.cases {
+            progress("hard-cases", &format!("{}: {}", family.name, case.name));
+            rows.extend(rows_of(family, case, &pools));
+        }
+    }
+    report.text(INTRODUCTION);
+    report.text(totals(&rows));
+    report.text(worst(&families, &rows));
+    report.text(promises(&families));
+    report.figure("hard-cases", FIGURE, figure(&rows)?);
+    progress("hard-cases", "locking");
+    let softness = locking::measure(form)?;
+    report.text(LOCKING);
+    report.figure("hard-cases-locking", LOCKING_FIGURE, locking::figure(&softness)?);
+    report.table(locking::table(&softness));
+    for row in rows.iter().filter(|row| row.outcome == Outcome::Failed) {
+        report.fault(fault(row));
+    }
+    report.text(failures(&rows));
+    report.records(record_table(&rows));
+    report.table(case_table(&families, &rows));
+    Ok(report)
+}
+
+fn fault(row: &Row) -> String {
+    let (way, element) = (row.way.name(), row.way.element().name());
+    format!("{}, {}; {element} by {way}: {}", row.family, row.case, row.note)
+}
+
+/// How many rows there are of each outcome.
+fn totals(rows: &[Row]) -> String {
+    let of = |outcome: Outcome| {
+        let count = rows.iter().filter(|r| r.outcome == outcome).count();
+        format!("{count} {}", outcome.name())
+    };
+    let runs: usize = rows.iter().map(|r| r.runs).sum();
+    let counts = Outcome::ALL.map(of).join(", ");
+    format!(
+        "**{} rows: {counts}.** {runs} runs in all; every repeated run gave the bits of the first, \
+         on 1, 2, 4 and 7 threads, unless its row is among the failed.",
+        rows.len()
+    )
+}
+
+/// The three cases with the largest errors that kept their promise, each of another family.
+fn worst(families: &[Family], rows: &[Row]) -> String {
+    let error = |row: &Row| row.numbers.and_then(|n| n.error_rel).unwrap_or(0.0);
+    let mut found: Vec<(&Family, &Row)> = Vec::new();
+    for family in families {
+        let kept = |r: &&Row| r.family == family.name && r.outcome != Outcome::Failed;
+        let of_family = rows.iter().filter(kept);
+        let worst = of_family.max_by(|a, b| error(a).total_cmp(&error(b)));
+        found.extend(worst.map(|row| (family, row)));
+    }
+    found.sort_by(|a, b| error(b.1).total_cmp(&error(a.1)));
+    let mut text = "### The worst three cases, and what to do about them\n\n".to_owned();
+    for (family, row) in found.into_iter().take(3) {
+        let Some(Numbers { stated_rel, condition, .. }) = row.numbers else { continue };
+        text.push_str(&format!(
+            "- **{}: {}.** Largest error {:.1e} ({} by {}, which states {stated_rel:.1e}; condition \
+             {condition:.1e}; {}). {}\n",
+            family.name,
+            row.case,
+            error(row),
+            row.way.element().name(),
+            row.way.name(),
+            row.outcome.name(),
+            family.advice
+        ));
+    }
+    text
+}
+
+/// Why the thresholds are what they are.
+fn promises(families: &[Family]) -> String {
+    let line = |f: &Family| format!("- **{}:** {} *{}*\n", f.name, f.reasoning, f.advice);
+    let lines: String = families.iter().map(line).collect();
+    format!("### Promises, made before measuring, and what to do\n\n{lines}")
+}
+
+fn failures(rows: &[Row]) -> String {
+    let failed = rows.iter().filter(|row| row.outcome == Outcome::Failed);
+    let lines: String = failed.map(|row| format!("- {}\n", fault(row))).collect();
+    match lines.is_empty() {
+        true => "### Failed rows\n\nNone.".to_owned(),
+        false => format!("### Failed rows\n\n{lines}"),
+    }
+}
+
+const RECORDS: [&str; 20] = [
+    "family",
+    "case",
+    "nodes",
+    "element",
+    "way",
+    "precision",
+    "outcome",
+    "allowed",
+    "threshold_rel",
+    "error_rel",
+    "stated_error_rel",
+    "error_bound_rel",
+    "residual_rel",
+    "condition",
+    "total_ms",
+    "against",
+    "runs",
+    "bits",
+    "note",
+    "index",
+];
+
+/// Every row.
+fn record_table(rows: &[Row]) -> Table {
+    let mut table = Table::new("hard-cases", "Every row", &RECORDS);
+    for (index, row) in rows.iter().enumerate() {
+        let number = |of: fn(&Numbers) -> Option<f64>| row.numbers.as_ref().and_then(of);
+        let cells: [Cell; 20] = [
+            row.family.into(),
+            row.case.clone().into(),
+            row.nodes.into(),
+            row.way.element().name().into(),
+            row.way.name().into(),
+            row.way.precision().into(),
+            row.outcome.name().into(),
+            row.allowed.text().into(),
+            row.threshold.into(),
+            number(|n| n.error_rel).into(),
+            number(|n| Some(n.stated_rel)).into(),
+            number(|n| n.bound_rel).into(),
+            number(|n| Some(n.residual_rel)).into(),
+            number(|n| Some(n.condition)).into(),
+            number(|n| Some(n.ms)).into(),
+            row.against.into(),
+            row.runs.into(),
+            format!("{:016x}", row.hash).into(),
+            row.note.clone().into(),
+            index.into(),
+        ];
+        table.push(cells);
+    }
+    table
+}
+
+const CASES: [&str; 13] = [
+    "family",
+    "case",
+    "nodes",
+    "allowed_f64",
+    "allowed_f32",
+    "threshold_rel",
+    "exact",
+    "degraded",
+    "refused",
+    "failed",
+    "error_max_rel",
+    "stated_max_rel",
+    "condition_max",
+];
+
+/// Every case, with how many of its ways had which outcome.
+fn case_table(families: &[Family], rows: &[Row]) -> Table {
+    let title = "Every case: what was allowed, and outcomes of its ways";
+    let mut table = Table::new("hard-cases-outcomes", title, &CASES);
+    let cases = families.iter().flat_map(|f| f.cases.iter().map(move |case| (f, case)));
+    for (family, case) in cases {
+        let Case { name, question, threshold, double, single, .. } = case;
+        let of_case: Vec<&Row> =
+            rows.iter().filter(|r| r.family == family.name && r.case == *name).collect();
+        let count = |outcome: Outcome| of_case.iter().filter(|r| r.outcome == outcome).count();
+        let most = |of: fn(&Numbers) -> Option<f64>| {
+            of_case.iter().filter_map(|r| r.numbers.as_ref().and_then(of)).reduce(f64::max)
+        };
+        let head: [Cell; 6] = [
+            family.name.into(),
+            name.clone().into(),
+            question.mesh.node_count().into(),
+            double.text().into(),
+            single.text().into(),
+            (*threshold).into(),
+        ];
+        let counts = Outcome::ALL.map(|outcome| Cell::from(count(outcome)));
+        let most: [Cell; 3] = [
+            most(|n| n.error_rel).into(),
+            most(|n| Some(n.stated_rel)).into(),
+            most(|n| Some(n.condition)).into(),
+        ];
+        table.push(head.into_iter().chain(counts).chain(most));
+    }
+    table
+}
+
+/// True error against what an answer says of itself.
+fn figure(rows: &[Row]) -> Result<String, PlotError> {
+    let points = |keep: &dyn Fn(&Row) -> bool| -> Vec<PlotPoint> {
+        let of = |row: &Row| {
+            let Numbers { error_rel, stated_rel, .. } = row.numbers?;
+            // An error of nothing has no place on the axis.
+            Some(PlotPoint { x: stated_rel, y: error_rel?.max(1e-18), spread: None })
+        };
+        rows.iter().filter(|row| keep(row)).filter_map(of).collect()
+    };
+    let series = |label: &str, keep: &dyn Fn(&Row) -> bool| Series {
+        label: label.to_owned(),
+        mark: Mark::Points,
+        points: points(keep),
+    };
+    let is = |row: &Row, outcome: Outcome| row.outcome == outcome;
+    let diagonal = [1e-16, 1e-1].map(|x| PlotPoint { x, y: x, spread: None });
+    let plot = Plot {
+        title: "Error of every answer against the error it states".to_owned(),
+        x_label: "stated error, relative".to_owned(),
+        y_label: "error, relative".to_owned(),
+        x_scale: Scale::Log,
+        y_scale: Scale::Log,
+        series: vec![
+            series("exact, f64 factor", &|r| is(r, Outcome::Exact) && !r.way.is_single()),
+            series("degraded as stated", &|r| is(r, Outcome::Degraded)),
+            series("exact, f32 factor", &|r| is(r, Outcome::Exact) && r.way.is_single()),
+            series("failed", &|r| is(r, Outcome::Failed)),
+            Series {
+                label: format!("as stated (refused from {})", three_digits(0.1)),
+                mark: Mark::Dashed,
+                points: diagonal.to_vec(),
+            },
+        ],
+    };
+    plot.svg()
+}
+
+const FIGURE: &str = "\
+Every row that was answered. Points below the dashed line are no worse than they say; above it only \
+answers whose error is below their case's threshold may lie.";
+
+const LOCKING_FIGURE: &str = "\
+Displacement of a pushed block over that of ten-node elements of a finer mesh: an element that locks \
+goes to zero.";
+
+const LOCKING: &str = "\
+### Locking
+
+The errors above are those of the equations' solution. What the element makes of the material is \
+another matter, and for linear elements near ν = 0.5 a worse one: a block of 1 × 1 × 2 m is clamped \
+below, its upper face pushed sideways, and the displacement for a force compared with ten-node \
+elements of a finer mesh.";
+
+const INTRODUCTION: &str = "\
+Every method, precision and element is asked the same hard questions. What may become of a question \
+was written down, in the file of its family, before it was measured:
+
+- **exact**: the largest error over all nodes, relative to the largest displacement, is at most the \
+threshold of the case. It is 1e-11 for a well supported body of ν = 0.3, grows as theory says the \
+condition does, and is never above 1e-9. `condensed` proves a bound besides, and the error must be \
+below that too.
+- **degraded as stated**: the error is larger, but no larger than the answer states of itself \
+(`Certainty::error_rel`), and what it states is above 1e-9, so that a user is warned.
+- **refused with reason**: there is no answer, and a sentence says why; so it is where the stated error \
+is 0.1 or more.
+- Anything else is **failed**: no number, a panic, no answer in time, an error beyond the threshold and \
+beyond what is stated, an outcome that the case does not allow, other bits on another number of \
+threads. Then this report ends with an error that names the rows.
+
+The right answer solves the stiffness as assembled, refined with residuals in twice the working \
+precision (`reference`); where that does not settle it is factored densely in twice the precision \
+(`dense reference`); where it is known without solving (a body moved as a whole), the larger of both \
+errors counts. Times are from the mesh to the displacements, one run each.";

@@ -1,0 +1,135 @@
+//! Meshes of the hard cases: blocks, and what is done to them.
+
+use nalgebra::{Point3, Vector3};
+use softgrasp_core::mesh::{MeshError, TetMesh, signed_volume};
+
+/// A box from the origin, six tetrahedra around the same diagonal of every cell.
+///
+/// Units: m.
+///
+/// # Errors
+/// [`MeshError`] for a box without volume.
+pub(super) fn block(cells: [usize; 3], size: [f64; 3]) -> Result<TetMesh, MeshError> {
+    let [a, b, c] = cells;
+    let at = |[i, j, k]: [usize; 3]| (i + (a + 1) * (j + (b + 1) * k)) as u32;
+    let mut vertices = Vec::new();
+    for (k, j, i) in
+        (0..=c).flat_map(|k| (0..=b).flat_map(move |j| (0..=a).map(move |i| (k, j, i))))
+    {
+        let place = |axis: usize, step: usize| size[axis] * (step as f64 / cells[axis] as f64);
+        vertices.push(Point3::new(place(0, i), place(1, j), place(2, k)));
+    }
+    let mut tets = Vec::new();
+    for (k, j, i) in (0..c).flat_map(|k| (0..b).flat_map(move |j| (0..a).map(move |i| (k, j, i)))) {
+        for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let mut corner = [i, j, k];
+            let mut tet = [at(corner); 4];
+            for (position, axis) in axes.into_iter().enumerate() {
+                corner[axis] += 1;
+                tet[position + 1] = at(corner);
+            }
+            if signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
+                tet.swap(0, 1);
+            }
+            tets.push(tet);
+        }
+    }
+    TetMesh::try_new(vertices, tets, Vec::new())
+}
+
+/// Nodes at places that fulfil a condition, ascending.
+pub(super) fn nodes_where(mesh: &TetMesh, is_in: impl Fn(&Point3<f64>) -> bool) -> Vec<u32> {
+    let nodes = mesh.vertices().iter().enumerate().filter(|(_, p)| is_in(p));
+    nodes.map(|(node, _)| node as u32).collect()
+}
+
+/// The node nearest to a place; the first of equals.
+pub(super) fn nearest(mesh: &TetMesh, place: &Point3<f64>) -> u32 {
+    let distance = |node: &usize| (mesh.vertices()[*node] - place).norm();
+    let nearest = (0..mesh.node_count()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    nearest.unwrap_or(0) as u32
+}
+
+/// The same mesh with a region per element, by the place of its centre.
+///
+/// # Errors
+/// None in fact: there is a label for every element.
+pub(super) fn with_regions(
+    mesh: &TetMesh,
+    region: impl Fn(&Point3<f64>) -> u32,
+) -> Result<TetMesh, MeshError> {
+    let centre = |tet: usize| {
+        let sum: Vector3<f64> = mesh.corners(tet).iter().map(|p| p.coords).sum();
+        Point3::from(sum / 4.0)
+    };
+    let regions = (0..mesh.tets().len()).map(|tet| region(&centre(tet))).collect();
+    TetMesh::try_new(mesh.vertices().to_vec(), mesh.tets().to_vec(), regions)
+}
+
+/// The same mesh with one node elsewhere.
+///
+/// # Errors
+/// [`MeshError`] if that turns an element inside out.
+pub(super) fn with_node_at(
+    mesh: &TetMesh,
+    node: u32,
+    place: Point3<f64>,
+) -> Result<TetMesh, MeshError> {
+    let mut vertices = mesh.vertices().to_vec();
+    vertices[node as usize] = place;
+    mesh.with_vertices(vertices)
+}
+
+/// The same mesh in another unit of length.
+///
+/// # Errors
+/// [`MeshError`] if volumes leave the range of a double.
+pub(super) fn in_unit(mesh: &TetMesh, unit: f64) -> Result<TetMesh, MeshError> {
+    mesh.with_vertices(mesh.vertices().iter().map(|p| p * unit).collect())
+}
+
+/// A mesh and a shifted copy of it, one where nodes fall together.
+///
+/// # Errors
+/// [`MeshError`] for a shift that makes the copy none.
+pub(super) fn doubled(mesh: &TetMesh, shift: Vector3<f64>) -> Result<TetMesh, MeshError> {
+    let mut vertices = mesh.vertices().to_vec();
+    let same = 1e-9 * mesh.size();
+    let mut copy = Vec::with_capacity(mesh.node_count());
+    for place in mesh.vertices().iter().map(|p| p + shift) {
+        let there = mesh.vertices().iter().position(|p| (p - place).norm() <= same);
+        copy.push(there.unwrap_or(vertices.len()) as u32);
+        if there.is_none() {
+            vertices.push(place);
+        }
+    }
+    let copied = mesh.tets().iter().map(|tet| tet.map(|n| copy[n as usize]));
+    let tets = mesh.tets().iter().copied().chain(copied).collect();
+    TetMesh::try_new(vertices, tets, Vec::new())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softgrasp_core::mesh::Bodies;
+
+    #[test]
+    fn block_fills_its_box() {
+        let mesh = block([3, 2, 1], [3.0, 1.0, 0.5]).unwrap();
+        let volume: f64 = (0..mesh.tets().len()).map(|t| mesh.signed_volume(t)).sum();
+        assert!((volume - 1.5).abs() < 1e-14);
+        assert_eq!((mesh.node_count(), mesh.tets().len()), (24, 36));
+    }
+
+    #[test]
+    fn copies_share_a_corner_an_edge_or_nothing() {
+        let mesh = block([2; 3], [1.0; 3]).unwrap();
+        let of = |shift: [f64; 3]| {
+            let both = doubled(&mesh, shift.into()).unwrap();
+            (both.node_count(), Bodies::from_mesh(&both).count())
+        };
+        assert_eq!(of([1.0, 1.0, 1.0]), (53, 1));
+        assert_eq!(of([1.0, 0.0, 1.0]), (51, 1));
+        assert_eq!(of([3.0, 0.0, 0.0]), (54, 2));
+    }
+}

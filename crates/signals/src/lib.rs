@@ -1,0 +1,60 @@
+//! The signals that ask a program to end: waited for by a thread, never handled in place.
+//!
+//! METIS takes SIGTERM and SIGABRT over while it orders (`gk_sigtrap`) and answers them by a
+//! `longjmp` on whichever thread the system gave the signal to. A program that was asked to end at
+//! such a moment crashed instead. A signal that every thread blocks waits for the one that asks for
+//! it, whatever handler stands there.
+
+use std::io;
+
+/// A signal that asked the program to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EndSignal {
+    /// As `SIGTERM`; `Ctrl-C` where the system has no signals.
+    pub name: &'static str,
+    /// Exit code by which a shell knows a program that this signal ended: 128 and its number.
+    pub exit_code: u8,
+}
+
+/// Calls `react`, on a thread of its own, for every signal that asks the program to end: Ctrl-C,
+/// and that of `docker stop`; `hang_up` adds that of a closed terminal.
+///
+/// To be called before any other thread is started: threads inherit what is blocked.
+///
+/// # Errors
+/// The system's, where signals cannot be blocked or the thread not be started.
+#[cfg(unix)]
+pub fn on_end_signal(
+    hang_up: bool,
+    mut react: impl FnMut(EndSignal) + Send + 'static,
+) -> io::Result<()> {
+    use nix::sys::signal::{SigSet, Signal};
+    let mut awaited = SigSet::empty();
+    awaited.add(Signal::SIGINT);
+    awaited.add(Signal::SIGTERM);
+    if hang_up {
+        awaited.add(Signal::SIGHUP);
+    }
+    awaited.thread_block()?;
+    let wait = move || {
+        // It fails for a set that holds no signal only.
+        while let Ok(signal) = awaited.wait() {
+            let exit_code = 128 + signal as i32 as u8;
+            react(EndSignal { name: signal.as_str(), exit_code });
+        }
+    };
+    std::thread::Builder::new().name("signals".to_owned()).spawn(wait).map(drop)
+}
+
+/// See above; only Ctrl-C and what the system counts as its like.
+///
+/// # Errors
+/// The system's, where no handler can be set.
+#[cfg(not(unix))]
+pub fn on_end_signal(
+    _hang_up: bool,
+    mut react: impl FnMut(EndSignal) + Send + 'static,
+) -> io::Result<()> {
+    ctrlc::set_handler(move || react(EndSignal { name: "Ctrl-C", exit_code: 130 }))
+        .map_err(io::Error::other)
+}

@@ -1,0 +1,141 @@
+//! The program `ccx`: found, run in a scratch folder under a time limit, its numbers read.
+
+use std::io::Read;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use crate::deck::System;
+
+/// One run may take so long; the largest of the full form takes a tenth of it on a quiet machine.
+const LIMIT: Duration = Duration::from_secs(900);
+
+/// CalculiX as it is on the PATH.
+pub struct Ccx {
+    version: String,
+}
+
+/// A number as printed: seven digits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Printed {
+    pub value: f64,
+    /// Half a unit of its last digit: how far the number meant can be from the one printed.
+    pub half_unit: f64,
+}
+
+/// What one run prints.
+///
+/// Shapes: per node of the system; nodes in no element have zeros.
+pub struct Results {
+    pub displacement: Vec<[Printed; 3]>,
+    pub force: Vec<[Printed; 3]>,
+}
+
+impl Ccx {
+    /// Looks for it; says that the test is skipped when it is not there.
+    pub fn find() -> Option<Self> {
+        let output = Command::new("ccx").arg("-v").stdin(Stdio::null()).output();
+        let Ok(output) = output else {
+            println!("skipped: ccx is not on the PATH (Debian: apt-get install calculix-ccx)");
+            return None;
+        };
+        let version = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        println!("ccx: {version}");
+        Some(Self { version })
+    }
+
+    /// Runs one deck.
+    ///
+    /// # Panics
+    /// If it fails, takes too long, or does not print every node; with what it said.
+    pub fn run(&self, folder: &Path, deck: &str, system: &System) -> Results {
+        let results = folder.join("referee.dat");
+        // A result of the run before must not be taken for one of this run.
+        let _ = std::fs::remove_file(&results);
+        std::fs::write(folder.join("referee.inp"), deck).unwrap();
+        let child = Command::new("ccx")
+            .arg("referee")
+            .current_dir(folder)
+            .env("OMP_NUM_THREADS", "1")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let said = wait(child);
+        let text = std::fs::read_to_string(&results).unwrap_or_default();
+        let read = |title| read_block(&text, title, system);
+        match (read("displacements"), read("forces")) {
+            (Some(displacement), Some(force)) => Results { displacement, force },
+            _ => panic!("ccx ({}) has not printed every node; it said:\n{said}", self.version),
+        }
+    }
+}
+
+/// Waits for the end of the program, which closes its output; what it said.
+fn wait(mut child: Child) -> String {
+    let mut output = child.stdout.take().unwrap();
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        let mut said = Vec::new();
+        let read = output.read_to_end(&mut said);
+        // The receiver is gone only if the limit has passed.
+        let _ = sender.send(read.map(|_| said));
+    });
+    let Ok(said) = receiver.recv_timeout(LIMIT) else {
+        child.kill().unwrap();
+        child.wait().unwrap();
+        panic!("ccx was not done after {LIMIT:?}");
+    };
+    let status = child.wait().unwrap();
+    let said = String::from_utf8_lossy(&said.unwrap()).into_owned();
+    assert!(status.success(), "ccx ended with {status}; it said:\n{said}");
+    said
+}
+
+/// Rows `node x y z` under the heading that begins with `title`, if every node used has one.
+fn read_block(text: &str, title: &str, system: &System) -> Option<Vec<[Printed; 3]>> {
+    let nothing = Printed { value: 0.0, half_unit: 0.0 };
+    let mut of_node = vec![[nothing; 3]; system.vertices.len()];
+    let mut seen = vec![false; system.vertices.len()];
+    let mut lines = text.lines().skip_while(|line| !line.trim_start().starts_with(title)).skip(1);
+    let rows = lines.by_ref().map(|line| line.split_whitespace().collect::<Vec<_>>());
+    for row in rows.skip_while(Vec::is_empty).take_while(|row| row.len() == 4) {
+        let node = row[0].parse::<usize>().ok()?.checked_sub(1)?;
+        *seen.get_mut(node)? = true;
+        for axis in 0..3 {
+            of_node[node][axis] = Printed::parse(row[axis + 1])?;
+        }
+    }
+    (seen == system.used).then_some(of_node)
+}
+
+impl Printed {
+    /// Reads Fortran's form, which leaves the `E` out where the exponent has three digits.
+    fn parse(text: &str) -> Option<Self> {
+        let split = match text.find(['E', 'e', 'D']) {
+            Some(at) => (&text[..at], &text[at + 1..]),
+            None => {
+                let at = text.rfind(['+', '-']).filter(|at| *at > 0)?;
+                (&text[..at], &text[at..])
+            }
+        };
+        let (digits, exponent) = (split.0, split.1.parse::<i32>().ok()?);
+        let decimals = digits.split_once('.')?.1.len();
+        let value = format!("{digits}e{exponent}").parse().ok()?;
+        let half_unit = format!("5e{}", exponent - decimals as i32 - 1).parse().ok()?;
+        Some(Self { value, half_unit })
+    }
+}
+
+#[test]
+fn printed_numbers_know_their_last_digit() {
+    let number = |text| Printed::parse(text).unwrap();
+    assert_eq!(number("-1.234568E-05"), Printed { value: -1.234568e-5, half_unit: 5e-12 });
+    assert_eq!(number("6.000000E+02"), Printed { value: 600.0, half_unit: 5e-5 });
+    assert_eq!(number("1.500000-101"), Printed { value: 1.5e-101, half_unit: 5e-108 });
+    for text in ["", "NaN", "-", "1.5", "********"] {
+        assert_eq!(Printed::parse(text), None, "{text}");
+    }
+}

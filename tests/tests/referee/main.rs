@@ -1,0 +1,103 @@
+//! CalculiX as referee: the same mesh, the same known displacements, the same element.
+//!
+//! Without `ccx` on the PATH the comparisons skip themselves in one line. `SOFTGRASP_REFEREE=full`
+//! asks for larger objects, every file and every question; `tests/referee/run.sh` sets it.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests fail and speak like tests"
+)]
+
+mod agreement;
+mod ccx;
+mod deck;
+mod object;
+mod question;
+mod solved;
+mod table;
+
+use std::path::Path;
+
+use softgrasp_core::fem::Element;
+
+use crate::agreement::Agreement;
+use crate::ccx::Ccx;
+use crate::deck::System;
+use crate::object::{Object, is_full};
+use crate::question::{Question, questions};
+use crate::solved::Asked;
+use crate::table::Table;
+
+/// Elements that CalculiX has too (C3D4 and C3D10).
+const ELEMENTS: [Element; 2] = [Element::Tet4, Element::Tet10];
+
+/// Systems of more nodes are asked the questions of the short form only: CalculiX takes half a
+/// minute and more for each.
+const LARGE: usize = 8000;
+
+/// Asks both, and compares; adds to the table.
+fn compare(ccx: &Ccx, folder: &Path, asked: &Asked, objects: &[Object]) {
+    let mut table = Table::default();
+    for object in objects {
+        for element in ELEMENTS {
+            let system = System::new(&object.mesh, element);
+            let mut of_object = Agreement::default();
+            for question in questions(object, &system) {
+                let is_large = system.vertices.len() > LARGE;
+                if !question.is_short && (is_large || !is_full()) {
+                    continue;
+                }
+                let printed = ccx.run(folder, &deck::deck(&system, &question), &system);
+                let found = asked.answer(object, &system, &question, folder);
+                let agreement = Agreement::of(&printed, &found, &question);
+                assert!(
+                    agreement.holds(),
+                    "{}, {element:?}, {}: {agreement}",
+                    object.name,
+                    question.name
+                );
+                of_object.add(&agreement);
+            }
+            table.push(object, &system, &of_object);
+        }
+    }
+    println!("{table}");
+}
+
+#[test]
+fn built_in_objects_agree_to_the_digits_that_calculix_prints() {
+    let Some(ccx) = Ccx::find() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = if is_full() { 1000 } else { 120 };
+    let objects = object::built_in(folder.path(), nodes);
+    assert_eq!(objects.len(), 4);
+    compare(&ccx, folder.path(), &Asked::new(), &objects);
+}
+
+#[test]
+fn files_of_others_agree_to_the_digits_that_calculix_prints() {
+    let Some(ccx) = Ccx::find() else { return };
+    let Some(objects) = object::files() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    compare(&ccx, folder.path(), &Asked::new(), &objects);
+}
+
+/// The comparison is worth something only if it notices a difference that is small.
+#[test]
+fn another_poissons_ratio_is_noticed() {
+    let Some(ccx) = Ccx::find() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let asked = Asked::new();
+    let objects = object::built_in(folder.path(), 60);
+    for element in ELEMENTS {
+        let system = System::new(&objects[0].mesh, element);
+        for question in questions(&objects[0], &system) {
+            let found = asked.answer(&objects[0], &system, &question, folder.path());
+            let other = Question { poisson: question.poisson + 1e-5, ..question.clone() };
+            let printed = ccx.run(folder.path(), &deck::deck(&system, &other), &system);
+            let agreement = Agreement::of(&printed, &found, &question);
+            assert!(!agreement.holds(), "{element:?}, {}: {agreement}", question.name);
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! The product's answers: by its program, by its server over a socket, by its mathematics.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use clap::Parser;
+use fea_server::{RunningServer, ServerConfig};
+use glove_client::commands::solve::SolveCommand;
+use glove_client::connection::ServerConnection;
+use softgrasp_core::fem::{Element, Material};
+use softgrasp_core::model::Model;
+use softgrasp_core::solve::{Loads, Method};
+use softgrasp_protocol::{
+    DofValue, ElementChoice, MethodName, NodeChoice, Precision, Reply, Request, SolveOnce, Want,
+};
+use softgrasp_tests::questions::mesh_data;
+
+use crate::deck::System;
+use crate::object::Object;
+use crate::question::Question;
+
+/// A way to an answer, each with another method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// `glove-client solve --method auto`, files in and a file out.
+    Program,
+    /// A request to a server with reactions wanted, `condensed` for linear elements.
+    Socket,
+    /// `Model` and the sparse factor, mid-edge nodes too.
+    Core,
+}
+
+/// An answer of ours.
+pub struct Found {
+    /// Per node; of the corners, or of the whole system.
+    pub displacement: Vec<[f64; 3]>,
+    /// Force at every known degree of freedom, in the question's order; empty if the way has none.
+    pub reaction: Vec<f64>,
+}
+
+/// Where questions go.
+pub struct Asked {
+    server: RunningServer,
+}
+
+#[derive(Parser)]
+struct SolveArguments {
+    #[command(flatten)]
+    solve: SolveCommand,
+}
+
+impl Asked {
+    /// Starts a server on a free loopback port.
+    pub fn new() -> Self {
+        let listen = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
+        let config = ServerConfig { listen, threads: 2, ..ServerConfig::default() };
+        Self { server: fea_server::start(config).unwrap() }
+    }
+
+    /// The answer by the question's way.
+    pub fn answer(
+        &self,
+        object: &Object,
+        system: &System,
+        question: &Question,
+        folder: &Path,
+    ) -> Found {
+        match question.way {
+            Way::Program => by_program(object, system, question, folder),
+            Way::Socket => self.by_socket(object, system, question),
+            Way::Core => by_core(object, system, question),
+        }
+    }
+
+    fn by_socket(&self, object: &Object, system: &System, question: &Question) -> Found {
+        let address = self.server.address().to_string();
+        let mut connection = ServerConnection::connect(&address, None).unwrap();
+        let value = |&(dof, value): &(u32, f64)| DofValue { dof, value };
+        let (element, method) = match system.element {
+            Element::Tet4 => (ElementChoice::T4, "condensed"),
+            _ => (ElementChoice::T10, "front"),
+        };
+        let (young, poisson) = (question.young, question.poisson);
+        let request = SolveOnce {
+            mesh: mesh_data(&object.mesh),
+            materials: vec![softgrasp_protocol::Material { young, poisson }],
+            element,
+            question: softgrasp_protocol::Question {
+                known: question.known.iter().map(value).collect(),
+                forces: question.forces.iter().map(value).collect(),
+                method: MethodName::try_new(method).unwrap(),
+                want: Want { nodes: NodeChoice::All, reactions: true, precision: Precision::F64 },
+                ..softgrasp_protocol::Question::default()
+            },
+        };
+        let reply = connection.ask(&Request::SolveOnce(Box::new(request)));
+        let Ok(Reply::Answer(answer)) = reply else { panic!("{}: {reply:?}", object.name) };
+        assert!(answer.reactions.iter().map(|r| r.dof).eq(question.known.iter().map(|k| k.0)));
+        assert_eq!(answer.report.method, method);
+        Found {
+            reaction: answer.reactions.iter().map(|r| r.value).collect(),
+            displacement: answer.displacements.into_f64(),
+        }
+    }
+}
+
+fn by_core(object: &Object, system: &System, question: &Question) -> Found {
+    let material = Material::try_new(question.young, question.poisson).unwrap();
+    let (mesh, element) = (object.mesh.clone(), system.element);
+    let model = Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).unwrap();
+    let known = model.known(question.known.clone()).unwrap();
+    let factored = model.factor(&known.dofs, Method::SparseCholesky, &mut |_| {}).unwrap();
+    let mut forces = vec![0.0; 3 * model.system_node_count()];
+    question.forces.iter().for_each(|&(dof, value)| forces[dof as usize] = value);
+    let loads = Loads { q_known: &known.q_known, forces: &forces, residual_rel: 0.0 };
+    let solution = factored.solve(model.stiffness(), loads, &mut |_| {}).unwrap();
+    let (displacement, rest) = solution.displacement.as_chunks();
+    assert!(rest.is_empty());
+    Found { displacement: displacement.to_vec(), reaction: solution.reaction }
+}
+
+/// Tables of the command contract in, one out.
+fn by_program(object: &Object, system: &System, question: &Question, folder: &Path) -> Found {
+    let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let (known, forces, out) = (path("K.csv"), path("F.csv"), path("U.csv"));
+    std::fs::write(&known, rows("node,ux,uy,uz", &question.known)).unwrap();
+    let (young, poisson) = (question.young.to_string(), question.poisson.to_string());
+    let element = if system.element == Element::Tet4 { "t4" } else { "t10" };
+    let mut arguments = vec!["solve", "--mesh", object.file.to_str().unwrap()];
+    arguments.extend(["--known", &known, "--young", &young, "--poisson", &poisson]);
+    arguments.extend(["--element", element, "--server", "embedded", "--out", &out]);
+    if !question.forces.is_empty() {
+        std::fs::write(&forces, rows("node,fx,fy,fz", &question.forces)).unwrap();
+        arguments.extend(["--forces", &forces]);
+    }
+    SolveArguments::parse_from(arguments).solve.run().unwrap();
+    let text = std::fs::read_to_string(&out).unwrap();
+    let row = |line: &str| {
+        let cells: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().unwrap()).collect();
+        <[f64; 3]>::try_from(cells).unwrap()
+    };
+    Found { displacement: text.lines().skip(1).map(row).collect(), reaction: Vec::new() }
+}
+
+/// A table with a row per node; directions that are not named stay empty.
+fn rows(header: &str, values: &[(u32, f64)]) -> String {
+    let mut text = format!("{header}\n");
+    for of_node in values.chunk_by(|a, b| a.0 / 3 == b.0 / 3) {
+        write!(text, "{}", of_node[0].0 / 3).unwrap();
+        for axis in 0..3 {
+            match of_node.iter().find(|(dof, _)| dof % 3 == axis) {
+                Some((_, value)) => write!(text, ",{value:e}").unwrap(),
+                None => text.push(','),
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
