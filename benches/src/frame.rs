@@ -19,6 +19,8 @@ use crate::threads::processors;
 
 /// Largest error, relative to a direct solve, with which a time is reported.
 const ERROR_ALLOWED: f64 = 1e-9;
+/// Echoes one after another, without frames.
+const LONE_ECHOES: usize = 500;
 /// A method whose matrix is larger is left out: it could not be asked for a frame at all.
 const DENSE_BYTES_MAX: u64 = 512 << 20;
 
@@ -41,6 +43,8 @@ struct Case {
     first_ms: f64,
     frames: Vec<Trip>,
     echoes: Vec<Trip>,
+    /// Echoes without frames between them, ms.
+    lone_echoes: Vec<f64>,
 }
 
 /// Measures frames of the cube with five contacts: surface nodes in, double precision.
@@ -124,6 +128,12 @@ impl<'a> Asker<'a> {
         let mut results = take_turns(&effort(nodes, is_quick), &mut competitors)?.into_iter();
         let (frames, echoes) =
             (results.next().unwrap_or_default(), results.next().unwrap_or_default());
+        drop(competitors);
+        let mut lone_echo = || {
+            let (ms, echoed) = timed_ms(|| echo.trip());
+            echoed.map(|()| ms).map_err(ReportError::Echo)
+        };
+        let lone_echoes = (0..LONE_ECHOES).map(|_| lone_echo()).collect::<Result<_, _>>()?;
         Ok(Case {
             method,
             nodes,
@@ -133,6 +143,7 @@ impl<'a> Asker<'a> {
             first_ms: first.ms,
             frames,
             echoes,
+            lone_echoes,
         })
     }
 
@@ -202,7 +213,7 @@ fn sorted_ms(trips: &[Trip]) -> Vec<f64> {
     sorted
 }
 
-fn trip_row(case: &Case) -> [Cell; 15] {
+fn trip_row(case: &Case) -> [Cell; 16] {
     let (frames, echoes) = (sorted_ms(&case.frames), sorted_ms(&case.echoes));
     let times = |trips: &[Trip]| trips.iter().map(|t| t.ms).collect::<Vec<f64>>();
     let ratio = Spread::of_ratio(&times(&case.frames), &times(&case.echoes));
@@ -218,6 +229,7 @@ fn trip_row(case: &Case) -> [Cell; 15] {
         quantile(&echoes, 0.5).into(),
         quantile(&echoes, 0.99).into(),
         quantile(&echoes, 0.999).into(),
+        Spread::of(case.lone_echoes.iter().copied()).median.into(),
         ratio.median.into(),
         Spread::of(case.frames.iter().map(|t| t.residual_rel)).max.into(),
         Spread::of(case.frames.iter().map(|t| t.error_rel)).max.into(),
@@ -244,7 +256,7 @@ fn stage_row(case: &Case) -> [Cell; 10] {
     ]
 }
 
-const TRIP_COLUMNS: [&str; 15] = [
+const TRIP_COLUMNS: [&str; 16] = [
     "method",
     "nodes",
     "surface_nodes",
@@ -256,6 +268,7 @@ const TRIP_COLUMNS: [&str; 15] = [
     "echo_p50_ms",
     "echo_p99_ms",
     "echo_p99.9_ms",
+    "echo_alone_p50_ms",
     "frame_over_echo",
     "residual_rel",
     "error_rel",
@@ -279,7 +292,12 @@ const INTRODUCTION: &str = "\
 An embedded server, over a loopback socket with TCP_NODELAY, keeps the cube and answers frames: \
 fifteen known degrees of freedom, another load each frame, displacements of all surface nodes in \
 double precision. The echo is a plain thread with a blocking socket that reads as many bytes as the \
-request has and writes the bytes of the reply. Frames and echoes alternate.
+request has and writes the bytes of the reply. Frames and echoes alternate; `echo_alone` is without \
+frames between. Where the system runs both ends of an echo on one processor it takes half as long as \
+on two, and what ran before decides which: so look at both before believing a ratio.
+
+The client stays awake for an answer, as `run` does, for as long as one usually takes; the thread of \
+the server's sockets asks for real-time scheduling, which the system may grant or not.
 
 Every answer is compared with a direct solve refined in twice the working precision; `error_rel` is \
 the worst of all frames, and above 1e-9 the report ends. `frame_over_echo` is the median of the \

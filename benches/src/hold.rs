@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use glove_client::connection::{Host, ServerChoice, ServerConnection, unexpected};
+use glove_client::pace::{be_urgent, wait_until};
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::{Answer, FrameRequest, ModelHash, NodeChoice, Reply, Request, StageMs};
 
@@ -60,8 +61,10 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     progress("hold", "waiting for the proof of the error bound");
     holder.wait_for_proof()?;
     progress("hold", &format!("{count} ticks of 1 ms"));
+    let is_urgent = be_urgent();
     let held = holder.hold(count)?;
     report.text(INTRODUCTION);
+    report.text(urgency(is_urgent));
     report.text(verdict(&held, scene.mesh.node_count()));
     report.table(times(&held, &scene));
     report.figure(
@@ -111,7 +114,8 @@ impl<'a> Holder<'a> {
     /// One request at each tick of an absolute schedule; a tick that passes while an earlier answer
     /// is awaited is not asked for any more.
     fn hold(&mut self, count: usize) -> Result<Held, ReportError> {
-        let mut held = Held { ticks: Vec::new(), missed: 0, lasted: Duration::ZERO };
+        // Growing would take as long as some ticks.
+        let mut held = Held { ticks: Vec::with_capacity(count), missed: 0, lasted: Duration::ZERO };
         let start = Instant::now() + 5 * PERIOD;
         for (number, tick) in (0..count as u32).map(|n| (n, start + n * PERIOD)) {
             if Instant::now() >= tick + PERIOD {
@@ -121,7 +125,7 @@ impl<'a> Holder<'a> {
             // Another load each time; the displacements are proportional to it.
             let scale = 1.0 + 0.25 * (1e-2 * f64::from(number)).sin();
             let request = self.request(scale);
-            std::thread::sleep(tick.saturating_duration_since(Instant::now()));
+            wait_until(tick);
             let sent = Instant::now();
             let answer = self.ask(&request)?;
             let (from_tick, round_trip) = (ms(tick.elapsed()), ms(sent.elapsed()));
@@ -204,6 +208,17 @@ fn verdict(held: &Held, nodes: usize) -> String {
         held.count(),
         three_digits(late),
         held.missed,
+    )
+}
+
+fn urgency(is_urgent: bool) -> String {
+    let (word, then) = match is_urgent {
+        true => ("grants", "no other work on the machine goes before them"),
+        false => ("does not grant", "they wait their turn like all others"),
+    };
+    format!(
+        "The thread that keeps the ticks, and the server's that reads, solves and answers, ask for \
+         real-time scheduling; this system {word} it, so {then}."
     )
 }
 
@@ -325,8 +340,9 @@ const STAGE_COLUMNS: [&str; 6] = ["part", "p50_ms", "p99_ms", "p99.9_ms", "max_m
 const INTRODUCTION: &str = "\
 An embedded server, over a loopback socket with TCP_NODELAY, keeps the cube. The client sends a \
 request at each tick of an absolute schedule, one a millisecond: fifteen known degrees of freedom, \
-another load each time, displacements of all surface nodes in double precision. It sleeps until the \
-tick, so the system's waking counts. A tick is late if its answer is not there before the next tick; \
+another load each time, displacements of all surface nodes in double precision. As `run` does, it \
+sleeps until shortly before the tick, stays awake for the rest, and stays awake for the answer for as \
+long as an answer usually takes. A tick is late if its answer is not there before the next tick; \
 a tick that passes while an earlier answer is awaited is late too and is not asked for any more, as \
 the newest order wins in the client. Times are counted from the tick, not from sending, so waiting \
 behind a slow answer counts.

@@ -30,6 +30,7 @@ pub struct Model {
     rigid: RigidBodies,
     /// For every node of the system (corners first), whether an element uses it.
     used: Vec<bool>,
+    used_count: usize,
     stiffness: Arc<Stiffness>,
     fixed: Vec<u32>,
 }
@@ -129,7 +130,8 @@ impl Model {
             }
         };
         let stiffness = Arc::new(stiffness);
-        Ok(Self { mesh, element, quadratic, bodies, rigid, used, stiffness, fixed })
+        let used_count = used.iter().filter(|used| **used).count();
+        Ok(Self { mesh, element, quadratic, bodies, rigid, used, used_count, stiffness, fixed })
     }
 
     /// The element it is made of.
@@ -188,7 +190,7 @@ impl Model {
 
     /// Degrees of freedom of nodes that elements use.
     pub fn modelled_dofs(&self) -> usize {
-        3 * self.used.iter().filter(|u| **u).count()
+        3 * self.used_count
     }
 
     /// Bytes held by mesh and stiffness, roughly.

@@ -27,4 +27,4 @@ pub use clock::StageWatch;
 pub use config::{ConfigError, ServerConfig};
 pub use memory::available_bytes;
 pub use rates::measure_rates;
-pub use server::{RunningServer, StartError, serve, start};
+pub use server::{RunningServer, StartError, serve, sockets_runtime, start};

@@ -80,17 +80,12 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
     let config = config(&arguments)?;
     let (stop, stopped) = watch::channel(false);
     // Before the first thread: all of them leave these signals to the one that waits.
-    softgrasp_signals::on_end_signal(false, move |signal| {
+    softgrasp_os::on_end_signal(false, move |signal| {
         tracing::info!(signal = signal.name, "asked to end");
         let _ = stop.send(true);
     })
     .context("cannot wait for the signals that end the server")?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .thread_name("sockets")
-        .enable_all()
-        .build()
-        .context("cannot start the server's sockets")?;
+    let runtime = fea_server::sockets_runtime().context("cannot start the server's sockets")?;
     runtime.block_on(fea_server::serve(config, announce, stopped))?;
     tracing::info!("stopped");
     Ok(())

@@ -134,6 +134,24 @@ async fn turn_away(stream: TcpStream) {
     }
 }
 
+/// The runtime a server's sockets live on: one thread, which rests unless there is something to
+/// read, write or answer at once, and then is not to wait for the threads that solve.
+///
+/// # Errors
+/// The system's, when it gives no thread.
+pub fn sockets_runtime() -> std::io::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .thread_name("sockets")
+        .on_thread_start(|| {
+            if let Err(error) = softgrasp_os::be_urgent() {
+                tracing::debug!(%error, "the thread of the sockets is one of many");
+            }
+        })
+        .enable_all()
+        .build()
+}
+
 /// A server on a thread of this process; dropping it stops it.
 #[derive(Debug)]
 pub struct RunningServer {
@@ -149,12 +167,7 @@ pub struct RunningServer {
 pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
     let (stop, stopped) = watch::channel(false);
     let (ready, is_ready) = oneshot::channel();
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .thread_name("sockets")
-        .enable_all()
-        .build()
-        .map_err(StartError::Runtime)?;
+    let runtime = sockets_runtime().map_err(StartError::Runtime)?;
     let thread = std::thread::Builder::new().name("server".to_owned());
     let thread = thread
         .spawn(move || {

@@ -4,7 +4,7 @@
 use std::process::exit;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use softgrasp_signals::{EndSignal, on_end_signal};
+use softgrasp_os::{EndSignal, on_end_signal};
 
 /// Nobody waits to be told.
 const UNHEARD: u8 = 0;

@@ -18,6 +18,7 @@ pub mod interruption;
 pub mod link;
 pub mod mending_summary;
 pub mod mesh_file;
+pub mod pace;
 pub mod prefetch;
 pub mod progress;
 pub mod run_report;

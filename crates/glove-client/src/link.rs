@@ -15,6 +15,7 @@ use softgrasp_protocol::{
 };
 
 use crate::connection::{LinkError, ServerConnection, unexpected};
+use crate::pace::be_urgent;
 use crate::prefetch::Hint;
 
 /// What has come from the server, or happened to it.
@@ -113,7 +114,10 @@ impl Link {
         let desk = Arc::new((Mutex::new(desk), Condvar::new()));
         let shared = Arc::clone(&desk);
         let thread = std::thread::Builder::new().name("link".to_owned());
-        let thread = thread.spawn(move || Worker { desk: shared, connection: None }.work())?;
+        let thread = thread.spawn(move || {
+            be_urgent();
+            Worker { desk: shared, connection: None }.work();
+        })?;
         Ok(Self { desk, thread: Some(thread) })
     }
 

@@ -104,7 +104,7 @@ const TRUE_EVERY: u32 = 20;
 
 /// Euclidean norm, scaled so that tiny and huge units neither vanish nor overflow.
 pub(super) fn norm(v: &[f64]) -> f64 {
-    let square = sum_of_squares(v, 1.0);
+    let square = sum_of_squares(v, |x| x);
     if SAFE_SQUARES.contains(&square) {
         return square.sqrt();
     }
@@ -113,7 +113,7 @@ pub(super) fn norm(v: &[f64]) -> f64 {
     if scale == 0.0 || !scale.is_finite() {
         return scale;
     }
-    scale * sum_of_squares(v, scale).sqrt()
+    scale * sum_of_squares(v, |x| x / scale).sqrt()
 }
 
 /// Sums of squares in which nothing that matters was lost below or above the range of a double.
@@ -121,15 +121,16 @@ const SAFE_SQUARES: std::ops::Range<f64> = 1e-200..1e200;
 /// Sums that run beside each other: always as many, so that the bits are always the same.
 const SUMS: usize = 8;
 
-fn sum_of_squares(v: &[f64], divisor: f64) -> f64 {
+#[inline]
+fn sum_of_squares(v: &[f64], scaled: impl Fn(f64) -> f64) -> f64 {
     let mut sums = [0.0; SUMS];
-    let chunks = v.chunks_exact(SUMS);
-    for (sum, x) in sums.iter_mut().zip(chunks.remainder()) {
-        *sum = (x / divisor) * (x / divisor);
+    let (chunks, rest) = v.as_chunks::<SUMS>();
+    for (sum, &x) in sums.iter_mut().zip(rest) {
+        *sum = scaled(x) * scaled(x);
     }
     for chunk in chunks {
-        for (sum, x) in sums.iter_mut().zip(chunk) {
-            *sum += (x / divisor) * (x / divisor);
+        for (sum, &x) in sums.iter_mut().zip(chunk) {
+            *sum += scaled(x) * scaled(x);
         }
     }
     sums.iter().sum()

@@ -20,6 +20,7 @@ use crate::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, Subscription,
 use crate::hand_reader::{HandReader, HandSetup};
 use crate::interruption;
 use crate::link::Link;
+use crate::pace::{be_urgent, wait_until};
 use crate::progress::Progress;
 use crate::run_report::{ObjectSummary, RunReport};
 use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile, SceneObject, load_object};
@@ -263,6 +264,9 @@ impl RunCommand {
         report: &mut RunReport,
     ) -> anyhow::Result<()> {
         interruption::hear();
+        if period.is_some() {
+            be_urgent();
+        }
         let mut status = StatusLine::start();
         let mut seen = Seen::default();
         let start = Instant::now();
@@ -318,12 +322,6 @@ fn prepare(
             }
             Err(error) => return Err(error.into()),
         }
-    }
-}
-
-fn wait_until(then: Instant) {
-    if let Some(left) = then.checked_duration_since(Instant::now()) {
-        std::thread::sleep(left);
     }
 }
 

@@ -17,6 +17,38 @@ pub(super) struct Judged {
     pub off: f64,
 }
 
+/// How fast the corrections of an answer by a single-precision factor shrink: a residual can be
+/// small while a smooth error, which makes little force, is not.
+///
+/// Units: relative to the answer.
+struct Shrinking {
+    /// Size of the last correction.
+    last: f64,
+    /// What the next one would be, if it shrank as the last one did.
+    next: f64,
+}
+
+/// A next correction this small is not made.
+const CORRECTION_GOOD: f64 = 1e-13;
+
+impl Shrinking {
+    /// Nothing is seen yet: at least one correction is made.
+    const UNSEEN: Self = Self { last: 1.0, next: f64::INFINITY };
+
+    fn see(&mut self, size: f64) {
+        self.next = match size < 0.5 * self.last {
+            true => size * size / self.last,
+            // It shrinks no more.
+            false => 0.0,
+        };
+        self.last = size;
+    }
+
+    fn is_done(&self) -> bool {
+        self.next <= CORRECTION_GOOD
+    }
+}
+
 impl Factored {
     /// Improves `x` until it is judged good or gets no better; the number of steps, and what was
     /// found of the last `x`.
@@ -28,22 +60,27 @@ impl Factored {
         x: &mut Vec<f64>,
         residual: &mut Vec<f64>,
     ) -> (u32, Judged) {
-        let steps_max = match self.kernel {
-            Kernel::FrontSingle(_) => REFINEMENT_STEPS_SINGLE_MAX,
-            _ => REFINEMENT_STEPS_MAX,
+        // The first answer of a factor in double precision is as good as corrections make it.
+        let (steps_max, mut shrinking) = match self.kernel {
+            Kernel::FrontSingle(_) => (REFINEMENT_STEPS_SINGLE_MAX, Some(Shrinking::UNSEEN)),
+            _ => (REFINEMENT_STEPS_MAX, None),
         };
         let mut before = judge(x, residual);
         for step in 0..steps_max {
-            if before.off <= 1.0 {
+            if before.off <= 1.0 && shrinking.as_ref().is_none_or(Shrinking::is_done) {
                 return (step, before);
             }
             let correction = self.apply_inverse(residual.clone());
             let refined: Vec<f64> = x.iter().zip(&correction).map(|(x, c)| x + c).collect();
             let refined_residual = subtract(b, &apply(&refined));
             let after = judge(&refined, &refined_residual);
-            // A NaN ends the loop too.
-            if after.off >= before.off || after.off.is_nan() {
+            // Of good answers a single-precision factor's later one is taken; a NaN ends the loop too.
+            let enough = if shrinking.is_some() { before.off.max(1.0) } else { before.off };
+            if after.off >= enough || after.off.is_nan() {
                 return (step, before);
+            }
+            if let Some(shrinking) = &mut shrinking {
+                shrinking.see(norm(&correction) / norm(&refined));
             }
             (*x, *residual, before) = (refined, refined_residual, after);
         }

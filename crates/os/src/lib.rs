@@ -1,0 +1,8 @@
+//! What the programs ask of the operating system: signals that are waited for, threads that are
+//! woken in time.
+
+mod end_signals;
+mod urgency;
+
+pub use end_signals::{EndSignal, on_end_signal};
+pub use urgency::{NotUrgent, be_urgent};
