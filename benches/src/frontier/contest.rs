@@ -58,7 +58,7 @@ impl Way {
             tolerances.iter().map(move |&residual_rel| Self::Direct { method, residual_rel })
         };
         let all = Method::ALL.into_iter().filter(fits).flat_map(direct);
-        all.chain((element == Element::Tet4).then_some(Self::Condensed)).collect()
+        all.chain((element != Element::Tet10).then_some(Self::Condensed)).collect()
     }
 
     pub fn name(self) -> &'static str {

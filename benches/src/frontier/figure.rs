@@ -184,6 +184,7 @@ fn draw_point(chart: &mut Panel<'_>, point: &Point) -> Drawn {
     let (at, style, thick) = (point.at, colour.filled(), colour.stroke_width(2));
     match point.discretisation {
         Discretisation::T4 => drop(chart.draw_series([Circle::new(at, 4, style)])?),
+        Discretisation::T4Anp => drop(chart.draw_series([Circle::new(at, 5, thick)])?),
         Discretisation::T4Refined => drop(chart.draw_series([Cross::new(at, 4, thick)])?),
         Discretisation::T10 => drop(chart.draw_series([TriangleMarker::new(at, 6, style)])?),
     }
@@ -202,6 +203,7 @@ fn draw_legend(area: &Area<'_>, methods: &[&str]) -> Drawn {
         let at = (METHODS_LEFT, y);
         match discretisation {
             Discretisation::T4 => area.draw(&Circle::new(at, 4, BLACK.filled()))?,
+            Discretisation::T4Anp => area.draw(&Circle::new(at, 5, BLACK.stroke_width(2)))?,
             Discretisation::T4Refined => {
                 area.draw(&Cross::new(at, 4, BLACK.stroke_width(2)))?;
             }

@@ -14,6 +14,8 @@ use crate::scene::rubber;
 pub(super) enum Discretisation {
     /// Linear elements of the mesh.
     T4,
+    /// Linear elements of the mesh with averaged nodal pressure.
+    T4Anp,
     /// Linear elements of the mesh refined once.
     T4Refined,
     /// Ten-node elements of the mesh.
@@ -21,11 +23,12 @@ pub(super) enum Discretisation {
 }
 
 impl Discretisation {
-    pub const ALL: [Self; 3] = [Self::T4, Self::T4Refined, Self::T10];
+    pub const ALL: [Self; 4] = [Self::T4, Self::T4Anp, Self::T4Refined, Self::T10];
 
     pub const fn name(self) -> &'static str {
         match self {
             Self::T4 => "t4",
+            Self::T4Anp => "t4-anp",
             Self::T4Refined => "t4, refined",
             Self::T10 => "t10",
         }
@@ -34,6 +37,7 @@ impl Discretisation {
     pub const fn element(self) -> Element {
         match self {
             Self::T4 | Self::T4Refined => Element::Tet4,
+            Self::T4Anp => Element::Tet4Anp,
             Self::T10 => Element::Tet10,
         }
     }

@@ -1,5 +1,7 @@
 //! Gauss–Jordan elimination of the thesis's Appendix A, a panel of pivots at a time.
 
+use std::ops::Range;
+
 use faer::linalg::matmul::matmul;
 use faer::prelude::*;
 use faer::{Accum, Par};
@@ -27,27 +29,42 @@ pub(super) fn invert(a: &mut [f64], n: usize) -> Result<(), NotPositive> {
     let Some(Cut { width, height }) = Cut::of(n) else {
         return gauss_jordan_plain::invert(a, n);
     };
-    let mut diagonal = vec![0.0; width * width];
     let mut row_panel = vec![0.0; n * width];
     let mut column_panel = vec![0.0; n * width];
+    let mut inverse = square_of(a, n, 0..width.min(n));
+    let mut inverted = invert(&mut inverse, width.min(n));
     for from in (0..n).step_by(width) {
         let pivots = width.min(n - from);
-        let inverse = &mut diagonal[..pivots * pivots];
-        for (row, own) in inverse.chunks_exact_mut(pivots).zip(a[from * n..].chunks_exact(n)) {
-            row.copy_from_slice(&own[from..from + pivots]);
-        }
-        invert(inverse, pivots).map_err(|e| NotPositive { row: from + e.row })?;
-        let row_panel = RowPanel::new(&mut row_panel[..n * pivots], a, from, inverse);
-        a.par_chunks_mut(height * n)
-            .zip(column_panel.par_chunks_mut(height * width))
-            .enumerate()
-            .with_max_len(1)
-            .for_each(|(k, (rows, factors))| match (k * height).checked_sub(from) {
-                Some(first) if first < pivots => row_panel.write(first, rows),
-                _ => row_panel.eliminate(rows, factors),
-            });
+        inverted.map_err(|e| NotPositive { row: from + e.row })?;
+        let row_panel = RowPanel::new(&mut row_panel[..n * pivots], a, from, &inverse);
+        // The next `A_II` is worked out first, to be inverted beside the elimination of all rows:
+        // it is the one piece of work that cannot be shared out.
+        let next = from + pivots..(from + pivots + width).min(n);
+        let mut next_inverse = row_panel.next_square(a, next.clone());
+        let invert_next = || invert(&mut next_inverse, next.len());
+        let eliminate = || {
+            a.par_chunks_mut(height * n)
+                .zip(column_panel.par_chunks_mut(height * width))
+                .enumerate()
+                .with_max_len(1)
+                .for_each(|(k, (rows, factors))| match (k * height).checked_sub(from) {
+                    Some(first) if first < pivots => row_panel.write(first, rows),
+                    _ => row_panel.eliminate(rows, factors),
+                });
+        };
+        (inverted, ()) = rayon::join(invert_next, eliminate);
+        inverse = next_inverse;
     }
     Ok(())
+}
+
+/// The square of `a` in some rows and the same columns, row-major.
+fn square_of(a: &[f64], n: usize, rows: Range<usize>) -> Vec<f64> {
+    a[rows.start * n..rows.end * n]
+        .chunks_exact(n)
+        .flat_map(|row| &row[rows.clone()])
+        .copied()
+        .collect()
 }
 
 /// Product of a row-major square matrix and a vector, rows in parallel.
@@ -134,6 +151,26 @@ impl<'a> RowPanel<'a> {
             let mut into = rows.as_mut().subrows_mut(column, tile.nrows());
             into.copy_from(tile.subcols(first, count));
         }
+    }
+
+    /// The square of `a` in the rows `next` with their `A_KI` times the panel taken off.
+    fn next_square(&self, a: &[f64], next: Range<usize>) -> Vec<f64> {
+        let mut square = square_of(a, self.n, next.clone());
+        let rows = a[next.start * self.n..next.end * self.n].chunks_exact(self.n);
+        let of_panel = self.from..self.from + self.pivots;
+        let factors: Vec<f64> = rows.flat_map(|row| &row[of_panel.clone()]).copied().collect();
+        let factors = MatRef::from_column_major_slice(&factors, self.pivots, next.len());
+        let mut into = MatMut::from_column_major_slice_mut(&mut square, next.len(), next.len());
+        for (column, tile) in self.tiles() {
+            let end = (column + tile.nrows()).min(next.end);
+            let start = column.max(next.start);
+            if start < end {
+                let into = into.as_mut().subrows_mut(start - next.start, end - start);
+                let tile = tile.subrows(start - column, end - start);
+                matmul(into, Accum::Add, tile, factors, -1.0, Par::Seq);
+            }
+        }
+        square
     }
 
     /// Takes their `A_KI` times the panel off other rows; `factors` is scratch for `A_KI`.
