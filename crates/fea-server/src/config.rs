@@ -27,6 +27,9 @@ pub struct ServerConfig {
     /// Whether the machine's speed is measured at once, beside the first requests, and not by the
     /// first request that needs it.
     pub measure_at_start: bool,
+    /// Whether the thread of the sockets asks for real-time scheduling, so that frames need not wait
+    /// for other work on the machine.
+    pub real_time: bool,
     /// A client that stops inside a frame for this long is given up.
     pub stall_limit: Duration,
     /// Where the stage of the newest request can be read, for whoever started the server.
@@ -68,6 +71,7 @@ impl Default for ServerConfig {
             column_cache: 1 << 30,
             token: None,
             measure_at_start: false,
+            real_time: false,
             stall_limit: Duration::from_secs(30),
             stage: StageWatch::default(),
         }

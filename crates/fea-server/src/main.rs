@@ -34,6 +34,10 @@ struct Arguments {
     /// Memory for the compliance columns kept per model: bytes, or 1GiB, 512MiB.
     #[arg(long, value_name = "BYTES", default_value = "1GiB")]
     column_cache: Bytes,
+    /// Ask for real-time scheduling of the thread that reads, answers small frames and writes, so that
+    /// they need not wait for other work; for machines on which all clients are trusted.
+    #[arg(long)]
+    real_time: bool,
     /// File whose first line is the token a client must show.
     #[arg(long, value_name = "F")]
     token_file: Option<PathBuf>,
@@ -85,7 +89,7 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
         let _ = stop.send(true);
     })
     .context("cannot wait for the signals that end the server")?;
-    let runtime = fea_server::sockets_runtime().context("cannot start the server's sockets")?;
+    let runtime = fea_server::sockets_runtime(&config).context("cannot start the server's sockets")?;
     runtime.block_on(fea_server::serve(config, announce, stopped))?;
     tracing::info!("stopped");
     Ok(())
@@ -112,6 +116,7 @@ fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
         column_cache: arguments.column_cache.0,
         token,
         measure_at_start: true,
+        real_time: arguments.real_time,
         ..usual
     })
 }

@@ -139,13 +139,14 @@ async fn turn_away(stream: TcpStream) {
 ///
 /// # Errors
 /// The system's, when it gives no thread.
-pub fn sockets_runtime() -> std::io::Result<tokio::runtime::Runtime> {
+pub fn sockets_runtime(config: &ServerConfig) -> std::io::Result<tokio::runtime::Runtime> {
+    let real_time = config.real_time;
     tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .thread_name("sockets")
-        .on_thread_start(|| {
-            if let Err(error) = softgrasp_os::be_urgent() {
-                tracing::debug!(%error, "the thread of the sockets is one of many");
+        .on_thread_start(move || {
+            if real_time && let Err(error) = softgrasp_os::be_urgent() {
+                tracing::info!(%error, "frames wait for other work on this machine");
             }
         })
         .enable_all()
@@ -167,7 +168,7 @@ pub struct RunningServer {
 pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
     let (stop, stopped) = watch::channel(false);
     let (ready, is_ready) = oneshot::channel();
-    let runtime = sockets_runtime().map_err(StartError::Runtime)?;
+    let runtime = sockets_runtime(&config).map_err(StartError::Runtime)?;
     let thread = std::thread::Builder::new().name("server".to_owned());
     let thread = thread
         .spawn(move || {

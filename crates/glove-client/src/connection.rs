@@ -145,6 +145,7 @@ impl Host {
                     threads: threads.unwrap_or(usual.threads),
                     memory_limit: memory_limit.unwrap_or(usual.memory_limit),
                     stage: stage.clone(),
+                    real_time: true,
                     ..usual
                 };
                 let server = fea_server::start(config)?;

@@ -11,6 +11,7 @@ mod substitute;
 mod supernodes;
 #[cfg(test)]
 mod tests;
+mod values;
 
 pub use analysis::FrontAnalysis;
 pub use factor::{FrontError, FrontFactor};
