@@ -89,7 +89,8 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
         let _ = stop.send(true);
     })
     .context("cannot wait for the signals that end the server")?;
-    let runtime = fea_server::sockets_runtime(&config).context("cannot start the server's sockets")?;
+    let runtime =
+        fea_server::sockets_runtime(&config).context("cannot start the server's sockets")?;
     runtime.block_on(fea_server::serve(config, announce, stopped))?;
     tracing::info!("stopped");
     Ok(())

@@ -8,7 +8,6 @@ use super::Real;
 use super::analysis::{Front, FrontAnalysis};
 use super::assembly::{Contribution, add_entries, extend_add};
 use super::dense::{Tasks, factor_panel, form_contribution};
-use super::values::Values;
 use crate::fem::Stiffness;
 
 /// Columns of a parallel front that one task fills.
@@ -20,7 +19,7 @@ const FILLED_COLUMNS: usize = 64;
 pub struct FrontFactor<T> {
     pub(super) analysis: Arc<FrontAnalysis>,
     /// Panel of each front, size × pivots column-major.
-    pub(super) panels: Vec<Values<T>>,
+    pub(super) panels: Vec<Vec<T>>,
 }
 
 /// Why there is no factor.
@@ -53,7 +52,7 @@ impl<T: Real> FrontFactor<T> {
         analysis: &Arc<FrontAnalysis>,
         stiffness: &Stiffness,
     ) -> Result<Self, FrontError> {
-        let panels = analysis.fronts.iter().map(|_| Values::default()).collect();
+        let panels = analysis.fronts.iter().map(|_| Vec::new()).collect();
         let mut factor = Self { analysis: Arc::clone(analysis), panels };
         factor.refactor(stiffness)?;
         Ok(factor)
@@ -74,7 +73,7 @@ impl<T: Real> FrontFactor<T> {
 
     /// Bytes of the panels.
     pub fn bytes(&self) -> usize {
-        self.panels.iter().map(|panel| size_of_val::<[T]>(panel)).sum()
+        self.panels.iter().map(|panel| size_of_val(panel.as_slice())).sum()
     }
 
     /// The analysis this factor follows.
@@ -97,8 +96,8 @@ impl Run<'_> {
         &self,
         heads: &[u32],
         first: usize,
-        panels: &mut [Values<T>],
-    ) -> Result<Vec<Values<T>>, FrontError> {
+        panels: &mut [Vec<T>],
+    ) -> Result<Vec<Vec<T>>, FrontError> {
         let mut rest = panels;
         let mut start = first;
         let mut tasks = Vec::with_capacity(heads.len());
@@ -109,20 +108,16 @@ impl Run<'_> {
             rest = tail;
         }
         // Every subtree is finished before an error is looked at, so that it is always the same.
-        let done: Vec<Result<Values<T>, FrontError>> =
+        let done: Vec<Result<Vec<T>, FrontError>> =
             tasks.into_par_iter().map(|(head, panels)| self.subtree(head, panels)).collect();
         done.into_iter().collect()
     }
 
     /// Factors one subtree; returns the contribution block of its head.
-    fn subtree<T: Real>(
-        &self,
-        head: usize,
-        panels: &mut [Values<T>],
-    ) -> Result<Values<T>, FrontError> {
+    fn subtree<T: Real>(&self, head: usize, panels: &mut [Vec<T>]) -> Result<Vec<T>, FrontError> {
         let fronts = &self.analysis.fronts;
         if fronts[head].is_serial() {
-            return self.serial(head, panels).map(Values::Small);
+            return self.serial(head, panels);
         }
         // A chain of only children is a loop, not a recursion: it can be long.
         let mut bottom = head;
@@ -142,7 +137,7 @@ impl Run<'_> {
                 .zip(&blocks)
                 .map(|(&c, values)| self.contribution(c, values))
                 .collect();
-            let mut block = Values::zeroed(front.rest() * front.rest());
+            let mut block = vec![T::ZERO; front.rest() * front.rest()];
             self.front(v, panel, &mut block, &children, Tasks::Parallel)?;
             blocks = vec![block];
         }
@@ -150,11 +145,7 @@ impl Run<'_> {
     }
 
     /// Factors a subtree front by front, with the contribution blocks in one arena.
-    fn serial<T: Real>(
-        &self,
-        head: usize,
-        panels: &mut [Values<T>],
-    ) -> Result<Vec<T>, FrontError> {
+    fn serial<T: Real>(&self, head: usize, panels: &mut [Vec<T>]) -> Result<Vec<T>, FrontError> {
         let fronts = &self.analysis.fronts;
         let first = fronts[head].subtree_first as usize;
         let mut arena = vec![T::ZERO; fronts[head].arena];
@@ -195,14 +186,14 @@ impl Run<'_> {
     fn front<T: Real>(
         &self,
         v: usize,
-        panel: &mut Values<T>,
+        panel: &mut Vec<T>,
         block: &mut [T],
         children: &[Contribution<'_, T>],
         tasks: Tasks,
     ) -> Result<(), FrontError> {
         let front = &self.analysis.fronts[v];
         let (size, pivots) = (front.size, front.pivots);
-        panel.reset(front.panel_len());
+        reset(panel, front.panel_len());
         add_entries(panel, front, &self.analysis.entries, self.stiffness);
         add_children(panel, 0..pivots, 0, size, children, tasks);
         factor_panel(panel, size, pivots, tasks)
@@ -254,4 +245,12 @@ fn add_children<T: Real>(
 /// works on them; only the infallible constructors offer that.
 fn probe_memory(bytes: usize) -> Result<(), FrontError> {
     Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| FrontError::OutOfMemory { bytes })
+}
+
+/// Makes `values` hold `len` zeros, in the memory it has if that fits.
+fn reset<T: Real>(values: &mut Vec<T>, len: usize) {
+    match values.len() == len {
+        true => values.fill(T::ZERO),
+        false => *values = vec![T::ZERO; len],
+    }
 }

@@ -11,7 +11,6 @@ mod substitute;
 mod supernodes;
 #[cfg(test)]
 mod tests;
-mod values;
 
 pub use analysis::FrontAnalysis;
 pub use factor::{FrontError, FrontFactor};

@@ -10,12 +10,7 @@ mod sealed {
 
 /// Precision of a factor: `f64`, or `f32` at half the time and memory for use with refinement.
 pub trait Real:
-    faer::traits::RealField
-    + bytemuck::Pod
-    + Default
-    + PartialOrd
-    + AddAssign
-    + sealed::Sealed
+    faer::traits::RealField + Copy + Default + PartialOrd + AddAssign + sealed::Sealed
 {
     /// Zero.
     const ZERO: Self;
