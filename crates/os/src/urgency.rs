@@ -1,11 +1,13 @@
 //! Threads that keep a schedule of a millisecond are scheduled before those that do not.
 
+use std::io;
+
 use thread_priority::Error;
 
 /// The system does not schedule this thread before others; it works as well, but is late more often.
 #[derive(Debug, thiserror::Error)]
-#[error("no real-time scheduling ({0:?}); on Linux it takes CAP_SYS_NICE or a limit `rtprio`")]
-pub struct NotUrgent(Error);
+#[error("no real-time scheduling ({0}); on Linux it takes CAP_SYS_NICE or a limit `rtprio`")]
+pub struct NotUrgent(io::Error);
 
 /// Asks the system to run the calling thread, whenever it has something to do, before all threads
 /// without this right. For threads that rest most of the time and start no others (which would
@@ -14,7 +16,12 @@ pub struct NotUrgent(Error);
 /// # Errors
 /// [`NotUrgent`] where it is not allowed; nothing has changed then.
 pub fn be_urgent() -> Result<(), NotUrgent> {
-    raise().map_err(NotUrgent)
+    raise().map_err(|error| {
+        NotUrgent(match error {
+            Error::OS(code) => io::Error::from_raw_os_error(code),
+            other => io::Error::other(format!("{other:?}")),
+        })
+    })
 }
 
 /// The least of the real-time priorities is above all that are none.
