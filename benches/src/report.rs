@@ -14,7 +14,7 @@ use crate::plot::PlotError;
 use crate::table::Table;
 
 /// What is asked of a report.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// Small sizes and few rounds: to see that it works.
     pub is_quick: bool,
@@ -289,7 +289,7 @@ mod tests {
             out: folder.path().to_owned(),
             command: "bench --quick".to_owned(),
             note: "shared".to_owned(),
-            meshes: PathBuf::new(),
+            ..Options::default()
         };
         let mut report = Report::begin("r", "Title", "2", &options);
         report.text("Words.");
@@ -315,13 +315,8 @@ mod tests {
     #[test]
     fn faults_are_an_error_that_names_them_and_long_tables_are_files() {
         let folder = tempfile::tempdir().unwrap();
-        let options = Options {
-            is_quick: true,
-            out: folder.path().to_owned(),
-            command: String::new(),
-            note: String::new(),
-            meshes: PathBuf::new(),
-        };
+        let options =
+            Options { is_quick: true, out: folder.path().to_owned(), ..Options::default() };
         let mut report = Report::begin("r", "Title", "2", &options);
         let mut table = Table::new("r-rows", "Every row", &["x"]);
         table.push([7usize.into()]);

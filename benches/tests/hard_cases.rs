@@ -3,8 +3,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
-use std::path::PathBuf;
-
 use softgrasp_bench::{Options, ReportName, run};
 
 #[test]
@@ -14,8 +12,7 @@ fn every_way_through_every_hard_case_has_its_stated_outcome() {
         is_quick: true,
         out: folder.path().to_owned(),
         command: "test".to_owned(),
-        note: String::new(),
-        meshes: PathBuf::new(),
+        ..Options::default()
     };
     // A row that fails is an error that names it.
     run(ReportName::HardCases, &options).unwrap_or_else(|error| panic!("{error}"));

@@ -5,18 +5,8 @@ use softgrasp_core::fem::Element;
 /// A quantity beside its closed form or published value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// Name of the case.
-    pub case: &'static str,
-    /// The element.
-    pub element: Element,
-    /// Poisson's ratio.
-    pub poisson: f64,
-    /// Boxes or layers along the length that the case names.
-    pub cells: usize,
-    /// Nodes, mid-edge nodes among them.
-    pub nodes: usize,
-    /// Unknown degrees of freedom.
-    pub unknown: usize,
+    /// What was solved for it.
+    pub solved: Solved,
     /// What is compared.
     pub quantity: &'static str,
     /// As computed; none where a whole field is compared.
@@ -27,7 +17,8 @@ pub struct Outcome {
     pub error_rel: f64,
 }
 
-/// What was solved: everything of an [`Outcome`] but what came out.
+/// One case on one mesh by one element.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Solved {
     /// Name of the case.
     pub case: &'static str,
@@ -52,32 +43,23 @@ impl Solved {
 
     /// The error of a whole field.
     pub fn with_error(self, quantity: &'static str, error_rel: f64) -> Outcome {
-        let Self { case, element, poisson, cells, nodes, unknown } = self;
-        let (computed, expected) = (None, None);
-        Outcome {
-            case,
-            element,
-            poisson,
-            cells,
-            nodes,
-            unknown,
-            quantity,
-            computed,
-            expected,
-            error_rel,
-        }
+        Outcome { solved: self, quantity, computed: None, expected: None, error_rel }
     }
 }
 
 impl Outcome {
     /// The order of convergence from a coarser mesh of the same case to this one.
     pub fn order_from(&self, coarser: &Self) -> f64 {
-        (coarser.error_rel / self.error_rel).ln() / (self.cells as f64 / coarser.cells as f64).ln()
+        let refined = self.solved.cells as f64 / coarser.solved.cells as f64;
+        (coarser.error_rel / self.error_rel).ln() / refined.ln()
     }
 
     /// Whether the other is the same case, element, material and quantity on another mesh.
     pub fn is_like(&self, other: &Self) -> bool {
-        let same = |o: &Self| (o.case, o.element, o.poisson.to_bits(), o.quantity);
+        let same = |o: &Self| {
+            let Solved { case, element, poisson, .. } = o.solved;
+            (case, element, poisson.to_bits(), o.quantity)
+        };
         same(self) == same(other)
     }
 }

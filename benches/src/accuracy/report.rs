@@ -106,12 +106,12 @@ fn table(outcomes: &[Outcome]) -> Table {
     for outcome in outcomes {
         let coarser = before.filter(|b| b.is_like(outcome));
         table.push([
-            outcome.case.into(),
-            outcome.element.name().into(),
-            outcome.poisson.into(),
-            outcome.cells.into(),
-            outcome.nodes.into(),
-            outcome.unknown.into(),
+            outcome.solved.case.into(),
+            outcome.solved.element.name().into(),
+            outcome.solved.poisson.into(),
+            outcome.solved.cells.into(),
+            outcome.solved.nodes.into(),
+            outcome.solved.unknown.into(),
             outcome.quantity.into(),
             outcome.computed.into(),
             outcome.expected.into(),
@@ -126,11 +126,18 @@ fn table(outcomes: &[Outcome]) -> Table {
 /// Error against unknowns of some cases, a line for each element and Poisson's ratio.
 fn figure(title: &str, outcomes: &[Outcome], cases: &[&str]) -> Result<String, ReportError> {
     let mut series = Vec::new();
-    for of_one in outcomes.chunk_by(Outcome::is_like).filter(|o| cases.contains(&o[0].case)) {
+    for of_one in outcomes.chunk_by(Outcome::is_like).filter(|o| cases.contains(&o[0].solved.case))
+    {
         let first = &of_one[0];
-        let point = |o: &Outcome| PlotPoint { x: o.unknown as f64, y: o.error_rel, spread: None };
+        let point =
+            |o: &Outcome| PlotPoint { x: o.solved.unknown as f64, y: o.error_rel, spread: None };
         series.push(Series {
-            label: format!("{}, {}, ν = {:.4}", first.case, first.element.name(), first.poisson),
+            label: format!(
+                "{}, {}, ν = {:.4}",
+                first.solved.case,
+                first.solved.element.name(),
+                first.solved.poisson
+            ),
             mark: Mark::Line,
             points: of_one.iter().map(point).collect(),
         });

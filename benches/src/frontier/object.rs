@@ -73,9 +73,8 @@ mod tests {
         let options = Options {
             is_quick: true,
             out: folder.path().to_owned(),
-            command: String::new(),
-            note: String::new(),
             meshes: folder.path().join("none"),
+            ..Options::default()
         };
         let (objects, left_out) = objects(&options).unwrap();
         let names: Vec<&str> = objects.iter().map(|o| o.name.as_str()).collect();

@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use softgrasp_core::fem::Element;
-use softgrasp_core::model::Model;
+use softgrasp_core::model::{Model, ModelError};
 use softgrasp_core::solve::memory::{Bytes, Need, Problem, Way, nodes_that_fit};
 use softgrasp_core::solve::work::MeshSize;
 use softgrasp_core::solve::{Analysed, Factored, FrontMethod, Method, SolveError};
@@ -66,6 +66,10 @@ impl Ledger {
 
     fn promised(&self) -> MutexGuard<'_, u64> {
         self.promised.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn promised_total(&self) -> u64 {
+        *self.promised()
     }
 }
 
@@ -194,7 +198,8 @@ impl Desk {
         (asking, held): (&Asking, u64),
         clock: &mut StageClock,
     ) -> Result<Factored, Refusal> {
-        let fronts: Vec<FrontMethod> = methods.iter().filter_map(|&m| front_method(m)).collect();
+        let fronts: Vec<FrontMethod> =
+            methods.iter().copied().filter_map(FrontMethod::of).collect();
         if let [method] = *methods
             && fronts.is_empty()
         {
@@ -237,9 +242,7 @@ impl Desk {
             None => room.free().saturating_sub(held),
         };
         match model.factor_within(dofs, method, limit, &mut |stage| clock.begin(stage)) {
-            Err(softgrasp_core::model::ModelError::Solve(SolveError::OverLimit {
-                needed, ..
-            })) => {
+            Err(ModelError::Solve(SolveError::OverLimit { needed, .. })) => {
                 let shortage = self.shortage(room, &[exact(needed)], asking, None);
                 Err(Refusal::Memory(Box::new(shortage)))
             }
@@ -248,27 +251,11 @@ impl Desk {
     }
 }
 
-impl Ledger {
-    fn promised_total(&self) -> u64 {
-        *self.promised()
-    }
-}
-
 /// Need of a factor over fronts whose pattern is analysed, `held` being what the model holds.
 pub(crate) fn counted(model: &Model, held: u64, analysed: &Analysed, front: FrontMethod) -> Need {
     let blocks = model.stiffness().pattern().block_count();
     let way = Way::Direct(front.into());
     Need::counted(model.element(), way, held, blocks, analysed.analysis())
-}
-
-/// The front's method behind a name, if it has one.
-pub(crate) fn front_method(method: Method) -> Option<FrontMethod> {
-    match method {
-        Method::Front => Some(FrontMethod::Double),
-        Method::FrontMixed => Some(FrontMethod::Mixed),
-        Method::Pcg => Some(FrontMethod::Pcg),
-        _ => None,
-    }
 }
 
 /// Nodes that elements use, and elements; indices out of range are refused elsewhere.

@@ -15,7 +15,7 @@ use softgrasp_protocol::{
     Answer, ElementChoice, ElementName, Material, MeshData, Question, SolveReport,
 };
 
-use crate::admission::{Asking, Room, counted, front_method};
+use crate::admission::{Asking, Room, counted};
 use crate::answer::{Desk, name_of};
 use crate::approach::is_auto;
 use crate::clock::StageClock;
@@ -54,7 +54,7 @@ impl Plan {
         let size = self.asking.problem.size;
         let counted = Work::estimate(size, self.element()).counted(analysed.analysis());
         let mut offers = offers_after_order(&wish, self.element(), &counted, &self.rates);
-        offers.retain(|offer| front_method(offer.method).is_none_or(&fits));
+        offers.retain(|offer| FrontMethod::of(offer.method).is_none_or(&fits));
         let mut choice = choose(&wish, &offers).unwrap_or(self.choice);
         choice.offer.predicted_ms += elapsed_ms;
         Choice { locks: self.choice.locks, ..choice }
@@ -133,7 +133,7 @@ impl Desk {
             factor_reused: false,
             chosen_because: String::new(),
         };
-        let (factored, solution, choice) = match front_method(plan.choice.offer.method) {
+        let (factored, solution, choice) = match FrontMethod::of(plan.choice.offer.method) {
             Some(_) => self.planned_front(plan, room, &model, &asked, &mut clock)?,
             None => {
                 let method = plan.choice.offer.method;
@@ -241,7 +241,7 @@ impl Desk {
         let need = |front| counted(model, model.bytes() as u64, &analysed, front);
         let fits = |front| need(front).bytes() <= room.free();
         let choice = plan.again(&analysed, clock.elapsed_ms(), asked.question.deadline_ms, fits);
-        let front = front_method(choice.offer.method).unwrap_or(FrontMethod::Double);
+        let front = FrontMethod::of(choice.offer.method).unwrap_or(FrontMethod::Double);
         self.admit(room, &[need(front)], &asking)?;
         let double_need = need(FrontMethod::Double);
         let double = analysed.clone();

@@ -220,13 +220,7 @@ impl ServerConnection {
     /// # Errors
     /// [`LinkError`]; after anything but `Rejected` and `Encode` the connection is to be given up.
     pub fn ask(&mut self, request: &Request) -> Result<Reply, LinkError> {
-        let request_id = self.send(request)?;
-        loop {
-            let frame = self.connection.read_frame()?;
-            if let Some(reply) = reply_in(frame, request_id)? {
-                return Ok(reply);
-            }
-        }
+        self.ask_by(request, |this| this.connection.read_frame())
     }
 
     /// The same for what is answered within a tick: looks for the reply without sleeping for a
@@ -235,12 +229,25 @@ impl ServerConnection {
     /// # Errors
     /// As [`Self::ask`].
     pub fn ask_awake(&mut self, request: &Request) -> Result<Reply, LinkError> {
+        self.ask_by(request, Self::read_frame_awake)
+    }
+
+    fn ask_by(
+        &mut self,
+        request: &Request,
+        read_frame: impl Fn(&mut Self) -> Result<Option<Frame>, ConnectionError>,
+    ) -> Result<Reply, LinkError> {
         let request_id = self.send(request)?;
         loop {
-            let frame = self.read_frame_awake()?;
-            if let Some(reply) = reply_in(frame, request_id)? {
-                return Ok(reply);
+            let frame = read_frame(self)?.ok_or(LinkError::Closed)?;
+            // Id 0 is the server speaking on its own: turned away, stopping, bad stream.
+            if frame.request_id() != request_id && frame.request_id() != 0 {
+                continue;
             }
+            return match Reply::decode(&frame, &Limits::default())? {
+                Reply::Rejected(rejected) => Err(LinkError::Rejected(rejected)),
+                reply => Ok(reply),
+            };
         }
     }
 
@@ -272,19 +279,6 @@ impl ServerConnection {
         request.encode_into(self.request_id, &self.limits, &mut self.out)?;
         self.connection.write_bytes(&self.out)?;
         Ok(self.request_id)
-    }
-}
-
-/// The reply in a frame; `None` for one to an abandoned request.
-fn reply_in(frame: Option<Frame>, request_id: u64) -> Result<Option<Reply>, LinkError> {
-    let frame = frame.ok_or(LinkError::Closed)?;
-    // Id 0 is the server speaking on its own: turned away, stopping, bad stream.
-    if frame.request_id() != request_id && frame.request_id() != 0 {
-        return Ok(None);
-    }
-    match Reply::decode(&frame, &Limits::default())? {
-        Reply::Rejected(rejected) => Err(LinkError::Rejected(rejected)),
-        reply => Ok(Some(reply)),
     }
 }
 

@@ -43,7 +43,12 @@ pub fn on_end_signal(
             react(EndSignal { name: signal.as_str(), exit_code });
         }
     };
-    std::thread::Builder::new().name("signals".to_owned()).spawn(wait).map(drop)
+    let waits = std::thread::Builder::new().name("signals".to_owned()).spawn(wait);
+    if waits.is_err() {
+        // Nobody waits: they are to end the program as they always did.
+        awaited.thread_unblock()?;
+    }
+    waits.map(drop)
 }
 
 /// See above; only Ctrl-C and what the system counts as its like.

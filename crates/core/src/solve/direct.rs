@@ -230,11 +230,7 @@ impl Factored {
                 Kernel::Sparse(Box::new(analysis.factor().map_err(not_positive)?))
             }
             Method::Front | Method::FrontMixed | Method::Pcg => {
-                let front = match method {
-                    Method::Front => FrontMethod::Double,
-                    Method::FrontMixed => FrontMethod::Mixed,
-                    _ => FrontMethod::Pcg,
-                };
+                let front = FrontMethod::of(method).unwrap_or(FrontMethod::Double);
                 let analysed = Analysed::new(stiffness, partition, on_stage);
                 check(analysed.peak_bytes(front))?;
                 return analysed.factor(stiffness, front, on_stage);

@@ -90,8 +90,8 @@ struct Cut {
 impl Cut {
     /// `None` where a matrix is small enough to be eliminated pivot by pivot.
     ///
-    /// A wide panel reads the matrix seldom, a narrow one leaves little to the one thread that
-    /// inverts `A_II`.
+    /// A wide panel reads the matrix seldom; the inverse of a narrow one is there before the
+    /// elimination beside it ends.
     const fn of(n: usize) -> Option<Self> {
         match n {
             0..=24 => None,

@@ -28,6 +28,18 @@ impl From<FrontMethod> for Method {
     }
 }
 
+impl FrontMethod {
+    /// The same method under its general name, the other way round; `None` for one without fronts.
+    pub fn of(method: Method) -> Option<Self> {
+        match method {
+            Method::Front => Some(Self::Double),
+            Method::FrontMixed => Some(Self::Mixed),
+            Method::Pcg => Some(Self::Pcg),
+            _ => None,
+        }
+    }
+}
+
 /// `K11` of one partition, ordered and analysed but not factored yet: what a factor will cost is
 /// known, so a precision can be chosen by it.
 ///
