@@ -137,7 +137,7 @@ impl Factored {
     /// `stiffness` must be the one this was factored from; `backward_error` that of the answer
     /// ([`super::Solution`]).
     pub fn certainty(&self, stiffness: &Stiffness, backward_error: f64) -> Certainty {
-        let condition = *self.condition.get_or_init(|| {
+        let condition = self.condition.get_or(|| {
             let weights = row_sums(stiffness, self.partition());
             inverse_norm(&weights, &|b, columns| {
                 self.apply_inverse_for_certain(stiffness, b, columns)

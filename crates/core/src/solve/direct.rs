@@ -1,7 +1,5 @@
 //! One interface to all direct methods: factor a partition once, then answer known displacements.
 
-use std::sync::OnceLock;
-
 use super::certainty::backward_error;
 use super::front::FrontFactor;
 use super::k11::{SparseK11, right_hand_side, visit_k11};
@@ -10,6 +8,7 @@ use super::pcg::{self, PcgParams, norm};
 use super::pivot::NotPositive;
 use super::sparse::{Analysis, SparseFactor};
 use super::tiles::Tiles;
+use super::worked_out::WorkedOut;
 use super::{Method, Partition, Stage, gauss_jordan, gauss_jordan_plain, ordering};
 use crate::fem::Stiffness;
 
@@ -27,7 +26,7 @@ pub struct Factored {
     partition: Partition,
     kernel: Kernel,
     /// Skeel's condition number, once somebody has asked for it.
-    pub(super) condition: OnceLock<f64>,
+    pub(super) condition: WorkedOut<f64>,
 }
 
 enum Kernel {
@@ -236,7 +235,7 @@ impl Factored {
                 return analysed.factor(stiffness, front, on_stage);
             }
         };
-        Ok(Self { method, partition, kernel, condition: OnceLock::new() })
+        Ok(Self { method, partition, kernel, condition: WorkedOut::default() })
     }
 
     /// The method used.

@@ -20,6 +20,7 @@ mod sparse;
 mod stage;
 mod tiles;
 pub mod work;
+mod worked_out;
 mod zero_energy;
 
 pub use certainty::{Certainty, ERROR_REFUSED, ERROR_SERIOUS, ERROR_UNREMARKABLE};

@@ -1,12 +1,13 @@
 //! What is worked out once per shape: the held base, its factor, the motions without energy.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use crate::fem::Stiffness;
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
 use crate::solve::partition::AXIS_NAMES;
 use crate::solve::pcg::norm;
+use crate::solve::worked_out::WorkedOut;
 use crate::solve::zero_energy::{BodyMotions, RigidBodies, dofs_by_body};
 use crate::solve::{Partition, PartitionError, Stage};
 
@@ -26,9 +27,9 @@ pub struct Base {
     /// Bound of the largest eigenvalue of `K`, N/m.
     pub(super) stiffest: f64,
     /// Skeel's condition number of `K_B`, once somebody has asked for it.
-    pub(super) condition: OnceLock<f64>,
+    pub(super) condition: WorkedOut<f64>,
     /// Lower bound of the smallest eigenvalue of `K_B`, once somebody has proven one.
-    pub(super) eigenvalue_min: OnceLock<Option<f64>>,
+    pub(super) eigenvalue_min: WorkedOut<Option<f64>>,
 }
 
 /// A motion that costs no energy and leaves the fixed degrees of freedom in place.
@@ -185,8 +186,8 @@ impl Base {
             held,
             modes,
             stiffest: stiffness.row_sum_max(),
-            condition: OnceLock::new(),
-            eigenvalue_min: OnceLock::new(),
+            condition: WorkedOut::default(),
+            eigenvalue_min: WorkedOut::default(),
         })
     }
 

@@ -84,7 +84,7 @@ impl Base {
     ///
     /// Returns N/m, or `None` where double precision cannot prove one.
     pub fn prove_eigenvalue_min(&self) -> Option<f64> {
-        *self.eigenvalue_min.get_or_init(|| {
+        self.eigenvalue_min.get_or(|| {
             let estimate = self.estimate_eigenvalue_min()?;
             let shift = SHIFT_SHARE * estimate;
             let shifted = self.stiffness.shifted(-shift);
@@ -100,7 +100,7 @@ impl Base {
 
     /// Bound proven earlier, without proving one now.
     pub fn eigenvalue_min(&self) -> Option<f64> {
-        self.eigenvalue_min.get().copied().flatten()
+        self.eigenvalue_min.get().flatten()
     }
 
     /// Rayleigh quotient after some steps of inverse iteration: an estimate from above.

@@ -23,7 +23,7 @@ pub struct Certificate {
 impl Base {
     /// Estimates Skeel's condition number of the held shape, once, by a few solves.
     pub fn estimate_condition(&self) -> f64 {
-        *self.condition.get_or_init(|| {
+        self.condition.get_or(|| {
             let weights = row_sums(&self.stiffness, &self.partition);
             inverse_norm(&weights, &|mut b, columns| {
                 self.factor.solve_in_place(&mut b, columns);

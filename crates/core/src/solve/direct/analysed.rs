@@ -1,10 +1,11 @@
 //! Between order and factor: what a factor over the tree of fronts will cost is known.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use super::{Factored, Kernel, SolveError, not_positive};
 use crate::fem::Stiffness;
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
+use crate::solve::worked_out::WorkedOut;
 use crate::solve::{Method, Partition, Stage};
 
 /// The methods that factor over the tree of fronts.
@@ -103,6 +104,6 @@ impl Analysed {
                 Kernel::FrontSingle(FrontFactor::try_new(&analysis, stiffness).map_err(failed)?)
             }
         };
-        Ok(Factored { method, partition, kernel, condition: OnceLock::new() })
+        Ok(Factored { method, partition, kernel, condition: WorkedOut::default() })
     }
 }
