@@ -68,7 +68,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
         let fits = |m: &Method| {
             m.dense_bytes(scene.unknown_dofs()).is_none_or(|bytes| bytes <= DENSE_BYTES_MAX)
         };
-        let direct = Method::ALL.into_iter().filter(fits).map(Method::name);
+        let direct = Method::DIRECT.into_iter().filter(fits).map(Method::name);
         for method in direct.chain(["condensed"]) {
             progress("frame", &format!("{method}, {nodes} nodes"));
             let case = Asker::new(&host, &scene, &reference, method)?.case(options.is_quick)?;

@@ -57,7 +57,7 @@ fn run_all(scene: &Pressed, threads: usize, is_quick: bool) -> Result<Vec<Vec<Ru
     let (model, known) = scene.model()?;
     let reference = Reference::of(&model, &known)?;
     let mut competitors: Vec<Competitor<'_, Run, ReportError>> = Vec::new();
-    for method in Method::ALL {
+    for method in Method::DIRECT {
         let (pool, reference) = (&pool, &reference);
         competitors.push(Box::new(move || {
             let (times, solution) = pool.install(|| scene.analyse(method))?;
@@ -91,7 +91,7 @@ fn effort(is_quick: bool) -> Effort {
 }
 
 fn add_rows(table: &mut Table, scene: &Pressed, runs: &[Vec<Run>]) {
-    for (method, runs) in Method::ALL.iter().zip(runs) {
+    for (method, runs) in Method::DIRECT.iter().zip(runs) {
         let stage = |of: fn(&StageTimes) -> f64| Spread::of(runs.iter().map(|r| of(&r.times)));
         let worst = |of: fn(&Run) -> f64| Spread::of(runs.iter().map(of)).max;
         let total = stage(|t| t.total);
@@ -117,7 +117,7 @@ fn add_rows(table: &mut Table, scene: &Pressed, runs: &[Vec<Run>]) {
 /// A line for each method that has a bar against the plain Gauss–Jordan loop.
 fn verdict(scene: &Pressed, runs: &[Vec<Run>]) -> String {
     let total = |method: Method| -> Vec<f64> {
-        let of = Method::ALL.iter().zip(runs).filter(|(m, _)| **m == method);
+        let of = Method::DIRECT.iter().zip(runs).filter(|(m, _)| **m == method);
         of.flat_map(|(_, runs)| runs.iter().map(|r| r.times.total)).collect()
     };
     let nodes = scene.mesh.node_count();

@@ -57,7 +57,7 @@ impl Way {
             let tolerances: &[f64] = if method == Method::Pcg { &TOLERANCES } else { &[0.0] };
             tolerances.iter().map(move |&residual_rel| Self::Direct { method, residual_rel })
         };
-        let all = Method::ALL.into_iter().filter(fits).flat_map(direct);
+        let all = Method::DIRECT.into_iter().filter(fits).flat_map(direct);
         all.chain((element != Element::Tet10).then_some(Self::Condensed)).collect()
     }
 

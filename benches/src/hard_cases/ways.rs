@@ -40,7 +40,7 @@ const PROVEN_NODES_MAX: usize = 20_000;
 impl Way {
     /// Ways that a case of this reach is asked.
     pub fn of(reach: Reach) -> Vec<Self> {
-        let direct = |element: Element| Method::ALL.map(|m| Self::Direct(element, m));
+        let direct = |element: Element| Method::DIRECT.map(|m| Self::Direct(element, m));
         let linear = [Element::Tet4, Element::Tet4Anp];
         let all = Element::ALL.into_iter().flat_map(direct).chain(linear.map(Self::Condensed));
         let is_of_each_kind = |way: &Self| match way {

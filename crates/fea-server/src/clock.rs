@@ -1,7 +1,7 @@
-//! Stage times of one request, and the memory this process has used at most.
+//! Stage times of one request.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Instant;
 
 use softgrasp_core::solve::Stage;
@@ -88,22 +88,4 @@ impl StageClock {
 /// Milliseconds since an instant.
 pub(crate) fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
-}
-
-/// Largest resident set as last read; reading it takes as long as a small frame.
-static PEAK_RSS: AtomicU64 = AtomicU64::new(0);
-
-/// Largest resident set of this process so far, bytes; 0 where the system does not tell.
-pub(crate) fn peak_rss_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    let kib = kib.and_then(|rest| rest.split_whitespace().next()?.parse::<u64>().ok());
-    let bytes = kib.unwrap_or(0) * 1024;
-    PEAK_RSS.store(bytes, Ordering::Relaxed);
-    bytes
-}
-
-/// The same as last read: good enough for a frame that allocates next to nothing.
-pub(crate) fn last_peak_rss_bytes() -> u64 {
-    PEAK_RSS.load(Ordering::Relaxed)
 }

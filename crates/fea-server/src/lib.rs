@@ -1,30 +1,30 @@
 //! Finite element server of Softgrasp, as a library so that the client can embed it.
 //!
-//! The way of a request: [`session`] reads a frame from its socket and decodes it, [`compute`]
-//! takes it from tokio to the rayon pool through a bounded queue, [`answer`] finds the model (in the
-//! [`store`] or in the request) and the [`approach`], [`condensed`] or [`direct`] solves, and the
-//! session writes the reply.
+//! The way of a request: [`session`] reads a message from its socket and decodes it, [`workers`] take
+//! it from tokio to the rayon pool through a bounded queue, [`request`] checks what it names, [`plan`]
+//! decides by which method it is answered and reserves the memory, [`answer`] finds the model (in the
+//! [`store`] or in the request) and solves, and the session writes the reply. [`resources`] are what
+//! all requests share.
 
-mod admission;
 mod answer;
-mod approach;
-mod caution;
+mod budget;
 mod clock;
-mod compute;
-mod condensed;
 mod config;
-mod direct;
-mod memory;
-mod planned;
-mod question;
-mod rates;
-mod reject;
+mod held_models;
+mod lock;
+mod machine_memory;
+mod plan;
+mod refusal;
+mod request;
+mod resources;
 mod server;
 mod session;
 mod store;
+mod uploads;
+mod workers;
 
 pub use clock::StageWatch;
 pub use config::{ConfigError, ServerConfig};
-pub use memory::available_bytes;
-pub use rates::measure_rates;
+pub use machine_memory::available_bytes;
+pub use plan::measure_rates;
 pub use server::{RunningServer, StartError, serve, sockets_runtime, start};

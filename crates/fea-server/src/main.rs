@@ -1,9 +1,10 @@
 //! The `fea-server` program: arguments, log, signals.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
@@ -52,6 +53,8 @@ enum LogForm {
     Json,
 }
 
+/// The server has ended so long after it was asked to, whatever its threads are at.
+const END_MAX: Duration = Duration::from_millis(2700);
 /// Exit code for options that make no sense, as clap's own.
 const WRONG_USAGE: u8 = 2;
 
@@ -73,7 +76,11 @@ fn main() -> ExitCode {
 fn start_log(form: LogForm) {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // Colour is for a person at a terminal; a file or another program gets plain text.
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr);
     match form {
         LogForm::Text => log.init(),
         LogForm::Json => log.json().init(),
@@ -87,11 +94,15 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
     softgrasp_os::on_end_signal(false, move |signal| {
         tracing::info!(signal = signal.name, "asked to end");
         let _ = stop.send(true);
+        softgrasp_os::end_within(END_MAX);
     })
     .context("cannot wait for the signals that end the server")?;
     let runtime =
         fea_server::sockets_runtime(&config).context("cannot start the server's sockets")?;
-    runtime.block_on(fea_server::serve(config, announce, stopped))?;
+    let served = runtime.block_on(fea_server::serve(config, announce, stopped));
+    // Whatever the threads are at, a stop does not wait for them.
+    runtime.shutdown_background();
+    served?;
     tracing::info!("stopped");
     Ok(())
 }

@@ -10,10 +10,11 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, oneshot, watch};
 use tokio::task::JoinSet;
 
-use crate::answer::Desk;
-use crate::compute::Compute;
 use crate::config::{ConfigError, ServerConfig};
-use crate::session::{self, Hall};
+use crate::resources::Resources;
+use crate::session::{self, ServerHandle};
+use crate::uploads::Uploads;
+use crate::workers::Workers;
 
 /// Why a server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +46,7 @@ pub enum StartError {
 }
 
 /// Sessions that are still at work this long after a stop are cut off.
-const STOP_GRACE: Duration = Duration::from_secs(5);
+const STOP_GRACE: Duration = Duration::from_secs(2);
 /// Pause after a failed accept, so that a process out of file descriptors does not spin.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
@@ -63,21 +64,26 @@ pub async fn serve(
     let listen_error = |source| StartError::Listen { address, source };
     let listener = TcpListener::bind(address).await.map_err(listen_error)?;
     let threads = config.threads;
-    let compute =
-        Compute::new(threads).map_err(|source| StartError::Threads { threads, source })?;
+    let workers =
+        Workers::new(threads).map_err(|source| StartError::Threads { threads, source })?;
     on_ready(listener.local_addr().map_err(listen_error)?);
     let places = Arc::new(Semaphore::new(config.max_sessions));
     let measure_at_start = config.measure_at_start;
-    let desk = Arc::new(Desk::new(config, compute.clone()));
-    let hall = Hall { desk, compute, places: Arc::clone(&places), stop: stop.clone() };
+    let resources = Arc::new(Resources::new(config, workers));
     if measure_at_start {
-        let desk = Arc::clone(&hall.desk);
-        hall.compute.in_background(move || {
-            desk.rates.get();
+        let later = Arc::clone(&resources);
+        resources.workers.in_background(move || {
+            later.rates.get();
         });
     }
+    let server = ServerHandle {
+        resources,
+        uploads: Uploads::default(),
+        places: Arc::clone(&places),
+        stop: stop.clone(),
+    };
     let mut sessions = JoinSet::new();
-    accept_until_stopped(&listener, &hall, &places, stop, &mut sessions).await;
+    accept_until_stopped(&listener, &server, &places, stop, &mut sessions).await;
     drop(listener);
     tracing::info!(sessions = sessions.len(), "stopping");
     let all_done = async { while sessions.join_next().await.is_some() {} };
@@ -90,7 +96,7 @@ pub async fn serve(
 
 async fn accept_until_stopped(
     listener: &TcpListener,
-    hall: &Hall,
+    server: &ServerHandle,
     places: &Arc<Semaphore>,
     mut stop: watch::Receiver<bool>,
     sessions: &mut JoinSet<()>,
@@ -104,9 +110,9 @@ async fn accept_until_stopped(
         match accepted {
             Ok((stream, peer)) => match Arc::clone(places).try_acquire_owned() {
                 Ok(place) => {
-                    let hall = hall.clone();
+                    let server = server.clone();
                     sessions.spawn(async move {
-                        session::serve(stream, peer, hall).await;
+                        session::serve(stream, peer, server).await;
                         drop(place);
                     });
                 }
@@ -180,6 +186,8 @@ pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
                 }
             };
             let served = runtime.block_on(serve(config, |address| say(Ok(address)), stopped));
+            // Whatever the threads are at, a stop does not wait for them.
+            runtime.shutdown_background();
             if let Err(error) = served {
                 say(Err(error));
             }

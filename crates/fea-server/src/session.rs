@@ -6,32 +6,36 @@ use std::time::{Duration, Instant};
 
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{
-    ConnectionError, Frame, FrameError, Hello, Kind, Limits, RejectCode, Rejected, Reply, Request,
-    Welcome,
+    ConnectionError, Frame, FrameError, Hello, Kind, Limits, ModelHash, RejectCode, Rejected,
+    Reply, Request, Welcome,
 };
 use tokio::net::TcpStream;
 use tokio::sync::{Semaphore, watch};
 use tokio::time::timeout;
 
-use crate::answer::Desk;
+use crate::answer::{Readiness, answer_frame, prefetch, prove, readiness, solve_once, upload};
 use crate::clock::{StageClock, ms_since};
-use crate::compute::Compute;
-use crate::reject::Refusal;
+use crate::held_models::HeldModels;
+use crate::refusal::Refusal;
+use crate::resources::Resources;
+use crate::uploads::Uploads;
+use crate::workers::Workers;
 
 /// What a session needs of its server.
 #[derive(Clone)]
-pub(crate) struct Hall {
-    pub desk: Arc<Desk>,
-    pub compute: Compute,
+pub(crate) struct ServerHandle {
+    pub resources: Arc<Resources>,
+    pub uploads: Uploads,
     /// Places for sessions that are still free.
     pub places: Arc<Semaphore>,
     pub stop: watch::Receiver<bool>,
 }
 
-impl Hall {
+impl ServerHandle {
     /// Whether so few sessions are there that one may use the sockets' thread for a moment.
     fn is_quiet(&self) -> bool {
-        self.desk.config.max_sessions.saturating_sub(self.places.available_permits()) <= QUIET_MAX
+        let max = self.resources.config.max_sessions;
+        max.saturating_sub(self.places.available_permits()) <= QUIET_MAX
     }
 }
 
@@ -43,20 +47,21 @@ const WRITE_MAX: Duration = Duration::from_secs(60);
 
 /// Serves one connection until the client goes, sends bytes that are no frames, or the server
 /// stops.
-pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut hall: Hall) {
+pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut server: ServerHandle) {
     if let Err(error) = stream.set_nodelay(true) {
         tracing::warn!(%peer, %error, "TCP_NODELAY could not be set");
     }
-    let limits = hall.desk.config.limits();
+    let limits = server.resources.config.limits();
     let mut session = Session {
         connection: Connection::new(stream, limits),
         limits,
-        stall_limit: hall.desk.config.stall_limit,
-        authorised: hall.desk.config.token.is_none(),
+        stall_limit: server.resources.config.stall_limit,
+        authorised: server.resources.config.token.is_none(),
+        held: HeldModels::new(Arc::clone(&server.resources)),
         out: Vec::new(),
     };
     tracing::info!(%peer, "session begins");
-    match session.run(&mut hall).await {
+    match session.run(&mut server).await {
         Ok(()) => tracing::info!(%peer, "session ends"),
         Err(error) => tracing::warn!(%peer, %error, "session is given up"),
     }
@@ -72,6 +77,7 @@ struct Session {
     limits: Limits,
     stall_limit: Duration,
     authorised: bool,
+    held: HeldModels,
     /// Encoded reply, kept so that its memory is reused.
     out: Vec<u8>,
 }
@@ -88,9 +94,9 @@ enum SessionError {
 }
 
 impl Session {
-    async fn run(&mut self, hall: &mut Hall) -> Result<(), SessionError> {
+    async fn run(&mut self, server: &mut ServerHandle) -> Result<(), SessionError> {
         loop {
-            let mut stop = hall.stop.clone();
+            let mut stop = server.stop.clone();
             let frame = tokio::select! {
                 frame = self.next_frame() => frame,
                 () = stopped(&mut stop) => {
@@ -100,7 +106,7 @@ impl Session {
                 }
             };
             match frame {
-                Ok(Some(frame)) => self.handle(frame, hall).await?,
+                Ok(Some(frame)) => self.handle(frame, server).await?,
                 Ok(None) => return Ok(()),
                 Err(SessionError::Connection(ConnectionError::Frame(error))) => {
                     self.answer_bad_stream(&error).await;
@@ -163,10 +169,10 @@ impl Session {
     }
 
     /// One request: decoded, worked on, answered. A bad request is answered and the session lives.
-    async fn handle(&mut self, frame: Frame, hall: &Hall) -> Result<(), SessionError> {
+    async fn handle(&mut self, frame: Frame, server: &ServerHandle) -> Result<(), SessionError> {
         let request_id = frame.request_id();
         let has_reply = !matches!(frame.kind(), Some(Kind::Prefetch | Kind::Drop));
-        match self.reply_to(frame, hall).await {
+        match self.reply_to(frame, server).await {
             Ok(Some(reply)) => self.write(request_id, &reply).await,
             Ok(None) => Ok(()),
             Err(refusal) => {
@@ -179,7 +185,11 @@ impl Session {
         }
     }
 
-    async fn reply_to(&mut self, frame: Frame, hall: &Hall) -> Result<Option<Reply>, Refusal> {
+    async fn reply_to(
+        &mut self,
+        frame: Frame,
+        server: &ServerHandle,
+    ) -> Result<Option<Reply>, Refusal> {
         let start = Instant::now();
         let request = Request::decode(&frame, &self.limits)?;
         drop(frame);
@@ -187,46 +197,61 @@ impl Session {
         if !self.authorised && !matches!(request, Request::Hello(_)) {
             return Err(Refusal::Token);
         }
-        let desk = Arc::clone(&hall.desk);
+        let resources = Arc::clone(&server.resources);
         let queued = Instant::now();
-        let watch = hall.desk.config.stage.clone();
+        let watch = resources.config.stage.clone();
         let clock = move || StageClock::new(decode_ms, queued, watch);
-        let run = &hall.compute;
+        let workers = &server.resources.workers;
         Ok(Some(match request {
-            Request::Hello(hello) => self.welcome(&hello, hall)?,
+            Request::Hello(hello) => self.welcome(&hello, server)?,
             Request::Ping { nonce } => Reply::Pong { nonce },
-            Request::HaveModel(hash) => {
-                Reply::ModelState { known: hall.desk.store.find(hash).is_some() }
-            }
+            Request::HaveModel(hash) => Reply::ModelState { known: self.held.hold(hash) },
             Request::Drop(hash) => {
-                hall.desk.store.forget(hash);
+                self.held.drop_model(hash);
                 return Ok(None);
             }
             Request::Prefetch(hint) => {
-                run.in_background(move || desk.prefetch(hint));
+                workers.in_background(move || prefetch(&resources, &hint));
                 return Ok(None);
             }
             Request::SolveOnce(once) => {
-                Reply::Answer(Box::new(run.run(move || desk.solve_once(*once, clock())).await?))
+                let work = move || solve_once(&resources, *once, clock());
+                Reply::Answer(Box::new(workers.run(work).await??))
             }
-            Request::UploadModel(upload) => {
-                let later = Arc::clone(&desk);
-                let ready = run.run(move || desk.upload(upload, clock())).await?;
-                let model = ready.model;
-                run.in_background(move || later.prove(model));
+            Request::UploadModel(model) => {
+                let hashed = workers.run(move || (ModelHash::of(&model), model)).await?;
+                let (hash, model) = hashed;
+                let turn = server.uploads.turn(hash).await;
+                let later = Arc::clone(&resources);
+                let work = move || upload(&resources, hash, model, clock());
+                let ready = workers.run(work).await??;
+                drop(turn);
+                self.held.hold(hash);
+                workers.in_background(move || prove(&later, hash));
                 Reply::ModelReady(ready)
             }
-            Request::Frame(frame) if hall.is_quiet() && desk.is_quick(&frame) => {
-                Reply::Answer(Box::new(Compute::run_here(|| desk.frame(frame, clock()))?))
-            }
-            Request::Frame(frame) => {
-                Reply::Answer(Box::new(run.run(move || desk.frame(frame, clock())).await?))
+            Request::Frame(request) => {
+                self.held.hold(request.model);
+                let answer = match server.is_quiet() {
+                    true => match readiness(&resources, request) {
+                        Readiness::Ready(kept) => {
+                            Workers::run_here(|| kept.answer(&resources, clock()))?
+                        }
+                        Readiness::NotReady(request) => {
+                            workers.run(move || answer_frame(&resources, request, clock())).await?
+                        }
+                    },
+                    false => {
+                        workers.run(move || answer_frame(&resources, request, clock())).await?
+                    }
+                };
+                Reply::Answer(Box::new(answer?))
             }
         }))
     }
 
-    fn welcome(&mut self, hello: &Hello, hall: &Hall) -> Result<Reply, Refusal> {
-        if let Some(token) = &hall.desk.config.token {
+    fn welcome(&mut self, hello: &Hello, server: &ServerHandle) -> Result<Reply, Refusal> {
+        if let Some(token) = &server.resources.config.token {
             if !same_secret(token, hello.token.as_deref().unwrap_or("")) {
                 return Err(Refusal::Token);
             }
@@ -236,7 +261,7 @@ impl Session {
         Ok(Reply::Welcome(Welcome {
             server: "fea-server".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            threads: hall.compute.threads() as u32,
+            threads: server.resources.workers.threads() as u32,
             limits: self.limits,
         }))
     }

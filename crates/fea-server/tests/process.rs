@@ -16,7 +16,7 @@ use softgrasp_core::fem::Material as CoreMaterial;
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_core::model::{Element, Model};
 use softgrasp_core::solve::Method;
-use softgrasp_core::solve::memory::{Need, Way};
+use softgrasp_core::solve::memory::Need;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
     Answer, DofValue, ElementChoice, Hello, Kind, Limits, Material, MeshData, MethodName, Question,
@@ -146,8 +146,7 @@ fn counted(request: &SolveOnce, method: Method) -> Need {
     dofs.sort_unstable();
     let analysed = model.analyse(&dofs, &mut |_| {}).unwrap();
     let blocks = model.stiffness().pattern().block_count();
-    let way = Way::Direct(method);
-    Need::counted(Element::Tet4, way, model.bytes() as u64, blocks, analysed.analysis())
+    Need::counted(Element::Tet4, method, model.bytes() as u64, blocks, analysed.analysis())
 }
 
 /// A cube whose lowest layer is held and one of whose upper corners is pulled.

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::Method;
-use softgrasp_core::solve::memory::{Bytes, Need, Problem, Way, nodes_that_fit};
+use softgrasp_core::solve::memory::{Bytes, Need, Problem, nodes_that_fit};
 use softgrasp_core::solve::rates::Rates;
 use softgrasp_core::solve::work::Work;
 
@@ -68,13 +68,13 @@ pub enum Fit {
 }
 
 /// What may answer, best first within an element; condensed knows linear ones only.
-const WAYS: [(Element, Way); 6] = [
-    (Element::Tet4, Way::Direct(Method::Front)),
-    (Element::Tet4, Way::Direct(Method::FrontMixed)),
-    (Element::Tet4, Way::Condensed),
-    (Element::Tet4Anp, Way::Direct(Method::Front)),
-    (Element::Tet10, Way::Direct(Method::Front)),
-    (Element::Tet10, Way::Direct(Method::FrontMixed)),
+const WAYS: [(Element, Method); 6] = [
+    (Element::Tet4, Method::Front),
+    (Element::Tet4, Method::FrontMixed),
+    (Element::Tet4, Method::Condensed),
+    (Element::Tet4Anp, Method::Front),
+    (Element::Tet10, Method::Front),
+    (Element::Tet10, Method::FrontMixed),
 ];
 /// Error that a refined answer is predicted for.
 const ERROR_REL: f64 = 1e-12;
@@ -97,16 +97,14 @@ impl Forecast {
     pub fn new(problem: Problem, memory_limit_bytes: Option<u64>, machine: &OwnMachine) -> Self {
         let limit = memory_limit_bytes.unwrap_or(machine.usual_limit_bytes);
         let rates = machine.rates.unwrap_or(Rates::ASSUMED);
-        let ways = WAYS.iter().map(|&(element, way)| {
-            let need = Need::predicted(problem, element, way);
+        let ways = WAYS.iter().map(|&(element, method)| {
+            let need = Need::predicted(problem, element, method);
             let work = Work::estimate(problem.size, element);
-            // The base of condensed is a factor as that of front.
-            let method = way.method().unwrap_or(Method::Front);
             let predicted_ms = rates.preparation_ms(&work, method)
                 + rates.factor_and_solve_ms(&work, method, ERROR_REL);
             WayForecast {
                 element: element.name(),
-                method: way.name(),
+                method: method.name(),
                 model_bytes: need.model_bytes,
                 factor_bytes: need.factor_bytes,
                 bytes: need.bytes(),
@@ -146,7 +144,7 @@ impl Forecast {
         let nodes = nodes_that_fit(
             self.problem,
             least.need.element,
-            least.need.way,
+            least.need.method,
             self.memory_limit_bytes,
         );
         Some(format!(

@@ -8,6 +8,7 @@
 
 mod bad_requests;
 mod bad_streams;
+mod crowd;
 mod disturbed_links;
 mod engine;
 mod keep_shape;

@@ -4,7 +4,7 @@ use fea_server::ServerConfig;
 use glove_client::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_core::model::{Element, Model};
-use softgrasp_core::solve::memory::{Need, Way};
+use softgrasp_core::solve::memory::Need;
 use softgrasp_core::solve::{Analysed, Method};
 use softgrasp_protocol::RejectCode::MemoryLimit;
 use softgrasp_protocol::{
@@ -25,7 +25,7 @@ fn counted_for(mesh: &TetMesh, element: Element, dofs: Vec<u32>) -> [Need; 2] {
     let analysed: Analysed = model.analyse(&dofs, &mut |_| {}).unwrap();
     let blocks = model.stiffness().pattern().block_count();
     [Method::Front, Method::FrontMixed].map(|method| {
-        let (way, held) = (Way::Direct(method), model.bytes() as u64);
+        let (way, held) = (method, model.bytes() as u64);
         Need::counted(element, way, held, blocks, analysed.analysis())
     })
 }

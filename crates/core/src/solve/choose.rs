@@ -1,4 +1,4 @@
-//! Which element, method and precision a question gets, by what it wishes and what each would cost.
+//! From a question to a plan: which element, method and precision, by what each would cost.
 //!
 //! Pure: costs come in as numbers, nothing is measured or tried here.
 
@@ -10,73 +10,65 @@ use super::rates::{ERROR_EXACT, ERROR_REFINED, Rates};
 use super::work::{MeshSize, Work};
 use crate::fem::Element;
 
-/// What a question wishes for.
+/// What is asked, apart from the numbers: what is named, and what is left open.
 ///
 /// Units: `deadline_ms` ms from now; `max_error` relative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub struct Question {
     /// Method asked for; `None` leaves it open.
     pub method: Option<Method>,
-    /// Element.
-    pub element: ElementWish,
+    /// Element asked for. `None` leaves it open: ten nodes where linear elements lock and time and
+    /// memory allow, else averaged nodal pressure, else plain linear ones.
+    pub element: Option<Element>,
+    /// Largest Poisson's ratio of the materials.
+    pub poisson_max: f64,
     /// Time there is.
     pub deadline_ms: Option<f64>,
     /// Error of the equations' solution that is small enough; the mesh's own error is not in it.
     pub max_error: Option<f64>,
 }
 
-/// Element asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ElementWish {
-    /// This one.
-    Given(Element),
-    /// Ten nodes where linear elements lock and time and memory allow, else averaged nodal pressure,
-    /// else plain linear ones.
-    Auto {
-        /// Largest Poisson's ratio of the materials.
-        poisson_max: f64,
-        /// Bytes a factor may take while it is made.
-        memory_limit: u64,
-    },
-}
-
-/// One way to the answer.
+/// What will be done, why, what it is predicted to cost, and what had to be given up for it.
 ///
-/// Units: ms, bytes, relative error.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Offer {
+/// Units: relative error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
     /// Element.
     pub element: Element,
     /// Method.
     pub method: Method,
-    /// Time it is predicted to take.
-    pub predicted_ms: f64,
-    /// Memory it is predicted to take at most.
-    pub bytes: f64,
+    /// Method that is taken in its place where its factor needs more memory than there is.
+    pub instead: Option<Method>,
+    /// What it is predicted to cost; `None` where nothing had to be weighed.
+    pub cost: Option<Cost>,
     /// Error it leaves, as far as rounding and its stopping rule decide.
     pub error_rel: f64,
-}
-
-/// A wish that could not be met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GaveUp {
-    /// No way is predicted to be in time.
-    Deadline,
-    /// No way that is in time, or none at all, is as exact.
-    ErrorBudget,
-    /// Neither can be met.
-    Both,
-}
-
-/// The way that was chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Choice {
-    /// What is to be done.
-    pub offer: Offer,
-    /// What had to be given up.
+    /// What was asked for and cannot be kept.
     pub gave_up: Option<GaveUp>,
     /// Whether linear elements were taken though they lock, and why.
     pub locks: Option<Locks>,
+    /// Why this was taken, where neither deadline nor error budget decided.
+    pub why: String,
+}
+
+/// What a plan is predicted to cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// Time, ms.
+    pub ms: f64,
+    /// Memory at most, bytes.
+    pub bytes: f64,
+}
+
+/// What was asked for and cannot be kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaveUp {
+    /// No plan is predicted to be in time.
+    Deadline,
+    /// No plan that is in time, or none at all, is as exact.
+    ErrorBudget,
+    /// Neither can be met.
+    Both,
 }
 
 /// Why linear elements are used on a material on which they lock.
@@ -103,22 +95,18 @@ const ERROR_IN_A_HURRY: f64 = 1e-6;
 const COMPARED: [Method; 4] =
     [Method::Front, Method::FrontMixed, Method::Pcg, Method::DenseCholesky];
 
-impl Wish {
+impl Question {
     /// Methods that may answer.
     fn methods(&self) -> &[Method] {
         self.method.as_ref().map_or(&COMPARED, std::slice::from_ref)
     }
 
     /// Elements that may answer.
-    fn elements(&self) -> &'static [Element] {
-        match self.element {
-            ElementWish::Given(Element::Tet4) => &[Element::Tet4],
-            ElementWish::Given(Element::Tet4Anp) => &[Element::Tet4Anp],
-            ElementWish::Given(Element::Tet10) => &[Element::Tet10],
-            ElementWish::Auto { poisson_max, .. } if poisson_max < LOCKING_POISSON => {
-                &[Element::Tet4]
-            }
-            ElementWish::Auto { .. } => &Element::ALL,
+    fn elements(&self) -> &[Element] {
+        match &self.element {
+            Some(element) => std::slice::from_ref(element),
+            None if self.poisson_max < LOCKING_POISSON => &[Element::Tet4],
+            None => &Element::ALL,
         }
     }
 
@@ -131,7 +119,21 @@ impl Wish {
         }
     }
 
-    fn offer(&self, element: Element, method: Method, work: &Work, predicted_ms: f64) -> Offer {
+    /// A plan that nothing has to be weighed for.
+    pub fn plan(&self, element: Element, method: Method, why: impl Into<String>) -> Plan {
+        Plan {
+            element,
+            method,
+            instead: None,
+            cost: None,
+            error_rel: self.error_of(method),
+            gave_up: None,
+            locks: None,
+            why: why.into(),
+        }
+    }
+
+    fn candidate(&self, element: Element, method: Method, work: &Work, ms: f64) -> Plan {
         let bytes_per_entry = match method {
             Method::FrontMixed | Method::Pcg => size_of::<f32>(),
             _ => size_of::<f64>(),
@@ -140,100 +142,114 @@ impl Wish {
             Some(bytes) => bytes as f64,
             None => bytes_per_entry as f64 * work.peak_entries,
         };
-        Offer { element, method, predicted_ms, bytes, error_rel: self.error_of(method) }
+        Plan { cost: Some(Cost { ms, bytes }), ..self.plan(element, method, "") }
     }
 }
 
-/// All ways that a wish allows, before anything is assembled: times from the mesh's size.
-pub fn offers(wish: &Wish, size: MeshSize, rates: &Rates) -> Vec<Offer> {
-    let mut offers = Vec::new();
-    for &element in wish.elements() {
+impl Plan {
+    /// Predicted time, ms; without end where none was predicted.
+    fn ms(&self) -> f64 {
+        self.cost.map_or(f64::INFINITY, |cost| cost.ms)
+    }
+
+    /// Predicted memory, bytes.
+    fn bytes(&self) -> f64 {
+        self.cost.map_or(0.0, |cost| cost.bytes)
+    }
+}
+
+/// All plans that a question allows, before anything is assembled: times from the mesh's size.
+pub fn candidates(question: &Question, size: MeshSize, rates: &Rates) -> Vec<Plan> {
+    let mut plans = Vec::new();
+    for &element in question.elements() {
         let work = Work::estimate(size, element);
-        offers.extend(wish.methods().iter().map(|&method| {
-            let error_rel = wish.error_of(method);
+        plans.extend(question.methods().iter().map(|&method| {
+            let error_rel = question.error_of(method);
             let ms = rates.preparation_ms(&work, method)
                 + rates.factor_and_solve_ms(&work, method, error_rel);
-            wish.offer(element, method, &work, ms)
+            question.candidate(element, method, &work, ms)
         }));
     }
-    offers
+    plans
 }
 
-/// The ways that are left once `K11` has been ordered: the factor's work is counted, not estimated.
-pub fn offers_after_order(
-    wish: &Wish,
+/// The plans that are left once `K11` has been ordered: the factor's work is counted, not estimated.
+pub fn candidates_after_order(
+    question: &Question,
     element: Element,
     counted: &Work,
     rates: &Rates,
-) -> Vec<Offer> {
-    let methods = wish.methods().iter().filter(|method| method.is_sparse());
+) -> Vec<Plan> {
+    let methods = question.methods().iter().filter(|method| method.is_sparse());
     methods
         .map(|&method| {
-            let ms = rates.factor_and_solve_ms(counted, method, wish.error_of(method));
-            wish.offer(element, method, counted, ms)
+            let error_rel = question.error_of(method);
+            let ms = rates.factor_and_solve_ms(counted, method, error_rel);
+            question.candidate(element, method, counted, ms)
         })
         .collect()
 }
 
-/// Chooses among offers; `None` only if there are none.
+/// Chooses among plans; `None` only if there are none.
 ///
 /// With an error budget the fastest that is within it and in time, else the most exact in time.
 /// Where not all can be met, a deadline that can be kept goes before the budget, because a late
 /// answer is of no use; a deadline that nothing keeps is given up first, and then the fastest within
 /// the budget is taken. Of several elements the most exact is taken that meets all wishes within the
 /// memory allowed; what is late or inexact anyhow gets the cheapest that does not lock.
-pub fn choose(wish: &Wish, offers: &[Offer]) -> Option<Choice> {
-    let memory_limit = match wish.element {
-        ElementWish::Auto { memory_limit, .. } => memory_limit as f64,
-        ElementWish::Given(_) => f64::INFINITY,
+///
+/// Units: `memory_limit` bytes that a factor of elements that do not lock may take.
+pub fn choose(question: &Question, candidates: &[Plan], memory_limit: u64) -> Option<Plan> {
+    let mixed = candidates.iter().any(|p| p.element != candidates[0].element);
+    let fits = |p: &Plan| !mixed || p.element == Element::Tet4 || p.bytes() <= memory_limit as f64;
+    let in_time = |p: &Plan| {
+        question.deadline_ms.is_none_or(|deadline| PREDICTION_MARGIN * p.ms() <= deadline)
     };
-    let mixed = offers.iter().any(|o| o.element != offers[0].element);
-    let fits = |o: &Offer| !mixed || o.element == Element::Tet4 || o.bytes <= memory_limit;
-    let in_time = |o: &Offer| {
-        wish.deadline_ms.is_none_or(|deadline| PREDICTION_MARGIN * o.predicted_ms <= deadline)
-    };
-    let exact = |o: &Offer| wish.max_error.is_none_or(|max| o.error_rel <= max);
-    let faster = |a: &Offer, b: &Offer| a.predicted_ms.total_cmp(&b.predicted_ms);
+    let exact = |p: &Plan| question.max_error.is_none_or(|max| p.error_rel <= max);
+    let faster = |a: &Plan, b: &Plan| a.ms().total_cmp(&b.ms());
     let exacter =
-        |a: &Offer, b: &Offer| a.error_rel.total_cmp(&b.error_rel).then_with(|| faster(a, b));
-    let preferred = |a: &Offer, b: &Offer| match wish.max_error {
+        |a: &Plan, b: &Plan| a.error_rel.total_cmp(&b.error_rel).then_with(|| faster(a, b));
+    let preferred = |a: &Plan, b: &Plan| match question.max_error {
         Some(_) => faster(a, b),
         None => exacter(a, b),
     };
-    let best = |allowed: &dyn Fn(&Offer) -> bool, by: &dyn Fn(&Offer, &Offer) -> Ordering| {
-        offers.iter().filter(|o| fits(o) && allowed(o)).copied().min_by(|a, b| by(a, b))
+    let best = |allowed: &dyn Fn(&Plan) -> bool, by: &dyn Fn(&Plan, &Plan) -> Ordering| {
+        candidates.iter().filter(|p| fits(p) && allowed(p)).min_by(|a, b| by(a, b)).cloned()
     };
-    let finest_first =
-        |a: &Offer, b: &Offer| b.element.cmp(&a.element).then_with(|| preferred(a, b));
-    let locks = |o: &Offer| mixed && o.element == Element::Tet4;
+    let finest_first = |a: &Plan, b: &Plan| b.element.cmp(&a.element).then_with(|| preferred(a, b));
+    let locks = |p: &Plan| mixed && p.element == Element::Tet4;
     let cheapest =
-        |a: &Offer, b: &Offer| locks(a).cmp(&locks(b)).then_with(|| a.element.cmp(&b.element));
-    let cheap_fast = |a: &Offer, b: &Offer| cheapest(a, b).then_with(|| faster(a, b));
-    let cheap_exact = |a: &Offer, b: &Offer| cheapest(a, b).then_with(|| exacter(a, b));
-    let (offer, gave_up) = best(&|o| in_time(o) && exact(o), &finest_first)
-        .map(|offer| (offer, None))
-        .or_else(|| best(&in_time, &cheap_exact).map(|offer| (offer, Some(GaveUp::ErrorBudget))))
-        .or_else(|| best(&exact, &cheap_fast).map(|offer| (offer, Some(GaveUp::Deadline))))
-        .or_else(|| best(&|_| true, &cheap_fast).map(|offer| (offer, Some(GaveUp::Both))))?;
-    let locks = locks(&offer).then(|| {
-        let does_not_lock = |o: &&Offer| o.element != Element::Tet4;
-        match offers.iter().filter(does_not_lock).any(fits) {
+        |a: &Plan, b: &Plan| locks(a).cmp(&locks(b)).then_with(|| a.element.cmp(&b.element));
+    let cheap_fast = |a: &Plan, b: &Plan| cheapest(a, b).then_with(|| faster(a, b));
+    let cheap_exact = |a: &Plan, b: &Plan| cheapest(a, b).then_with(|| exacter(a, b));
+    let (plan, gave_up) = best(&|p| in_time(p) && exact(p), &finest_first)
+        .map(|plan| (plan, None))
+        .or_else(|| best(&in_time, &cheap_exact).map(|plan| (plan, Some(GaveUp::ErrorBudget))))
+        .or_else(|| best(&exact, &cheap_fast).map(|plan| (plan, Some(GaveUp::Deadline))))
+        .or_else(|| best(&|_| true, &cheap_fast).map(|plan| (plan, Some(GaveUp::Both))))?;
+    let locks = locks(&plan).then(|| {
+        let does_not_lock = |p: &&Plan| p.element != Element::Tet4;
+        match candidates.iter().filter(does_not_lock).any(fits) {
             true => Locks::NoTime,
             false => Locks::NoMemory,
         }
     });
-    Some(Choice { offer, gave_up, locks })
+    Some(Plan { gave_up, locks, ..plan })
 }
 
-impl fmt::Display for Choice {
-    /// Why it was chosen, for the report.
+impl fmt::Display for Plan {
+    /// Why it was taken where deadline or error budget decided, for the report.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.gave_up {
             None => write!(f, "chosen by deadline and error budget")?,
             Some(gave_up) => write!(f, "{gave_up}")?,
         }
-        let Offer { predicted_ms, error_rel, .. } = self.offer;
-        write!(f, "; predicted {predicted_ms:.1} ms at an error of {error_rel:.0e}")
+        match self.cost {
+            Some(Cost { ms, .. }) => {
+                write!(f, "; predicted {ms:.1} ms at an error of {:.0e}", self.error_rel)
+            }
+            None => Ok(()),
+        }
     }
 }
 

@@ -98,6 +98,12 @@ pub enum SolveError {
         /// Axis of the pivot.
         axis: char,
     },
+    /// A method that has no factor of `K11`.
+    #[error("{method} does not factor the stiffness of the free nodes")]
+    NotDirect {
+        /// The method.
+        method: Method,
+    },
     /// Memory for the factor could not be had.
     #[error("{method}: no memory for the factor of {unknown_dofs} unknowns")]
     OutOfMemory {
@@ -186,6 +192,9 @@ impl Factored {
             true => Err(SolveError::OverLimit { method, unknown_dofs: n, needed, limit }),
             false => Ok(()),
         };
+        if method == Method::Condensed {
+            return Err(SolveError::NotDirect { method });
+        }
         check(method.dense_bytes(n).unwrap_or(0))?;
         let not_positive = |error: NotPositive| not_positive(method, &partition, error.row);
         let out_of_memory = || SolveError::OutOfMemory { method, unknown_dofs: n };
@@ -228,7 +237,7 @@ impl Factored {
                 on_stage(Stage::Factor);
                 Kernel::Sparse(Box::new(analysis.factor().map_err(not_positive)?))
             }
-            Method::Front | Method::FrontMixed | Method::Pcg => {
+            Method::Front | Method::FrontMixed | Method::Pcg | Method::Condensed => {
                 let front = FrontMethod::of(method).unwrap_or(FrontMethod::Double);
                 let analysed = Analysed::new(stiffness, partition, on_stage);
                 check(analysed.peak_bytes(front))?;

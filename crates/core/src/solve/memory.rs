@@ -1,5 +1,4 @@
-//! How much memory a way to the answer holds at once: predicted from the size of a mesh, then
-//! counted.
+//! How much memory a method holds at once: predicted from the size of a mesh, then counted.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,24 +7,16 @@ use super::work::{MeshSize, Work};
 use super::{FrontAnalysis, Method};
 use crate::fem::{AXES, Element};
 
-/// A way to an answer, as far as its memory goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
-    /// A factor or inverse of `K11`.
-    Direct(Method),
-    /// A factor of the held base, without the columns, which have a bound of their own.
-    Condensed,
-}
-
-/// Memory that one way to an answer holds at once, at most.
+/// Memory that one method holds at once, at most.
 ///
 /// Units: bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Need {
     /// Element.
     pub element: Element,
-    /// Way.
-    pub way: Way,
+    /// Method. That of [`Method::Condensed`] is its base, without the columns, which have a bound of
+    /// their own.
+    pub method: Method,
     /// Mesh, pattern and stiffness.
     pub model_bytes: u64,
     /// Factor or inverse with all that waits while it is made.
@@ -64,39 +55,14 @@ const ORDER_BYTES_PER_BLOCK: f64 = 8.0;
 /// Vectors of all degrees of freedom that are held at once while the answer is refined.
 const VECTORS: f64 = 10.0;
 
-impl Way {
-    /// The ways that are worth a look, best first.
-    pub const SENSIBLE: [Self; 3] =
-        [Self::Direct(Method::Front), Self::Direct(Method::FrontMixed), Self::Condensed];
+/// The methods that are worth a look where none is asked for, best first.
+pub const SENSIBLE: [Method; 3] = [Method::Front, Method::FrontMixed, Method::Condensed];
 
-    /// Name on the command line and in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Direct(method) => method.name(),
-            Self::Condensed => "condensed",
-        }
-    }
-
-    /// Its method, where it is a factor or inverse of `K11`.
-    pub const fn method(self) -> Option<Method> {
-        match self {
-            Self::Direct(method) => Some(method),
-            Self::Condensed => None,
-        }
-    }
-
-    /// Bytes of a number of its factor.
-    fn number_bytes(self) -> f64 {
-        match self {
-            Self::Direct(Method::FrontMixed | Method::Pcg) => 4.0,
-            _ => 8.0,
-        }
-    }
-}
-
-impl fmt::Display for Way {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+/// Bytes of a number of a method's factor.
+fn number_bytes(method: Method) -> f64 {
+    match method {
+        Method::FrontMixed | Method::Pcg => 4.0,
+        _ => 8.0,
     }
 }
 
@@ -105,7 +71,7 @@ impl Need {
     ///
     /// Dense methods are exact; a factor over fronts is between [`Need::factor_bytes_min`] and
     /// [`Need::factor_bytes_max`].
-    pub fn predicted(problem: Problem, element: Element, way: Way) -> Self {
+    pub fn predicted(problem: Problem, element: Element, method: Method) -> Self {
         let whole = Work::estimate(problem.size, element);
         let unknown = (whole.unknown_dofs - problem.known_dofs as f64).max(0.0);
         let i = usize::from(element.node_count() > 4);
@@ -113,22 +79,18 @@ impl Need {
             + BYTES_PER_NODE * whole.unknown_dofs / AXES as f64
             + BYTES_PER_BLOCK * whole.blocks;
         let around = Self::around(&whole);
-        let dense = match way {
-            Way::Direct(method) => method.dense_bytes(unknown as usize),
-            Way::Condensed => None,
-        };
-        let (factor, least) = match dense {
+        let (factor, least) = match method.dense_bytes(unknown as usize) {
             Some(bytes) => (bytes as f64, bytes as f64),
             None => {
                 let share = unknown / whole.unknown_dofs.max(1.0);
                 let entries = whole.peak_entries * share.powf(4.0 / 3.0);
-                let factor = way.number_bytes() * entries;
+                let factor = number_bytes(method) * entries;
                 (factor + around, factor / PREDICTED_OVER_LEAST)
             }
         };
         Self {
             element,
-            way,
+            method,
             model_bytes: model_bytes as u64,
             factor_bytes: factor as u64,
             factor_bytes_min: least as u64,
@@ -140,22 +102,22 @@ impl Need {
     /// Units: `model_bytes` bytes.
     pub fn counted(
         element: Element,
-        way: Way,
+        method: Method,
         model_bytes: u64,
         blocks: usize,
         analysis: &FrontAnalysis,
     ) -> Self {
-        let numbers = analysis.peak_bytes::<u8>() as f64 * way.number_bytes();
+        let numbers = analysis.peak_bytes::<u8>() as f64 * number_bytes(method);
         let vectors = VECTORS * (size_of::<f64>() * analysis.row_count()) as f64;
         let factor_bytes = numbers + ORDER_BYTES_PER_BLOCK * blocks as f64 + vectors;
-        Self::exact(element, way, model_bytes, factor_bytes as u64)
+        Self::exact(element, method, model_bytes, factor_bytes as u64)
     }
 
     /// A need that is known.
     ///
     /// Units: bytes.
-    pub fn exact(element: Element, way: Way, model_bytes: u64, factor_bytes: u64) -> Self {
-        Self { element, way, model_bytes, factor_bytes, factor_bytes_min: factor_bytes }
+    pub fn exact(element: Element, method: Method, model_bytes: u64, factor_bytes: u64) -> Self {
+        Self { element, method, model_bytes, factor_bytes, factor_bytes_min: factor_bytes }
     }
 
     /// Order, analysis and vectors of an estimate.
@@ -192,15 +154,15 @@ impl Need {
     }
 }
 
-/// About as many nodes as fit a limit by one way, with as many elements per node.
+/// About as many nodes as fit a limit by one method, with as many elements per node.
 ///
 /// Units: `limit` bytes; the result nodes, 0 where nothing fits.
-pub fn nodes_that_fit(problem: Problem, element: Element, way: Way, limit: u64) -> usize {
+pub fn nodes_that_fit(problem: Problem, element: Element, method: Method, limit: u64) -> usize {
     let nodes = problem.size.nodes.max(1);
     let fits = |n: usize| {
         let tets = (problem.size.tets as f64 * n as f64 / nodes as f64) as usize;
         let scaled = Problem { size: MeshSize { nodes: n, tets }, known_dofs: 0 };
-        Need::predicted(scaled, element, way).bytes() <= limit
+        Need::predicted(scaled, element, method).bytes() <= limit
     };
     let (mut low, mut high) = (0, nodes);
     while low + 1 < high {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// How `K11` is inverted or factored.
+/// How displacements are found: by a factor or inverse of `K11`, or from kept columns of the compliance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Method {
     /// Gauss–Jordan elimination of Appendix A pivot by pivot, rows in parallel: the thesis's own
@@ -23,13 +23,16 @@ pub enum Method {
     FrontMixed,
     /// Conjugate gradients preconditioned by the single-precision factor, to a stated residual.
     Pcg,
+    /// Kept columns of the compliance and a small dense system ([`super::condensed`]).
+    Condensed,
 }
 
-/// A method name that is none of [`Method::ALL`].
+/// A name that no method has.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "no method is called '{name}'; there are {}, condensed and auto",
-    Method::ALL.map(Method::name).join(", ")
+    "no method is called '{name}'; there are {}, {} and auto",
+    Method::DIRECT.map(Method::name).join(", "),
+    Method::Condensed
 )]
 pub struct UnknownMethod {
     /// The name given.
@@ -37,8 +40,8 @@ pub struct UnknownMethod {
 }
 
 impl Method {
-    /// All methods, slowest first.
-    pub const ALL: [Self; 8] = [
+    /// The methods that factor or invert `K11`, slowest first.
+    pub const DIRECT: [Self; 8] = [
         Self::GaussJordanPlain,
         Self::GaussJordan,
         Self::DenseInverse,
@@ -60,6 +63,18 @@ impl Method {
             Self::Front => "front",
             Self::FrontMixed => "front-mixed",
             Self::Pcg => "pcg",
+            Self::Condensed => "condensed",
+        }
+    }
+
+    /// The method of a name, or `None` for `auto`, which leaves the choice open.
+    ///
+    /// # Errors
+    /// [`UnknownMethod`] with all names there are.
+    pub fn named_or_auto(name: &str) -> Result<Option<Self>, UnknownMethod> {
+        match name {
+            "auto" => Ok(None),
+            name => name.parse().map(Some),
         }
     }
 
@@ -71,9 +86,12 @@ impl Method {
         }
     }
 
-    /// Whether it makes use of the zeros of `K11`, and so orders it first.
+    /// Whether it makes use of the zeros of the stiffness, and so orders the nodes first.
     pub const fn is_sparse(self) -> bool {
-        matches!(self, Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg)
+        matches!(
+            self,
+            Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg | Self::Condensed
+        )
     }
 
     /// Bytes that the factor or inverse of `n` unknowns stays below, but for a few rows of the
@@ -83,7 +101,9 @@ impl Method {
         match self {
             Self::GaussJordanPlain | Self::GaussJordan | Self::DenseInverse => Some(square),
             Self::DenseCholesky => Some(square / 2),
-            Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg => None,
+            Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg | Self::Condensed => {
+                None
+            }
         }
     }
 }
@@ -98,8 +118,8 @@ impl FromStr for Method {
     type Err = UnknownMethod;
 
     fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        Self::ALL
-            .into_iter()
+        let all = Self::DIRECT.into_iter().chain([Self::Condensed]);
+        all.into_iter()
             .find(|m| m.name() == name)
             .ok_or_else(|| UnknownMethod { name: name.to_owned() })
     }

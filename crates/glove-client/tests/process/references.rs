@@ -10,7 +10,8 @@ fn all_sixteen_reference_cases_agree_to_1e_8_of_the_largest_displacement() {
     let mut cases = 0;
     for entry in std::fs::read_dir(references).unwrap() {
         let case = entry.unwrap().path();
-        if !case.is_dir() {
+        // Beside the cases lie a page and a folder of cases at large deformation.
+        if !case.join("known.csv").is_file() {
             continue;
         }
         cases += 1;

@@ -55,6 +55,11 @@ impl Columns {
         bytes_of(base, self.lock().columns.keys())
     }
 
+    /// Drops all columns; they are computed again when they are asked for.
+    pub fn clear(&self) {
+        self.lock().columns.clear();
+    }
+
     /// Contacts whose columns have been computed so far, repetitions counted.
     pub fn computed(&self) -> u64 {
         self.lock().computed
@@ -131,8 +136,12 @@ fn trim(kept: &mut Kept, base: &Base, bound: usize) {
     }
 }
 
-/// Contacts solved together: enough right-hand sides for matrix products, few enough for the cache.
-const CONTACTS_TOGETHER: usize = 8;
+/// Contacts solved together: the fingers of a hand.
+///
+/// A solve always has this many contacts, some of them empty where fewer are asked for. The kernels
+/// sum in another order for another number of columns, so a column would depend in its last bits on
+/// which others happened to be missing with it, and that depends on timing.
+pub const CONTACTS_TOGETHER: usize = 5;
 
 fn compute(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
     contacts.chunks(CONTACTS_TOGETHER).flat_map(|some| compute_together(base, some)).collect()
@@ -142,20 +151,22 @@ fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
     let unknown = base.partition.unknown();
     let n = unknown.len();
     let rows_wanted: Vec<usize> = (0..n).collect();
-    let loads: Vec<Load> = contacts.iter().flat_map(|c| unit_loads(base, c)).collect();
+    let mut loads: Vec<Load> = contacts.iter().flat_map(|c| unit_loads(base, c)).collect();
+    let asked = loads.len();
+    loads.resize_with(3 * CONTACTS_TOGETHER, Vec::new);
     let solved = base.factor.solve_partial(&loads, &rows_wanted);
     // Not refined: as they come, all columns are those of one matrix very near to K_B, so their
     // errors cancel in an answer; refined one by one they would be errors of their own, up to a
     // hundred times as large (docs/decisions.md).
-    let fields: Vec<Field> = loads
-        .into_par_iter()
+    let fields: Vec<Field> = loads[..asked]
+        .par_iter()
         .enumerate()
         .map(|(column, load)| {
             let mut field = vec![0.0; base.dof_count()];
             for (row, &dof) in unknown.iter().enumerate() {
                 field[dof as usize] = solved[(row, column)];
             }
-            Field::check(base, &load, field)
+            Field::check(base, load, field)
         })
         .collect();
     let mut fields = fields.into_iter();

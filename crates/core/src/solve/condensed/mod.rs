@@ -31,6 +31,6 @@ mod touched;
 
 pub use base::{Base, CondensedError};
 pub use certificate::Certificate;
-pub use columns::{Columns, ContactColumns};
+pub use columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
 pub use contact_set::{ContactAnswer, ContactSet};
 pub use touched::{Contact, Touched};

@@ -189,6 +189,28 @@ fn same_bits_for_one_two_four_and_seven_threads() {
 }
 
 #[test]
+fn column_has_the_same_bits_whichever_others_were_missing_with_it() {
+    let shape = Shape::new(generate(BuiltIn::Cube, 216).unwrap(), 0.3, &[]);
+    let node = Contact::Node(77);
+    let fields = |others: &[u32], at: usize| {
+        let columns = Columns::new(1 << 30);
+        let mut contacts: Vec<Contact> = others.iter().map(|&n| Contact::Node(n)).collect();
+        contacts.insert(at, node.clone());
+        columns.of_contacts(&shape.base, &contacts).unwrap()[at].fields.clone()
+    };
+    let alone = fields(&[], 0);
+    for (others, at) in [
+        (&[3][..], 1),
+        (&[3, 9], 0),
+        (&[3, 9, 200], 2),
+        (&[1, 2, 3, 4], 4),
+        (&[1, 2, 3, 4, 5, 6], 6),
+    ] {
+        assert!(alone == fields(others, at), "with {others:?} at {at}");
+    }
+}
+
+#[test]
 fn columns_are_kept_and_the_least_recently_used_go_first() {
     let shape = Shape::new(cube(125), 0.3, &[]);
     let two = 2 * Columns::bytes_per_contact(&shape.base);

@@ -27,10 +27,9 @@ fn predicted_bytes_are_within_the_stated_factor_of_the_counted() {
             let analysed: Analysed = model.analyse(&known, &mut |_| {}).unwrap();
             let blocks = model.stiffness().pattern().block_count();
             for method in [Method::Front, Method::FrontMixed, Method::Pcg] {
-                let way = Way::Direct(method);
-                let predicted = Need::predicted(problem(size), element, way);
+                let predicted = Need::predicted(problem(size), element, method);
                 let held = model.bytes() as u64;
-                let counted = Need::counted(element, way, held, blocks, analysed.analysis());
+                let counted = Need::counted(element, method, held, blocks, analysed.analysis());
                 let told = format!("{shape:?} {element:?} {method}: {predicted:?} {counted:?}");
                 let (low, high) = (predicted.factor_bytes_min, predicted.factor_bytes_max());
                 assert!(low <= counted.factor_bytes && counted.factor_bytes <= high, "{told}");
@@ -44,7 +43,7 @@ fn predicted_bytes_are_within_the_stated_factor_of_the_counted() {
 #[test]
 fn dense_needs_are_exact_and_single_precision_halves_a_factor() {
     let size = MeshSize { nodes: 1000, tets: 4500 };
-    let need = |method| Need::predicted(problem(size), Element::Tet4, Way::Direct(method));
+    let need = |method| Need::predicted(problem(size), Element::Tet4, method);
     let unknown = 3000 - 9;
     for method in [Method::GaussJordan, Method::DenseInverse, Method::DenseCholesky] {
         let dense = need(method);
@@ -60,15 +59,15 @@ fn dense_needs_are_exact_and_single_precision_halves_a_factor() {
 #[test]
 fn nodes_that_fit_do_fit_and_more_do_not() {
     let size = MeshSize { nodes: 160_000, tets: 900_000 };
-    let way = Way::Direct(Method::Front);
-    let fit = nodes_that_fit(problem(size), Element::Tet4, way, 1 << 30);
+    let method = Method::Front;
+    let fit = nodes_that_fit(problem(size), Element::Tet4, method, 1 << 30);
     let bytes = |nodes: usize| {
         let tets = (5.625 * nodes as f64) as usize;
         let scaled = Problem { size: MeshSize { nodes, tets }, known_dofs: 0 };
-        Need::predicted(scaled, Element::Tet4, way).bytes()
+        Need::predicted(scaled, Element::Tet4, method).bytes()
     };
     assert!(bytes(fit) <= 1 << 30 && bytes(fit + fit / 50) > 1 << 30, "{fit}");
-    assert_eq!(nodes_that_fit(problem(size), Element::Tet4, way, 10), 0);
+    assert_eq!(nodes_that_fit(problem(size), Element::Tet4, method, 10), 0);
 }
 
 #[test]

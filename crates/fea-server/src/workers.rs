@@ -6,15 +6,16 @@ use std::time::Instant;
 
 use tokio::sync::{Semaphore, oneshot};
 
-use crate::reject::Refusal;
+use crate::lock::assert_none_is_held;
 
 /// A rayon pool behind a bounded queue.
 ///
-/// Invariant: requests waiting or running ≤ `QUEUE_DEPTH`; one more waits in its own session,
-/// which stops reading its socket, so a client that asks faster than it is answered is slowed by
-/// TCP and not by a growing queue here.
+/// Invariant: requests waiting or running ≤ `QUEUE_DEPTH`; one more waits in its own session, which
+/// stops reading its socket, so TCP slows a client that asks faster than it is answered.
+///
+/// Invariant: no work begins on a thread that holds a [`crate::lock::Lock`].
 #[derive(Clone)]
-pub(crate) struct Compute {
+pub(crate) struct Workers {
     pool: Arc<rayon::ThreadPool>,
     places: Arc<Semaphore>,
     background: Arc<Semaphore>,
@@ -24,12 +25,17 @@ pub(crate) struct Compute {
 /// Work for the thread beside the frames.
 type Task = Box<dyn FnOnce() + Send>;
 
+/// The work on a request panicked, or the server stopped before it began; it has been logged.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the work on this request ended abnormally")]
+pub(crate) struct EndedAbnormally;
+
 /// Background tasks that may wait or run at once.
 const BACKGROUND_MAX: usize = 8;
 /// Requests of all sessions that may wait or run at once.
 const QUEUE_DEPTH: usize = 32;
 
-impl Compute {
+impl Workers {
     /// A pool of exactly `threads` threads.
     ///
     /// # Errors
@@ -38,6 +44,7 @@ impl Compute {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|i| format!("solve-{i}"))
+            .stack_size(STACK_BYTES)
             .build()
             .map_err(std::io::Error::other)?;
         Ok(Self {
@@ -53,17 +60,15 @@ impl Compute {
         self.pool.current_num_threads()
     }
 
-    /// Runs `work` on the pool when it comes to it; nobody waits. What is over the bound is dropped:
-    /// this is for hints and for proofs, without which everything still works.
+    /// Runs `work` on the pool when a thread is free; nobody waits for it. What is over the bound is
+    /// dropped: this is for hints and for proofs, without which everything still works.
     pub fn in_background(&self, work: impl FnOnce() + Send + 'static) {
         let Ok(place) = Arc::clone(&self.background).try_acquire_owned() else {
             tracing::debug!("a background task is dropped");
             return;
         };
         self.pool.spawn(move || {
-            if std::panic::catch_unwind(AssertUnwindSafe(work)).is_err() {
-                tracing::error!("work in the background ended abnormally");
-            }
+            let _ = caught("in the background", work);
             drop(place);
         });
     }
@@ -79,41 +84,42 @@ impl Compute {
     /// Runs `work` on the pool and waits for it without blocking the sockets.
     ///
     /// # Errors
-    /// [`Refusal::Internal`] if the work panicked; the panic is logged and the pool lives on.
+    /// [`EndedAbnormally`] if the work panicked; the pool lives on.
     pub async fn run<T: Send + 'static>(
         &self,
-        work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
-    ) -> Result<T, Refusal> {
-        let place =
-            Arc::clone(&self.places).acquire_owned().await.map_err(|_| Refusal::Internal)?;
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, EndedAbnormally> {
+        let place = Arc::clone(&self.places).acquire_owned().await.map_err(|_| EndedAbnormally)?;
         let (sender, receiver) = oneshot::channel();
         self.pool.spawn(move || {
-            let outcome = caught(work);
+            let outcome = caught("on a request", work);
             drop(place);
             // The session may have gone in the meantime; then nobody waits for this.
             let _ = sender.send(outcome);
         });
-        receiver.await.unwrap_or(Err(Refusal::Internal))
+        receiver.await.unwrap_or(Err(EndedAbnormally))
     }
 
-    /// Does `work` at once on the calling thread of the sockets: for what is done sooner than handed
-    /// over, and must not wait behind a factor either.
+    /// Does `work` at once on the calling thread of the sockets: for work that takes less time than
+    /// handing it over, and that must not wait behind a factor either.
     ///
     /// # Errors
-    /// [`Refusal::Internal`] if the work panicked; the panic is logged.
-    pub fn run_here<T>(work: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
-        caught(work)
+    /// [`EndedAbnormally`] if the work panicked.
+    pub fn run_here<T>(work: impl FnOnce() -> T) -> Result<T, EndedAbnormally> {
+        caught("on a small frame", work)
     }
 }
 
-/// Starts the thread beside the frames; it ends when the last [`Compute`] has gone.
+/// A thread that waits in a parallel loop takes other requests from the queue, each on top of the
+/// last on one stack.
+const STACK_BYTES: usize = 16 << 20;
+
+/// Starts the thread beside the frames; it ends when the last [`Workers`] has gone.
 fn start_beside() -> std::io::Result<mpsc::Sender<Task>> {
     let (sender, tasks) = mpsc::channel::<Task>();
     std::thread::Builder::new().name("beside".to_owned()).spawn(move || {
         for work in tasks {
-            if std::panic::catch_unwind(AssertUnwindSafe(work)).is_err() {
-                tracing::error!("work beside the frames ended abnormally");
-            }
+            let _ = caught("beside the frames", work);
         }
     })?;
     Ok(sender)
@@ -141,16 +147,20 @@ impl Rest {
     }
 }
 
-/// What `work` comes to; a panic is logged and is the server's fault.
-fn caught<T>(work: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
-    std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+/// The result of `work`; a panic is logged.
+fn caught<T>(place: &str, work: impl FnOnce() -> T) -> Result<T, EndedAbnormally> {
+    let checked = || {
+        assert_none_is_held();
+        work()
+    };
+    std::panic::catch_unwind(AssertUnwindSafe(checked)).map_err(|panic| {
         let text = panic
             .downcast_ref::<String>()
             .map(String::as_str)
             .or_else(|| panic.downcast_ref::<&str>().copied())
             .unwrap_or("no text");
-        tracing::error!(panic = text, "work on a request ended abnormally");
-        Err(Refusal::Internal)
+        tracing::error!(panic = text, "work {place} ended abnormally");
+        EndedAbnormally
     })
 }
 
@@ -160,12 +170,21 @@ mod tests {
 
     #[tokio::test]
     async fn panic_in_one_request_is_answered_and_the_pool_lives_on() {
-        let compute = Compute::new(1).unwrap();
-        let broken: Result<(), Refusal> = compute.run(|| panic!("a fault")).await;
-        assert!(matches!(broken, Err(Refusal::Internal)));
-        let broken: Result<(), Refusal> = Compute::run_here(|| panic!("a fault"));
-        assert!(matches!(broken, Err(Refusal::Internal)));
-        assert_eq!(compute.run(|| Ok(7)).await.unwrap(), 7);
-        assert_eq!(compute.threads(), 1);
+        let workers = Workers::new(1).unwrap();
+        let broken: Result<(), EndedAbnormally> = workers.run(|| panic!("a fault")).await;
+        assert_eq!(broken, Err(EndedAbnormally));
+        let broken: Result<(), EndedAbnormally> = Workers::run_here(|| panic!("a fault"));
+        assert_eq!(broken, Err(EndedAbnormally));
+        assert_eq!(workers.run(|| 7).await, Ok(7));
+        assert_eq!(workers.threads(), 1);
+    }
+
+    #[tokio::test]
+    async fn panic_beside_the_frames_does_not_end_their_thread() {
+        let workers = Workers::new(1).unwrap();
+        workers.beside(|| panic!("a fault"));
+        let (sender, receiver) = oneshot::channel();
+        workers.beside(move || sender.send(5).unwrap());
+        assert_eq!(receiver.await, Ok(5));
     }
 }

@@ -1,11 +1,13 @@
 //! What a user should know about an answer: where linear elasticity stops being right, and which
 //! of the wishes it does not meet.
 
+use softgrasp_core::fem::Element;
 use softgrasp_core::fem::StrainSummary;
+use softgrasp_core::solve::choose::{LOCKING_POISSON, Plan};
 use softgrasp_core::solve::{Certainty, ERROR_SERIOUS, ERROR_UNREMARKABLE};
 use softgrasp_protocol::{Question, SolveReport, WarningLevel};
 
-use crate::reject::Refusal;
+use crate::refusal::Refusal;
 
 /// Linear elasticity errs by the square of the rotation: 1.5 % at 10°.
 const ROTATION_WARNING_DEG: f64 = 10.0;
@@ -13,7 +15,7 @@ const ROTATION_WARNING_DEG: f64 = 10.0;
 const STRAIN_WARNING: f64 = 0.1;
 
 /// Sentences for answers that leave the range of small rotations and strains.
-pub(crate) fn warnings(summary: StrainSummary) -> Vec<String> {
+pub(super) fn strain_warnings(summary: StrainSummary) -> Vec<String> {
     let (rotation_deg, strain) = (summary.rotation_max.to_degrees(), summary.strain_max);
     let mut warnings = Vec::new();
     if rotation_deg > ROTATION_WARNING_DEG {
@@ -33,7 +35,7 @@ pub(crate) fn warnings(summary: StrainSummary) -> Vec<String> {
 }
 
 /// Writes into the report how certain the digits are, and refuses an answer without any.
-pub(crate) fn add_certainty(
+pub(super) fn add_certainty(
     certainty: Certainty,
     question: &Question,
     report: &mut SolveReport,
@@ -63,7 +65,7 @@ pub(crate) fn add_certainty(
 }
 
 /// Adds a sentence for each wish of the question that the answer does not meet.
-pub(crate) fn add_unmet_wishes(question: &Question, report: &mut SolveReport) {
+pub(super) fn add_unmet_wishes(question: &Question, report: &mut SolveReport) {
     let ms = &report.stage_ms;
     let took = ms.queue + ms.decode + ms.assemble + ms.order + ms.factor + ms.solve + ms.encode;
     if let Some(deadline) = question.deadline_ms.filter(|deadline| took > *deadline) {
@@ -79,5 +81,23 @@ pub(crate) fn add_unmet_wishes(question: &Question, report: &mut SolveReport) {
             report.residual_rel
         )),
         _ => {}
+    }
+}
+
+/// Warns of linear elements that were asked for on a material on which they lock, and of what a plan
+/// had to give up.
+pub(super) fn add_plan_warnings(
+    plan: &Plan,
+    asked: Option<Element>,
+    poisson_max: f64,
+    report: &mut SolveReport,
+) {
+    report.warnings.extend(plan.gave_up.map(|gave_up| gave_up.to_string()));
+    report.warnings.extend(plan.locks.map(|locks| locks.to_string()));
+    if asked == Some(Element::Tet4) && poisson_max >= LOCKING_POISSON {
+        report.warnings.push(format!(
+            "linear elements lock at a Poisson's ratio of {poisson_max}: the object seems stiffer \
+             than it is; ask for elements that do not (t4-anp, t10, auto)"
+        ));
     }
 }

@@ -4,7 +4,7 @@ use softgrasp_core::contact::Mask;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_protocol::{DofValue, NodeChoice, Question, Want};
 
-use crate::reject::Refusal;
+use crate::refusal::Refusal;
 
 /// With masks so many unknown forces at most: above it the small system is not small any more, and
 /// there is no other method to go to.
@@ -38,26 +38,16 @@ pub(crate) fn checked_masks(
 
 /// Forces by degree of freedom, once all that a question names is seen to be there; before a factor
 /// is made, because that is what costs.
+///
+/// # Errors
+/// [`Refusal`] naming the node.
 pub(crate) fn checked_forces(
     model: &Model,
     known: &Known,
     question: &Question,
 ) -> Result<Vec<f64>, Refusal> {
-    check_wishes(question)?;
     check_nodes(&question.want, model)?;
     scatter_forces(model, known, &question.forces)
-}
-
-/// Deadline and error budget are numbers that can be compared with.
-pub(crate) fn check_wishes(question: &Question) -> Result<(), Refusal> {
-    for (what, value) in
-        [("the deadline", question.deadline_ms), ("the error budget", question.max_error)]
-    {
-        if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-            return Err(Refusal::Wish { what, value });
-        }
-    }
-    Ok(())
 }
 
 fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {

@@ -1,6 +1,5 @@
 //! How fast this machine is at each kind of work: measured once, so that times can be predicted.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use softgrasp_core::fem::{Element, Material};
@@ -10,13 +9,15 @@ use softgrasp_core::solve::rates::{FactorRates, FactorSample, Rates};
 use softgrasp_core::solve::work::{MeshSize, Work};
 use softgrasp_core::solve::{Analysed, Factored, FrontFactor, Method, Partition, Real};
 
+use crate::lock::Lock;
+
 /// Rates of this machine's solving threads.
 #[derive(Default)]
 pub(crate) struct MeasuredRates {
-    state: Mutex<State>,
+    state: Lock<State>,
 }
 
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, PartialEq)]
 enum State {
     #[default]
     Unknown,
@@ -34,13 +35,17 @@ impl MeasuredRates {
     /// The rates, measured now on the current pool if nobody has. Nobody waits for another who
     /// measures: until that is done, a typical machine is assumed.
     pub fn get(&self) -> Rates {
-        {
-            let mut state = self.lock();
-            match *state {
-                State::Known(rates) => return rates,
-                State::Running => return Rates::ASSUMED,
-                State::Unknown => *state = State::Running,
+        let before = self.state.with(|state| {
+            let before = *state;
+            if before == State::Unknown {
+                *state = State::Running;
             }
+            before
+        });
+        match before {
+            State::Known(rates) => return rates,
+            State::Running => return Rates::ASSUMED,
+            State::Unknown => {}
         }
         let start = Instant::now();
         let rates = measure().unwrap_or_else(|| {
@@ -49,12 +54,8 @@ impl MeasuredRates {
         });
         let ms = 1e3 * start.elapsed().as_secs_f64();
         tracing::info!(ms, ?rates, "speed of this machine measured");
-        *self.lock() = State::Known(rates);
+        self.state.with(|state| *state = State::Known(rates));
         rates
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -179,7 +180,7 @@ mod tests {
     #[test]
     fn who_comes_while_another_measures_does_not_wait() {
         let measured = MeasuredRates::default();
-        *measured.lock() = State::Running;
+        measured.state.with(|state| *state = State::Running);
         assert_eq!(measured.get(), Rates::ASSUMED);
     }
 }

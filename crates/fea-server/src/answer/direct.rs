@@ -8,12 +8,13 @@ use softgrasp_protocol::{
     Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
 };
 
-use crate::caution::{add_certainty, add_unmet_wishes, warnings};
-use crate::clock::{StageClock, ms_since, peak_rss_bytes};
-use crate::reject::Refusal;
+use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
+use crate::clock::{StageClock, ms_since};
+use crate::machine_memory::peak_rss_bytes;
+use crate::refusal::Refusal;
 
 /// A question with what has been worked out of it.
-pub(crate) struct Asked<'a> {
+pub(super) struct Posed<'a> {
     pub question: &'a Question,
     pub known: Known,
     pub forces: Vec<f64>,
@@ -23,44 +24,44 @@ pub(crate) struct Asked<'a> {
 }
 
 /// Solves and gathers what was asked for.
-pub(crate) fn answer(
+pub(super) fn answer(
     model: &Model,
     factored: &Factored,
-    asked: Asked<'_>,
+    posed: Posed<'_>,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    let solution = solve(model, factored, &asked, &mut clock)?;
-    gather(model, factored, asked, &solution, clock)
+    let solution = solve(model, factored, &posed, &mut clock)?;
+    gather(model, factored, posed, &solution, clock)
 }
 
 /// Displacements of the whole system, refined or stopped as the question allows.
-pub(crate) fn solve(
+pub(super) fn solve(
     model: &Model,
     factored: &Factored,
-    asked: &Asked<'_>,
+    posed: &Posed<'_>,
     clock: &mut StageClock,
 ) -> Result<Solution, Refusal> {
-    let residual_rel = asked.question.max_error.unwrap_or(0.0);
-    let loads = Loads { q_known: &asked.known.q_known, forces: &asked.forces, residual_rel };
+    let residual_rel = posed.question.max_error.unwrap_or(0.0);
+    let loads = Loads { q_known: &posed.known.q_known, forces: &posed.forces, residual_rel };
     factored
         .solve(model.stiffness(), loads, &mut |stage| clock.begin(stage))
         .map_err(|error| Refusal::Model(error.into()))
 }
 
 /// What was asked for, out of a solution, and what it cost.
-pub(crate) fn gather(
+pub(super) fn gather(
     model: &Model,
     factored: &Factored,
-    asked: Asked<'_>,
+    posed: Posed<'_>,
     solution: &Solution,
     clock: StageClock,
 ) -> Result<Answer, Refusal> {
     // A few solves more, once per factor: not where somebody is in a hurry.
-    let certainty = match asked.question.deadline_ms {
+    let certainty = match posed.question.deadline_ms {
         None => Some(certainty(model, factored, solution)),
         Some(_) => None,
     };
-    let Asked { question, known, element, factor_reused, chosen_because, .. } = asked;
+    let Posed { question, known, element, factor_reused, chosen_because, .. } = posed;
     let strain = model.strain(&solution.displacement);
     let mut stage_ms = clock.finish();
     let start = Instant::now();
@@ -83,7 +84,7 @@ pub(crate) fn gather(
         max_rotation_deg: strain.rotation_max.to_degrees(),
         max_strain: strain.strain_max,
         precision: factored.method().precision().to_owned(),
-        warnings: warnings(strain),
+        warnings: strain_warnings(strain),
         peak_rss_bytes: peak_rss_bytes(),
         factor_reused,
         chosen_because,
@@ -98,7 +99,7 @@ pub(crate) fn gather(
 }
 
 /// How certain the digits are; a method that stops early has an estimate of its own beside rounding.
-pub(crate) fn certainty(model: &Model, factored: &Factored, solution: &Solution) -> Certainty {
+pub(super) fn certainty(model: &Model, factored: &Factored, solution: &Solution) -> Certainty {
     match solution.error_estimate_rel {
         None => factored.certainty(model.stiffness(), solution.backward_error),
         Some(stopped_at) => {

@@ -7,7 +7,8 @@ use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::{SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
 
-use crate::admission::Shortage;
+use crate::plan::PlanError;
+use crate::workers::EndedAbnormally;
 
 /// Why a request is refused, before it becomes a message.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +25,8 @@ pub(crate) enum Refusal {
     Model(#[from] ModelError),
     #[error(transparent)]
     Method(#[from] UnknownMethod),
+    #[error(transparent)]
+    Plan(#[from] PlanError),
     #[error("no material was given")]
     NoMaterial,
     #[error(
@@ -42,12 +45,8 @@ pub(crate) enum Refusal {
     ForceNotFinite { node: u32, value: f64 },
     #[error("a force acts on node {node} along an axis whose displacement is known")]
     ForceOnKnown { node: u32 },
-    #[error("{0}")]
-    Memory(Box<Shortage>),
     #[error("{what} is {value}; it must be a finite number above 0, or be left out")]
     Wish { what: &'static str, value: f64 },
-    #[error("condensed takes known displacements only, not forces; use front or auto")]
-    CondensedForces,
     #[error("mask {mask} (from 0) is given the displacement {value} m; it must be a finite number")]
     MaskNotFinite { mask: usize, value: f64 },
     #[error(
@@ -55,12 +54,6 @@ pub(crate) enum Refusal {
          hold nodes that never move by fixing them in the model"
     )]
     TooManyTouched { forces: usize, max: usize },
-    #[error("{method} does not answer masks; ask for condensed or auto")]
-    MasksDirect { method: String },
-    #[error("masks are answered by condensed only, and not here: {0}")]
-    MasksNotCondensed(Box<Refusal>),
-    #[error("node {node} is fixed by the model and moved by the question; use front or auto")]
-    FixedMoved { node: u32 },
     #[error("the mesh has {node_count} nodes; this server takes {max} (--max-nodes)")]
     TooManyNodes { node_count: usize, max: u32 },
     #[error(
@@ -85,29 +78,19 @@ impl From<DecodeError> for Refusal {
     }
 }
 
+impl From<EndedAbnormally> for Refusal {
+    fn from(_: EndedAbnormally) -> Self {
+        Self::Internal
+    }
+}
+
 impl Refusal {
     fn code(&self) -> RejectCode {
         match self {
             Self::UnknownModel(_) => RejectCode::UnknownModel,
-            Self::Model(ModelError::Free(_)) => RejectCode::RigidMotionFree,
-            Self::Model(ModelError::Solve(error)) => match error {
-                SolveError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
-                SolveError::OutOfMemory { .. } | SolveError::OverLimit { .. } => {
-                    RejectCode::MemoryLimit
-                }
-                _ => RejectCode::BadRequest,
-            },
-            Self::Model(ModelError::Condensed(error)) => match error {
-                CondensedError::NotHeld => RejectCode::RigidMotionFree,
-                CondensedError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
-                CondensedError::OutOfMemory { .. }
-                | CondensedError::OverLimit { .. }
-                | CondensedError::CacheTooSmall { .. } => RejectCode::MemoryLimit,
-                _ => RejectCode::BadRequest,
-            },
-            Self::MasksNotCondensed(reason) => reason.code(),
+            Self::Model(error) => code_of_model(error),
+            Self::Plan(error) => code_of_plan(error),
             Self::Method(_) => RejectCode::UnknownMethod,
-            Self::Memory(_) => RejectCode::MemoryLimit,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
             Self::Uncertain { .. } => RejectCode::Uncertain,
             Self::Token => RejectCode::NotAuthorised,
@@ -120,9 +103,42 @@ impl Refusal {
     /// The message for the client.
     pub fn to_message(&self) -> Rejected {
         let detail = match self {
-            Self::Memory(shortage) => shortage.detail(),
+            Self::Plan(PlanError::Memory(shortage)) => shortage.detail(),
             _ => String::new(),
         };
         Rejected { code: self.code(), text: self.to_string(), detail }
+    }
+}
+
+fn code_of_plan(error: &PlanError) -> RejectCode {
+    match error {
+        PlanError::MasksNotCondensed(reason) => code_of_plan(reason),
+        PlanError::Memory(_) => RejectCode::MemoryLimit,
+        PlanError::Model(error) => code_of_model(error),
+        PlanError::CondensedForces
+        | PlanError::FixedMoved { .. }
+        | PlanError::MasksDirect { .. } => RejectCode::BadRequest,
+    }
+}
+
+fn code_of_model(error: &ModelError) -> RejectCode {
+    match error {
+        ModelError::Free(_) => RejectCode::RigidMotionFree,
+        ModelError::Solve(error) => match error {
+            SolveError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
+            SolveError::OutOfMemory { .. } | SolveError::OverLimit { .. } => {
+                RejectCode::MemoryLimit
+            }
+            _ => RejectCode::BadRequest,
+        },
+        ModelError::Condensed(error) => match error {
+            CondensedError::NotHeld => RejectCode::RigidMotionFree,
+            CondensedError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
+            CondensedError::OutOfMemory { .. }
+            | CondensedError::OverLimit { .. }
+            | CondensedError::CacheTooSmall { .. } => RejectCode::MemoryLimit,
+            _ => RejectCode::BadRequest,
+        },
+        _ => RejectCode::BadRequest,
     }
 }

@@ -1,7 +1,8 @@
-//! How much memory there is to spare, on the machine and in the container.
+//! How much memory the machine and its container have to spare, and how much this process has used.
 
 use std::fs::read_to_string;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes that can be had without ending somebody's program: what the machine has available, or what
 /// a container's limit leaves, if that is less; `None` where the system does not tell.
@@ -28,6 +29,24 @@ fn left_in(group: &Path) -> Option<u64> {
 fn bytes_of_line(text: &str, word: &str, unit: u64) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(word))?;
     rest.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(unit)
+}
+
+/// Largest resident set as last read; reading it takes as long as a small frame.
+static PEAK_RSS: AtomicU64 = AtomicU64::new(0);
+
+/// Largest resident set of this process so far, bytes; 0 where the system does not tell.
+pub(crate) fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = kib.and_then(|rest| rest.split_whitespace().next()?.parse::<u64>().ok());
+    let bytes = kib.unwrap_or(0) * 1024;
+    PEAK_RSS.store(bytes, Ordering::Relaxed);
+    bytes
+}
+
+/// The same as last read: good enough for a frame that allocates next to nothing.
+pub(crate) fn last_peak_rss_bytes() -> u64 {
+    PEAK_RSS.load(Ordering::Relaxed)
 }
 
 #[cfg(test)]

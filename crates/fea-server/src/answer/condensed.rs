@@ -1,0 +1,245 @@
+//! An answer from cached columns of the compliance: what a frame costs once a contact is known.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use softgrasp_core::model::{Known, ModelError};
+use softgrasp_core::solve::condensed::{Base, Certificate, ContactAnswer, ContactSet, Touched};
+use softgrasp_core::solve::{Method, Stage};
+use softgrasp_protocol::{Answer, Displacements, DofValue, NodeChoice, Question, SolveReport};
+
+use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
+use crate::clock::{StageClock, ms_since};
+use crate::machine_memory::{last_peak_rss_bytes, peak_rss_bytes};
+use crate::refusal::Refusal;
+use crate::request::{checked_masks, name_of};
+use crate::store::StoredModel;
+use crate::workers::{Rest, Workers};
+
+/// Above this condition of the small system the touched nodes hold the body weakly.
+const CONDITION_WARNING: f64 = 1e9;
+
+/// Which answer the reported strain and rotation belong to.
+#[derive(Clone, Copy)]
+pub(super) enum StrainOf<'a> {
+    /// The answer itself has to wait for it, and for the proof of the bound if `may_prove`.
+    ThisAnswer {
+        /// Whether there is memory for the proof.
+        may_prove: bool,
+    },
+    /// Worked out beside the frames; no frame waits.
+    NewestFrame(&'a Workers),
+}
+
+/// What one question touches on a model with a base.
+pub(crate) struct Contacts {
+    stored: Arc<StoredModel>,
+    base: Arc<Base>,
+    known: Known,
+    touched: Touched,
+    /// Prescribed displacement of every touched degree of freedom, then three per mask, m.
+    q: Vec<f64>,
+    /// Nodes whose displacements are wanted.
+    nodes: Vec<u32>,
+}
+
+/// The small system of some contacts, and whether it was kept from an earlier frame.
+pub(super) struct PreparedSet {
+    pub set: Arc<ContactSet>,
+    pub is_kept: bool,
+}
+
+impl Contacts {
+    /// Sorts out what is touched, without the degrees of freedom that the scene fixes.
+    ///
+    /// # Errors
+    /// [`Refusal`] where the model has no base, or a mask does not fit it.
+    pub fn new(
+        stored: Arc<StoredModel>,
+        question: &Question,
+        known: Known,
+    ) -> Result<Self, Refusal> {
+        let base = stored.base()?;
+        let fixed = base.fixed();
+        let (masks, of_masks) = checked_masks(&stored.model, question)?;
+        let pairs = known.dofs.iter().zip(&known.q_known);
+        let free = pairs.filter(|(dof, _)| fixed.binary_search(dof).is_err());
+        let (dofs, mut q): (Vec<u32>, Vec<f64>) = free.map(|(d, q)| (*d, *q)).unzip();
+        q.extend(of_masks);
+        let nodes = match &question.want.nodes {
+            NodeChoice::All => (0..stored.model.mesh().node_count() as u32).collect(),
+            NodeChoice::Nodes(nodes) => nodes.clone(),
+        };
+        Ok(Self { stored, base, known, touched: Touched { dofs, masks }, q, nodes })
+    }
+
+    /// The small system, if an earlier frame with the same contacts has left one.
+    pub fn kept_set(&self) -> Option<PreparedSet> {
+        let set = self.stored.set_for(&self.touched, &self.nodes)?;
+        Some(PreparedSet { set, is_kept: true })
+    }
+
+    /// Whether forces are wanted that take a product with the whole stiffness: those at the nodes
+    /// that the scene fixes.
+    pub fn has_large_product(&self, question: &Question) -> bool {
+        question.want.reactions && !self.base.fixed().is_empty()
+    }
+
+    fn made_set(&self, clock: &mut StageClock) -> Result<PreparedSet, Refusal> {
+        clock.begin(Stage::Factor);
+        let Self { stored, base, known, touched, nodes, .. } = self;
+        stored.model.check_held(&known.dofs, &touched.masks)?;
+        let mut set =
+            ContactSet::try_new(base, &stored.columns, touched).map_err(ModelError::from)?;
+        set.want(base, nodes);
+        let set = Arc::new(set);
+        stored.keep_set(nodes.clone(), Arc::clone(&set));
+        Ok(PreparedSet { set, is_kept: false })
+    }
+
+    /// Answers the question, with a kept small system or one made now.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn answer(
+        &self,
+        question: &Question,
+        why: &str,
+        strain: StrainOf<'_>,
+        mut clock: StageClock,
+    ) -> Result<Answer, Refusal> {
+        let prepared = match self.kept_set() {
+            Some(kept) => kept,
+            None => self.made_set(&mut clock)?,
+        };
+        self.answer_with(&prepared, question, why, strain, clock)
+    }
+
+    /// Answers the question with a small system that was found or made for it.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn answer_with(
+        &self,
+        PreparedSet { set, is_kept }: &PreparedSet,
+        question: &Question,
+        why: &str,
+        strain: StrainOf<'_>,
+        mut clock: StageClock,
+    ) -> Result<Answer, Refusal> {
+        let Self { stored, base, known, q, .. } = self;
+        clock.begin(Stage::Solve);
+        let solved = set.solve(q).map_err(ModelError::from)?;
+        let displacement = set.wanted_displacements(&solved);
+        if let StrainOf::ThisAnswer { may_prove: true } = strain {
+            // One request has no later frames that a proof in the background could serve.
+            base.estimate_condition();
+            base.prove_eigenvalue_min();
+        }
+        let certificate = set.certify(base, q, &solved, &displacement);
+        let mut stage_ms = clock.finish();
+        let start = Instant::now();
+        let (mut reactions, mut mask_forces) = (Vec::new(), Vec::new());
+        if question.want.reactions {
+            reactions = reactions_of(known, base, set, &solved);
+            let (of_masks, _) = solved.lambda[set.dofs().len()..].as_chunks();
+            mask_forces = of_masks.to_vec();
+        }
+        let displacements = Displacements::of(displacement, question.want.precision);
+        stage_ms.encode = ms_since(start);
+        if let StrainOf::ThisAnswer { .. } = strain {
+            stored.keep_strain(stored.model.strain(&set.full_displacement(base, &solved)));
+        }
+        let mut report = self.report(set, &certificate, why);
+        report.stage_ms = stage_ms;
+        report.factor_reused = *is_kept;
+        report.peak_rss_bytes = match is_kept {
+            true => last_peak_rss_bytes(),
+            false => peak_rss_bytes(),
+        };
+        if let Some(certainty) = set.certainty(base) {
+            add_certainty(certainty, question, &mut report)?;
+        }
+        add_unmet_wishes(question, &mut report);
+        if let StrainOf::NewestFrame(workers) = strain {
+            self.watch_strain(workers, Arc::clone(set), solved);
+        }
+        let nodes = question.want.nodes.clone();
+        Ok(Answer { report, nodes, displacements, reactions, mask_forces })
+    }
+
+    fn report(&self, set: &ContactSet, certificate: &Certificate, why: &str) -> SolveReport {
+        // Worked out beside the frames: it belongs to the newest frame it is known for.
+        let strain = self.stored.strain();
+        let mut warnings = strain_warnings(strain);
+        if set.condition() > CONDITION_WARNING {
+            warnings.push(format!(
+                "the touched nodes hold the body weakly (condition {:.0e}); spread them",
+                set.condition()
+            ));
+        }
+        // The average under a mask is one equation along each axis, as a known degree of freedom is.
+        let known_dofs = self.known.dofs.len() + 3 * set.touched().masks.len();
+        let model = &self.stored.model;
+        SolveReport {
+            method: Method::Condensed.to_string(),
+            element: name_of(model.element()),
+            unknown_dofs: (model.modelled_dofs() - known_dofs) as u64,
+            known_dofs: known_dofs as u64,
+            residual_rel: certificate.residual_rel,
+            error_bound_rel: certificate.error_bound_rel.ok(),
+            error_bound_why: certificate.error_bound_rel.err().unwrap_or_default().to_owned(),
+            max_rotation_deg: strain.rotation_max.to_degrees(),
+            max_strain: strain.strain_max,
+            precision: "f64".to_owned(),
+            condition_estimate: Some(set.condition()),
+            warnings,
+            chosen_because: why.to_owned(),
+            ..SolveReport::default()
+        }
+    }
+
+    /// Works out rotation and strain of a frame beside the frames that follow, one at a time,
+    /// resting for nine tenths of the time.
+    fn watch_strain(&self, workers: &Workers, set: Arc<ContactSet>, solved: ContactAnswer) {
+        let Some(claimed) = self.stored.strain_under_way.take() else { return };
+        let (stored, base) = (Arc::clone(&self.stored), Arc::clone(&self.base));
+        workers.beside(move || {
+            let mut rest = Rest::new();
+            let displacement = set.full_displacement(&base, &solved);
+            let newest = stored.model.strain_with_pauses(&displacement, &mut || rest.rest());
+            stored.keep_strain(newest);
+            drop(claimed);
+        });
+    }
+}
+
+/// Forces at all known degrees of freedom (3.43b): λ where touched, `K u` where the scene fixes.
+fn reactions_of(
+    known: &Known,
+    base: &Base,
+    set: &ContactSet,
+    solved: &ContactAnswer,
+) -> Vec<DofValue> {
+    let fixed = base.fixed();
+    let mut at_fixed = match fixed.is_empty() {
+        true => Vec::new(),
+        false => base.forces_of(&set.full_displacement(base, solved)),
+    };
+    // What a mask presses onto a fixed node is not the support's force.
+    if !at_fixed.is_empty() {
+        let (of_masks, _) = solved.lambda[set.dofs().len()..].as_chunks::<3>();
+        for (mask, force) in set.touched().masks.iter().zip(of_masks) {
+            for &(node, weight) in mask.entries() {
+                for (axis, force) in force.iter().enumerate() {
+                    at_fixed[3 * node as usize + axis] -= weight * force;
+                }
+            }
+        }
+    }
+    let force = |dof: &u32| match set.dofs().binary_search(dof) {
+        Ok(at) => solved.lambda[at],
+        Err(_) => at_fixed.get(*dof as usize).copied().unwrap_or(0.0),
+    };
+    known.dofs.iter().map(|dof| DofValue { dof: *dof, value: force(dof) }).collect()
+}

@@ -1,0 +1,194 @@
+//! One frame on a kept model.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+use softgrasp_core::model::{Known, ModelError};
+use softgrasp_core::solve::choose::{Plan, Question};
+use softgrasp_core::solve::{Factored, Method};
+use softgrasp_protocol::{
+    Answer, FrameRequest, ModelHash, NodeChoice, Question as QuestionMessage,
+};
+
+use super::condensed::{Contacts, PreparedSet, StrainOf};
+use super::direct::{self, Posed};
+use super::factor::{FactorRequest, because_of_memory};
+use crate::clock::StageClock;
+use crate::plan::{Subject, plan_frame};
+use crate::refusal::Refusal;
+use crate::request::{checked_forces, name_of, pairs, question_of};
+use crate::resources::Resources;
+use crate::store::StoredModel;
+
+/// Numbers multiplied for a frame that takes less time than handing it to another thread.
+const SMALL_PRODUCTS: usize = 1 << 18;
+
+/// Numbers that such a frame prescribes at most.
+const TOUCHED_MAX: usize = 1 << 10;
+
+/// A frame with all that its plan needs.
+struct Frame {
+    hash: ModelHash,
+    stored: Arc<StoredModel>,
+    message: QuestionMessage,
+    question: Question,
+    known: Known,
+    forces: Vec<f64>,
+    plan: Plan,
+}
+
+/// A frame whose contact set is kept, with that set: nothing has to be made for its answer.
+pub(crate) struct KeptFrame {
+    frame: Frame,
+    contacts: Contacts,
+    prepared: PreparedSet,
+}
+
+/// A frame that is ready to be answered, or one that has to be worked on by the pool.
+pub(crate) enum Readiness {
+    /// A small product with what is kept.
+    Ready(Box<KeptFrame>),
+    /// Anything else.
+    NotReady(FrameRequest),
+}
+
+/// Looks whether a frame is a small product with what is kept, and holds on to what was found.
+pub(crate) fn readiness(resources: &Resources, request: FrameRequest) -> Readiness {
+    match kept_frame(resources, &request) {
+        Some(kept) => Readiness::Ready(Box::new(kept)),
+        None => Readiness::NotReady(request),
+    }
+}
+
+fn kept_frame(resources: &Resources, request: &FrameRequest) -> Option<KeptFrame> {
+    let QuestionMessage { known, masks, want, .. } = &request.question;
+    let NodeChoice::Nodes(nodes) = &want.nodes else { return None };
+    // What cannot be small is not even copied for a look, on the thread that all sockets share.
+    let forces = known.len() + 3 * masks.len();
+    if forces > TOUCHED_MAX || 3 * nodes.len() * forces > SMALL_PRODUCTS {
+        return None;
+    }
+    let frame = Frame::new(resources, request.clone()).ok()?;
+    if frame.plan.method != Method::Condensed {
+        return None;
+    }
+    let stored = Arc::clone(&frame.stored);
+    let contacts = Contacts::new(stored, &frame.message, frame.known.clone()).ok()?;
+    let prepared = contacts.kept_set()?;
+    let is_small =
+        prepared.set.products() <= SMALL_PRODUCTS && !contacts.has_large_product(&frame.message);
+    is_small.then_some(KeptFrame { frame, contacts, prepared })
+}
+
+impl KeptFrame {
+    /// Answers at once, with what was found.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn answer(&self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {
+        let Self { frame, contacts, prepared } = self;
+        let strain = StrainOf::NewestFrame(&resources.workers);
+        contacts.answer_with(prepared, &frame.message, &frame.plan.why, strain, clock)
+    }
+}
+
+/// One frame on a kept model.
+///
+/// # Errors
+/// [`Refusal`].
+pub(crate) fn answer_frame(
+    resources: &Resources,
+    request: FrameRequest,
+    clock: StageClock,
+) -> Result<Answer, Refusal> {
+    let mut frame = Frame::new(resources, request)?;
+    if frame.plan.method == Method::Condensed {
+        let answer = frame.by_columns(resources, clock.clone());
+        resources.models.trim();
+        match answer {
+            // What the small system cannot do, a factor of its own may.
+            Err(Refusal::Model(ModelError::Condensed(error)))
+                if frame.question.method.is_none() && frame.message.masks.is_empty() =>
+            {
+                let why = format!("not condensed: {error}");
+                let plan = frame.question.plan(frame.plan.element, Method::Front, why);
+                frame.plan = Plan { instead: Some(Method::FrontMixed), ..plan };
+            }
+            answered => return answered,
+        }
+    }
+    frame.by_factor(resources, clock)
+}
+
+impl Frame {
+    fn new(resources: &Resources, request: FrameRequest) -> Result<Self, Refusal> {
+        let FrameRequest { model: hash, question: message } = request;
+        let stored = resources.models.find(hash).ok_or(Refusal::UnknownModel(hash))?;
+        let model = &stored.model;
+        let question = question_of(&message, Some(model.element()), 0.0)?;
+        let known = model.known(pairs(&message.known))?;
+        let forces = checked_forces(model, &known, &message)?;
+        let has = (!message.masks.is_empty(), !message.forces.is_empty());
+        let plan = plan_frame(&question, &stored, &known, has)?;
+        Ok(Self { hash, stored, message, question, known, forces, plan })
+    }
+
+    fn by_columns(&self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {
+        let stored = Arc::clone(&self.stored);
+        let contacts = Contacts::new(stored, &self.message, self.known.clone())?;
+        let strain = StrainOf::NewestFrame(&resources.workers);
+        contacts.answer(&self.message, &self.plan.why, strain, clock)
+    }
+
+    fn by_factor(self, resources: &Resources, mut clock: StageClock) -> Result<Answer, Refusal> {
+        let kept = self.kept_factor();
+        let factor_reused = kept.is_some();
+        let factored = match kept {
+            Some(factored) => factored,
+            None => self.made_factor(resources, &mut clock)?,
+        };
+        let Self { stored, message, known, forces, plan, .. } = self;
+        let posed = Posed {
+            question: &message,
+            known,
+            forces,
+            element: name_of(plan.element),
+            factor_reused,
+            chosen_because: because_of_memory(plan.why, plan.method, factored.method()),
+        };
+        direct::answer(&stored.model, &factored, posed, clock)
+    }
+
+    fn kept_factor(&self) -> Option<Arc<Factored>> {
+        let Self { stored, known, plan, .. } = self;
+        let kept = |method| stored.factor_for(&known.dofs, method);
+        let instead = plan.instead.filter(|_| stored.single_only.load(Relaxed));
+        kept(plan.method).or_else(|| instead.and_then(kept))
+    }
+
+    fn made_factor(
+        &self,
+        resources: &Resources,
+        clock: &mut StageClock,
+    ) -> Result<Arc<Factored>, Refusal> {
+        let Self { hash, stored, known, plan, .. } = self;
+        let reservation = resources.budget.reservation();
+        let request = FactorRequest {
+            models: &resources.models,
+            reservation: &reservation,
+            model: &stored.model,
+            dofs: &known.dofs,
+            subject: &Subject::about(&stored.model, known.dofs.len(), Some(*hash)),
+            held: stored.lasting_bytes(),
+        };
+        let methods: Vec<Method> = [plan.method].into_iter().chain(plan.instead).collect();
+        let made = Arc::new(request.factor(&methods, clock)?);
+        if made.method() != plan.method {
+            stored.single_only.store(true, Relaxed);
+        }
+        drop(reservation);
+        stored.keep_factor(known.dofs.clone(), Arc::clone(&made));
+        resources.models.trim();
+        Ok(made)
+    }
+}

@@ -1,0 +1,52 @@
+//! The models that one session has named: none of them is forgotten while another session holds it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use softgrasp_protocol::ModelHash;
+
+use crate::resources::Resources;
+
+/// Models that a session holds; all are released when it ends.
+pub(crate) struct HeldModels {
+    resources: Arc<Resources>,
+    held: BTreeSet<ModelHash>,
+}
+
+impl HeldModels {
+    /// None.
+    pub fn new(resources: Arc<Resources>) -> Self {
+        Self { resources, held: BTreeSet::new() }
+    }
+
+    /// Holds a model if it is kept, and says whether it is.
+    pub fn hold(&mut self, model: ModelHash) -> bool {
+        let models = &self.resources.models;
+        match self.held.contains(&model) {
+            true => models.find(model).is_some(),
+            false => {
+                let is_kept = models.hold(model);
+                if is_kept {
+                    self.held.insert(model);
+                }
+                is_kept
+            }
+        }
+    }
+
+    /// Releases a model; it is forgotten unless another session holds it.
+    pub fn drop_model(&mut self, model: ModelHash) {
+        if self.held.remove(&model) {
+            self.resources.models.release(model);
+        }
+        self.resources.models.forget(model);
+    }
+}
+
+impl Drop for HeldModels {
+    fn drop(&mut self) {
+        for model in &self.held {
+            self.resources.models.release(*model);
+        }
+    }
+}

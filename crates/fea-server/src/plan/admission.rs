@@ -1,0 +1,103 @@
+//! Reserves memory for a request: by what is predicted from the size of its mesh before anything is
+//! made, by what is counted before a factor is.
+
+use softgrasp_core::fem::Element;
+use softgrasp_core::model::Model;
+use softgrasp_core::solve::memory::{Need, Problem};
+use softgrasp_core::solve::work::MeshSize;
+use softgrasp_core::solve::{Analysed, FrontMethod, Method};
+use softgrasp_protocol::{MeshData, ModelHash};
+
+use super::shortage::Shortage;
+use crate::budget::Reservation;
+use crate::machine_memory::available_bytes;
+use crate::store::ModelStore;
+
+/// What a request for memory is about.
+#[derive(Clone, Copy)]
+pub(crate) struct Subject {
+    pub problem: Problem,
+    pub unknown_dofs: usize,
+    /// A kept model that must not be dropped to make room; its bytes are those of the need.
+    pub kept: Option<ModelHash>,
+}
+
+impl Subject {
+    /// A request that brings its own mesh.
+    pub fn once(mesh: &MeshData, known_dofs: usize) -> Self {
+        let size = size_of(mesh);
+        let unknown_dofs = (3 * size.nodes).saturating_sub(known_dofs);
+        Self { problem: Problem { size, known_dofs }, unknown_dofs, kept: None }
+    }
+
+    /// A model that is there.
+    pub fn about(model: &Model, known_dofs: usize, kept: Option<ModelHash>) -> Self {
+        let nodes = model.mesh().used_nodes().iter().filter(|used| **used).count();
+        let size = MeshSize { nodes, tets: model.mesh().tets().len() };
+        let unknown_dofs = model.modelled_dofs().saturating_sub(known_dofs);
+        Self { problem: Problem { size, known_dofs }, unknown_dofs, kept }
+    }
+
+    /// What some methods are predicted to need.
+    pub fn predict(&self, element: Element, methods: &[Method]) -> Vec<Need> {
+        methods.iter().map(|&method| Need::predicted(self.problem, element, method)).collect()
+    }
+}
+
+/// Reserves memory for the first of some needs that fits, and drops what is kept and unused for
+/// longest to make room for it. A prediction is refused only if the least it can be is too much.
+///
+/// # Errors
+/// [`Shortage`] if none fits.
+pub(crate) fn admit(
+    models: &ModelStore,
+    reservation: &Reservation,
+    needs: &[Need],
+    subject: &Subject,
+) -> Result<Need, Box<Shortage>> {
+    let available = available_bytes();
+    let is_there = |need: &Need| available.is_none_or(|there| need.factor_bytes_min <= there);
+    let mut is_machine = false;
+    for need in needs {
+        let (own, held) = match subject.kept {
+            None => (need.bytes_min(), 0),
+            Some(_) => (need.factor_bytes_min, need.model_bytes),
+        };
+        if !is_there(need) {
+            is_machine = true;
+        } else if reservation.reserve(own, held) {
+            models.make_room(subject.kept);
+            return Ok(*need);
+        }
+    }
+    Err(shortage(reservation, needs, subject, available.filter(|_| is_machine)))
+}
+
+/// What is short, `available` being what the machine has to spare if that is what is too little.
+pub(crate) fn shortage(
+    reservation: &Reservation,
+    asked: &[Need],
+    subject: &Subject,
+    available: Option<u64>,
+) -> Box<Shortage> {
+    let limits = (reservation.limit(), reservation.of_others());
+    Box::new(Shortage::new(asked, subject.problem, subject.unknown_dofs, limits, available))
+}
+
+/// What a factor over fronts needs once its pattern is analysed, `held` bytes being what the model
+/// holds.
+pub(crate) fn counted(model: &Model, held: u64, analysed: &Analysed, front: FrontMethod) -> Need {
+    let blocks = model.stiffness().pattern().block_count();
+    Need::counted(model.element(), front.into(), held, blocks, analysed.analysis())
+}
+
+/// Nodes that elements use, and elements; indices out of range are refused elsewhere.
+fn size_of(mesh: &MeshData) -> MeshSize {
+    let mut used = vec![false; mesh.vertices.len()];
+    for &node in mesh.tets.iter().flatten() {
+        if let Some(used) = used.get_mut(node as usize) {
+            *used = true;
+        }
+    }
+    MeshSize { nodes: used.iter().filter(|used| **used).count(), tets: mesh.tets.len() }
+}

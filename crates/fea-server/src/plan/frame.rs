@@ -1,0 +1,62 @@
+//! The plan for a frame on a kept model: kept columns for whatever they can answer, else a factor.
+
+use softgrasp_core::model::Known;
+use softgrasp_core::solve::Method;
+use softgrasp_core::solve::choose::{Plan, Question};
+
+use super::error::PlanError;
+use super::once::{ASKED, plan_for_masks};
+use crate::store::StoredModel;
+
+/// Above so many touched degrees of freedom the small system is not small any more.
+const TOUCHED_DOFS_MAX: usize = 600;
+
+/// What is done for one frame.
+///
+/// # Errors
+/// [`PlanError`] where the method asked for, or masks, cannot be answered on this model.
+pub(crate) fn plan_frame(
+    question: &Question,
+    stored: &StoredModel,
+    known: &Known,
+    (has_masks, has_forces): (bool, bool),
+) -> Result<Plan, PlanError> {
+    let element = stored.model.element();
+    let asked = question.method;
+    if let Some(method) = asked.filter(|method| *method != Method::Condensed && !has_masks) {
+        return Ok(question.plan(element, method, ASKED));
+    }
+    let obstacle = match stored.base() {
+        Err(error) => Some(PlanError::Model(error)),
+        Ok(_) if has_forces => Some(PlanError::CondensedForces),
+        Ok(_) => moved_fixed_node(stored, known).map(|node| PlanError::FixedMoved { node }),
+    };
+    if has_masks {
+        return plan_for_masks(question, element, obstacle);
+    }
+    let by_factor = |why: String| Plan {
+        instead: Some(Method::FrontMixed),
+        ..question.plan(element, Method::Front, format!("not condensed: {why}"))
+    };
+    let touched = known.dofs.len() - stored.model.fixed().len().min(known.dofs.len());
+    match (asked, obstacle) {
+        (None, _) if touched > TOUCHED_DOFS_MAX => {
+            Ok(by_factor(format!("{touched} degrees of freedom are held at once")))
+        }
+        (None, None) => {
+            let why = "frames on a kept model: exact from cached columns";
+            Ok(question.plan(element, Method::Condensed, why))
+        }
+        (None, Some(obstacle)) => Ok(by_factor(obstacle.to_string())),
+        (Some(_), None) => Ok(question.plan(element, Method::Condensed, ASKED)),
+        (Some(_), Some(obstacle)) => Err(obstacle),
+    }
+}
+
+/// A node that the scene fixes and the question moves all the same.
+fn moved_fixed_node(stored: &StoredModel, known: &Known) -> Option<u32> {
+    let fixed = stored.model.fixed();
+    let moved = |(dof, q): (&u32, &f64)| *q != 0.0 && fixed.binary_search(dof).is_ok();
+    let mut pairs = known.dofs.iter().zip(&known.q_known);
+    pairs.find(|&pair| moved(pair)).map(|(dof, _)| dof / 3)
+}

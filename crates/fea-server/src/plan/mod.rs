@@ -1,0 +1,17 @@
+//! From a question to a plan: method, element and precision, within the memory there is.
+
+mod admission;
+mod error;
+mod frame;
+mod once;
+mod rates;
+mod shortage;
+mod why;
+
+pub(crate) use admission::{Subject, admit, counted, shortage};
+pub(crate) use error::PlanError;
+pub(crate) use frame::plan_frame;
+pub(crate) use once::{OnceRequest, plan_after_order, plan_once};
+pub(crate) use rates::MeasuredRates;
+pub use rates::measure_rates;
+pub(crate) use why::because;

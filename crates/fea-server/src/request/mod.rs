@@ -1,0 +1,11 @@
+//! From a decoded message to what the core takes, checked before anything costly is done.
+
+mod checks;
+mod model;
+mod question;
+
+pub(crate) use checks::{checked_forces, checked_masks, paired, pairs};
+pub(crate) use model::{
+    check_node_count, element_given, element_of, model_of, name_of, poisson_max,
+};
+pub(crate) use question::question_of;

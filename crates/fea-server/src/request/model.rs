@@ -1,0 +1,110 @@
+//! A model from what a message brings: mesh, materials, element, fixed degrees of freedom.
+
+use nalgebra::Point3;
+use softgrasp_core::fem::{Element, Material};
+use softgrasp_core::mesh::{TetMesh, signed_volume};
+use softgrasp_core::model::Model;
+use softgrasp_protocol::{ElementChoice, ElementName, Material as MaterialMessage, MeshData};
+
+use crate::clock::StageClock;
+use crate::refusal::Refusal;
+
+/// A model from what has been sent, with all that is checked of it.
+///
+/// # Errors
+/// [`Refusal`] for what the mesh, the materials or the fixed degrees of freedom are at fault for.
+pub(crate) fn model_of(
+    mesh: MeshData,
+    materials: &[MaterialMessage],
+    element: Element,
+    fixed: Vec<u32>,
+    clock: &mut StageClock,
+) -> Result<Model, Refusal> {
+    if materials.is_empty() {
+        return Err(Refusal::NoMaterial);
+    }
+    let materials: Vec<Material> = materials
+        .iter()
+        .map(|m| Material::try_new(m.young, m.poisson))
+        .collect::<Result<_, _>>()?;
+    let regions = ranks(&mesh.regions, materials.len())?;
+    let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
+    let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
+    let mesh = TetMesh::try_new(vertices, tets, regions)?;
+    Ok(Model::try_new(mesh, element, &materials, fixed, &mut |stage| clock.begin(stage))?)
+}
+
+/// Refuses a mesh of more nodes than the server takes, before anything is allocated for it.
+///
+/// # Errors
+/// [`Refusal::TooManyNodes`] with both numbers.
+pub(crate) fn check_node_count(mesh: &MeshData, max: u32) -> Result<(), Refusal> {
+    let node_count = mesh.vertices.len();
+    match node_count > max as usize {
+        true => Err(Refusal::TooManyNodes { node_count, max }),
+        false => Ok(()),
+    }
+}
+
+/// Name of an element on the wire.
+pub(crate) fn name_of(element: Element) -> ElementName {
+    match element {
+        Element::Tet4 => ElementName::T4,
+        Element::Tet10 => ElementName::T10,
+        Element::Tet4Anp => ElementName::T4Anp,
+    }
+}
+
+/// The element behind a name on the wire.
+pub(crate) fn element_of(name: ElementName) -> Element {
+    match name {
+        ElementName::T4 => Element::Tet4,
+        ElementName::T10 => Element::Tet10,
+        ElementName::T4Anp => Element::Tet4Anp,
+    }
+}
+
+/// The element that a request names; `None` where it leaves the choice to the server.
+pub(crate) fn element_given(choice: ElementChoice) -> Option<Element> {
+    match choice {
+        ElementChoice::T4 => Some(Element::Tet4),
+        ElementChoice::T10 => Some(Element::Tet10),
+        ElementChoice::T4Anp => Some(Element::Tet4Anp),
+        ElementChoice::Auto => None,
+    }
+}
+
+/// Largest Poisson's ratio of some materials.
+pub(crate) fn poisson_max(materials: &[MaterialMessage]) -> f64 {
+    materials.iter().map(|material| material.poisson).fold(-1.0, f64::max)
+}
+
+/// The corners in the order of (3.23). Gmsh and VTK count them the other way round, and the
+/// stiffness does not depend on it, so clients may send either.
+fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
+    let corner = |i: usize| vertices.get(tet[i] as usize).copied();
+    match (corner(0), corner(1), corner(2), corner(3)) {
+        (Some(a), Some(b), Some(c), Some(d)) if signed_volume(&[a, b, c, d]) < 0.0 => {
+            [tet[0], tet[1], tet[3], tet[2]]
+        }
+        // Indices out of range are refused with the mesh.
+        _ => tet,
+    }
+}
+
+/// Region labels as positions in the list of materials, which stands in ascending order of the
+/// labels; empty when one material is for the whole body. Labels are any numbers: nothing may be
+/// as large as they are.
+fn ranks(labels: &[u32], materials: usize) -> Result<Vec<u32>, Refusal> {
+    if materials == 1 {
+        return Ok(Vec::new());
+    }
+    let mut known = labels.to_vec();
+    known.sort_unstable();
+    known.dedup();
+    // Without labels all elements belong to one region.
+    if known.len().max(1) != materials {
+        return Err(Refusal::Regions { labels: known.len(), materials });
+    }
+    Ok(labels.iter().map(|label| known.partition_point(|k| k < label) as u32).collect())
+}

@@ -1,0 +1,25 @@
+//! What all requests of one server share.
+
+use crate::budget::Budget;
+use crate::config::ServerConfig;
+use crate::plan::MeasuredRates;
+use crate::store::ModelStore;
+use crate::workers::Workers;
+
+/// Settings, kept models, memory, solving threads and their speed.
+pub(crate) struct Resources {
+    pub config: ServerConfig,
+    pub models: ModelStore,
+    pub budget: Budget,
+    pub workers: Workers,
+    pub rates: MeasuredRates,
+}
+
+impl Resources {
+    /// Those of a server that has just started.
+    pub fn new(config: ServerConfig, workers: Workers) -> Self {
+        let budget = Budget::new(config.memory_limit);
+        let models = ModelStore::new(budget.clone());
+        Self { config, models, budget, workers, rates: MeasuredRates::default() }
+    }
+}

@@ -1,0 +1,8 @@
+//! Models kept between requests, with what has been made for them, under the memory budget.
+
+mod model_store;
+mod recent;
+mod stored_model;
+
+pub(crate) use model_store::ModelStore;
+pub(crate) use stored_model::{Allowed, StoredModel};

@@ -1,0 +1,185 @@
+//! A kept model and what has been made for it: factors, base, columns, contact sets, strain.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use softgrasp_core::fem::StrainSummary;
+use softgrasp_core::model::{Model, ModelError};
+use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Touched};
+use softgrasp_core::solve::{Factored, Method, Stage};
+
+use super::recent::Recent;
+use crate::lock::Lock;
+
+/// A model and what has been made for it.
+pub(crate) struct StoredModel {
+    pub model: Model,
+    factors: Lock<Recent<KeptFactor>>,
+    base: Result<Arc<Base>, ModelError>,
+    pub columns: Columns,
+    /// Whether a factor in double precision was larger than allowed.
+    pub single_only: AtomicBool,
+    sets: Lock<Recent<KeptSet>>,
+    strain: Lock<StrainSummary>,
+    /// Whether somebody works out the strain of a frame.
+    pub strain_under_way: Claim,
+    /// Whether somebody proves the bound of the smallest eigenvalue.
+    pub proof_under_way: Claim,
+}
+
+/// Something that one thread at a time does and nobody waits for.
+#[derive(Default)]
+pub(crate) struct Claim(Arc<AtomicBool>);
+
+/// A claim that is held; given back when dropped, after a panic as well.
+pub(crate) struct Claimed(Arc<AtomicBool>);
+
+impl Claim {
+    /// Claims it, or `None` if it is claimed.
+    pub fn take(&self) -> Option<Claimed> {
+        (!self.0.swap(true, Ordering::Acquire)).then(|| Claimed(Arc::clone(&self.0)))
+    }
+}
+
+impl Drop for Claimed {
+    fn drop(&mut self) {
+        self.0.store(false, Ordering::Release);
+    }
+}
+
+/// Bytes that a model and what is made for it may take.
+#[derive(Clone, Copy)]
+pub(crate) struct Allowed {
+    /// All of it.
+    pub bytes: u64,
+    /// Columns of the compliance.
+    pub column_cache: u64,
+}
+
+/// A factor for a set of known degrees of freedom.
+struct KeptFactor {
+    dofs: Vec<u32>,
+    factored: Arc<Factored>,
+}
+
+/// A contact set with the rows of the nodes that answers are wanted for.
+struct KeptSet {
+    nodes: Vec<u32>,
+    set: Arc<ContactSet>,
+}
+
+/// Factors kept per model; a grasp needs one, a change of grip a second.
+const FACTORS_MAX: usize = 4;
+/// Contact sets kept per model.
+const SETS_MAX: usize = 8;
+
+impl StoredModel {
+    /// A model with the base of the condensed engine, or the reason why it has none; columns get
+    /// what the base leaves.
+    pub fn new(model: Model, allowed: Allowed, on_stage: &mut dyn FnMut(Stage)) -> Self {
+        let left = allowed.bytes.saturating_sub(model.bytes() as u64);
+        let base = model.condense_within(left, on_stage).map(Arc::new);
+        let base_bytes = base.as_ref().map_or(0, |base| base.bytes()) as u64;
+        let column_bytes = allowed.column_cache.min(left.saturating_sub(base_bytes));
+        Self {
+            model,
+            factors: Lock::default(),
+            base,
+            columns: Columns::new(usize::try_from(column_bytes).unwrap_or(usize::MAX)),
+            single_only: AtomicBool::default(),
+            sets: Lock::default(),
+            strain: Lock::default(),
+            strain_under_way: Claim::default(),
+            proof_under_way: Claim::default(),
+        }
+    }
+
+    /// The base of the condensed engine, or why there is none.
+    pub fn base(&self) -> Result<Arc<Base>, ModelError> {
+        self.base.clone()
+    }
+
+    /// A contact set with the rows of some nodes, if it is kept.
+    pub fn set_for(&self, touched: &Touched, nodes: &[u32]) -> Option<Arc<ContactSet>> {
+        let is_it = |kept: &KeptSet| kept.set.touched() == touched && kept.nodes == nodes;
+        self.sets.with(|sets| sets.find(is_it).map(|kept| Arc::clone(&kept.set)))
+    }
+
+    /// Keeps a contact set; the one unused for longest goes when there are too many.
+    pub fn keep_set(&self, nodes: Vec<u32>, set: Arc<ContactSet>) {
+        self.sets.with(|sets| {
+            // Two frames at once may have made the same set.
+            sets.retain(|kept| kept.set.touched() != set.touched() || kept.nodes != nodes);
+            sets.push(KeptSet { nodes, set });
+            sets.shorten(SETS_MAX);
+        });
+    }
+
+    /// Strain of the newest frame it is known for; zero before the first.
+    pub fn strain(&self) -> StrainSummary {
+        self.strain.with(|strain| *strain)
+    }
+
+    /// Keeps the strain of the newest frame.
+    pub fn keep_strain(&self, newest: StrainSummary) {
+        self.strain.with(|strain| *strain = newest);
+    }
+
+    /// Factor for a set of known degrees of freedom by a method, if it is kept.
+    pub fn factor_for(&self, dofs: &[u32], method: Method) -> Option<Arc<Factored>> {
+        let is_it = |kept: &KeptFactor| kept.factored.method() == method && kept.dofs == dofs;
+        self.factors.with(|factors| factors.find(is_it).map(|kept| Arc::clone(&kept.factored)))
+    }
+
+    /// Keeps a factor; the one unused for longest goes when there are too many.
+    pub fn keep_factor(&self, dofs: Vec<u32>, factored: Arc<Factored>) {
+        self.factors.with(|factors| {
+            let method = factored.method();
+            factors.retain(|kept| kept.factored.method() != method || kept.dofs != dofs);
+            factors.push(KeptFactor { dofs, factored });
+            factors.shorten(FACTORS_MAX);
+        });
+    }
+
+    /// Bytes of the model and the base: what cannot be dropped without the model.
+    pub fn lasting_bytes(&self) -> u64 {
+        let base = self.base.as_ref().map_or(0, |base| base.bytes());
+        (self.model.bytes() + base) as u64
+    }
+
+    /// Bytes of all that is kept.
+    pub fn bytes(&self) -> u64 {
+        let columns = self.base.as_ref().map_or(0, |base| self.columns.bytes(base));
+        let factors: usize =
+            self.factors.with(|factors| factors.iter().map(|kept| kept.factored.bytes()).sum());
+        let sets: usize = self.sets.with(|sets| sets.iter().map(|kept| kept.set.bytes()).sum());
+        self.lasting_bytes() + (columns + factors + sets) as u64
+    }
+
+    /// Drops factors and contact sets, which can be made again.
+    pub fn drop_factors_and_sets(&self) {
+        self.factors.with(Recent::clear);
+        self.sets.with(Recent::clear);
+    }
+
+    /// Drops the columns, which can be made again.
+    pub fn drop_columns(&self) {
+        self.columns.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn claim_is_given_back_after_a_panic() {
+        let claim = Claim::default();
+        let broken = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let _claimed = claim.take().unwrap();
+            assert!(claim.take().is_none(), "claimed once");
+            panic!("a fault");
+        }));
+        assert!(broken.is_err() && claim.take().is_some());
+    }
+}
