@@ -4,6 +4,7 @@ pub mod conversation;
 pub mod fake_server;
 pub mod faulty_proxy;
 pub mod heard;
+pub mod imports;
 pub mod questions;
 pub mod random;
 pub mod raw_session;

@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use softgrasp_tests::imports::Package;
+
 /// Lines a source file may have.
 const LINES_MAX: usize = 500;
 /// Longer files, each with its reason; there is none.
@@ -150,6 +152,53 @@ fn crates_depend_downwards_only() {
         }
     }
     assert_none("layers", faults);
+}
+
+#[test]
+fn no_file_imports_a_file_that_imports_it() {
+    let folders = ["core", "protocol", "fea-server", "os", "glove-client"];
+    let folders = folders.map(|name| format!("crates/{name}/src"));
+    let mut faults = Vec::new();
+    let mut files = 0;
+    for folder in folders.iter().map(String::as_str).chain(["benches/src", "tests/src"]) {
+        let package = Package::read(&root().join(folder)).expect("sources can be read");
+        files += package.len();
+        let short = |file: &str| file.rsplit("/src/").next().unwrap_or(file).to_owned();
+        faults.extend(package.circles().into_iter().map(|circle| {
+            let circle: Vec<String> = circle.into_iter().map(short).collect();
+            format!("{folder}: {}", circle.join(", "))
+        }));
+    }
+    assert!(files > 200, "only {files} files read: the walk is broken");
+    assert_none("these import each other in a circle", faults);
+}
+
+/// Files that may hold a once-cell or a bare mutex, each with the reason why it cannot hang.
+const WAITING_FILES: [(&str, &str); 4] = [
+    ("crates/core/src/solve/worked_out.rs", "set only when the work is done; nobody waits"),
+    ("crates/core/src/solve/ordering.rs", "METIS, which is sequential, under it"),
+    ("crates/core/src/solve/condensed/columns.rs", "look-ups and changes of a map under it"),
+    ("crates/fea-server/src/lock.rs", "closures only; work that begins under it panics"),
+];
+
+#[test]
+fn no_lock_or_once_cell_can_be_held_across_parallel_work() {
+    let banned = ["OnceLock", "OnceCell", "LazyLock", "Mutex", "RwLock", "Condvar"];
+    let mut faults = Vec::new();
+    for file in text_files() {
+        let is_solving =
+            ["crates/core/src/", "crates/fea-server/src/"].iter().any(|f| file.path.starts_with(f));
+        if !is_solving || WAITING_FILES.iter().any(|(path, _)| *path == file.path) {
+            continue;
+        }
+        for (line, text) in file.shipped_code() {
+            // Those of tokio wait without a thread.
+            let is_asynchronous = file.path.ends_with("/uploads.rs");
+            let found = banned.iter().filter(|b| !is_asynchronous && text.contains(**b));
+            faults.extend(found.map(|b| format!("{}:{line}: {b}", file.path)));
+        }
+    }
+    assert_none("a thread that waits in a parallel loop takes other work: use Lock", faults);
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! Listening, accepting, stopping.
 
 use std::net::SocketAddr;
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{Limits, RejectCode, Rejected, Reply};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Semaphore, oneshot, watch};
+use tokio::sync::{Semaphore, watch};
 use tokio::task::JoinSet;
 
 use crate::config::{ConfigError, ServerConfig};
@@ -173,18 +173,13 @@ pub struct RunningServer {
 /// [`StartError`].
 pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
     let (stop, stopped) = watch::channel(false);
-    let (ready, is_ready) = oneshot::channel();
+    let (ready, is_ready) = mpsc::channel();
     let runtime = sockets_runtime(&config).map_err(StartError::Runtime)?;
     let thread = std::thread::Builder::new().name("server".to_owned());
     let thread = thread
         .spawn(move || {
-            let ready = std::sync::Mutex::new(Some(ready));
-            let say = |outcome| {
-                let sender = ready.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
-                if let Some(sender) = sender {
-                    let _ = sender.send(outcome);
-                }
-            };
+            // The first word counts; nobody listens for a second one.
+            let say = |outcome| drop(ready.send(outcome));
             let served = runtime.block_on(serve(config, |address| say(Ok(address)), stopped));
             // Whatever the threads are at, a stop does not wait for them.
             runtime.shutdown_background();
@@ -193,7 +188,7 @@ pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
             }
         })
         .map_err(StartError::Runtime)?;
-    match is_ready.blocking_recv() {
+    match is_ready.recv() {
         Ok(Ok(address)) => Ok(RunningServer { address, stop, thread: Some(thread) }),
         Ok(Err(error)) => Err(error),
         Err(_) => Err(StartError::Runtime(std::io::Error::other("the server's thread ended"))),

@@ -1,13 +1,7 @@
 //! The 32 bytes before every payload.
 
+use crate::format::{HEADER_LEN, MAGIC, VERSION};
 use crate::{FrameError, Limits};
-
-/// First bytes of every frame.
-pub const MAGIC: [u8; 4] = *b"SGRP";
-/// Version of the format this crate reads and writes.
-pub const VERSION: u16 = 3;
-/// Bytes of a header.
-pub const HEADER_LEN: usize = 32;
 
 /// What the header of a frame says; the kind stays a number, since an unknown kind in a sound
 /// frame is a bad request and not a bad stream.

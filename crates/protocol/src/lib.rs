@@ -15,6 +15,7 @@
 pub mod asynchronous;
 pub mod blocking;
 mod error;
+mod format;
 mod frame_buffer;
 mod header;
 mod kind;
@@ -23,8 +24,9 @@ mod message;
 mod payload;
 
 pub use error::{ConnectionError, DecodeError, EncodeError, FrameError};
+pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION};
 pub use frame_buffer::{Frame, FrameBuffer};
-pub use header::{HEADER_LEN, Header, MAGIC, VERSION};
+pub use header::Header;
 pub use kind::Kind;
-pub use limits::{Limits, PART_LEN_MAX};
+pub use limits::Limits;
 pub use message::*;

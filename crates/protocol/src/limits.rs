@@ -4,9 +4,6 @@ use wincode::{SchemaRead, SchemaWrite};
 
 use crate::DecodeError;
 
-/// Most bytes the bincode part of a payload may take; part of the format.
-pub const PART_LEN_MAX: usize = 64 * 1024;
-
 /// Limits one side puts on what it reads; the server tells its own in `Welcome`.
 ///
 /// Units: bytes for `…_len_max`, entries for `…_count_max`. Announced counts are compared with

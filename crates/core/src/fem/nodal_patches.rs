@@ -17,7 +17,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::pattern::elements_around;
+use super::elements_around::elements_around;
 use super::tet4;
 use crate::mesh::TetMesh;
 

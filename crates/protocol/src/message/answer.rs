@@ -2,7 +2,8 @@
 
 use wincode::{SchemaRead, SchemaWrite};
 
-use super::question::{DofValue, NodeChoice, Precision};
+use super::dof_value::DofValue;
+use super::question::{NodeChoice, Precision};
 use super::report::SolveReport;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};

@@ -1,6 +1,7 @@
 //! Typed messages: what the client asks and what the server answers.
 
 mod answer;
+mod dof_value;
 mod masks;
 mod mesh;
 mod model;
@@ -13,11 +14,12 @@ mod request;
 mod session;
 
 pub use answer::{Answer, Displacements};
+pub use dof_value::DofValue;
 pub use masks::Masks;
 pub use mesh::{Material, MeshData};
 pub use model::{FrameRequest, ModelHash, ModelHashError, ModelReady, Prefetch, UploadModel};
 pub use names::{ElementChoice, ElementChoiceError, ElementName, MethodName, MethodNameError};
-pub use question::{DofValue, NodeChoice, Precision, Question, SolveOnce, Want};
+pub use question::{NodeChoice, Precision, Question, SolveOnce, Want};
 pub use reject::{RejectCode, Rejected};
 pub use reply::Reply;
 pub use report::{SolveReport, StageMs, WarningLevel};

@@ -2,21 +2,13 @@
 
 use wincode::{SchemaRead, SchemaWrite};
 
+use super::dof_value::DofValue;
 use super::masks::{Masks, MasksPart};
 use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
 use super::names::{ElementChoice, MethodName};
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
-
-/// A number at one degree of freedom: known displacement (m), force (N) or reaction force (N).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DofValue {
-    /// `3 · node + axis`, axis 0 to 2.
-    pub dof: u32,
-    /// Its value, m or N.
-    pub value: f64,
-}
 
 /// Nodes to be answered.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
