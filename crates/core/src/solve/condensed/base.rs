@@ -6,7 +6,7 @@ use crate::fem::Stiffness;
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
 use crate::solve::partition::AXIS_NAMES;
-use crate::solve::pcg::norm;
+use crate::solve::vectors::norm;
 use crate::solve::worked_out::WorkedOut;
 use crate::solve::zero_energy::{BodyMotions, RigidBodies, dofs_by_body};
 use crate::solve::{Partition, PartitionError, Stage};

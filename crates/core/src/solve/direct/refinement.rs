@@ -1,8 +1,7 @@
 //! Refinement of direct answers, and solves that are good to a digit whatever the precision.
 
-use super::{Factored, Kernel, subtract};
-use crate::fem::Stiffness;
-use crate::solve::pcg::norm;
+use super::kernel::Kernel;
+use crate::solve::vectors::{norm, subtract};
 
 /// Refinement stops after this many steps in any case.
 const REFINEMENT_STEPS_MAX: u32 = 3;
@@ -49,70 +48,69 @@ impl Shrinking {
     }
 }
 
-impl Factored {
-    /// Improves `x` until it is judged good or gets no better; the number of steps, and what was
-    /// found of the last `x`.
-    pub(super) fn refine(
-        &self,
-        apply: &dyn Fn(&[f64]) -> Vec<f64>,
-        judge: &mut dyn FnMut(&[f64], &[f64]) -> Judged,
-        b: &[f64],
-        x: &mut Vec<f64>,
-        residual: &mut Vec<f64>,
-    ) -> (u32, Judged) {
-        // The first answer of a factor in double precision is as good as corrections make it.
-        let (steps_max, mut shrinking) = match self.kernel {
-            Kernel::FrontSingle(_) => (REFINEMENT_STEPS_SINGLE_MAX, Some(Shrinking::UNSEEN)),
-            _ => (REFINEMENT_STEPS_MAX, None),
-        };
-        let mut before = judge(x, residual);
-        for step in 0..steps_max {
-            if before.off <= 1.0 && shrinking.as_ref().is_none_or(Shrinking::is_done) {
-                return (step, before);
-            }
-            let correction = self.apply_inverse(residual.clone());
-            let refined: Vec<f64> = x.iter().zip(&correction).map(|(x, c)| x + c).collect();
-            let refined_residual = subtract(b, &apply(&refined));
-            let after = judge(&refined, &refined_residual);
-            // Of good answers a single-precision factor's later one is taken; a NaN ends the loop too.
-            let enough = if shrinking.is_some() { before.off.max(1.0) } else { before.off };
-            if after.off >= enough || after.off.is_nan() {
-                return (step, before);
-            }
-            if let Some(shrinking) = &mut shrinking {
-                shrinking.see(norm(&correction) / norm(&refined));
-            }
-            (*x, *residual, before) = (refined, refined_residual, after);
+/// Improves `x` until it is judged good or gets no better; the number of steps, and what was
+/// found of the last `x`.
+pub(super) fn refine(
+    kernel: &Kernel,
+    apply: &dyn Fn(&[f64]) -> Vec<f64>,
+    judge: &mut dyn FnMut(&[f64], &[f64]) -> Judged,
+    b: &[f64],
+    x: &mut Vec<f64>,
+    residual: &mut Vec<f64>,
+) -> (u32, Judged) {
+    // The first answer of a factor in double precision is as good as corrections make it.
+    let (steps_max, mut shrinking) = match kernel.is_single() {
+        true => (REFINEMENT_STEPS_SINGLE_MAX, Some(Shrinking::UNSEEN)),
+        false => (REFINEMENT_STEPS_MAX, None),
+    };
+    let mut before = judge(x, residual);
+    for step in 0..steps_max {
+        if before.off <= 1.0 && shrinking.as_ref().is_none_or(Shrinking::is_done) {
+            return (step, before);
         }
-        (steps_max, before)
+        let correction = kernel.apply(residual.clone());
+        let refined: Vec<f64> = x.iter().zip(&correction).map(|(x, c)| x + c).collect();
+        let refined_residual = subtract(b, &apply(&refined));
+        let after = judge(&refined, &refined_residual);
+        // Of good answers a single-precision factor's later one is taken; a NaN ends the loop too.
+        let enough = if shrinking.is_some() { before.off.max(1.0) } else { before.off };
+        if after.off >= enough || after.off.is_nan() {
+            return (step, before);
+        }
+        if let Some(shrinking) = &mut shrinking {
+            shrinking.see(norm(&correction) / norm(&refined));
+        }
+        (*x, *residual, before) = (refined, refined_residual, after);
     }
+    (steps_max, before)
+}
 
-    /// `K11⁻¹ B` to a digit at least: by a factor in single precision refined until corrections are
-    /// small. Where they do not shrink the factor is that of another matrix: no number.
-    pub(in crate::solve) fn apply_inverse_for_certain(
-        &self,
-        stiffness: &Stiffness,
-        b: Vec<f64>,
-        columns: usize,
-    ) -> Vec<f64> {
-        let mut x = self.apply_inverse_to_columns(b.clone(), columns);
-        if !matches!(self.kernel, Kernel::FrontSingle(_)) {
-            return x;
-        }
-        let n = self.partition.unknown().len().max(1);
-        for (b, x) in b.chunks(n).zip(x.chunks_mut(n)) {
-            let mut before = norm(x);
-            while before > 0.1 * norm(x) {
-                let correction = self.apply_inverse(subtract(b, &self.apply_k11(stiffness, x)));
-                let size = norm(&correction);
-                // A NaN ends the loop too.
-                let shrinks = size <= 0.5 * before;
-                x.iter_mut().zip(&correction).for_each(|(x, c)| {
-                    *x = if shrinks { *x + c } else { f64::NAN };
-                });
-                before = size;
-            }
-        }
-        x
+/// `K11⁻¹ B` to a digit at least: by a factor in single precision refined until corrections are
+/// small. Where they do not shrink the factor is that of another matrix: no number.
+pub(super) fn apply_inverse_for_certain(
+    kernel: &Kernel,
+    apply: &dyn Fn(&[f64]) -> Vec<f64>,
+    b: Vec<f64>,
+    n: usize,
+    columns: usize,
+) -> Vec<f64> {
+    let mut x = kernel.apply_to_columns(b.clone(), n, columns);
+    if !kernel.is_single() {
+        return x;
     }
+    let n = n.max(1);
+    for (b, x) in b.chunks(n).zip(x.chunks_mut(n)) {
+        let mut before = norm(x);
+        while before > 0.1 * norm(x) {
+            let correction = kernel.apply(subtract(b, &apply(x)));
+            let size = norm(&correction);
+            // A NaN ends the loop too.
+            let shrinks = size <= 0.5 * before;
+            x.iter_mut().zip(&correction).for_each(|(x, c)| {
+                *x = if shrinks { *x + c } else { f64::NAN };
+            });
+            before = size;
+        }
+    }
+    x
 }

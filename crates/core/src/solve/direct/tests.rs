@@ -5,8 +5,11 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::*;
-use crate::fem::{Material, StiffnessPattern, assemble};
+use crate::fem::{Material, Stiffness, StiffnessPattern, assemble};
 use crate::mesh::{TetMesh, signed_volume};
+use crate::solve::k11::SparseK11;
+use crate::solve::sparse::Analysis;
+use crate::solve::{Method, Partition, ordering};
 
 /// n³ nodes, six tetrahedra a cell, inner nodes moved irregularly.
 fn irregular_cube(n: usize) -> TetMesh {
