@@ -41,7 +41,6 @@ mod tests {
             names.dedup();
             assert_eq!(names.len(), count);
             for (family, case) in cases {
-                assert!(case.threshold > 0.0 && case.threshold <= 1e-9, "{}", case.name);
                 assert!(family.reasoning.len() > 40 && family.advice.len() > 20);
             }
         }

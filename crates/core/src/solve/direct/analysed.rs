@@ -76,35 +76,38 @@ impl Analysed {
         }) as u64
     }
 
-    /// The factor on the current rayon pool, and the partition; `on_stage` hears
-    /// [`Stage::Factor`].
+    /// The partition that was analysed.
+    pub(super) fn into_partition(self) -> Partition {
+        self.partition
+    }
+
+    /// The factor on the current rayon pool; `on_stage` hears [`Stage::Factor`].
     ///
     /// `stiffness` must be the one this was analysed from.
     ///
     /// # Errors
     /// [`SolveError::NotPositiveDefinite`] with the node, [`SolveError::OutOfMemory`].
-    pub(super) fn into_kernel(
-        self,
+    pub(super) fn kernel(
+        &self,
         stiffness: &Stiffness,
         front: FrontMethod,
         on_stage: &mut dyn FnMut(Stage),
-    ) -> Result<(Partition, Kernel), SolveError> {
+    ) -> Result<Kernel, SolveError> {
         let Self { partition, analysis } = self;
         let method = Method::from(front);
         on_stage(Stage::Factor);
         let unknown_dofs = partition.unknown().len();
         let failed = |error| match error {
-            FrontError::NotPositive { row } => SolveError::not_positive(method, &partition, row),
+            FrontError::NotPositive { row } => SolveError::not_positive(method, partition, row),
             _ => SolveError::OutOfMemory { method, unknown_dofs },
         };
-        let kernel = match front {
+        Ok(match front {
             FrontMethod::Double => {
-                Kernel::Front(FrontFactor::try_new(&analysis, stiffness).map_err(failed)?)
+                Kernel::Front(FrontFactor::try_new(analysis, stiffness).map_err(failed)?)
             }
             FrontMethod::Mixed | FrontMethod::Pcg => {
-                Kernel::FrontSingle(FrontFactor::try_new(&analysis, stiffness).map_err(failed)?)
+                Kernel::FrontSingle(FrontFactor::try_new(analysis, stiffness).map_err(failed)?)
             }
-        };
-        Ok((partition, kernel))
+        })
     }
 }

@@ -7,11 +7,9 @@ use crate::solve::partition::AXIS_NAMES;
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolveError {
-    /// A pivot of `K11` was not positive.
-    #[error(
-        "{method}: the stiffness of the free nodes is not positive definite at node {node} axis \
-         {axis}: the known displacements leave a motion free, or an element there is degenerate"
-    )]
+    /// A pivot of `K11` was not positive. Whether a body is held at all is known before anything is
+    /// factored ([`super::super::find_free_motion`]); here rounding was larger than the pivot.
+    #[error("{method}: {}", no_pivot(*.method, *.node, *.axis))]
     NotPositiveDefinite {
         /// Method that found it.
         method: Method,
@@ -71,4 +69,19 @@ impl SolveError {
         let (node, axis) = (dof / 3, AXIS_NAMES[dof % 3]);
         Self::NotPositiveDefinite { method, node, axis }
     }
+}
+
+/// What a pivot lost in rounding says of the body, which is another thing than a free motion.
+fn no_pivot(method: Method, node: usize, axis: char) -> String {
+    let lost = format!("the pivot of node {node} axis {axis} is lost in the rounding of");
+    if method.is_single() {
+        return format!(
+            "{lost} single precision, and there is no memory for a factor in double precision; \
+             raise the memory limit, or hold the body at nodes further apart"
+        );
+    }
+    format!(
+        "{lost} double precision: what is known holds the body too weakly, or an element there is \
+         degenerate; hold nodes further apart and not in line, or mend the mesh"
+    )
 }

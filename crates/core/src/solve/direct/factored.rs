@@ -1,11 +1,15 @@
 //! `K11` of one partition, inverted or factored by one method.
 
+use std::sync::Arc;
+
 use super::analysed::{Analysed, FrontMethod};
 use super::error::SolveError;
+use super::fallback::Fallback;
 use super::kernel::Kernel;
 use super::refinement;
 use crate::fem::Stiffness;
 use crate::solve::certainty::{Certainty, inverse_norm, row_sums};
+use crate::solve::front::FrontFactor;
 use crate::solve::k11::{SparseK11, visit_k11};
 use crate::solve::pivot::NotPositive;
 use crate::solve::sparse::Analysis;
@@ -19,7 +23,13 @@ use crate::solve::{Method, Partition, Stage, gauss_jordan, gauss_jordan_plain, o
 pub struct Factored {
     method: Method,
     partition: Partition,
-    pub(super) kernel: Kernel,
+    kernel: Kernel,
+    /// Bytes that this may take, with a factor in double precision beside the single one.
+    limit: u64,
+    /// Why double precision was taken already when this was made.
+    began_with: Option<Fallback>,
+    /// The factor in double precision, once refinement has come to a halt; none if it failed too.
+    double: WorkedOut<Option<Arc<Kernel>>>,
     /// Skeel's condition number, once somebody has asked for it.
     condition: WorkedOut<f64>,
 }
@@ -49,6 +59,9 @@ impl Factored {
     ///
     /// # Errors
     /// Those of [`Factored::try_new`], and [`SolveError::OverLimit`] with both numbers.
+    ///
+    /// Where a factor in single precision fails double precision is taken, as by
+    /// [`Analysed::factor_within`].
     pub fn try_within(
         stiffness: &Stiffness,
         partition: Partition,
@@ -107,11 +120,15 @@ impl Factored {
             Method::Front | Method::FrontMixed | Method::Pcg => {
                 let front = FrontMethod::of(method).unwrap_or(FrontMethod::Double);
                 let analysed = Analysed::new(stiffness, partition, on_stage);
-                check(analysed.peak_bytes(front))?;
-                return analysed.factor(stiffness, front, on_stage);
+                return analysed.factor_within(stiffness, front, limit, on_stage);
             }
         };
-        Ok(Self { method, partition, kernel, condition: WorkedOut::default() })
+        Ok(Self::of(method, partition, kernel, limit))
+    }
+
+    fn of(method: Method, partition: Partition, kernel: Kernel, limit: u64) -> Self {
+        let (double, condition) = (WorkedOut::default(), WorkedOut::default());
+        Self { method, partition, kernel, limit, began_with: None, double, condition }
     }
 
     /// The method used.
@@ -124,9 +141,44 @@ impl Factored {
         &self.partition
     }
 
-    /// Bytes held by the factor or inverse.
+    /// Bytes held by the factor or inverse: more once double precision had to be taken beside a
+    /// factor in single precision.
     pub fn bytes(&self) -> usize {
-        self.kernel.bytes(self.partition.unknown().len())
+        let n = self.partition.unknown().len();
+        let double = self.double.get().flatten();
+        self.kernel.bytes(n) + double.map_or(0, |kernel| kernel.bytes(n))
+    }
+
+    /// Why answers are of double precision where the method asked for single, if they are.
+    pub fn fallback(&self) -> Option<Fallback> {
+        let stalled = || self.double.get().flatten().map(|_| Fallback::Stalled);
+        self.began_with.or_else(stalled)
+    }
+
+    /// The inverse or factor that answers are made with now.
+    pub(super) fn with_kernel<T>(&self, work: impl FnOnce(&Kernel) -> T) -> T {
+        match self.double.get().flatten() {
+            Some(double) => work(&double),
+            None => work(&self.kernel),
+        }
+    }
+
+    /// Makes a factor in double precision beside the single one, where there is none yet and memory
+    /// allows it; whether answers are of double precision now, and were not before.
+    pub(super) fn take_double(&self, stiffness: &Stiffness) -> bool {
+        let Kernel::FrontSingle(single) = &self.kernel else { return false };
+        if self.double.get().is_some() {
+            return false;
+        }
+        let needed = (single.bytes() + single.analysis().peak_bytes::<f64>()) as u64;
+        if needed > self.limit {
+            return false;
+        }
+        let made = self.double.get_or(|| {
+            let factor = FrontFactor::try_new(single.analysis(), stiffness).ok()?;
+            Some(Arc::new(Kernel::Front(factor)))
+        });
+        made.is_some()
     }
 
     /// `K11 x`, through the whole stiffness with zeros at the known degrees of freedom.
@@ -145,29 +197,32 @@ impl Factored {
     /// ([`crate::solve::Solution`]).
     pub fn certainty(&self, stiffness: &Stiffness, backward_error: f64) -> Certainty {
         let condition = self.condition.get_or(|| {
-            let apply = |x: &[f64]| self.apply_k11(stiffness, x);
-            let weights = row_sums(stiffness, self.partition());
-            inverse_norm(&weights, &|b, columns| {
-                refinement::apply_inverse_for_certain(
-                    &self.kernel,
-                    &apply,
-                    b,
-                    weights.len(),
-                    columns,
-                )
-            })
+            let found = self.estimate_condition(stiffness);
+            match found.is_finite() || !self.take_double(stiffness) {
+                true => found,
+                false => self.estimate_condition(stiffness),
+            }
         });
         Certainty::new(condition, backward_error)
     }
 
-    /// `K11⁻¹ b`.
-    pub(super) fn apply_inverse(&self, b: Vec<f64>) -> Vec<f64> {
-        self.kernel.apply(b)
+    /// Skeel's condition number by the factor as it is; infinite where refinement with a factor in
+    /// single precision comes to a halt.
+    fn estimate_condition(&self, stiffness: &Stiffness) -> f64 {
+        let apply = |x: &[f64]| self.apply_k11(stiffness, x);
+        let weights = row_sums(stiffness, self.partition());
+        let n = weights.len();
+        self.with_kernel(|kernel| {
+            inverse_norm(&weights, &|b, columns| {
+                refinement::apply_inverse_for_certain(kernel, &apply, b, n, columns)
+            })
+        })
     }
 }
 
 impl Analysed {
-    /// Factors on the current rayon pool; `on_stage` hears [`Stage::Factor`].
+    /// Factors on the current rayon pool, in the precision asked for and no other; `on_stage` hears
+    /// [`Stage::Factor`].
     ///
     /// `stiffness` must be the one this was analysed from.
     ///
@@ -179,8 +234,40 @@ impl Analysed {
         front: FrontMethod,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Factored, SolveError> {
+        let kernel = self.kernel(stiffness, front, on_stage)?;
+        // Nothing is left for another factor.
+        Ok(Factored::of(front.into(), self.into_partition(), kernel, 0))
+    }
+
+    /// The same, but where a factor in single precision fails, now or in refinement later, double
+    /// precision is taken as far as memory goes, and [`Factored::fallback`] says so.
+    ///
+    /// Units: `limit` bytes, for all that is held at once.
+    ///
+    /// # Errors
+    /// Those of [`Analysed::factor`], and [`SolveError::OverLimit`].
+    pub fn factor_within(
+        self,
+        stiffness: &Stiffness,
+        front: FrontMethod,
+        limit: u64,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Factored, SolveError> {
         let method = Method::from(front);
-        let (partition, kernel) = self.into_kernel(stiffness, front, on_stage)?;
-        Ok(Factored { method, partition, kernel, condition: WorkedOut::default() })
+        let needed = self.peak_bytes(front);
+        if needed > limit {
+            let unknown_dofs = self.analysis().row_count();
+            return Err(SolveError::OverLimit { method, unknown_dofs, needed, limit });
+        }
+        let has_room = self.peak_bytes(FrontMethod::Double) <= limit;
+        let (kernel, began_with) = match self.kernel(stiffness, front, on_stage) {
+            Err(SolveError::NotPositiveDefinite { .. }) if method.is_single() && has_room => {
+                let double = self.kernel(stiffness, FrontMethod::Double, on_stage)?;
+                (double, Some(Fallback::NoFactor))
+            }
+            kernel => (kernel?, None),
+        };
+        let factored = Factored::of(method, self.into_partition(), kernel, limit);
+        Ok(Factored { began_with, ..factored })
     }
 }

@@ -3,6 +3,7 @@
 mod analysed;
 mod error;
 mod factored;
+mod fallback;
 mod kernel;
 mod refinement;
 mod solution;
@@ -12,4 +13,5 @@ mod tests;
 pub use analysed::{Analysed, FrontMethod};
 pub use error::SolveError;
 pub use factored::Factored;
+pub use fallback::Fallback;
 pub use solution::{Loads, Solution};

@@ -27,6 +27,8 @@ struct Shrinking {
     next: f64,
 }
 
+/// A correction this large that shrinks no more leaves hardly a digit of the answer.
+const CORRECTION_STALLED: f64 = 1e-3;
 /// A next correction this small is not made.
 const CORRECTION_GOOD: f64 = 1e-13;
 
@@ -37,10 +39,16 @@ impl Shrinking {
     fn see(&mut self, size: f64) {
         self.next = match size < 0.5 * self.last {
             true => size * size / self.last,
-            // It shrinks no more.
+            // It shrinks no more, or is no number.
             false => 0.0,
         };
         self.last = size;
+    }
+
+    /// Whether corrections that are still large shrink no more: the factor is that of another
+    /// matrix.
+    fn has_stalled(&self) -> bool {
+        self.next == 0.0 && !matches!(self.last, 0.0..=CORRECTION_STALLED)
     }
 
     fn is_done(&self) -> bool {
@@ -48,8 +56,23 @@ impl Shrinking {
     }
 }
 
-/// Improves `x` until it is judged good or gets no better; the number of steps, and what was
-/// found of the last `x`.
+/// What became of a refinement.
+pub(super) struct Refined {
+    pub steps: u32,
+    /// What was found of the last `x`.
+    pub judged: Judged,
+    /// Corrections by a single-precision factor stayed large.
+    pub has_stalled: bool,
+}
+
+impl Refined {
+    fn of(steps: u32, judged: Judged, shrinking: Option<&Shrinking>) -> Self {
+        let has_stalled = shrinking.is_some_and(Shrinking::has_stalled);
+        Self { steps, judged, has_stalled }
+    }
+}
+
+/// Improves `x` until it is judged good or gets no better.
 pub(super) fn refine(
     kernel: &Kernel,
     apply: &dyn Fn(&[f64]) -> Vec<f64>,
@@ -57,7 +80,7 @@ pub(super) fn refine(
     b: &[f64],
     x: &mut Vec<f64>,
     residual: &mut Vec<f64>,
-) -> (u32, Judged) {
+) -> Refined {
     // The first answer of a factor in double precision is as good as corrections make it.
     let (steps_max, mut shrinking) = match kernel.is_single() {
         true => (REFINEMENT_STEPS_SINGLE_MAX, Some(Shrinking::UNSEEN)),
@@ -66,7 +89,7 @@ pub(super) fn refine(
     let mut before = judge(x, residual);
     for step in 0..steps_max {
         if before.off <= 1.0 && shrinking.as_ref().is_none_or(Shrinking::is_done) {
-            return (step, before);
+            return Refined::of(step, before, shrinking.as_ref());
         }
         let correction = kernel.apply(residual.clone());
         let refined: Vec<f64> = x.iter().zip(&correction).map(|(x, c)| x + c).collect();
@@ -74,15 +97,15 @@ pub(super) fn refine(
         let after = judge(&refined, &refined_residual);
         // Of good answers a single-precision factor's later one is taken; a NaN ends the loop too.
         let enough = if shrinking.is_some() { before.off.max(1.0) } else { before.off };
-        if after.off >= enough || after.off.is_nan() {
-            return (step, before);
-        }
         if let Some(shrinking) = &mut shrinking {
             shrinking.see(norm(&correction) / norm(&refined));
         }
+        if after.off >= enough || after.off.is_nan() {
+            return Refined::of(step, before, shrinking.as_ref());
+        }
         (*x, *residual, before) = (refined, refined_residual, after);
     }
-    (steps_max, before)
+    Refined::of(steps_max, before, shrinking.as_ref())
 }
 
 /// `K11⁻¹ B` to a digit at least: by a factor in single precision refined until corrections are
