@@ -152,7 +152,8 @@ def sparse(sides, folder, options):
         for label, outcome in outcomes.items():
             push(table, label, name, head, outcome, outcomes["front"])
         push_claims(claims, name, outcomes)
-    return [SPARSE_TEXT, table, claims_text(), claims, ELSEWHERE]
+    like_with_like = [claims_text(), claims] if claims.rows else []
+    return [SPARSE_TEXT, table, *like_with_like, ELSEWHERE]
 
 
 def dense(sides, folder, options):

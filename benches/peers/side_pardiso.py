@@ -64,13 +64,6 @@ class Pardiso:
         if error.value != 0:
             raise RuntimeError(f"Pardiso, phase {phase}: error {error.value}")
 
-
-def load(folder):
-    global problem
-    problem = Problem(folder)
-    return {}
-
-
     def solve(self, b):
         """Columns of answers to columns of right-hand sides."""
         b = np.asfortranarray(b, dtype=self.kind)
@@ -90,6 +83,12 @@ def load(folder):
                 break
             residual = b - matrix @ x
         return x
+
+
+def load(folder):
+    global problem
+    problem = Problem(folder)
+    return {}
 
 
 def whole_matrix(problem):

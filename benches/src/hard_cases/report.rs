@@ -80,20 +80,21 @@ fn refuse_refusals_that_others_answer(rows: &mut [Row]) {
     }
 }
 
-/// How far the thresholds are above the errors.
+/// How far the thresholds are above the errors of exact answers.
 fn slack(rows: &[Row]) -> String {
     let of = |row: &Row| {
         let Numbers { error_rel, threshold_rel, .. } = row.numbers?;
         Some(threshold_rel? / error_rel.filter(|error| *error > 0.0)?)
     };
-    let mut slack: Vec<f64> = rows.iter().filter_map(of).collect();
+    let exact = rows.iter().filter(|row| row.outcome == Outcome::Exact);
+    let mut slack: Vec<f64> = exact.filter_map(of).collect();
     slack.sort_by(f64::total_cmp);
     let at = |share: f64| slack.get((share * slack.len() as f64) as usize).copied();
     let [least, median, most] =
         [at(0.0), at(0.5), slack.last().copied()].map(|s| three_digits(s.unwrap_or(f64::NAN)));
     format!(
         "**Slack**: the threshold of an answer is {median} times its error in the median, {least} \
-         times at least and {most} times at most, over {} answers whose error is not zero.",
+         times at least and {most} times at most, over {} exact answers whose error is not zero.",
         slack.len()
     )
 }

@@ -182,7 +182,10 @@ impl Solution {
         match self.error_estimate_rel {
             None => factored.certainty(stiffness, self.backward_error),
             Some(stopped_at) => {
-                let rounding = factored.certainty(stiffness, 0.0);
+                // What was stopped early on purpose is not judged by its residual.
+                let is_whole = self.residual_rel <= SHORT_OF_GOAL * RESIDUAL_GOOD;
+                let backward_error = if is_whole { self.backward_error } else { 0.0 };
+                let rounding = factored.certainty(stiffness, backward_error);
                 Certainty { error_rel: rounding.error_rel.max(stopped_at), ..rounding }
             }
         }
