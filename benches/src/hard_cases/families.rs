@@ -40,7 +40,7 @@ mod tests {
             names.sort();
             names.dedup();
             assert_eq!(names.len(), count);
-            for (family, case) in cases {
+            for family in &families {
                 assert!(family.reasoning.len() > 40 && family.advice.len() > 20);
             }
         }
