@@ -32,6 +32,12 @@ def commit():
     return f"{head} + changes" if changes else head
 
 
+def processor_maker():
+    """Who made the processor, for a claim about a library of one maker on a machine of another."""
+    vendor = first_match(r"^vendor_id\s*: (.*)$", Path("/proc/cpuinfo"))
+    return {"AuthenticAMD": "AMD", "GenuineIntel": "Intel"}.get(vendor, vendor)
+
+
 def load():
     return f"{os.getloadavg()[0]:.2f}"
 

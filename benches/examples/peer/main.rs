@@ -6,6 +6,7 @@
 
 mod answers;
 mod methods;
+mod over_wire;
 mod problem;
 mod still_frames;
 
@@ -26,6 +27,8 @@ enum Request {
     File { mesh: PathBuf, folder: PathBuf },
     /// Order, factor and solve once; the answers are written to the folder of the problem.
     Run { method: String },
+    /// The same by a server of our own, over a loopback socket.
+    OverWire { method: String },
     /// Solve by what is kept of the shape.
     Frames,
 }
@@ -38,7 +41,12 @@ fn main() -> anyhow::Result<()> {
     let pool = pool(threads)?;
     let mut problem: Option<Problem> = None;
     for line in std::io::stdin().lock().lines() {
-        let answer = pool.install(|| answer(&serde_json::from_str(&line?)?, &mut problem))?;
+        let request: Request = serde_json::from_str(&line?)?;
+        let answer = match &request {
+            // The server has a pool of its own.
+            Request::OverWire { method } => over_wire::run(given(&problem)?, method, threads)?,
+            request => pool.install(|| answer(request, &mut problem))?,
+        };
         let mut out = std::io::stdout().lock();
         writeln!(out, "{answer}")?;
         out.flush()?;
@@ -52,6 +60,7 @@ fn answer(request: &Request, problem: &mut Option<Problem>) -> anyhow::Result<se
         Request::File { mesh, folder } => Problem::of_file(mesh, folder)?,
         Request::Run { method } => return methods::run(given(problem)?, method),
         Request::Frames => return still_frames::run(given(problem)?),
+        Request::OverWire { .. } => anyhow::bail!("the server is asked by the main thread"),
     };
     let head = made.write()?;
     *problem = Some(made);

@@ -8,12 +8,12 @@ use softgrasp_core::solve::{Factored, FrontAnalysis, FrontFactor, Loads, Method,
 
 use crate::problem::{COLUMNS, Problem};
 
-/// Runs one method by its name; `front` answers through its factor alone, without refinement, as
-/// the peers do, the others through `Factored::solve`.
+/// Runs one method by its name through `Factored::solve`, refinement included; `bare-front` answers
+/// through the factor alone, without refinement, as the peers do by default.
 pub fn run(problem: &Problem, method: &str) -> anyhow::Result<serde_json::Value> {
-    match method.parse()? {
-        Method::Front => front(problem),
-        other => factored(problem, other),
+    match method {
+        "bare-front" => front(problem),
+        other => factored(problem, other.parse()?),
     }
 }
 

@@ -14,8 +14,8 @@ use crate::answers::{write_f64, write_u32};
 
 /// Right-hand sides of the wide solve.
 pub const COLUMNS: usize = 21;
-const YOUNG: f64 = 1.0e5;
-const POISSON: f64 = 0.3;
+pub const YOUNG: f64 = 1.0e5;
+pub const POISSON: f64 = 0.3;
 
 /// What all sides solve.
 ///

@@ -5,9 +5,12 @@ use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::solve::ERROR_UNREMARKABLE;
 
-use super::row::THREADS;
+use super::refusal::Reason;
 use super::shapes::{nearest, nodes_where};
 use crate::report::ReportError;
+
+/// Threads of the pools that must give the same bits; the first is asked again at the end.
+pub(super) const THREADS: [usize; 5] = [2, 1, 4, 7, 2];
 
 /// What is asked: an object, what holds it, what moves it.
 ///
@@ -55,8 +58,8 @@ pub(super) enum Repeats {
 pub(super) struct Case {
     pub name: String,
     pub question: Question,
-    /// Error up to which an answer is exact, relative to the largest displacement.
-    pub threshold: f64,
+    /// The right reason for there being no answer, where there is none.
+    pub reason: Reason,
     /// What ways with a factor in double precision may do.
     pub double: Allowed,
     /// What ways with a factor in single precision may do.
@@ -66,7 +69,7 @@ pub(super) struct Case {
     pub reach: Reach,
     pub repeats: Repeats,
     /// How often it is asked, each time with another number of threads, at most
-    /// [`super::row::THREADS`].
+    /// [`THREADS`].
     pub runs: usize,
 }
 
@@ -93,9 +96,6 @@ pub(super) struct Form {
 const WELL_POSED: f64 = 1e-11;
 /// Condition of the same block, roughly.
 const WELL_POSED_CONDITION: f64 = 1e3;
-/// Growth up to which single precision still makes a factor that refinement can use: the condition
-/// times its rounding stays below a tenth.
-const SINGLE_GROWTH_MAX: f64 = 0.1 / (WELL_POSED_CONDITION * (f32::EPSILON as f64));
 /// Growth at which no digit is certain: the condition times the rounding is a tenth.
 const DOUBLE_GROWTH_MAX: f64 = 0.1 / (WELL_POSED_CONDITION * f64::EPSILON);
 /// Share of that from which an estimate that errs by its usual factors may say so already.
@@ -119,10 +119,9 @@ impl Allowed {
 impl Case {
     /// A case whose condition is `growth` times that of a well supported block, by theory.
     ///
-    /// The threshold grows with it up to the error that nothing is said about, so that no answer is
-    /// silently off by more than that: beyond, it has to say so.
+    /// Where the expected error grows beyond what goes without saying an answer may be degraded, as
+    /// it states; and it may be refused where no digit can be certain.
     pub fn new(name: impl Into<String>, question: Question, growth: f64) -> Self {
-        let threshold = (WELL_POSED * growth).min(ERROR_UNREMARKABLE);
         let double = if growth >= REFUSAL_MARGIN * DOUBLE_GROWTH_MAX {
             Allowed::ANY
         } else if WELL_POSED * growth >= ERROR_UNREMARKABLE {
@@ -130,11 +129,12 @@ impl Case {
         } else {
             Allowed::EXACT
         };
-        let single = if growth > SINGLE_GROWTH_MAX { Allowed::ANY } else { double };
+        // Single precision falls back to double, so it promises as much.
+        let single = double;
         Self {
             name: name.into(),
             question,
-            threshold,
+            reason: Reason::Weak,
             double,
             single,
             field: None,
@@ -142,6 +142,11 @@ impl Case {
             repeats: Repeats::Once,
             runs: THREADS.len(),
         }
+    }
+
+    /// States the right reason of a refusal.
+    pub fn because(self, reason: Reason) -> Self {
+        Self { reason, ..self }
     }
 
     /// States the outcomes that are allowed, whatever the factor.
@@ -228,11 +233,12 @@ mod tests {
     fn promises_follow_from_the_growth_of_the_condition() {
         let question = Question::held(block([1; 3], [1.0; 3]).unwrap(), plain().unwrap());
         let case = |growth| Case::new("", question.clone(), growth);
-        assert_eq!((case(1.0).threshold, case(1.0).double), (1e-11, Allowed::EXACT));
+        assert_eq!((case(1.0).reason, case(1.0).double), (Reason::Weak, Allowed::EXACT));
         assert_eq!(case(1.0).single, Allowed::EXACT);
         // Beyond a hundred an answer may be off by more than goes without saying: it says so.
-        assert_eq!((case(1e6).threshold, case(1e6).double), (1e-9, Allowed::ANSWERED));
-        assert_eq!(case(1e6).single, Allowed::ANY);
+        assert_eq!(case(1e6).double, Allowed::ANSWERED);
+        // Single precision falls back to double: it may refuse no more than that.
+        assert_eq!(case(1e6).single, Allowed::ANSWERED);
         assert_eq!(case(1e12).double, Allowed::ANY);
         assert_eq!(Allowed::ANY.text(), "exact or degraded or refused");
     }

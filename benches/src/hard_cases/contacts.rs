@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use super::case::{Allowed, Case, Family, Form, Question, moved, plain};
+use super::refusal::Reason;
 use super::shapes::{block, nearest, nodes_where};
 use crate::report::ReportError;
 
@@ -30,7 +31,8 @@ pub(super) fn family(form: Form) -> Result<Family, ReportError> {
         case("neighbours, against each other", vec![on(corner, push), on(neighbour, pull)])?,
         case("one node twice, equal", vec![on(corner, push), on(corner, push)])?,
         case("one node twice, contradicting", vec![on(corner, push), on(corner, pull)])?
-            .allowing(Allowed::REFUSED),
+            .allowing(Allowed::REFUSED)
+            .because(Reason::Question),
         case("a whole face", top.iter().map(|&n| on(n, push)).collect())?,
         case("one axis of one node", vec![vec![(3 * corner, 0.01)]])?,
         // Nodes that the scene holds stay where they are.

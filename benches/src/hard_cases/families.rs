@@ -40,8 +40,7 @@ mod tests {
             names.sort();
             names.dedup();
             assert_eq!(names.len(), count);
-            for (family, case) in cases {
-                assert!(case.threshold > 0.0 && case.threshold <= 1e-9, "{}", case.name);
+            for family in &families {
                 assert!(family.reasoning.len() > 40 && family.advice.len() > 20);
             }
         }

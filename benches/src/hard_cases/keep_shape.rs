@@ -3,12 +3,15 @@
 use nalgebra::Vector3;
 use softgrasp_core::mesh::Inversion;
 
-use super::case::{Allowed, Case, Family, Form, Question, Reach, Repeats, plain};
+use glove_client::connection::Host;
+
+use super::answer::Answer;
+use super::case::{Allowed, Case, Family, Form, Question, Reach, Repeats, THREADS, plain};
 use super::outcome::{Judged, Outcome};
-use super::row::THREADS;
+use super::refusal::{Reason, Refusal};
 use super::shapes::block;
 use super::truth::{Errors, Truth};
-use super::ways::{Answer, Way};
+use super::ways::Way;
 use crate::report::ReportError;
 
 /// How often a shape is kept.
@@ -35,7 +38,9 @@ pub(super) fn family(form: Form) -> Result<Family, ReportError> {
         reach: Reach::OfEachKind,
         repeats: Repeats::Onwards(TIMES),
         runs,
-        ..Case::new("200 times, always onwards", question, 1.0).allowing(Allowed::EXACT_OR_REFUSED)
+        ..Case::new("200 times, always onwards", question, 1.0)
+            .allowing(Allowed::EXACT_OR_REFUSED)
+            .because(Reason::Inverted)
     };
     Ok(Family {
         name: "keep shape",
@@ -53,13 +58,13 @@ pub(super) enum Walk {
     /// The last answer, and the largest errors of those that were compared.
     Answered(Answer, Option<Errors>),
     /// No answer, or a shape that cannot be kept.
-    Refused(String),
+    Refused(Refusal),
     /// An answer on the way that was wrong beyond its threshold and beyond what it said.
     Failed(String),
 }
 
 /// Asks, keeps the shape, asks again.
-pub(super) fn walk(way: Way, case: &Case, compare: bool) -> Walk {
+pub(super) fn walk(way: Way, case: &Case, compare: bool, host: &Host) -> Walk {
     let (times, and_fro) = match case.repeats {
         Repeats::Once => (1, false),
         Repeats::ToAndFro(times) => (times, true),
@@ -69,17 +74,19 @@ pub(super) fn walk(way: Way, case: &Case, compare: bool) -> Walk {
     let mut worst: Option<Errors> = None;
     let mut last = None;
     for time in 0..times {
-        let answer = match way.answer(&question) {
+        let refused = |reason: Reason, text: String| {
+            Walk::Refused(Refusal::new(reason, format!("time {}: {text}", time + 1)))
+        };
+        let answer = match way.answer(&question, host) {
             Ok(answer) => answer,
-            Err(reason) => return Walk::Refused(format!("time {}: {reason}", time + 1)),
+            Err(Refusal { reason, text }) => return refused(reason, text),
         };
         if compare && (time % COMPARED_EVERY == 0 || time + 1 == times) {
-            let errors = Truth::of(&question, way.element(), None).errors_of(&answer.displacement);
+            let truth = Truth::of(&question, way.element(), None);
+            let errors = truth.errors_of(&answer.displacement, way.is_single());
             let Answer { stated_rel, bound_rel, .. } = answer;
             let judged = Judged { errors, stated_rel, bound_rel };
-            if let (Outcome::Failed, text) =
-                Outcome::of_answer(&judged, case.threshold, Allowed::ANY)
-            {
+            if let (Outcome::Failed, text) = Outcome::of_answer(&judged, Allowed::ANY) {
                 return Walk::Failed(format!("time {}: {text}", time + 1));
             }
             worst = larger(worst, errors);
@@ -89,11 +96,11 @@ pub(super) fn walk(way: Way, case: &Case, compare: bool) -> Walk {
         let moved: Vec<_> =
             mesh.vertices().iter().zip(steps).map(|(p, u)| p + Vector3::from(*u)).collect();
         if let Some(inversion) = Inversion::of(mesh, &moved) {
-            return Walk::Refused(format!("time {}: {inversion}", time + 1));
+            return refused(Reason::Inverted, inversion.to_string());
         }
         question.mesh = match mesh.with_vertices(moved) {
             Ok(mesh) => mesh,
-            Err(error) => return Walk::Refused(format!("time {}: {error}", time + 1)),
+            Err(error) => return refused(Reason::Inverted, error.to_string()),
         };
         if and_fro {
             question = question.scaled(-1.0);
@@ -102,14 +109,16 @@ pub(super) fn walk(way: Way, case: &Case, compare: bool) -> Walk {
     }
     match last {
         Some(answer) => Walk::Answered(answer, worst),
-        None => Walk::Refused("it was not asked".to_owned()),
+        None => Walk::Failed("it was not asked".to_owned()),
     }
 }
 
-/// Whichever is larger.
+/// Whichever is larger, over its threshold.
 fn larger(a: Option<Errors>, b: Option<Errors>) -> Option<Errors> {
     match (a, b) {
-        (Some(a), Some(b)) if a.largest_rel > b.largest_rel => Some(a),
+        (Some(a), Some(b)) if a.largest_rel * b.threshold_rel > b.largest_rel * a.threshold_rel => {
+            Some(a)
+        }
         (a, None) => a,
         (_, b) => b,
     }

@@ -1,15 +1,19 @@
 //! Report `hard-cases`: what every way does where numbers get difficult, against what was promised.
 
+mod answer;
 mod case;
 mod contacts;
 mod double_double;
 mod families;
+mod in_process;
 mod keep_shape;
 mod large;
 mod locking;
 mod materials;
 mod outcome;
+mod over_socket;
 mod pieces;
+mod refusal;
 mod report;
 mod row;
 mod scales;

@@ -3,12 +3,13 @@
 use softgrasp_core::solve::ERROR_UNREMARKABLE;
 
 use super::case::Allowed;
+use super::refusal::{Reason, Refusal};
 use super::truth::Errors;
 
 /// Of one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// The error is at most the case's threshold.
+    /// The error is at most a hundred times the expected one.
     Exact,
     /// The error is larger, at most what the answer states, and what it states is warned of.
     Degraded,
@@ -39,21 +40,30 @@ impl Outcome {
     }
 
     /// Outcome of a refusal, and what is to be said about it.
-    pub fn of_refusal(reason: &str, allowed: Allowed) -> (Self, String) {
-        match (allowed.refused, reason.trim().is_empty()) {
-            (_, true) => (Self::Failed, "refused without a reason".to_owned()),
-            (true, _) => (Self::Refused, reason.to_owned()),
-            (false, _) => (Self::Failed, format!("refused, which was not to be: {reason}")),
+    pub fn of_refusal(refusal: &Refusal, right: Reason, allowed: Allowed) -> (Self, String) {
+        let Refusal { reason, text } = refusal;
+        if text.trim().is_empty() {
+            return (Self::Failed, "refused without a reason".to_owned());
+        }
+        if !allowed.refused {
+            return (Self::Failed, format!("refused, which was not to be: {text}"));
+        }
+        match *reason == right {
+            true => (Self::Refused, text.clone()),
+            false => {
+                let (said, right) = (reason.name(), right.name());
+                (Self::Failed, format!("refused for {said}, but the reason is {right}: {text}"))
+            }
         }
     }
 
     /// Outcome of an answer, and what is to be said about it.
-    pub fn of_answer(judged: &Judged, threshold: f64, allowed: Allowed) -> (Self, String) {
+    pub fn of_answer(judged: &Judged, allowed: Allowed) -> (Self, String) {
         let failed = |text: String| (Self::Failed, text);
         let Judged { errors: Some(errors), stated_rel, bound_rel } = *judged else {
             return failed("there is no right answer to compare with".to_owned());
         };
-        let error = errors.largest_rel;
+        let (error, threshold) = (errors.largest_rel, errors.threshold_rel);
         if !error.is_finite() {
             return failed("the answer is not finite".to_owned());
         }
@@ -84,8 +94,9 @@ mod tests {
     use super::*;
 
     fn outcome(error: f64, stated_rel: f64, bound_rel: Option<f64>, allowed: Allowed) -> Outcome {
-        let errors = Some(Errors { largest_rel: error, norm_rel: Some(error) });
-        Outcome::of_answer(&Judged { errors, stated_rel, bound_rel }, 1e-11, allowed).0
+        let errors =
+            Some(Errors { largest_rel: error, norm_rel: Some(error), threshold_rel: 1e-11 });
+        Outcome::of_answer(&Judged { errors, stated_rel, bound_rel }, allowed).0
     }
 
     #[test]
@@ -102,14 +113,18 @@ mod tests {
         assert_eq!(outcome(f64::INFINITY, f64::INFINITY, None, any), Outcome::Failed);
         assert_eq!(outcome(1e-12, f64::NAN, None, any), Outcome::Exact);
         let nothing = Judged { errors: None, stated_rel: 1.0, bound_rel: None };
-        assert_eq!(Outcome::of_answer(&nothing, 1.0, any).0, Outcome::Failed);
+        assert_eq!(Outcome::of_answer(&nothing, any).0, Outcome::Failed);
     }
 
     #[test]
-    fn a_refusal_needs_a_reason_and_leave() {
-        let of = |reason, allowed| Outcome::of_refusal(reason, allowed).0;
+    fn a_refusal_needs_the_right_reason_and_leave() {
+        let free = |text: &str| Refusal::new(Reason::Free, text);
+        let of = |text, allowed| Outcome::of_refusal(&free(text), Reason::Free, allowed).0;
         assert_eq!(of("body 1 can still move", Allowed::REFUSED), Outcome::Refused);
         assert_eq!(of("", Allowed::ANY), Outcome::Failed);
         assert_eq!(of("body 1 can still move", Allowed::ANSWERED), Outcome::Failed);
+        // A body that is held must not be said to be free.
+        let blamed = Outcome::of_refusal(&free("it can move"), Reason::Weak, Allowed::ANY);
+        assert_eq!(blamed.0, Outcome::Failed);
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::case::{Allowed, Case, Family, Form, Question, moved, plain};
+use super::refusal::Reason;
 use super::shapes::{block, doubled, nearest};
 use crate::report::ReportError;
 
@@ -40,7 +41,7 @@ pub(super) fn family(form: Form) -> Result<Family, ReportError> {
         for count in too_few {
             let title = format!("{name}, held by {count}");
             let case = Case::new(title, question(on_copy(count))?, 1.0);
-            cases.push(case.allowing(Allowed::REFUSED));
+            cases.push(case.allowing(Allowed::REFUSED).because(Reason::Free));
         }
         let held = question(on_copy(contacts_needed))?;
         cases.push(Case::new(format!("{name}, held by {contacts_needed}"), held, 1.0));

@@ -4,16 +4,17 @@ use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use super::case::{Allowed, Case, Family, Reach, Repeats};
+use glove_client::connection::{Host, ServerChoice};
+
+use super::answer::Answer;
+use super::case::{Allowed, Case, Family, Reach, Repeats, THREADS};
 use super::keep_shape::{Walk, walk};
 use super::outcome::{Judged, Outcome};
+use super::refusal::Refusal;
 use super::truth::{Errors, Truth};
-use super::ways::{Answer, Way};
+use super::ways::Way;
 use crate::report::ReportError;
 use crate::threads::pool;
-
-/// Threads of the pools that must give the same bits; the first is asked again at the end.
-pub(super) const THREADS: [usize; 5] = [2, 1, 4, 7, 2];
 
 /// One way through one case.
 #[derive(Clone, Debug)]
@@ -23,7 +24,6 @@ pub(super) struct Row {
     pub nodes: usize,
     pub way: Way,
     pub allowed: Allowed,
-    pub threshold: f64,
     pub outcome: Outcome,
     /// Reason of a refusal or failure, or what a degraded answer states.
     pub note: String,
@@ -39,6 +39,8 @@ pub(super) struct Row {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Numbers {
     pub error_rel: Option<f64>,
+    /// Largest error with which the answer is exact.
+    pub threshold_rel: Option<f64>,
     pub stated_rel: f64,
     pub bound_rel: Option<f64>,
     pub residual_rel: f64,
@@ -49,20 +51,30 @@ pub(super) struct Numbers {
 /// What one run of a row found.
 enum Found {
     Answer(Box<Answer>, Option<Errors>),
-    Refusal(String),
+    Refusal(Refusal),
     Fault(String),
 }
 
-/// Pools that rows are asked on.
-pub(super) struct Pools(Vec<Arc<rayon::ThreadPool>>);
+/// A pool that rows are asked on, and a server with as many threads.
+#[derive(Clone)]
+struct Place {
+    pool: Arc<rayon::ThreadPool>,
+    host: Arc<Host>,
+}
+
+/// Pools and servers that rows are asked on.
+pub(super) struct Pools(Vec<Place>);
 
 impl Pools {
-    /// A pool for every entry of [`THREADS`].
+    /// A pool and a server for every entry of [`THREADS`].
     ///
     /// # Errors
-    /// [`ReportError::Threads`].
+    /// [`ReportError::Threads`], [`ReportError::Link`].
     pub fn new() -> Result<Self, ReportError> {
-        let pools = THREADS.iter().map(|&threads| Ok(Arc::new(pool(threads)?)));
+        let pools = THREADS.iter().map(|&threads| {
+            let host = Arc::new(Host::open(&ServerChoice::Embedded, Some(threads))?);
+            Ok(Place { pool: Arc::new(pool(threads)?), host })
+        });
         Ok(Self(pools.collect::<Result<_, ReportError>>()?))
     }
 }
@@ -111,11 +123,12 @@ fn truth_of(case: &Arc<Case>, way: Way) -> Result<Arc<Truth>, String> {
 /// One row: timed and compared on the first pool, repeated on the others.
 fn row(family: &Family, case: &Arc<Case>, way: Way, right: &Arc<Truth>, pools: &Pools) -> Row {
     let mut first: Option<Row> = None;
-    for (pool, threads) in pools.0.iter().zip(THREADS).take(case.runs) {
-        let (of, right_one, pool) = (Arc::clone(case), Arc::clone(right), Arc::clone(pool));
+    for (place, threads) in pools.0.iter().zip(THREADS).take(case.runs) {
+        let (of, right_one, place) = (Arc::clone(case), Arc::clone(right), place.clone());
         let is_first = first.is_none();
         let asked = guarded(limit(case.reach), move || {
-            pool.install(|| ask(&of, way, is_first.then_some(&*right_one)))
+            let Place { pool, host } = place;
+            pool.install(|| ask(&of, way, is_first.then_some(&*right_one), &host))
         });
         let found = asked.unwrap_or_else(|fault| (Found::Fault(fault), 0));
         match &mut first {
@@ -143,18 +156,19 @@ fn row(family: &Family, case: &Arc<Case>, way: Way, right: &Arc<Truth>, pools: &
 }
 
 /// Asks once; compares where there is something to compare with.
-fn ask(case: &Case, way: Way, right: Option<&Truth>) -> (Found, u64) {
+fn ask(case: &Case, way: Way, right: Option<&Truth>, host: &Host) -> (Found, u64) {
     let found = match case.repeats {
-        Repeats::Once => match way.answer(&case.question) {
+        Repeats::Once => match way.answer(&case.question, host) {
             Ok(answer) => {
-                let errors = right.and_then(|right| right.errors_of(&answer.displacement));
+                let errors =
+                    right.and_then(|right| right.errors_of(&answer.displacement, way.is_single()));
                 Found::Answer(Box::new(answer), errors)
             }
-            Err(reason) => Found::Refusal(reason),
+            Err(refusal) => Found::Refusal(refusal),
         },
-        _ => match walk(way, case, right.is_some()) {
+        _ => match walk(way, case, right.is_some(), host) {
             Walk::Answered(answer, errors) => Found::Answer(Box::new(answer), errors),
-            Walk::Refused(reason) => Found::Refusal(reason),
+            Walk::Refused(refusal) => Found::Refusal(refusal),
             Walk::Failed(fault) => Found::Fault(fault),
         },
     };
@@ -162,7 +176,7 @@ fn ask(case: &Case, way: Way, right: Option<&Truth>) -> (Found, u64) {
         Found::Answer(answer, _) => {
             hash_of(answer.displacement.iter().flat_map(|u| u.to_bits().to_le_bytes()))
         }
-        Found::Refusal(text) | Found::Fault(text) => hash_of(text.bytes()),
+        Found::Refusal(Refusal { text, .. }) | Found::Fault(text) => hash_of(text.bytes()),
     };
     (found, hash)
 }
@@ -179,14 +193,18 @@ fn judged(
         Found::Answer(answer, errors) => {
             let Answer { stated_rel, bound_rel, .. } = **answer;
             let judged = Judged { errors: *errors, stated_rel, bound_rel };
-            Outcome::of_answer(&judged, case.threshold, allowed)
+            let (outcome, note) = Outcome::of_answer(&judged, allowed);
+            let parts = [note.as_str(), answer.remark.as_str()];
+            let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+            (outcome, parts.join("; "))
         }
-        Found::Refusal(reason) => Outcome::of_refusal(reason, allowed),
+        Found::Refusal(refusal) => Outcome::of_refusal(refusal, case.reason, allowed),
         Found::Fault(text) => (Outcome::Failed, text.clone()),
     };
     let numbers = match found {
         Found::Answer(answer, errors) => Some(Numbers {
             error_rel: errors.map(|e| e.largest_rel),
+            threshold_rel: errors.map(|e| e.threshold_rel),
             stated_rel: answer.stated_rel,
             bound_rel: answer.bound_rel,
             residual_rel: answer.residual_rel,
@@ -201,7 +219,6 @@ fn judged(
         nodes: case.question.mesh.node_count(),
         way,
         allowed,
-        threshold: case.threshold,
         outcome,
         note,
         against,

@@ -3,6 +3,7 @@
 use softgrasp_core::fem::Material;
 
 use super::case::{Allowed, Case, Family, Form, Question, plain};
+use super::refusal::Reason;
 use super::shapes::{block, in_unit};
 use crate::report::ReportError;
 
@@ -62,11 +63,14 @@ pub(super) fn displacements(form: Form) -> Result<Family, ReportError> {
     // Forces overflow before displacements do.
     let case = |name: &str, by: f64| Case::new(name, held.scaled(by), 1.0);
     cases.push(case("1e-298 of the size", 1e-296).allowing(Allowed::ANY));
-    cases.push(case("1e302 of the size", 1e304).allowing(Allowed::EXACT_OR_REFUSED));
-    cases.push(case("no number", f64::NAN).allowing(Allowed::REFUSED));
+    cases.push(
+        case("1e302 of the size", 1e304).allowing(Allowed::EXACT_OR_REFUSED).because(Reason::Range),
+    );
+    let refused = |case: Case| case.allowing(Allowed::REFUSED).because(Reason::Question);
+    cases.push(refused(case("no number", f64::NAN)));
     let mut infinite = held.clone();
     infinite.pairs.push((3 * infinite.mesh.node_count() as u32 - 5, f64::INFINITY));
-    cases.push(Case::new("infinite", infinite, 1.0).allowing(Allowed::REFUSED));
+    cases.push(refused(Case::new("infinite", infinite, 1.0)));
     Ok(Family {
         name: "displacements",
         reasoning: "The equations are linear: the relative error is the same for every amount that \

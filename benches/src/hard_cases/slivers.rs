@@ -29,7 +29,7 @@ pub(super) fn family(form: Form) -> Result<Family, ReportError> {
         name: "slivers",
         reasoning: "An element of height a (over the edges around it) is 1/a times as stiff across \
                     as its neighbours are, and the digits of 1/a are lost where its stiffness is \
-                    added to theirs: 1e-11 over a.",
+                    added to theirs.",
         advice: "Nothing for a few slivers down to 0.1°. Flatter ones: let the mesh maker improve \
                  the mesh, or merge the two nodes; the warning of an answer says what it costs.",
         cases,

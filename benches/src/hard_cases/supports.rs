@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 use softgrasp_core::mesh::TetMesh;
 
 use super::case::{Allowed, Case, Family, Form, Question, moved, plain};
+use super::refusal::Reason;
 use super::shapes::{block, nearest, with_node_at};
 use crate::report::ReportError;
 
@@ -79,7 +80,9 @@ pub(super) fn free(form: Form) -> Result<Family, ReportError> {
     let case = |name: &str, contacts: &[Vec<(u32, f64)>]| {
         let pairs = contacts.concat();
         let question = Question { mesh: mesh.clone(), materials: plain()?, fixed: vec![], pairs };
-        Ok::<_, ReportError>(Case::new(name, question, 1.0).allowing(Allowed::REFUSED))
+        Ok::<_, ReportError>(
+            Case::new(name, question, 1.0).allowing(Allowed::REFUSED).because(Reason::Free),
+        )
     };
     let sliding: Vec<(u32, f64)> =
         (0..mesh.node_count() as u32).flat_map(|n| [(3 * n, 0.0), (3 * n + 1, 0.0)]).collect();

@@ -11,7 +11,6 @@
 //! Source: Higham, Accuracy and Stability of Numerical Algorithms (2002), 7.2 and 15; estimator of
 //! Hager (1984) and Higham (1988) in the form with two columns of Higham and Tisseur (2000).
 
-use super::direct::Factored;
 use super::partition::Partition;
 use crate::fem::Stiffness;
 
@@ -128,23 +127,6 @@ pub(super) fn backward_error(
         if *r == 0.0 { 0.0 } else { r.abs() / size }
     })
     .fold(0.0, |most, ratio| if ratio > most || ratio.is_nan() { ratio } else { most })
-}
-
-impl Factored {
-    /// How certain an answer of this factor is; the condition is estimated at the first call, by a
-    /// few solves, and kept.
-    ///
-    /// `stiffness` must be the one this was factored from; `backward_error` that of the answer
-    /// ([`super::Solution`]).
-    pub fn certainty(&self, stiffness: &Stiffness, backward_error: f64) -> Certainty {
-        let condition = self.condition.get_or(|| {
-            let weights = row_sums(stiffness, self.partition());
-            inverse_norm(&weights, &|b, columns| {
-                self.apply_inverse_for_certain(stiffness, b, columns)
-            })
-        });
-        Certainty::new(condition, backward_error)
-    }
 }
 
 #[cfg(test)]

@@ -78,11 +78,16 @@ impl Method {
         }
     }
 
+    /// Whether its factor is in single precision.
+    pub const fn is_single(self) -> bool {
+        matches!(self, Self::FrontMixed | Self::Pcg)
+    }
+
     /// Precision of the factor or inverse.
     pub const fn precision(self) -> &'static str {
-        match self {
-            Self::FrontMixed | Self::Pcg => "f32 factor, f64 residual",
-            _ => "f64",
+        match self.is_single() {
+            true => "f32 factor, f64 residual",
+            false => "f64",
         }
     }
 

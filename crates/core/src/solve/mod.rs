@@ -19,12 +19,13 @@ pub mod rates;
 mod sparse;
 mod stage;
 mod tiles;
+mod vectors;
 pub mod work;
 mod worked_out;
 mod zero_energy;
 
 pub use certainty::{Certainty, ERROR_REFUSED, ERROR_SERIOUS, ERROR_UNREMARKABLE};
-pub use direct::{Analysed, Factored, FrontMethod, Loads, Solution, SolveError};
+pub use direct::{Analysed, Factored, Fallback, FrontMethod, Loads, Solution, SolveError};
 pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};
 pub use method::{Method, UnknownMethod};
 pub use mobility::{FreeMotion, Motion, find_free_motion};

@@ -171,6 +171,13 @@ impl Partition {
         &self.unknown
     }
 
+    /// Writes the unknown displacements to their places among all.
+    pub(super) fn scatter_unknown(&self, x: &[f64], q: &mut [f64]) {
+        for (&dof, x) in self.unknown.iter().zip(x) {
+            q[dof as usize] = *x;
+        }
+    }
+
     /// Known degrees of freedom, ascending.
     pub fn known(&self) -> &[u32] {
         &self.known

@@ -16,10 +16,10 @@ impl<T> Default for WorkedOut<T> {
     }
 }
 
-impl<T: Copy> WorkedOut<T> {
+impl<T: Clone> WorkedOut<T> {
     /// The number, if somebody has worked it out.
     pub fn get(&self) -> Option<T> {
-        self.0.get().copied()
+        self.0.get().cloned()
     }
 
     /// The number, worked out now by `work` if nobody has; the first result is the one that stays.
@@ -29,7 +29,7 @@ impl<T: Copy> WorkedOut<T> {
         }
         let value = work();
         // Somebody else may have been first; their number is the same.
-        let _ = self.0.set(value);
+        let _ = self.0.set(value.clone());
         self.get().unwrap_or(value)
     }
 }

@@ -6,7 +6,7 @@ use crate::fem::Stiffness;
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
 use crate::solve::partition::AXIS_NAMES;
-use crate::solve::pcg::norm;
+use crate::solve::vectors::norm;
 use crate::solve::worked_out::WorkedOut;
 use crate::solve::zero_energy::{BodyMotions, RigidBodies, dofs_by_body};
 use crate::solve::{Partition, PartitionError, Stage};
@@ -97,9 +97,19 @@ pub enum CondensedError {
         /// The bound.
         bound: usize,
     },
-    /// The touched nodes leave a motion free or nearly so.
-    #[error("condensed: the touched nodes do not hold the body")]
+    /// The touched nodes and masks leave a motion free.
+    #[error("condensed: the touched nodes and masks do not hold the body")]
     NotHeld,
+    /// The touched nodes and masks hold the body, but so weakly that rounding takes every digit.
+    #[error(
+        "condensed: the touched nodes and masks hold the body too weakly for double precision \
+         (condition of the small system {condition:.0e}); hold nodes further apart and not in line, \
+         or ask for front"
+    )]
+    HeldTooWeakly {
+        /// Condition of the small system; infinite where it has no inverse.
+        condition: f64,
+    },
     /// A mask whose mean displacement follows from what else is held.
     #[error(
         "condensed: along {axis}, mask {mask} (from 0) says what other masks, touched nodes or fixed \

@@ -27,7 +27,7 @@ use nalgebra::DMatrix;
 use super::base::{Base, CondensedError, gamma};
 use super::columns::ContactColumns;
 use crate::solve::FrontFactor;
-use crate::solve::pcg::norm;
+use crate::solve::vectors::norm;
 
 /// What the bound needs of a contact set.
 pub(super) struct SmallBound {

@@ -8,7 +8,7 @@ use super::overlap::{Overlap, product};
 use super::touched::Touched;
 use crate::solve::Certainty;
 use crate::solve::certainty::{inverse_norm, row_sums};
-use crate::solve::pcg::norm;
+use crate::solve::vectors::norm;
 
 /// How wrong an answer can be.
 #[derive(Clone, Debug, PartialEq)]

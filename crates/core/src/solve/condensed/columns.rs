@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::base::{Base, CondensedError, rounding_of_product};
 use super::touched::Contact;
-use crate::solve::pcg::norm;
+use crate::solve::vectors::norm;
 
 /// Responses of the held shape to unit forces at one contact: on one node, or spread by a mask.
 ///

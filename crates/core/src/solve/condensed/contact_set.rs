@@ -11,6 +11,7 @@ use super::certificate::LoadSize;
 use super::columns::{Columns, ContactColumns};
 use super::overlap::Overlap;
 use super::touched::Touched;
+use crate::solve::zero_energy::FREE_BELOW;
 
 /// A set of contacts, ready to answer any displacements of them.
 ///
@@ -61,12 +62,27 @@ const ROWS_TOGETHER: usize = 1536;
 /// A product of more numbers is shared out among the threads; a smaller one is sooner done.
 const SHARED_PRODUCT: usize = 1 << 20;
 
+/// Why a small system cannot be solved: `moved` says how far each motion without energy moves each
+/// contact, and a motion that moves none of them is free.
+///
+/// Shapes: `moved` one row per displacement of a contact, one column per motion.
+fn refusal(moved: &DMatrix<f64>, condition: f64) -> CondensedError {
+    let sizes = moved.clone().singular_values();
+    let is_free = moved.nrows() < moved.ncols()
+        || !moved.is_empty() && sizes.min() <= FREE_BELOW * sizes.max();
+    match is_free {
+        true => CondensedError::NotHeld,
+        false => CondensedError::HeldTooWeakly { condition },
+    }
+}
+
 impl ContactSet {
     /// Gathers (or computes) the columns of the contacts and factors the small system.
     ///
     /// # Errors
     /// [`CondensedError::Dependent`] if a mask follows from other contacts;
-    /// [`CondensedError::CacheTooSmall`]; [`CondensedError::NotHeld`] if a motion is left free.
+    /// [`CondensedError::CacheTooSmall`]; [`CondensedError::NotHeld`] if a motion is left free,
+    /// [`CondensedError::HeldTooWeakly`] if one is nearly free.
     pub fn try_new(
         base: &Base,
         columns: &Columns,
@@ -90,11 +106,12 @@ impl ContactSet {
         small.view_mut((c, 0), (z, c)).copy_from(&moved.transpose());
         let symmetric = 0.5 * (&small + small.transpose());
         let small_lu = symmetric.lu();
-        let inverse = small_lu.try_inverse().ok_or(CondensedError::NotHeld)?;
+        let unsolvable = |condition| refusal(&moved, condition);
+        let inverse = small_lu.try_inverse().ok_or_else(|| unsolvable(f64::INFINITY))?;
         let condition = small.norm() * inverse.norm();
         // Written so that a NaN is refused too.
         if !(0.0..=CONDITION_MAX).contains(&condition) {
-            return Err(CondensedError::NotHeld);
+            return Err(unsolvable(condition));
         }
         let bound = SmallBound::new(base, &columns, &places, &inverse, scale)?;
         let load = LoadSize::new(base, touched, &overlap);

@@ -240,6 +240,25 @@ fn contacts_that_do_not_hold_the_body_are_refused() {
     assert!(matches!(set.err(), Some(CondensedError::NotHeld)));
 }
 
+#[test]
+fn body_held_within_rounding_of_a_line_is_not_said_to_be_free() {
+    let mesh = cube(125);
+    let mut vertices = mesh.vertices().to_vec();
+    // The middle of an edge moved inwards by a hundred millionth of the edge.
+    let size = mesh.size();
+    let line: Vec<u32> = (0..5).collect();
+    vertices[2].y += 1e-8 * size;
+    let mesh = mesh.with_vertices(vertices).unwrap();
+    let shape = Shape::new(mesh, 0.3, &[]);
+    let of = |nodes: &[u32]| {
+        let touched = Touched::of_dofs(&touched(nodes));
+        ContactSet::try_new(&shape.base, &shape.columns, &touched).err()
+    };
+    let weak = of(&[line[0], line[2], line[4]]);
+    assert!(matches!(weak, Some(CondensedError::HeldTooWeakly { .. })), "{weak:?}");
+    assert!(matches!(of(&[line[0], line[4]]), Some(CondensedError::NotHeld)));
+}
+
 /// The bound must hold on every one of ten thousand random frames, held by fingers and by the
 /// scene; the true error is taken against a refined direct answer.
 #[test]

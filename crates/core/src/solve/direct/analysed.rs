@@ -1,11 +1,11 @@
-//! Between order and factor: what a factor over the tree of fronts will cost is known.
+//! `K11` ordered and analysed: what a factor over the tree of fronts will cost is known.
 
 use std::sync::Arc;
 
-use super::{Factored, Kernel, SolveError, not_positive};
+use super::error::SolveError;
+use super::kernel::Kernel;
 use crate::fem::Stiffness;
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
-use crate::solve::worked_out::WorkedOut;
 use crate::solve::{Method, Partition, Stage};
 
 /// The methods that factor over the tree of fronts.
@@ -76,34 +76,38 @@ impl Analysed {
         }) as u64
     }
 
-    /// Factors on the current rayon pool; `on_stage` hears [`Stage::Factor`].
+    /// The partition that was analysed.
+    pub(super) fn into_partition(self) -> Partition {
+        self.partition
+    }
+
+    /// The factor on the current rayon pool; `on_stage` hears [`Stage::Factor`].
     ///
     /// `stiffness` must be the one this was analysed from.
     ///
     /// # Errors
     /// [`SolveError::NotPositiveDefinite`] with the node, [`SolveError::OutOfMemory`].
-    pub fn factor(
-        self,
+    pub(super) fn kernel(
+        &self,
         stiffness: &Stiffness,
         front: FrontMethod,
         on_stage: &mut dyn FnMut(Stage),
-    ) -> Result<Factored, SolveError> {
+    ) -> Result<Kernel, SolveError> {
         let Self { partition, analysis } = self;
         let method = Method::from(front);
         on_stage(Stage::Factor);
         let unknown_dofs = partition.unknown().len();
         let failed = |error| match error {
-            FrontError::NotPositive { row } => not_positive(method, &partition, row),
+            FrontError::NotPositive { row } => SolveError::not_positive(method, partition, row),
             _ => SolveError::OutOfMemory { method, unknown_dofs },
         };
-        let kernel = match front {
+        Ok(match front {
             FrontMethod::Double => {
-                Kernel::Front(FrontFactor::try_new(&analysis, stiffness).map_err(failed)?)
+                Kernel::Front(FrontFactor::try_new(analysis, stiffness).map_err(failed)?)
             }
             FrontMethod::Mixed | FrontMethod::Pcg => {
-                Kernel::FrontSingle(FrontFactor::try_new(&analysis, stiffness).map_err(failed)?)
+                Kernel::FrontSingle(FrontFactor::try_new(analysis, stiffness).map_err(failed)?)
             }
-        };
-        Ok(Factored { method, partition, kernel, condition: WorkedOut::default() })
+        })
     }
 }

@@ -5,8 +5,11 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::*;
-use crate::fem::{Material, StiffnessPattern, assemble};
+use crate::fem::{Material, Stiffness, StiffnessPattern, assemble};
 use crate::mesh::{TetMesh, signed_volume};
+use crate::solve::k11::SparseK11;
+use crate::solve::sparse::Analysis;
+use crate::solve::{Method, Partition, ordering};
 
 /// n³ nodes, six tetrahedra a cell, inner nodes moved irregularly.
 fn irregular_cube(n: usize) -> TetMesh {
@@ -203,4 +206,70 @@ fn nested_dissection_fills_less_than_the_natural_order() {
     // The inverse permutation is easy to pass by mistake and fills several times as much.
     assert!(3 * fill(dissected.clone()) < fill(swapped));
     assert!(fill(dissected) < natural);
+}
+
+/// A sheet a thousand times as wide as thick, clamped at one edge and bent at the other: harder than
+/// single precision's seven digits. Its stiffness and known degrees of freedom, fixed ones first.
+fn harder_than_single_precision() -> (TetMesh, Stiffness, Vec<u32>, Vec<f64>) {
+    let cube = irregular_cube(5);
+    let thin = cube.vertices().iter().map(|p| Point3::new(p.x, p.y, 1e-4 * p.z)).collect();
+    let sheet = cube.with_vertices(thin).unwrap();
+    let stiffness = stiffness_of(&sheet, 0.3);
+    let at = |x: f64| (0..125u32).filter(move |n| f64::from(n % 5) / 4.0 == x);
+    let dofs: Vec<u32> = at(0.0).chain(at(1.0).take(1)).flat_map(|n| 3 * n..3 * n + 3).collect();
+    let mut dofs_sorted = dofs.clone();
+    dofs_sorted.sort_unstable();
+    let pushed = at(1.0).next().unwrap();
+    let q_known = dofs_sorted.iter().map(|&d| if d == 3 * pushed + 2 { 0.01 } else { 0.0 });
+    let q_known = q_known.collect();
+    (sheet, stiffness, dofs_sorted, q_known)
+}
+
+#[test]
+fn question_too_hard_for_single_precision_is_answered_in_double_and_says_so() {
+    let (mesh, stiffness, dofs, q_known) = harder_than_single_precision();
+    let loads = Loads { q_known: &q_known, ..Loads::default() };
+    let of = |method: Method| {
+        let partition = Partition::try_new(&mesh.used_nodes(), &dofs).unwrap();
+        let factored = Factored::try_new(&stiffness, partition, method, &mut |_| {}).unwrap();
+        factored.solve_for_certain(&stiffness, loads, &mut |_| {}).unwrap()
+    };
+    let (right, certainty) = of(Method::Front);
+    assert!(!certainty.is_none() && right.fallback.is_none(), "{certainty:?}");
+    for method in [Method::FrontMixed, Method::Pcg] {
+        let (solution, certainty) = of(method);
+        assert!(solution.fallback.is_some() && !certainty.is_none(), "{method} {certainty:?}");
+        for (a, b) in solution.displacement.iter().zip(&right.displacement) {
+            assert!((a - b).abs() <= 0.02 * certainty.error_rel, "{method}: {a:e} {b:e}");
+        }
+    }
+}
+
+#[test]
+fn double_precision_is_not_taken_beyond_the_memory_limit() {
+    let (mesh, stiffness, dofs, q_known) = harder_than_single_precision();
+    let loads = Loads { q_known: &q_known, ..Loads::default() };
+    let partition = Partition::try_new(&mesh.used_nodes(), &dofs).unwrap();
+    let analysed = Analysed::new(&stiffness, partition, &mut |_| {});
+    let limit = analysed.peak_bytes(FrontMethod::Mixed);
+    match analysed.factor_within(&stiffness, FrontMethod::Mixed, limit, &mut |_| {}) {
+        Err(SolveError::NotPositiveDefinite { .. }) => {}
+        Err(other) => panic!("{other}"),
+        Ok(factored) => {
+            let solved = factored.solve_for_certain(&stiffness, loads, &mut |_| {});
+            assert_eq!(factored.fallback(), None);
+            assert!((factored.bytes() as u64) <= limit, "{solved:?}");
+        }
+    }
+}
+
+#[test]
+fn pivot_lost_in_rounding_is_not_called_a_free_motion() {
+    for method in Method::DIRECT {
+        let error = SolveError::NotPositiveDefinite { method, node: 3, axis: 'z' };
+        let text = error.to_string();
+        assert!(text.contains("rounding") && !text.contains("free"), "{text}");
+        let precision = if method.is_single() { "single precision" } else { "double precision" };
+        assert!(text.contains(precision), "{text}");
+    }
 }

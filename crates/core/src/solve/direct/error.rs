@@ -1,0 +1,93 @@
+//! Why a direct method gives no answer.
+
+use crate::solve::Method;
+use crate::solve::Partition;
+use crate::solve::partition::AXIS_NAMES;
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// A pivot of `K11` was not positive. Whether a body is held at all is known before anything is
+    /// factored ([`super::super::find_free_motion`]); here rounding was larger than the pivot.
+    #[error("{method}: {}", no_pivot(*.method, *.node, *.axis))]
+    NotPositiveDefinite {
+        /// Method that found it.
+        method: Method,
+        /// Node of the pivot.
+        node: usize,
+        /// Axis of the pivot.
+        axis: char,
+    },
+    /// A method that has no factor of `K11`.
+    #[error("{method} does not factor the stiffness of the free nodes")]
+    NotDirect {
+        /// The method.
+        method: Method,
+    },
+    /// Memory for the factor could not be had.
+    #[error("{method}: no memory for the factor of {unknown_dofs} unknowns")]
+    OutOfMemory {
+        /// Method that asked.
+        method: Method,
+        /// Size of `K11`.
+        unknown_dofs: usize,
+    },
+    /// The factor or inverse is larger than it may be.
+    #[error(
+        "{method}: the factor or inverse of {unknown_dofs} unknowns takes up to {needed} bytes while \
+         it is made, and may take {limit}"
+    )]
+    OverLimit {
+        /// Method that asked.
+        method: Method,
+        /// Size of `K11`.
+        unknown_dofs: usize,
+        /// Bytes it would take at most.
+        needed: u64,
+        /// Bytes it may take.
+        limit: u64,
+    },
+    /// The answer holds NaN or infinity.
+    #[error(
+        "{method}: the answer is not finite; the numbers of the mesh, the material or the known \
+         displacements are too large or too small for double precision"
+    )]
+    NotFinite {
+        /// Method used.
+        method: Method,
+    },
+    /// Loads that do not fit the partition.
+    #[error("{given} values for {expected} {what}")]
+    LoadCount {
+        /// Which list.
+        what: &'static str,
+        /// Values given.
+        given: usize,
+        /// Values expected.
+        expected: usize,
+    },
+}
+
+impl SolveError {
+    /// A pivot that was not positive, at the node and axis of its row of `K11`.
+    pub(super) fn not_positive(method: Method, partition: &Partition, row: usize) -> Self {
+        let dof = partition.unknown().get(row).map_or(0, |&d| d as usize);
+        let (node, axis) = (dof / 3, AXIS_NAMES[dof % 3]);
+        Self::NotPositiveDefinite { method, node, axis }
+    }
+}
+
+/// What a pivot lost in rounding says of the body, which is another thing than a free motion.
+fn no_pivot(method: Method, node: usize, axis: char) -> String {
+    let lost = format!("the pivot of node {node} axis {axis} is lost in the rounding of");
+    if method.is_single() {
+        return format!(
+            "{lost} single precision, and there is no memory for a factor in double precision; \
+             raise the memory limit, or hold the body at nodes further apart"
+        );
+    }
+    format!(
+        "{lost} double precision: what is known holds the body too weakly, or an element there is \
+         degenerate; hold nodes further apart and not in line, or mend the mesh"
+    )
+}

@@ -1,0 +1,17 @@
+//! One interface to all direct methods: factor a partition once, then answer known displacements.
+
+mod analysed;
+mod error;
+mod factored;
+mod fallback;
+mod kernel;
+mod refinement;
+mod solution;
+#[cfg(test)]
+mod tests;
+
+pub use analysed::{Analysed, FrontMethod};
+pub use error::SolveError;
+pub use factored::Factored;
+pub use fallback::Fallback;
+pub use solution::{Loads, Solution};
