@@ -123,9 +123,11 @@ impl GraspLoop {
         self.link.wait_idle(at_most)
     }
 
-    /// Whether work on the object goes on beside the ticks.
-    pub fn is_working(&self) -> bool {
-        self.work.is_busy()
+    /// Waits until the server has answered all, at most so long, and until the work beside the ticks
+    /// is done: what the next tick finds then does not depend on time.
+    pub fn settle(&mut self, at_most: Duration) {
+        self.work.settle();
+        self.link.wait_idle(at_most);
     }
 
     /// One tick at a time on the client's clock.

@@ -78,6 +78,11 @@ impl Session {
         self.grasp_loop.wait_idle(at_most)
     }
 
+    /// Waits until nothing is under way but the planning of the hand; see [`GraspLoop::settle`].
+    pub fn settle(&mut self, at_most: Duration) {
+        self.grasp_loop.settle(at_most);
+    }
+
     /// Ends the run; `interrupted` if the user did.
     pub fn finish(mut self, interrupted: bool) -> RunReport {
         self.report.interrupted = interrupted;
