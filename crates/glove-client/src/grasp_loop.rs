@@ -130,6 +130,16 @@ impl GraspLoop {
         self.link.wait_idle(at_most);
     }
 
+    /// What the server has done since the last tick, when no tick follows.
+    ///
+    /// # Errors
+    /// [`ObjectError`] when the object cannot be shown any more.
+    pub fn take_last(&mut self) -> Result<TickOutcome, ObjectError> {
+        let mut outcome = TickOutcome::default();
+        self.pick_up(&mut outcome)?;
+        Ok(outcome)
+    }
+
     /// One tick at a time on the client's clock.
     ///
     /// # Errors

@@ -84,10 +84,14 @@ impl Session {
     }
 
     /// Ends the run; `interrupted` if the user did.
-    pub fn finish(mut self, interrupted: bool) -> RunReport {
+    ///
+    /// # Errors
+    /// As [`Session::play`].
+    pub fn finish(mut self, interrupted: bool) -> Result<RunReport, ObjectError> {
+        self.report.add_last(&self.grasp_loop.take_last()?);
         self.report.interrupted = interrupted;
         self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
-        self.report
+        Ok(self.report)
     }
 }
 

@@ -99,7 +99,7 @@ impl Play {
 
     fn finish(mut self) -> RunReport {
         self.session.settle(PATIENCE);
-        self.session.finish(false)
+        self.session.finish(false).unwrap()
     }
 }
 
