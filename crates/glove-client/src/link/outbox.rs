@@ -1,4 +1,4 @@
-//! What waits to be sent, what is being done, and what has come: shared by the ticks and the link.
+//! The state that the ticks and the link's thread share: what is to be sent, and what has come.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
