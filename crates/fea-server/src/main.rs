@@ -64,7 +64,7 @@ fn main() -> ExitCode {
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("fea-server: {}", one_line(&error));
+            eprintln!("fea-server: {}", softgrasp_os::one_line(error.as_ref()));
             match error.downcast_ref() {
                 Some(StartError::Config(_)) => ExitCode::from(WRONG_USAGE),
                 _ => ExitCode::FAILURE,
@@ -146,13 +146,4 @@ fn announce(address: SocketAddr) {
     // A closed standard output is no reason not to serve.
     let _ = writeln!(out, "listening on {address}").and_then(|()| out.flush());
     tracing::info!(%address, "ready");
-}
-
-/// The error and its causes in one line; a cause that the line already tells is left out.
-fn one_line(error: &anyhow::Error) -> String {
-    error.chain().fold(String::new(), |line, cause| match cause.to_string() {
-        told if line.contains(&told) => line,
-        cause if line.is_empty() => cause,
-        cause => format!("{line}: {cause}"),
-    })
 }

@@ -1,4 +1,4 @@
-//! A client's side of one TCP connection: requests out, replies in, one at a time.
+//! Sends requests to a server over one TCP connection, and reads their replies.
 
 use std::fmt;
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
@@ -215,6 +215,16 @@ impl ServerConnection {
         self.connection.stream()
     }
 
+    /// Whether the server has closed the connection, or has said something that nobody asked for,
+    /// as it does before it closes; never waits. To be called while no reply is awaited.
+    pub fn is_closed(&self) -> bool {
+        let stream = self.connection.stream();
+        let peeked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut [0]));
+        let restored = stream.set_nonblocking(false);
+        let quiet = peeked.is_err_and(|e| e.kind() == std::io::ErrorKind::WouldBlock);
+        !quiet || restored.is_err()
+    }
+
     /// Sends a request and waits for its reply; replies to abandoned requests are passed over.
     ///
     /// # Errors
@@ -282,7 +292,7 @@ impl ServerConnection {
     }
 }
 
-/// What this machine is like for a server in this process.
+/// Speed and memory of this machine, as an embedded server would find them.
 pub struct OwnMachine {
     /// Speeds of its threads; `None` where they cannot be measured.
     pub rates: Option<Rates>,
@@ -295,7 +305,7 @@ pub struct OwnMachine {
 }
 
 impl OwnMachine {
-    /// Measures for some hundredths of a second.
+    /// Measures the speeds; takes some hundredths of a second.
     pub fn measure() -> Self {
         let ServerConfig { threads, memory_limit, .. } = ServerConfig::default();
         Self {

@@ -1,11 +1,11 @@
-//! One line that lives on the terminal while the hand is at work.
+//! Shows tick, grasp state and the last solve on one line of the terminal during a run.
 
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::grasp_loop::TickOutcome;
 use crate::solve_report::SolveSummary;
+use crate::tick_outcome::TickOutcome;
 
 /// The status line; silent when standard error is not a terminal.
 pub struct StatusLine {
