@@ -12,15 +12,18 @@ pub mod contact;
 pub mod echo;
 pub mod fit;
 pub mod frame;
+mod frame_bytes;
 pub mod frontier;
 pub mod hard_cases;
 pub mod hold;
 pub mod machine;
 pub mod methods;
+
 pub mod onset;
 pub mod plot;
 pub mod reference;
 pub mod report;
+pub mod report_error;
 pub mod sample;
 pub mod scaling;
 pub mod scene;

@@ -108,15 +108,20 @@ fn contacts_are_pressed_and_timed_with_small_errors() {
 fn frames_are_timed_beside_their_echo_with_small_errors() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Frame, folder.path());
-    for name in ["error_rel", "residual_rel"] {
-        let errors = numbers(folder.path(), "frame.csv", name);
-        assert!(errors.iter().all(|&e| e < 1e-11) && errors.len() >= 8, "{name}: {errors:?}");
+    for (file, rows) in [("frame.csv", 6), ("frame-methods.csv", 18)] {
+        for name in ["error_rel", "residual_rel"] {
+            let errors = numbers(folder.path(), file, name);
+            assert!(errors.iter().all(|&e| e < 1e-11), "{file} {name}: {errors:?}");
+            assert!(errors.len() >= rows, "{file}: {errors:?}");
+        }
     }
-    let (frames, echoes) = (
-        numbers(folder.path(), "frame.csv", "p50_ms"),
-        numbers(folder.path(), "frame.csv", "echo_p50_ms"),
-    );
-    assert!(frames.iter().chain(&echoes).all(|&ms| ms > 0.0));
+    assert_eq!(column(folder.path(), "frame.csv", "contact")[0], "mask");
+    for name in ["alone_p50_ms", "echo_alone_p50_ms", "alone_over_echo_alone"] {
+        assert!(numbers(folder.path(), "frame.csv", name).iter().all(|&x| x > 0.0), "{name}");
+    }
+    // Where an echo keeps a processor for itself, nothing takes turns with it.
+    let in_turn = column(folder.path(), "frame.csv", "frame_over_echo");
+    assert_eq!(in_turn.iter().filter(|ratio| ratio.is_empty()).count(), 2);
     // Warm frames reuse the factor of the first.
     assert!(numbers(folder.path(), "frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
 }
