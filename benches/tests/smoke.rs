@@ -60,8 +60,14 @@ fn collision_is_timed_and_nothing_is_missed() {
     // The check is worth something only if something was there to be missed.
     let inside = column(folder.path(), "collision.csv", "inside_per_hand");
     assert!(inside.iter().filter(|v| !v.is_empty()).all(|v| v.parse::<f64>().unwrap() > 5.0));
-    let contacts = numbers(folder.path(), "collision-ratios.csv", "contacts_checked");
-    assert!(contacts.iter().all(|&c| c > 0.0), "{contacts:?}");
+    for file in ["collision-like.csv", "collision-triangles.csv"] {
+        let contacts = numbers(folder.path(), file, "contacts_checked");
+        assert!(contacts.iter().all(|&c| c > 0.0), "{file}: {contacts:?}");
+        // The peer answers the same questions, and as well.
+        let wrong = numbers(folder.path(), file, "missed_by_peer");
+        assert!(wrong.iter().all(|&m| m == 0.0), "{file}: {wrong:?}");
+        assert!(numbers(folder.path(), file, "ratio").iter().all(|&r| r > 0.0));
+    }
 }
 
 #[test]
@@ -182,11 +188,25 @@ fn first_frames_of_grips_are_right_with_and_without_prefetch() {
 fn a_held_pace_is_counted_and_every_answer_compared() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Hold, folder.path());
-    let of = |name| numbers(folder.path(), "hold.csv", name)[0];
-    assert_eq!(of("ticks"), 500.0);
-    assert!((0.0..=100.0).contains(&of("late_percent")) && of("missed") <= 500.0);
-    assert!(of("error_rel") < 1e-10 && of("residual_rel") < 1e-10);
+    let (rights, asked) = ("real_time", "asked");
+    let of = |name| column(folder.path(), "hold.csv", name);
+    // The server and nobody, with real-time rights where the system grants them, and without.
+    assert_eq!(of(asked)[..2], ["the server", "nobody"]);
+    assert_eq!(of(rights).last().map(String::as_str), Some("no"));
+    assert!(numbers(folder.path(), "hold.csv", "ticks").iter().all(|&ticks| ticks == 500.0));
+    let late = numbers(folder.path(), "hold.csv", "late_percent");
+    assert!(late.iter().all(|late| (0.0..=100.0).contains(late)), "{late:?}");
+    let of_answers = |name| {
+        let all: Vec<String> = of(name).into_iter().step_by(2).collect();
+        all.iter().map(|v| v.parse::<f64>().unwrap()).collect::<Vec<_>>()
+    };
+    for name in ["error_rel", "residual_rel"] {
+        assert!(of_answers(name).iter().all(|&e| e < 1e-10), "{name}: {:?}", of(name));
+    }
+    for (place, difference) in of_answers("late_above_control_percent").iter().enumerate() {
+        assert!((late[2 * place] - late[2 * place + 1] - difference).abs() < 1e-3);
+    }
     // Without a bound the pace would be held without the certificate.
-    assert_eq!(of("with_bound_percent"), 100.0);
-    assert!(of("error_bound_rel") > 0.0 && of("error_bound_rel") < 1e-4);
+    assert!(of_answers("with_bound_percent").iter().all(|&share| share == 100.0));
+    assert!(of_answers("error_bound_rel").iter().all(|&bound| bound > 0.0 && bound < 1e-4));
 }

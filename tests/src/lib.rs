@@ -5,6 +5,7 @@ pub mod fake_server;
 pub mod faulty_proxy;
 pub mod heard;
 pub mod questions;
+pub mod quoting;
 pub mod random;
 pub mod raw_session;
 pub mod watchdog;
