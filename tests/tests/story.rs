@@ -12,13 +12,15 @@ use clap::Parser;
 use fea_server::ServerConfig;
 use glove_client::commands::run::RunCommand;
 use glove_client::contact_model::ContactModel;
-use glove_client::grasp_loop::{
-    GraspLoop, LoopEvent, Pace, SolveSettings, Subscription, TickOutcome,
-};
+use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
+use glove_client::pace::Pace;
 use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
 use glove_client::soft_object::SoftObject;
+use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::tick_budget::Priority;
+use glove_client::tick_outcome::{LoopEvent, TickOutcome};
 use nalgebra::Isometry3;
 use serde_json::Value;
 use softgrasp_core::grasp::{Grasp, StateName};
@@ -162,8 +164,10 @@ impl Bench {
             subscription: Subscription::Surface,
         };
         let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
-        let (reader, link) = (HandReader::new(setup), Link::start(address).unwrap());
-        let grasp_loop = GraspLoop::new(reader, object, grasp, link, settings, Pace::Lockstep);
+        let (reader, link) =
+            (HandReader::new(setup), Link::start(address, Priority::Ordinary).unwrap());
+        let grasp_loop =
+            GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();
         Self { grasp_loop, hand, seen: Seen::default(), tick: 0 }
     }
 

@@ -215,6 +215,16 @@ impl ServerConnection {
         self.connection.stream()
     }
 
+    /// Whether the server has closed the connection, or has said something that nobody asked for,
+    /// as it does before it closes; never waits. To be called while no reply is awaited.
+    pub fn is_closed(&self) -> bool {
+        let stream = self.connection.stream();
+        let peeked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut [0]));
+        let restored = stream.set_nonblocking(false);
+        let quiet = peeked.is_err_and(|e| e.kind() == std::io::ErrorKind::WouldBlock);
+        !quiet || restored.is_err()
+    }
+
     /// Sends a request and waits for its reply; replies to abandoned requests are passed over.
     ///
     /// # Errors

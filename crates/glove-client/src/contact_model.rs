@@ -1,5 +1,4 @@
-//! How a fingertip's displacement is put on the object: on one node, on every node it covers, or on
-//! their mean under its pressure.
+//! Which nodes follow a fingertip: the one it touched, all that it covers, or the average of those.
 
 use std::fmt;
 use std::str::FromStr;
@@ -61,31 +60,31 @@ pub struct HeldNodes {
     masks: Masks,
 }
 
-/// What five fingertips ask of the object.
+/// The displacements that five fingertips prescribe.
 ///
 /// Units: m. Frame: the object's.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Prescribed {
-    /// Known displacements.
-    pub known: Vec<DofValue>,
-    /// Masks, and the mean displacement of each.
+pub struct PrescribedDisplacements {
+    /// Prescribed displacements of single degrees of freedom.
+    pub of_dofs: Vec<DofValue>,
+    /// Masks whose mean displacement is prescribed.
     pub masks: Masks,
-    /// See `masks`.
-    pub mask_displacements: Vec<[f64; 3]>,
+    /// Prescribed mean displacement of each mask.
+    pub of_masks: Vec<[f64; 3]>,
 }
 
 impl HeldNodes {
-    /// What the tips ask.
+    /// The displacements that the tips prescribe.
     ///
     /// Units: `tip_radii` and displacements m. Frame: the object's, at rest: what a tip covers is a
     /// part of the rest surface, so it stays the same while the object deforms.
-    pub fn prescribed(
+    pub fn prescribed_displacements(
         &mut self,
         model: ContactModel,
         object: &SoftObject,
         tip_radii: [f64; 5],
         known: &[KnownNode; 5],
-    ) -> Prescribed {
+    ) -> PrescribedDisplacements {
         let touched = known.map(|k| k.node);
         if self.touched != Some(touched) {
             *self = Self { touched: Some(touched), ..Self::default() };
@@ -96,7 +95,8 @@ impl HeldNodes {
                 }
                 ContactModel::Patch => self.held = patches(object, tip_radii, &touched),
                 ContactModel::Mask => fingers.for_each(|(finger, node)| {
-                    self.masks.push(object.tip_mask(node, tip_radii[finger]).entries());
+                    self.masks
+                        .push(object.rest_shape().tip_mask(node, tip_radii[finger]).entries());
                 }),
             }
             self.held.sort_unstable();
@@ -106,10 +106,10 @@ impl HeldNodes {
             (0..3u32).map(move |axis| DofValue { dof: 3 * node + axis, value: u[axis as usize] })
         });
         let of_masks = known.iter().map(|k| k.displacement_in_object.into());
-        Prescribed {
-            known: values.collect(),
+        PrescribedDisplacements {
+            of_dofs: values.collect(),
             masks: self.masks.clone(),
-            mask_displacements: of_masks.take(self.masks.len()).collect(),
+            of_masks: of_masks.take(self.masks.len()).collect(),
         }
     }
 
@@ -160,8 +160,8 @@ mod tests {
         let object = sphere();
         let known = known(&object);
         let values = HeldNodes::default()
-            .prescribed(ContactModel::Vertex, &object, [0.007; 5], &known)
-            .known;
+            .prescribed_displacements(ContactModel::Vertex, &object, [0.007; 5], &known)
+            .of_dofs;
         assert_eq!(values.len(), 15);
         let first = values.iter().find(|v| v.dof == 3 * known[2].node).unwrap();
         assert_eq!(first.value, 0.003);
@@ -172,8 +172,9 @@ mod tests {
         let object = sphere();
         let known = known(&object);
         let radii = [0.008; 5];
-        let values =
-            HeldNodes::default().prescribed(ContactModel::Patch, &object, radii, &known).known;
+        let values = HeldNodes::default()
+            .prescribed_displacements(ContactModel::Patch, &object, radii, &known)
+            .of_dofs;
         assert!(values.len() > 15 && values.windows(2).all(|w| w[0].dof < w[1].dof));
         let rest = object.rest().vertices();
         for &node in &object.surface().nodes {
@@ -188,19 +189,19 @@ mod tests {
         let object = sphere();
         let mut known = known(&object);
         let mut held = HeldNodes::default();
-        let asked = held.prescribed(ContactModel::Mask, &object, [0.008; 5], &known);
-        assert!(asked.known.is_empty() && asked.masks.len() == 5);
+        let asked = held.prescribed_displacements(ContactModel::Mask, &object, [0.008; 5], &known);
+        assert!(asked.of_dofs.is_empty() && asked.masks.len() == 5);
         for ((nodes, weights), touched) in asked.masks.iter().zip(&known) {
             let at = nodes.binary_search(&touched.node).unwrap();
             assert!(nodes.len() > 3 && weights.iter().all(|w| *w <= weights[at]));
         }
-        assert_eq!(asked.mask_displacements[4], [0.005, 0.0, -0.002]);
+        assert_eq!(asked.of_masks[4], [0.005, 0.0, -0.002]);
         // The next frame holds the same; another node is another mask.
         known[0].displacement_in_object.x = 0.5;
-        let next = held.prescribed(ContactModel::Mask, &object, [0.008; 5], &known);
-        assert!(next.masks == asked.masks && next.mask_displacements[0][0] == 0.5);
+        let next = held.prescribed_displacements(ContactModel::Mask, &object, [0.008; 5], &known);
+        assert!(next.masks == asked.masks && next.of_masks[0][0] == 0.5);
         known[0].node = object.surface().nodes[7];
-        let other = held.prescribed(ContactModel::Mask, &object, [0.008; 5], &known);
+        let other = held.prescribed_displacements(ContactModel::Mask, &object, [0.008; 5], &known);
         assert!(other.masks != asked.masks);
     }
 }

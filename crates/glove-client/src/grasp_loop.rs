@@ -8,80 +8,22 @@ use softgrasp_core::grasp::{
     Command, Grasp, GraspEvent, KnownNode, StateName, StepInput, StepOutput, sense,
 };
 use softgrasp_core::hand::{HandColliders, HandPose};
-use softgrasp_protocol::{
-    ElementName, Material, MethodName, ModelHash, NodeChoice, Precision, Question, UploadModel,
-    Want,
-};
+use softgrasp_protocol::{NodeChoice, Precision, Question, Want};
 
-use crate::commands::mesh_data;
-use crate::contact_model::{ContactModel, HeldNodes, Prescribed};
+use crate::contact_model::{HeldNodes, PrescribedDisplacements};
 use crate::hand_reader::HandReader;
-use crate::link::{Link, LinkEvent, ModelOrder};
+use crate::link::{Link, LinkEvent, Reached, RequestEnd};
+use crate::model_upload::ModelUpload;
+use crate::object_work::{KeptShape, ObjectDone, ObjectJob, ObjectWork};
+use crate::pace::Pace;
 use crate::prefetch::Prefetched;
-use crate::scripted::{Seen, Sent};
-use crate::soft_object::{ObjectError, SoftObject};
+use crate::rest_shape::ObjectError;
+use crate::scripted::Sent;
+use crate::soft_object::SoftObject;
 use crate::solve_report::SolveSummary;
-
-/// How the tick and the server keep step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
-    /// The tick never waits; an answer is shown when it comes.
-    Free,
-    /// Each tick waits for its answer (bounded): every run gives the same frames.
-    Lockstep,
-}
-
-/// What the object is made of and how it is to be solved.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SolveSettings {
-    /// Its material.
-    pub material: Material,
-    /// Element of the model.
-    pub element: ElementName,
-    /// Method asked for.
-    pub method: MethodName,
-    /// What a fingertip holds.
-    pub contact: ContactModel,
-    /// Nodes that frames are asked for.
-    pub subscription: Subscription,
-}
-
-/// Nodes that frames are asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Subscription {
-    /// What is seen and touched; the inside is asked for when a shape is to be kept.
-    Surface,
-    /// Every node: the whole object is written down.
-    Whole,
-}
-
-/// What happened, for the report; in the order it happened.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LoopEvent {
-    /// The grasp changed.
-    Grasp(GraspEvent),
-    /// A shape was to be kept, but cannot be.
-    KeepRefused(String),
-    /// Something about the server.
-    Server(String),
-}
-
-/// One tick, for the status line and the report.
-#[derive(Clone, Debug)]
-pub struct TickOutcome {
-    /// Events of this tick.
-    pub events: Vec<LoopEvent>,
-    /// State after it.
-    pub state: Option<StateName>,
-    /// Which tips hold or touch, thumb first.
-    pub tips: [bool; 5],
-    /// Segments shown at their last free pose, by finger.
-    pub recalled: [u8; 5],
-    /// Answers that came, with the tick they were asked for in.
-    pub answers: Vec<(u64, SolveSummary)>,
-    /// What the person sees next.
-    pub seen: Seen,
-}
+use crate::solve_settings::{SolveSettings, Subscription};
+use crate::tick_outcome::{LoopEvent, TickOutcome};
+use crate::unanswered::Unanswered;
 
 /// The client between devices and server.
 pub struct GraspLoop {
@@ -91,30 +33,55 @@ pub struct GraspLoop {
     link: Link,
     settings: SolveSettings,
     pace: Pace,
-    /// Tick of the last order, to tell answers of an earlier grasp from those of this one.
+    /// Tick in which the grip began, to tell answers of an earlier grip from those of this one.
     deforming_since: Option<u64>,
     held: HeldNodes,
-    /// A shape is to be kept as soon as its inside is known.
-    keep_wanted: bool,
+    keep: Keep,
+    work: ObjectWork,
     prefetched: Prefetched,
     world_from_object: Isometry3<f64>,
     hand: Option<HandPose>,
+}
+
+/// How far the wish to keep the shape has come.
+enum Keep {
+    /// Nobody wishes to.
+    NotWanted,
+    /// The next answer is asked for whole: those so far brought the surface only.
+    WhenWhole,
+    /// The next rest shape is being made; the object keeps the shape it has.
+    BeingMade,
+    /// It is made, and the grasp is told in this tick.
+    Made(Box<KeptShape>),
+}
+
+impl Keep {
+    /// Whether the object stays as it is until its next rest shape is there.
+    fn freezes(&self) -> bool {
+        matches!(self, Self::BeingMade | Self::Made(_))
+    }
 }
 
 /// Longest wait of a lockstep tick; a server that takes longer is overtaken.
 const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
 
 impl GraspLoop {
-    /// A loop around an object at the origin; its model is sent to the server at once.
-    pub fn new(
+    /// A loop around an object at the origin; its model is sent to the server at once. To be made
+    /// before the calling thread asks for real-time priority.
+    ///
+    /// # Errors
+    /// The system's, when it gives no thread.
+    pub fn try_new(
         reader: HandReader,
         object: SoftObject,
         grasp: Grasp,
         link: Link,
         settings: SolveSettings,
         pace: Pace,
-    ) -> Self {
-        let this = Self {
+    ) -> std::io::Result<Self> {
+        let SolveSettings { material, element, .. } = settings;
+        link.set_model(ModelUpload::new(object.rest(), object.rest_shapes(), material, element));
+        Ok(Self {
             reader,
             object,
             grasp,
@@ -123,13 +90,12 @@ impl GraspLoop {
             pace,
             deforming_since: None,
             held: HeldNodes::default(),
-            keep_wanted: false,
+            keep: Keep::NotWanted,
+            work: ObjectWork::start(pace)?,
             prefetched: Prefetched::default(),
             world_from_object: Isometry3::identity(),
             hand: None,
-        };
-        this.send_model();
-        this
+        })
     }
 
     /// The object as it is now.
@@ -157,23 +123,22 @@ impl GraspLoop {
         self.link.wait_idle(at_most)
     }
 
+    /// Whether work on the object goes on beside the ticks.
+    pub fn is_working(&self) -> bool {
+        self.work.is_busy()
+    }
+
     /// One tick at a time on the client's clock.
     ///
     /// # Errors
     /// [`ObjectError`] when the object cannot be shown any more.
     pub fn tick(&mut self, tick: u64, now_s: f64, sent: &Sent) -> Result<TickOutcome, ObjectError> {
-        let mut outcome = TickOutcome {
-            events: Vec::new(),
-            state: None,
-            tips: [false; 5],
-            recalled: [0; 5],
-            answers: Vec::new(),
-            seen: Seen::default(),
-        };
+        let mut outcome = TickOutcome::default();
         self.reader.feed(&sent.glove, &sent.tracker, now_s);
         self.pick_up(&mut outcome)?;
         // Until both devices have spoken there is no hand to act with.
         let Some(hand) = self.reader.hand(now_s) else { return Ok(outcome) };
+        self.take_work(&mut outcome);
         let command = self.allowed(sent.command, &mut outcome);
         let step = self.step(&hand, command, &mut outcome);
         self.follow(tick, &step, &mut outcome)?;
@@ -182,27 +147,63 @@ impl GraspLoop {
         outcome.events.extend(step.events.iter().map(|&event| LoopEvent::Grasp(event)));
         outcome.state = Some(step.state);
         outcome.seen.state = Some(step.state);
+        // In lockstep a shape is kept in the next tick, and the hand goes on.
+        outcome.seen.keeping = self.pace == Pace::Free && !matches!(self.keep, Keep::NotWanted);
         outcome.recalled = step.recalled;
         Ok(outcome)
     }
 
-    /// A command, unless the shape that is to be kept cannot be, or not yet.
+    /// A command for the grasp, unless the shape that is to be kept cannot be, or not yet.
     fn allowed(&mut self, command: Option<Command>, outcome: &mut TickOutcome) -> Option<Command> {
-        let other = command.filter(|c| *c != Command::KeepShape);
-        if other.is_some() || (command.is_none() && !self.keep_wanted) {
-            return other;
+        if !matches!(command, None | Some(Command::KeepShape)) || self.deforming_since.is_none() {
+            return command;
         }
-        // Frames bring the surface; the next one is asked for whole.
-        self.keep_wanted = !self.object.is_whole();
-        if self.keep_wanted {
-            return None;
-        }
-        match self.object.check_shape() {
-            Ok(()) => Some(Command::KeepShape),
-            Err(error) => {
-                outcome.events.push(LoopEvent::KeepRefused(error.to_string()));
-                None
+        let wanted = command.is_some() || matches!(self.keep, Keep::WhenWhole);
+        if wanted && matches!(self.keep, Keep::NotWanted | Keep::WhenWhole) {
+            if self.object.is_whole() {
+                self.begin_to_keep(outcome);
+            } else {
+                self.keep = Keep::WhenWhole;
             }
+        }
+        matches!(self.keep, Keep::Made(_)).then_some(Command::KeepShape)
+    }
+
+    /// Begins to make the shape as it is now the next rest shape.
+    fn begin_to_keep(&mut self, outcome: &mut TickOutcome) {
+        self.keep = Keep::BeingMade;
+        self.work.begin(ObjectJob::Keep {
+            rest: Arc::clone(self.object.rest_shape()),
+            vertices: self.object.shape().to_vec(),
+            rest_shapes: self.object.rest_shapes(),
+            material: self.settings.material,
+            element: self.settings.element,
+        });
+        self.take_work(outcome);
+    }
+
+    /// Takes what has been done beside the ticks.
+    fn take_work(&mut self, outcome: &mut TickOutcome) {
+        while let Some(done) = self.work.take() {
+            match done {
+                ObjectDone::Prefetch { rest_shapes, hint } => {
+                    if rest_shapes == self.object.rest_shapes() {
+                        self.link.prefetch(&hint);
+                    }
+                }
+                // The hand has let go meanwhile.
+                ObjectDone::Kept(_) if !matches!(self.keep, Keep::BeingMade) => {}
+                ObjectDone::Kept(Ok(kept)) => self.keep = Keep::Made(kept),
+                ObjectDone::Kept(Err(error)) => {
+                    self.keep = Keep::NotWanted;
+                    outcome.events.push(LoopEvent::KeepRefused(error.to_string()));
+                }
+            }
+        }
+        if matches!(self.keep, Keep::BeingMade) && !self.work.is_busy() {
+            self.keep = Keep::NotWanted;
+            let text = "the work on the new rest shape failed; this is a fault of the program";
+            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
         }
     }
 
@@ -220,7 +221,7 @@ impl GraspLoop {
         let tips = fingers.map(|finger| finger.tip_in_object);
         outcome.seen.inside = std::array::from_fn(|i| fingers[i].tip_hits[0].is_some());
         outcome.tips = outcome.seen.inside;
-        self.prefetch(&tips);
+        self.prefetch(&tips, outcome);
         self.grasp.step(&StepInput {
             world_from_palm: hand.world_from_palm,
             world_from_segment: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
@@ -236,112 +237,132 @@ impl GraspLoop {
         step: &StepOutput,
         outcome: &mut TickOutcome,
     ) -> Result<(), ObjectError> {
-        if step.events.contains(&GraspEvent::ShapeKept) {
-            self.object.keep_shape()?;
+        if step.events.contains(&GraspEvent::ShapeKept)
+            && let Keep::Made(kept) = std::mem::replace(&mut self.keep, Keep::NotWanted)
+        {
+            self.object = kept.object;
             self.held.clear();
             self.prefetched.clear();
-            self.send_model();
+            self.link.set_model(kept.model);
         }
         match &step.known {
             Some(known) => {
                 outcome.tips = [true; 5];
-                self.deforming_since.get_or_insert(tick);
+                let grip = *self.deforming_since.get_or_insert(tick);
+                if self.keep.freezes() {
+                    outcome.unanswered.push((tick, Unanswered::KeepingShape));
+                    return Ok(());
+                }
                 let question = self.question(known);
-                self.link.ask(tick, question);
+                self.link.ask(tick, grip, question);
                 if self.pace == Pace::Lockstep {
                     self.link.wait_idle(LOCKSTEP_WAIT_MAX);
                     self.pick_up(outcome)?;
                 }
             }
             // A tick whose input was ignored keeps the shape as it is.
-            None if step.state == StateName::Deforming => {}
-            None => {
-                self.deforming_since = None;
-                self.keep_wanted = false;
-                self.link.cancel();
-                self.object.relax()?;
+            None if step.state == StateName::Deforming => {
+                outcome.unanswered.push((tick, Unanswered::InputIgnored));
             }
+            None => self.let_go(outcome)?,
         }
         Ok(())
+    }
+
+    /// The fingers do not deform the object (any more).
+    fn let_go(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
+        self.deforming_since = None;
+        if !matches!(self.keep, Keep::NotWanted) {
+            self.keep = Keep::NotWanted;
+            let text = "the hand let go before the shape could be kept";
+            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
+        }
+        self.link.cancel();
+        self.object.relax()
     }
 
     fn question(&mut self, known: &[KnownNode; 5]) -> Question {
         let tip_radii = self.reader.setup().dimensions.tip_radii();
         let contact = self.settings.contact;
-        let Prescribed { known, masks, mask_displacements } =
-            self.held.prescribed(contact, &self.object, tip_radii, known);
+        let PrescribedDisplacements { of_dofs, masks, of_masks } =
+            self.held.prescribed_displacements(contact, &self.object, tip_radii, known);
         let nodes = match self.settings.subscription {
-            Subscription::Surface if !self.keep_wanted => {
+            Subscription::Surface if matches!(self.keep, Keep::NotWanted) => {
                 NodeChoice::Nodes(self.object.surface().nodes.clone())
             }
             _ => NodeChoice::All,
         };
         Question {
-            known,
+            known: of_dofs,
             masks,
-            mask_displacements,
+            mask_displacements: of_masks,
             method: self.settings.method.clone(),
             want: Want { nodes, reactions: false, precision: Precision::F64 },
             ..Question::default()
         }
     }
 
-    /// Takes what has come from the server; only answers of the grasp that is going on are shown.
+    /// Takes what has come from the server.
     fn pick_up(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
-        for event in self.link.take_events() {
-            match event {
-                LinkEvent::Answer { tick, rest_shape, nodes, displacement, report, round_trip } => {
-                    let ms = round_trip.as_secs_f64() * 1e3;
-                    outcome.answers.push((tick, SolveSummary::new(&report, ms)));
-                    let current = rest_shape == self.object.rest_shapes()
-                        && self.deforming_since.is_some_and(|since| tick >= since);
-                    match nodes {
-                        _ if !current => {}
-                        NodeChoice::All => self.object.apply(displacement)?,
-                        NodeChoice::Nodes(_) => self.object.apply_to_surface(&displacement)?,
-                    }
+        let (events, ended) = self.link.take();
+        for event in events {
+            let text = match event {
+                LinkEvent::Connected { server } => format!("connected to {server}"),
+                LinkEvent::Refused { text } => format!("refused {text}"),
+                LinkEvent::Lost { text } => format!("lost: {text}"),
+                LinkEvent::ModelReady(ready) => {
+                    tracing::info!(model = %ready.model, "model ready");
+                    continue;
                 }
-                LinkEvent::Connected { server } => {
-                    outcome.events.push(LoopEvent::Server(format!("connected to {server}")));
-                }
-                LinkEvent::ModelReady(ready) => tracing::info!(model = %ready.model, "model ready"),
-                LinkEvent::Refused { text, .. } => {
-                    outcome.events.push(LoopEvent::Server(format!("refused: {text}")));
-                }
-                LinkEvent::Lost { text } => {
-                    outcome.events.push(LoopEvent::Server(format!("lost: {text}")));
-                }
+            };
+            outcome.events.push(LoopEvent::Server(text));
+        }
+        for RequestEnd { tick, reached } in ended {
+            match reached {
+                Ok(reached) => self.show(tick, *reached, outcome)?,
+                Err(why) => outcome.unanswered.push((tick, why)),
             }
         }
         Ok(())
     }
 
+    /// Shows an answer if it belongs to the grasp that is going on, and to a shape that may change.
+    fn show(
+        &mut self,
+        tick: u64,
+        reached: Reached,
+        outcome: &mut TickOutcome,
+    ) -> Result<(), ObjectError> {
+        let Reached { rest_shape, nodes, displacement, report, round_trip } = reached;
+        let ms = round_trip.as_secs_f64() * 1e3;
+        outcome.answers.push((tick, SolveSummary::new(&report, ms)));
+        let current = rest_shape == self.object.rest_shapes()
+            && self.deforming_since.is_some_and(|since| tick >= since)
+            && !self.keep.freezes();
+        match nodes {
+            _ if !current => Ok(()),
+            NodeChoice::All => self.object.apply(displacement),
+            NodeChoice::Nodes(_) => self.object.apply_to_surface(&displacement),
+        }
+    }
+
     /// Lets the server prepare the columns of what a fingertip is about to touch.
-    fn prefetch(&mut self, tips_in_object: &[Point3<f64>; 5]) {
+    fn prefetch(&mut self, tips_in_object: &[Point3<f64>; 5], outcome: &mut TickOutcome) {
         // Only condensed frames are made of columns.
         if !matches!(self.settings.method.as_str(), "auto" | "condensed") {
             return;
         }
-        let tip_radii = self.reader.setup().dimensions.tip_radii();
-        let contact = self.settings.contact;
-        let hint = self.prefetched.next(contact, &self.object, tip_radii, tips_in_object);
-        if !hint.is_empty() {
-            self.link.prefetch(hint);
+        let model = self.settings.contact;
+        let contacts = self.prefetched.next(model, self.object.tree(), tips_in_object);
+        if !contacts.is_empty() {
+            self.work.begin(ObjectJob::Prefetch {
+                rest: Arc::clone(self.object.rest_shape()),
+                rest_shapes: self.object.rest_shapes(),
+                model,
+                tip_radii: self.reader.setup().dimensions.tip_radii(),
+                contacts,
+            });
+            self.take_work(outcome);
         }
-    }
-
-    /// Gives the link the rest shape as the model of the frames to come.
-    fn send_model(&self) {
-        let upload = UploadModel {
-            mesh: mesh_data(self.object.rest()),
-            materials: vec![self.settings.material],
-            element: self.settings.element,
-            fixed: Vec::new(),
-        };
-        self.link.set_model(ModelOrder {
-            rest_shape: self.object.rest_shapes(),
-            hash: ModelHash::of(&upload),
-            upload: Arc::new(upload),
-        });
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! The way of one tick, [`grasp_loop`]: device bytes ([`devices`], [`scripted`]) → hand pose
 //! ([`hand_reader`]) → contacts and grasp (`softgrasp_core::grasp`) → request ([`link`]) → answer →
-//! deformed object ([`soft_object`]).
+//! deformed object ([`soft_object`]). What can take longer than a tick is done beside it
+//! ([`beside`]).
 
+pub mod beside;
 pub mod commands;
 pub mod connection;
 pub mod contact_model;
@@ -18,12 +20,20 @@ pub mod interruption;
 pub mod link;
 pub mod mending_summary;
 pub mod mesh_file;
+pub mod model_upload;
+pub mod object_work;
 pub mod pace;
 pub mod prefetch;
 pub mod progress;
+pub mod rest_shape;
 pub mod run_report;
 pub mod scene;
 pub mod scripted;
+pub mod session;
 pub mod soft_object;
 pub mod solve_report;
+pub mod solve_settings;
 pub mod status_line;
+pub mod tick_budget;
+pub mod tick_outcome;
+pub mod unanswered;

@@ -1,5 +1,6 @@
 //! The `glove-client` program: arguments, exit codes, the one place that prints errors.
 
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -8,6 +9,7 @@ use glove_client::commands::mesh::MeshCommand;
 use glove_client::commands::run::RunCommand;
 use glove_client::commands::solve::SolveCommand;
 use glove_client::interruption;
+use softgrasp_os::one_line;
 
 /// Grasp and squeeze a soft object with an instrumented glove.
 #[derive(Parser)]
@@ -38,24 +40,20 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("glove-client: {}", one_line(&error));
+            eprintln!("glove-client: {}", one_line(error.as_ref()));
             ExitCode::FAILURE
         }
     }
 }
 
-/// Warnings on standard error; `RUST_LOG` shows more.
+/// Warnings on standard error, in colour on a terminal only; `RUST_LOG` shows more.
 fn start_log() {
+    let is_terminal = std::io::stderr().is_terminal();
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-}
-
-/// The error and its causes in one line; a cause that the line already tells is left out.
-fn one_line(error: &anyhow::Error) -> String {
-    error.chain().fold(String::new(), |line, cause| match cause.to_string() {
-        told if line.contains(&told) => line,
-        cause if line.is_empty() => cause,
-        cause => format!("{line}: {cause}"),
-    })
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(is_terminal)
+        .with_writer(std::io::stderr)
+        .init();
 }

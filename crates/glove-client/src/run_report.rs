@@ -1,12 +1,17 @@
 //! What a run tells afterwards: the JSON report and the summary a newcomer understands.
 
+use std::time::Duration;
+
 use serde::Serialize;
 use softgrasp_core::grasp::{GraspEvent, StateName};
 
 use crate::contact_model::ContactModel;
-use crate::grasp_loop::{LoopEvent, TickOutcome};
 use crate::hand_reader::DeviceFaults;
+use crate::pace::{Due, Pace};
 use crate::solve_report::{SCHEMA, SolveSummary};
+use crate::tick_budget::TickBudget;
+use crate::tick_outcome::{LoopEvent, TickOutcome};
+use crate::unanswered::{Unanswered, UnansweredCounts};
 
 /// JSON report of `glove-client run`.
 #[derive(Debug, Serialize)]
@@ -23,7 +28,7 @@ pub struct RunReport {
     pub pace: &'static str,
     /// What a fingertip holds: `vertex`, `patch` or `mask`.
     pub contact: String,
-    /// Ticks played.
+    /// Ticks of the run, played and skipped.
     pub ticks: u64,
     /// Whether the user ended it.
     pub interrupted: bool,
@@ -31,8 +36,9 @@ pub struct RunReport {
     pub states_reached: Vec<String>,
     /// Everything that happened.
     pub events: Vec<EventRecord>,
-    /// One entry per tick.
-    pub frames: Vec<FrameRecord>,
+    /// One entry per tick that was played.
+    #[serde(rename = "frames")]
+    pub played: Vec<TickRecord>,
     /// The run in a few numbers.
     pub summary: RunSummary,
 }
@@ -63,9 +69,9 @@ pub struct EventRecord {
     pub what: String,
 }
 
-/// One tick.
+/// One tick that was played.
 #[derive(Clone, Debug, Serialize)]
-pub struct FrameRecord {
+pub struct TickRecord {
     /// Number, from 0.
     pub tick: u64,
     /// Grasp state after it.
@@ -74,17 +80,31 @@ pub struct FrameRecord {
     pub tips: [bool; 5],
     /// Segments shown at their last free pose, by finger.
     pub recalled: [u8; 5],
-    /// The solve asked for in this tick; null when nothing was asked or no answer came.
+    /// The answer to what was asked in this tick; null when nothing was asked or no answer came.
     pub solve: Option<SolveSummary>,
+    /// Why a deforming tick has no answer; null for all others.
+    pub unanswered: Option<&'static str>,
+    /// Time for which the tick computed, ms.
+    pub compute_ms: f64,
 }
 
 /// A run in a few numbers.
+///
+/// Invariant: `deforming_ticks` = `solves` + the sum of `unanswered`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RunSummary {
-    /// Answers received.
+    /// Deforming ticks that were answered.
     pub solves: usize,
-    /// Ticks that asked.
-    pub deforming_ticks: usize,
+    /// Ticks in which the fingers deformed the object, skipped ones included.
+    pub deforming_ticks: u64,
+    /// Deforming ticks without an answer, by reason.
+    pub unanswered: UnansweredCounts,
+    /// Ticks that were not played because their time was over.
+    pub ticks_skipped: u64,
+    /// Ticks that computed for longer than a millisecond.
+    pub ticks_over_1_ms: u64,
+    /// Longest time for which a tick computed, ms.
+    pub compute_ms_max: f64,
     /// Largest relative residual.
     pub residual_rel_max: f64,
     /// Median round trip, ms.
@@ -113,7 +133,7 @@ impl RunReport {
         object: ObjectSummary,
         hand: String,
         server: String,
-        pace: &'static str,
+        pace: Pace,
         contact: ContactModel,
     ) -> Self {
         Self {
@@ -122,37 +142,75 @@ impl RunReport {
             object,
             hand,
             server,
-            pace,
+            pace: pace.name(),
             contact: contact.to_string(),
             ticks: 0,
             interrupted: false,
             states_reached: Vec::new(),
             events: Vec::new(),
-            frames: Vec::new(),
+            played: Vec::new(),
             summary: RunSummary::default(),
         }
     }
 
-    /// Adds a tick.
-    pub fn add(&mut self, tick: u64, outcome: &TickOutcome) {
-        self.ticks = tick + 1;
+    /// Adds a tick, and those that were skipped before it.
+    pub fn add(&mut self, due: Due, outcome: &TickOutcome) {
+        self.add_skipped(due.skipped);
+        self.ticks = due.tick + 1;
         let state = outcome.state.map_or("no hand yet".to_owned(), |s| s.to_string());
         if outcome.state.is_some() && !self.states_reached.contains(&state) {
             self.states_reached.push(state.clone());
         }
-        self.frames.push(FrameRecord {
-            tick,
+        self.played.push(TickRecord {
+            tick: due.tick,
             state,
             tips: outcome.tips,
             recalled: outcome.recalled,
             solve: None,
+            unanswered: None,
+            compute_ms: 0.0,
         });
-        self.add_events(tick, &outcome.events);
-        for (asked_in, solve) in &outcome.answers {
-            if let Some(frame) = self.frames.get_mut(*asked_in as usize) {
-                frame.solve = Some(solve.clone());
+        self.add_events(due.tick, &outcome.events);
+        for (tick, solve) in &outcome.answers {
+            if let Some(record) = self.record(*tick) {
+                record.solve = Some(solve.clone());
             }
         }
+        for (tick, why) in &outcome.unanswered {
+            self.add_unanswered(*tick, *why);
+        }
+    }
+
+    /// Adds ticks that were not played. They are deforming ticks if the one before them was.
+    pub fn add_skipped(&mut self, ticks: u64) {
+        self.ticks += ticks;
+        self.summary.ticks_skipped += ticks;
+        if self.played.last().is_some_and(TickRecord::deforms) {
+            self.summary.deforming_ticks += ticks;
+            self.summary.unanswered.add(Unanswered::TickSkipped, ticks);
+        }
+    }
+
+    /// Adds how long the last tick computed.
+    pub fn add_computed(&mut self, computed: Duration) {
+        if let Some(record) = self.played.last_mut() {
+            record.compute_ms = computed.as_secs_f64() * 1e3;
+        }
+    }
+
+    fn add_unanswered(&mut self, tick: u64, why: Unanswered) {
+        if let Some(record) = self.record(tick)
+            && record.unanswered.is_none()
+        {
+            record.unanswered = Some(why.key());
+            self.summary.unanswered.add(why, 1);
+        }
+    }
+
+    /// The record of a tick that was played.
+    fn record(&mut self, tick: u64) -> Option<&mut TickRecord> {
+        let at = self.played.binary_search_by_key(&tick, |record| record.tick).ok()?;
+        self.played.get_mut(at)
     }
 
     fn add_events(&mut self, tick: u64, events: &[LoopEvent]) {
@@ -169,10 +227,15 @@ impl RunReport {
         }));
     }
 
-    /// Fills the summary.
-    pub fn finish(&mut self, faults: DeviceFaults) {
+    /// Fills the summary. What is not answered by now never is.
+    pub fn finish(&mut self, faults: DeviceFaults, budget: &TickBudget) {
+        let open = |record: &&TickRecord| {
+            record.deforms() && record.solve.is_none() && record.unanswered.is_none()
+        };
+        let open: Vec<u64> = self.played.iter().filter(open).map(|record| record.tick).collect();
+        open.into_iter().for_each(|tick| self.add_unanswered(tick, Unanswered::RunEnded));
         let solves: Vec<&SolveSummary> =
-            self.frames.iter().filter_map(|f| f.solve.as_ref()).collect();
+            self.played.iter().filter_map(|record| record.solve.as_ref()).collect();
         let mut round_trips: Vec<f64> = solves.iter().map(|s| s.round_trip_ms).collect();
         round_trips.sort_by(f64::total_cmp);
         let quantile = |q: f64| {
@@ -180,11 +243,17 @@ impl RunReport {
             round_trips.get((q * last as f64).round() as usize).copied()
         };
         let most = |of: fn(&SolveSummary) -> f64| solves.iter().map(|s| of(s)).fold(0.0, f64::max);
-        let deforming = StateName::Deforming.to_string();
+        let deforming = self.played.iter().filter(|record| record.deforms()).count() as u64;
         let kept = GraspEvent::ShapeKept.to_string();
+        let counted = &self.summary;
         self.summary = RunSummary {
             solves: solves.len(),
-            deforming_ticks: self.frames.iter().filter(|f| f.state == deforming).count(),
+            // Those that were skipped are there already.
+            deforming_ticks: counted.deforming_ticks + deforming,
+            unanswered: counted.unanswered.clone(),
+            ticks_skipped: counted.ticks_skipped,
+            ticks_over_1_ms: budget.over(),
+            compute_ms_max: budget.longest().as_secs_f64() * 1e3,
             residual_rel_max: most(|s| s.residual_rel),
             round_trip_ms_p50: quantile(0.5),
             round_trip_ms_p99: quantile(0.99),
@@ -198,11 +267,30 @@ impl RunReport {
         };
     }
 
+    /// Why the run is a failure: answers were asked for and none came. `None` if it is none.
+    pub fn failure(&self) -> Option<String> {
+        let s = &self.summary;
+        if s.solves > 0 || s.deforming_ticks == 0 || self.interrupted {
+            return None;
+        }
+        let said = |event: &&EventRecord| {
+            event.kind == "server"
+                && ["refused ", "lost: "].iter().any(|w| event.what.starts_with(w))
+        };
+        let why = match self.events.iter().rfind(said) {
+            Some(event) => format!("the server {}", event.what.replacen("lost", "was lost", 1)),
+            None => {
+                s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
+            }
+        };
+        Some(format!("none of {} deforming ticks was answered: {why}", s.deforming_ticks))
+    }
+
     /// One screen for a person who has never seen the program.
     pub fn describe(&self) -> String {
         let s = &self.summary;
         let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
-        let method = self.frames.iter().rev().find_map(|f| f.solve.as_ref());
+        let solve = self.played.iter().rev().find_map(|record| record.solve.as_ref());
         let mut text = format!(
             "\n{} ({} nodes, {} tetrahedra, {:.0} mm) in the {} hand, held by {}, solved by {}\n",
             self.object.name,
@@ -213,19 +301,37 @@ impl RunReport {
             self.contact,
             self.server
         );
+        for note in &self.object.notes {
+            text.push_str(&format!("  {note}\n"));
+        }
         text.push_str("\nWhat happened:\n");
         for event in &self.events {
             text.push_str(&format!("  tick {:>5}  {}\n", event.tick, event.what));
         }
-        text.push_str(&format!("\n  ticks               {}\n", self.ticks));
-        text.push_str(&format!("  grasp states        {}\n", self.states_reached.join(", ")));
+        text.push_str(&format!("\n  ticks               {}", self.ticks));
+        if s.ticks_skipped > 0 {
+            text.push_str(&format!(
+                ", of which {} came too late and were skipped",
+                s.ticks_skipped
+            ));
+        }
+        text.push_str(&format!("\n  grasp states        {}\n", self.states_reached.join(", ")));
         text.push_str(&format!(
-            "  frames deformed     {} of {} asked for\n",
+            "  deforming ticks     {} of {} answered\n",
             s.solves, s.deforming_ticks
         ));
-        if let Some(solve) = method {
+        for (why, count) in s.unanswered.by_count() {
+            text.push_str(&format!("    not answered      {count}: {why}\n"));
+        }
+        if s.ticks_over_1_ms > 0 {
             text.push_str(&format!(
-                "  equations           {} unknown, {} known, by {}\n  \
+                "  long ticks          {} computed for more than 1 ms ({:.1} ms at most)\n",
+                s.ticks_over_1_ms, s.compute_ms_max
+            ));
+        }
+        if let Some(solve) = solve {
+            text.push_str(&format!(
+                "  equations           {} unknown, {} prescribed, by {}\n  \
                  answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
                  residual            {:.1e} at most\n  \
                  shape               turned by {:.1} degrees, strained by {:.0} % at most\n",
@@ -244,5 +350,80 @@ impl RunReport {
             text.push_str("  ended by the user\n");
         }
         text
+    }
+}
+
+impl TickRecord {
+    /// Whether the fingers deformed the object.
+    fn deforms(&self) -> bool {
+        self.state == StateName::Deforming.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tick_budget::Priority;
+
+    fn report() -> RunReport {
+        let object = ObjectSummary {
+            name: "cube".to_owned(),
+            nodes: 8,
+            tets: 6,
+            size_m: 0.1,
+            notes: vec![],
+        };
+        let contact = ContactModel::default();
+        RunReport::new(object, "none".to_owned(), "none".to_owned(), Pace::Free, contact)
+    }
+
+    fn tick(report: &mut RunReport, tick: u64, skipped: u64, outcome: TickOutcome) {
+        report.add(Due { tick, skipped }, &outcome);
+    }
+
+    fn deforming() -> TickOutcome {
+        TickOutcome { state: Some(StateName::Deforming), ..TickOutcome::default() }
+    }
+
+    #[test]
+    fn every_deforming_tick_is_answered_or_has_one_reason() {
+        let mut report = report();
+        let free = TickOutcome { state: Some(StateName::Free), ..TickOutcome::default() };
+        tick(&mut report, 0, 0, free.clone());
+        // Missed while nothing is deformed: no answer is missing.
+        tick(&mut report, 4, 3, deforming());
+        // Missed while something is.
+        let solve = SolveSummary::new(&softgrasp_protocol::SolveReport::default(), 0.5);
+        let answered = TickOutcome { answers: vec![(4, solve)], ..deforming() };
+        tick(&mut report, 7, 2, answered);
+        let late = (7, Unanswered::AnswerLate);
+        tick(&mut report, 8, 0, TickOutcome { unanswered: vec![late, late], ..deforming() });
+        tick(&mut report, 9, 0, free);
+        report.add_skipped(2);
+        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
+        let s = &report.summary;
+        assert_eq!((report.ticks, s.ticks_skipped), (12, 7));
+        let mut counts = UnansweredCounts::default();
+        counts.add(Unanswered::TickSkipped, 2);
+        counts.add(Unanswered::AnswerLate, 1);
+        counts.add(Unanswered::RunEnded, 1);
+        assert_eq!(s.unanswered, counts);
+        assert_eq!(s.deforming_ticks, s.solves as u64 + s.unanswered.total());
+        assert_eq!(report.failure(), None);
+    }
+
+    #[test]
+    fn run_without_any_answer_says_what_the_server_refused() {
+        let mut report = report();
+        let refused = LoopEvent::Server("refused the model (BadRequest): too soft".to_owned());
+        let unanswered = vec![(0, Unanswered::Refused)];
+        tick(&mut report, 0, 0, TickOutcome { events: vec![refused], unanswered, ..deforming() });
+        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
+        let why = report.failure().unwrap();
+        assert_eq!(
+            why,
+            "none of 1 deforming ticks was answered: the server refused the model (BadRequest): \
+             too soft"
+        );
     }
 }

@@ -1,9 +1,12 @@
-//! The object in the hand: rest shape, deformed shape, surface, and the sphere tree that follows.
+//! The object in the hand: its rest shape, its deformed shape, and the sphere tree that follows.
+
+use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
-use softgrasp_core::contact::{Mask, SurfaceStars};
-use softgrasp_core::mesh::{Inversion, MeshError, Surface, TetMesh};
-use softgrasp_core::sphere_tree::{SphereTree, TreeError, vertex_normals};
+use softgrasp_core::mesh::{Surface, TetMesh};
+use softgrasp_core::sphere_tree::{SphereTree, vertex_normals};
+
+use crate::rest_shape::{ObjectError, RestShape};
 
 /// A soft object as the client knows it.
 ///
@@ -11,9 +14,7 @@ use softgrasp_core::sphere_tree::{SphereTree, TreeError, vertex_normals};
 /// Invariant: `tree` and `normals` belong to `shape`; `shape` is the rest shape unless an answer
 /// of the server has been applied since the last [`SoftObject::relax`].
 pub struct SoftObject {
-    rest: TetMesh,
-    surface: Surface,
-    stars: SurfaceStars,
+    rest: Arc<RestShape>,
     shape: Vec<Point3<f64>>,
     displacement: Vec<[f64; 3]>,
     deformed: bool,
@@ -24,70 +25,43 @@ pub struct SoftObject {
     rest_shapes: u64,
 }
 
-/// An object that cannot be touched.
-#[derive(Debug, thiserror::Error)]
-pub enum ObjectError {
-    /// The surface gives no tree or no normals.
-    #[error("the object's surface cannot be searched: {0}")]
-    Tree(#[from] TreeError),
-    /// A shape that is no mesh any more.
-    #[error("the shape cannot be kept: {0}; let go and grasp again")]
-    Shape(#[from] MeshError),
-    /// A shape with elements turned inside out.
-    #[error("the shape cannot be kept: {0}; open the hand a little and keep it then")]
-    Inverted(Inversion),
-    /// An answer for another mesh.
-    #[error("the answer holds {got} displacements, {expected} nodes were asked for")]
-    Count {
-        /// Displacements in the answer.
-        got: usize,
-        /// Nodes of the object, or of its surface.
-        expected: usize,
-    },
-}
-
 impl SoftObject {
     /// An object at rest.
     ///
     /// # Errors
     /// [`ObjectError::Tree`].
-    pub fn try_new(rest: TetMesh) -> Result<Self, ObjectError> {
-        let surface = Surface::from_mesh(&rest);
-        let stars = SurfaceStars::new(&surface, rest.node_count());
-        let shape = rest.vertices().to_vec();
-        let tree = SphereTree::try_build(&shape, &surface.nodes)?;
-        let mut normals = Vec::new();
-        vertex_normals(&shape, &surface.triangles, &mut normals)?;
-        let displacement = vec![[0.0; 3]; shape.len()];
-        Ok(Self {
-            rest,
-            surface,
-            stars,
-            shape,
-            displacement,
-            deformed: false,
-            whole: true,
-            tree,
-            normals,
-            rest_shapes: 1,
-        })
+    pub fn try_new(mesh: TetMesh) -> Result<Self, ObjectError> {
+        Ok(Self::at_rest(RestShape::try_new(mesh)?, 1))
     }
 
-    /// The shape it returns to when nothing holds it.
+    /// The same object with its `rest_shapes`-th rest shape, at rest in it.
+    pub fn at_rest(rest: RestShape, rest_shapes: u64) -> Self {
+        let shape = rest.mesh().vertices().to_vec();
+        Self {
+            displacement: vec![[0.0; 3]; shape.len()],
+            shape,
+            deformed: false,
+            whole: true,
+            tree: rest.tree().clone(),
+            normals: rest.normals().to_vec(),
+            rest_shapes,
+            rest: Arc::new(rest),
+        }
+    }
+
+    /// The shape it returns to when nothing holds it, as a mesh.
     pub fn rest(&self) -> &TetMesh {
+        self.rest.mesh()
+    }
+
+    /// The same with all that is worked out from it, to be read by other threads too.
+    pub fn rest_shape(&self) -> &Arc<RestShape> {
         &self.rest
     }
 
     /// Boundary triangles and nodes.
     pub fn surface(&self) -> &Surface {
-        &self.surface
-    }
-
-    /// Mask of a tip that touches a node of the rest surface.
-    ///
-    /// Units: m.
-    pub fn tip_mask(&self, node: u32, radius: f64) -> Mask {
-        self.stars.tip_mask(self.rest.vertices(), &self.surface, node, radius)
+        self.rest.surface()
     }
 
     /// Vertices as they are now.
@@ -125,7 +99,7 @@ impl SoftObject {
         if displacement.len() != expected {
             return Err(ObjectError::Count { got: displacement.len(), expected });
         }
-        let moved = self.rest.vertices().iter().zip(&displacement);
+        let moved = self.rest().vertices().iter().zip(&displacement);
         self.follow(moved.map(|(p, u)| p + Vector3::from(*u)).collect())?;
         self.displacement = displacement;
         (self.deformed, self.whole) = (true, true);
@@ -140,14 +114,14 @@ impl SoftObject {
     /// # Errors
     /// As [`SoftObject::apply`].
     pub fn apply_to_surface(&mut self, displacement: &[[f64; 3]]) -> Result<(), ObjectError> {
-        let expected = self.surface.nodes.len();
+        let expected = self.surface().nodes.len();
         if displacement.len() != expected {
             return Err(ObjectError::Count { got: displacement.len(), expected });
         }
         let mut shape = self.shape.clone();
-        for (&node, u) in self.surface.nodes.iter().zip(displacement) {
+        for (&node, u) in self.rest.surface().nodes.iter().zip(displacement) {
             let node = node as usize;
-            shape[node] = self.rest.vertices()[node] + Vector3::from(*u);
+            shape[node] = self.rest.mesh().vertices()[node] + Vector3::from(*u);
             self.displacement[node] = *u;
         }
         self.follow(shape)?;
@@ -166,39 +140,19 @@ impl SoftObject {
     /// [`ObjectError::Tree`], not seen for a shape that once was good.
     pub fn relax(&mut self) -> Result<(), ObjectError> {
         if self.deformed {
-            self.follow(self.rest.vertices().to_vec())?;
+            self.follow(self.rest().vertices().to_vec())?;
             self.displacement.fill([0.0; 3]);
             (self.deformed, self.whole) = (false, true);
         }
         Ok(())
     }
 
-    /// Whether the shape as it is now could become the rest shape.
-    ///
-    /// # Errors
-    /// [`ObjectError::Inverted`] says which elements are turned inside out and how far.
-    pub fn check_shape(&self) -> Result<(), ObjectError> {
-        Inversion::of(&self.rest, &self.shape).map_or(Ok(()), |i| Err(ObjectError::Inverted(i)))
-    }
-
-    /// Makes the shape as it is now the rest shape and rebuilds the tree (thesis 4.6, 6.1.2).
-    ///
-    /// # Errors
-    /// [`ObjectError::Inverted`] if elements are turned inside out; nothing is changed then.
-    pub fn keep_shape(&mut self) -> Result<(), ObjectError> {
-        self.check_shape()?;
-        let rest = self.rest.with_vertices(self.shape.clone())?;
-        let rest_shapes = self.rest_shapes + 1;
-        *self = Self { rest_shapes, ..Self::try_new(rest)? };
-        Ok(())
-    }
-
     fn follow(&mut self, shape: Vec<Point3<f64>>) -> Result<(), ObjectError> {
         self.tree.refit(&shape)?;
         if self.tree.needs_rebuild() {
-            self.tree = SphereTree::try_build(&shape, &self.surface.nodes)?;
+            self.tree = SphereTree::try_build(&shape, &self.surface().nodes)?;
         }
-        vertex_normals(&shape, &self.surface.triangles, &mut self.normals)?;
+        vertex_normals(&shape, &self.rest.surface().triangles, &mut self.normals)?;
         self.shape = shape;
         Ok(())
     }
@@ -246,22 +200,9 @@ mod tests {
         let mut object = cube();
         object.apply((0..64).map(|n| [0.0, 1e-4 * f64::from(n), 0.0]).collect()).unwrap();
         let shape = object.shape().to_vec();
-        object.keep_shape().unwrap();
-        assert!(object.rest().vertices() == shape.as_slice());
-        assert_eq!(object.rest_shapes(), 2);
-    }
-
-    #[test]
-    fn shape_with_an_element_inside_out_is_not_kept() {
-        let mut object = cube();
-        let mut displacement = vec![[0.0; 3]; 64];
-        displacement[0] = [0.5, 0.5, 0.5];
-        object.apply(displacement).unwrap();
-        let refused = object.check_shape().unwrap_err();
-        let ObjectError::Inverted(inversion) = &refused else { panic!("{refused}") };
-        assert!(inversion.volume_rel_min < 0.0 && inversion.count > 0);
-        assert!(refused.to_string().contains("open the hand"), "{refused}");
-        assert!(object.keep_shape().is_err());
-        assert_eq!(object.rest_shapes(), 1);
+        let kept = object.rest_shape().kept(shape.clone()).unwrap();
+        let kept = SoftObject::at_rest(kept, object.rest_shapes() + 1);
+        assert!(kept.rest().vertices() == shape.as_slice() && kept.shape() == shape.as_slice());
+        assert_eq!(kept.rest_shapes(), 2);
     }
 }

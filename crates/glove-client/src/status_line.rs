@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::grasp_loop::TickOutcome;
 use crate::solve_report::SolveSummary;
+use crate::tick_outcome::TickOutcome;
 
 /// The status line; silent when standard error is not a terminal.
 pub struct StatusLine {

@@ -24,6 +24,12 @@ pub fn be_urgent() -> Result<(), NotUrgent> {
     })
 }
 
+/// Gives the right of [`be_urgent`] back: the calling thread is scheduled like any other. For work
+/// that takes longer than a millisecond. Does nothing on a thread that never had the right.
+pub fn be_ordinary() {
+    lower();
+}
+
 /// The least of the real-time priorities is above all that are none.
 #[cfg(unix)]
 fn raise() -> Result<(), Error> {
@@ -38,4 +44,45 @@ fn raise() -> Result<(), Error> {
 #[cfg(not(unix))]
 fn raise() -> Result<(), Error> {
     thread_priority::set_current_thread_priority(thread_priority::ThreadPriority::Max)
+}
+
+#[cfg(unix)]
+fn lower() {
+    use nix::libc::{SCHED_OTHER, pthread_self, pthread_setschedparam, sched_param};
+    // SAFETY: `sched_param` holds plain integers, for which all zeros is a value.
+    let mut ordinary: sched_param = unsafe { std::mem::zeroed() };
+    ordinary.sched_priority = 0;
+    // SAFETY: the calling thread exists while it calls, and `ordinary` outlives the call. A thread
+    // may always lower itself, so there is no failure to tell of.
+    let _ = unsafe { pthread_setschedparam(pthread_self(), SCHED_OTHER, &raw const ordinary) };
+}
+
+#[cfg(not(unix))]
+fn lower() {
+    // A thread that keeps its priority still does the same work.
+    let _ = thread_priority::set_current_thread_priority(
+        thread_priority::ThreadPriority::Crossplatform(
+            thread_priority::ThreadPriorityValue::default(),
+        ),
+    );
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thread_that_gives_the_right_back_is_scheduled_like_any_other() {
+        let policy = || thread_priority::thread_schedule_policy().ok();
+        let on_its_own = std::thread::spawn(move || {
+            let before = policy();
+            let urgent = be_urgent().is_ok();
+            let while_urgent = policy();
+            be_ordinary();
+            (before, urgent, while_urgent, policy())
+        });
+        let (before, urgent, while_urgent, after) = on_its_own.join().expect("it does not panic");
+        assert_eq!(after, before);
+        assert_eq!(while_urgent != before, urgent, "only where it is allowed");
+    }
 }

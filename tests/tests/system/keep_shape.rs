@@ -2,11 +2,15 @@
 //! inside out is not kept.
 
 use glove_client::contact_model::ContactModel;
-use glove_client::grasp_loop::{GraspLoop, LoopEvent, Pace, SolveSettings, Subscription};
+use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
+use glove_client::pace::Pace;
 use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
 use glove_client::soft_object::SoftObject;
+use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::tick_budget::Priority;
+use glove_client::tick_outcome::LoopEvent;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::{Command, Grasp, StateName};
 use softgrasp_core::mesh::TetMesh;
@@ -76,8 +80,10 @@ fn shape_with_elements_inside_out_is_not_kept_and_the_grasp_goes_on() {
         subscription: Subscription::Surface,
     };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
-    let (reader, link) = (HandReader::new(setup), Link::start(&address).unwrap());
-    let mut grasp_loop = GraspLoop::new(reader, object, grasp, link, settings, Pace::Lockstep);
+    let (reader, link) =
+        (HandReader::new(setup), Link::start(&address, Priority::Ordinary).unwrap());
+    let mut grasp_loop =
+        GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();
 
     let (mut seen, mut answered, mut refused, mut answered_after) = (Seen::default(), 0, None, 0);
     for tick in 0..2000 {

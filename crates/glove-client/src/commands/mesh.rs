@@ -9,6 +9,7 @@ use softgrasp_core::mesh_io::{
     write_msh41_labelled, write_thesis_lists_labelled, write_vtu_labelled,
 };
 
+use super::numbers::count;
 use super::output::{print, write_file};
 use crate::progress::Progress;
 
@@ -18,7 +19,7 @@ pub struct MeshCommand {
     /// cube, sphere, strawberry or toothpaste.
     shape: BuiltIn,
     /// Number of nodes, as near as the shape allows.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     nodes: usize,
     /// File to write: .msh (Gmsh 4.1), .vtu, or .txt (the three lists of the thesis).
     #[arg(long, value_name = "F")]

@@ -1,4 +1,4 @@
-//! `glove-client solve`: one request holding mesh, known displacements and partition.
+//! `glove-client solve`: one request with a mesh, prescribed displacements and forces.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -10,10 +10,11 @@ use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::mesh_io::{MeshFile, PointField, write_vtu};
 use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, ElementChoice, Material, MeshData, MethodName, NodeChoice,
-    Precision, Question, Reply, Request, SolveOnce, Want,
+    Answer, Displacements, DofValue, ElementChoice, Material, MethodName, NodeChoice, Precision,
+    Question, Reply, Request, SolveOnce, Want,
 };
 
+use super::numbers::{count, poisson, positive};
 use super::output::{print, write_file, write_json};
 use crate::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
 use crate::discretisation::DiscretisationEstimate;
@@ -21,16 +22,17 @@ use crate::displacement_table::{
     DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError, read_table, write_displacements,
 };
 use crate::mesh_file::read_mesh_file;
+use crate::model_upload::mesh_data;
 use crate::progress::Progress;
 use crate::solve_report::{SCHEMA, SolveSummary};
 
-/// Solve one request on a mesh file: known displacements in, all displacements out.
+/// Solve one request on a mesh file: prescribed displacements in, all displacements out.
 #[derive(Args)]
 pub struct SolveCommand {
     /// Mesh file; the format is recognised by its content.
     #[arg(long, value_name = "F")]
     mesh: PathBuf,
-    /// Known displacements: node,ux,uy,uz; nodes from 0 in the order of the file, an empty cell
+    /// Prescribed displacements: node,ux,uy,uz; nodes from 0 in the order of the file, an empty cell
     /// leaves that direction free.
     #[arg(long, value_name = "K.csv")]
     known: PathBuf,
@@ -41,11 +43,11 @@ pub struct SolveCommand {
     #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
     server: ServerChoice,
     /// Threads of the embedded server [default: one per processor].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     threads: Option<usize>,
     /// Memory for the embedded server: bytes, or 8GiB, 512MiB [default: 8GiB]. What needs more is
     /// refused before it is made; auto takes single precision where only that fits.
-    #[arg(long, value_name = "BYTES")]
+    #[arg(long, value_name = "BYTES", allow_negative_numbers = true)]
     memory_limit: Option<Bytes>,
     /// gauss-jordan-plain, gauss-jordan, dense-inverse, dense-cholesky, sparse-cholesky, front,
     /// front-mixed, pcg, condensed or auto.
@@ -56,16 +58,16 @@ pub struct SolveCommand {
     #[arg(long, default_value = "t4", value_name = "t4|t4-anp|t10|auto")]
     element: ElementChoice,
     /// Young's modulus, Pa (in the mesh's unit of length).
-    #[arg(long, default_value_t = 1.0e5, value_name = "PA")]
+    #[arg(long, default_value_t = 1.0e5, value_name = "PA", value_parser = positive, allow_negative_numbers = true)]
     young: f64,
     /// Poisson's ratio.
-    #[arg(long, default_value_t = 0.3, value_name = "NU")]
+    #[arg(long, default_value_t = 0.3, value_name = "NU", value_parser = poisson, allow_negative_numbers = true)]
     poisson: f64,
     /// Largest relative error of the solution wanted: auto takes the fastest method within it.
-    #[arg(long, value_name = "REL", value_parser = parse_positive)]
+    #[arg(long, value_name = "REL", value_parser = positive, allow_negative_numbers = true)]
     max_error: Option<f64>,
     /// Time wanted, ms: auto takes the most exact method that is predicted to be in time.
-    #[arg(long, value_name = "MS", value_parser = parse_positive)]
+    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     deadline: Option<f64>,
     /// Solve once more with the other element and report the difference: an estimate of the
     /// mesh's own error.
@@ -104,13 +106,6 @@ struct MeshSummary {
     degenerate_dropped: usize,
     repeated_dropped: usize,
     orphans: usize,
-}
-
-fn parse_positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
-        _ => Err("it must be a finite number above 0".to_owned()),
-    }
 }
 
 fn parse_out(text: &str) -> Result<PathBuf, String> {
@@ -263,15 +258,6 @@ fn read_values(
     Ok(read_table(&name, &bytes, columns, node_count)?)
 }
 
-/// A mesh as it travels.
-pub(crate) fn mesh_data(mesh: &TetMesh) -> MeshData {
-    MeshData {
-        vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
-        tets: mesh.tets().to_vec(),
-        regions: mesh.regions().to_vec(),
-    }
-}
-
 fn encode(path: &Path, mesh: &TetMesh, displacements: &[[f64; 3]]) -> anyhow::Result<Vec<u8>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("vtu") => {
@@ -284,7 +270,7 @@ fn encode(path: &Path, mesh: &TetMesh, displacements: &[[f64; 3]]) -> anyhow::Re
 
 fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
     let mut text = format!(
-        "{}: {} nodes, {} tetrahedra\n{} on {}: {} unknown and {} known degrees of freedom, \
+        "{}: {} nodes, {} tetrahedra\n{} on {}: {} unknown and {} prescribed degrees of freedom, \
          {:.1} ms, residual {:.1e}\nlargest element rotation {:.2} degrees, strain {:.2} %\n",
         file.format,
         file.mesh.node_count(),

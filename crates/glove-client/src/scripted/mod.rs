@@ -1,9 +1,13 @@
 //! The scripted hand: plays a person who looks, reaches, grasps and squeezes, as device bytes.
 
 mod approach;
+mod hand;
 mod plan;
+mod planner;
 mod script;
 
 pub use approach::PalmPath;
+pub use hand::{NoGrasp, ScriptedHand, Seen, Sent};
 pub use plan::{GraspPlan, Posture, angles, plan_grasp};
-pub use script::{NoGrasp, ScriptName, ScriptedHand, Seen, Sent, UnknownScript};
+pub use planner::{PlanRequest, Planner};
+pub use script::{ScriptName, UnknownScript};

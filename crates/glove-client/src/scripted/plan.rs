@@ -10,7 +10,7 @@ use softgrasp_core::sphere_tree::{ContactHit, tip_hits};
 
 use super::approach::PalmPath;
 use crate::hand_reader::HandSetup;
-use crate::soft_object::SoftObject;
+use crate::rest_shape::RestShape;
 
 /// A palm pose and how far each finger closes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +100,7 @@ const TILTS_MANY: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// Units: `press_depth` m. `avoid_gaze` is the direction of an earlier grasp; the palm will look at
 /// least 60° away from it.
 pub fn plan_grasp(
-    object: &SoftObject,
+    object: &RestShape,
     setup: &HandSetup,
     press_depth: f64,
     avoid_gaze: Option<Vector3<f64>>,
@@ -114,13 +114,13 @@ pub fn plan_grasp(
 }
 
 fn search(
-    object: &SoftObject,
+    object: &RestShape,
     setup: &HandSetup,
     press_depth: f64,
     avoid_gaze: Option<Vector3<f64>>,
     tilts: &[f64],
 ) -> Option<GraspPlan> {
-    let centre = centre_of(object);
+    let centre = object.centre();
     let thumbs = thumb_paths(setup);
     let orientations = orientations(tilts);
     let mut best: Option<(f64, GraspPlan)> = None;
@@ -149,12 +149,6 @@ fn search(
         }
     }
     best.map(|(_, plan)| plan)
-}
-
-/// Centre of the box around the object.
-pub fn centre_of(object: &SoftObject) -> Point3<f64> {
-    let (low, high) = object.rest().bounds();
-    nalgebra::center(&low, &high)
 }
 
 /// One fingertip at every closure, in the palm frame.
@@ -228,8 +222,8 @@ fn orientations(tilts: &[f64]) -> Vec<UnitQuaternion<f64>> {
 }
 
 /// Places of the object's centre in front of the palm, nearest to a natural grip first.
-fn places(object: &SoftObject) -> Vec<Vector3<f64>> {
-    let half = 0.5 * object.rest().size();
+fn places(object: &RestShape) -> Vec<Vector3<f64>> {
+    let half = 0.5 * object.mesh().size();
     let mut all = Vec::new();
     for z in 0..6 {
         for y in 0..6 {
@@ -244,7 +238,7 @@ fn places(object: &SoftObject) -> Vec<Vector3<f64>> {
 
 /// One palm pose under trial.
 struct Reach<'a> {
-    object: &'a SoftObject,
+    object: &'a RestShape,
     object_from_palm: Isometry3<f64>,
 }
 

@@ -1,0 +1,98 @@
+//! The deformed object at the moments that matter, as files, written beside the ticks.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::Context;
+use softgrasp_core::grasp::{GraspEvent, StateName};
+use softgrasp_core::mesh_io::{PointField, write_vtu};
+
+use super::output::write_file;
+use crate::beside::Beside;
+
+use crate::rest_shape::RestShape;
+use crate::soft_object::SoftObject;
+use crate::tick_outcome::{LoopEvent, TickOutcome};
+
+/// Writes the object when it starts to deform, just before its shape is kept or let go, and after.
+pub struct KeyFrames {
+    folder: PathBuf,
+    writer: Beside<Picture, anyhow::Result<()>>,
+    /// Displacement after the last tick, and the rest shape it counts from.
+    before: (Arc<RestShape>, Vec<[f64; 3]>),
+}
+
+/// One file to write.
+struct Picture {
+    path: PathBuf,
+    rest: Arc<RestShape>,
+    displacement: Vec<[f64; 3]>,
+}
+
+impl KeyFrames {
+    /// Makes the folder and starts the thread that writes.
+    ///
+    /// # Errors
+    /// The system's, in one line.
+    pub fn start(folder: &Path, object: &SoftObject) -> anyhow::Result<Self> {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        let writer = Beside::start("key frames", |picture: Picture| picture.write())
+            .context("cannot start the thread that writes key frames")?;
+        let before = (Arc::clone(object.rest_shape()), object.displacement().to_vec());
+        Ok(Self { folder: folder.to_owned(), writer, before })
+    }
+
+    /// Has the files of a tick written.
+    ///
+    /// # Errors
+    /// That of a file of an earlier tick.
+    pub fn add(
+        &mut self,
+        tick: u64,
+        outcome: &TickOutcome,
+        object: &SoftObject,
+    ) -> anyhow::Result<()> {
+        let now = (Arc::clone(object.rest_shape()), object.displacement().to_vec());
+        for event in &outcome.events {
+            let LoopEvent::Grasp(event) = event else { continue };
+            let (name, (rest, displacement)) = match event {
+                GraspEvent::Entered(StateName::Deforming) => ("deforming", &now),
+                // The rest shape has just become the kept one: it is the squeezed shape.
+                GraspEvent::ShapeKept => ("kept", &now),
+                GraspEvent::Released | GraspEvent::TipLeft(_)
+                    if self.before.1.iter().flatten().any(|&u| u != 0.0) =>
+                {
+                    ("squeezed", &self.before)
+                }
+                GraspEvent::Entered(StateName::Detached) => ("detached", &now),
+                _ => continue,
+            };
+            self.writer.begin(Picture {
+                path: self.folder.join(format!("{tick:05}-{name}.vtu")),
+                rest: Arc::clone(rest),
+                displacement: displacement.clone(),
+            });
+        }
+        self.before = now;
+        self.writer.take().unwrap_or(Ok(()))
+    }
+
+    /// Waits until all files are written.
+    ///
+    /// # Errors
+    /// The first file that could not be.
+    pub fn finish(mut self) -> anyhow::Result<()> {
+        while self.writer.is_busy() {
+            self.writer.wait().unwrap_or(Ok(()))?;
+        }
+        Ok(())
+    }
+}
+
+impl Picture {
+    fn write(self) -> anyhow::Result<()> {
+        let field = PointField { name: "displacement", values: &self.displacement };
+        write_file(&self.path, &write_vtu(self.rest.mesh(), &[field])?)
+    }
+}

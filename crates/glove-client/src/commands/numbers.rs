@@ -1,0 +1,45 @@
+//! Numbers on the command line: a value that can never work is refused with the option's name.
+
+use softgrasp_core::fem::Material;
+
+/// A finite number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a finite number above 0".to_owned()),
+    }
+}
+
+/// A Poisson's ratio of an elastic material.
+pub fn poisson(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().map_err(|_| "it must be a number".to_owned())?;
+    Material::try_new(1.0, number).map_err(|error| error.to_string())?;
+    Ok(number)
+}
+
+/// A whole number, 1 or above.
+pub fn count(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(number) if number > 0 => Ok(number),
+        _ => Err("it must be a whole number, 1 or above".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_can_never_work_are_refused() {
+        for text in ["0", "-1", "nan", "inf", "", "stiff"] {
+            assert!(positive(text).is_err(), "{text}");
+        }
+        for text in ["0.5", "-1", "nan", "2", "soft"] {
+            assert!(poisson(text).is_err(), "{text}");
+        }
+        for text in ["0", "-1", "1.5", "99999999999999999999999"] {
+            assert!(count(text).is_err(), "{text}");
+        }
+        assert_eq!((positive("2e4"), poisson("-0.3"), count("7")), (Ok(2e4), Ok(-0.3), Ok(7)));
+    }
+}

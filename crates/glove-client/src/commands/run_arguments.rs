@@ -1,0 +1,210 @@
+//! The arguments of `glove-client run`, and the run that they and the scene file describe.
+
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use softgrasp_core::fem::{Element, Material as ElasticMaterial};
+use softgrasp_core::solve::choose::cheapest_element;
+use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
+
+use super::numbers::{count, poisson, positive};
+use crate::connection::ServerChoice;
+use crate::contact_model::ContactModel;
+use crate::pace::Pace;
+use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile};
+use crate::scripted::ScriptName;
+use crate::solve_settings::{SolveSettings, Subscription};
+
+/// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
+#[derive(Args, Clone, Default)]
+pub struct RunArguments {
+    /// Scene file (TOML); flags win over it.
+    #[arg(long, value_name = "F.toml")]
+    pub(super) scene: Option<PathBuf>,
+    /// cube, sphere, strawberry, toothpaste, or a mesh file [default: strawberry].
+    #[arg(long, value_name = "FILE|SHAPE")]
+    pub(super) object: Option<ObjectChoice>,
+    /// Nodes of a built-in object [default: 1000].
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub(super) nodes: Option<usize>,
+    /// Longest extent of the object, m [default: 0.08 for a mesh file, its own for a built-in].
+    #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) object_size: Option<f64>,
+    /// The hand: scripted[:approach|attach|squeeze|release|regrasp].
+    #[arg(long, value_name = "SOURCE")]
+    pub(super) hand: Option<HandChoice>,
+    /// Where to solve: HOST:PORT, or embedded [default: embedded].
+    #[arg(long, value_name = "ADDR|embedded")]
+    pub(super) server: Option<ServerChoice>,
+    /// Threads of the embedded server [default: one per processor].
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub(super) threads: Option<usize>,
+    /// Method, or auto.
+    #[arg(long, value_name = "NAME|auto")]
+    pub(super) method: Option<MethodName>,
+    /// Element: t4, t4-anp (does not lock when Poisson's ratio nears 0.5), or auto: t4 below 0.45,
+    /// t4-anp from there on [default: auto].
+    #[arg(long, value_name = "t4|t4-anp|auto")]
+    pub(super) element: Option<ElementChoice>,
+    /// What a fingertip holds: vertex (the node it touched, as in the thesis), patch (every surface
+    /// node under it) or mask (their mean, weighted by the tip's pressure) [default: mask].
+    #[arg(long, value_name = "vertex|patch|mask")]
+    pub(super) contact: Option<ContactModel>,
+    /// Young's modulus, Pa [default: 20000, a soft fruit].
+    #[arg(long, value_name = "PA", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) young: Option<f64>,
+    /// Poisson's ratio [default: 0.4].
+    #[arg(long, value_name = "NU", value_parser = poisson, allow_negative_numbers = true)]
+    pub(super) poisson: Option<f64>,
+    /// Ticks per second, in real time; without it a scripted hand waits for each answer.
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) rate: Option<f64>,
+    /// Ticks to play [default: until the script ends].
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub(super) frames: Option<u64>,
+    /// No window.
+    #[arg(long)]
+    pub(super) headless: bool,
+    /// Folder for the deformed object at key frames (VTU).
+    #[arg(long, value_name = "D")]
+    pub(super) out_dir: Option<PathBuf>,
+    /// File for a JSON report.
+    #[arg(long, value_name = "F.json")]
+    pub(super) report: Option<PathBuf>,
+}
+
+/// Where the hand comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HandChoice {
+    /// Played by the program, as device bytes.
+    Scripted(ScriptName),
+}
+
+impl FromStr for HandChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':').unwrap_or((text, "")) {
+            ("scripted", "") => Ok(Self::Scripted(ScriptName::default())),
+            ("scripted", name) => Ok(Self::Scripted(name.parse().map_err(|e| format!("{e}"))?)),
+            _ => {
+                Err("there is scripted and scripted:NAME; gloves and recordings come later".into())
+            }
+        }
+    }
+}
+
+/// The element that ticks are solved with; they need one whose system is condensed.
+fn element_for_frames(choice: ElementChoice, poisson: f64) -> anyhow::Result<ElementName> {
+    match choice {
+        ElementChoice::T4 => Ok(ElementName::T4),
+        ElementChoice::T4Anp => Ok(ElementName::T4Anp),
+        ElementChoice::Auto => Ok(match cheapest_element(poisson) {
+            Element::Tet4 => ElementName::T4,
+            Element::Tet4Anp => ElementName::T4Anp,
+            Element::Tet10 => ElementName::T10,
+        }),
+        ElementChoice::T10 => bail!(
+            "run has no ten-node elements: a frame would take as long as a whole solve; take t4, \
+             t4-anp or auto, or solve one request with `glove-client solve --element t10`"
+        ),
+    }
+}
+
+/// A run after flags and scene file have been put together.
+pub(super) struct RunPlan {
+    /// What is grasped.
+    pub(super) object: ObjectChoice,
+    /// Nodes of a built-in object.
+    pub(super) nodes: usize,
+    /// Longest extent of the object, m; `None` where the hand may choose it.
+    pub(super) object_size: Option<f64>,
+    /// Material and solving.
+    pub(super) settings: SolveSettings,
+    /// Where to solve.
+    pub(super) server: ServerChoice,
+    /// What the hand plays.
+    pub(super) script: ScriptName,
+    /// Whether ticks wait for answers.
+    pub(super) pace: Pace,
+    /// From tick to tick, in real time.
+    pub(super) period: Option<Duration>,
+}
+
+/// Ticks per second where a person watches.
+const WATCHED_RATE_HZ: f64 = 60.0;
+/// Longest time from tick to tick, s: an hour is as good as any.
+const PERIOD_MAX_S: f64 = 3600.0;
+
+impl RunArguments {
+    /// Puts flags and scene file together.
+    ///
+    /// # Errors
+    /// A scene that cannot be read, or that asks for what cannot be.
+    pub(super) fn plan(&self) -> anyhow::Result<RunPlan> {
+        let scene = match &self.scene {
+            Some(path) => SceneFile::read(path)?,
+            None => SceneFile::default(),
+        };
+        let object = match (&self.object, &scene.object) {
+            (Some(choice), _) => choice.clone(),
+            (None, Some(name)) => name.parse()?,
+            (None, None) => "strawberry".parse()?,
+        };
+        let method = match (&self.method, &scene.method) {
+            (Some(method), _) => method.clone(),
+            (None, Some(name)) => name.parse().context("the scene's method")?,
+            (None, None) => MethodName::auto(),
+        };
+        let element = match (self.element, &scene.element) {
+            (Some(element), _) => element,
+            (None, Some(name)) => name.parse().context("the scene's element")?,
+            (None, None) => ElementChoice::Auto,
+        };
+        let material = Material {
+            young: self.young.or(scene.young_pa).unwrap_or(2.0e4),
+            poisson: self.poisson.or(scene.poisson).unwrap_or(0.4),
+        };
+        // Flags have been checked; what is wrong here stands in the scene file.
+        ElasticMaterial::try_new(material.young, material.poisson)
+            .context("the scene's material")?;
+        let contact = match (self.contact, &scene.contact) {
+            (Some(contact), _) => contact,
+            (None, Some(name)) => name.parse().context("the scene's contact")?,
+            (None, None) => ContactModel::default(),
+        };
+        let HandChoice::Scripted(script) =
+            self.hand.clone().unwrap_or(HandChoice::Scripted(ScriptName::default()));
+        // A person at a terminal watches; a pipe wants the result.
+        let watched = console_is_watched() && !self.headless;
+        let rate = self.rate.or(watched.then_some(WATCHED_RATE_HZ));
+        let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
+        Ok(RunPlan {
+            object,
+            nodes: self.nodes.or(scene.nodes).unwrap_or(NODES_DEFAULT),
+            object_size: self.object_size.or(scene.object_size_m),
+            settings: SolveSettings {
+                material,
+                element: element_for_frames(element, material.poisson)?,
+                method,
+                contact,
+                subscription: match self.out_dir {
+                    Some(_) => Subscription::Whole,
+                    None => Subscription::Surface,
+                },
+            },
+            server: self.server.clone().unwrap_or(ServerChoice::Embedded),
+            script,
+            pace: if period.is_some() { Pace::Free } else { Pace::Lockstep },
+            period,
+        })
+    }
+}
+
+fn console_is_watched() -> bool {
+    std::io::stderr().is_terminal()
+}

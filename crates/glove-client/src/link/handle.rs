@@ -1,0 +1,94 @@
+//! The ticks' side of the link.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use softgrasp_protocol::Question;
+
+use super::event::{LinkEvent, RequestEnd};
+use super::outbox::{LinkState, Shared, TickRequest};
+use super::worker::Worker;
+use crate::model_upload::ModelUpload;
+use crate::prefetch::Hint;
+use crate::tick_budget::Priority;
+use crate::unanswered::Unanswered;
+
+/// Owner of the link's thread.
+pub struct Link {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Link {
+    /// Starts the link to a server. Its thread has the priority while it awaits the answer of a
+    /// tick; it connects and sends the model like any other thread.
+    ///
+    /// # Errors
+    /// The system's, when it gives no thread.
+    pub fn start(address: &str, priority: Priority) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let worker = Worker::new(Arc::clone(&shared), address.to_owned(), priority);
+        let thread = std::thread::Builder::new().name("link".to_owned());
+        let thread = thread.spawn(move || worker.work())?;
+        Ok(Self { shared, thread: Some(thread) })
+    }
+
+    /// Sets the model that requests refer to from now on; an older request that waits ends.
+    pub fn set_model(&self, model: ModelUpload) {
+        let mut state = self.shared.lock();
+        state.drop_request(Unanswered::GraspEnded);
+        state.outbox.model = Some(model);
+        state.outbox.model_is_new = true;
+        state.outbox.hint = Hint::default();
+        drop(state);
+        self.shared.notify();
+    }
+
+    /// Asks for the displacements of a tick; a request that has not been sent yet is replaced.
+    /// `grip` is the tick in which the grip began.
+    pub fn ask(&self, tick: u64, grip: u64, question: Question) {
+        self.shared.lock().replace_request(TickRequest { tick, grip, question });
+        self.shared.notify();
+    }
+
+    /// Hints at contacts that may be made soon; there is no answer.
+    pub fn prefetch(&self, hint: &Hint) {
+        self.shared.lock().outbox.hint.append(hint);
+        self.shared.notify();
+    }
+
+    /// Ends a request that has not been sent yet: the grasp is over.
+    pub fn cancel(&self) {
+        self.shared.lock().drop_request(Unanswered::GraspEnded);
+    }
+
+    /// News and ended requests since the last call.
+    pub fn take(&self) -> (Vec<LinkEvent>, Vec<RequestEnd>) {
+        self.shared.lock().take()
+    }
+
+    /// Waits until nothing is asked for and nothing in flight, the server is lost, or the time is
+    /// up; whether all is answered.
+    pub fn wait_idle(&self, at_most: Duration) -> bool {
+        let busy = |state: &mut LinkState| !state.is_idle() && !state.lost;
+        self.shared.wait_while(self.shared.lock(), at_most, busy).is_idle()
+    }
+
+    /// Whether the server is there.
+    pub fn is_connected(&self) -> bool {
+        self.shared.lock().connected
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.shared.lock().stop = true;
+        self.shared.notify();
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the link's thread ended abnormally");
+        }
+    }
+}

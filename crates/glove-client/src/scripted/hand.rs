@@ -1,0 +1,293 @@
+//! What the scripted hand does, step by step, and the device bytes it sends while doing it.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use softgrasp_core::grasp::{Command, StateName};
+use softgrasp_core::hand::Finger;
+
+use super::approach::PalmPath;
+use super::plan::{GraspPlan, Posture, angles};
+use super::planner::{PlanRequest, Planner};
+use super::script::{ScriptName, Step};
+use crate::hand_reader::HandSetup;
+use crate::soft_object::SoftObject;
+
+/// What the person behind the hand sees before moving on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Whether each tip is inside the object, thumb first.
+    pub inside: [bool; 5],
+    /// State of the grasp, once there is one.
+    pub state: Option<StateName>,
+    /// The shape is being kept beside the ticks; the hand holds still until it is.
+    pub keeping: bool,
+}
+
+/// What the devices send in one tick, and what the person asks for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sent {
+    /// Bytes of the glove.
+    pub glove: Vec<u8>,
+    /// Bytes of the tracker.
+    pub tracker: Vec<u8>,
+    /// Menu command.
+    pub command: Option<Command>,
+    /// The script is over; the hand rests.
+    pub over: bool,
+}
+
+/// The hand found no way to grasp.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoGrasp {
+    /// No palm pose is good.
+    #[error(
+        "the scripted hand found no palm pose from which all five fingertips reach this object \
+         ({extent_m:.3} m long); try another --object-size"
+    )]
+    OutOfReach {
+        /// Longest extent of the object.
+        extent_m: f64,
+    },
+    /// Five tips need five nodes.
+    #[error("the object has {nodes} surface nodes; five fingertips need five different ones")]
+    TooFewNodes {
+        /// Nodes on its surface.
+        nodes: usize,
+    },
+}
+
+/// The scripted hand.
+pub struct ScriptedHand {
+    setup: HandSetup,
+    planner: Planner,
+    /// A plan has been asked for and is not there yet.
+    planning: bool,
+    steps: Vec<Step>,
+    at: usize,
+    step_tick: u32,
+    /// Share of the step that is over, from 0 to 1, gently at both ends.
+    progress: f64,
+    /// Ticks for which the hand has held still because the shape is being kept.
+    rested: u32,
+    plan: GraspPlan,
+    /// Where the palm came from when the hand turns to the other side.
+    turned_from: PalmPath,
+    closure: [f64; 5],
+    closure_before: [f64; 5],
+    lift: f64,
+}
+
+/// The hand holds still for so many ticks at most while the shape is being kept; by then the server
+/// is lost, or has refused.
+const REST_MAX: u32 = 200;
+/// How far the hand keeps away while it is not grasping, m.
+const BACK_OFF: f64 = 0.22;
+/// How far the hand lifts the object while it squeezes, m.
+const LIFT: f64 = 0.03;
+/// Closure per tick far from and near the expected touch.
+const CLOSE_FAST: f64 = 0.03;
+const CLOSE_SLOW: f64 = 0.008;
+/// How much further than expected a finger closes while it looks for the touch.
+const CLOSE_BEYOND: f64 = 0.15;
+impl ScriptedHand {
+    /// A hand that has looked at the object and knows how to grasp it. It plans its later
+    /// approaches while the tick waits, unless it is given another planner.
+    ///
+    /// # Errors
+    /// [`NoGrasp`] if it cannot be grasped by this hand.
+    pub fn try_new(
+        name: ScriptName,
+        setup: HandSetup,
+        object: &SoftObject,
+    ) -> Result<Self, NoGrasp> {
+        let object = Arc::clone(object.rest_shape());
+        let request = PlanRequest { object, setup, avoid_gaze: None };
+        let PlanRequest { object, setup, .. } = &request;
+        let plan = request.plan().ok_or_else(|| match object.surface().nodes.len() {
+            nodes @ ..5 => NoGrasp::TooFewNodes { nodes },
+            _ => NoGrasp::OutOfReach { extent_m: object.mesh().size() },
+        })?;
+        Ok(Self {
+            setup: setup.clone(),
+            planner: Planner::waited(),
+            planning: false,
+            steps: name.steps(),
+            at: 0,
+            step_tick: 0,
+            progress: 0.0,
+            rested: 0,
+            plan,
+            turned_from: plan.path,
+            closure: [0.0; 5],
+            closure_before: [0.0; 5],
+            lift: 0.0,
+        })
+    }
+
+    /// The same hand with another place to plan its later approaches.
+    #[must_use]
+    pub fn with_planner(self, planner: Planner) -> Self {
+        Self { planner, ..self }
+    }
+
+    /// The plan being followed.
+    pub fn plan(&self) -> &GraspPlan {
+        &self.plan
+    }
+
+    /// Whether the hand rests because its next approach is being planned.
+    pub fn is_planning(&self) -> bool {
+        self.planning
+    }
+
+    /// Moves on by one tick and says what the devices send.
+    pub fn next(&mut self, seen: &Seen, object: &SoftObject) -> Sent {
+        self.next_after(1, seen, object)
+    }
+
+    /// Moves on by the time of so many ticks, of which only the last is played, and says what the
+    /// devices send then.
+    pub fn next_after(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Sent {
+        let mut command = None;
+        let mut step = None;
+        for _ in 0..ticks {
+            step = self.steps.get(self.at).copied();
+            let Some(step) = step else { break };
+            if self.step_tick == 0 {
+                self.progress = 0.0;
+            }
+            // A person who waits to see something goes on after it, however long it took.
+            if self.rests(seen) || !self.is_ready_for(step, object) {
+                break;
+            }
+            if self.advance(step, seen) {
+                command = Some(Command::KeepShape);
+                break;
+            }
+        }
+        let world_from_palm = self.world_from_palm(step, object.rest_shape().centre());
+        let joint_angles = angles(&self.closure, self.posture(step));
+        let (glove, tracker) = self.setup.bytes_of(&joint_angles, &world_from_palm);
+        Sent { glove, tracker, command, over: step.is_none() }
+    }
+
+    /// Whether the hand holds still because the shape is being kept.
+    fn rests(&mut self, seen: &Seen) -> bool {
+        self.rested = if seen.keeping { self.rested + 1 } else { 0 };
+        (1..=REST_MAX).contains(&self.rested)
+    }
+
+    /// One tick of a step; whether the shape is to be kept.
+    fn advance(&mut self, step: Step, seen: &Seen) -> bool {
+        if self.step_tick == 0 {
+            self.closure_before = self.closure;
+        }
+        self.step_tick += 1;
+        let t = (f64::from(self.step_tick) / f64::from(step.ticks_max())).min(1.0);
+        self.progress = t * t * (3.0 - 2.0 * t);
+        self.close(step, seen);
+        if self.step_tick >= step.ticks_max() || is_done(step, seen) {
+            self.at += 1;
+            self.step_tick = 0;
+        }
+        step == Step::Keep
+    }
+
+    /// Whether the step can go on: turning to the other side needs a plan of what follows.
+    fn is_ready_for(&mut self, step: Step, object: &SoftObject) -> bool {
+        if step != Step::TurnToOtherSide || self.step_tick > 0 {
+            return true;
+        }
+        if !self.planning {
+            self.planning = true;
+            self.turned_from = self.plan.path;
+            self.planner.ask(PlanRequest {
+                object: Arc::clone(object.rest_shape()),
+                setup: self.setup.clone(),
+                avoid_gaze: Some(self.plan.path.gaze()),
+            });
+        }
+        let Some(planned) = self.planner.take() else { return false };
+        self.planning = false;
+        // A shape that cannot be grasped any more is reached for as before.
+        self.plan = planned.unwrap_or(self.plan);
+        true
+    }
+
+    fn close(&mut self, step: Step, seen: &Seen) {
+        let progress = self.progress;
+        let plan = self.plan;
+        match step {
+            Step::CloseThree => self.close_until_touch(seen, |finger| finger.attaches()),
+            Step::CloseOthers => self.close_until_touch(seen, |finger| !finger.attaches()),
+            Step::Press => {
+                for digit in 0..5 {
+                    let more = plan.press[digit] - plan.touch[digit];
+                    self.closure[digit] = self.closure_before[digit] + progress * more;
+                }
+                self.lift = LIFT * progress;
+            }
+            Step::Open => {
+                for digit in 0..5 {
+                    self.closure[digit] = self.closure_before[digit] * (1.0 - progress);
+                }
+            }
+            Step::TurnToOtherSide => self.lift = self.lift.min(LIFT * (1.0 - progress)),
+            Step::Reach | Step::Hold | Step::Keep | Step::Retreat => {}
+        }
+    }
+
+    fn close_until_touch(&mut self, seen: &Seen, moves: impl Fn(Finger) -> bool) {
+        for finger in Finger::ALL.into_iter().filter(|f| moves(*f)) {
+            let digit = finger.index();
+            let touch = self.plan.touch[digit];
+            if seen.inside[digit] {
+                continue;
+            }
+            let speed = if self.closure[digit] < touch - 0.06 { CLOSE_FAST } else { CLOSE_SLOW };
+            self.closure[digit] =
+                (self.closure[digit] + speed).min((touch + CLOSE_BEYOND).min(1.0));
+        }
+    }
+
+    fn posture(&self, step: Option<Step>) -> Posture {
+        // The hand is set for the grasp while it is still away, and opened after it.
+        let set = match step {
+            Some(Step::Reach) => self.progress,
+            Some(Step::Retreat) => 1.0 - self.progress,
+            Some(Step::TurnToOtherSide) | None => 0.0,
+            Some(_) => 1.0,
+        };
+        Posture::OPEN.toward(&self.plan.posture, set)
+    }
+
+    fn world_from_palm(&self, step: Option<Step>, centre: Point3<f64>) -> Isometry3<f64> {
+        let path = match step {
+            Some(Step::Reach) => self.plan.path.backed_off(BACK_OFF * (1.0 - self.progress)),
+            Some(Step::Retreat) => self.plan.path.backed_off(BACK_OFF * self.progress),
+            Some(Step::TurnToOtherSide) => {
+                let share = self.progress;
+                self.turned_from
+                    .backed_off(BACK_OFF)
+                    .toward(&self.plan.path.backed_off(BACK_OFF), share)
+            }
+            None if self.steps.last() == Some(&Step::Retreat) => {
+                self.plan.path.backed_off(BACK_OFF)
+            }
+            _ => self.plan.path,
+        };
+        path.world_from_palm(centre + Vector3::new(0.0, self.lift, 0.0))
+    }
+}
+
+/// Whether the person sees that the step has done what it was for.
+fn is_done(step: Step, seen: &Seen) -> bool {
+    match step {
+        Step::CloseThree => {
+            matches!(seen.state, Some(StateName::Attached | StateName::Deforming))
+        }
+        Step::CloseOthers => seen.state == Some(StateName::Deforming),
+        _ => false,
+    }
+}

@@ -1,0 +1,137 @@
+//! The millisecond that a thread with real-time priority may compute for at a time.
+
+use std::time::{Duration, Instant};
+
+use crate::pace::be_urgent;
+
+/// How a thread is scheduled that a tick passes through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Priority {
+    /// Like any other thread.
+    Ordinary,
+    /// Before the others, where the system allows it, for pieces of work of a millisecond at most.
+    RealTime,
+}
+
+/// Measures the pieces of work of the calling thread, and takes its real-time priority away when
+/// they are too long to be fair to other threads.
+///
+/// Invariant: never `urgent` again once [`LONG_IN_A_ROW_MAX`] pieces in a row were over [`LIMIT`].
+#[derive(Debug)]
+pub struct TickBudget {
+    /// What the thread may ask for.
+    priority: Priority,
+    urgent: bool,
+    began: Option<Moment>,
+    in_a_row: u32,
+    over: u64,
+    longest: Duration,
+}
+
+/// A moment on the clock of the thread's own computing; on the wall's where the system has none.
+#[derive(Clone, Copy, Debug)]
+enum Moment {
+    Computed(Duration),
+    Wall(Instant),
+}
+
+/// A thread with real-time priority computes no longer than this at a time.
+pub const LIMIT: Duration = Duration::from_millis(1);
+/// One long piece may be a page that was not in memory; so many in a row are the work itself.
+const LONG_IN_A_ROW_MAX: u32 = 3;
+
+impl TickBudget {
+    /// A budget for the calling thread, which stays ordinary until its first piece of work.
+    pub const fn new(priority: Priority) -> Self {
+        let (in_a_row, over, longest) = (0, 0, Duration::ZERO);
+        Self { priority, urgent: false, began: None, in_a_row, over, longest }
+    }
+
+    /// A piece of work begins, with real-time priority where that is wanted and allowed.
+    pub fn begin(&mut self) {
+        if self.priority == Priority::RealTime && !self.urgent {
+            self.urgent = be_urgent();
+            if !self.urgent {
+                self.priority = Priority::Ordinary;
+            }
+        }
+        self.began = Some(Moment::now());
+    }
+
+    /// What follows may take long: until the next piece the thread is an ordinary one.
+    pub fn step_back(&mut self) {
+        if self.urgent {
+            softgrasp_os::be_ordinary();
+            self.urgent = false;
+        }
+    }
+
+    /// The piece of work is over; returns how long it was.
+    pub fn end(&mut self) -> Duration {
+        let computed = self.began.take().map_or(Duration::ZERO, Moment::elapsed);
+        self.add(computed);
+        computed
+    }
+
+    fn add(&mut self, computed: Duration) {
+        self.longest = self.longest.max(computed);
+        if computed <= LIMIT {
+            self.in_a_row = 0;
+            return;
+        }
+        self.over += 1;
+        self.in_a_row += 1;
+        if self.in_a_row >= LONG_IN_A_ROW_MAX && self.priority == Priority::RealTime {
+            tracing::info!(?computed, "pieces of work over 1 ms: real-time priority is given back");
+            self.priority = Priority::Ordinary;
+            self.step_back();
+        }
+    }
+
+    /// What the thread may still ask for.
+    pub fn priority(&self) -> Priority {
+        self.priority
+    }
+
+    /// Pieces over the limit so far.
+    pub fn over(&self) -> u64 {
+        self.over
+    }
+
+    /// Longest piece so far.
+    pub fn longest(&self) -> Duration {
+        self.longest
+    }
+}
+
+impl Moment {
+    fn now() -> Self {
+        softgrasp_os::thread_cpu_time().map_or_else(|| Self::Wall(Instant::now()), Self::Computed)
+    }
+
+    fn elapsed(self) -> Duration {
+        match (self, Self::now()) {
+            (Self::Computed(began), Self::Computed(now)) => now.saturating_sub(began),
+            (Self::Wall(began), _) => began.elapsed(),
+            (Self::Computed(_), Self::Wall(_)) => Duration::ZERO,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_pieces_are_counted_and_three_in_a_row_end_the_right() {
+        let (short, long) = (LIMIT, LIMIT + Duration::from_nanos(1));
+        let mut budget = TickBudget::new(Priority::RealTime);
+        for computed in [long, long, short, long, long] {
+            budget.add(computed);
+        }
+        assert_eq!((budget.priority(), budget.over()), (Priority::RealTime, 4));
+        budget.add(long);
+        assert_eq!((budget.priority(), budget.over()), (Priority::Ordinary, 5));
+        assert_eq!(budget.longest(), long);
+    }
+}
