@@ -61,6 +61,36 @@ pub enum ReportError {
         /// What is allowed.
         allowed: f64,
     },
+    /// A program that is measured is not there.
+    #[error("there is no program {}; build all with `cargo build --release --workspace`", path.display())]
+    NoProgram {
+        /// Where it was looked for.
+        path: PathBuf,
+    },
+    /// The system did not start or show a process.
+    #[error("{what}: {source}")]
+    Process {
+        /// The process.
+        what: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A process failed or hung.
+    #[error("{what} failed: {}", said.trim())]
+    Ended {
+        /// The process.
+        what: String,
+        /// What it said.
+        said: String,
+    },
+    /// A file that a program wrote does not hold what is looked for.
+    #[error("{} cannot be read: {why}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        why: String,
+    },
     /// Nothing to fit a law to.
     #[error("{what}: {count} measurements are too few for a fit")]
     TooFew {

@@ -210,3 +210,21 @@ fn a_held_pace_is_counted_and_every_answer_compared() {
     assert!(of_answers("with_bound_percent").iter().all(|&share| share == 100.0));
     assert!(of_answers("error_bound_rel").iter().all(|&bound| bound > 0.0 && bound < 1e-4));
 }
+
+#[test]
+fn a_session_of_the_real_programs_is_read_from_its_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Session, folder.path());
+    let of = |name| numbers(folder.path(), "session.csv", name);
+    assert_eq!(of("runs"), [1.0, 1.0, 2.0]);
+    assert!(of("deforming").iter().all(|&ticks| ticks > 0.0), "{:?}", of("deforming"));
+    assert!(of("residual_rel").iter().all(|&e| e < 1e-9));
+    // What was answered is shown for a while, and nothing is shown that is not old.
+    let ages = column(folder.path(), "session.csv", "age_max_ms");
+    for (age, answered) in ages.iter().zip(of("answered")) {
+        assert!(answered == 0.0 || age.parse::<f64>().unwrap() > 0.0, "{age}");
+    }
+    let outcomes = column(folder.path(), "session-large.csv", "outcome");
+    assert_eq!(outcomes[0], "answered");
+    assert!(numbers(folder.path(), "session-large.csv", "nodes").iter().all(|&n| n > 900.0));
+}
