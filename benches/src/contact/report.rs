@@ -2,19 +2,19 @@
 
 use std::time::Duration;
 
-use glove_client::connection::{Host, ServerChoice, ServerConnection, unexpected};
+use glove_client::connection::{Host, ServerChoice, ServerConnection};
 use glove_client::contact_model::ContactModel;
-use softgrasp_protocol::{Answer, FrameRequest, ModelHash, Question, Reply, Request, SolveReport};
+use softgrasp_protocol::{Answer, FrameRequest, ModelHash, Question, Request, SolveReport};
 
 use super::half_space;
 use super::tips::{DEPTH, RADIUS, Tips, WANT_ALL};
 use super::verify::verify;
 use crate::axis::Scale;
 use crate::echo::{Echo, Ends};
-use crate::frame_bytes::{encode_reply, encode_request, held_nodes};
 use crate::plot::{Mark, Plot, PlotPoint, Series};
 use crate::reference::error_rel;
 use crate::report::{Options, Report, ReportError, check, progress};
+use crate::requests::{answer, encode_reply, encode_request, held_nodes, upload};
 use crate::sample::{Competitor, Effort, Spread, quantile, take_turns, timed_ms};
 use crate::table::{Cell, Table};
 use crate::threads::processors;
@@ -84,19 +84,14 @@ struct Asker<'a> {
 impl<'a> Asker<'a> {
     fn new(host: &Host, tips: &'a Tips) -> Result<Self, ReportError> {
         let mut connection = host.connect(None)?;
-        match connection.ask(&Request::UploadModel(tips.upload()))? {
-            Reply::ModelReady(ready) => Ok(Self { tips, model: ready.model, connection }),
-            other => Err(unexpected("UploadModel", &other).into()),
-        }
+        let model = upload(&mut connection, tips.upload())?;
+        Ok(Self { tips, model, connection })
     }
 
     fn ask(&mut self, question: Question) -> Result<(f64, Answer), ReportError> {
         let request = Request::Frame(FrameRequest { model: self.model, question });
         let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
-        match reply? {
-            Reply::Answer(answer) => Ok((ms, *answer)),
-            other => Err(unexpected("Frame", &other).into()),
-        }
+        Ok((ms, answer(reply)?))
     }
 
     /// The press by one contact model: its force, once the answer is seen to be right.

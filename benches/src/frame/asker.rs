@@ -1,9 +1,9 @@
 //! A client that asks for frames of one object and compares every answer with the right one.
 
-use glove_client::connection::{Host, ServerConnection, unexpected};
+use glove_client::connection::{Host, ServerConnection};
 use glove_client::contact_model::ContactModel;
 use softgrasp_protocol::{
-    Answer, FrameRequest, MethodName, ModelHash, NodeChoice, Question, Reply, Request, StageMs,
+    Answer, FrameRequest, MethodName, ModelHash, NodeChoice, Question, Request, StageMs,
     UploadModel,
 };
 
@@ -11,6 +11,7 @@ use crate::contact::{Tips, WANT_ALL, verify};
 use crate::echo::Waiting;
 use crate::reference::{Reference, error_rel};
 use crate::report::{ReportError, check};
+use crate::requests::{answer, upload};
 use crate::sample::timed_ms;
 use crate::scene::Pressed;
 
@@ -83,7 +84,7 @@ impl Asked {
             right: Vec::new(),
             right_error_rel: 0.0,
         };
-        let answer = Asker::new(host, asked.clone())?.answer(1.0, Waiting::Asleep)?.1;
+        let answer = Asker::new(host, asked.clone())?.ask(1.0, Waiting::Asleep)?.1;
         asked.right_error_rel = verify(&tips, &asked.question, &answer, ERROR_ALLOWED)?;
         let whole = answer.displacements.into_f64();
         asked.right = of_nodes(&tips.surface.nodes, |n| whole[n as usize]);
@@ -116,12 +117,8 @@ impl Asker {
     /// Connects and makes sure that the server has the model.
     pub fn new(host: &Host, asked: Asked) -> Result<Self, ReportError> {
         let mut connection = host.connect(None)?;
-        match connection.ask(&Request::UploadModel(asked.upload.clone()))? {
-            Reply::ModelReady(ready) => {
-                Ok(Self { asked, model: ready.model, connection, count: 0 })
-            }
-            other => Err(unexpected("UploadModel", &other).into()),
-        }
+        let model = upload(&mut connection, asked.upload.clone())?;
+        Ok(Self { asked, model, connection, count: 0 })
     }
 
     /// One frame with its own load, compared with the right answer.
@@ -129,7 +126,7 @@ impl Asker {
         self.count += 1;
         // Another load each time; the displacements are proportional to it.
         let scale = 1.0 + 0.25 * f64::from(self.count).sin();
-        let (ms, answer) = self.answer(scale, waiting)?;
+        let (ms, answer) = self.ask(scale, waiting)?;
         let got = answer.displacements.clone().into_f64();
         let right = self.asked.right.iter().map(|u| scale * u);
         let error_rel = match got.len() == self.asked.surface_nodes {
@@ -144,16 +141,13 @@ impl Asker {
     }
 
     /// An answer, and the time from asking to having it, ms.
-    fn answer(&mut self, scale: f64, waiting: Waiting) -> Result<(f64, Answer), ReportError> {
+    fn ask(&mut self, scale: f64, waiting: Waiting) -> Result<(f64, Answer), ReportError> {
         let question = self.asked.scaled(scale);
         let request = Request::Frame(FrameRequest { model: self.model, question });
         let (ms, reply) = timed_ms(|| match waiting {
             Waiting::Asleep => self.connection.ask(&request),
             Waiting::Awake => self.connection.ask_awake(&request),
         });
-        match reply? {
-            Reply::Answer(answer) => Ok((ms, *answer)),
-            other => Err(unexpected("Frame", &other).into()),
-        }
+        Ok((ms, answer(reply)?))
     }
 }

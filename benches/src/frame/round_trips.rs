@@ -6,8 +6,8 @@ use glove_client::connection::Host;
 
 use super::asker::{Asked, Asker, Trip};
 use crate::echo::{Echo, Ends, Waiting};
-use crate::frame_bytes::{encode_reply, encode_request, held_nodes};
 use crate::report::ReportError;
+use crate::requests::{encode_reply, encode_request, held_nodes};
 use crate::sample::{Competitor, Effort, take_turns, timed_ms};
 
 /// All round trips of one question, and how it began.

@@ -3,12 +3,13 @@
 use std::time::{Duration, Instant};
 
 use fea_server::{RunningServer, ServerConfig};
-use glove_client::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
-use softgrasp_protocol::{Answer, FrameRequest, ModelHash, NodeChoice, Reply, Request};
+use glove_client::connection::{Host, LinkError, ServerChoice, ServerConnection};
+use softgrasp_protocol::{Answer, FrameRequest, ModelHash, NodeChoice, Request};
 
 use super::kept::{Kept, Solved, keep};
 use crate::reference::{Reference, error_rel};
 use crate::report::{ReportError, check};
+use crate::requests::{answer, upload};
 use crate::sample::Spread;
 use crate::scene::Pressed;
 
@@ -63,10 +64,7 @@ impl<'a> Holder<'a> {
         let server = fea_server::start(config).map_err(LinkError::from)?;
         let host = Host::open(&ServerChoice::At(server.address().to_string()), None)?;
         let mut connection = host.connect(None)?;
-        let model = match connection.ask(&Request::UploadModel(scene.upload()))? {
-            Reply::ModelReady(ready) => ready.model,
-            other => return Err(unexpected("UploadModel", &other).into()),
-        };
+        let model = upload(&mut connection, scene.upload())?;
         let answer = proven(&mut connection, &request(scene, model, 1.0))?;
         let usual = Duration::ZERO;
         Ok(Self { scene, right, model, connection, answer, usual, _server: server })
@@ -81,7 +79,7 @@ impl<'a> Holder<'a> {
         let kept = keep(
             count,
             |number| request(scene, *model, scale(number)),
-            |request| ask(connection, request),
+            |request| answer(connection.ask_awake(request)),
             |number, answer| judge(right, &answer, scale(number)),
         )?;
         self.usual = Duration::from_secs_f64(1e-3 * Spread::of(kept.of(|t| t.work)).median);
@@ -121,19 +119,12 @@ fn request(scene: &Pressed, model: ModelHash, scale: f64) -> Request {
     Request::Frame(FrameRequest { model, question })
 }
 
-fn ask(connection: &mut ServerConnection, request: &Request) -> Result<Answer, ReportError> {
-    match connection.ask_awake(request)? {
-        Reply::Answer(answer) => Ok(*answer),
-        other => Err(unexpected("Frame", &other).into()),
-    }
-}
-
 /// An answer that carries its error bound: the proof is made beside the frames after an upload, and
 /// a session lasts longer than it.
 fn proven(connection: &mut ServerConnection, request: &Request) -> Result<Answer, ReportError> {
     let start = Instant::now();
     loop {
-        let answer = ask(connection, request)?;
+        let answer = answer(connection.ask_awake(request))?;
         if answer.report.error_bound_rel.is_some() || start.elapsed() > PROOF_MAX {
             return Ok(answer);
         }

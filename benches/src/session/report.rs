@@ -7,6 +7,7 @@ use super::programs::Programs;
 use super::record::Record;
 use super::way::{Arrangement, Object, RATE_HZ, play};
 use crate::report::{Options, Report, ReportError, check, progress};
+use crate::sample::Spread;
 use crate::table::{Cell, Table};
 use crate::tail::Tail;
 use crate::threads::processors;
@@ -95,7 +96,6 @@ fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
 fn age_row(object: &Object, arrangement: Arrangement, record: &Record) -> [Cell; 21] {
     let tail = |times: &[f64]| Tail::of(times.iter().copied());
     let (ages, trips) = (tail(&record.ages), tail(&record.round_trips));
-    let first = tail(&record.first_answers);
     [
         object.name.as_str().into(),
         record.nodes.into(),
@@ -110,8 +110,8 @@ fn age_row(object: &Object, arrangement: Arrangement, record: &Record) -> [Cell;
         ages.p50.into(),
         ages.p99.into(),
         ages.max.into(),
-        first.p50.into(),
-        first.max.into(),
+        median(&record.first_answers).into(),
+        tail(&record.first_answers).max.into(),
         record.unseen_grips.into(),
         trips.p50.into(),
         trips.p99.into(),
@@ -119,6 +119,12 @@ fn age_row(object: &Object, arrangement: Arrangement, record: &Record) -> [Cell;
         record.residual_rel.into(),
         record.error_bound_rel.into(),
     ]
+}
+
+/// Of times that are few; nothing of none.
+fn median(times: &[f64]) -> Option<f64> {
+    let spread = Spread::of(times.iter().copied());
+    (spread.count > 0).then_some(spread.median)
 }
 
 fn keep_row(object: &Object, arrangement: Arrangement, record: &Record) -> [Cell; 9] {
@@ -129,9 +135,9 @@ fn keep_row(object: &Object, arrangement: Arrangement, record: &Record) -> [Cell
         record.nodes.into(),
         arrangement.name().into(),
         record.keeps.len().into(),
-        keeps.p50.into(),
+        median(&record.keeps).into(),
         keeps.max.into(),
-        ready.p50.into(),
+        median(&record.ready).into(),
         ready.max.into(),
         record.residual_rel.into(),
     ]
@@ -206,8 +212,8 @@ computed for more than 1 ms. Every deforming tick without an answer has a reason
 up, or the report fails.
 
 `keep` is the time for which the object stands still because its shape is being kept; `server ready` \
-the time from then until the server has prepared the new shape (blank where another session had \
-brought it).
+the time from then until a tick hears that the server has prepared the new shape (blank where another \
+session had brought it). Both are seen by ticks, so they come in steps of one.
 
 Every answer carries its residual, and a proven bound of its error where it has one; the largest of \
 all are in the tables, and a residual above 1e-9 ends the report. The displacements of the same \
