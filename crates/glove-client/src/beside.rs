@@ -1,5 +1,6 @@
 //! One kind of long work on a thread of its own, without real-time priority, beside the ticks.
 
+use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
 /// A thread that does one job after the other, and what has become of them.
@@ -9,6 +10,8 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 pub struct Beside<Job, Done> {
     jobs: Sender<Job>,
     done: Receiver<Done>,
+    /// Outcomes that were waited for and have not been taken.
+    settled: VecDeque<Done>,
     /// Jobs whose outcome has not been taken.
     waiting: usize,
 }
@@ -32,7 +35,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Beside<Job, Done> {
                 }
             }
         })?;
-        Ok(Self { jobs, done, waiting: 0 })
+        Ok(Self { jobs, done, settled: VecDeque::new(), waiting: 0 })
     }
 
     /// Hands a job over. A thread that has panicked does nothing any more: the job is lost.
@@ -47,6 +50,10 @@ impl<Job: Send + 'static, Done: Send + 'static> Beside<Job, Done> {
 
     /// The next outcome, if it is there; never waits.
     pub fn take(&mut self) -> Option<Done> {
+        if let Some(done) = self.settled.pop_front() {
+            self.waiting = self.waiting.saturating_sub(1);
+            return Some(done);
+        }
         match self.done.try_recv() {
             Ok(done) => {
                 self.waiting = self.waiting.saturating_sub(1);
@@ -62,12 +69,19 @@ impl<Job: Send + 'static, Done: Send + 'static> Beside<Job, Done> {
 
     /// The next outcome of a job that was handed over; waits for it.
     pub fn wait(&mut self) -> Option<Done> {
-        if self.waiting == 0 {
-            return None;
+        self.settle();
+        self.take()
+    }
+
+    /// Waits until every job that was handed over is done; the outcomes are still to be taken.
+    pub fn settle(&mut self) {
+        while self.settled.len() < self.waiting {
+            match self.done.recv() {
+                Ok(done) => self.settled.push_back(done),
+                // The thread has panicked: what is not done is lost.
+                Err(_) => self.waiting = self.settled.len(),
+            }
         }
-        let done = self.done.recv().ok();
-        self.waiting = if done.is_some() { self.waiting - 1 } else { 0 };
-        done
     }
 }
 
@@ -89,9 +103,10 @@ mod tests {
         beside.begin(4);
         assert!(beside.is_busy() && beside.take().is_none());
         gate.send(()).unwrap();
-        assert_eq!(beside.wait(), Some(9));
         gate.send(()).unwrap();
-        assert_eq!(beside.wait(), Some(16));
+        beside.settle();
+        assert!(beside.is_busy(), "an outcome that nobody has taken");
+        assert_eq!((beside.take(), beside.wait(), beside.take()), (Some(9), Some(16), None));
         assert!(!beside.is_busy());
     }
 

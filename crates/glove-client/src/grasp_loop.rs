@@ -128,9 +128,21 @@ impl GraspLoop {
         self.link.wait_idle(at_most)
     }
 
-    /// Whether work on the object goes on beside the ticks.
-    pub fn is_working(&self) -> bool {
-        self.work.is_busy()
+    /// Waits until the server has answered all, at most so long, and until the work beside the ticks
+    /// is done: what the next tick finds then does not depend on time.
+    pub fn settle(&mut self, at_most: Duration) {
+        self.work.settle();
+        self.link.wait_idle(at_most);
+    }
+
+    /// What the server has done since the last tick, when no tick follows.
+    ///
+    /// # Errors
+    /// [`ObjectError`] when the object cannot be shown any more.
+    pub fn take_last(&mut self) -> Result<TickOutcome, ObjectError> {
+        let mut outcome = TickOutcome::default();
+        self.pick_up(&mut outcome)?;
+        Ok(outcome)
     }
 
     /// One tick at a time on the client's clock.

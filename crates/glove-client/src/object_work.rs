@@ -120,6 +120,13 @@ impl ObjectWork {
         }
     }
 
+    /// Waits until all work that was handed over is done; the outcomes are still to be taken.
+    pub fn settle(&mut self) {
+        if let Self::Beside(beside) = self {
+            beside.settle();
+        }
+    }
+
     /// Whether work was handed over whose outcome has not been taken.
     pub fn is_busy(&self) -> bool {
         match self {

@@ -78,11 +78,20 @@ impl Session {
         self.grasp_loop.wait_idle(at_most)
     }
 
+    /// Waits until nothing is under way but the planning of the hand; see [`GraspLoop::settle`].
+    pub fn settle(&mut self, at_most: Duration) {
+        self.grasp_loop.settle(at_most);
+    }
+
     /// Ends the run; `interrupted` if the user did.
-    pub fn finish(mut self, interrupted: bool) -> RunReport {
+    ///
+    /// # Errors
+    /// As [`Session::play`].
+    pub fn finish(mut self, interrupted: bool) -> Result<RunReport, ObjectError> {
+        self.report.add_last(&self.grasp_loop.take_last()?);
         self.report.interrupted = interrupted;
         self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
-        self.report
+        Ok(self.report)
     }
 }
 

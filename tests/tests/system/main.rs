@@ -14,6 +14,7 @@ mod keep_shape;
 mod many_clients;
 mod masks;
 mod memory;
+mod real_time;
 mod same_bits;
 mod start;
 mod stopping;

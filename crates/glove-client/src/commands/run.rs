@@ -149,7 +149,7 @@ impl RunCommand {
         if let Some(key_frames) = key_frames {
             key_frames.finish()?;
         }
-        Ok(session.finish(interrupted))
+        Ok(session.finish(interrupted)?)
     }
 }
 

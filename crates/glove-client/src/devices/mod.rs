@@ -3,6 +3,7 @@
 pub mod calibration;
 pub mod cyberglove;
 pub mod fastrak;
+mod feeding;
 mod inbox;
 mod mount;
 pub mod recordings;

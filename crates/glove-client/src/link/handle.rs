@@ -68,11 +68,13 @@ impl Link {
         self.shared.lock().take()
     }
 
-    /// Waits until nothing is asked for and nothing in flight, the server is lost, or the time is
-    /// up; whether all is answered.
+    /// Waits until nothing is asked for and nothing in flight, the server is looked for in vain, or
+    /// the time is up; whether all is answered.
     pub fn wait_idle(&self, at_most: Duration) -> bool {
-        let busy = |state: &mut LinkState| !state.is_idle() && !state.lost;
-        self.shared.wait_while(self.shared.lock(), at_most, busy).is_idle()
+        let state = self.shared.lock();
+        let losses = state.losses;
+        let waits = |state: &mut LinkState| !state.is_idle() && state.losses == losses;
+        self.shared.wait_while(state, at_most, waits).is_idle()
     }
 
     /// Whether the server is there.

@@ -61,8 +61,10 @@ pub struct LinkState {
     pub busy: bool,
     /// Whether the server is there.
     pub connected: bool,
-    /// Whether the server was looked for and not found, or went away, and is not back.
+    /// Whether the ticks know that the server is not there.
     pub lost: bool,
+    /// How often the server was looked for and not found, or went away.
+    pub losses: u64,
     /// The link is to end.
     pub stop: bool,
     /// News that no tick has picked up.

@@ -276,6 +276,7 @@ fn lose(state: &mut LinkState, error: &LinkError, job: Job) {
     }
     tracing::debug!(%error, "the server is not there");
     (state.connected, state.lost) = (false, true);
+    state.losses += 1;
     state.outbox.model_is_new |= job.request.is_none();
     match job.request {
         Some(request) if state.outbox.request.is_some() => {

@@ -256,8 +256,10 @@ impl ScriptedHand {
         let set = match step {
             Some(Step::Reach) => self.progress,
             Some(Step::Retreat) => 1.0 - self.progress,
-            Some(Step::TurnToOtherSide) | None => 0.0,
-            Some(_) => 1.0,
+            Some(Step::TurnToOtherSide) => 0.0,
+            None if self.steps.last() == Some(&Step::Retreat) => 0.0,
+            // A script that does not end with letting go holds on.
+            Some(_) | None => 1.0,
         };
         Posture::OPEN.toward(&self.plan.posture, set)
     }
@@ -289,5 +291,62 @@ fn is_done(step: Step, seen: &Seen) -> bool {
         }
         Step::CloseOthers => seen.state == Some(StateName::Deforming),
         _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softgrasp_core::mesh::{BuiltIn, generate};
+
+    fn cube() -> SoftObject {
+        SoftObject::try_new(generate(BuiltIn::Cube, 216).unwrap()).unwrap()
+    }
+
+    fn hand(name: ScriptName, object: &SoftObject) -> ScriptedHand {
+        ScriptedHand::try_new(name, HandSetup::default(), object).unwrap()
+    }
+
+    #[test]
+    fn hand_is_where_it_is_now_however_many_ticks_were_missed() {
+        let (object, seen) = (cube(), Seen::default());
+        let mut played = hand(ScriptName::Approach, &object);
+        let mut missed = hand(ScriptName::Approach, &object);
+        for ticks in [1, 7, 30, 20] {
+            let all: Vec<Sent> = (0..ticks).map(|_| played.next(&seen, &object)).collect();
+            assert!(missed.next_after(ticks, &seen, &object) == *all.last().unwrap());
+        }
+    }
+
+    #[test]
+    fn hand_does_not_jump_back_in_the_last_tick_of_a_step() {
+        let (object, seen) = (cube(), Seen::default());
+        let mut hand = hand(ScriptName::Approach, &object);
+        let mut reader = crate::hand_reader::HandReader::new(HandSetup::default());
+        let mut before: Option<Isometry3<f64>> = None;
+        for tick in 0..95 {
+            let sent = hand.next(&seen, &object);
+            let now_s = f64::from(tick) / 60.0;
+            reader.feed(&sent.glove, &sent.tracker, now_s);
+            let palm = reader.hand(now_s).unwrap().world_from_palm;
+            if let Some(before) = before {
+                let moved = (palm.translation.vector - before.translation.vector).norm();
+                // The way back is 22 cm in 25 ticks, at most 1.5 times as fast in the middle.
+                assert!(moved < 0.02, "{moved} m in tick {tick}");
+            }
+            before = Some(palm);
+        }
+    }
+
+    #[test]
+    fn hand_rests_and_sends_while_the_shape_is_kept_but_not_for_ever() {
+        let object = cube();
+        let mut hand = hand(ScriptName::Regrasp, &object);
+        let (free, keeping) = (Seen::default(), Seen { keeping: true, ..Seen::default() });
+        let first = hand.next(&free, &object);
+        let resting: Vec<Sent> = (0..REST_MAX).map(|_| hand.next(&keeping, &object)).collect();
+        assert!(resting.iter().all(|sent| !sent.glove.is_empty() && *sent == resting[0]));
+        assert!(resting[0].tracker == first.tracker);
+        assert!(hand.next(&keeping, &object).tracker != first.tracker);
     }
 }

@@ -11,5 +11,7 @@ mod agreement;
 mod commands;
 mod discretisation;
 mod interruption;
+mod numbers;
 mod references;
+mod runs;
 mod start;

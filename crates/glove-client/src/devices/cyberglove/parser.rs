@@ -2,6 +2,7 @@
 
 use super::record::{GloveRecord, RecordError, RecordOptions, decode_frame};
 use super::sensor::SensorCount;
+use crate::devices::feeding::feed_all;
 use crate::devices::inbox::Inbox;
 
 /// What the interface unit complains about.
@@ -126,18 +127,8 @@ impl GloveParser {
     }
 
     /// Feeds all bytes and hands each event to `on_event`.
-    pub fn feed_all(&mut self, mut bytes: &[u8], mut on_event: impl FnMut(GloveEvent)) {
-        loop {
-            let taken = self.feed(bytes);
-            bytes = &bytes[taken..];
-            for event in self.by_ref() {
-                on_event(event);
-            }
-            // Reading every event leaves less than one record waiting, so the next feed takes some.
-            if bytes.is_empty() {
-                return;
-            }
-        }
+    pub fn feed_all(&mut self, bytes: &[u8], on_event: impl FnMut(GloveEvent)) {
+        feed_all(self, Self::feed, bytes, on_event);
     }
 
     /// Longest possible piece before a NUL: a record with an error text.

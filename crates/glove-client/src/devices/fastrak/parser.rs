@@ -4,6 +4,7 @@ use super::decode::{Head, head};
 use super::fault::{FastrakFault, FastrakFaultKind};
 use super::flip::{FlipWatch, HemisphereFlip};
 use super::record::{FastrakFormat, FastrakRecord};
+use crate::devices::feeding::feed_all;
 use crate::devices::inbox::Inbox;
 
 /// What the stream contained.
@@ -62,18 +63,8 @@ impl FastrakParser {
     }
 
     /// Feeds all bytes and hands each event to `on_event`.
-    pub fn feed_all(&mut self, mut bytes: &[u8], mut on_event: impl FnMut(FastrakEvent)) {
-        loop {
-            let taken = self.feed(bytes);
-            bytes = &bytes[taken..];
-            for event in self.by_ref() {
-                on_event(event);
-            }
-            // Reading every event leaves at most one reply waiting, so the next feed takes some.
-            if bytes.is_empty() {
-                return;
-            }
-        }
+    pub fn feed_all(&mut self, bytes: &[u8], on_event: impl FnMut(FastrakEvent)) {
+        feed_all(self, Self::feed, bytes, on_event);
     }
 
     /// Drops one byte; a fault when the run is long enough to be reported.
