@@ -1,6 +1,7 @@
 //! A report: its head, its text, tables and figures, and how it is written.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use crate::machine::{Machine, load_text};
 use crate::table::Table;
@@ -50,6 +51,7 @@ pub struct Report {
     head: Vec<(&'static str, String)>,
     sections: Vec<Section>,
     faults: Vec<String>,
+    begun: Instant,
 }
 
 impl Report {
@@ -70,11 +72,14 @@ impl Report {
             head,
             sections: Vec::new(),
             faults: Vec::new(),
+            begun: Instant::now(),
         }
     }
 
-    /// Notes the load at the end of the measurement.
+    /// Notes the load at the end of the measurement, and how long it took.
     pub fn end(&mut self) {
+        let minutes = self.begun.elapsed().as_secs_f64() / 60.0;
+        self.head.push(("took", format!("{minutes:.1} min")));
         self.head.push(("load after", load_text()));
     }
 

@@ -31,7 +31,14 @@ fn run_quick(name: ReportName, folder: &Path) {
     let (_, files) = run(name, &options).unwrap();
     assert!(files.iter().all(|file| file.is_file()), "{files:?}");
     let page = std::fs::read_to_string(folder.join(format!("{}.md", name.name()))).unwrap();
-    for part in ["- command: ", "- commit: ", "- date: ", "- processor: ", "- threads: "] {
+    for part in [
+        "- command: ",
+        "- commit: ",
+        "- date: ",
+        "- processor: ",
+        "- processor maker: ",
+        "- threads: ",
+    ] {
         assert!(page.contains(part), "{part} is not in the head of {}", name.name());
     }
 }
@@ -217,7 +224,17 @@ fn a_session_of_the_real_programs_is_read_from_its_reports() {
     run_quick(ReportName::Session, folder.path());
     let of = |name| numbers(folder.path(), "session.csv", name);
     assert_eq!(of("runs"), [1.0, 1.0, 2.0]);
-    assert!(of("deforming").iter().all(|&ticks| ticks > 0.0), "{:?}", of("deforming"));
+    assert!(of("ticks").iter().all(|&ticks| ticks > 0.0), "{:?}", of("ticks"));
+    // Every deforming tick is answered or has a reason, however slow the machine is.
+    let why = |name| column(folder.path(), "session-unanswered.csv", name);
+    for (server, (deforming, answered)) in column(folder.path(), "session.csv", "server")
+        .iter()
+        .zip(of("deforming").into_iter().zip(of("answered")))
+    {
+        let rows = why("server").into_iter().zip(why("ticks"));
+        let of_server = rows.filter(|(of, _)| of == server).map(|(_, n)| n.parse::<f64>().unwrap());
+        assert_eq!(deforming, answered + of_server.sum::<f64>(), "{server}");
+    }
     assert!(of("residual_rel").iter().all(|&e| e < 1e-9));
     // What was answered is shown for a while, and nothing is shown that is not old.
     let ages = column(folder.path(), "session.csv", "age_max_ms");

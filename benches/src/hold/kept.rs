@@ -90,7 +90,8 @@ pub(super) fn keep<P, W, E>(
         wait_until(tick);
         let begun = Instant::now();
         let done = work(&prepared)?;
-        let (from_tick, work) = (ms(tick.elapsed()), ms(begun.elapsed()));
+        let over = Instant::now();
+        let (from_tick, work) = (ms(over - tick), ms(over - begun));
         let solved = check(number, done)?;
         kept.ticks.push(Tick { from_tick, work, solved });
     }
