@@ -92,9 +92,12 @@ impl Source {
         }
     }
 
-    /// Values of keys that are numbers: constants that a text may name.
+    /// Constants that a text may name: values of keys that are numbers, and numbers in the names of
+    /// columns that are quoted (21 in `solve_21_ms`).
     pub fn constants(&self) -> impl Iterator<Item = f64> + '_ {
-        self.keys.iter().flat_map(|(_, values)| values).filter_map(|value| value.parse().ok())
+        let values = self.keys.iter().flat_map(|(_, values)| values).map(String::as_str);
+        let in_names = self.columns.iter().flat_map(|(name, _)| name.split('_'));
+        values.chain(in_names).filter_map(|word| word.parse().ok())
     }
 }
 
@@ -130,6 +133,8 @@ mod tests {
         assert_eq!((columns[0].unit, columns[1].unit), (Unit::Time(1e-3), Unit::Time(1.0)));
         let both = Source::parse("f.csv | name = a, b / c | -> ratio").unwrap();
         assert_eq!(both.select(CSV).unwrap()[0].numbers, [2.0, 4.0]);
+        let named = Source::parse("f.csv | nodes = 27 | -> solve_21_ms, p99_ms").unwrap();
+        assert_eq!(named.constants().collect::<Vec<_>>(), [27.0, 21.0]);
         let all = Source::parse("f.csv -> ratio").unwrap();
         assert_eq!(all.select(CSV).unwrap()[0].numbers, [2.0, 4.0]);
     }
