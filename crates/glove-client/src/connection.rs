@@ -1,4 +1,4 @@
-//! A client's side of one TCP connection: requests out, replies in, one at a time.
+//! Sends requests to a server over one TCP connection, and reads their replies.
 
 use std::fmt;
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
@@ -292,7 +292,7 @@ impl ServerConnection {
     }
 }
 
-/// What this machine is like for a server in this process.
+/// Speed and memory of this machine, as an embedded server would find them.
 pub struct OwnMachine {
     /// Speeds of its threads; `None` where they cannot be measured.
     pub rates: Option<Rates>,
@@ -305,7 +305,7 @@ pub struct OwnMachine {
 }
 
 impl OwnMachine {
-    /// Measures for some hundredths of a second.
+    /// Measures the speeds; takes some hundredths of a second.
     pub fn measure() -> Self {
         let ServerConfig { threads, memory_limit, .. } = ServerConfig::default();
         Self {

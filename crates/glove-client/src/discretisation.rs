@@ -1,4 +1,4 @@
-//! How coarse the mesh is for an answer, estimated by asking again with the other element.
+//! Estimates the error that the mesh brings, by solving once more with the other element.
 
 use softgrasp_protocol::{
     Answer, ElementChoice, ElementName, MethodName, NodeChoice, Precision, Reply, Request,
@@ -7,10 +7,10 @@ use softgrasp_protocol::{
 
 use crate::connection::{LinkError, ServerConnection, unexpected};
 
-/// What is known about the mesh's share of the error.
+/// Estimate of the error that the mesh brings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiscretisationEstimate {
-    /// `‖u_t4 − u_t10‖ / ‖u_t10‖` over the nodes of the mesh, for the same known displacements and
+    /// `‖u_t4 − u_t10‖ / ‖u_t10‖` over the nodes of the mesh, for the same prescribed displacements and
     /// forces; `None` where there is none.
     pub rel: Option<f64>,
     /// What it is, or why there is none.

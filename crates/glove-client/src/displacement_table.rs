@@ -61,7 +61,7 @@ pub enum TableError {
     },
 }
 
-/// Column names of a table of known displacements.
+/// Column names of a table of prescribed displacements.
 pub const DISPLACEMENT_COLUMNS: [&str; 4] = ["node", "ux", "uy", "uz"];
 /// Column names of a table of forces.
 pub const FORCE_COLUMNS: [&str; 4] = ["node", "fx", "fy", "fz"];

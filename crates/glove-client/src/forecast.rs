@@ -1,4 +1,4 @@
-//! What an answer on a mesh would cost, way by way, before anything is made.
+//! Predicts memory and time of one answer on a mesh, for every element and method.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! From device bytes to the pose of the hand: parsers, calibration, mount, in this order.
+//! Turns the bytes of glove and tracker into the pose of the hand.
 
 use nalgebra::{Isometry3, Translation3};
 use softgrasp_core::hand::{HandDimensions, HandPose, JointAngles, pose};
@@ -51,13 +51,13 @@ impl Default for HandSetup {
 }
 
 impl HandSetup {
-    /// What the client will make of these angles once they have passed the glove's sensors.
+    /// The angles that the client reads when the glove's sensors measure these.
     pub fn felt(&self, angles: &JointAngles) -> JointAngles {
         let raw = self.calibration.raw_from_angles(angles, self.sensors);
         self.calibration.angles(&raw, SensorSet::EMPTY)
     }
 
-    /// What glove and tracker would send for a hand in this pose.
+    /// The bytes that glove and tracker send for a hand in this pose.
     pub fn bytes_of(
         &self,
         angles: &JointAngles,

@@ -1,4 +1,4 @@
-//! What `inspect` tells of a mesh file: what is in it, what is mended, what it would cost.
+//! The report of `inspect` on a mesh file: its content, its faults, and the cost of an answer.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -154,7 +154,7 @@ impl Inspection {
         say(
             self.bodies_by_node > 1,
             format!(
-                "{} separate bodies: each needs known displacements of its own",
+                "{} separate bodies: each needs prescribed displacements of its own",
                 self.bodies_by_node
             ),
         );

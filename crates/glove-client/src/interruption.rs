@@ -1,16 +1,16 @@
-//! Ctrl-C, SIGTERM and a closed terminal: a command that ends with a summary is told, any other
-//! program ends at once. So does one that is asked a second time.
+//! Ends the program on Ctrl-C, SIGTERM and a closed terminal: `run` writes its report first, other
+//! commands end at once, and so does any command at the second signal.
 
 use std::process::exit;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use softgrasp_os::{EndSignal, on_end_signal};
 
-/// Nobody waits to be told.
+/// The command does not look: a signal ends the program.
 const UNHEARD: u8 = 0;
-/// A command looks whether it was asked to end.
+/// The command looks at [`asked`].
 const HEARD: u8 = 1;
-/// It was asked.
+/// A signal has asked the command to end.
 const ASKED: u8 = 2;
 
 static STATE: AtomicU8 = AtomicU8::new(UNHEARD);

@@ -1,4 +1,4 @@
-//! What is put right in the tetrahedra of a file, as `inspect` tells it.
+//! The report of `inspect` on bad tetrahedra of a file: which were turned or dropped, and why.
 
 use std::fmt;
 

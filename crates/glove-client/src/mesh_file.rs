@@ -1,4 +1,4 @@
-//! Mesh files on disk: the file and its companions to bytes, bytes to a mesh.
+//! Reads a mesh file, and the files beside it that belong to it, from disk.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! A moving sign of life for long work: on a terminal only, never in a pipe.
+//! Shows on a terminal that long work goes on; writes nothing into a pipe or a file.
 
 use std::time::Duration;
 
@@ -21,7 +21,7 @@ impl Progress {
         Self { bar }
     }
 
-    /// Says behind the message, and anew with every sign of life, what `now` tells at that moment.
+    /// Shows behind the message what `now` returns, and asks it again whenever the line is drawn.
     pub fn watch(&self, now: impl Fn() -> &'static str + Send + Sync + Clone + 'static) {
         let template = ProgressStyle::with_template("{spinner} {msg} {now} ({elapsed})");
         if let Ok(style) = template {

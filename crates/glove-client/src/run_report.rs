@@ -1,4 +1,4 @@
-//! What a run tells afterwards: the JSON report and the summary a newcomer understands.
+//! The report of a run: JSON for programs, and a summary of one screen for people.
 
 use std::time::Duration;
 

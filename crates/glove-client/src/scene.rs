@@ -1,4 +1,4 @@
-//! What is in the scene: the object, its size and material, the solver; from flags or a TOML file.
+//! Reads a scene (object, size, material, method) from a TOML file, and loads its object.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! The part of every JSON report that tells what one solve cost and how wrong it can be.
+//! The part of every JSON report about one solve: method, times, residual, error bound.
 
 use serde::Serialize;
 use softgrasp_protocol::{SolveReport, StageMs};

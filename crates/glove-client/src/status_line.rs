@@ -1,4 +1,4 @@
-//! One line that lives on the terminal while the hand is at work.
+//! Shows tick, grasp state and the last solve on one line of the terminal during a run.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! What one tick brought: events, the state of the grasp, answers and the lack of them.
+//! The outcome of one tick: events, the state of the grasp, answers, and ticks without one.
 
 use softgrasp_core::grasp::{GraspEvent, StateName};
 

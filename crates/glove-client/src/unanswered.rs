@@ -1,4 +1,4 @@
-//! Why a deforming tick has no answer.
+//! The reasons for which a deforming tick has no answer, and how often each occurred.
 
 use std::collections::BTreeMap;
 use std::fmt;

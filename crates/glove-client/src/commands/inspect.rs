@@ -1,5 +1,4 @@
-//! `glove-client inspect F [--json] [--repair OUT]`: what is in a mesh file, whether it can be used,
-//! what that would cost, and the file mended.
+//! `glove-client inspect F [--json] [--repair OUT]`: reports on a mesh file, and writes it mended.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +25,7 @@ pub struct InspectCommand {
     json: bool,
     /// Memory limit of the server that is to solve: bytes, or 8GiB, 512MiB [default: 8GiB]. A mesh
     /// that needs more by every way is refused (exit code 1).
-    #[arg(long, value_name = "BYTES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
     memory_limit: Option<Bytes>,
     /// Write the mended mesh: .msh (Gmsh 4.1), .vtu, or .txt (the three lists of the thesis).
     #[arg(long, value_name = "OUT")]

@@ -19,7 +19,7 @@ pub struct MeshCommand {
     /// cube, sphere, strawberry or toothpaste.
     shape: BuiltIn,
     /// Number of nodes, as near as the shape allows.
-    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     nodes: usize,
     /// File to write: .msh (Gmsh 4.1), .vtu, or .txt (the three lists of the thesis).
     #[arg(long, value_name = "F")]

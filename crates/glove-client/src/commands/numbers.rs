@@ -25,6 +25,11 @@ pub fn count(text: &str) -> Result<usize, String> {
     }
 }
 
+/// A number of ticks.
+pub fn ticks(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "it must be a whole number, 0 or above".to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

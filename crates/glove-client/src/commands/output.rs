@@ -1,4 +1,4 @@
-//! Files a command writes: whole or not at all.
+//! Writes the files of a command: each is written completely, or an older one stays.
 
 use std::path::Path;
 

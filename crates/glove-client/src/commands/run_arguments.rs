@@ -11,7 +11,7 @@ use softgrasp_core::fem::{Element, Material as ElasticMaterial};
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
-use super::numbers::{count, poisson, positive};
+use super::numbers::{count, poisson, positive, ticks};
 use crate::connection::ServerChoice;
 use crate::contact_model::ContactModel;
 use crate::pace::Pace;
@@ -29,10 +29,10 @@ pub struct RunArguments {
     #[arg(long, value_name = "FILE|SHAPE")]
     pub(super) object: Option<ObjectChoice>,
     /// Nodes of a built-in object [default: 1000].
-    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub(super) nodes: Option<usize>,
     /// Longest extent of the object, m [default: 0.08 for a mesh file, its own for a built-in].
-    #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     pub(super) object_size: Option<f64>,
     /// The hand: scripted[:approach|attach|squeeze|release|regrasp].
     #[arg(long, value_name = "SOURCE")]
@@ -41,7 +41,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "ADDR|embedded")]
     pub(super) server: Option<ServerChoice>,
     /// Threads of the embedded server [default: one per processor].
-    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub(super) threads: Option<usize>,
     /// Method, or auto.
     #[arg(long, value_name = "NAME|auto")]
@@ -55,16 +55,16 @@ pub struct RunArguments {
     #[arg(long, value_name = "vertex|patch|mask")]
     pub(super) contact: Option<ContactModel>,
     /// Young's modulus, Pa [default: 20000, a soft fruit].
-    #[arg(long, value_name = "PA", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "PA", value_parser = positive, allow_hyphen_values = true)]
     pub(super) young: Option<f64>,
     /// Poisson's ratio [default: 0.4].
-    #[arg(long, value_name = "NU", value_parser = poisson, allow_negative_numbers = true)]
+    #[arg(long, value_name = "NU", value_parser = poisson, allow_hyphen_values = true)]
     pub(super) poisson: Option<f64>,
     /// Ticks per second, in real time; without it a scripted hand waits for each answer.
-    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_hyphen_values = true)]
     pub(super) rate: Option<f64>,
     /// Ticks to play [default: until the script ends].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = ticks, allow_hyphen_values = true)]
     pub(super) frames: Option<u64>,
     /// No window.
     #[arg(long)]

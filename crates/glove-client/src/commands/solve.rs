@@ -43,11 +43,11 @@ pub struct SolveCommand {
     #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
     server: ServerChoice,
     /// Threads of the embedded server [default: one per processor].
-    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     threads: Option<usize>,
     /// Memory for the embedded server: bytes, or 8GiB, 512MiB [default: 8GiB]. What needs more is
     /// refused before it is made; auto takes single precision where only that fits.
-    #[arg(long, value_name = "BYTES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
     memory_limit: Option<Bytes>,
     /// gauss-jordan-plain, gauss-jordan, dense-inverse, dense-cholesky, sparse-cholesky, front,
     /// front-mixed, pcg, condensed or auto.
@@ -58,16 +58,16 @@ pub struct SolveCommand {
     #[arg(long, default_value = "t4", value_name = "t4|t4-anp|t10|auto")]
     element: ElementChoice,
     /// Young's modulus, Pa (in the mesh's unit of length).
-    #[arg(long, default_value_t = 1.0e5, value_name = "PA", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1.0e5, value_name = "PA", value_parser = positive, allow_hyphen_values = true)]
     young: f64,
     /// Poisson's ratio.
-    #[arg(long, default_value_t = 0.3, value_name = "NU", value_parser = poisson, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.3, value_name = "NU", value_parser = poisson, allow_hyphen_values = true)]
     poisson: f64,
     /// Largest relative error of the solution wanted: auto takes the fastest method within it.
-    #[arg(long, value_name = "REL", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "REL", value_parser = positive, allow_hyphen_values = true)]
     max_error: Option<f64>,
     /// Time wanted, ms: auto takes the most exact method that is predicted to be in time.
-    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", value_parser = positive, allow_hyphen_values = true)]
     deadline: Option<f64>,
     /// Solve once more with the other element and report the difference: an estimate of the
     /// mesh's own error.

@@ -1,4 +1,4 @@
-//! Where on the arm the tracker's receiver sits.
+//! The place of the tracker's receiver on the arm, and the palm's pose that follows from it.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use softgrasp_core::hand::{Handedness, JointAngles, forearm_from_palm};

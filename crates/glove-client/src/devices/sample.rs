@@ -1,4 +1,4 @@
-//! What the devices said last, held together with the time it was said.
+//! Holds the newest record of each device with the time at which it arrived.
 
 use nalgebra::Isometry3;
 

@@ -1,4 +1,4 @@
-//! What comes out of the link: news about the server, and how each request ended.
+//! The messages of the link to the ticks: news about the server, and the end of each request.
 
 use std::time::Duration;
 

@@ -40,6 +40,7 @@ impl Link {
         state.drop_request(Unanswered::GraspEnded);
         state.outbox.model = Some(model);
         state.outbox.model_is_new = true;
+        state.model_refused = false;
         state.outbox.hint = Hint::default();
         drop(state);
         self.shared.notify();

@@ -1,4 +1,4 @@
-//! What waits to be sent, what is being done, and what has come: shared by the ticks and the link.
+//! The state that the ticks and the link's thread share: what is to be sent, and what has come.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -61,6 +61,8 @@ pub struct LinkState {
     pub busy: bool,
     /// Whether the server is there.
     pub connected: bool,
+    /// Whether the server has refused the newest model.
+    pub model_refused: bool,
     /// Whether the ticks know that the server is not there.
     pub lost: bool,
     /// How often the server was looked for and not found, or went away.
@@ -82,6 +84,7 @@ impl LinkState {
         let why = match self.activity {
             _ if !self.connected => Unanswered::ServerLost,
             Activity::Connecting => Unanswered::ServerLost,
+            _ if self.model_refused => Unanswered::Refused,
             Activity::Uploading => Unanswered::ModelNotReady,
             Activity::FirstAnswer => Unanswered::NewGrip,
             Activity::LaterAnswer | Activity::Waiting => Unanswered::AnswerLate,
@@ -184,6 +187,11 @@ mod tests {
             };
             assert_eq!((*ended_tick, *reason), (tick, why), "{activity:?}");
         }
+        state.model_refused = true;
+        state.activity = Activity::Waiting;
+        state.replace_request(request(6));
+        let (_, ended) = state.take();
+        assert!(matches!(ended[..], [RequestEnd { tick: 5, reached: Err(Unanswered::Refused) }]));
         state.drop_request(Unanswered::GraspEnded);
         state.drop_request(Unanswered::GraspEnded);
         assert_eq!(state.take().1.len(), 1, "it ends once");

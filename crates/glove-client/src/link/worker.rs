@@ -173,7 +173,7 @@ impl Session {
             format!("{} {} ({} threads)", welcome.server, welcome.version, welcome.threads);
         // Told at once: a model may take long to prepare.
         let mut state = shared.lock();
-        (state.connected, state.lost) = (true, false);
+        (state.connected, state.lost, state.model_refused) = (true, false, false);
         state.tell(LinkEvent::Connected { server });
         Ok(Self { connection, model: None, refusal: None, answered_grip: None })
     }
@@ -194,7 +194,11 @@ impl Session {
     fn refuse(&mut self, shared: &Shared, what: &str, rejected: &Rejected, refusal: Refusal) {
         tracing::info!(code = %rejected.code, text = rejected.text, "the server refused {what}");
         let text = format!("{what} ({}): {}", rejected.code, shortened(&rejected.text));
-        shared.lock().tell(LinkEvent::Refused { text });
+        let mut state = shared.lock();
+        state.tell(LinkEvent::Refused { text });
+        let newest = state.outbox.model.as_ref().is_some_and(|m| m.hash == refusal.model);
+        state.model_refused |= newest && refusal.grip.is_none();
+        drop(state);
         self.refusal = Some(refusal);
     }
 

@@ -1,4 +1,4 @@
-//! Where the palm is while the scripted hand reaches: always facing the object.
+//! The path of the palm while the scripted hand reaches; the palm always faces the object.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 

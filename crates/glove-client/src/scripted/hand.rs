@@ -1,4 +1,4 @@
-//! What the scripted hand does, step by step, and the device bytes it sends while doing it.
+//! Plays a script step by step, and sends what glove and tracker would send meanwhile.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Where the scripted hand's approaches are planned: beside the ticks, or while a tick waits.
+//! Plans the approaches of the scripted hand, beside the ticks or while a tick waits.
 
 use std::sync::Arc;
 

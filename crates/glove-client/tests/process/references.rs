@@ -10,12 +10,12 @@ fn all_sixteen_reference_cases_agree_to_1e_8_of_the_largest_displacement() {
     let mut cases = 0;
     for entry in std::fs::read_dir(references).unwrap() {
         let case = entry.unwrap().path();
-        if !case.is_dir() {
-            continue;
-        }
-        cases += 1;
         let name = case.file_name().unwrap().to_str().unwrap();
-        let (mesh, poisson) = name.rsplit_once('-').unwrap();
+        // Other folders hold other kinds of cases.
+        let Some((mesh, poisson)) = name.rsplit_once('-').filter(|_| case.is_dir()) else {
+            continue;
+        };
+        cases += 1;
         let text = |path: std::path::PathBuf| path.display().to_string();
         let (mesh, known) = (text(meshes.join(mesh)), text(case.join("known.csv")));
         succeed(&[

@@ -1,4 +1,4 @@
-//! From the glove's byte stream to records and faults, whatever the pieces it arrives in.
+//! Splits the glove's byte stream, which arrives in pieces of any size, into records and faults.
 
 use super::record::{GloveRecord, RecordError, RecordOptions, decode_frame};
 use super::sensor::SensorCount;

@@ -1,4 +1,4 @@
-//! Decides what the bytes at the head of the tracker's stream are.
+//! Recognises records and replies at the head of the tracker's byte stream.
 
 use super::encode::NUMBER_LIMIT;
 use super::fault::FastrakFaultKind;

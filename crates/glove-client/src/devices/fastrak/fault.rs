@@ -1,4 +1,4 @@
-//! What is wrong with bytes of the tracker's line.
+//! The faults that bytes of the tracker's line can have.
 
 /// Why bytes did not become a record; the first reason of a run of skipped bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,4 +1,4 @@
-//! From the tracker's byte stream to records, replies and faults, whatever pieces it arrives in.
+//! Splits the tracker's byte stream, which arrives in pieces of any size, into records and replies.
 
 use super::decode::{Head, head};
 use super::fault::{FastrakFault, FastrakFaultKind};
