@@ -1,8 +1,37 @@
-//! The least a round trip can cost: the same bytes to and fro, without any work.
+//! The least that a round trip can cost: the same bytes to and fro, without any work.
 
 use std::io::{Error, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::thread::JoinHandle;
+
+use glove_client::pace::be_urgent;
+
+/// How one end of a connection waits for bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Waiting {
+    /// The system wakes the thread when bytes have come.
+    Asleep,
+    /// The thread looks again and again, and lets others run between two looks.
+    Awake,
+}
+
+/// How both ends of a connection wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ends {
+    /// The end that asks.
+    pub client: Waiting,
+    /// The end that answers.
+    pub server: Waiting,
+}
+
+impl Ends {
+    /// Both ends sleep.
+    pub const ASLEEP: Self = Self { client: Waiting::Asleep, server: Waiting::Asleep };
+    /// As a client that stays awake and a `fea-server`, which always sleeps.
+    pub const CLIENT_AWAKE: Self = Self { client: Waiting::Awake, server: Waiting::Asleep };
+    /// Neither end sleeps: the shortest way there is, and it keeps two processors busy.
+    pub const AWAKE: Self = Self { client: Waiting::Awake, server: Waiting::Awake };
+}
 
 /// A thread that answers every request on a loopback socket with the same bytes, and the client's
 /// side of it.
@@ -16,19 +45,23 @@ pub struct Echo {
 
 impl Echo {
     /// Starts the thread and connects; both sides send at once (TCP_NODELAY), as the system does.
+    /// A thread that sleeps asks for real-time scheduling, as that of the server's sockets does.
     ///
     /// # Errors
     /// The system's.
-    pub fn start(request_bytes: usize, reply: &[u8]) -> std::io::Result<Self> {
+    pub fn start(request_bytes: usize, reply: &[u8], ends: Ends) -> std::io::Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", 0))?;
         let address = listener.local_addr()?;
         let answer = reply.to_vec();
         let thread = std::thread::Builder::new().name("echo".to_owned()).spawn(move || {
+            if ends.server == Waiting::Asleep {
+                be_urgent();
+            }
             // An error here is one on the other side too, where it is reported.
-            let _ = serve(&listener, request_bytes, &answer);
+            let _ = serve(&listener, request_bytes, &answer, ends.server);
         })?;
         let stream = TcpStream::connect(address)?;
-        stream.set_nodelay(true)?;
+        prepare(&stream, ends.client)?;
         Ok(Self {
             stream,
             request: vec![0x5a; request_bytes],
@@ -43,8 +76,8 @@ impl Echo {
     /// # Errors
     /// The system's, or `InvalidData` if other bytes came back.
     pub fn trip(&mut self) -> std::io::Result<()> {
-        self.stream.write_all(&self.request)?;
-        self.stream.read_exact(&mut self.received)?;
+        write_all(&mut self.stream, &self.request)?;
+        read_exact(&mut self.stream, &mut self.received)?;
         if self.received != self.reply {
             return Err(Error::new(ErrorKind::InvalidData, "other bytes came back"));
         }
@@ -52,13 +85,54 @@ impl Echo {
     }
 }
 
-fn serve(listener: &TcpListener, request_bytes: usize, reply: &[u8]) -> std::io::Result<()> {
-    let (mut stream, _) = listener.accept()?;
+/// A stream that does not block is looked at again and again: its end stays awake.
+fn prepare(stream: &TcpStream, waiting: Waiting) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
+    stream.set_nonblocking(waiting == Waiting::Awake)
+}
+
+fn serve(
+    listener: &TcpListener,
+    request_bytes: usize,
+    reply: &[u8],
+    waiting: Waiting,
+) -> std::io::Result<()> {
+    let (mut stream, _) = listener.accept()?;
+    prepare(&stream, waiting)?;
     let mut request = vec![0; request_bytes];
     loop {
-        stream.read_exact(&mut request)?;
-        stream.write_all(reply)?;
+        read_exact(&mut stream, &mut request)?;
+        write_all(&mut stream, reply)?;
+    }
+}
+
+fn read_exact(stream: &mut TcpStream, mut bytes: &mut [u8]) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        let count = awake(|| stream.read(bytes))?;
+        if count == 0 {
+            return Err(ErrorKind::UnexpectedEof.into());
+        }
+        bytes = &mut bytes[count..];
+    }
+    Ok(())
+}
+
+fn write_all(stream: &mut TcpStream, mut bytes: &[u8]) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        let count = awake(|| stream.write(bytes))?;
+        bytes = &bytes[count..];
+    }
+    Ok(())
+}
+
+/// Tries again while the system has nothing; a stream that blocks never says so.
+fn awake(mut attempt: impl FnMut() -> std::io::Result<usize>) -> std::io::Result<usize> {
+    loop {
+        match attempt() {
+            Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::yield_now(),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            done => return done,
+        }
     }
 }
 
@@ -77,14 +151,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn large_replies_come_back_whole_and_the_thread_ends() {
+    fn large_replies_come_back_whole_and_the_thread_ends_however_it_waits() {
         let reply: Vec<u8> = (0..1_000_000u32).map(|i| (i * 7 % 251) as u8).collect();
-        let mut echo = Echo::start(600, &reply).unwrap();
-        for _ in 0..5 {
-            echo.trip().unwrap();
+        for ends in [Ends::ASLEEP, Ends::CLIENT_AWAKE, Ends::AWAKE] {
+            let mut echo = Echo::start(600, &reply, ends).unwrap();
+            for _ in 0..5 {
+                echo.trip().unwrap();
+            }
+            echo.reply[999_999] ^= 1;
+            assert_eq!(echo.trip().unwrap_err().kind(), ErrorKind::InvalidData);
+            drop(echo);
         }
-        echo.reply[999_999] ^= 1;
-        assert_eq!(echo.trip().unwrap_err().kind(), ErrorKind::InvalidData);
-        drop(echo);
     }
 }

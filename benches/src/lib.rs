@@ -17,13 +17,17 @@ pub mod hard_cases;
 pub mod hold;
 pub mod machine;
 pub mod methods;
+
 pub mod onset;
 pub mod plot;
 pub mod reference;
 pub mod report;
+pub mod report_error;
+mod requests;
 pub mod sample;
 pub mod scaling;
 pub mod scene;
+pub mod session;
 pub mod stages;
 pub mod table;
 pub mod tail;
@@ -47,6 +51,8 @@ pub enum ReportName {
     Onset,
     /// A request every millisecond for a minute.
     Hold,
+    /// What a user of `run` gets in real time.
+    Session,
     /// Figures 5.1, 5.2 and 6.13 to 6.16 of the thesis, measured again.
     Scaling,
     /// Force of one press on finer meshes by each contact model, and its frame time.
@@ -68,6 +74,7 @@ impl ReportName {
             Self::Frontier => "frontier",
             Self::Onset => "onset",
             Self::Hold => "hold",
+            Self::Session => "session",
             Self::Scaling => "scaling",
             Self::Contact => "contact",
             Self::Accuracy => "accuracy",
@@ -89,6 +96,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Frontier => frontier::measure(options)?,
         ReportName::Onset => onset::measure(options)?,
         ReportName::Hold => hold::measure(options)?,
+        ReportName::Session => session::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,
         ReportName::Contact => contact::measure(options)?,
         ReportName::Accuracy => accuracy::measure(options)?,

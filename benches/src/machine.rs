@@ -10,6 +10,8 @@ use crate::threads::processors;
 pub struct Machine {
     /// Model name of the processor.
     pub cpu: String,
+    /// Who made it.
+    pub cpu_maker: String,
     /// Processors this process may use.
     pub processors: usize,
     /// Main memory, GiB; 0 where the system does not tell.
@@ -34,6 +36,7 @@ impl Machine {
             .and_then(|v| v.split(' ').next()?.parse().ok());
         Self {
             cpu: field(&cpu_info, "model name").unwrap_or_else(|| "unknown".to_owned()),
+            cpu_maker: maker(field(&cpu_info, "vendor_id").as_deref()),
             processors: processors(),
             memory_gib: memory_kib.map_or(0.0, |kib: f64| kib / f64::from(1 << 20)),
             system: system(),
@@ -53,6 +56,7 @@ impl Machine {
             ("date", self.date.clone()),
             ("commit", self.commit.clone()),
             ("processor", self.cpu.clone()),
+            ("processor maker", self.cpu_maker.clone()),
             ("processors", self.processors.to_string()),
             ("memory", if self.memory_gib > 0.0 { memory } else { "unknown".to_owned() }),
             ("system", self.system.clone()),
@@ -81,6 +85,16 @@ fn read(path: &str) -> String {
 fn field(text: &str, name: &str) -> Option<String> {
     let line = text.lines().find(|line| line.starts_with(name))?;
     Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+/// Plain name of a maker that the processor names in its own way.
+fn maker(vendor: Option<&str>) -> String {
+    match vendor {
+        Some("AuthenticAMD") => "AMD".to_owned(),
+        Some("GenuineIntel") => "Intel".to_owned(),
+        Some(other) => other.to_owned(),
+        None => "unknown".to_owned(),
+    }
 }
 
 fn system() -> String {

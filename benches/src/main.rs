@@ -21,7 +21,7 @@ struct Arguments {
     /// A remark for the head of the report, for example what else the machine was doing.
     #[arg(long, default_value = "", value_name = "TEXT", hide_default_value = true)]
     note: String,
-    /// Folder with mesh files of others, for `frontier`; what is not there is left out.
+    /// Folder with mesh files of others, for `frontier` and `session`; what is not there is left out.
     #[arg(long, default_value = MESHES, value_name = "DIR")]
     meshes: PathBuf,
 }

@@ -1,17 +1,12 @@
 //! A report: its head, its text, tables and figures, and how it is written.
 
 use std::path::{Path, PathBuf};
-
-use glove_client::connection::LinkError;
-use softgrasp_core::fem::MaterialError;
-use softgrasp_core::mesh::{GenerateError, MeshError};
-use softgrasp_core::model::ModelError;
-use softgrasp_core::solve::SolveError;
-use softgrasp_core::sphere_tree::TreeError;
+use std::time::Instant;
 
 use crate::machine::{Machine, load_text};
-use crate::plot::PlotError;
 use crate::table::Table;
+
+pub use crate::report_error::ReportError;
 
 /// What is asked of a report.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,83 +21,6 @@ pub struct Options {
     pub note: String,
     /// Folder with mesh files of others; what is not there is left out, and the report says so.
     pub meshes: PathBuf,
-}
-
-/// Why there is no report.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// An object could not be made.
-    #[error(transparent)]
-    Generate(#[from] GenerateError),
-    /// Elements that make no mesh.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// A material that is none.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
-    /// A model could not be made or held.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// A method failed.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-    /// A sphere tree could not be built or refitted.
-    #[error(transparent)]
-    Tree(#[from] TreeError),
-    /// Client and server did not come together.
-    #[error(transparent)]
-    Link(#[from] LinkError),
-    /// The echo that frames are compared with failed.
-    #[error("the echo over loopback failed: {0}")]
-    Echo(std::io::Error),
-    /// The factor that times are set beside could not be made.
-    #[error(
-        "the stiffness of the held object could not be factored, so there is no sparse solve to compare with"
-    )]
-    NoFactor,
-    /// No threads.
-    #[error("no pool of {threads} threads: {source}")]
-    Threads {
-        /// Threads asked for.
-        threads: usize,
-        /// The system's reason.
-        source: rayon::ThreadPoolBuildError,
-    },
-    /// An answer failed its check, so its time means nothing.
-    #[error("{what}: error {error:e}, allowed is {allowed:e}; its time is not reported")]
-    Wrong {
-        /// What was checked.
-        what: String,
-        /// Its error.
-        error: f64,
-        /// What is allowed.
-        allowed: f64,
-    },
-    /// Nothing to fit a law to.
-    #[error("{what}: {count} measurements are too few for a fit")]
-    TooFew {
-        /// What was to be fitted.
-        what: String,
-        /// Measurements there are.
-        count: usize,
-    },
-    /// Rows that did not keep what was promised; the files are written.
-    #[error("{} of the report's rows failed:\n  {}", rows.len(), rows.join("\n  "))]
-    Failed {
-        /// What failed, and how.
-        rows: Vec<String>,
-    },
-    /// A figure could not be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
-    /// A file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
 }
 
 /// Part of a report, in the order of the page.
@@ -133,6 +51,7 @@ pub struct Report {
     head: Vec<(&'static str, String)>,
     sections: Vec<Section>,
     faults: Vec<String>,
+    begun: Instant,
 }
 
 impl Report {
@@ -153,11 +72,14 @@ impl Report {
             head,
             sections: Vec::new(),
             faults: Vec::new(),
+            begun: Instant::now(),
         }
     }
 
-    /// Notes the load at the end of the measurement.
+    /// Notes the load at the end of the measurement, and how long it took.
     pub fn end(&mut self) {
+        let minutes = self.begun.elapsed().as_secs_f64() / 60.0;
+        self.head.push(("took", format!("{minutes:.1} min")));
         self.head.push(("load after", load_text()));
     }
 

@@ -1,6 +1,6 @@
 //! Pools of exact size, and which sizes are measured.
 
-use crate::report::ReportError;
+use crate::report_error::ReportError;
 
 /// Processors this process may use.
 pub fn processors() -> usize {

@@ -31,7 +31,14 @@ fn run_quick(name: ReportName, folder: &Path) {
     let (_, files) = run(name, &options).unwrap();
     assert!(files.iter().all(|file| file.is_file()), "{files:?}");
     let page = std::fs::read_to_string(folder.join(format!("{}.md", name.name()))).unwrap();
-    for part in ["- command: ", "- commit: ", "- date: ", "- processor: ", "- threads: "] {
+    for part in [
+        "- command: ",
+        "- commit: ",
+        "- date: ",
+        "- processor: ",
+        "- processor maker: ",
+        "- threads: ",
+    ] {
         assert!(page.contains(part), "{part} is not in the head of {}", name.name());
     }
 }
@@ -60,8 +67,14 @@ fn collision_is_timed_and_nothing_is_missed() {
     // The check is worth something only if something was there to be missed.
     let inside = column(folder.path(), "collision.csv", "inside_per_hand");
     assert!(inside.iter().filter(|v| !v.is_empty()).all(|v| v.parse::<f64>().unwrap() > 5.0));
-    let contacts = numbers(folder.path(), "collision-ratios.csv", "contacts_checked");
-    assert!(contacts.iter().all(|&c| c > 0.0), "{contacts:?}");
+    for file in ["collision-like.csv", "collision-triangles.csv"] {
+        let contacts = numbers(folder.path(), file, "contacts_checked");
+        assert!(contacts.iter().all(|&c| c > 0.0), "{file}: {contacts:?}");
+        // The peer answers the same questions, and as well.
+        let wrong = numbers(folder.path(), file, "missed_by_peer");
+        assert!(wrong.iter().all(|&m| m == 0.0), "{file}: {wrong:?}");
+        assert!(numbers(folder.path(), file, "ratio").iter().all(|&r| r > 0.0));
+    }
 }
 
 #[test]
@@ -108,15 +121,20 @@ fn contacts_are_pressed_and_timed_with_small_errors() {
 fn frames_are_timed_beside_their_echo_with_small_errors() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Frame, folder.path());
-    for name in ["error_rel", "residual_rel"] {
-        let errors = numbers(folder.path(), "frame.csv", name);
-        assert!(errors.iter().all(|&e| e < 1e-11) && errors.len() >= 8, "{name}: {errors:?}");
+    for (file, rows) in [("frame.csv", 6), ("frame-methods.csv", 18)] {
+        for name in ["error_rel", "residual_rel"] {
+            let errors = numbers(folder.path(), file, name);
+            assert!(errors.iter().all(|&e| e < 1e-11), "{file} {name}: {errors:?}");
+            assert!(errors.len() >= rows, "{file}: {errors:?}");
+        }
     }
-    let (frames, echoes) = (
-        numbers(folder.path(), "frame.csv", "p50_ms"),
-        numbers(folder.path(), "frame.csv", "echo_p50_ms"),
-    );
-    assert!(frames.iter().chain(&echoes).all(|&ms| ms > 0.0));
+    assert_eq!(column(folder.path(), "frame.csv", "contact")[0], "mask");
+    for name in ["alone_p50_ms", "echo_alone_p50_ms", "alone_over_echo_alone"] {
+        assert!(numbers(folder.path(), "frame.csv", name).iter().all(|&x| x > 0.0), "{name}");
+    }
+    // Where an echo keeps a processor for itself, nothing takes turns with it.
+    let in_turn = column(folder.path(), "frame.csv", "frame_over_echo");
+    assert_eq!(in_turn.iter().filter(|ratio| ratio.is_empty()).count(), 2);
     // Warm frames reuse the factor of the first.
     assert!(numbers(folder.path(), "frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
 }
@@ -177,11 +195,53 @@ fn first_frames_of_grips_are_right_with_and_without_prefetch() {
 fn a_held_pace_is_counted_and_every_answer_compared() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Hold, folder.path());
-    let of = |name| numbers(folder.path(), "hold.csv", name)[0];
-    assert_eq!(of("ticks"), 500.0);
-    assert!((0.0..=100.0).contains(&of("late_percent")) && of("missed") <= 500.0);
-    assert!(of("error_rel") < 1e-10 && of("residual_rel") < 1e-10);
+    let (rights, asked) = ("real_time", "asked");
+    let of = |name| column(folder.path(), "hold.csv", name);
+    // The server and nobody, with real-time rights where the system grants them, and without.
+    assert_eq!(of(asked)[..2], ["the server", "nobody"]);
+    assert_eq!(of(rights).last().map(String::as_str), Some("no"));
+    assert!(numbers(folder.path(), "hold.csv", "ticks").iter().all(|&ticks| ticks == 500.0));
+    let late = numbers(folder.path(), "hold.csv", "late_percent");
+    assert!(late.iter().all(|late| (0.0..=100.0).contains(late)), "{late:?}");
+    let of_answers = |name| {
+        let all: Vec<String> = of(name).into_iter().step_by(2).collect();
+        all.iter().map(|v| v.parse::<f64>().unwrap()).collect::<Vec<_>>()
+    };
+    for name in ["error_rel", "residual_rel"] {
+        assert!(of_answers(name).iter().all(|&e| e < 1e-10), "{name}: {:?}", of(name));
+    }
+    for (place, difference) in of_answers("late_above_control_percent").iter().enumerate() {
+        assert!((late[2 * place] - late[2 * place + 1] - difference).abs() < 1e-3);
+    }
     // Without a bound the pace would be held without the certificate.
-    assert_eq!(of("with_bound_percent"), 100.0);
-    assert!(of("error_bound_rel") > 0.0 && of("error_bound_rel") < 1e-4);
+    assert!(of_answers("with_bound_percent").iter().all(|&share| share == 100.0));
+    assert!(of_answers("error_bound_rel").iter().all(|&bound| bound > 0.0 && bound < 1e-4));
+}
+
+#[test]
+fn a_session_of_the_real_programs_is_read_from_its_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Session, folder.path());
+    let of = |name| numbers(folder.path(), "session.csv", name);
+    assert_eq!(of("runs"), [1.0, 1.0, 2.0]);
+    assert!(of("ticks").iter().all(|&ticks| ticks > 0.0), "{:?}", of("ticks"));
+    // Every deforming tick is answered or has a reason, however slow the machine is.
+    let why = |name| column(folder.path(), "session-unanswered.csv", name);
+    for (server, (deforming, answered)) in column(folder.path(), "session.csv", "server")
+        .iter()
+        .zip(of("deforming").into_iter().zip(of("answered")))
+    {
+        let rows = why("server").into_iter().zip(why("ticks"));
+        let of_server = rows.filter(|(of, _)| of == server).map(|(_, n)| n.parse::<f64>().unwrap());
+        assert_eq!(deforming, answered + of_server.sum::<f64>(), "{server}");
+    }
+    assert!(of("residual_rel").iter().all(|&e| e < 1e-9));
+    // What was answered is shown for a while, and nothing is shown that is not old.
+    let ages = column(folder.path(), "session.csv", "age_max_ms");
+    for (age, answered) in ages.iter().zip(of("answered")) {
+        assert!(answered == 0.0 || age.parse::<f64>().unwrap() > 0.0, "{age}");
+    }
+    let outcomes = column(folder.path(), "session-large.csv", "outcome");
+    assert_eq!(outcomes[0], "answered");
+    assert!(numbers(folder.path(), "session-large.csv", "nodes").iter().all(|&n| n > 900.0));
 }

@@ -6,6 +6,7 @@ pub mod faulty_proxy;
 pub mod heard;
 pub mod imports;
 pub mod questions;
+pub mod quoting;
 pub mod random;
 pub mod raw_session;
 pub mod watchdog;

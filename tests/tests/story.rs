@@ -119,7 +119,10 @@ fn thread_count_changes_no_event_and_no_residual() {
         let report = play(&["--object", "cube", "--nodes", "216", "--threads", threads]);
         let frames = report["frames"].as_array().unwrap().iter();
         let residuals: Vec<Value> = frames.map(|f| f["solve"]["residual_rel"].clone()).collect();
-        (report["events"].as_array().unwrap()[1..].to_vec(), residuals)
+        // When the server had prepared a model, and what the clock said, differ from run to run.
+        let events = report["events"].as_array().unwrap().iter().filter(|e| e["kind"] != "server");
+        let events = events.map(|e| [e["tick"].clone(), e["what"].clone()]);
+        (events.collect::<Vec<_>>(), residuals)
     };
     assert!(run("1") == run("3"));
 }

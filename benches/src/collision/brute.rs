@@ -33,6 +33,12 @@ impl Inside {
         Self { by_collider, contacts }
     }
 
+    /// Whether each segment of a finger has a vertex inside; the last is its cylinder and its tip.
+    pub fn collide(&self, finger: usize) -> [bool; 3] {
+        let has = |collider: usize| !self.by_collider[collider].is_empty();
+        [has(3 * finger), has(3 * finger + 1), has(3 * finger + 2) || has(15 + finger)]
+    }
+
     /// Pairs of collider and vertex inside it.
     pub fn count(&self) -> usize {
         self.by_collider.iter().map(Vec::len).sum()

@@ -74,6 +74,20 @@ impl Peer {
         out.extend(self.bvh.intersect_aabb(collider));
     }
 
+    /// What the leaves are boxes of.
+    pub fn leaf(&self) -> Leaf {
+        self.leaf
+    }
+
+    /// Shows the leaves whose boxes meet a box until one says that it is enough.
+    pub fn visit(&self, aabb: &Aabb, mut is_enough: impl FnMut(&u32) -> bool) {
+        for leaf in self.bvh.intersect_aabb(aabb) {
+            if is_enough(&leaf) {
+                return;
+            }
+        }
+    }
+
     /// Vertices of a list of leaves, ascending, each once.
     pub fn vertices_of(&self, leaves: &[u32], triangles: &[[u32; 3]]) -> Vec<u32> {
         let mut vertices: Vec<u32> = match self.leaf {
@@ -94,25 +108,28 @@ pub(super) fn peer_points(points: &[Point3<f64>]) -> PeerPoints {
 /// Boxes of the fifteen cylinders and then the five tips of a hand.
 pub(super) fn collider_boxes(hand: &HandColliders) -> [Aabb; 20] {
     let mut boxes = [Aabb { mins: Vector::ZERO, maxs: Vector::ZERO }; 20];
-    let all = hand.fingers.iter().flat_map(|f| f.cylinders).map(|c| cylinder_box(&c));
-    let all = all.chain(hand.fingers.iter().map(|f| sphere_box(&f.tip)));
+    let all = hand.fingers.iter().flat_map(|f| f.cylinders).map(|c| cylinder_box(&c, 0.0));
+    let all = all.chain(hand.fingers.iter().map(|f| sphere_box(&f.tip, 0.0)));
     for (slot, aabb) in boxes.iter_mut().zip(all) {
         *slot = aabb;
     }
     boxes
 }
 
-fn cylinder_box(cylinder: &Cylinder) -> Aabb {
+/// Box of a cylinder and all that is nearer to it than `margin`, m.
+pub(super) fn cylinder_box(cylinder: &Cylinder, margin: f64) -> Aabb {
     let axis = cylinder.axis.into_inner();
     let centre = cylinder.base + axis * (0.5 * cylinder.length);
     // Half the length along each axis, plus the disc of the end seen from that axis.
-    let half = axis
-        .map(|a| 0.5 * cylinder.length * a.abs() + cylinder.radius * (1.0 - a * a).max(0.0).sqrt());
+    let half = axis.map(|a| {
+        0.5 * cylinder.length * a.abs() + cylinder.radius * (1.0 - a * a).max(0.0).sqrt() + margin
+    });
     aabb(&centre, half.into())
 }
 
-fn sphere_box(sphere: &Sphere) -> Aabb {
-    aabb(&sphere.centre, [sphere.radius; 3])
+/// The same of a sphere.
+pub(super) fn sphere_box(sphere: &Sphere, margin: f64) -> Aabb {
+    aabb(&sphere.centre, [sphere.radius + margin; 3])
 }
 
 fn aabb(centre: &Point3<f64>, half: [f64; 3]) -> Aabb {
@@ -141,7 +158,7 @@ mod tests {
             prop_assume!(axis.is_some());
             let axis = axis.unwrap();
             let cylinder = Cylinder { base: Point3::new(0.3, -0.2, 0.1), axis, length, radius };
-            let aabb = cylinder_box(&cylinder);
+            let aabb = cylinder_box(&cylinder, 0.0);
             // The rim, at many angles: inside the box, and reaching its sides.
             let u = axis.cross(&Vector3::new(0.31, 0.77, -0.56)).normalize();
             let v = axis.cross(&u);

@@ -3,5 +3,8 @@
 mod half_space;
 mod report;
 mod tips;
+mod verify;
 
 pub use report::measure;
+pub(crate) use tips::{Tips, WANT_ALL};
+pub(crate) use verify::verify;

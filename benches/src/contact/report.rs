@@ -2,20 +2,19 @@
 
 use std::time::Duration;
 
-use glove_client::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
+use glove_client::connection::{Host, ServerChoice, ServerConnection};
 use glove_client::contact_model::ContactModel;
-use softgrasp_core::solve::{Loads, Method};
-use softgrasp_protocol::{
-    Answer, FrameRequest, Limits, ModelHash, Question, Reply, Request, SolveReport,
-};
+use softgrasp_protocol::{Answer, FrameRequest, ModelHash, Question, Request, SolveReport};
 
 use super::half_space;
 use super::tips::{DEPTH, RADIUS, Tips, WANT_ALL};
+use super::verify::verify;
 use crate::axis::Scale;
-use crate::echo::Echo;
+use crate::echo::{Echo, Ends};
 use crate::plot::{Mark, Plot, PlotPoint, Series};
 use crate::reference::error_rel;
 use crate::report::{Options, Report, ReportError, check, progress};
+use crate::requests::{answer, encode_reply, encode_request, held_nodes, upload};
 use crate::sample::{Competitor, Effort, Spread, quantile, take_turns, timed_ms};
 use crate::table::{Cell, Table};
 use crate::threads::processors;
@@ -85,26 +84,21 @@ struct Asker<'a> {
 impl<'a> Asker<'a> {
     fn new(host: &Host, tips: &'a Tips) -> Result<Self, ReportError> {
         let mut connection = host.connect(None)?;
-        match connection.ask(&Request::UploadModel(tips.upload()))? {
-            Reply::ModelReady(ready) => Ok(Self { tips, model: ready.model, connection }),
-            other => Err(unexpected("UploadModel", &other).into()),
-        }
+        let model = upload(&mut connection, tips.upload())?;
+        Ok(Self { tips, model, connection })
     }
 
     fn ask(&mut self, question: Question) -> Result<(f64, Answer), ReportError> {
         let request = Request::Frame(FrameRequest { model: self.model, question });
         let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
-        match reply? {
-            Reply::Answer(answer) => Ok((ms, *answer)),
-            other => Err(unexpected("Frame", &other).into()),
-        }
+        Ok((ms, answer(reply)?))
     }
 
     /// The press by one contact model: its force, once the answer is seen to be right.
     fn press(&mut self, contact: ContactModel) -> Result<Pressing, ReportError> {
         let question = self.tips.question(contact, 1.0, WANT_ALL);
         let (_, answer) = self.ask(question.clone())?;
-        let error_rel = verify(self.tips, &question, &answer)?;
+        let error_rel = verify(self.tips, &question, &answer, ERROR_ALLOWED)?;
         let down = answer.reactions.iter().filter(|r| r.dof % 3 == 1);
         let of_touched = down.filter(|r| self.tips.fixed.binary_search(&r.dof).is_err());
         let of_masks = answer.mask_forces.iter().map(|f| f[1]);
@@ -125,14 +119,12 @@ impl<'a> Asker<'a> {
         let whole = self.tips.question(contact, 1.0, WANT_ALL);
         let (first_ms, first) = self.ask(question.clone())?;
         let (_, answer) = self.ask(whole.clone())?;
-        let mut error = verify(self.tips, &whole, &answer)?;
+        let mut error = verify(self.tips, &whole, &answer, ERROR_ALLOWED)?;
         let right = first.displacements.clone().into_f64();
-        let request_bytes = encoded_len(self.model, question.clone())?;
-        let mut reply = Vec::new();
-        let limits = Limits::default();
-        let encoded = Reply::Answer(Box::new(first)).encode_into(1, &limits, &mut reply);
-        encoded.map_err(LinkError::from)?;
-        let mut echo = Echo::start(request_bytes, &reply).map_err(ReportError::Echo)?;
+        let request_bytes = encode_request(self.model, question.clone())?.len();
+        let reply = encode_reply(first)?;
+        let mut echo =
+            Echo::start(request_bytes, &reply, Ends::CLIENT_AWAKE).map_err(ReportError::Echo)?;
         let mut asked = 0u32;
         let (tips, nodes) = (self.tips, self.tips.mesh.node_count());
         let mut method = String::new();
@@ -177,63 +169,6 @@ impl<'a> Asker<'a> {
             error.into(),
         ])
     }
-}
-
-/// Error of an answer. All displacements are compared with a direct solve in which the held nodes
-/// have the displacements of the answer; for masks, the forces that those nodes then need must be
-/// the masks' own, shared out by weight, and their means must be as asked.
-fn verify(tips: &Tips, question: &Question, answer: &Answer) -> Result<f64, ReportError> {
-    let model = tips.model()?;
-    let u = answer.displacements.clone().into_f64();
-    let mut pairs: Vec<(u32, f64)> = question.known.iter().map(|k| (k.dof, k.value)).collect();
-    for (nodes, _) in question.masks.iter() {
-        let of_node = |&n: &u32| (0..3).map(move |axis| (3 * n + axis as u32, axis));
-        pairs.extend(
-            nodes.iter().flat_map(|n| of_node(n).map(|(dof, axis)| (dof, u[*n as usize][axis]))),
-        );
-    }
-    let known = model.known(pairs)?;
-    let factored = model.factor(&known.dofs, Method::SparseCholesky, &mut |_| {})?;
-    let loads = Loads { q_known: &known.q_known, ..Loads::default() };
-    let solution = factored.solve(model.stiffness(), loads, &mut |_| {})?;
-    let right = solution.displacement.iter().copied();
-    let mut error = error_rel(u.iter().flatten().copied().zip(right));
-    let mut expected = vec![0.0; 3 * model.mesh().node_count()];
-    for ((nodes, weights), force) in question.masks.iter().zip(&answer.mask_forces) {
-        for (node, weight) in nodes.iter().zip(weights) {
-            for (axis, force) in force.iter().enumerate() {
-                expected[3 * *node as usize + axis] += weight * force;
-            }
-        }
-    }
-    if !question.masks.is_empty() {
-        let needed = known.dofs.iter().zip(&solution.reaction);
-        let free = needed.filter(|(dof, _)| tips.fixed.binary_search(dof).is_err());
-        error = error.max(error_rel(free.map(|(dof, f)| (*f, expected[*dof as usize]))));
-    }
-    for ((nodes, weights), q) in question.masks.iter().zip(&question.mask_displacements) {
-        for axis in 0..3 {
-            let entries = nodes.iter().zip(weights);
-            let mean: f64 = entries.map(|(n, w)| w * u[*n as usize][axis]).sum();
-            let largest = q.iter().fold(0.0f64, |m, q| m.max(q.abs()));
-            error = error.max((mean - q[axis]).abs() / largest);
-        }
-    }
-    check(|| format!("press on {} nodes", u.len()), error, ERROR_ALLOWED)?;
-    Ok(error)
-}
-
-fn held_nodes(question: &Question) -> usize {
-    let of_masks: usize = question.masks.iter().map(|(nodes, _)| nodes.len()).sum();
-    question.known.len() / 3 + of_masks
-}
-
-fn encoded_len(model: ModelHash, question: Question) -> Result<usize, ReportError> {
-    let mut bytes = Vec::new();
-    Request::Frame(FrameRequest { model, question })
-        .encode_into(1, &Limits::default(), &mut bytes)
-        .map_err(LinkError::from)?;
-    Ok(bytes.len())
 }
 
 fn effort(is_quick: bool) -> Effort {
@@ -350,7 +285,7 @@ force times the weights, and the means as asked; `error_rel` is the worst of the
 the report ends.\n\n\
 The frames are those of the frame report: a free cube held by five tips, another load each frame, \
 displacements of all surface nodes back, `auto` as method, frames and echoes of the same bytes in \
-turn. `first_frame_ms` is the first of a grip, without prefetch.",
+turn, both with a client that stays awake and a server that sleeps. `first_frame_ms` is the first of a grip, without prefetch.",
         1e3 * RADIUS,
         1e3 * DEPTH,
         exact()

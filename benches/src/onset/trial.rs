@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use glove_client::connection::{Host, ServerConnection, unexpected};
+use glove_client::connection::{Host, ServerConnection};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{FrontAnalysis, FrontFactor, Loads, Method};
 use softgrasp_protocol::{
@@ -15,6 +15,7 @@ use softgrasp_protocol::{
 use super::grips::Grip;
 use crate::reference::error_rel;
 use crate::report::{ReportError, check};
+use crate::requests::{answer, upload};
 use crate::sample::timed_ms;
 use crate::scene::Pressed;
 
@@ -49,15 +50,12 @@ impl<'a> Toucher<'a> {
     /// Uploads the object anew, so that no column is kept, and waits until nothing is worked on.
     pub fn try_new(host: &Host, scene: &'a Pressed) -> Result<Self, ReportError> {
         let mut connection = host.connect(None)?;
-        let upload = scene.upload();
-        let known = ModelHash::of(&upload);
+        let object = scene.upload();
+        let known = ModelHash::of(&object);
         if let Reply::ModelState { known: true } = connection.ask(&Request::HaveModel(known))? {
             connection.send(&Request::Drop(known))?;
         }
-        let model = match connection.ask(&Request::UploadModel(upload))? {
-            Reply::ModelReady(ready) => ready.model,
-            other => return Err(unexpected("UploadModel", &other).into()),
-        };
+        let model = upload(&mut connection, object)?;
         Ok(Self { scene, connection, model, recent_ms: VecDeque::new() })
     }
 
@@ -110,10 +108,7 @@ impl<'a> Toucher<'a> {
         let request =
             Request::Frame(FrameRequest { model: self.model, question: self.question(grip) });
         let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
-        match reply? {
-            Reply::Answer(answer) => Ok((ms, *answer)),
-            other => Err(unexpected("Frame", &other).into()),
-        }
+        Ok((ms, answer(reply)?))
     }
 
     fn question(&self, grip: &Grip) -> Question {

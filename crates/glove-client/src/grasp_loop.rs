@@ -35,6 +35,8 @@ pub struct GraspLoop {
     pace: Pace,
     /// Tick in which the grip began, to tell answers of an earlier grip from those of this one.
     deforming_since: Option<u64>,
+    /// Tick whose answer the object shows.
+    shown_tick: Option<u64>,
     held: HeldNodes,
     keep: Keep,
     work: ObjectWork,
@@ -62,6 +64,8 @@ impl Keep {
     }
 }
 
+/// What a report says when the server has prepared the model of a rest shape.
+pub const MODEL_READY: &str = "model ready";
 /// Longest wait of a lockstep tick; a server that takes longer is overtaken.
 const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
 
@@ -89,6 +93,7 @@ impl GraspLoop {
             settings,
             pace,
             deforming_since: None,
+            shown_tick: None,
             held: HeldNodes::default(),
             keep: Keep::NotWanted,
             work: ObjectWork::start(pace)?,
@@ -162,6 +167,7 @@ impl GraspLoop {
         // In lockstep a shape is kept in the next tick, and the hand goes on.
         outcome.seen.keeping = self.pace == Pace::Free && !matches!(self.keep, Keep::NotWanted);
         outcome.recalled = step.recalled;
+        outcome.shown_tick = self.shown_tick;
         Ok(outcome)
     }
 
@@ -253,6 +259,7 @@ impl GraspLoop {
             && let Keep::Made(kept) = std::mem::replace(&mut self.keep, Keep::NotWanted)
         {
             self.object = kept.object;
+            self.shown_tick = None;
             self.held.clear();
             self.prefetched.clear();
             self.link.set_model(kept.model);
@@ -284,6 +291,7 @@ impl GraspLoop {
     /// The fingers do not deform the object (any more).
     fn let_go(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
         self.deforming_since = None;
+        self.shown_tick = None;
         if !matches!(self.keep, Keep::NotWanted) {
             self.keep = Keep::NotWanted;
             let text = "the hand let go before the shape could be kept";
@@ -324,7 +332,7 @@ impl GraspLoop {
                 LinkEvent::Lost { text } => format!("lost: {text}"),
                 LinkEvent::ModelReady(ready) => {
                     tracing::info!(model = %ready.model, "model ready");
-                    continue;
+                    MODEL_READY.to_owned()
                 }
             };
             outcome.events.push(LoopEvent::Server(text));
@@ -351,6 +359,9 @@ impl GraspLoop {
         let current = rest_shape == self.object.rest_shapes()
             && self.deforming_since.is_some_and(|since| tick >= since)
             && !self.keep.freezes();
+        if current {
+            self.shown_tick = Some(tick);
+        }
         match nodes {
             _ if !current => Ok(()),
             NodeChoice::All => self.object.apply(displacement),

@@ -63,6 +63,8 @@ pub struct ObjectSummary {
 pub struct EventRecord {
     /// When.
     pub tick: u64,
+    /// When, ms since the first tick was due.
+    pub at_ms: f64,
     /// `grasp`, `shape` or `server`.
     pub kind: &'static str,
     /// What, in words.
@@ -74,6 +76,8 @@ pub struct EventRecord {
 pub struct TickRecord {
     /// Number, from 0.
     pub tick: u64,
+    /// When it began, ms since the first tick was due.
+    pub at_ms: f64,
     /// Grasp state after it.
     pub state: String,
     /// Which tips touch: thumb, index, middle, ring, little.
@@ -84,6 +88,8 @@ pub struct TickRecord {
     pub solve: Option<SolveSummary>,
     /// Why a deforming tick has no answer; null for all others.
     pub unanswered: Option<&'static str>,
+    /// Tick whose answer the object shows after this one; null while it shows none of this grip.
+    pub shown_tick: Option<u64>,
     /// Time for which the tick computed, ms.
     pub compute_ms: f64,
 }
@@ -154,32 +160,38 @@ impl RunReport {
     }
 
     /// Adds a tick, and those that were skipped before it.
-    pub fn add(&mut self, due: Due, outcome: &TickOutcome) {
+    ///
+    /// Units: `now_s` s since the first tick was due.
+    pub fn add(&mut self, due: Due, now_s: f64, outcome: &TickOutcome) {
         self.add_skipped(due.skipped);
         self.ticks = due.tick + 1;
         let state = outcome.state.map_or("no hand yet".to_owned(), |s| s.to_string());
         if outcome.state.is_some() && !self.states_reached.contains(&state) {
             self.states_reached.push(state.clone());
         }
+        let at_ms = 1e3 * now_s;
         self.played.push(TickRecord {
             tick: due.tick,
+            at_ms,
             state,
             tips: outcome.tips,
             recalled: outcome.recalled,
             solve: None,
             unanswered: None,
+            shown_tick: outcome.shown_tick,
             compute_ms: 0.0,
         });
-        self.add_outcome(due.tick, outcome);
+        self.add_outcome(due.tick, at_ms, outcome);
     }
 
     /// Adds what came after the last tick.
     pub fn add_last(&mut self, outcome: &TickOutcome) {
-        self.add_outcome(self.ticks.saturating_sub(1), outcome);
+        let at_ms = self.played.last().map_or(0.0, |record| record.at_ms);
+        self.add_outcome(self.ticks.saturating_sub(1), at_ms, outcome);
     }
 
-    fn add_outcome(&mut self, tick: u64, outcome: &TickOutcome) {
-        self.add_events(tick, &outcome.events);
+    fn add_outcome(&mut self, tick: u64, at_ms: f64, outcome: &TickOutcome) {
+        self.add_events(tick, at_ms, &outcome.events);
         for (tick, solve) in &outcome.answers {
             if let Some(record) = self.record(*tick) {
                 record.solve = Some(solve.clone());
@@ -222,7 +234,7 @@ impl RunReport {
         self.played.get_mut(at)
     }
 
-    fn add_events(&mut self, tick: u64, events: &[LoopEvent]) {
+    fn add_events(&mut self, tick: u64, at_ms: f64, events: &[LoopEvent]) {
         self.events.extend(events.iter().map(|event| {
             let (kind, what) = match event {
                 LoopEvent::Grasp(GraspEvent::TipTouched(finger, node)) => {
@@ -232,7 +244,7 @@ impl RunReport {
                 LoopEvent::KeepRefused(text) => ("shape", format!("keep shape refused: {text}")),
                 LoopEvent::Server(text) => ("server", text.clone()),
             };
-            EventRecord { tick, kind, what }
+            EventRecord { tick, at_ms, kind, what }
         }));
     }
 
@@ -388,7 +400,7 @@ mod tests {
     }
 
     fn tick(report: &mut RunReport, tick: u64, skipped: u64, outcome: TickOutcome) {
-        report.add(Due { tick, skipped }, &outcome);
+        report.add(Due { tick, skipped }, 0.01 * tick as f64, &outcome);
     }
 
     fn deforming() -> TickOutcome {

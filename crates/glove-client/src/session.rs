@@ -52,7 +52,7 @@ impl Session {
         }
         let outcome = self.grasp_loop.tick(due.tick, now_s, &sent)?;
         self.seen = outcome.seen;
-        self.report.add(due, &outcome);
+        self.report.add(due, now_s, &outcome);
         let computed = self.budget.end();
         self.report.add_computed(computed);
         Ok(Some(outcome))

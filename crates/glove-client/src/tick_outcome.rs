@@ -32,6 +32,8 @@ pub struct TickOutcome {
     pub answers: Vec<(u64, SolveSummary)>,
     /// Deforming ticks of which it is now certain that no answer comes, and why.
     pub unanswered: Vec<(u64, Unanswered)>,
+    /// Tick whose answer the object shows now; `None` while it shows none of this grip.
+    pub shown_tick: Option<u64>,
     /// What the person sees next.
     pub seen: Seen,
 }

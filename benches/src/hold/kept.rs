@@ -1,0 +1,129 @@
+//! What became of the ticks of one loop: when each was over, and what the server did in it.
+
+use std::time::{Duration, Instant};
+
+use glove_client::pace::wait_until;
+use softgrasp_protocol::StageMs;
+
+/// A haptic device asks a thousand times a second.
+pub(super) const PERIOD: Duration = Duration::from_millis(1);
+
+/// One tick; times in ms.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tick {
+    /// From the moment of the tick until its work was done.
+    pub from_tick: f64,
+    /// From beginning the work until it was done.
+    pub work: f64,
+    /// What the server did; nothing in a loop without one.
+    pub solved: Solved,
+}
+
+/// What an answer said of itself, and how wrong it was.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Solved {
+    pub stages: StageMs,
+    pub error_rel: f64,
+    pub residual_rel: f64,
+    pub error_bound_rel: Option<f64>,
+}
+
+/// All ticks of one loop.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Kept {
+    pub ticks: Vec<Tick>,
+    /// Ticks that passed while an earlier one was still at work.
+    pub missed: usize,
+    pub lasted: Duration,
+}
+
+impl Kept {
+    /// Adds what came later.
+    pub fn append(&mut self, mut later: Self) {
+        self.ticks.append(&mut later.ticks);
+        self.missed += later.missed;
+        self.lasted += later.lasted;
+    }
+
+    /// Ticks, those that were missed among them.
+    pub fn count(&self) -> usize {
+        self.ticks.len() + self.missed
+    }
+
+    /// Ticks whose work was not done before the next one.
+    pub fn late(&self) -> usize {
+        let period = ms(PERIOD);
+        self.ticks.iter().filter(|t| t.from_tick >= period).count() + self.missed
+    }
+
+    /// The same, per cent.
+    pub fn late_percent(&self) -> f64 {
+        100.0 * self.late() as f64 / self.count().max(1) as f64
+    }
+
+    /// One value of every tick that was not missed.
+    pub fn of(&self, value: fn(&Tick) -> f64) -> impl Iterator<Item = f64> + '_ {
+        self.ticks.iter().map(value)
+    }
+}
+
+/// Does something at each tick of an absolute schedule; a tick that passes while an earlier one is
+/// still at work is missed. `prepare` comes before the tick, `work` is timed, `check` comes after.
+///
+/// # Errors
+/// Those of `work` and `check`.
+pub(super) fn keep<P, W, E>(
+    count: usize,
+    mut prepare: impl FnMut(u32) -> P,
+    mut work: impl FnMut(&P) -> Result<W, E>,
+    mut check: impl FnMut(u32, W) -> Result<Solved, E>,
+) -> Result<Kept, E> {
+    // Growing would take as long as some ticks.
+    let mut kept = Kept { ticks: Vec::with_capacity(count), ..Kept::default() };
+    let start = Instant::now() + 5 * PERIOD;
+    for (number, tick) in (0..count as u32).map(|n| (n, start + n * PERIOD)) {
+        if Instant::now() >= tick + PERIOD {
+            kept.missed += 1;
+            continue;
+        }
+        let prepared = prepare(number);
+        wait_until(tick);
+        let begun = Instant::now();
+        let done = work(&prepared)?;
+        let over = Instant::now();
+        let (from_tick, work) = (ms(over - tick), ms(over - begun));
+        let solved = check(number, done)?;
+        kept.ticks.push(Tick { from_tick, work, solved });
+    }
+    kept.lasted = start.elapsed();
+    Ok(kept)
+}
+
+fn ms(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_tick_is_kept_or_missed_and_late_ones_are_counted() {
+        let mut is_first = true;
+        let slow = |_: &u32| {
+            // The first tick that is kept is at work for four periods.
+            let end = Instant::now() + if is_first { 4 * PERIOD } else { Duration::ZERO };
+            is_first = false;
+            while Instant::now() < end {}
+            Ok::<(), ()>(())
+        };
+        let kept = keep(20, |number| number, slow, |_, ()| Ok(Solved::default())).unwrap();
+        assert_eq!(kept.count(), 20);
+        assert!(kept.missed >= 2 && kept.late() > kept.missed, "{kept:?}");
+        assert!(kept.ticks.iter().all(|t| t.from_tick >= t.work));
+        let mut both = kept.clone();
+        both.append(kept.clone());
+        assert_eq!((both.count(), both.late()), (40, 2 * kept.late()));
+        assert!((both.late_percent() - 5.0 * kept.late() as f64).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,63 @@
+//! What every report asks of a server: to keep a model and to answer frames; and a frame in bytes.
+
+use glove_client::connection::{LinkError, ServerConnection, unexpected};
+use softgrasp_protocol::{
+    Answer, FrameRequest, Limits, ModelHash, Question, Reply, Request, UploadModel,
+};
+
+use crate::report_error::ReportError;
+
+/// Gives a server a model to keep; the model's name.
+///
+/// # Errors
+/// [`ReportError::Link`].
+pub fn upload(
+    connection: &mut ServerConnection,
+    model: UploadModel,
+) -> Result<ModelHash, ReportError> {
+    match connection.ask(&Request::UploadModel(model))? {
+        Reply::ModelReady(ready) => Ok(ready.model),
+        other => Err(unexpected("UploadModel", &other).into()),
+    }
+}
+
+/// The answer to a frame, out of the reply to it.
+///
+/// # Errors
+/// [`ReportError::Link`] for any other reply.
+pub fn answer(reply: Result<Reply, LinkError>) -> Result<Answer, ReportError> {
+    match reply? {
+        Reply::Answer(answer) => Ok(*answer),
+        other => Err(unexpected("Frame", &other).into()),
+    }
+}
+
+/// The bytes that ask for a frame.
+///
+/// # Errors
+/// [`ReportError::Link`] for what cannot be sent.
+pub fn encode_request(model: ModelHash, question: Question) -> Result<Vec<u8>, ReportError> {
+    let mut bytes = Vec::new();
+    Request::Frame(FrameRequest { model, question })
+        .encode_into(1, &Limits::default(), &mut bytes)
+        .map_err(LinkError::from)?;
+    Ok(bytes)
+}
+
+/// The bytes of an answer.
+///
+/// # Errors
+/// As [`encode_request`].
+pub fn encode_reply(answer: Answer) -> Result<Vec<u8>, ReportError> {
+    let mut bytes = Vec::new();
+    Reply::Answer(Box::new(answer))
+        .encode_into(1, &Limits::default(), &mut bytes)
+        .map_err(LinkError::from)?;
+    Ok(bytes)
+}
+
+/// Nodes that a question holds, one by one or by masks.
+pub fn held_nodes(question: &Question) -> usize {
+    let of_masks: usize = question.masks.iter().map(|(nodes, _)| nodes.len()).sum();
+    question.known.len() / 3 + of_masks
+}

@@ -1,0 +1,140 @@
+//! The two programs as processes: found beside this one, started, waited for, ended.
+
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::report_error::ReportError;
+
+/// Where the programs are.
+pub(super) struct Programs {
+    client: PathBuf,
+    server: PathBuf,
+}
+
+/// A program that has not ended by then hangs.
+const RUN_MAX: Duration = Duration::from_secs(300);
+/// How often a running program is looked at; it is another process that must not be disturbed.
+const LOOK: Duration = Duration::from_millis(50);
+
+impl Programs {
+    /// Beside this program, or beside the folder of a test.
+    ///
+    /// # Errors
+    /// [`ReportError::NoProgram`] says how to build them.
+    pub fn find() -> Result<Self, ReportError> {
+        let this = std::env::current_exe()
+            .map_err(|source| ReportError::Process { what: "this program".to_owned(), source })?;
+        let beside = this.parent().unwrap_or(Path::new(""));
+        let folder = match beside.file_name().and_then(OsStr::to_str) {
+            Some("deps") => beside.parent().unwrap_or(beside),
+            _ => beside,
+        };
+        let program = |name: &str| {
+            let path = folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+            if path.is_file() { Ok(path) } else { Err(ReportError::NoProgram { path }) }
+        };
+        Ok(Self { client: program("glove-client")?, server: program("fea-server")? })
+    }
+
+    /// Starts a server on a free port of this machine; it asks for real-time scheduling, as an
+    /// embedded one does.
+    ///
+    /// # Errors
+    /// [`ReportError::Process`].
+    pub fn serve(&self, threads: usize) -> Result<Server, ReportError> {
+        let mut command = Command::new(&self.server);
+        command.args(["--listen", "127.0.0.1:0", "--real-time", "--threads"]);
+        command.arg(threads.to_string()).stdout(Stdio::piped()).stderr(Stdio::null());
+        let failed = |source| ReportError::Process { what: "fea-server".to_owned(), source };
+        let mut process = Process(command.spawn().map_err(failed)?);
+        let mut line = String::new();
+        if let Some(out) = process.0.stdout.take() {
+            BufReader::new(out).read_line(&mut line).map_err(failed)?;
+        }
+        match line.trim().strip_prefix("listening on ") {
+            Some(address) => Ok(Server { address: address.to_owned(), _process: process }),
+            None => Err(ReportError::Ended { what: "fea-server".to_owned(), said: line }),
+        }
+    }
+
+    /// Starts `glove-client` with these arguments; what it says is kept in a file of the folder.
+    ///
+    /// # Errors
+    /// [`ReportError::Process`].
+    pub fn ask(
+        &self,
+        arguments: &[&OsStr],
+        folder: &Path,
+        name: &str,
+    ) -> Result<Client, ReportError> {
+        let what = format!("glove-client {}", arguments.join(OsStr::new(" ")).display());
+        let failed = |source| ReportError::Process { what: what.clone(), source };
+        let said = folder.join(format!("{name}.txt"));
+        let file = std::fs::File::create(&said).map_err(failed)?;
+        let mut command = Command::new(&self.client);
+        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(file);
+        let process = Process(command.spawn().map_err(failed)?);
+        Ok(Client { what, said, process, begun: Instant::now() })
+    }
+}
+
+/// A process that ends with its owner.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A server that runs.
+pub(super) struct Server {
+    pub address: String,
+    _process: Process,
+}
+
+/// A client that runs.
+pub(super) struct Client {
+    what: String,
+    said: PathBuf,
+    process: Process,
+    begun: Instant,
+}
+
+impl Client {
+    /// Waits until it has ended; how long it ran, or what it said when it failed.
+    ///
+    /// # Errors
+    /// [`ReportError::Process`], and [`ReportError::Ended`] when it hangs.
+    pub fn wait(mut self) -> Result<Result<Duration, String>, ReportError> {
+        loop {
+            let ended = self.process.0.try_wait();
+            let ended =
+                ended.map_err(|source| ReportError::Process { what: self.what.clone(), source })?;
+            if let Some(status) = ended {
+                let said = std::fs::read_to_string(&self.said).unwrap_or_default();
+                let lasted = self.begun.elapsed();
+                return Ok(if status.success() { Ok(lasted) } else { Err(said) });
+            }
+            if self.begun.elapsed() > RUN_MAX {
+                let said = format!("still running after {} s", RUN_MAX.as_secs());
+                return Err(ReportError::Ended { what: self.what.clone(), said });
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// The same for a client that must not fail.
+    ///
+    /// # Errors
+    /// As [`Self::wait`], and [`ReportError::Ended`] with what it said.
+    pub fn succeed(self) -> Result<Duration, ReportError> {
+        let what = self.what.clone();
+        self.wait()?.map_err(|said| ReportError::Ended { what, said })
+    }
+}

@@ -1,0 +1,95 @@
+//! One object in one arrangement of programs: its runs, added up.
+
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
+
+use super::programs::Programs;
+use super::record::Record;
+use crate::report_error::ReportError;
+
+/// How client and server are arranged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arrangement {
+    /// The server is in the client's process.
+    Embedded,
+    /// A client and a server, each a process of its own.
+    TwoProcesses,
+    /// So many clients at once, and one server for all.
+    ManySessions(usize),
+}
+
+impl Arrangement {
+    /// Its name in the tables.
+    pub fn name(self) -> String {
+        match self {
+            Self::Embedded => "embedded".to_owned(),
+            Self::TwoProcesses => "two processes".to_owned(),
+            Self::ManySessions(count) => format!("{count} sessions on one server"),
+        }
+    }
+
+    /// Clients at once.
+    fn clients(self) -> usize {
+        if let Self::ManySessions(count) = self { count } else { 1 }
+    }
+}
+
+/// What is grasped, and how fast.
+pub(super) struct Object {
+    pub name: String,
+    /// Arguments of `run` that name it.
+    pub arguments: Vec<OsString>,
+}
+
+/// Ticks a second.
+pub(super) const RATE_HZ: u32 = 100;
+
+/// Plays an object so many times in one arrangement; each time with a server that knows nothing.
+///
+/// # Errors
+/// [`ReportError`]; a run that fails or hangs is one.
+pub(super) fn play(
+    programs: &Programs,
+    object: &Object,
+    arrangement: Arrangement,
+    times: usize,
+    threads: usize,
+    folder: &Path,
+) -> Result<Record, ReportError> {
+    let mut all = Record::default();
+    for _ in 0..times {
+        let server = match arrangement {
+            Arrangement::Embedded => None,
+            _ => Some(programs.serve(threads)?),
+        };
+        let address = server.as_ref().map_or("embedded", |server| server.address.as_str());
+        let names: Vec<String> = (0..arrangement.clients()).map(|n| format!("run-{n}")).collect();
+        let mut clients = Vec::new();
+        for name in &names {
+            let report = folder.join(format!("{name}.json"));
+            let rate = RATE_HZ.to_string();
+            let mut arguments: Vec<&OsStr> =
+                ["run", "--headless", "--rate", &rate, "--server"].map(OsStr::new).to_vec();
+            arguments.extend([OsStr::new(address), OsStr::new("--report"), report.as_os_str()]);
+            let threads = threads.to_string();
+            if server.is_none() {
+                arguments.extend(["--threads", &threads].map(OsStr::new));
+            }
+            arguments.extend(object.arguments.iter().map(OsString::as_os_str));
+            clients.push(programs.ask(&arguments, folder, name)?);
+        }
+        for (client, name) in clients.into_iter().zip(&names) {
+            // A run in which nothing was answered fails; its report says why, and this one too.
+            let ended = client.wait()?;
+            let report = folder.join(format!("{name}.json"));
+            if let (Err(said), false) = (ended, report.is_file()) {
+                let what = format!("run of {}", object.name);
+                return Err(ReportError::Ended { what, said });
+            }
+            all.append(Record::read(&report)?);
+            std::fs::remove_file(&report)
+                .map_err(|source| ReportError::Write { path: report.clone(), source })?;
+        }
+    }
+    Ok(all)
+}
