@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use softgrasp_core::model::{Element, Model, ModelError};
-use softgrasp_core::solve::condensed::{Columns, ContactSet, Touched};
+use softgrasp_core::solve::condensed::{Columns, ContactSet, Delivery, Touched};
 use softgrasp_core::solve::{Certainty, Loads, Method};
 
 use super::case::{Question, Reach};
@@ -165,7 +165,7 @@ fn condensed(question: &Question, element: Element, begin: Instant) -> Result<An
         let _ = base.prove_eigenvalue_min();
     }
     let delivered = displacement.as_chunks::<3>().0;
-    let certificate = set.certify(&base, &q, &answer, delivered);
+    let certificate = set.certify(&base, &q, &answer, delivered, Delivery::Double);
     base.estimate_condition();
     let certainty = set.certainty(&base);
     Ok(Answer {

@@ -6,10 +6,10 @@ use std::time::Instant;
 use softgrasp_core::model::{Known, ModelError};
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{
-    Base, Certificate, Contact, ContactAnswer, ContactSet, Touched,
+    Base, Certificate, Contact, ContactAnswer, ContactSet, Delivery, Touched,
 };
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, NodeChoice, Prefetch, Question, SolveReport,
+    Answer, Displacements, DofValue, NodeChoice, Precision, Prefetch, Question, SolveReport,
 };
 
 use crate::answer::name_of;
@@ -77,8 +77,13 @@ pub(crate) fn answer(
         // One request has no later frames that a proof in the background could serve.
         base.estimate_condition();
         base.prove_eigenvalue_min();
+        set.refine(&base);
     }
-    let certificate = set.certify(&base, &q, &solved, &displacement);
+    let delivery = match question.want.precision {
+        Precision::F64 => Delivery::Double,
+        Precision::F32Quantised => Delivery::Single,
+    };
+    let certificate = set.certify(&base, &q, &solved, &displacement, delivery);
     let mut stage_ms = clock.finish();
     let start = Instant::now();
     let (mut reactions, mut mask_forces) = (Vec::new(), Vec::new());
@@ -104,6 +109,11 @@ pub(crate) fn answer(
     }
     add_unmet_wishes(question, &mut report);
     if let StrainOf::NewestFrame(compute) = watch {
+        // A grip that lasts gets a sharper bound; the first frame after another's may come alone.
+        if factor_reused && base.eigenvalue_min().is_some() && set.begin_refining() {
+            let (base, set) = (Arc::clone(&base), Arc::clone(&set));
+            compute.in_background(move || set.refine(&base));
+        }
         watch_strain(compute, stored, &base, set, solved);
     }
     let nodes = question.want.nodes.clone();
