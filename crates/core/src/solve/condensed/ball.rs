@@ -36,12 +36,6 @@ impl Ball {
         Self { middle: self.middle.transpose(), radius: self.radius.transpose() }
     }
 
-    /// All multiples by one number.
-    pub fn scaled(&self, factor: f64) -> Self {
-        let radius = (&self.radius + self.middle.abs() * gamma(1)) * (factor.abs() * SLACK);
-        Self { middle: &self.middle * factor, radius }
-    }
-
     /// Bound of the Frobenius norm, and so of the spectral norm, of every member.
     pub fn norm(&self) -> f64 {
         (self.middle.norm() + self.radius.norm()) * SLACK

@@ -49,7 +49,7 @@ fn bounds_at(
 
 #[test]
 fn frame_that_touches_nothing_on_a_held_body_does_not_panic_and_is_at_rest() {
-    let shape = Shape::new(cube(64), 0.3, &touched(&[0, 1, 2, 3]));
+    let shape = Shape::new(cube(64), 0.3, &touched(&[0, 1, 4, 16]));
     let mut set = ContactSet::try_new(&shape.base, &shape.columns, &Touched::of_dofs(&[])).unwrap();
     set.want(&shape.base, &[63, 5]);
     let answer = set.solve(&[]).unwrap();
@@ -61,7 +61,7 @@ fn bound_does_not_depend_on_the_units_of_length_and_modulus() {
     let mesh = cube(64);
     let (nodes, wanted) = ([20, 35, 50, 63], [63, 7]);
     let units = [(1e-6, 1e5), (1e6, 1e5), (1.0, 1e-3), (1.0, 1e12), (3e3, 7e9), (0.01, 3.0)];
-    for (fixed, poisson) in [(vec![], 0.3), (touched(&[0, 1, 2, 3]), 0.3), (vec![], 0.49)] {
+    for (fixed, poisson) in [(vec![], 0.3), (touched(&[0, 1, 4, 16]), 0.3), (vec![], 0.49)] {
         let at = |length, young| {
             let shape = scaled(&mesh, length, young, poisson, &fixed);
             bounds_at(&shape, &nodes, length, &wanted, Delivery::Double)
@@ -79,15 +79,11 @@ fn bound_does_not_depend_on_the_units_of_length_and_modulus() {
 
 #[test]
 fn repeated_nodes_do_not_shrink_the_bound() {
-    for fixed in [vec![], touched(&[0, 1, 2, 3])] {
+    for fixed in [vec![], touched(&[0, 1, 4, 16])] {
         let shape = Shape::new(cube(64), 0.3, &fixed);
         for delivery in [Delivery::Double, Delivery::Single] {
-            let of = |wanted: &[u32]| bounds_at(&shape, &[20, 35], 1.0, wanted, delivery);
-            let nodes = [20, 35, 50, 63];
-            let of = |wanted: &[u32]| match fixed.is_empty() {
-                true => bounds_at(&shape, &nodes, 1.0, wanted, delivery),
-                false => of(wanted),
-            };
+            let nodes: &[u32] = if fixed.is_empty() { &[20, 35, 50, 63] } else { &[20, 35] };
+            let of = |wanted: &[u32]| bounds_at(&shape, nodes, 1.0, wanted, delivery);
             assert_eq!(of(&[7]), of(&[7; 500]));
         }
     }
@@ -95,7 +91,7 @@ fn repeated_nodes_do_not_shrink_the_bound() {
 
 #[test]
 fn bound_counts_the_rounding_to_single_precision() {
-    let shape = Shape::new(cube(64), 0.3, &touched(&[0, 1, 2, 3]));
+    let shape = Shape::new(cube(64), 0.3, &touched(&[0, 1, 4, 16]));
     let dofs = touched(&[20, 63]);
     let mut set =
         ContactSet::try_new(&shape.base, &shape.columns, &Touched::of_dofs(&dofs)).unwrap();
