@@ -64,8 +64,7 @@ fn grip(
     };
     let nodes = wanted(scene, random);
     set.want(base, &nodes);
-    let plain: Vec<Bound> = Vec::with_capacity(grips);
-    let mut plain = plain;
+    let mut plain: Vec<Bound> = Vec::with_capacity(grips);
     let mut asked = Vec::with_capacity(grips);
     for at in 0..grips {
         let q = pushes(scene, touched, random);

@@ -17,7 +17,7 @@ use crate::table::{Cell, Table, three_digits};
 pub fn measure(options: &Options) -> Result<Report, ReportError> {
     let amount = match options.is_quick {
         true => Amount { sets: 1, grips: 4 },
-        false => Amount { sets: 12, grips: 80 },
+        false => Amount { sets: 30, grips: 27 },
     };
     let title = "Bound: whether the proven error is ever below the true one, and how far above";
     let mut report = Report::begin("bound", title, "all; nothing is timed", options);

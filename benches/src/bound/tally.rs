@@ -41,9 +41,7 @@ impl Tally {
         for (at, bound) in [plain, refined].into_iter().enumerate() {
             match bound {
                 Err(why) => *self.none[at].entry(why).or_default() += 1,
-                // Written so that a NaN counts as below.
-                Ok(bound) if !(error <= bound) => self.below.push((error, bound)),
-                Ok(bound) if error > 0.0 => {
+                Ok(bound) if error > 0.0 && error <= bound => {
                     let list = match (delivery, at) {
                         (Delivery::Double, at) => Some(at),
                         (Delivery::Single, 1) => Some(2),
@@ -53,6 +51,8 @@ impl Tally {
                         self.ratios[list].push(bound / error);
                     }
                 }
+                // An answer without error has no ratio; a NaN counts as below.
+                Ok(bound) if error != 0.0 => self.below.push((error, bound)),
                 Ok(_) => {}
             }
         }

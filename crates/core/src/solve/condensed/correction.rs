@@ -120,24 +120,12 @@ impl Correction {
             modes.map(|mode| residual(&base.stiffness, &mode.field, &[], true)).collect();
         let corrections = solve(base, wrong.iter().map(|w| &w.value));
         let scale = |j: usize| if j < c { verified.scale } else { 1.0 };
+        let residuals = corrections.iter().zip(&wrong).enumerate();
         let residuals =
-            corrections.iter().zip(&wrong).enumerate().map(|(j, (correction, wrong))| {
-                let left = norm_of_unknown(base, &wrong.value, &base.stiffness.mul(correction));
-                let rounded =
-                    UNIT * norm_of_unknown(base, &wrong.value, &vec![0.0; wrong.value.len()]);
-                let rounding =
-                    rounding_of_product(&base.stiffness, correction) + wrong.lost + rounded;
-                settled(left, rounding) * scale(j) * SLACK
-            });
+            residuals.map(|(j, (correction, wrong))| scale(j) * left_over(base, correction, wrong));
         let residuals: Vec<f64> = residuals.collect();
         let corrections: Vec<Vec<f64>> =
             corrections.iter().enumerate().map(|(j, field)| scaled(j, field)).collect();
-        let moments = base.rigid.as_ref().map_or(0.0, |rigid| {
-            let d = &rigid.to_orthonormal;
-            let off = |i: usize| forces[i].lost + UNIT * norm(&forces[i].value);
-            let of = |j: usize| (0..forces.len()).map(move |i| off(i) * d[(i, j)].abs());
-            (0..forces.len()).map(|j| of(j).sum::<f64>().powi(2)).sum::<f64>().sqrt() * SLACK
-        });
         let lengths: Vec<f64> = corrections.iter().map(|c| norm(c) * SLACK).collect();
         // The residual of a mode is −Kᵀ R.
         let found =
@@ -167,7 +155,7 @@ impl Correction {
             eta: (verified.eta + verified.times_inverse(&changes)) * SLACK,
             changes,
             lengths,
-            moments,
+            moments: moments(base, &forces),
         }
     }
 
@@ -236,6 +224,25 @@ impl Part {
         let off = off.collect();
         (self.columns, off)
     }
+}
+
+/// Bound of the residual of a column less its correction, over the rows of `K_B`.
+fn left_over(base: &Base, correction: &[f64], wrong: &Accurate) -> f64 {
+    let left = norm_of_unknown(base, &wrong.value, &base.stiffness.mul(correction));
+    let rounded = UNIT * norm_of_unknown(base, &wrong.value, &vec![0.0; wrong.value.len()]);
+    let rounding = rounding_of_product(&base.stiffness, correction) + wrong.lost + rounded;
+    settled(left, rounding) * SLACK
+}
+
+/// Bound on how far the forces `Kᵀ R D` of the modes are off.
+fn moments(base: &Base, forces: &[Accurate]) -> f64 {
+    let Some(rigid) = &base.rigid else { return 0.0 };
+    let off = |f: &Accurate| f.lost + UNIT * norm(&f.value);
+    let columns = rigid.to_orthonormal.column_iter();
+    let of_column = |d: nalgebra::DVectorView<'_, f64>| {
+        forces.iter().zip(d.iter()).map(|(f, d)| off(f) * d.abs()).sum::<f64>()
+    };
+    columns.map(|d| of_column(d).powi(2)).sum::<f64>().sqrt() * SLACK
 }
 
 /// `K_B⁻¹` of some loads, 3N each; rows that are held count nothing.
