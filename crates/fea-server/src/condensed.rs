@@ -26,6 +26,10 @@ const CONDITION_WARNING: f64 = 1e9;
 /// Nodes or masks prefetched between two looks at what else is waiting.
 const PREFETCH_TOGETHER: usize = 2;
 
+/// Bytes that sharpening a bound beside the frames may take for the moment: they are promised to
+/// nobody.
+const REFINED_BYTES_MAX: u64 = 256 << 20;
+
 /// Which answer the reported strain and rotation belong to.
 #[derive(Clone, Copy)]
 pub(crate) enum StrainOf<'a> {
@@ -77,7 +81,10 @@ pub(crate) fn answer(
         // One request has no later frames that a proof in the background could serve.
         base.estimate_condition();
         base.prove_eigenvalue_min();
-        set.refine(&base);
+        // Less than the second factor that there was memory for.
+        if set.refine_bytes(&base) <= base.proof_bytes() {
+            set.refine(&base);
+        }
     }
     let delivery = match question.want.precision {
         Precision::F64 => Delivery::Double,
@@ -109,8 +116,10 @@ pub(crate) fn answer(
     }
     add_unmet_wishes(question, &mut report);
     if let StrainOf::NewestFrame(compute) = watch {
-        // A grip that lasts gets a sharper bound; the first frame after another's may come alone.
-        if factor_reused && base.eigenvalue_min().is_some() && set.begin_refining() {
+        // A grip that lasts gets a sharper bound: the second frame asks for it.
+        let is_small = set.refine_bytes(&base) <= REFINED_BYTES_MAX;
+        let is_proven = base.eigenvalue_min().is_some();
+        if factor_reused && is_small && is_proven && set.begin_refining() {
             let (base, set) = (Arc::clone(&base), Arc::clone(&set));
             compute.in_background(move || set.refine(&base));
         }
