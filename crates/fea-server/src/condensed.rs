@@ -81,8 +81,8 @@ pub(crate) fn answer(
         // One request has no later frames that a proof in the background could serve.
         base.estimate_condition();
         base.prove_eigenvalue_min();
-        // Less than the second factor that there was memory for.
-        if set.refine_bytes(&base) <= base.proof_bytes() {
+        // Little, or less than the second factor that there was memory for.
+        if set.refine_bytes(&base) <= base.proof_bytes().max(REFINED_BYTES_MAX) {
             set.refine(&base);
         }
     }
