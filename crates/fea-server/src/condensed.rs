@@ -86,10 +86,7 @@ pub(crate) fn answer(
             set.refine(&base);
         }
     }
-    let delivery = match question.want.precision {
-        Precision::F64 => Delivery::Double,
-        Precision::F32Quantised => Delivery::Single,
-    };
+    let delivery = delivery(question.want.precision);
     let certificate = set.certify(&base, &q, &solved, &displacement, delivery);
     let mut stage_ms = clock.finish();
     let start = Instant::now();
@@ -116,17 +113,30 @@ pub(crate) fn answer(
     }
     add_unmet_wishes(question, &mut report);
     if let StrainOf::NewestFrame(compute) = watch {
-        // A grip that lasts gets a sharper bound: the second frame asks for it.
-        let is_small = set.refine_bytes(&base) <= REFINED_BYTES_MAX;
-        let is_proven = base.eigenvalue_min().is_some();
-        if factor_reused && is_small && is_proven && set.begin_refining() {
-            let (base, set) = (Arc::clone(&base), Arc::clone(&set));
-            compute.in_background(move || set.refine(&base));
+        if factor_reused {
+            sharpen(compute, &base, &set);
         }
         watch_strain(compute, stored, &base, set, solved);
     }
     let nodes = question.want.nodes.clone();
     Ok(Answer { report, nodes, displacements, reactions, mask_forces })
+}
+
+/// How displacements are rounded on the way.
+fn delivery(precision: Precision) -> Delivery {
+    match precision {
+        Precision::F64 => Delivery::Double,
+        Precision::F32Quantised => Delivery::Single,
+    }
+}
+
+/// Solves once more for a grip that lasts, in the background: its bounds get sharper.
+fn sharpen(compute: &Compute, base: &Arc<Base>, set: &Arc<ContactSet>) {
+    let is_small = set.refine_bytes(base) <= REFINED_BYTES_MAX;
+    if is_small && base.eigenvalue_min().is_some() && set.begin_refining() {
+        let (base, set) = (Arc::clone(base), Arc::clone(set));
+        compute.in_background(move || set.refine(&base));
+    }
 }
 
 /// Numbers multiplied for an answer from a kept contact set; `None` where something has to be made.
