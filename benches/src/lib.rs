@@ -7,6 +7,7 @@
 
 pub mod accuracy;
 mod axis;
+pub mod bound;
 pub mod collision;
 pub mod contact;
 pub mod echo;
@@ -63,6 +64,8 @@ pub enum ReportName {
     Collision,
     /// Every way through hard cases, against what was promised.
     HardCases,
+    /// Random grips: the proven bound against the true error.
+    Bound,
 }
 
 impl ReportName {
@@ -80,6 +83,7 @@ impl ReportName {
             Self::Accuracy => "accuracy",
             Self::Collision => "collision",
             Self::HardCases => "hard-cases",
+            Self::Bound => "bound",
         }
     }
 }
@@ -102,6 +106,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Accuracy => accuracy::measure(options)?,
         ReportName::Collision => collision::measure(options)?,
         ReportName::HardCases => hard_cases::measure(options)?,
+        ReportName::Bound => bound::measure(options)?,
     };
     report.end();
     let files = report.write(&options.out)?;

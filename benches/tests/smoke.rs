@@ -78,6 +78,18 @@ fn collision_is_timed_and_nothing_is_missed() {
 }
 
 #[test]
+fn bound_is_never_below_the_true_error_of_random_grips() {
+    let folder = tempfile::tempdir().unwrap();
+    // A bound below the true error fails the report.
+    run_quick(ReportName::Bound, folder.path());
+    let of = |name| column(folder.path(), "bound.csv", name);
+    let ratios: Vec<f64> = of("ratio_nearest").iter().filter_map(|r| r.parse().ok()).collect();
+    assert!(ratios.len() > 30 && ratios.iter().all(|&r| r >= 1.0), "{ratios:?}");
+    let grips: f64 = numbers(folder.path(), "bound.csv", "grips").iter().sum();
+    assert!(grips > 300.0, "{grips}");
+}
+
+#[test]
 fn every_element_comes_nearer_to_closed_forms_on_finer_meshes() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Accuracy, folder.path());

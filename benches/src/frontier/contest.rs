@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::model::{Element, Known, Model, ModelError};
-use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Touched};
+use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Delivery, Touched};
 use softgrasp_core::solve::{Factored, Loads, Method};
 
 use super::system::{System, assembled, at_nodes, rms_rel};
@@ -133,7 +133,7 @@ impl Kept {
             Self::Condensed { base, set } => {
                 let solved = set.solve(q_known).map_err(ModelError::from)?;
                 let delivered = set.wanted_displacements(&solved);
-                let certificate = set.certify(base, q_known, &solved, &delivered);
+                let certificate = set.certify(base, q_known, &solved, &delivered, Delivery::Double);
                 Ok((delivered.into_iter().flatten().collect(), certificate.residual_rel))
             }
         }

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use softgrasp_core::contact::Mask;
 use softgrasp_core::model::{Element, Model, ModelError};
-use softgrasp_core::solve::condensed::{Columns, ContactSet, Touched};
+use softgrasp_core::solve::condensed::{Columns, ContactSet, Delivery, Touched};
 use softgrasp_core::solve::{Certainty, Loads, Method};
 
 use super::answer::{Answer, since};
@@ -89,7 +89,7 @@ pub(super) fn condensed(
         let _ = base.prove_eigenvalue_min();
     }
     let delivered = displacement.as_chunks::<3>().0;
-    let certificate = set.certify(&base, &q, &answer, delivered);
+    let certificate = set.certify(&base, &q, &answer, delivered, Delivery::Double);
     base.estimate_condition();
     let nothing = Certainty { condition: f64::NAN, error_rel: f64::NAN };
     let certainty = set.certainty(&base).unwrap_or(nothing);

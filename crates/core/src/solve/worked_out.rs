@@ -16,6 +16,18 @@ impl<T> Default for WorkedOut<T> {
     }
 }
 
+impl<T> WorkedOut<T> {
+    /// What has been worked out, if somebody has.
+    pub fn get_ref(&self) -> Option<&T> {
+        self.0.get()
+    }
+
+    /// Keeps what has been worked out; what somebody else has kept before stays.
+    pub fn keep(&self, value: T) {
+        let _ = self.0.set(value);
+    }
+}
+
 impl<T: Clone> WorkedOut<T> {
     /// The number, if somebody has worked it out.
     pub fn get(&self) -> Option<T> {
@@ -29,7 +41,7 @@ impl<T: Clone> WorkedOut<T> {
         }
         let value = work();
         // Somebody else may have been first; their number is the same.
-        let _ = self.0.set(value.clone());
+        self.keep(value.clone());
         self.get().unwrap_or(value)
     }
 }

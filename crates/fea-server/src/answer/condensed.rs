@@ -4,20 +4,28 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_core::model::{Known, ModelError};
-use softgrasp_core::solve::condensed::{Base, Certificate, ContactAnswer, ContactSet, Touched};
+use softgrasp_core::solve::condensed::{
+    Base, Certificate, ContactAnswer, ContactSet, Delivery, Touched,
+};
 use softgrasp_core::solve::{Method, Stage};
-use softgrasp_protocol::{Answer, Displacements, DofValue, NodeChoice, Question, SolveReport};
+use softgrasp_protocol::{
+    Answer, Displacements, DofValue, NodeChoice, Precision, Question, SolveReport,
+};
 
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::{last_peak_rss_bytes, peak_rss_bytes};
 use crate::refusal::Refusal;
 use crate::request::{checked_masks, name_of};
+use crate::resources::Resources;
 use crate::store::StoredModel;
 use crate::workers::{Rest, Workers};
 
 /// Above this condition of the small system the touched nodes hold the body weakly.
 const CONDITION_WARNING: f64 = 1e9;
+
+/// Bytes that sharpening a bound may take in any case.
+const REFINED_BYTES_MIN: u64 = 16 << 20;
 
 /// Which answer the reported strain and rotation belong to.
 #[derive(Clone, Copy)]
@@ -28,7 +36,7 @@ pub(super) enum StrainOf<'a> {
         may_prove: bool,
     },
     /// Worked out beside the frames; no frame waits.
-    NewestFrame(&'a Workers),
+    NewestFrame(&'a Resources),
 }
 
 /// What one question touches on a model with a base.
@@ -135,8 +143,13 @@ impl Contacts {
             // One request has no later frames that a proof in the background could serve.
             base.estimate_condition();
             base.prove_eigenvalue_min();
+            // It takes no more than the second factor that there was memory for.
+            if set.refine_bytes(base) <= base.proof_bytes().max(REFINED_BYTES_MIN) {
+                set.refine(base);
+            }
         }
-        let certificate = set.certify(base, q, &solved, &displacement);
+        let delivery = delivery(question.want.precision);
+        let certificate = set.certify(base, q, &solved, &displacement, delivery);
         let mut stage_ms = clock.finish();
         let start = Instant::now();
         let (mut reactions, mut mask_forces) = (Vec::new(), Vec::new());
@@ -161,8 +174,11 @@ impl Contacts {
             add_certainty(certainty, question, &mut report)?;
         }
         add_unmet_wishes(question, &mut report);
-        if let StrainOf::NewestFrame(workers) = strain {
-            self.watch_strain(workers, Arc::clone(set), solved);
+        if let StrainOf::NewestFrame(resources) = strain {
+            if *is_kept {
+                self.sharpen(resources, set);
+            }
+            self.watch_strain(&resources.workers, Arc::clone(set), solved);
         }
         let nodes = question.want.nodes.clone();
         Ok(Answer { report, nodes, displacements, reactions, mask_forces })
@@ -199,6 +215,24 @@ impl Contacts {
         }
     }
 
+    /// Solves once more for a grip that lasts, in the background, if there is memory for it: its
+    /// bounds get sharper.
+    fn sharpen(&self, resources: &Resources, set: &Arc<ContactSet>) {
+        if self.base.eigenvalue_min().is_none() || !set.begin_refining() {
+            return;
+        }
+        let reservation = resources.budget.reservation();
+        if !reservation.reserve(set.refine_bytes(&self.base), self.stored.lasting_bytes()) {
+            return;
+        }
+        resources.models.trim();
+        let (base, set) = (Arc::clone(&self.base), Arc::clone(set));
+        resources.workers.in_background(move || {
+            set.refine(&base);
+            drop(reservation);
+        });
+    }
+
     /// Works out rotation and strain of a frame beside the frames that follow, one at a time,
     /// resting for nine tenths of the time.
     fn watch_strain(&self, workers: &Workers, set: Arc<ContactSet>, solved: ContactAnswer) {
@@ -211,6 +245,14 @@ impl Contacts {
             stored.keep_strain(newest);
             drop(claimed);
         });
+    }
+}
+
+/// How displacements are rounded on the way.
+fn delivery(precision: Precision) -> Delivery {
+    match precision {
+        Precision::F64 => Delivery::Double,
+        Precision::F32Quantised => Delivery::Single,
     }
 }
 

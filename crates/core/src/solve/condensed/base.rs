@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use super::rigid::{Mode, Rigid};
+use super::rounding::asymmetry;
 use crate::fem::Stiffness;
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
 use crate::solve::partition::AXIS_NAMES;
-use crate::solve::vectors::norm;
 use crate::solve::worked_out::WorkedOut;
 use crate::solve::zero_energy::{BodyMotions, RigidBodies, dofs_by_body};
 use crate::solve::{Partition, PartitionError, Stage};
@@ -24,24 +25,16 @@ pub struct Base {
     /// Degrees of freedom held in addition so that `K_B` is definite; as many as modes.
     pub(super) held: Vec<u32>,
     pub(super) modes: Vec<Mode>,
-    /// Bound of the largest eigenvalue of `K`, N/m.
+    /// Largest sum of absolute values in a row of `K`, N/m: a bound of its norm.
     pub(super) stiffest: f64,
+    /// Bound on how far a symmetric matrix of entries of `K` is from its symmetric part, N/m.
+    pub(super) asymmetry: f64,
+    /// The modes as one basis; `None` without modes or where the basis is not proven to be one.
+    pub(super) rigid: Option<Rigid>,
     /// Skeel's condition number of `K_B`, once somebody has asked for it.
     pub(super) condition: WorkedOut<f64>,
     /// Lower bound of the smallest eigenvalue of `K_B`, once somebody has proven one.
     pub(super) eigenvalue_min: WorkedOut<Option<f64>>,
-}
-
-/// A motion that costs no energy and leaves the fixed degrees of freedom in place.
-pub(super) struct Mode {
-    /// Displacement of every degree of freedom, largest about one.
-    pub field: Vec<f64>,
-    /// Norm of the field.
-    pub norm: f64,
-    /// Norm of `K` times the field, as computed; it is all rounding.
-    pub residual: f64,
-    /// Bound on the same norm, rounding of the computation included.
-    pub residual_bound: f64,
 }
 
 /// Why a shape cannot be condensed, or a question not be answered this way.
@@ -187,15 +180,20 @@ impl Base {
         on_stage(Stage::Factor);
         let factor = FrontFactor::try_new(&analysis, stiffness)
             .map_err(|error| refuse(error, &partition))?;
-        let modes = fields.into_iter().map(|field| Mode::new(stiffness, field)).collect();
+        let modes: Vec<Mode> =
+            fields.into_iter().map(|field| Mode::new(stiffness, field)).collect();
+        let stiffest = stiffness.row_sum_max();
+        let asymmetry = asymmetry(stiffness, stiffest);
         Ok(Self {
             stiffness: Arc::clone(stiffness),
             partition,
             factor,
             fixed: fixed.to_vec(),
+            rigid: Rigid::new(&modes, &held, asymmetry),
             held,
             modes,
-            stiffest: stiffness.row_sum_max(),
+            stiffest,
+            asymmetry,
             condition: WorkedOut::default(),
             eigenvalue_min: WorkedOut::default(),
         })
@@ -244,30 +242,6 @@ fn refuse(error: FrontError, partition: &Partition) -> CondensedError {
         // The analysis was made from this very stiffness.
         FrontError::OtherPattern => CondensedError::OutOfMemory { bytes: 0 },
     }
-}
-
-impl Mode {
-    fn new(stiffness: &Stiffness, field: Vec<f64>) -> Self {
-        let residual = norm(&stiffness.mul(&field));
-        let residual_bound = residual + rounding_of_product(stiffness, &field);
-        Self { norm: norm(&field), residual, residual_bound, field }
-    }
-}
-
-/// Bound on how far the computed product `K x` can be off, as a norm.
-///
-/// Source: Higham, Accuracy and Stability of Numerical Algorithms, (3.12): `|fl(Kx) − Kx| ≤ γₙ |K||x|`
-/// with n the longest row.
-pub(super) fn rounding_of_product(stiffness: &Stiffness, x: &[f64]) -> f64 {
-    let rows = (0..stiffness.node_count()).map(|n| stiffness.pattern().columns(n).len());
-    let longest = 3 * rows.max().unwrap_or(0) + 3;
-    gamma(longest) * norm(&stiffness.mul_abs(x))
-}
-
-/// `γₙ = n ε / (1 − n ε)` with the unit roundoff ε.
-pub(super) fn gamma(n: usize) -> f64 {
-    let n = n as f64 * (f64::EPSILON / 2.0);
-    n / (1.0 - n)
 }
 
 /// Fields of all motions without energy that leave the fixed degrees of freedom in place.

@@ -1,11 +1,11 @@
-//! How wrong an answer can be, said with every answer (the reasoning is in [`super::bound`]).
+//! How wrong an answer can be, said with every answer (`docs/bound.md`).
 
-use nalgebra::DMatrix;
+use nalgebra::DVector;
 
-use super::base::{Base, gamma};
+use super::base::Base;
 use super::contact_set::{ContactAnswer, ContactSet};
-use super::overlap::{Overlap, product};
-use super::touched::Touched;
+use super::rounding::{SAFE, SLACK, gamma};
+use super::verified::{Amplification, Verified};
 use crate::solve::Certainty;
 use crate::solve::certainty::{inverse_norm, row_sums};
 use crate::solve::vectors::norm;
@@ -19,6 +19,26 @@ pub struct Certificate {
     /// Proven bound on `‖e‖ / ‖u‖` over all nodes, or why there is none.
     pub error_bound_rel: Result<f64, &'static str>,
 }
+
+/// How displacements are rounded before they are handed over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Delivery {
+    /// Not at all.
+    #[default]
+    Double,
+    /// Each component, as a share of the largest one, to single precision.
+    Single,
+}
+
+/// Half the distance of numbers in single precision, relative, with what the two roundings to
+/// double precision around it and the smallest single numbers can add.
+const SINGLE: f64 = 5.960_464_477_539_063e-8 * (1.0 + 1e-6);
+
+const NOT_PROVEN: &str = "no lower bound of the smallest eigenvalue has been proven for this shape";
+const OUT_OF_RANGE: &str = "the numbers are too large or too small for a bound in double precision";
+const WEAKLY_HELD: &str =
+    "the contacts hold the body so weakly that double precision proves no bound";
+const NO_USE: &str = "the proven error is as large as the displacements";
 
 impl Base {
     /// Estimates Skeel's condition number of the held shape, once, by a few solves.
@@ -48,112 +68,128 @@ impl ContactSet {
 
     /// How wrong an answer can be; costs no more than a few products of the size of the set.
     ///
-    /// Shapes: `q` as in [`ContactSet::solve`]; `delivered` displacements of distinct nodes, whose
-    /// size makes the relative bound sharper (may be empty).
+    /// Shapes: `q` as in [`ContactSet::solve`]; `delivered` what
+    /// [`ContactSet::wanted_displacements`] gave, or all nodes where none were asked for (may be
+    /// empty).
     pub fn certify(
         &self,
         base: &Base,
         q: &[f64],
         answer: &ContactAnswer,
         delivered: &[[f64; 3]],
+        delivery: Delivery,
     ) -> Certificate {
-        let places = self.places.iter().map(|&(at, axis)| {
-            let columns = &self.columns[at];
-            [columns.norms[axis], columns.residuals[axis], columns.residual_bounds[axis]]
-        });
-        let modes = base.modes.iter().map(|m| [m.norm, m.residual, m.residual_bound]);
+        let residual_rel = self.residual_rel(base, q, answer);
+        let error_bound_rel = self.bound(base, q, answer, self.size_of(delivered), delivery);
+        Certificate { residual_rel, error_bound_rel }
+    }
+
+    fn residual_rel(&self, base: &Base, q: &[f64], answer: &ContactAnswer) -> f64 {
+        let places = self.places.iter().map(|&(at, axis)| self.columns[at].residuals[axis]);
+        let residuals = places.chain(base.modes.iter().map(|m| m.residual));
         let amounts = answer.lambda.iter().chain(&answer.amounts);
-        let [mut moved, mut residual, mut residual_bound] = [0.0; 3];
-        for ([field, computed, bound], amount) in places.chain(modes).zip(amounts) {
-            moved += amount.abs() * field;
-            residual += amount.abs() * computed;
-            residual_bound += amount.abs() * bound;
-        }
+        let mut residual: f64 = residuals.zip(amounts).map(|(r, amount)| amount.abs() * r).sum();
         // What the contacts are off moves their neighbours by at most so much force.
         let stiffest = (base.stiffest * self.overlap.lift).max(self.scale);
         residual += stiffest * answer.mismatch;
         let b = self.load.size(q);
-        let residual_rel = if b > 0.0 { residual / b } else { residual };
-        let terms = answer.lambda.len() + base.modes.len() + 2;
-        let rounding = gamma(terms) * moved;
-        // The mismatch is itself computed: products of the means of the columns.
-        let rows = (terms as f64).sqrt();
-        let mismatch = answer.mismatch + rows * gamma(terms + self.touched().longest()) * moved;
-        residual_bound += stiffest * mismatch;
-        // Part of the answer bounds the size of the whole from below.
-        let size = (norm(q) / self.overlap.stretch).max(norm(delivered.as_flattened()));
-        let error_bound_rel = match base.eigenvalue_min() {
-            None => Err("no lower bound of the smallest eigenvalue has been proven for this shape"),
-            Some(_) if size <= 0.0 => Err("nothing moves"),
-            Some(eigenvalue) => {
-                let compliance = 1.0 / eigenvalue + self.bound.compliance;
-                let lifted = self.overlap.lift * mismatch;
-                Ok((residual_bound * compliance + rounding + lifted) / size)
-            }
+        if b > 0.0 { residual / b } else { residual }
+    }
+
+    fn bound(
+        &self,
+        base: &Base,
+        q: &[f64],
+        answer: &ContactAnswer,
+        delivered: f64,
+        delivery: Delivery,
+    ) -> Result<f64, &'static str> {
+        let eigenvalue = base.eigenvalue_min().ok_or(NOT_PROVEN)?;
+        let asked = norm(q);
+        if asked == 0.0 {
+            return Err("nothing moves");
+        }
+        let verified = &self.verified;
+        if ![asked, eigenvalue, base.stiffest, verified.scale].iter().all(|x| SAFE.contains(x)) {
+            return Err(OUT_OF_RANGE);
+        }
+        let factors = verified.amplification(base, eigenvalue).ok_or(WEAKLY_HELD)?;
+        let of_lambda = answer.lambda.iter().map(|x| x / verified.scale);
+        let x: Vec<f64> = of_lambda.chain(answer.amounts.iter().copied()).collect();
+        let x = DVector::from_vec(x);
+        let missed = verified.mismatch(q, &x);
+        let plain = self.plain(base, &x, missed, factors);
+        let refined = self.refined(&x, missed, factors);
+        let error = match (plain, refined) {
+            (Some(plain), Some(refined)) => plain.min(refined),
+            (plain, refined) => plain.or(refined).ok_or(WEAKLY_HELD)?,
         };
-        Certificate { residual_rel, error_bound_rel }
+        // The size of the exact answer, from below.
+        let by_contacts = asked / self.overlap.stretch;
+        let by_all = self.correction().map_or(0.0, |c| c.size.at_least(&x));
+        let size = by_contacts.max((delivered / SLACK).max(by_all) - error) / SLACK;
+        let rounded = match delivery {
+            Delivery::Double => 0.0,
+            Delivery::Single => SINGLE * delivered,
+        };
+        let bound = (error + rounded * SLACK) / size * SLACK;
+        // Written so that a NaN is refused too.
+        if bound < 1.0 { Ok(bound) } else { Err(NO_USE) }
+    }
+
+    /// The bound from the columns' residuals.
+    fn plain(
+        &self,
+        base: &Base,
+        x: &DVector<f64>,
+        missed: f64,
+        factors: Amplification,
+    ) -> Option<f64> {
+        let v = &self.verified;
+        // Written so that a NaN is refused too.
+        let is_verified = v.eta < 0.5;
+        let step = missed / (1.0 - v.eta);
+        let residual = Verified::sum(&v.residuals, x) + v.left * step;
+        let size = Verified::sum(&v.norms, x);
+        let moments = base.rigid.as_ref().map_or(0.0, |rigid| rigid.stiffness);
+        let error = factors.of_residual * residual
+            + factors.of_moment * moments * (size + v.moved * step)
+            + v.moved * step
+            + gamma(x.len() + 6) * size;
+        is_verified.then_some(error * SLACK)
+    }
+
+    /// The bound from what a second solve found, once there was one ([`ContactSet::refine`]).
+    ///
+    /// What was found is all rounding, so it would be another number in other units; what is said is
+    /// the smallest of some fixed multiples of what was expected that is no smaller.
+    fn refined(&self, x: &DVector<f64>, missed: f64, factors: Amplification) -> Option<f64> {
+        let (c, v) = (self.correction()?, &self.verified);
+        // Written so that a NaN is refused too.
+        let is_verified = c.eta < 0.5;
+        if !is_verified {
+            return None;
+        }
+        let step = (missed + Verified::sum(&c.changes, x)) / (1.0 - c.eta);
+        let residual = Verified::sum(&c.residuals, x) + c.left * step;
+        let size =
+            c.size.at_most(x) + Verified::sum(&c.lengths, x) + (c.moved + c.corrected) * step;
+        let found = c.error.at_most(x)
+            + Verified::sum(&c.off, x)
+            + (c.corrected + c.moved * c.eta) * step
+            + factors.of_residual * residual
+            + factors.of_moment * c.moments * size;
+        let found = found * SLACK;
+        let expected = EXPECTED_AT_LEAST * c.expected.about(x);
+        let steps = (0..EXPECTED_STEPS).map(|m| expected * EXPECTED_STEP.powi(m));
+        let said = steps.into_iter().find(|said| *said >= found).unwrap_or(found);
+        let known = c.moved * missed + gamma(v.norms.len() + 8) * c.sizes.at_most(&x.abs());
+        Some((said + known) * SLACK)
     }
 }
 
-/// Size of `b = −K12 q` of (3.42a) for any `q`, from the products of the columns of `K12`; with masks
-/// of `K E (EᵀE)⁻¹ q`, which is the same for single nodes but for the rows of the touched.
-pub(super) struct LoadSize {
-    /// Products of the columns with each other.
-    products: DMatrix<f64>,
-}
-
-impl LoadSize {
-    /// Shapes: `overlap` that of `touched`.
-    pub fn new(base: &Base, touched: &Touched, overlap: &Overlap) -> Self {
-        let is_known = |set: &[u32], row: u32| set.binary_search(&row).is_ok();
-        let has_masks = !touched.masks.is_empty();
-        let mut loads = loads_of(base, &touched.columns());
-        for load in &mut loads {
-            load.retain(|&(row, _)| {
-                (has_masks || !is_known(&touched.dofs, row)) && !is_known(&base.fixed, row)
-            });
-        }
-        let count = loads.len();
-        let mut products = DMatrix::zeros(count, count);
-        for j in 0..count {
-            for i in 0..=j {
-                products[(i, j)] = product(&loads[i], &loads[j]);
-                products[(j, i)] = products[(i, j)];
-            }
-        }
-        match overlap.inverse() {
-            Some(inverse) => Self { products: &inverse * products * &inverse },
-            None => Self { products },
-        }
-    }
-
-    /// `‖b‖`.
-    pub fn size(&self, q: &[f64]) -> f64 {
-        let columns = self.products.column_iter().zip(q);
-        let along = |column: &[f64]| column.iter().zip(q).map(|(p, q)| p * q).sum::<f64>();
-        columns.map(|(p, q_j)| along(p.as_slice()) * q_j).sum::<f64>().max(0.0).sqrt()
-    }
-}
-
-/// `K E`, column by column: degrees of freedom, ascending, and forces.
-fn loads_of(base: &Base, columns: &[Vec<(u32, f64)>]) -> Vec<Vec<(u32, f64)>> {
-    // Nodes of a mask share most of their neighbours, so the sums are made in place.
-    let mut force = vec![0.0; base.dof_count()];
-    let mut reached: Vec<u32> = Vec::new();
-    let load_of = |column: &Vec<(u32, f64)>| {
-        for &(dof, weight) in column {
-            let (node, axis) = (dof as usize / 3, dof as usize % 3);
-            for (other, block) in base.stiffness.row(node) {
-                reached.push(other as u32);
-                for c in 0..3 {
-                    force[3 * other + c] += weight * block[3 * axis + c];
-                }
-            }
-        }
-        reached.sort_unstable();
-        reached.dedup();
-        let rows = reached.drain(..).flat_map(|node| 3 * node..3 * node + 3);
-        rows.map(|row| (row, std::mem::take(&mut force[row as usize]))).collect()
-    };
-    columns.iter().map(load_of).collect()
-}
+/// A bound is at least so many times the error that rounding of one unit in the stiffness makes.
+const EXPECTED_AT_LEAST: f64 = 20.0;
+/// Multiples of it that are tried: powers of this.
+const EXPECTED_STEP: f64 = 8.0;
+const EXPECTED_STEPS: i32 = 6;

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
-use super::base::{Base, CondensedError, rounding_of_product};
+use super::base::{Base, CondensedError};
+use super::rounding::{rounding_of_product, settled};
 use super::touched::Contact;
 use crate::solve::vectors::norm;
 
@@ -215,7 +216,7 @@ impl Field {
             residual[row] += weight;
         }
         let residual = norm(&residual);
-        let residual_bound = residual + rounding_of_product(&base.stiffness, &field);
+        let residual_bound = settled(residual, rounding_of_product(&base.stiffness, &field));
         Self { norm: norm(&field), field, residual, residual_bound }
     }
 }

@@ -1,16 +1,21 @@
 //! One set of contacts (touched degrees of freedom and masks): the small system, and answers from it.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use rayon::prelude::*;
 
 use super::base::{Base, CondensedError};
-use super::bound::SmallBound;
-use super::certificate::LoadSize;
 use super::columns::{Columns, ContactColumns};
+use super::correction::Correction;
+use super::load_size::LoadSize;
 use super::overlap::Overlap;
 use super::touched::Touched;
+use super::verified::Verified;
+use crate::solve::vectors::norm;
+use crate::solve::worked_out::WorkedOut;
 use crate::solve::zero_energy::FREE_BELOW;
 
 /// A set of contacts, ready to answer any displacements of them.
@@ -23,13 +28,18 @@ pub struct ContactSet {
     pub(super) places: Vec<(usize, usize)>,
     /// Scaled `[ EᵀG EᵀR ; (EᵀR)ᵀ 0 ]`, so that both kinds of unknowns have size one.
     small: DMatrix<f64>,
-    /// Factor of the same with `EᵀG` made symmetric: the two triangles differ by rounding.
-    small_lu: LU<f64, Dyn, Dyn>,
+    /// Factor of the same with `EᵀG` made symmetric: the two triangles differ by rounding. `None`
+    /// where nothing is unknown.
+    small_lu: Option<LU<f64, Dyn, Dyn>>,
     /// Scale of λ.
     pub(super) scale: f64,
     condition: f64,
     pub(super) overlap: Overlap,
-    pub(super) bound: SmallBound,
+    pub(super) verified: Verified,
+    /// What a second solve found, once there was one. Nobody waits for it: a thread that waits in a
+    /// parallel loop takes other work, which may need the same.
+    correction: WorkedOut<Correction>,
+    is_refining: AtomicBool,
     pub(super) load: LoadSize,
     rows: Option<WantedRows>,
 }
@@ -41,6 +51,8 @@ pub struct ContactSet {
 struct WantedRows {
     nodes: Vec<u32>,
     blocks: Vec<f64>,
+    /// Places in `nodes` of those that stand further ahead already, ascending.
+    repeated: Vec<usize>,
 }
 
 /// Forces and motions that answer one set of displacements.
@@ -99,21 +111,25 @@ impl ContactSet {
         });
         let moved = DMatrix::from_fn(c, z, |i, k| touched.mean(i, &base.modes[k].field));
         let trace = compliance.trace();
-        let scale = if trace > 0.0 { c as f64 / trace } else { 1.0 };
+        let scale = if trace > 0.0 { c as f64 / trace } else { base.stiffest };
         let mut small = DMatrix::zeros(c + z, c + z);
         small.view_mut((0, 0), (c, c)).copy_from(&(&compliance * scale));
         small.view_mut((0, c), (c, z)).copy_from(&moved);
         small.view_mut((c, 0), (z, c)).copy_from(&moved.transpose());
         let symmetric = 0.5 * (&small + small.transpose());
-        let small_lu = symmetric.lu();
         let unsolvable = |condition| refusal(&moved, condition);
-        let inverse = small_lu.try_inverse().ok_or_else(|| unsolvable(f64::INFINITY))?;
+        // A matrix without rows has no factor, and needs none.
+        let small_lu = (c + z > 0).then(|| symmetric.lu());
+        let inverse = match &small_lu {
+            Some(lu) => lu.try_inverse().ok_or_else(|| unsolvable(f64::INFINITY))?,
+            None => DMatrix::zeros(0, 0),
+        };
         let condition = small.norm() * inverse.norm();
         // Written so that a NaN is refused too.
         if !(0.0..=CONDITION_MAX).contains(&condition) {
             return Err(unsolvable(condition));
         }
-        let bound = SmallBound::new(base, &columns, &places, &inverse, scale)?;
+        let verified = Verified::new(base, touched, &columns, &places, &small, inverse, scale);
         let load = LoadSize::new(base, touched, &overlap);
         let (touched, rows) = (touched.clone(), None);
         Ok(Self {
@@ -125,7 +141,9 @@ impl ContactSet {
             scale,
             condition,
             overlap,
-            bound,
+            verified,
+            correction: WorkedOut::default(),
+            is_refining: AtomicBool::new(false),
             load,
             rows,
         })
@@ -144,7 +162,8 @@ impl ContactSet {
     /// Bytes of the small system and the wanted rows; the columns are counted where they are kept.
     pub fn bytes(&self) -> usize {
         let rows = self.rows.as_ref().map_or(0, |rows| rows.blocks.len());
-        8 * (rows + 2 * self.small.len() + self.overlap.len())
+        8 * (rows + 5 * self.small.len() + self.overlap.len())
+            + Correction::bytes(self.small.nrows())
     }
 
     /// Numbers multiplied for one answer at the wanted nodes.
@@ -175,7 +194,9 @@ impl ContactSet {
                 }
             }
         });
-        self.rows = Some(WantedRows { nodes: nodes.to_vec(), blocks });
+        let mut seen = BTreeSet::new();
+        let repeated = (0..nodes.len()).filter(|&at| !seen.insert(nodes[at])).collect();
+        self.rows = Some(WantedRows { nodes: nodes.to_vec(), blocks, repeated });
     }
 
     /// Forces and motions for displacements of the contacts.
@@ -187,10 +208,14 @@ impl ContactSet {
     pub fn solve(&self, q: &[f64]) -> Result<ContactAnswer, CondensedError> {
         let c = self.places.len();
         let right = DVector::from_fn(self.small.nrows(), |i, _| q.get(i).copied().unwrap_or(0.0));
-        let mut x = self.small_lu.solve(&right).ok_or(CondensedError::NotHeld)?;
+        let solve = |right: &DVector<f64>| match &self.small_lu {
+            Some(lu) => lu.solve(right).ok_or(CondensedError::NotHeld),
+            None => Ok(right.clone()),
+        };
+        let mut x = solve(&right)?;
         // One step of refinement takes out the rounding of the elimination and of the symmetry.
         let miss = &right - &self.small * &x;
-        x += self.small_lu.solve(&miss).ok_or(CondensedError::NotHeld)?;
+        x += solve(&miss)?;
         let mismatch = (&right - &self.small * &x).norm();
         if !x.iter().all(|v| v.is_finite()) {
             return Err(CondensedError::NotFinite);
@@ -216,6 +241,47 @@ impl ContactSet {
             false => parts.zip(blocks).par_bridge().for_each(|(u, block)| multiply(block, &x, u)),
         }
         u
+    }
+
+    /// Solves once more for every column of the set, on the current rayon pool: from then on bounds
+    /// ([`ContactSet::certify`]) are hundreds of times sharper. Does nothing where that was done.
+    pub fn refine(&self, base: &Base) {
+        if self.correction.get_ref().is_none() && !self.small.is_empty() {
+            let columns = self.places.iter().map(|&(at, axis)| &self.columns[at].fields[axis]);
+            let fields: Vec<&Vec<f64>> =
+                columns.chain(base.modes.iter().map(|m| &m.field)).collect();
+            let made = Correction::new(base, &self.touched, &self.verified, &fields);
+            // Somebody else may have been first; theirs is the same.
+            self.correction.keep(made);
+        }
+    }
+
+    /// Whether nobody has begun or done [`ContactSet::refine`] yet; whoever is told so shall do it.
+    pub fn begin_refining(&self) -> bool {
+        self.correction.get_ref().is_none() && !self.is_refining.swap(true, Ordering::Relaxed)
+    }
+
+    /// Bytes that [`ContactSet::refine`] takes for the moment.
+    pub fn refine_bytes(&self, base: &Base) -> u64 {
+        6 * 8 * (self.small.nrows() * base.dof_count()) as u64
+    }
+
+    pub(super) fn correction(&self) -> Option<&Correction> {
+        self.correction.get_ref()
+    }
+
+    /// Norm of delivered displacements, every node once; zero where it is not known whose they are.
+    pub(super) fn size_of(&self, delivered: &[[f64; 3]]) -> f64 {
+        let Some(rows) = &self.rows else { return norm(delivered.as_flattened()) };
+        if delivered.len() != rows.nodes.len() {
+            return 0.0;
+        }
+        if rows.repeated.is_empty() {
+            return norm(delivered.as_flattened());
+        }
+        let mut once = delivered.to_vec();
+        rows.repeated.iter().for_each(|&at| once[at] = [0.0; 3]);
+        norm(once.as_flattened())
     }
 
     /// Displacement of every degree of freedom, 3N, m.

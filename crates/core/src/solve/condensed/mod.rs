@@ -17,20 +17,29 @@
 //! for single nodes that is (3.43a), and λ are the reactions (3.43b). Nodes that the scene fixes are
 //! a true base and need no R.
 
+mod ball;
 mod base;
-mod bound;
+#[cfg(test)]
+mod bound_tests;
 mod certificate;
 mod columns;
 mod contact_set;
+mod correction;
+mod eigenvalue;
+mod exact;
+mod load_size;
 #[cfg(test)]
 mod mask_tests;
 mod overlap;
+mod rigid;
+mod rounding;
 #[cfg(test)]
 mod tests;
 mod touched;
+mod verified;
 
 pub use base::{Base, CondensedError};
-pub use certificate::Certificate;
+pub use certificate::{Certificate, Delivery};
 pub use columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
 pub use contact_set::{ContactAnswer, ContactSet};
 pub use touched::{Contact, Touched};

@@ -32,7 +32,7 @@ impl Shape {
     fn answer(&self, dofs: &[u32], q: &[f64]) -> (Vec<f64>, Vec<f64>, Certificate) {
         let set = ContactSet::try_new(&self.base, &self.columns, &Touched::of_dofs(dofs)).unwrap();
         let answer = set.solve(q).unwrap();
-        let certificate = set.certify(&self.base, q, &answer, &[]);
+        let certificate = set.certify(&self.base, q, &answer, &[], Delivery::Double);
         (set.full_displacement(&self.base, &answer), answer.lambda, certificate)
     }
 
@@ -294,7 +294,10 @@ fn proven_bound_is_above_the_true_error_on_ten_thousand_random_frames() {
             for _ in 0..100 {
                 let q: Vec<f64> = dofs.iter().map(|_| next() - 0.5).collect();
                 let answer = set.solve(&q).unwrap();
-                let bound = set.certify(&shape.base, &q, &answer, &[]).error_bound_rel.unwrap();
+                let bound = set
+                    .certify(&shape.base, &q, &answer, &[], Delivery::Double)
+                    .error_bound_rel
+                    .unwrap();
                 let u = set.full_displacement(&shape.base, &answer);
                 let q_known: Vec<f64> =
                     known.iter().map(|d| dofs.binary_search(d).map_or(0.0, |at| q[at])).collect();

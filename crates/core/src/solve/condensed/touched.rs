@@ -69,6 +69,17 @@ impl Touched {
         }
     }
 
+    /// The same of the absolute values of the field: what rounding in it is measured by.
+    pub(super) fn mean_of_sizes(&self, i: usize, field: &[f64]) -> f64 {
+        match self.dofs.get(i) {
+            Some(&dof) => field[dof as usize].abs(),
+            None => {
+                let (mask, axis) = self.mask_and_axis(i);
+                self.masks[mask].mean(|node| field[3 * node as usize + axis].abs())
+            }
+        }
+    }
+
     /// Mask and axis of an unknown force behind those of `dofs`.
     pub(super) fn mask_and_axis(&self, i: usize) -> (usize, usize) {
         let behind = i - self.dofs.len();
