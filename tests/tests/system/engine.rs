@@ -7,7 +7,7 @@ use glove_client::connection::ServerConnection;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{
     Answer, DofValue, ElementName, FrameRequest, Masks, ModelHash, NodeChoice, Precision, Prefetch,
-    Question, RejectCode, Reply, Request,
+    Question, RejectCode, Reply, Request, UploadModel,
 };
 use softgrasp_tests::questions::{cube, once, question, upload};
 use softgrasp_tests::watchdog::until;
@@ -189,4 +189,25 @@ fn ten_node_elements_answer_for_the_corners_and_are_softer() {
     // The same known displacements cost less force when there is more freedom in between.
     let force = |answer: &Answer| answer.reactions.iter().map(|r| r.value.powi(2)).sum::<f64>();
     assert!(force(&quadratic) < force(&linear));
+}
+
+#[test]
+fn frame_that_touches_nothing_on_a_fixed_body_is_answered_with_zeros() {
+    let server = server(2);
+    let mut connection = client(&server);
+    let mesh = cube(64);
+    // A face: three nodes that are not in line would do.
+    let fixed = (0..48).collect();
+    let model = UploadModel { fixed, ..upload(&mesh) };
+    let hash = ModelHash::of(&model);
+    connection.ask(&Request::UploadModel(model)).unwrap();
+    for method in ["auto", "condensed", "front"] {
+        let question = question(Vec::new(), method);
+        let request = Request::Frame(FrameRequest { model: hash, question });
+        let found = answer(&mut connection, &request);
+        assert_eq!(found.reactions.len(), 48, "{method}");
+        assert!(found.reactions.iter().all(|r| r.value == 0.0), "{method}");
+        let rows = found.displacements.into_f64();
+        assert!(rows.len() == 64 && rows.iter().flatten().all(|u| *u == 0.0), "{method}");
+    }
 }

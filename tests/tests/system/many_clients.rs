@@ -98,6 +98,24 @@ fn two_clients_share_a_model_and_its_factor() {
 }
 
 #[test]
+fn model_dropped_by_one_client_stays_for_another_that_has_named_it() {
+    let server = server(1);
+    let (mut first, mut second) = (client(&server), client(&server));
+    let mesh = cube(64);
+    let hash = ModelHash::of(&upload(&mesh));
+    first.ask(&Request::UploadModel(upload(&mesh))).unwrap();
+    assert_eq!(second.ask(&Request::HaveModel(hash)).unwrap(), Reply::ModelState { known: true });
+    first.send(&Request::Drop(hash)).unwrap();
+    // In order: the drop has been heard before this is answered.
+    first.ask(&Request::Ping { nonce: 1 }).unwrap();
+    answer(&mut second, &Request::Frame(frame(&mesh, 1.0, "auto")));
+    second.send(&Request::Drop(hash)).unwrap();
+    second.ask(&Request::Ping { nonce: 2 }).unwrap();
+    let (code, _) = refusal(&mut second, &Request::Frame(frame(&mesh, 1.0, "auto")));
+    assert_eq!(code, RejectCode::UnknownModel);
+}
+
+#[test]
 fn model_that_had_to_make_room_is_unknown_and_may_be_uploaded_again() {
     // The cubes take about 3, 6 and 13 MB with what is made for them.
     let limit = ServerConfig { memory_limit: 12_000_000, ..config(1) };

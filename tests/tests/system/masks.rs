@@ -4,8 +4,8 @@ use fea_server::RunningServer;
 use glove_client::connection::ServerConnection;
 use softgrasp_protocol::RejectCode::{BadRequest, MemoryLimit, RigidMotionFree, UnknownMethod};
 use softgrasp_protocol::{
-    Answer, DofValue, ElementName, FrameRequest, Masks, ModelHash, Prefetch, Question, RejectCode,
-    Reply, Request, SolveOnce, UploadModel,
+    Answer, DofValue, ElementChoice, ElementName, FrameRequest, Masks, ModelHash, Prefetch,
+    Question, RejectCode, Reply, Request, SolveOnce, UploadModel,
 };
 use softgrasp_tests::questions::{MATERIAL, cube, mesh_data, question, upload};
 
@@ -275,4 +275,24 @@ fn one_request_with_masks_is_condensed_and_carries_its_bound() {
     assert!(bound < 1e-5, "{bound:e}");
     let (code, text) = refusal(&mut connection, &asked(holding(&FOUR, "front")));
     assert!(code == BadRequest && text.contains("condensed or auto"), "{text}");
+}
+
+#[test]
+fn masks_are_not_forgotten_where_the_element_is_left_open() {
+    let server = server(2);
+    let mut connection = client(&server);
+    let mut by_element = |element| {
+        let request = SolveOnce {
+            mesh: mesh_data(&cube(216)),
+            materials: vec![MATERIAL],
+            element,
+            question: holding(&FOUR, "auto"),
+        };
+        answer(&mut connection, &Request::SolveOnce(Box::new(request)))
+    };
+    let given = by_element(ElementChoice::T4);
+    let open = by_element(ElementChoice::Auto);
+    assert_eq!((open.report.method.as_str(), open.report.element), ("condensed", ElementName::T4));
+    assert_eq!(open.displacements, given.displacements);
+    assert_eq!(open.mask_forces.len(), FOUR.len());
 }
