@@ -66,7 +66,7 @@ impl From<ModelError> for Refusal {
             ModelError::Solve(error) => match error {
                 SolveError::NotPositiveDefinite { .. } => Reason::Weak,
                 SolveError::NotFinite { .. } => Reason::Range,
-                SolveError::LoadCount { .. } | SolveError::NotDirect { .. } => Reason::Question,
+                SolveError::LoadCount { .. } | SolveError::NoSuchFactor { .. } => Reason::Question,
                 SolveError::OutOfMemory { .. } | SolveError::OverLimit { .. } => Reason::Other,
             },
             ModelError::Condensed(error) => match error {

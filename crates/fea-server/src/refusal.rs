@@ -133,6 +133,7 @@ fn code_of_model(error: &ModelError) -> RejectCode {
         },
         ModelError::Condensed(error) => match error {
             CondensedError::NotHeld => RejectCode::RigidMotionFree,
+            CondensedError::HeldTooWeakly { .. } => RejectCode::Uncertain,
             CondensedError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
             CondensedError::OutOfMemory { .. }
             | CondensedError::OverLimit { .. }

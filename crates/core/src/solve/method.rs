@@ -91,6 +91,11 @@ impl Method {
         }
     }
 
+    /// Whether it factors over the tree of fronts.
+    pub const fn has_fronts(self) -> bool {
+        matches!(self, Self::Front | Self::FrontMixed | Self::Pcg)
+    }
+
     /// Whether it makes use of the zeros of the stiffness, and so orders the nodes first.
     pub const fn is_sparse(self) -> bool {
         matches!(

@@ -25,7 +25,7 @@ mod worked_out;
 mod zero_energy;
 
 pub use certainty::{Certainty, ERROR_REFUSED, ERROR_SERIOUS, ERROR_UNREMARKABLE};
-pub use direct::{Analysed, Factored, Fallback, FrontMethod, Loads, Solution, SolveError};
+pub use direct::{Analysed, Factored, Fallback, Loads, Solution, SolveError};
 pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};
 pub use method::{Method, UnknownMethod};
 pub use mobility::{FreeMotion, Motion, find_free_motion};

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use softgrasp_core::model::{Known, Model};
-use softgrasp_core::solve::{Certainty, Factored, Loads, Solution};
+use softgrasp_core::solve::{Certainty, Factored, Loads, Method, Solution};
 use softgrasp_protocol::{
     Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
 };
@@ -23,44 +23,42 @@ pub(super) struct Posed<'a> {
     pub chosen_because: String,
 }
 
-/// Solves and gathers what was asked for.
+/// Solves, refined or stopped as the question allows, and gathers what was asked for.
+///
+/// # Errors
+/// [`Refusal`].
 pub(super) fn answer(
     model: &Model,
     factored: &Factored,
     posed: Posed<'_>,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    let solution = solve(model, factored, &posed, &mut clock)?;
-    gather(model, factored, posed, &solution, clock)
-}
-
-/// Displacements of the whole system, refined or stopped as the question allows.
-pub(super) fn solve(
-    model: &Model,
-    factored: &Factored,
-    posed: &Posed<'_>,
-    clock: &mut StageClock,
-) -> Result<Solution, Refusal> {
     let residual_rel = posed.question.max_error.unwrap_or(0.0);
     let loads = Loads { q_known: &posed.known.q_known, forces: &posed.forces, residual_rel };
-    factored
-        .solve(model.stiffness(), loads, &mut |stage| clock.begin(stage))
-        .map_err(|error| Refusal::Model(error.into()))
+    let stiffness = model.stiffness();
+    let on_stage = &mut |stage| clock.begin(stage);
+    // How certain an answer is takes a few solves more, once per factor: not where somebody is in a
+    // hurry.
+    let (solution, certainty) = match posed.question.deadline_ms {
+        None => {
+            let found = factored.solve_for_certain(stiffness, loads, on_stage);
+            found.map(|(solution, certainty)| (solution, Some(certainty)))
+        }
+        Some(_) => factored.solve(stiffness, loads, on_stage).map(|solution| (solution, None)),
+    }
+    .map_err(|error| Refusal::Model(error.into()))?;
+    gather(model, factored, posed, &solution, certainty, clock)
 }
 
 /// What was asked for, out of a solution, and what it cost.
-pub(super) fn gather(
+fn gather(
     model: &Model,
     factored: &Factored,
     posed: Posed<'_>,
     solution: &Solution,
+    certainty: Option<Certainty>,
     clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    // A few solves more, once per factor: not where somebody is in a hurry.
-    let certainty = match posed.question.deadline_ms {
-        None => Some(certainty(model, factored, solution)),
-        Some(_) => None,
-    };
     let Posed { question, known, element, factor_reused, chosen_because, .. } = posed;
     let strain = model.strain(&solution.displacement);
     let mut stage_ms = clock.finish();
@@ -71,6 +69,10 @@ pub(super) fn gather(
         false => Vec::new(),
     };
     stage_ms.encode = ms_since(start);
+    let (precision, chosen_because) = match solution.fallback {
+        None => (factored.method().precision(), chosen_because),
+        Some(fallback) => (Method::Front.precision(), format!("{chosen_because}; {fallback}")),
+    };
     let mut report = SolveReport {
         method: factored.method().to_string(),
         element,
@@ -83,7 +85,7 @@ pub(super) fn gather(
         refinement_steps: solution.refinement_steps,
         max_rotation_deg: strain.rotation_max.to_degrees(),
         max_strain: strain.strain_max,
-        precision: factored.method().precision().to_owned(),
+        precision: precision.to_owned(),
         warnings: strain_warnings(strain),
         peak_rss_bytes: peak_rss_bytes(),
         factor_reused,
@@ -96,17 +98,6 @@ pub(super) fn gather(
     add_unmet_wishes(question, &mut report);
     let (nodes, mask_forces) = (question.want.nodes.clone(), Vec::new());
     Ok(Answer { report, nodes, displacements, reactions, mask_forces })
-}
-
-/// How certain the digits are; a method that stops early has an estimate of its own beside rounding.
-pub(super) fn certainty(model: &Model, factored: &Factored, solution: &Solution) -> Certainty {
-    match solution.error_estimate_rel {
-        None => factored.certainty(model.stiffness(), solution.backward_error),
-        Some(stopped_at) => {
-            let rounding = factored.certainty(model.stiffness(), 0.0);
-            Certainty { error_rel: rounding.error_rel.max(stopped_at), ..rounding }
-        }
-    }
 }
 
 fn no_bound(error_estimate_rel: Option<f64>) -> String {

@@ -2,7 +2,7 @@
 
 use softgrasp_core::model::{Model, ModelError};
 use softgrasp_core::solve::memory::Need;
-use softgrasp_core::solve::{Factored, FrontMethod, Method, SolveError};
+use softgrasp_core::solve::{Analysed, Factored, Method, SolveError};
 
 use crate::budget::Reservation;
 use crate::clock::StageClock;
@@ -29,22 +29,43 @@ impl FactorRequest<'_> {
     /// # Errors
     /// [`PlanError::Memory`] where none fits; [`Refusal::Model`] where there is no factor.
     pub fn factor(&self, methods: &[Method], clock: &mut StageClock) -> Result<Factored, Refusal> {
-        let fronts: Vec<FrontMethod> =
-            methods.iter().copied().filter_map(FrontMethod::of).collect();
-        if let [method] = *methods
-            && fronts.is_empty()
-        {
-            return self.factor_without_fronts(method, clock);
+        match *methods {
+            [method] if !method.has_fronts() => self.factor_without_fronts(method, clock),
+            _ => {
+                let analysed = self.analyse(clock)?;
+                self.factor_analysed(analysed, methods, clock)
+            }
         }
+    }
+
+    /// Orders and analyses `K11`: what a factor over fronts needs is known then.
+    pub fn analyse(&self, clock: &mut StageClock) -> Result<Analysed, Refusal> {
         let analysed = self.model.analyse(self.dofs, &mut |stage| clock.begin(stage))?;
         clock.end();
-        let needs: Vec<Need> =
-            fronts.iter().map(|&front| counted(self.model, self.held, &analysed, front)).collect();
+        Ok(analysed)
+    }
+
+    /// What the factor of a method over fronts needs.
+    pub fn need(&self, analysed: &Analysed, method: Method) -> Need {
+        counted(self.model, self.held, analysed, method)
+    }
+
+    /// Factors what is analysed by the first of some methods over fronts whose factor fits.
+    ///
+    /// # Errors
+    /// As [`FactorRequest::factor`].
+    pub fn factor_analysed(
+        &self,
+        analysed: Analysed,
+        methods: &[Method],
+        clock: &mut StageClock,
+    ) -> Result<Factored, Refusal> {
+        let fronts = methods.iter().copied().filter(|method| method.has_fronts());
+        let needs: Vec<Need> = fronts.map(|method| self.need(&analysed, method)).collect();
         let admitted = self.admit(&needs)?;
-        let front = fronts.into_iter().find(|&f| Method::from(f) == admitted.method);
-        let front = front.unwrap_or(FrontMethod::Double);
-        let stiffness = self.model.stiffness();
-        match analysed.factor(stiffness, front, &mut |stage| clock.begin(stage)) {
+        let limit = self.limit_with_fallback(&analysed, &admitted);
+        let (stiffness, method) = (self.model.stiffness(), admitted.method);
+        match analysed.factor_within(stiffness, method, limit, &mut |stage| clock.begin(stage)) {
             // Too hard for single precision, which was taken for its size: what is short is memory.
             Err(SolveError::NotPositiveDefinite { .. }) if Some(&admitted) != needs.first() => {
                 Err(self.short_of(&needs[..1]))
@@ -53,8 +74,29 @@ impl FactorRequest<'_> {
         }
     }
 
+    /// Bytes that a factor may take: where single precision is admitted and there is room for a
+    /// factor in double precision beside it, room for both is reserved, should it not do.
+    fn limit_with_fallback(&self, analysed: &Analysed, admitted: &Need) -> u64 {
+        if !admitted.method.is_single() {
+            return u64::MAX;
+        }
+        let double = self.need(analysed, Method::Front);
+        let both = admitted.factor_bytes.saturating_add(double.factor_bytes);
+        let (own, held) = match self.subject.kept {
+            None => (both.saturating_add(admitted.model_bytes), 0),
+            Some(_) => (both, admitted.model_bytes),
+        };
+        match self.reservation.reserve(own, held) {
+            true => {
+                self.models.make_room(self.subject.kept);
+                both
+            }
+            false => admitted.factor_bytes,
+        }
+    }
+
     /// Reserves memory for the first of some needs that fits.
-    pub fn admit(&self, needs: &[Need]) -> Result<Need, Refusal> {
+    fn admit(&self, needs: &[Need]) -> Result<Need, Refusal> {
         admit(self.models, self.reservation, needs, self.subject)
             .map_err(|shortage| PlanError::Memory(shortage).into())
     }

@@ -156,7 +156,10 @@ impl Frame {
             factor_reused,
             chosen_because: because_of_memory(plan.why, plan.method, factored.method()),
         };
-        direct::answer(&stored.model, &factored, posed, clock)
+        let answer = direct::answer(&stored.model, &factored, posed, clock);
+        // Double precision may have been taken beside a factor in single precision.
+        resources.models.trim();
+        answer
     }
 
     fn kept_factor(&self) -> Option<Arc<Factored>> {

@@ -5,7 +5,7 @@ use softgrasp_core::fem::Element;
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::memory::{Need, Problem};
 use softgrasp_core::solve::work::MeshSize;
-use softgrasp_core::solve::{Analysed, FrontMethod, Method};
+use softgrasp_core::solve::{Analysed, Method};
 use softgrasp_protocol::{MeshData, ModelHash};
 
 use super::shortage::Shortage;
@@ -86,9 +86,9 @@ pub(crate) fn shortage(
 
 /// What a factor over fronts needs once its pattern is analysed, `held` bytes being what the model
 /// holds.
-pub(crate) fn counted(model: &Model, held: u64, analysed: &Analysed, front: FrontMethod) -> Need {
+pub(crate) fn counted(model: &Model, held: u64, analysed: &Analysed, method: Method) -> Need {
     let blocks = model.stiffness().pattern().block_count();
-    Need::counted(model.element(), front.into(), held, blocks, analysed.analysis())
+    Need::counted(model.element(), method, held, blocks, analysed.analysis())
 }
 
 /// Nodes that elements use, and elements; indices out of range are refused elsewhere.

@@ -8,7 +8,7 @@ use softgrasp_core::solve::choose::{
 use softgrasp_core::solve::memory::Need;
 use softgrasp_core::solve::rates::Rates;
 use softgrasp_core::solve::work::Work;
-use softgrasp_core::solve::{Analysed, FrontMethod, Method};
+use softgrasp_core::solve::{Analysed, Method};
 
 use super::admission::{Subject, admit};
 use super::error::PlanError;
@@ -152,7 +152,7 @@ pub(crate) fn plan_after_order(
     analysed: &Analysed,
     rates: &Rates,
     elapsed_ms: f64,
-    fits: impl Fn(FrontMethod) -> bool,
+    fits: impl Fn(Method) -> bool,
 ) -> Plan {
     let element = plan.element;
     let question = Question {
@@ -163,7 +163,7 @@ pub(crate) fn plan_after_order(
     let counted = Work::estimate(request.subject.problem.size, element);
     let counted = counted.counted(analysed.analysis());
     let mut plans = candidates_after_order(&question, element, &counted, rates);
-    plans.retain(|plan| FrontMethod::of(plan.method).is_none_or(&fits));
+    plans.retain(|plan| !plan.method.has_fronts() || fits(plan.method));
     let locks = plan.locks;
     let chosen = choose(&question, &plans, u64::MAX).unwrap_or(plan);
     let cost = chosen.cost.map(|cost| Cost { ms: cost.ms + elapsed_ms, ..cost });

@@ -5,14 +5,14 @@ use softgrasp_core::solve::choose::{LOCKING_POISSON, Plan};
 
 use super::once::OnceRequest;
 
-/// Why a plan was taken; `fell_back` says what was tried first.
-pub(crate) fn because(request: &OnceRequest, plan: &Plan, fell_back: Option<String>) -> String {
+/// Why a plan was taken.
+pub(crate) fn because(request: &OnceRequest, plan: &Plan) -> String {
     let choice = match request.is_method_open() {
         true => plan.to_string(),
         false if request.is_weighed() => String::new(),
         false => plan.why.clone(),
     };
-    let parts = [Some(choice), element_because(request, plan), fell_back];
+    let parts = [Some(choice), element_because(request, plan)];
     let parts: Vec<String> = parts.into_iter().flatten().filter(|p| !p.is_empty()).collect();
     match parts.is_empty() {
         true => "asked for".to_owned(),

@@ -18,9 +18,9 @@ pub enum SolveError {
         /// Axis of the pivot.
         axis: char,
     },
-    /// A method that has no factor of `K11`.
-    #[error("{method} does not factor the stiffness of the free nodes")]
-    NotDirect {
+    /// A method without a factor of the kind that is made here.
+    #[error("{method} has no factor of this kind")]
+    NoSuchFactor {
         /// The method.
         method: Method,
     },

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::analysed::{Analysed, FrontMethod};
+use super::analysed::Analysed;
 use super::error::SolveError;
 use super::fallback::Fallback;
 use super::kernel::Kernel;
@@ -75,7 +75,7 @@ impl Factored {
             false => Ok(()),
         };
         if method == Method::Condensed {
-            return Err(SolveError::NotDirect { method });
+            return Err(SolveError::NoSuchFactor { method });
         }
         check(method.dense_bytes(n).unwrap_or(0))?;
         let not_positive =
@@ -121,9 +121,8 @@ impl Factored {
                 Kernel::Sparse(Box::new(analysis.factor().map_err(not_positive)?))
             }
             Method::Front | Method::FrontMixed | Method::Pcg | Method::Condensed => {
-                let front = FrontMethod::of(method).unwrap_or(FrontMethod::Double);
                 let analysed = Analysed::new(stiffness, partition, on_stage);
-                return analysed.factor_within(stiffness, front, limit, on_stage);
+                return analysed.factor_within(stiffness, method, limit, on_stage);
             }
         };
         Ok(Self::of(method, partition, kernel, limit))
@@ -234,12 +233,12 @@ impl Analysed {
     pub fn factor(
         self,
         stiffness: &Stiffness,
-        front: FrontMethod,
+        method: Method,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Factored, SolveError> {
-        let kernel = self.kernel(stiffness, front, on_stage)?;
+        let kernel = self.kernel(stiffness, method, on_stage)?;
         // Nothing is left for another factor.
-        Ok(Factored::of(front.into(), self.into_partition(), kernel, 0))
+        Ok(Factored::of(method, self.into_partition(), kernel, 0))
     }
 
     /// The same, but where a factor in single precision fails, now or in refinement later, double
@@ -252,20 +251,19 @@ impl Analysed {
     pub fn factor_within(
         self,
         stiffness: &Stiffness,
-        front: FrontMethod,
+        method: Method,
         limit: u64,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Factored, SolveError> {
-        let method = Method::from(front);
-        let needed = self.peak_bytes(front);
+        let needed = self.peak_bytes(method);
         if needed > limit {
             let unknown_dofs = self.analysis().row_count();
             return Err(SolveError::OverLimit { method, unknown_dofs, needed, limit });
         }
-        let has_room = self.peak_bytes(FrontMethod::Double) <= limit;
-        let (kernel, began_with) = match self.kernel(stiffness, front, on_stage) {
+        let has_room = self.peak_bytes(Method::Front) <= limit;
+        let (kernel, began_with) = match self.kernel(stiffness, method, on_stage) {
             Err(SolveError::NotPositiveDefinite { .. }) if method.is_single() && has_room => {
-                let double = self.kernel(stiffness, FrontMethod::Double, on_stage)?;
+                let double = self.kernel(stiffness, Method::Front, on_stage)?;
                 (double, Some(Fallback::NoFactor))
             }
             kernel => (kernel?, None),

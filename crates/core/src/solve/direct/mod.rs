@@ -10,7 +10,7 @@ mod solution;
 #[cfg(test)]
 mod tests;
 
-pub use analysed::{Analysed, FrontMethod};
+pub use analysed::Analysed;
 pub use error::SolveError;
 pub use factored::Factored;
 pub use fallback::Fallback;

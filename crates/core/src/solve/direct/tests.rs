@@ -251,8 +251,8 @@ fn double_precision_is_not_taken_beyond_the_memory_limit() {
     let loads = Loads { q_known: &q_known, ..Loads::default() };
     let partition = Partition::try_new(&mesh.used_nodes(), &dofs).unwrap();
     let analysed = Analysed::new(&stiffness, partition, &mut |_| {});
-    let limit = analysed.peak_bytes(FrontMethod::Mixed);
-    match analysed.factor_within(&stiffness, FrontMethod::Mixed, limit, &mut |_| {}) {
+    let limit = analysed.peak_bytes(Method::FrontMixed);
+    match analysed.factor_within(&stiffness, Method::FrontMixed, limit, &mut |_| {}) {
         Err(SolveError::NotPositiveDefinite { .. }) => {}
         Err(other) => panic!("{other}"),
         Ok(factored) => {
