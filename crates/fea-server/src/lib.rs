@@ -8,6 +8,7 @@
 
 mod answer;
 mod budget;
+mod client_connection;
 mod clock;
 mod config;
 mod held_models;

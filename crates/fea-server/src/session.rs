@@ -2,18 +2,17 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{
     ConnectionError, Frame, FrameError, Hello, Kind, Limits, ModelHash, RejectCode, Rejected,
     Reply, Request, Welcome,
 };
 use tokio::net::TcpStream;
 use tokio::sync::{Semaphore, watch};
-use tokio::time::timeout;
 
 use crate::answer::{Readiness, answer_frame, prefetch, prove, readiness, solve_once, upload};
+use crate::client_connection::{ClientConnection, SessionError};
 use crate::clock::{StageClock, ms_since};
 use crate::held_models::HeldModels;
 use crate::refusal::Refusal;
@@ -42,9 +41,6 @@ impl ServerHandle {
 /// With more sessions, frames are shared out among the solving threads however small they are.
 const QUIET_MAX: usize = 4;
 
-/// A client that does not take its reply for this long is given up.
-const WRITE_MAX: Duration = Duration::from_secs(60);
-
 /// Serves one connection until the client goes, sends bytes that are no frames, or the server
 /// stops.
 pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut server: ServerHandle) {
@@ -52,10 +48,10 @@ pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut server: Serve
         tracing::warn!(%peer, %error, "TCP_NODELAY could not be set");
     }
     let limits = server.resources.config.limits();
+    let stall_limit = server.resources.config.stall_limit;
     let mut session = Session {
-        connection: Connection::new(stream, limits),
+        connection: ClientConnection::new(stream, limits, stall_limit),
         limits,
-        stall_limit: server.resources.config.stall_limit,
         authorised: server.resources.config.token.is_none(),
         held: HeldModels::new(Arc::clone(&server.resources)),
         out: Vec::new(),
@@ -73,24 +69,12 @@ pub(crate) async fn stopped(stop: &mut watch::Receiver<bool>) {
 }
 
 struct Session {
-    connection: Connection<TcpStream>,
+    connection: ClientConnection<TcpStream>,
     limits: Limits,
-    stall_limit: Duration,
     authorised: bool,
     held: HeldModels,
     /// Encoded reply, kept so that its memory is reused.
     out: Vec<u8>,
-}
-
-/// Why a session is given up.
-#[derive(Debug, thiserror::Error)]
-enum SessionError {
-    #[error(transparent)]
-    Connection(#[from] ConnectionError),
-    #[error("the client stopped inside a frame for {} s", .0.as_secs_f64())]
-    Stalled(Duration),
-    #[error("the client did not take its reply for {} s", WRITE_MAX.as_secs())]
-    NotTaken,
 }
 
 impl Session {
@@ -98,7 +82,7 @@ impl Session {
         loop {
             let mut stop = server.stop.clone();
             let frame = tokio::select! {
-                frame = self.next_frame() => frame,
+                frame = self.connection.next_frame() => frame,
                 () = stopped(&mut stop) => {
                     let text = "the server is stopping; connect again later".to_owned();
                     self.reject(0, RejectCode::ShuttingDown, text).await?;
@@ -113,21 +97,6 @@ impl Session {
                     return Err(ConnectionError::Frame(error).into());
                 }
                 Err(error) => return Err(error),
-            }
-        }
-    }
-
-    /// Waits for ever between frames, but not inside one.
-    async fn next_frame(&mut self) -> Result<Option<Frame>, SessionError> {
-        loop {
-            let inside = self.connection.is_inside_frame();
-            let received = self.connection.received();
-            match timeout(self.stall_limit, self.connection.read_frame()).await {
-                Ok(frame) => return Ok(frame?),
-                Err(_) if inside && self.connection.received() == received => {
-                    return Err(SessionError::Stalled(self.stall_limit));
-                }
-                Err(_) => {}
             }
         }
     }
@@ -162,10 +131,7 @@ impl Session {
                 return Ok(());
             }
         }
-        match timeout(WRITE_MAX, self.connection.write_bytes(&self.out)).await {
-            Ok(written) => Ok(written?),
-            Err(_) => Err(SessionError::NotTaken),
-        }
+        self.connection.write_bytes(&self.out).await
     }
 
     /// One request: decoded, worked on, answered. A bad request is answered and the session lives.

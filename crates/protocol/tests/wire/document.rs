@@ -7,17 +7,42 @@ use crate::samples::conversation;
 
 const DOCUMENT: &str = include_str!("../../../../docs/wire.md");
 
-/// Cells of the table under the heading `## title`, without its head.
+/// Cells of the tables under the heading `title`, without the first head.
 fn table(title: &str) -> Vec<Vec<String>> {
     let rows = DOCUMENT
         .lines()
-        .skip_while(|line| *line != format!("## {title}"))
+        .skip_while(|line| !line.starts_with('#') || line.trim_start_matches('#').trim() != title)
         .skip(1)
         .take_while(|line| !line.starts_with('#'))
         .filter(|line| line.starts_with('|'))
         .skip(2)
         .map(|line| line.trim_matches('|').split('|').map(|c| c.trim().to_owned()).collect());
     rows.collect()
+}
+
+#[test]
+fn the_document_is_about_this_version() {
+    assert!(DOCUMENT.contains(&format!("| 4 | u16 | protocol version, {VERSION} |")));
+    assert!(DOCUMENT.contains(&format!("\nVERSION = {VERSION}\n")), "the Python example");
+    assert!(!DOCUMENT.contains("magic, version 2"), "notes of the examples");
+}
+
+#[test]
+fn the_document_lists_every_field_of_the_report_in_order() {
+    // `Debug` of a structure names its fields in the order in which they are written.
+    let named = |debug: String| -> Vec<String> {
+        let lines =
+            debug.lines().filter(|line| line.starts_with("    ") && !line.starts_with("     "));
+        lines.filter_map(|line| Some(line.trim().split_once(": ")?.0.to_owned())).collect()
+    };
+    let rows = table("SolveReport");
+    let written: Vec<String> = rows.iter().map(|row| row[0].trim_matches('`').to_owned()).collect();
+    let known = named(format!("{:#?}", SolveReport::default()));
+    let stages = named(format!("{:#?}", StageMs::default()));
+    assert!(!known.is_empty() && !stages.is_empty());
+    // The second table of the section, with its head, is that of the stages.
+    let head = ["Field".to_owned(), "---".to_owned()];
+    assert_eq!(written, [known, head.to_vec(), stages].concat());
 }
 
 #[test]
@@ -65,7 +90,7 @@ fn the_examples_of_the_document_are_real_frames() {
         let message = conversation().into_iter().find(|message| message.kind() == kind).unwrap();
         hex(&message.encode())
     };
-    assert_eq!(shown, [frames(Kind::Ping), frames(Kind::SolveOnce)]);
+    assert_eq!(shown, [frames(Kind::Ping), frames(Kind::SolveOnce), frames(Kind::Answer)]);
 }
 
 /// The bytes of a block whose lines may end in `; a note`.
