@@ -72,6 +72,7 @@ def check_beyond(page, address):
     scope["known"] = [(3 * node, 0.001) for node in scope["right"]]
     check_methods(page, scope)
     check_zero_answer(scope)
+    check_empty_question(scope)
     check_shared_model(scope)
     check_last_words(scope)
 
@@ -85,6 +86,14 @@ def check_zero_answer(scope):
     assert all(u == (0.0, 0.0, 0.0) for _, u in answer["displacements"]), answer
     expected = sorted({dof for dof, _ in known} | set(scope["fixed"]))
     assert list(answer["reactions"]) == expected, answer
+
+
+def check_empty_question(scope):
+    """A frame that gives no displacement is answered where the fixed nodes hold the body."""
+    payload = scope["frame_payload"](scope["model"], [], quantised=True)
+    reader = scope["session"].ask(scope["FRAME"], payload, scope["ANSWER"])
+    answer = scope["read_answer"](reader)
+    assert all(u == (0.0, 0.0, 0.0) for _, u in answer["displacements"]), answer
 
 
 def check_shared_model(scope):
