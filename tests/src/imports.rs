@@ -257,7 +257,10 @@ fn without_comments_and_tests(text: &str) -> String {
         _ => line,
     });
     let mut code = lines.collect::<Vec<_>>().join("\n");
-    while let Some(at) = code.find("#[cfg(test)]") {
+    let of_tests = |code: &str| {
+        ["#[cfg(test)]", "#[cfg(all(test"].iter().filter_map(|text| code.find(text)).min()
+    };
+    while let Some(at) = of_tests(&code) {
         let item = &code[at..];
         let end = match (item.find(';'), item.find('{')) {
             (Some(semicolon), Some(brace)) if semicolon < brace => semicolon + 1,

@@ -1,12 +1,13 @@
 //! Report `accuracy`: every element against closed forms and published values.
 //!
-//! A further element is one more entry of [`ELEMENTS`].
+//! A further element is one more entry of the list in `elements.rs`.
 
 mod bar;
 mod block;
 mod cantilever;
 mod clamped_block;
 mod discrete;
+mod elements;
 mod indentation;
 mod membrane;
 mod mirror;
@@ -17,15 +18,5 @@ mod report;
 mod thick_sphere;
 mod waves;
 
-use softgrasp_core::fem::Element;
-
+use elements::{ELEMENTS, order};
 pub use report::measure;
-
-/// Elements that every case is solved with.
-pub const ELEMENTS: &[Element] = &Element::ALL;
-
-/// Power of the size of an element with which displacements converge on straight-edged bodies, in
-/// the mean over the volume: one more than the degree of the polynomials that the element holds.
-fn order(element: Element) -> f64 {
-    if element.node_count() == 10 { 3.0 } else { 2.0 }
-}

@@ -204,7 +204,7 @@ impl Session {
                             Workers::run_here(|| kept.answer(&resources, clock()))?
                         }
                         Readiness::NotReady(request) => {
-                            workers.run(move || answer_frame(&resources, request, clock())).await?
+                            workers.run(move || answer_frame(&resources, *request, clock())).await?
                         }
                     },
                     false => {

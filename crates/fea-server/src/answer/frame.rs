@@ -49,14 +49,14 @@ pub(crate) enum Readiness {
     /// A small product with what is kept.
     Ready(Box<KeptFrame>),
     /// Anything else.
-    NotReady(FrameRequest),
+    NotReady(Box<FrameRequest>),
 }
 
 /// Looks whether a frame is a small product with what is kept, and holds on to what was found.
 pub(crate) fn readiness(resources: &Resources, request: FrameRequest) -> Readiness {
     match kept_frame(resources, &request) {
         Some(kept) => Readiness::Ready(Box::new(kept)),
-        None => Readiness::NotReady(request),
+        None => Readiness::NotReady(Box::new(request)),
     }
 }
 
