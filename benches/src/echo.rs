@@ -1,4 +1,4 @@
-//! The least that a round trip can cost: the same bytes to and fro, without any work.
+//! An echo of the same bytes without any work: the least that a round trip can cost.
 
 use std::io::{Error, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};

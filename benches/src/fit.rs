@@ -1,4 +1,4 @@
-//! Laws T = k Nᵐ (6.1) fitted to measured times, with what is not known about them.
+//! Laws T = k Nᵐ (6.1) fitted to measured times, with their uncertainty.
 
 use crate::report::ReportError;
 

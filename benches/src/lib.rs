@@ -1,6 +1,6 @@
 //! Reports of Softgrasp: measured figures, each beside its error.
 //!
-//! The way of a report: a [`scene`] is set up and its answer known ([`reference`]); competitors
+//! How a report is made: a [`scene`] is set up and its answer known ([`reference`]); competitors
 //! take turns ([`sample`]), and none's time counts before its answer was compared; [`table`] and
 //! [`plot`] give it a form, and [`report`] writes it under the head that [`machine`] knows.
 //! A further report is one more file, one more [`ReportName`] and one more arm of [`run`].

@@ -1,4 +1,4 @@
-//! Why a report could not be made.
+//! Errors of making a report.
 
 use std::path::PathBuf;
 

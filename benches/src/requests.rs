@@ -1,4 +1,4 @@
-//! What every report asks of a server: to keep a model and to answer frames; and a frame in bytes.
+//! The requests of all reports to a server: to keep a model and to answer frames.
 
 use glove_client::connection::{LinkError, ServerConnection, unexpected};
 use softgrasp_protocol::{

@@ -1,4 +1,4 @@
-//! Taking turns and taking medians: how times are measured on a machine that is never quite quiet.
+//! Measures times in turns and takes medians, because no machine is quite quiet.
 
 use std::time::{Duration, Instant};
 

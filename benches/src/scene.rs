@@ -1,4 +1,4 @@
-//! What is solved in every report: an object held and pressed by five fingertips.
+//! The scene of every report: an object held and pressed by five fingertips.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;

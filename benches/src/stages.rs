@@ -1,4 +1,4 @@
-//! Time by stage: the core announces each stage, this takes the time.
+//! Measures the time of each stage that the core announces.
 
 use std::time::Instant;
 

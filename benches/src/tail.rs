@@ -1,4 +1,4 @@
-//! How long the slowest answers take: quantiles far out, and the curve of what is slower.
+//! The slowest answers: high quantiles, and the share that is slower than a given time.
 
 use crate::plot::PlotPoint;
 use crate::sample::quantile;

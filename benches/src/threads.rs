@@ -1,4 +1,4 @@
-//! Pools of exact size, and which sizes are measured.
+//! Pools of exact size, and the sizes that are measured.
 
 use crate::report_error::ReportError;
 

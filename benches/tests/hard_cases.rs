@@ -1,5 +1,5 @@
-//! The small form of `hard-cases`: every way keeps what was promised, and every kind of promise is
-//! there.
+//! The small form of `hard-cases`: every method keeps what was promised, and every kind of promise
+//! occurs.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 

@@ -1,4 +1,4 @@
-//! Small forms of the reports: files are there, rows are there, errors are small.
+//! Small forms of the reports: their files and rows are there, and errors are small.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 

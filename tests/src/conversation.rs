@@ -1,4 +1,4 @@
-//! One client's whole conversation with a server, to be held again under other conditions.
+//! A conversation of one client with a server, which tests repeat under other conditions.
 
 use std::net::SocketAddr;
 

@@ -1,4 +1,4 @@
-//! What of a reply must be the same to the last bit every time: all but times and memory.
+//! The part of a reply that must have the same bits every time: all but times and memory.
 
 use softgrasp_protocol::{
     Answer, Displacements, ModelHash, NodeChoice, RejectCode, Reply, SolveReport,

@@ -1,4 +1,4 @@
-//! What the system tests share: questions to ask, ways to ask them, and ways to disturb the asking.
+//! Shared by the system tests: questions, clients, disturbed connections, checks of files.
 
 pub mod conversation;
 pub mod fake_server;

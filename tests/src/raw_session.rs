@@ -1,4 +1,4 @@
-//! A client that sends any bytes it likes.
+//! A client that sends any bytes, whether they make sense or not.
 
 use std::io::Write;
 use std::net::{Shutdown, SocketAddr, TcpStream};

@@ -1,4 +1,4 @@
-//! The whole story, headless: reach, attach, squeeze, keep the shape, grasp again, let go.
+//! A whole run without a window: reach, attach, squeeze, keep the shape, grasp again, let go.
 //!
 //! The list of grasp events of each run is a golden file in `tests/golden`; `UPDATE_GOLDEN=1`
 //! writes them anew, and then a person looks at the difference.

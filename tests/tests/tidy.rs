@@ -1,4 +1,4 @@
-//! Rules of the repository that no compiler checks: form of files, layers, documents that stay true.
+//! Rules of the repository that no compiler checks: form of files, layers, true documents.
 
 use std::collections::BTreeSet;
 use std::fs;

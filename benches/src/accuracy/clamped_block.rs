@@ -1,4 +1,4 @@
-//! A block clamped below and pushed sideways: what an element that locks cannot do.
+//! A block clamped below and pushed sideways, on which elements that lock are too stiff.
 
 use softgrasp_core::fem::{AXES, Element};
 

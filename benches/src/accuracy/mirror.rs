@@ -1,4 +1,4 @@
-//! Mirror images: what is symmetric stays so, and a mirrored question has the mirrored answer.
+//! Mirror images: a mirrored question must have the mirrored answer.
 
 use std::collections::BTreeMap;
 

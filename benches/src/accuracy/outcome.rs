@@ -1,4 +1,4 @@
-//! What a case gives for one element on one mesh.
+//! The outcome of a case for one element on one mesh.
 
 use softgrasp_core::fem::Element;
 

@@ -1,4 +1,4 @@
-//! One scene: many contacts, many grips of each, every bound against the true error.
+//! Attacks the bound in one scene: random grips, every bound compared with the true error.
 
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Delivery, Touched};

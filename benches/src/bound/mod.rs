@@ -1,4 +1,4 @@
-//! Report `bound`: random grips, and whether the proven bound is ever below the true error.
+//! Report `bound`: random grips whose proven bound must not be below the true error.
 
 mod attack;
 mod exact;

@@ -1,4 +1,4 @@
-//! The report: how far above the true error the bound is, by family and by kind of contacts.
+//! Writes the report: how far above the true error the bound is, by body and contacts.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Bodies that are gripped: blocks, rods and sheets in several units, soft and nearly incompressible.
+//! Bodies that are gripped: blocks, rods and sheets, in several units and materials.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;

@@ -1,4 +1,4 @@
-//! Bounds over true errors, counted.
+//! Counts proven bounds over true errors.
 
 use std::collections::BTreeMap;
 

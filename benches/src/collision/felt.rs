@@ -1,4 +1,4 @@
-//! What the grasp asks about a hand in every tick, answered by the sphere tree and by the peer.
+//! Finds what a hand touches in a tick, by the sphere tree and by the peer.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::bounding_volume::Aabb;

@@ -1,4 +1,4 @@
-//! The hands that search: each closes around the object until its fingertips are in it.
+//! The poses of hands that close around the object until their fingertips are inside it.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use softgrasp_core::hand::{HandColliders, HandDimensions, JointAngles, pose};

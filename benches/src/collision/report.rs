@@ -1,4 +1,4 @@
-//! The page: the ratios of like with like first, every one of them, then the times.
+//! Writes the page: the ratios of like with like first, every one of them, then the times.
 
 use softgrasp_core::mesh::BuiltIn;
 

@@ -1,4 +1,4 @@
-//! Whether the answer to a press is right: forces in balance, held nodes and masks as asked.
+//! Checks the answer to a press: forces balance, nodes and masks move as prescribed.
 
 use softgrasp_core::solve::{Loads, Method};
 use softgrasp_protocol::{Answer, Question};

@@ -1,4 +1,4 @@
-//! The page: frames of the default contact first, then of single nodes, then of every method.
+//! Writes the page: frames of the default contact, of single nodes, then of every method.
 
 use glove_client::connection::{Host, ServerChoice};
 use softgrasp_core::mesh::BuiltIn;

@@ -1,4 +1,4 @@
-//! The figure: for every object time against both errors, what is worth its time drawn strong.
+//! The figure: for every object time against both errors; rows that no other beats are strong.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;

@@ -1,4 +1,4 @@
-//! Which of several answers are worth their time.
+//! Finds the answers that no other answer beats in both time and error.
 
 /// Marks those that no other one beats: faster, and with an error no more than `same` times as
 /// large.

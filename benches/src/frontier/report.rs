@@ -1,4 +1,4 @@
-//! The page: every object in turn, its finest mesh, its rows.
+//! Writes the page: every object in turn, its finest mesh, its rows.
 
 use super::contest::contest;
 use super::figure::{Time, figure};

@@ -1,4 +1,4 @@
-//! One row: an object, its elements, a way to the answer, and whether it is worth its time.
+//! One row: an object, its element, a method, and whether another row beats it.
 
 use super::contest::Outcome;
 use super::pareto::marks;

@@ -1,4 +1,4 @@
-//! One system of equations: an object, its element, and what the right answer is.
+//! One system of equations: an object, its element, and the right answer.
 
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::model::{Element, Known, Model, ModelError};

@@ -1,4 +1,4 @@
-//! What a way answers, whichever it is.
+//! The answer to a hard case, in the same form for every method.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! Contacts beside each other and on top of each other.
+//! Cases with contacts on neighbouring nodes, and twice on one node.
 
 use nalgebra::Point3;
 

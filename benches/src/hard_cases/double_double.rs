@@ -1,4 +1,4 @@
-//! Sums of two doubles, and a dense factor made of them: the last resort for a right answer.
+//! Sums of two doubles, and a dense factor made of them, for right answers of hard cases.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

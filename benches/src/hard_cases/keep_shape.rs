@@ -1,4 +1,4 @@
-//! Shapes that are kept again and again: every answer is the next question's shape.
+//! Cases in which a shape is kept again and again: each answer is the next rest shape.
 
 use nalgebra::Vector3;
 use softgrasp_core::mesh::Inversion;

@@ -1,4 +1,4 @@
-//! What no digit helps against: linear elements lock as ν comes near one half.
+//! Measures how linear elements lock as Poisson's ratio nears one half.
 
 use softgrasp_core::fem::{Material, QuadraticMesh, dof};
 use softgrasp_core::model::{Element, Model, ModelError};

@@ -1,4 +1,4 @@
-//! Hard materials: nearly incompressible, and stiff beside soft.
+//! Cases with hard materials: nearly incompressible, and stiff beside soft.
 
 use nalgebra::Point3;
 use softgrasp_core::fem::Material;

@@ -1,4 +1,4 @@
-//! Report `hard-cases`: what every way does where numbers get difficult, against what was promised.
+//! Report `hard-cases`: what every method does where numbers get difficult, and what was promised.
 
 mod answer;
 mod case;

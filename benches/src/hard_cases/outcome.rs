@@ -1,4 +1,4 @@
-//! What became of a question: exact, degraded as stated, refused with reason, or failed.
+//! The outcome of a question: exact, degraded as stated, refused with reason, or failed.
 
 use softgrasp_core::solve::ERROR_UNREMARKABLE;
 

@@ -1,4 +1,4 @@
-//! Pieces that hang together by a node or an edge, and bodies that nothing touches.
+//! Cases with pieces joined by a node or an edge, and with bodies that nothing touches.
 
 use nalgebra::{Point3, Vector3};
 

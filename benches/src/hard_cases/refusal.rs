@@ -1,4 +1,4 @@
-//! Why a way gives no answer, as a kind that can be compared with the right one.
+//! The kinds of refusals, to compare the reason of a refusal with the right one.
 
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;

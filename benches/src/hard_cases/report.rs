@@ -1,4 +1,4 @@
-//! The report: every way through every case, what became of it, and what a user should do.
+//! Writes the report: the outcome of every method in every case, and what a user should do.
 
 use super::case::{Case, Family, Form};
 use super::outcome::Outcome;

@@ -1,4 +1,4 @@
-//! One way through one case: asked under a time limit on pools of several sizes, and judged.
+//! One row: a method asked one case under a time limit on several pools, and judged.
 
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};

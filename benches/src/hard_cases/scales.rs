@@ -1,4 +1,4 @@
-//! Units and amounts: neither changes an answer but by its scale.
+//! Cases in other units and amounts, which change an answer by their factor only.
 
 use softgrasp_core::fem::Material;
 

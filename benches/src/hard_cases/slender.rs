@@ -1,4 +1,4 @@
-//! Sheets and rods of one element's thickness.
+//! Cases of sheets and rods that are one element thick.
 
 use super::case::{Case, Family, Form, Question, plain};
 use super::shapes::block;

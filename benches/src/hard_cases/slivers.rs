@@ -1,4 +1,4 @@
-//! Elements that are nearly flat or nearly a line.
+//! Cases with elements that are nearly flat or nearly a line.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::mesh::{MeshError, Quality, TetMesh};

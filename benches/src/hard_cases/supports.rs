@@ -1,4 +1,4 @@
-//! Bodies that contacts hold weakly or not at all.
+//! Cases of bodies that contacts hold weakly or not at all.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::mesh::TetMesh;

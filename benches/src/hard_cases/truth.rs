@@ -1,4 +1,4 @@
-//! The right answer of a case, and how far another one is from it.
+//! The right answer of a case, and the error of another answer to it.
 
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{ERROR_UNREMARKABLE, Loads, Method};

@@ -1,4 +1,4 @@
-//! The ways to an answer: every method with every element, `condensed`, masks, and the server.
+//! Lists what is asked: every method with every element, `condensed`, masks, and the server.
 
 use glove_client::connection::Host;
 use softgrasp_core::model::Element;

@@ -1,4 +1,4 @@
-//! What became of the ticks of one loop: when each was over, and what the server did in it.
+//! The record of a loop's ticks: when each ended, and the server's times in it.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! The page: late ticks with a server and without, with real-time rights and without.
+//! Writes the page: late ticks with a server and without, with real-time rights and without.
 
 use softgrasp_core::mesh::BuiltIn;
 

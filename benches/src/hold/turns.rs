@@ -1,4 +1,4 @@
-//! Loops take turns of a second, so that what else the machine does falls on all of them alike.
+//! Lets loops take turns of a second, so that other work on the machine disturbs all alike.
 
 use glove_client::pace::be_urgent;
 

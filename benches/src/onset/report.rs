@@ -1,4 +1,4 @@
-//! The page: how long the first frame of a grip takes, beside one sparse solve.
+//! Writes the page: how long the first frame of a grip takes, beside one sparse solve.
 
 use std::time::{Duration, Instant};
 

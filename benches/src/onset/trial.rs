@@ -1,4 +1,4 @@
-//! One touch after the other, with and without prefetch, and the checks of their answers.
+//! Measures first frames of grips, with and without prefetch, and checks their answers.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

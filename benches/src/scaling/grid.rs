@@ -1,4 +1,4 @@
-//! Times over sizes, shapes, methods and processors.
+//! Measures times over sizes, kinds of objects, methods and processors.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! Figures 5.1 and 5.2: which procedures of the system, and which stages of the analysis, take the
-//! time.
+//! Figures 5.1 and 5.2: the share of time of each procedure of the system and each stage of the
+//! analysis.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! The page: tables, laws, and the 1998 figures beside ours.
+//! Writes the page: tables, laws, and the 1998 figures beside ours.
 
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::Method;

@@ -1,4 +1,4 @@
-//! The two programs as processes: found beside this one, started, waited for, ended.
+//! Starts the two programs as processes, waits for them and ends them.
 
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};

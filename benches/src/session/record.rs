@@ -1,4 +1,4 @@
-//! What a run in real time was like for its user, from the JSON report it wrote.
+//! Reads from the JSON report of a run in real time what its user got.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The page: how old the shown answer is, what was not answered and why, and one large object.
+//! Writes the page: age of the shown answer, ticks without one and why, and one large object.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! One object in one arrangement of programs: its runs, added up.
+//! The runs of one object with one arrangement of programs, added up.
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! A shape that can be asked: mesh, stiffness, bodies, and the degrees of freedom the scene fixes.
+//! The finite element model of a body: mesh, stiffness, connected parts, fixed degrees of freedom.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Solid shapes the hand is approximated by (thesis Figure 4.14), in any one frame.
+//! Solids that approximate the hand (thesis Figure 4.14), in one frame of coordinates.
 
 use nalgebra::{Point3, Unit, Vector3};
 

@@ -1,4 +1,4 @@
-//! The memory that all requests and all that is kept may take together.
+//! The memory that kept models and requests under way may take together.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};

@@ -1,4 +1,4 @@
-//! Stage times of one request.
+//! Measures the time of each stage of a request.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};

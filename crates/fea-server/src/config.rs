@@ -1,4 +1,4 @@
-//! What a server is started with, and what it checks before it starts.
+//! The settings of a server, checked before it starts.
 
 use std::net::SocketAddr;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! The models that one session has named: none of them is forgotten while another session holds it.
+//! The models that one session holds: no other session's `Drop` removes them.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

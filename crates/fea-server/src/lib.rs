@@ -1,10 +1,10 @@
 //! Finite element server of Softgrasp, as a library so that the client can embed it.
 //!
-//! The way of a request: [`session`] reads a message from its socket and decodes it, [`workers`] take
-//! it from tokio to the rayon pool through a bounded queue, [`request`] checks what it names, [`plan`]
-//! decides by which method it is answered and reserves the memory, [`answer`] finds the model (in the
-//! [`store`] or in the request) and solves, and the session writes the reply. [`resources`] are what
-//! all requests share.
+//! The path of a request: [`session`] reads a message from its socket and decodes it, [`workers`]
+//! take it from tokio to the rayon pool through a bounded queue, [`request`] checks what it names,
+//! [`plan`] decides by which method it is answered and reserves the memory, [`answer`] finds the model
+//! (in the [`store`] or in the request) and solves, and the session writes the reply. [`resources`]
+//! are what all requests share.
 
 mod answer;
 mod budget;

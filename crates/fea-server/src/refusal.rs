@@ -1,4 +1,4 @@
-//! From what went wrong to what the client is told.
+//! The reasons for which a request is refused, and the message that tells the client.
 
 use softgrasp_core::fem::MaterialError;
 use softgrasp_core::mesh::MeshError;

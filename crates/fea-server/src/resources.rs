@@ -1,4 +1,4 @@
-//! What all requests of one server share.
+//! The resources that all requests of one server share.
 
 use crate::budget::Budget;
 use crate::config::ServerConfig;

@@ -1,4 +1,4 @@
-//! Listening, accepting, stopping.
+//! Listens for connections, accepts sessions, and stops them.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};

@@ -1,4 +1,4 @@
-//! One client's connection: frames in, frames out, in order.
+//! A session: reads one client's requests and writes the replies, in order.
 
 use std::net::SocketAddr;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Uploads under way: of two uploads of one mesh, the second waits for the first and finds its model.
+//! Uploads under way: the second upload of a mesh waits for the first and finds its model.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! The one place where tokio and rayon meet: a bounded queue of work for a pool of exact size.
+//! Hands work from tokio to a rayon pool of exact size, through a bounded queue.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::{Arc, mpsc};

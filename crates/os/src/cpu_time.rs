@@ -1,4 +1,4 @@
-//! How long a thread has computed, not counting the time it slept or waited for a processor.
+//! Measures how long a thread has computed, without the time it slept or waited.
 
 use std::time::Duration;
 

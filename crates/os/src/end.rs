@@ -1,4 +1,4 @@
-//! The end of a program that does not come to its end by itself.
+//! Ends a program after a time limit if it has not ended by itself.
 
 use std::time::Duration;
 

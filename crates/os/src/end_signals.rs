@@ -1,4 +1,4 @@
-//! The signals that ask a program to end: waited for by a thread, never handled in place.
+//! Waits, on a thread of its own, for the signals that ask a program to end.
 //!
 //! METIS takes SIGTERM and SIGABRT over while it orders (`gk_sigtrap`) and answers them by a
 //! `longjmp` on whichever thread the system gave the signal to. A program that was asked to end at

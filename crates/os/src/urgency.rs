@@ -1,4 +1,4 @@
-//! Threads that keep a schedule of a millisecond are scheduled before those that do not.
+//! Asks the system for real-time scheduling of the calling thread, and gives it back.
 
 use std::io;
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a stream, a payload, a message to be sent, or the connection below.
+//! Errors of a stream, a payload, a message to be sent, and the connection below.
 
 use std::io;
 

@@ -1,4 +1,4 @@
-//! The numbers of the format: what every reader and writer of it must agree on.
+//! Constants of the format, on which every reader and writer must agree.
 
 /// First bytes of every frame.
 pub const MAGIC: [u8; 4] = *b"SGRP";

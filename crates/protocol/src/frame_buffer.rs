@@ -1,4 +1,4 @@
-//! Frames out of bytes that come in any pieces.
+//! Collects bytes that come in any pieces into frames.
 
 use bytes::{Buf, Bytes, BytesMut};
 

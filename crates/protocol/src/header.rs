@@ -1,4 +1,4 @@
-//! The 32 bytes before every payload.
+//! The header of a frame: the 32 bytes before every payload.
 
 use crate::format::{HEADER_LEN, MAGIC, VERSION};
 use crate::{FrameError, Limits};

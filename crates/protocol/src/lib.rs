@@ -1,4 +1,4 @@
-//! Bytes ⇄ messages of the Softgrasp wire, without I/O.
+//! Turns bytes into messages of the Softgrasp wire and back, without I/O.
 //!
 //! A stream is a sequence of frames; a frame is a 32-byte header and a payload; a payload is one
 //! small part in bincode's format followed by raw little-endian arrays. `docs/wire.md` describes

@@ -1,4 +1,4 @@
-//! How large anything that comes from the other side may be.
+//! Upper limits on everything that comes from the other side.
 
 use wincode::{SchemaRead, SchemaWrite};
 

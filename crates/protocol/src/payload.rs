@@ -1,4 +1,4 @@
-//! Inside a payload: one bincode part, then raw little-endian arrays on eight-byte borders.
+//! The payload of a frame: one bincode part, then little-endian arrays on eight-byte borders.
 
 use wincode::config::{Configuration, Serialize};
 use wincode::io::Reader;

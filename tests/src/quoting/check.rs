@@ -1,4 +1,4 @@
-//! Whether every figure of a text stands in the reports, and everything that is named is quoted.
+//! Checks that every figure of a text is in the reports, and every named column is quoted.
 
 use super::figure::{Figure, figures};
 use super::item::{Item, items};

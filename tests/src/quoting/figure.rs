@@ -1,4 +1,4 @@
-//! The figures of a text: numbers with the precision and the unit they are written with.
+//! Finds the figures of a text: numbers with their precision and unit as written.
 
 use super::unit::Unit;
 

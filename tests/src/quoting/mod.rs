@@ -1,4 +1,4 @@
-//! Figures that a document quotes from reports, found in the reports again.
+//! Finds the figures that a document quotes from reports in the reports again.
 //!
 //! A paragraph, bullet or table row names where its figures come from in a comment that is not
 //! shown: `<!-- frame.csv | contact = mask | nodes = 10648 | -> p50_ms, error_rel -->`: the file,

@@ -1,4 +1,4 @@
-//! Where figures come from: rows and columns of one file of a report.
+//! The source of figures: rows and columns of one file of a report.
 
 use super::unit::Unit;
 

@@ -1,4 +1,4 @@
-//! Units of figures and columns, as far as one can be turned into another.
+//! The units of figures and columns, and the conversion between them.
 
 /// What a number counts, with the factor to the base of its kind.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! How far two answers are apart, and what the printed digits allow.
+//! Compares two answers, and says by how much printed digits let them differ.
 //!
 //! CalculiX prints seven digits, so a number that agrees is within half a unit of the seventh of
 //! what is printed: at most 5e-7 of the number itself. Both programs also round within: a number

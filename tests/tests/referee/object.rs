@@ -1,4 +1,4 @@
-//! What is compared: built-in objects, and mesh files of others.
+//! The objects that are compared: built-in ones, and mesh files of others.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! What is asked about an object: several sets of known displacements, and external forces.
+//! The questions about an object: several sets of known displacements, and external forces.
 
 use softgrasp_core::fem::{Element, Material, dof};
 use softgrasp_core::model::Model;

@@ -1,4 +1,4 @@
-//! The product's answers: by its program, by its server over a socket, by its mathematics.
+//! Answers of Softgrasp: by its program, by its server over a socket, by its mathematics.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Requests that make no sense: refused with the right code and a text that says what is wrong
-//! where, and the session goes on.
+//! Requests that make no sense: refused with the right code and a text that names the fault, and
+//! the session goes on.
 
 use fea_server::{RunningServer, ServerConfig};
 use glove_client::connection::ServerConnection;

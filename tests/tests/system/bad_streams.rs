@@ -1,4 +1,4 @@
-//! Bytes that are no frames, and frames that lie: an answer or a close, for that session only.
+//! Bytes that are not frames, and frames with wrong sizes: only their session is refused.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};

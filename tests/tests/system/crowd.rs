@@ -1,4 +1,4 @@
-//! A crowd of clients that bring one mesh at the same moment: nobody waits for ever.
+//! Many clients bring one mesh at the same moment: all of them are answered.
 //!
 //! Threads that wait inside a parallel loop take other requests from the queue. When one of them needed
 //! a number that the loop they had left was working out (the condition of the base, the proof of its

@@ -1,4 +1,4 @@
-//! A link that splits, delays or cuts the bytes: same answers, or a clean end.
+//! Connections that split, delay or cut the bytes: same answers, or a clean end.
 
 use std::time::Duration;
 

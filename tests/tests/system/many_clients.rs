@@ -1,4 +1,4 @@
-//! Several clients at once: nobody's answer depends on who else is there.
+//! Several clients at once: no answer depends on the other clients.
 
 use std::time::Duration;
 

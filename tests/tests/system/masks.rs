@@ -1,4 +1,4 @@
-//! Contacts held by a weighted mean of nodes, end to end: right answers, kept sets, clear refusals.
+//! Contacts held by a weighted mean of nodes: right answers, kept sets, clear refusals.
 
 use fea_server::RunningServer;
 use glove_client::connection::ServerConnection;

@@ -1,4 +1,4 @@
-//! Memory: predicted and counted before it is taken, refused with the numbers, and the session lives.
+//! Memory: predicted and counted before it is taken, refused with numbers; the session lives on.
 
 use fea_server::ServerConfig;
 use glove_client::connection::{LinkError, ServerConnection};

@@ -1,4 +1,4 @@
-//! A server that stops while it is asked: a clean end for its clients, in time.
+//! A server that stops while clients ask: they end cleanly and in time.
 
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};

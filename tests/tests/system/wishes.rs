@@ -1,5 +1,5 @@
-//! Deadline, error budget and choice of the element: what `auto` makes of them, and what is said
-//! when they cannot be met.
+//! Deadline, error budget and choice of the element: what `auto` chooses for them, and what the
+//! report says when they cannot be kept.
 
 use fea_server::ServerConfig;
 use glove_client::connection::ServerConnection;

@@ -1,4 +1,4 @@
-//! A mask: surface nodes with weights, held by their mean displacement instead of one by one.
+//! A mask: surface nodes with weights, whose weighted mean displacement is prescribed.
 
 use std::cmp::Ordering;
 

@@ -1,4 +1,4 @@
-//! What a fingertip holds where it touches: the surface around a node, weighted by pressure.
+//! Contacts of fingertips as masks: the surface around a touched node, weighted by pressure.
 
 mod mask;
 mod pressure;

@@ -1,4 +1,4 @@
-//! How degrees of freedom are numbered.
+//! The numbering of degrees of freedom.
 
 /// Degrees of freedom per node: displacements along x, y and z.
 pub const AXES: usize = 3;

@@ -1,4 +1,4 @@
-//! The finite elements there are.
+//! The kinds of finite elements, and their names.
 
 /// Which finite element a model is made of, in the order of what they cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,4 +1,4 @@
-//! Which elements use a node.
+//! Lists, for every node, the elements that use it.
 
 /// For each node the elements that use it, in element order (counting sort).
 pub(super) fn elements_around<const K: usize>(

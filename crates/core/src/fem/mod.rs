@@ -1,4 +1,4 @@
-//! Finite elements (thesis chapter 3): material, tetrahedra of four and ten nodes, assembly, strain.
+//! Finite elements (thesis chapter 3): material, tetrahedra, assembly, strain.
 
 mod assembly;
 mod dofs;

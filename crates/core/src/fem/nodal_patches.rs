@@ -1,4 +1,4 @@
-//! Averaged nodal pressure: linear tetrahedra that do not lock when the material hardly gives way.
+//! Averaged nodal pressure: linear tetrahedra that do not lock on nearly incompressible material.
 //!
 //! A linear tetrahedron has one volume change, and there are more tetrahedra than nodes can serve:
 //! as Poisson's ratio nears 0.5 each of them wants its volume back and nothing moves. Here the

@@ -1,4 +1,4 @@
-//! Where the entries of the global stiffness matrix are, known before any value is (thesis 3.5.2).
+//! The sparsity pattern of the global stiffness matrix (thesis 3.5.2).
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! How far an answer leaves the range of linear elasticity: largest element strain and rotation.
+//! The largest rotation and strain of an element: how far linear elasticity can be trusted.
 
 use nalgebra::{Matrix3, Vector3};
 

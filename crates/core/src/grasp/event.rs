@@ -1,4 +1,4 @@
-//! What goes into a tick of the grasp and what comes out.
+//! Input, output and events of one tick of the grasp.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

@@ -1,4 +1,4 @@
-//! The grasp with real geometry: colliders, a sphere tree and the state machine together.
+//! Tests of the grasp with real geometry: colliders, a sphere tree and the state machine.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! From the hand's colliders and the sphere tree to what each finger touches.
+//! Finds what each finger touches, from the hand's colliders and the sphere tree.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

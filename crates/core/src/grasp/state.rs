@@ -1,4 +1,4 @@
-//! The states of a grasp; each owns the data that is true in it.
+//! The states of a grasp, each with the data that only it needs.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

@@ -1,4 +1,4 @@
-//! The state machine alone: every small input, thousands of random steps, noise, single rules.
+//! Tests of the state machine alone: every small input, random steps, noise, single rules.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! How a fingertip's contact point moves when one joint turns.
+//! The derivative of a fingertip's contact point by the angle of one joint.
 
 use nalgebra::{Isometry3, Matrix3x4, Point3, Vector3};
 

@@ -1,4 +1,4 @@
-//! From joint angles to the place of every finger segment.
+//! Computes the place of every finger segment from the joint angles.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 

@@ -1,4 +1,4 @@
-//! Connected parts of a mesh: bodies that hang together by nodes, pieces by faces.
+//! Connected parts of a mesh: bodies are connected through nodes, pieces through faces.
 
 use super::TetMesh;
 use super::faces::Faces;

@@ -1,4 +1,4 @@
-//! Other files that a mesh file needs, asked for by what the file itself knows about them.
+//! Names the other files that a mesh file needs, as the file itself refers to them.
 
 use std::fmt;
 

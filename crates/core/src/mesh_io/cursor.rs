@@ -1,4 +1,4 @@
-//! Position in a file: words, lines and raw bytes come off the front, errors name the place.
+//! A position in a file from which words, lines and bytes are read; errors name the place.
 
 use super::error::{Fault, MeshFileError, Place};
 use super::number::{parse_integer, parse_real};

@@ -1,4 +1,4 @@
-//! Why a mesh file could not be used: one line with file, place, what was expected, what was found.
+//! Errors of mesh files: one line with file, place, what was expected, what was found.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! What a mesh file was found to hold besides the mesh that came out of it.
+//! Findings: what a mesh file holds besides the mesh that is made of it.
 
 use std::collections::BTreeMap;
 

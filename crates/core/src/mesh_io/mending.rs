@@ -1,4 +1,4 @@
-//! Tetrahedra of a file that cannot be used as they stand: which, what is done, what it changes.
+//! Mends the tetrahedra of a file that cannot be used as they are, and lists what that changes.
 
 use crate::mesh::{Bodies, TetMesh};
 

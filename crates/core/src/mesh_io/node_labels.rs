@@ -1,4 +1,4 @@
-//! From node labels, which are any numbers in some formats, to node indices from 0.
+//! Turns node labels, which are any numbers in some formats, into node indices from 0.
 
 use super::error::Fault;
 

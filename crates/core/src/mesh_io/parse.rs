@@ -1,4 +1,4 @@
-//! From the bytes of a mesh file to a mesh: find out the format, read, check.
+//! Reads a mesh from the bytes of a file: recognises the format, reads, checks.
 
 use super::companion::{Companion, FindCompanion};
 use super::cursor::{Cursor, quote};

@@ -1,4 +1,4 @@
-//! What a reader collects, and the one way from there to a checked mesh.
+//! The data that a reader collects, and the one place where a checked mesh is made of them.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Which number a region has in a file that is written: its label, where that is a number.
+//! Chooses the number of a region in a written file: its label, where that is a number.
 
 use crate::mesh::TetMesh;
 

@@ -1,4 +1,4 @@
-//! Which format a file has, by its content alone: extensions lie.
+//! Recognises the format of a file by its content; the file's extension is not looked at.
 
 use super::cursor::{Cursor, find, words};
 use super::number::parse_integer;

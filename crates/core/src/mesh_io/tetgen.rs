@@ -1,4 +1,4 @@
-//! TetGen `.node` and `.ele`: given either one, the other is asked for.
+//! Reads TetGen `.node` and `.ele`: given either one, it asks for the other.
 
 use nalgebra::Point3;
 

@@ -1,4 +1,4 @@
-//! Why a mesh could not be written: data that does not belong to it.
+//! Errors of writing a mesh: data that do not belong to it.
 
 /// Data for a file that does not fit the mesh.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,4 +1,4 @@
-//! From a question to a plan: which element, method and precision, by what each would cost.
+//! Chooses element, method and precision for a question, by what each is predicted to cost.
 //!
 //! Pure: costs come in as numbers, nothing is measured or tried here.
 

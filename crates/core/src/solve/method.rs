@@ -1,4 +1,4 @@
-//! The methods by name.
+//! The methods that answer a question, and their names.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! Motions without energy that the known displacements do not hold back.
+//! Finds motions without energy that the known displacements leave free.
 //!
 //! `K11` is positive definite exactly when no such motion is left; it is decided here before
 //! anything is factored.

@@ -1,4 +1,4 @@
-//! Known and unknown degrees of freedom, and the methods that answer for them (thesis 3.4).
+//! Known and unknown degrees of freedom, and the methods that solve for the unknown (thesis 3.4).
 
 mod certainty;
 pub mod choose;

@@ -1,4 +1,4 @@
-//! Preconditioned conjugate gradients: the error as a dial.
+//! Preconditioned conjugate gradients, which stop at a given residual and estimated error.
 
 use super::vectors::{add_scaled, dot, norm, subtract};
 

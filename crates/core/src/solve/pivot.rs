@@ -1,4 +1,4 @@
-//! The one way in which a factorisation without pivoting fails.
+//! The error of a factorisation without pivoting: a pivot that is not positive.
 
 /// Row of `K11` where a pivot was not positive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

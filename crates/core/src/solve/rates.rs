@@ -1,4 +1,4 @@
-//! What a machine takes for a unit of work, and so for an answer.
+//! The time that a machine takes for a unit of work, and the predicted time of an answer.
 
 use super::Method;
 use super::work::Work;

@@ -1,4 +1,4 @@
-//! How much there is to do for one answer, counted or estimated before anything is done.
+//! The number of operations and entries of an answer, estimated or counted beforehand.
 
 use super::FrontAnalysis;
 use crate::fem::{AXES, Element};

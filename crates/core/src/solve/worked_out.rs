@@ -1,4 +1,4 @@
-//! A number that is worked out when it is first needed and kept, with nothing held in the meantime.
+//! A number that is computed when first needed and then kept; no lock is held meanwhile.
 //!
 //! Working it out takes parallel loops, and a thread that waits inside a parallel loop takes other
 //! work from the pool, which may need the same number. A cell that makes the second caller wait for

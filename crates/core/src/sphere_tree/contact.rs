@@ -1,4 +1,4 @@
-//! The exact test at the leaves: which vertices a fingertip or a finger segment is in (thesis 4.4.4).
+//! The exact test at the leaves: which vertices a fingertip or segment contains (thesis 4.4.4).
 
 use std::ops::ControlFlow;
 

@@ -1,4 +1,4 @@
-//! Oracle of the tests: every question to the tree answered by looking at everything.
+//! Answers every question to the tree by looking at every vertex, to compare with in tests.
 
 use nalgebra::{Point3, Vector3};
 

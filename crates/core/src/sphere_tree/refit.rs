@@ -1,4 +1,4 @@
-//! Refitting: the same tree over a deformed surface, and when to give up and rebuild.
+//! Fits the spheres of a tree to a deformed surface, and says when to rebuild it instead.
 
 use nalgebra::{Point3, Vector3};
 

@@ -1,4 +1,4 @@
-//! Properties of the tree on many shapes, against the oracle that looks at everything.
+//! Tests of the tree on many surfaces, compared with a search of every vertex.
 
 use nalgebra::{Point3, Unit, Vector3};
 use proptest::prelude::*;

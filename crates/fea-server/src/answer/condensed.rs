@@ -1,4 +1,4 @@
-//! An answer from cached columns of the compliance: what a frame costs once a contact is known.
+//! Answers a question from cached columns of the compliance.
 
 use std::sync::Arc;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! An answer by a factor or inverse of `K11`.
+//! Answers a question by a factor or inverse of `K11`.
 
 use std::time::Instant;
 

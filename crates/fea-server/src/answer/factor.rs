@@ -1,4 +1,4 @@
-//! A factor or inverse of `K11` within the memory there is.
+//! Makes a factor or inverse of `K11` within the memory there is.
 
 use softgrasp_core::model::{Model, ModelError};
 use softgrasp_core::solve::memory::Need;

@@ -1,4 +1,4 @@
-//! One frame on a kept model.
+//! Answers one frame on a kept model.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;

@@ -1,4 +1,4 @@
-//! The work on one request, on the solving pool: mesh or kept model in, answer out.
+//! Answers requests on the solving pool: a mesh or a kept model comes in, an answer goes out.
 
 mod condensed;
 mod direct;

@@ -1,4 +1,4 @@
-//! One request that holds mesh, known displacements and partition (thesis 5.1.1).
+//! Answers one request that holds mesh, known displacements and partition (thesis 5.1.1).
 
 use std::sync::Arc;
 

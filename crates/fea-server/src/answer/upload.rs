@@ -1,4 +1,4 @@
-//! A model that is made and kept for later frames, its proof, and columns for nodes that may be touched.
+//! Makes and keeps a model, proves its eigenvalue bound, and prefetches columns for its frames.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! What a user should know about an answer: where linear elasticity stops being right, and which
-//! of the wishes it does not meet.
+//! Writes the warnings of an answer: large rotations and strains, uncertain digits, a missed
+//! deadline or error budget.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::fem::StrainSummary;

@@ -1,4 +1,4 @@
-//! Why there is no plan for a question.
+//! Errors of planning: why a question cannot be answered as it was asked.
 
 use softgrasp_core::model::ModelError;
 

@@ -1,4 +1,4 @@
-//! The plan for a frame on a kept model: kept columns for whatever they can answer, else a factor.
+//! Plans a frame on a kept model: by kept columns where they can answer it, else by a factor.
 
 use softgrasp_core::model::Known;
 use softgrasp_core::solve::Method;

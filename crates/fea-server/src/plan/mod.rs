@@ -1,4 +1,4 @@
-//! From a question to a plan: method, element and precision, within the memory there is.
+//! Plans the answer to a question: method, element and precision, within the memory there is.
 
 mod admission;
 mod error;

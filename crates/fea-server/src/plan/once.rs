@@ -1,5 +1,5 @@
-//! The plan for a request that brings its own mesh: what is asked for, or what deadline, error budget,
-//! material and memory leave.
+//! Plans a request that brings its own mesh, by what it asks for, its deadline and error budget,
+//! material and memory.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::choose::{

@@ -1,4 +1,4 @@
-//! How fast this machine is at each kind of work: measured once, so that times can be predicted.
+//! Measures once how fast this machine is at each kind of work, to predict times.
 
 use std::time::Instant;
 

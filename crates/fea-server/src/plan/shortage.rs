@@ -1,4 +1,4 @@
-//! A need for memory that does not fit, with all the numbers and what would fit instead.
+//! The refusal of a request that needs too much memory: all numbers, and what would fit.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Why a plan was taken, in a sentence for the report.
+//! Writes why a plan was taken, in a sentence for the report.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::choose::{LOCKING_POISSON, Plan};

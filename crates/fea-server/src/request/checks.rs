@@ -1,4 +1,4 @@
-//! What a question names, checked before anything costly is done.
+//! Checks the nodes, forces and masks that a question names, before anything costly is done.
 
 use softgrasp_core::contact::Mask;
 use softgrasp_core::model::{Known, Model};

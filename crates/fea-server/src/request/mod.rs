@@ -1,4 +1,4 @@
-//! From a decoded message to what the core takes, checked before anything costly is done.
+//! Turns a decoded message into what the core takes, checked before anything costly is done.
 
 mod checks;
 mod model;

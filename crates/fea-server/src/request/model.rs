@@ -1,4 +1,4 @@
-//! A model from what a message brings: mesh, materials, element, fixed degrees of freedom.
+//! Makes a model of what a message brings: mesh, materials, element, fixed degrees of freedom.
 
 use nalgebra::Point3;
 use softgrasp_core::fem::{Element, Material};

@@ -1,4 +1,4 @@
-//! Method, element and wishes of a question, parsed once.
+//! Parses method, element, deadline and error budget of a question, once.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::Method;

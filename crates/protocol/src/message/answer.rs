@@ -1,4 +1,4 @@
-//! Displacements and reaction forces, and how they shrink for the way.
+//! The displacements and forces of an answer, in double or quantised single precision.
 
 use wincode::{SchemaRead, SchemaWrite};
 

@@ -1,4 +1,4 @@
-//! Masks as they travel: lists of nodes with weights, one behind the other.
+//! Masks on the wire: lists of nodes with weights, one behind the other.
 
 use wincode::{SchemaRead, SchemaWrite};
 

@@ -1,4 +1,4 @@
-//! A tetrahedral mesh and its materials as they travel.
+//! A tetrahedral mesh and its materials on the wire.
 
 use wincode::{SchemaRead, SchemaWrite};
 

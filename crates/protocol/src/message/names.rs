@@ -1,4 +1,4 @@
-//! Names of solution methods and elements as they travel.
+//! Names of solution methods and elements on the wire.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! What a client wants to know about a mesh or a kept model.
+//! The question that a client asks about a mesh or a kept model.
 
 use wincode::{SchemaRead, SchemaWrite};
 

@@ -1,4 +1,4 @@
-//! Why a request is not granted.
+//! The refusal of a request: a code and a text.
 
 use std::fmt;
 

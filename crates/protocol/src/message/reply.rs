@@ -1,4 +1,4 @@
-//! Everything a server may say.
+//! All messages of a server as one type.
 
 use super::answer::Answer;
 use super::model::ModelReady;

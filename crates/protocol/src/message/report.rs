@@ -1,4 +1,4 @@
-//! What an answer cost and how wrong it can be.
+//! The report of an answer: times, residual, error bound, warnings.
 
 use wincode::{SchemaRead, SchemaWrite};
 

@@ -1,4 +1,4 @@
-//! Everything a client may say.
+//! All messages of a client as one type.
 
 use super::model::{FrameRequest, ModelHash, Prefetch, UploadModel};
 use super::question::SolveOnce;

@@ -1,4 +1,4 @@
-//! How the two sides introduce themselves.
+//! The messages by which client and server introduce themselves.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Averaged nodal pressure against its energy written out, the patch test, and what it is for.
+//! Tests of averaged nodal pressure: energy written out, patch test, a block on which t4 locks.
 
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 use proptest::prelude::*;

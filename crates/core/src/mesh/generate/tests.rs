@@ -1,4 +1,4 @@
-//! What every built-in object promises, at every size.
+//! Tests of what holds for every built-in object at every size.
 
 use proptest::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Quirks of Gmsh files met in the wild (numbers as in the list of facts).
+//! Tests of what Gmsh files of other programs do unexpectedly.
 
 use super::samples::{
     Order, assert_is_sample, msh2, msh2_binary, msh41, msh41_binary, point_lines, read, refusal,

@@ -1,4 +1,4 @@
-//! What is put right in broken files, what that changes, and that mended files are sound.
+//! Tests of mending: what is changed in broken files, and that mended files have no faults.
 
 use nalgebra::Point3;
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Quirks of TetGen, MEDIT, Vega and .tet files met in the wild (numbers as in the list of facts).
+//! Tests of what TetGen, MEDIT, Vega and .tet files of other programs do unexpectedly.
 
 use super::samples::{assert_is_sample, point_lines, read, refusal, tet_lines};
 use crate::mesh_io::{Companion, MeshFile, MeshFileError, parse};

@@ -1,4 +1,4 @@
-//! Quirks of VTK legacy and XML files met in the wild (numbers as in the list of facts).
+//! Tests of what VTK legacy and XML files of other programs do unexpectedly.
 
 use super::samples::{
     assert_is_sample, point_lines, read, refusal, tet_lines, vtk_binary, vtk_head,

@@ -1,4 +1,4 @@
-//! The table of questions and the plans they get.
+//! Tests of the choice: a table of questions and the plans they get.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Small matrices with a bound on how far each entry can be off.
+//! Small matrices with a bound on the error of each entry.
 
 use nalgebra::DMatrix;
 

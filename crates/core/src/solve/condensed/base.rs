@@ -1,4 +1,4 @@
-//! What is worked out once per shape: the held base, its factor, the motions without energy.
+//! The base of a body, made once: held degrees of freedom, factor, motions without energy.
 
 use std::sync::Arc;
 

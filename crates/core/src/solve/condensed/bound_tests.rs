@@ -1,4 +1,4 @@
-//! Bounds against units, single precision and repeated nodes; a held body that nothing touches.
+//! Tests of the bound: units, single precision, repeated nodes, a held body that nothing touches.
 
 use std::sync::Arc;
 

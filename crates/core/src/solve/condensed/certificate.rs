@@ -1,4 +1,4 @@
-//! How wrong an answer can be, said with every answer (`docs/bound.md`).
+//! The residual of a condensed answer and the proven bound of its error (`docs/bound.md`).
 
 use nalgebra::DVector;
 

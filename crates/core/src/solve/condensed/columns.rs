@@ -1,4 +1,4 @@
-//! Columns of the compliance, computed when a contact is first asked for and kept under a bound.
+//! Columns of the compliance: computed when first needed, kept in a cache of bounded size.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,4 +1,4 @@
-//! One set of contacts (touched degrees of freedom and masks): the small system, and answers from it.
+//! The small system of one set of contacts (touched degrees of freedom, masks), and its answers.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

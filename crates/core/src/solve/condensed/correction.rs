@@ -1,4 +1,4 @@
-//! The error of a contact set to first order: what a second solve finds wrong with every column
+//! The error of a contact set to first order, from a second solve for every column
 //! (`docs/bound.md`, section 6).
 
 use nalgebra::{DMatrix, DVector};

@@ -1,4 +1,4 @@
-//! Products of the stiffness and a field with errors of twice the working precision.
+//! Products of the stiffness and a field, computed in twice the working precision.
 
 use rayon::prelude::*;
 

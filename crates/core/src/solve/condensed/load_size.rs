@@ -1,4 +1,4 @@
-//! Size of the load that displacements of the contacts stand for.
+//! The norm of the load that prescribed displacements of the contacts are equal to.
 
 use nalgebra::DMatrix;
 

@@ -1,4 +1,4 @@
-//! Masks against the dense saddle-point system, bounds against true errors, and what is refused.
+//! Tests of masks: a dense saddle-point system, bounds and true errors, refusals.
 
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! How the contacts of a set overlap: whether one says what others say, and how large E is.
+//! Finds masks that follow from other contacts of their set, and bounds the norm of E.
 //!
 //! Single nodes are orthonormal columns of E, so nothing has to be looked at. Masks are shorter than
 //! one and may overlap; then EᵀE over the degrees of freedom that the scene leaves free decides. If

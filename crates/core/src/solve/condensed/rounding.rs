@@ -1,4 +1,4 @@
-//! Rounding of the standard model, and slack for the sums that a bound itself is made of.
+//! Rounding errors by the standard model of floating point, and the slack for sums in a bound.
 
 use crate::fem::Stiffness;
 use crate::solve::vectors::norm;

@@ -1,4 +1,4 @@
-//! Condensed answers against the direct factor, bounds against true errors, the cache.
+//! Tests of condensed answers: the direct factor, bounds and true errors, the cache.
 
 use std::sync::Arc;
 

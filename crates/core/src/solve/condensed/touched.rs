@@ -1,4 +1,4 @@
-//! What a frame holds: single degrees of freedom, and masks by their mean displacement.
+//! The contacts of a frame: touched degrees of freedom, and masks.
 
 use super::base::CondensedError;
 use crate::contact::Mask;

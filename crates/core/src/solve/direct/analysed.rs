@@ -1,4 +1,4 @@
-//! `K11` ordered and analysed: what a factor over the tree of fronts will cost is known.
+//! `K11` ordered and analysed: work and memory of its factor are counted before it is made.
 
 use std::sync::Arc;
 

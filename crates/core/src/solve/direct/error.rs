@@ -1,4 +1,4 @@
-//! Why a direct method gives no answer.
+//! Errors of the direct methods.
 
 use crate::solve::Method;
 use crate::solve::Partition;

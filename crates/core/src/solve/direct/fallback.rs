@@ -1,4 +1,4 @@
-//! Why double precision was taken where single precision had been asked for.
+//! The reasons for taking double precision where single precision was asked for.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! One interface to all direct methods: factor a partition once, then answer known displacements.
+//! One interface to all direct methods: factor a partition once, then solve for many loads.
 
 mod analysed;
 mod error;

@@ -1,4 +1,4 @@
-//! Refinement of direct answers, and solves that are good to a digit whatever the precision.
+//! Refines direct answers, and solves to a digit at least, whatever the factor's precision.
 
 use super::kernel::Kernel;
 use crate::solve::vectors::{norm, subtract};

@@ -1,4 +1,4 @@
-//! Loads, and the displacements and reactions that answer them.
+//! Loads, and the displacements and reactions that they cause.
 
 use super::error::SolveError;
 use super::factored::Factored;

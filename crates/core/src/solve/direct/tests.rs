@@ -1,4 +1,4 @@
-//! All methods on one small irregular mesh: patch test, agreement, threads, awkward partitions.
+//! Tests of all methods on one small mesh: patch test, agreement, threads, odd partitions.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The two precisions a factor can be kept in.
+//! The two precisions of a factor: double and single.
 
 use std::ops::AddAssign;
 

@@ -1,4 +1,4 @@
-//! Solves with a factor: down the tree to the roots and back, whole or on a few paths only.
+//! Solves with a factor, over the whole tree of fronts or along a few of its paths.
 
 use faer::Mat;
 use rayon::prelude::*;

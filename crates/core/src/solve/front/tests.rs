@@ -1,4 +1,4 @@
-//! The whole factor on small irregular bodies: answers, bits, partial solves, hard input.
+//! Tests of the factor on small irregular bodies: answers, bits, partial solves, hard input.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Predictions against counts, and bytes against text.
+//! Tests: predicted memory against counted memory, and numbers of bytes as text.
 
 use proptest::prelude::*;
 

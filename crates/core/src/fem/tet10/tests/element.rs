@@ -1,5 +1,5 @@
-//! One element: shape functions, quadrature, stiffness against brute force, rigid motions, hard
-//! shapes and scales.
+//! Tests of one element: shape functions, quadrature, stiffness, rigid motions, flat elements,
+//! large and small scales.
 
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;

@@ -1,5 +1,5 @@
-//! Quadrature of high degree over a tetrahedron: the oracle for the four-point rule, and the one
-//! for loads and errors.
+//! Quadrature of high degree over a tetrahedron, to compare the four-point rule with, and for loads
+//! and errors of tests.
 
 use std::sync::LazyLock;
 

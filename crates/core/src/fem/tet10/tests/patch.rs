@@ -1,4 +1,4 @@
-//! Fields that the ten-node tetrahedron holds are solutions of its equations on irregular meshes.
+//! Patch tests of the ten-node tetrahedron on irregular meshes.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Built-in objects and real meshes: threads, energies, methods, known nodes at corners only.
+//! Tests of ten-node elements on built-in objects and real meshes: threads, energies, methods.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
