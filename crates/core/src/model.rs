@@ -11,6 +11,7 @@ use crate::fem::{
 };
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::condensed::{Base, CondensedError};
+use crate::solve::memory::model_bytes;
 use crate::solve::{
     Analysed, Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition,
     PartitionError, RigidBodies, SolveError, Stage, find_free_motion,
@@ -195,14 +196,8 @@ impl Model {
 
     /// Bytes held by mesh and stiffness, roughly.
     pub fn bytes(&self) -> usize {
-        // Corners; and for each node of an element the row it adds to, with a place per node.
-        let per_tet = match &self.quadratic {
-            None => 16 + 4 * (8 + 4 * 4),
-            Some(_) => 16 + 40 + 10 * (8 + 4 * 10),
-        };
-        self.used.len() * 40
-            + self.mesh.tets().len() * per_tet
-            + self.stiffness.pattern().block_count() * 76
+        let blocks = self.stiffness.pattern().block_count();
+        model_bytes(self.element(), self.used.len(), self.mesh.tets().len(), blocks)
     }
 
     /// Joins the known displacements of one question with the fixed degrees of freedom; where both

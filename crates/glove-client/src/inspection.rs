@@ -8,7 +8,7 @@ use softgrasp_core::fem::StiffnessPattern;
 use softgrasp_core::mesh::{Bodies, Quality, Surface};
 use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_core::solve::Method;
-use softgrasp_core::solve::memory::{Bytes, Problem};
+use softgrasp_core::solve::memory::{BYTES_PER_BLOCK, Bytes, Problem};
 use softgrasp_core::solve::work::MeshSize;
 
 use crate::connection::OwnMachine;
@@ -189,7 +189,7 @@ fn modelled(nodes: usize, blocks: usize, forecast: &Forecast) -> Modelled {
         element: "t4",
         nodes,
         dofs,
-        stiffness_bytes: blocks as u64 * 76,
+        stiffness_bytes: (blocks * BYTES_PER_BLOCK) as u64,
         dense_inverse_bytes: Method::DenseInverse.dense_bytes(dofs).unwrap_or(0),
         // Thesis (C.5) with one processor.
         gauss_jordan_operations: 2.0 * (dofs as f64).powi(2) * (3.0 * dofs as f64 - 1.0),

@@ -44,16 +44,26 @@ pub const MOST_OVER_PREDICTED: f64 = 2.0;
 /// chance.
 pub const PREDICTED_OVER_LEAST: f64 = 3.0;
 
-/// Bytes of the elements of a model: corners, and for each of their nodes the row that it adds to.
-const BYTES_PER_TET: [f64; 2] = [112.0, 536.0];
-/// Bytes of a node: coordinates, marks, starts of rows.
-const BYTES_PER_NODE: f64 = 40.0;
-/// Bytes of a block of the stiffness with its column.
-const BYTES_PER_BLOCK: f64 = 76.0;
+/// Bytes of a node of a model: coordinates, marks, starts of rows.
+const BYTES_PER_NODE: usize = 40;
+/// Bytes of a 3 × 3 block of the stiffness with its column.
+pub const BYTES_PER_BLOCK: usize = 76;
 /// Bytes of order and analysis for each block, while the factor is there.
 const ORDER_BYTES_PER_BLOCK: f64 = 8.0;
 /// Vectors of all degrees of freedom that are held at once while the answer is refined.
 const VECTORS: f64 = 10.0;
+
+/// Bytes of mesh, pattern and stiffness, roughly.
+///
+/// Shapes: `nodes` corners; `blocks` 3 × 3 blocks of the stiffness.
+pub fn model_bytes(element: Element, nodes: usize, tets: usize, blocks: usize) -> usize {
+    // Corners; and for each node of an element the row it adds to, with a place per node.
+    let per_tet = match element {
+        Element::Tet4 | Element::Tet4Anp => 16 + 4 * (8 + 4 * 4),
+        Element::Tet10 => 16 + 40 + 10 * (8 + 4 * 10),
+    };
+    BYTES_PER_NODE * nodes + per_tet * tets + BYTES_PER_BLOCK * blocks
+}
 
 /// The methods that are worth a look where none is asked for, best first.
 pub const SENSIBLE: [Method; 3] = [Method::Front, Method::FrontMixed, Method::Condensed];
@@ -74,10 +84,9 @@ impl Need {
     pub fn predicted(problem: Problem, element: Element, method: Method) -> Self {
         let whole = Work::estimate(problem.size, element);
         let unknown = (whole.unknown_dofs - problem.known_dofs as f64).max(0.0);
-        let i = usize::from(element.node_count() > 4);
-        let model_bytes = BYTES_PER_TET[i] * problem.size.tets as f64
-            + BYTES_PER_NODE * whole.unknown_dofs / AXES as f64
-            + BYTES_PER_BLOCK * whole.blocks;
+        let nodes = (whole.unknown_dofs / AXES as f64) as usize;
+        let model_bytes =
+            model_bytes(element, nodes, problem.size.tets, whole.blocks as usize) as u64;
         let around = Self::around(&whole);
         let (factor, least) = match method.dense_bytes(unknown as usize) {
             Some(bytes) => (bytes as f64, bytes as f64),
@@ -91,7 +100,7 @@ impl Need {
         Self {
             element,
             method,
-            model_bytes: model_bytes as u64,
+            model_bytes,
             factor_bytes: factor as u64,
             factor_bytes_min: least as u64,
         }
