@@ -76,6 +76,8 @@ factor in ms, in double precision, with other versions of both codes than above;
 | :-- | --: | --: | --: |
 | cube 10648 | 45 + 313 | 82 + 234 | 1.13 |
 | cube 21952 | 101 + 989 | 183 + 854 | 1.05 |
+
+[peers-intel.csv](peers-intel.csv)
 """
 
 
