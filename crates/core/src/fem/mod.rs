@@ -9,6 +9,7 @@ mod nodal_patches;
 mod pattern;
 mod quadratic_mesh;
 mod strain;
+mod stress_recovery;
 pub mod tet10;
 pub mod tet4;
 
@@ -22,3 +23,4 @@ pub use nodal_patches::NodalPatches;
 pub use pattern::StiffnessPattern;
 pub use quadratic_mesh::{QuadraticMesh, TooManyNodes};
 pub use strain::{StrainSummary, summarise_strain, summarise_strain_quadratic};
+pub use stress_recovery::{OtherNodeCount, StressRecovery};

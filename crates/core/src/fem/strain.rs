@@ -128,7 +128,7 @@ fn displacements_of<const K: usize>(nodes: &[u32; K], displacement: &[f64]) -> [
 }
 
 /// Largest absolute eigenvalue of a symmetric 3 × 3 matrix, by the trigonometric formula.
-fn principal_max(e: &Matrix3<f64>) -> f64 {
+pub(super) fn principal_max(e: &Matrix3<f64>) -> f64 {
     let mean = e.trace() / 3.0;
     let deviator = e - Matrix3::identity() * mean;
     let spread = (deviator.norm_squared() / 6.0).sqrt();

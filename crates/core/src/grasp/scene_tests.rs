@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::event::{GraspEvent, StepInput, StepOutput};
 use super::sense::sense;
-use super::state::{Grasp, StateName};
+use super::state::{Grasp, GraspError, StateName};
 use crate::hand::{Finger, FingerColliders, HandColliders};
 use crate::shape::{Cylinder, Sphere};
 use crate::sphere_tree::SphereTree;
@@ -97,6 +97,49 @@ fn a_hand_closes_on_a_ball_squeezes_it_and_opens_again() {
     assert_eq!(scene.tick(away, [0.002; 5]).state, StateName::Detached);
     let output = scene.tick(away, [0.01; 5]);
     assert_eq!((output.state, output.world_from_object), (StateName::Free, left_there));
+}
+
+#[test]
+fn object_is_placed_only_while_nothing_holds_it_and_is_grasped_where_it_stands() {
+    let home = Isometry3::identity();
+    let turned = Isometry3::new(Vector3::new(0.01, 0.0, 0.02), Vector3::new(0.0, 1.2, 0.4));
+    let mut scene = Scene::new(home);
+    scene.tick(home, [0.02; 5]);
+    scene.tick(home, [-0.001; 5]);
+    assert!(scene.grasp.is_held());
+    let before = scene.grasp.clone();
+    assert_eq!(scene.grasp.place(turned), Err(GraspError::Held));
+    let nowhere = Isometry3::translation(f64::NAN, 0.0, 0.0);
+    scene.grasp.let_go();
+    assert_eq!(scene.grasp.place(nowhere), Err(GraspError::Pose));
+    assert_eq!(scene.grasp.world_from_object(&turned), before.world_from_object(&home));
+    assert_eq!(scene.grasp.place(turned), Ok(()));
+    // Fingers that are inside it there do not hold it before they have left it.
+    let place = |scene: &mut Scene, gap| scene.tick(turned, [gap; 5]);
+    assert_eq!(place(&mut scene, -0.001).state, StateName::Detached);
+    let output = place(&mut scene, 0.02);
+    assert_eq!((output.state, output.world_from_object), (StateName::Free, turned));
+    assert_eq!(place(&mut scene, -0.001).state, StateName::Attached);
+    assert_eq!(*scene.grasp.home(), home);
+}
+
+#[test]
+fn fingers_that_avoid_an_object_stay_where_they_are_shown_while_it_is_turned() {
+    let palm = Isometry3::identity();
+    let mut scene = Scene::new(palm);
+    scene.tick(palm, [0.02; 5]);
+    let shown = scene.tick(palm, [0.02, -0.001, 0.02, 0.02, 0.02]);
+    assert_eq!(shown.state, StateName::Avoiding);
+    // A ball that is turned is where it was.
+    let turned = Isometry3::new(Vector3::zeros(), Vector3::new(0.3, -0.8, 0.1));
+    scene.grasp.place(turned).unwrap();
+    let output = scene.tick(palm, [0.02, -0.001, 0.02, 0.02, 0.02]);
+    assert_eq!((output.state, output.events), (StateName::Avoiding, Vec::new()));
+    assert_eq!(output.world_from_object, turned);
+    for (now, before) in output.world_from_segment[1].iter().zip(shown.world_from_segment[1]) {
+        assert!((now.translation.vector - before.translation.vector).norm() < 1e-12);
+        assert!(now.rotation.angle_to(&before.rotation) < 1e-7);
+    }
 }
 
 proptest! {

@@ -105,6 +105,12 @@ pub enum GraspError {
         /// Margin given.
         metres: f64,
     },
+    /// An object in the hand stays where the hand has it.
+    #[error("a hand holds the object; let it go first")]
+    Held,
+    /// A pose with a number that is not finite.
+    #[error("the object's pose is not finite")]
+    Pose,
 }
 
 impl Grasp {
@@ -134,6 +140,53 @@ impl Grasp {
         self.release_margin
     }
 
+    /// Where the object returns to (world from object).
+    pub fn home(&self) -> &Isometry3<f64> {
+        &self.home
+    }
+
+    /// Whether the object follows the palm.
+    pub fn is_held(&self) -> bool {
+        matches!(self.state, GraspState::Attached { .. } | GraspState::Deforming { .. })
+    }
+
+    /// Lets go of the object where it is, between two ticks; a hand inside it has to leave it first.
+    ///
+    /// For a hand or an object that is replaced. What a user asks for in a tick is a
+    /// [`super::Command`].
+    pub fn let_go(&mut self) {
+        self.state = GraspState::Detached;
+    }
+
+    /// Puts the object, which nothing holds, somewhere else, between two ticks. Fingers that avoid
+    /// it stay where they are shown in the world.
+    ///
+    /// Source: thesis 6.1.2, the mouse turns the object.
+    ///
+    /// # Errors
+    /// [`GraspError::Held`] while the object follows the palm, [`GraspError::Pose`] for a pose that
+    /// is not finite; nothing has changed then.
+    pub fn place(&mut self, world_from_object: Isometry3<f64>) -> Result<(), GraspError> {
+        let Isometry3 { rotation, translation } = &world_from_object;
+        let mut numbers = rotation.coords.iter().chain(translation.vector.iter());
+        if !numbers.all(|number| number.is_finite()) {
+            return Err(GraspError::Pose);
+        }
+        let now_from_before = world_from_object.inverse() * self.world_from_object;
+        match &mut self.state {
+            GraspState::Attached { .. } | GraspState::Deforming { .. } => {
+                return Err(GraspError::Held);
+            }
+            GraspState::Free { last_free } | GraspState::Avoiding { last_free, .. } => {
+                *last_free =
+                    last_free.map(|finger| finger.map(|segment| now_from_before * segment));
+            }
+            GraspState::Detached => {}
+        }
+        self.world_from_object = world_from_object;
+        Ok(())
+    }
+
     /// Where the object is when the palm is at `world_from_palm`: it follows while it is attached.
     ///
     /// Sense against this pose, then step with the same palm pose.
@@ -157,6 +210,15 @@ impl GraspState {
             Self::Attached { .. } => StateName::Attached,
             Self::Deforming { .. } => StateName::Deforming,
             Self::Detached => StateName::Detached,
+        }
+    }
+
+    /// What each fingertip holds, thumb first; nothing unless the object is attached.
+    pub fn contacts(&self) -> [Option<Contact>; 5] {
+        match self {
+            Self::Attached { holds, .. } => holds.map(|hold| hold.contact().copied()),
+            Self::Deforming { contacts, .. } => contacts.map(Some),
+            Self::Free { .. } | Self::Avoiding { .. } | Self::Detached => [None; 5],
         }
     }
 }

@@ -84,20 +84,31 @@ pub fn pose(
     angles: &JointAngles,
     world_from_palm: Isometry3<f64>,
 ) -> HandPose {
+    let world_from_segment = Finger::ALL.map(|finger| {
+        right_chain(dimensions, angles, finger)
+            .map(|chain| world_from_palm * handed(dimensions.handedness, &chain))
+    });
+    pose_of_segments(dimensions, world_from_palm, &world_from_segment)
+}
+
+/// The hand whose segments stand where they are said to, each for itself: a grasp shows segments
+/// elsewhere than they were measured.
+///
+/// Units: m. Frame: world.
+pub fn pose_of_segments(
+    dimensions: &HandDimensions,
+    world_from_palm: Isometry3<f64>,
+    world_from_segment: &[[Isometry3<f64>; 3]; 5],
+) -> HandPose {
     let lengths = dimensions.segment_lengths();
     let tip_radii = dimensions.tip_radii();
     let fingers = Finger::ALL.map(|finger| {
         let digit = finger.index();
-        let chain = right_chain(dimensions, angles, finger);
-        let mut segments = [SegmentPose { world_from_segment: world_from_palm, length: 0.0 }; 3];
-        for i in 0..3 {
-            let palm_from_segment = handed(dimensions.handedness, &chain[i]);
-            segments[i] = SegmentPose {
-                world_from_segment: world_from_palm * palm_from_segment,
-                length: lengths[digit][i],
-            };
-        }
-        let world_from_distal = segments[2].world_from_segment;
+        let segments = std::array::from_fn(|i| SegmentPose {
+            world_from_segment: world_from_segment[digit][i],
+            length: lengths[digit][i],
+        });
+        let world_from_distal = world_from_segment[digit][2];
         FingerPose {
             finger,
             segments,

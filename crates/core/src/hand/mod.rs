@@ -12,4 +12,6 @@ pub use dimensions::{
 };
 pub use jacobian::contact_jacobian;
 pub use joints::{ANGLE_COUNT, Finger, FingerAngles, JointAngles, ThumbAngles};
-pub use kinematics::{FingerPose, HandPose, SegmentPose, forearm_from_palm, pose};
+pub use kinematics::{
+    FingerPose, HandPose, SegmentPose, forearm_from_palm, pose, pose_of_segments,
+};

@@ -2,6 +2,7 @@
 
 mod build;
 mod contact;
+mod levels;
 #[cfg(test)]
 mod naive;
 mod overlap;
@@ -10,7 +11,9 @@ mod search;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod visited;
 
 pub use contact::{Closeness, ContactHit, TIP_HITS_MAX, tip_hits, vertex_normals};
 pub use overlap::{cylinder_meets_sphere, sphere_meets_sphere};
 pub use tree::{SphereTree, TreeError};
+pub use visited::VisitedSphere;

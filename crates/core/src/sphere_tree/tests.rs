@@ -6,7 +6,7 @@ use proptest::strategy::ValueTree;
 
 use super::naive::{self, Probe};
 use super::tree::SphereTree;
-use super::{tip_hits, vertex_normals};
+use super::{VisitedSphere, tip_hits, vertex_normals};
 use crate::shape::{Cylinder, Sphere};
 
 /// Clouds, balls, flat sheets, lines, coincident points: 1 to 400 vertices, metres, finger scale.
@@ -136,6 +136,44 @@ proptest! {
         tree.refit(&bent).unwrap();
         assert_valid(&tree, &bent);
         assert_search_is_exhaustive(&tree, &bent, &seeds);
+    }
+
+    #[test]
+    fn visited_spheres_end_at_the_leaves_that_the_search_finds(
+        points in shapes(),
+        seeds in probes(6),
+    ) {
+        let tree = tree_over(&points);
+        for seed in &seeds {
+            let probe = probe(seed, &points);
+            let visited = match &probe {
+                Probe::Cylinder(cylinder) => tree.visited_by_cylinder(cylinder),
+                Probe::Sphere(tip) => tree.visited_by_sphere(tip),
+            };
+            prop_assert!(visited.is_sorted_by_key(|v| v.level) && visited[0].level == 0);
+            // Each sphere but the root is the child of one that overlaps.
+            for below in visited.iter().filter(|v| v.level > 0) {
+                let holds = |v: &&VisitedSphere| {
+                    let reach = (v.sphere.centre - below.sphere.centre).norm();
+                    v.overlaps && !v.is_leaf && reach + below.sphere.radius <= v.sphere.radius
+                };
+                let parents = visited.iter().filter(|v| v.level + 1 == below.level);
+                prop_assert!(parents.filter(holds).count() > 0);
+            }
+            let mut ends: Vec<Sphere> =
+                visited.iter().filter(|v| v.overlaps && v.is_leaf).map(|v| v.sphere).collect();
+            let found = search(&tree, &probe);
+            let leaves = tree.nodes.iter().filter(|node| node.is_leaf());
+            let expected = leaves.filter(|leaf| found.contains(&tree.run(leaf).0[0]));
+            let by_place = |a: &Sphere, b: &Sphere| {
+                let key = |s: &Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
+                key(a).partial_cmp(&key(b)).unwrap()
+            };
+            let mut expected: Vec<Sphere> = expected.map(|leaf| leaf.sphere).collect();
+            ends.sort_by(by_place);
+            expected.sort_by(by_place);
+            prop_assert_eq!(ends, expected);
+        }
     }
 
     #[test]
