@@ -7,7 +7,8 @@ ARG BASE_RUN=debian:bookworm-slim
 FROM ${BASE_BUILD} AS build
 WORKDIR /src
 COPY . .
-RUN cargo build --release --locked --bins --package fea-server --package glove-client
+# No display, no window: the client is built without it.
+RUN cargo build --release --locked --bins --package fea-server --package glove-client --no-default-features
 
 FROM ${BASE_RUN} AS run
 WORKDIR /out

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use nalgebra::Vector3;
 use softgrasp_core::grasp::KnownNode;
 use softgrasp_protocol::{DofValue, Masks};
 
@@ -113,6 +114,32 @@ impl HeldNodes {
         }
     }
 
+    /// Force of each fingertip on the object, thumb first, from an answer to what was prescribed
+    /// last; `None` if the answer holds no forces.
+    ///
+    /// Shapes: `reactions` at any degrees of freedom, those that no finger holds are passed over;
+    /// `mask_forces` one per finger or none. Units: N. Frame: the object's.
+    pub fn fingertip_forces(
+        &self,
+        reactions: &[DofValue],
+        mask_forces: &[[f64; 3]],
+    ) -> Option<[Vector3<f64>; 5]> {
+        if !self.masks.is_empty() {
+            let forces: [[f64; 3]; 5] = mask_forces.try_into().ok()?;
+            return Some(forces.map(Vector3::from));
+        }
+        if reactions.is_empty() {
+            return None;
+        }
+        let mut forces = [Vector3::zeros(); 5];
+        for DofValue { dof, value } in reactions {
+            if let Ok(at) = self.held.binary_search_by_key(&(dof / 3), |held| held.0) {
+                forces[self.held[at].1][*dof as usize % 3] += value;
+            }
+        }
+        Some(forces)
+    }
+
     /// Forgets the nodes: the rest shape has changed.
     pub fn clear(&mut self) {
         self.touched = None;
@@ -140,7 +167,6 @@ fn patches(object: &SoftObject, tip_radii: [f64; 5], touched: &[u32; 5]) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
     use softgrasp_core::mesh::{BuiltIn, generate};
 
     fn sphere() -> SoftObject {
@@ -182,6 +208,31 @@ mod tests {
             let covered = known.iter().any(|k| near(k) <= 0.008);
             assert_eq!(covered, values.iter().any(|v| v.dof == 3 * node));
         }
+    }
+
+    #[test]
+    fn forces_of_a_finger_are_those_of_its_nodes_or_that_of_its_mask() {
+        let object = sphere();
+        let known = known(&object);
+        let radii = [0.008; 5];
+        let at = |dof: u32| DofValue { dof, value: f64::from(dof % 3 + 1) };
+        let mut held = HeldNodes::default();
+        assert_eq!(held.fingertip_forces(&[], &[]), None);
+        let asked = held.prescribed_displacements(ContactModel::Patch, &object, radii, &known);
+        // A reaction at a node that no finger holds is no finger's.
+        let free = object.surface().nodes.iter().find(|n| held.held.iter().all(|h| h.0 != **n));
+        let reactions = asked.of_dofs.iter().map(|v| at(v.dof)).chain(free.map(|n| at(3 * n)));
+        let forces = held.fingertip_forces(&reactions.collect::<Vec<_>>(), &[]).unwrap();
+        for (finger, force) in forces.iter().enumerate() {
+            let nodes = held.held.iter().filter(|h| h.1 == finger).count() as f64;
+            assert_eq!(*force, Vector3::new(nodes, 2.0 * nodes, 3.0 * nodes));
+        }
+        held.clear();
+        held.prescribed_displacements(ContactModel::Mask, &object, radii, &known);
+        let of_masks: [[f64; 3]; 5] = std::array::from_fn(|i| [i as f64, 0.0, -1.0]);
+        let forces = held.fingertip_forces(&[], &of_masks).unwrap();
+        assert_eq!(forces[4], Vector3::new(4.0, 0.0, -1.0));
+        assert_eq!(held.fingertip_forces(&[], &of_masks[..4]), None);
     }
 
     #[test]

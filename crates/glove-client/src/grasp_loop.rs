@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use softgrasp_core::grasp::{
-    Command, Grasp, GraspEvent, KnownNode, StateName, StepInput, StepOutput, sense,
+    Command, Contact, Grasp, GraspEvent, HandSegments, KnownNode, StateName, StepInput, StepOutput,
+    sense,
 };
 use softgrasp_core::hand::{HandColliders, HandPose};
 use softgrasp_protocol::{NodeChoice, Precision, Question, Want};
@@ -14,6 +15,7 @@ use crate::contact_model::{HeldNodes, PrescribedDisplacements};
 use crate::hand_reader::HandReader;
 use crate::link::{Link, LinkEvent, Reached, RequestEnd};
 use crate::model_upload::ModelUpload;
+use crate::object_changes::{ObjectChanges, UNCOUNTED};
 use crate::object_work::{KeptShape, ObjectDone, ObjectJob, ObjectWork};
 use crate::pace::Pace;
 use crate::prefetch::Prefetched;
@@ -21,32 +23,39 @@ use crate::rest_shape::ObjectError;
 use crate::scripted::Sent;
 use crate::soft_object::SoftObject;
 use crate::solve_report::SolveSummary;
-use crate::solve_settings::{SolveSettings, Subscription};
+use crate::solve_settings::{AnswerWishes, SolveSettings, Subscription};
 use crate::tick_outcome::{LoopEvent, TickOutcome};
 use crate::unanswered::Unanswered;
 
 /// The client between devices and server.
 pub struct GraspLoop {
     reader: HandReader,
-    object: SoftObject,
-    grasp: Grasp,
-    link: Link,
-    settings: SolveSettings,
+    pub(crate) object: SoftObject,
+    pub(crate) grasp: Grasp,
+    pub(crate) link: Link,
+    pub(crate) settings: SolveSettings,
+    pub(crate) wishes: AnswerWishes,
     pace: Pace,
     /// Tick in which the grip began, to tell answers of an earlier grip from those of this one.
-    deforming_since: Option<u64>,
+    pub(crate) deforming_since: Option<u64>,
     /// Tick whose answer the object shows.
-    shown_tick: Option<u64>,
-    held: HeldNodes,
-    keep: Keep,
-    work: ObjectWork,
-    prefetched: Prefetched,
-    world_from_object: Isometry3<f64>,
+    pub(crate) shown_tick: Option<u64>,
+    /// Forces of the fingertips in the answer that the object shows.
+    pub(crate) shown_forces: Option<[Vector3<f64>; 5]>,
+    pub(crate) held: HeldNodes,
+    pub(crate) keep: Keep,
+    /// What the fingers held the object by in the last tick that asked.
+    pub(crate) last_known: Option<[KnownNode; 5]>,
+    pub(crate) changes: ObjectChanges,
+    pub(crate) work: ObjectWork,
+    pub(crate) prefetched: Prefetched,
+    pub(crate) world_from_object: Isometry3<f64>,
     hand: Option<HandPose>,
+    shown_segments: HandSegments,
 }
 
 /// How far the wish to keep the shape has come.
-enum Keep {
+pub(crate) enum Keep {
     /// Nobody wishes to.
     NotWanted,
     /// The next answer is asked for whole: those so far brought the surface only.
@@ -91,15 +100,20 @@ impl GraspLoop {
             grasp,
             link,
             settings,
+            wishes: AnswerWishes::default(),
             pace,
             deforming_since: None,
             shown_tick: None,
+            shown_forces: None,
             held: HeldNodes::default(),
             keep: Keep::NotWanted,
+            last_known: None,
+            changes: ObjectChanges::default(),
             work: ObjectWork::start(pace)?,
             prefetched: Prefetched::default(),
             world_from_object: Isometry3::identity(),
             hand: None,
+            shown_segments: [[Isometry3::identity(); 3]; 5],
         })
     }
 
@@ -113,9 +127,43 @@ impl GraspLoop {
         &self.world_from_object
     }
 
+    /// State of the grasp.
+    pub fn state(&self) -> StateName {
+        self.grasp.state().name()
+    }
+
     /// The hand as measured in the last tick.
     pub fn hand(&self) -> Option<&HandPose> {
         self.hand.as_ref()
+    }
+
+    /// The segments as the last tick shows them, in the world: those that may not enter the object
+    /// stay at their last free pose.
+    pub fn shown_segments(&self) -> &HandSegments {
+        &self.shown_segments
+    }
+
+    /// What each fingertip holds after the last tick, thumb first.
+    pub fn contacts(&self) -> [Option<Contact>; 5] {
+        self.grasp.state().contacts()
+    }
+
+    /// Force of each fingertip on the object as it is shown, thumb first; `None` where the fingers
+    /// do not deform it, until the first answer, and unless [`AnswerWishes::forces`] asks for them.
+    ///
+    /// Units: N. Frame: the object's.
+    pub fn fingertip_forces(&self) -> Option<[Vector3<f64>; 5]> {
+        self.shown_forces
+    }
+
+    /// Whether the server is preparing the object's model.
+    pub fn is_model_prepared(&self) -> bool {
+        !self.link.is_giving_model()
+    }
+
+    /// Whether the server is there.
+    pub fn is_connected(&self) -> bool {
+        self.link.is_connected()
     }
 
     /// The reader, for its faults.
@@ -153,6 +201,7 @@ impl GraspLoop {
         let mut outcome = TickOutcome::default();
         self.reader.feed(&sent.glove, &sent.tracker, now_s);
         self.pick_up(&mut outcome)?;
+        self.save_when_whole(&mut outcome);
         // Until both devices have spoken there is no hand to act with.
         let Some(hand) = self.reader.hand(now_s) else { return Ok(outcome) };
         self.take_work(&mut outcome);
@@ -161,9 +210,11 @@ impl GraspLoop {
         self.follow(tick, &step, &mut outcome)?;
         self.world_from_object = step.world_from_object;
         self.hand = Some(hand);
+        self.shown_segments = step.world_from_segment;
         outcome.events.extend(step.events.iter().map(|&event| LoopEvent::Grasp(event)));
         outcome.state = Some(step.state);
         outcome.seen.state = Some(step.state);
+        outcome.seen.world_from_object = step.world_from_object;
         // In lockstep a shape is kept in the next tick, and the hand goes on.
         outcome.seen.keeping = self.pace == Pace::Free && !matches!(self.keep, Keep::NotWanted);
         outcome.recalled = step.recalled;
@@ -175,6 +226,11 @@ impl GraspLoop {
     fn allowed(&mut self, command: Option<Command>, outcome: &mut TickOutcome) -> Option<Command> {
         if !matches!(command, None | Some(Command::KeepShape)) || self.deforming_since.is_none() {
             return command;
+        }
+        if command.is_some() && self.changes.are_under_way() {
+            let text = "the object is being changed; keep the shape after that";
+            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
+            return None;
         }
         let wanted = command.is_some() || matches!(self.keep, Keep::WhenWhole);
         if wanted && matches!(self.keep, Keep::NotWanted | Keep::WhenWhole) {
@@ -201,7 +257,7 @@ impl GraspLoop {
     }
 
     /// Takes what has been done beside the ticks.
-    fn take_work(&mut self, outcome: &mut TickOutcome) {
+    pub(crate) fn take_work(&mut self, outcome: &mut TickOutcome) {
         while let Some(done) = self.work.take() {
             match done {
                 ObjectDone::Prefetch { rest_shapes, hint } => {
@@ -209,6 +265,8 @@ impl GraspLoop {
                         self.link.prefetch(&hint);
                     }
                 }
+                ObjectDone::Replacement(made) => self.put_in_place(*made, outcome),
+                ObjectDone::Saved(saved) => self.tell_saved(saved, outcome),
                 // The hand has let go meanwhile.
                 ObjectDone::Kept(_) if !matches!(self.keep, Keep::BeingMade) => {}
                 ObjectDone::Kept(Ok(kept)) => self.keep = Keep::Made(kept),
@@ -258,11 +316,8 @@ impl GraspLoop {
         if step.events.contains(&GraspEvent::ShapeKept)
             && let Keep::Made(kept) = std::mem::replace(&mut self.keep, Keep::NotWanted)
         {
-            self.object = kept.object;
-            self.shown_tick = None;
-            self.held.clear();
-            self.prefetched.clear();
-            self.link.set_model(kept.model);
+            self.changes.history.push(Arc::clone(self.object.rest_shape()));
+            self.show_from_now_on(*kept);
         }
         match &step.known {
             Some(known) => {
@@ -272,6 +327,7 @@ impl GraspLoop {
                     outcome.unanswered.push((tick, Unanswered::KeepingShape));
                     return Ok(());
                 }
+                self.last_known = Some(*known);
                 let question = self.question(known);
                 self.link.ask(tick, grip, question);
                 if self.pace == Pace::Lockstep {
@@ -291,23 +347,27 @@ impl GraspLoop {
     /// The fingers do not deform the object (any more).
     fn let_go(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
         self.deforming_since = None;
-        self.shown_tick = None;
+        (self.shown_tick, self.shown_forces) = (None, None);
         if !matches!(self.keep, Keep::NotWanted) {
             self.keep = Keep::NotWanted;
             let text = "the hand let go before the shape could be kept";
             outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
         }
+        self.refuse_to_save_half(outcome);
         self.link.cancel();
         self.object.relax()
     }
 
-    fn question(&mut self, known: &[KnownNode; 5]) -> Question {
+    /// The question of a tick.
+    pub(crate) fn question(&mut self, known: &[KnownNode; 5]) -> Question {
         let tip_radii = self.reader.setup().dimensions.tip_radii();
         let contact = self.settings.contact;
         let PrescribedDisplacements { of_dofs, masks, of_masks } =
             self.held.prescribed_displacements(contact, &self.object, tip_radii, known);
         let nodes = match self.settings.subscription {
-            Subscription::Surface if matches!(self.keep, Keep::NotWanted) => {
+            Subscription::Surface
+                if matches!(self.keep, Keep::NotWanted) && self.changes.save_to.is_none() =>
+            {
                 NodeChoice::Nodes(self.object.surface().nodes.clone())
             }
             _ => NodeChoice::All,
@@ -317,13 +377,14 @@ impl GraspLoop {
             masks,
             mask_displacements: of_masks,
             method: self.settings.method.clone(),
-            want: Want { nodes, reactions: false, precision: Precision::F64 },
+            want: Want { nodes, reactions: self.wishes.forces, precision: Precision::F64 },
+            max_error: self.wishes.max_error,
             ..Question::default()
         }
     }
 
     /// Takes what has come from the server.
-    fn pick_up(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
+    pub(crate) fn pick_up(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
         let (events, ended) = self.link.take();
         for event in events {
             let text = match event {
@@ -340,6 +401,7 @@ impl GraspLoop {
         for RequestEnd { tick, reached } in ended {
             match reached {
                 Ok(reached) => self.show(tick, *reached, outcome)?,
+                Err(_) if tick == UNCOUNTED => self.refuse_to_save_unanswered(outcome),
                 Err(why) => outcome.unanswered.push((tick, why)),
             }
         }
@@ -353,14 +415,19 @@ impl GraspLoop {
         reached: Reached,
         outcome: &mut TickOutcome,
     ) -> Result<(), ObjectError> {
-        let Reached { rest_shape, nodes, displacement, report, round_trip } = reached;
+        let Reached { rest_shape, nodes, displacement, reactions, mask_forces, report, round_trip } =
+            reached;
         let ms = round_trip.as_secs_f64() * 1e3;
-        outcome.answers.push((tick, SolveSummary::new(&report, ms)));
+        if tick != UNCOUNTED {
+            outcome.answers.push((tick, SolveSummary::new(&report, ms)));
+        }
         let current = rest_shape == self.object.rest_shapes()
             && self.deforming_since.is_some_and(|since| tick >= since)
             && !self.keep.freezes();
-        if current {
+        if current && tick != UNCOUNTED {
             self.shown_tick = Some(tick);
+            // The touched nodes stay the same as long as the grip that the answer belongs to.
+            self.shown_forces = self.held.fingertip_forces(&reactions, &mask_forces);
         }
         match nodes {
             _ if !current => Ok(()),

@@ -31,7 +31,8 @@ pub fn watch() {
 
 /// From now on the command looks at [`asked`] and ends by itself.
 pub fn hear() {
-    STATE.store(HEARD, Ordering::Relaxed);
+    // Where it has heard already, it may have been asked already.
+    let _ = STATE.compare_exchange(UNHEARD, HEARD, Ordering::Relaxed, Ordering::Relaxed);
 }
 
 /// Whether the program was asked to end since [`hear`].

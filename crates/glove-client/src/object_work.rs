@@ -1,9 +1,11 @@
-//! Work on the object that can take longer than a tick: a new rest shape, masks to be prefetched.
+//! Work on the object that can take longer than a tick: a new rest shape, a file to be
+//! written, masks to be prefetched.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Point3;
+use softgrasp_os::one_line;
 use softgrasp_protocol::{ElementName, Material};
 
 use crate::beside::Beside;
@@ -12,6 +14,7 @@ use crate::model_upload::ModelUpload;
 use crate::pace::Pace;
 use crate::prefetch::{Hint, NearContact};
 use crate::rest_shape::{ObjectError, RestShape};
+use crate::saving::ShapeToSave;
 use crate::soft_object::SoftObject;
 
 /// A piece of work.
@@ -29,6 +32,19 @@ pub enum ObjectJob {
         /// Element of the model.
         element: ElementName,
     },
+    /// Make an object with another rest shape, and form its model.
+    Replace {
+        /// The rest shape.
+        rest: Arc<RestShape>,
+        /// How many rest shapes there will have been.
+        rest_shapes: u64,
+        /// Material of the model.
+        material: Material,
+        /// Element of the model.
+        element: ElementName,
+    },
+    /// Write a shape to a file.
+    Save(ShapeToSave),
     /// Work out what the server is asked to prepare.
     Prefetch {
         /// The rest shape that the contacts are on.
@@ -48,6 +64,10 @@ pub enum ObjectJob {
 pub enum ObjectDone {
     /// The object with its next rest shape, and the model of it; or why it cannot be kept.
     Kept(Result<Box<KeptShape>, ObjectError>),
+    /// The object that takes the place of the one so far, and its model.
+    Replacement(Box<KeptShape>),
+    /// What was written, or why nothing was; a sentence.
+    Saved(Result<String, String>),
     /// What the server is asked to prepare for a rest shape.
     Prefetch {
         /// How many rest shapes there had been.
@@ -76,6 +96,12 @@ impl ObjectJob {
                     Box::new(KeptShape { object, model })
                 }))
             }
+            Self::Replace { rest, rest_shapes, material, element } => {
+                let object = SoftObject::at_rest(rest, rest_shapes);
+                let model = ModelUpload::new(object.rest(), rest_shapes, material, element);
+                ObjectDone::Replacement(Box::new(KeptShape { object, model }))
+            }
+            Self::Save(shape) => ObjectDone::Saved(shape.save().map_err(|error| one_line(&error))),
             Self::Prefetch { rest, rest_shapes, model, tip_radii, contacts } => {
                 let hint = Hint::new(model, &rest, tip_radii, &contacts);
                 ObjectDone::Prefetch { rest_shapes, hint }

@@ -242,6 +242,7 @@ impl RunReport {
                 }
                 LoopEvent::Grasp(event) => ("grasp", event.to_string()),
                 LoopEvent::KeepRefused(text) => ("shape", format!("keep shape refused: {text}")),
+                LoopEvent::Shape(text) => ("shape", text.clone()),
                 LoopEvent::Server(text) => ("server", text.clone()),
             };
             EventRecord { tick, at_ms, kind, what }

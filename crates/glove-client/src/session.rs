@@ -1,24 +1,41 @@
-//! A run from its first tick to its report: hand, grasp loop and report, one tick at a time.
+//! A run from its first tick to its report: hand, grasp loop and report, one tick at a time, and
+//! what a person asks of it between the ticks.
 
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
+use nalgebra::UnitQuaternion;
+use softgrasp_core::grasp::{Command, GraspEvent};
+
+use crate::control::Control;
 use crate::grasp_loop::GraspLoop;
+use crate::hand_source::HandSource;
+use crate::loading::LoadedObject;
+use crate::notice::Notice;
 use crate::pace::Due;
 use crate::rest_shape::ObjectError;
 use crate::run_report::RunReport;
-use crate::scripted::{ScriptedHand, Seen};
+use crate::scripted::Seen;
 use crate::soft_object::SoftObject;
+use crate::solve_settings::Subscription;
 use crate::tick_budget::{LIMIT, Priority, TickBudget};
-use crate::tick_outcome::TickOutcome;
+use crate::tick_outcome::{LoopEvent, TickOutcome};
 
-/// A run of a scripted hand. It has no clock: whoever plays it says which tick is due.
+/// A run. It has no clock: whoever plays it says which tick is due.
 pub struct Session {
     grasp_loop: GraspLoop,
-    hand: ScriptedHand,
+    hand: HandSource,
     seen: Seen,
     report: RunReport,
     budget: TickBudget,
     ends_with_script: bool,
+    /// Commands of the menu; one a tick.
+    commands: VecDeque<Command>,
+    notices: Vec<Notice>,
+    /// State, tips and segments after the last tick, without its news.
+    last: TickOutcome,
 }
 
 impl Session {
@@ -26,13 +43,22 @@ impl Session {
     /// It ends with the script, or goes on with a hand that rests.
     pub fn new(
         grasp_loop: GraspLoop,
-        hand: ScriptedHand,
+        hand: impl Into<HandSource>,
         report: RunReport,
         priority: Priority,
         ends_with_script: bool,
     ) -> Self {
-        let (seen, budget) = (Seen::default(), TickBudget::new(priority));
-        Self { grasp_loop, hand, seen, report, budget, ends_with_script }
+        Self {
+            grasp_loop,
+            hand: hand.into(),
+            seen: Seen::default(),
+            report,
+            budget: TickBudget::new(priority),
+            ends_with_script,
+            commands: VecDeque::new(),
+            notices: Vec::new(),
+            last: TickOutcome::default(),
+        }
     }
 
     /// Plays the tick that is due; `None` when the script is over. Ticks that were missed are
@@ -44,18 +70,82 @@ impl Session {
     /// [`ObjectError`] when the object cannot be shown any more.
     pub fn play(&mut self, due: Due, now_s: f64) -> Result<Option<TickOutcome>, ObjectError> {
         self.budget.begin();
+        // Between the ticks the object may have been turned or replaced.
+        self.seen.world_from_object = *self.grasp_loop.world_from_object();
         let object = self.grasp_loop.object();
-        let sent = self.hand.next_after(due.skipped + 1, &self.seen, object);
+        let mut sent = self.hand.next_after(due.skipped + 1, &self.seen, object);
         if sent.over && self.ends_with_script {
             self.report.add_skipped(due.skipped);
             return Ok(None);
         }
+        if sent.command.is_none() {
+            sent.command = self.commands.pop_front();
+        }
         let outcome = self.grasp_loop.tick(due.tick, now_s, &sent)?;
         self.seen = outcome.seen;
+        self.hear(&outcome);
         self.report.add(due, now_s, &outcome);
         let computed = self.budget.end();
         self.report.add_computed(computed);
         Ok(Some(outcome))
+    }
+
+    /// Goes on with what is under way while no tick is played. The outcome repeats what the last
+    /// tick showed.
+    ///
+    /// # Errors
+    /// As [`Session::play`].
+    pub fn idle(&mut self) -> Result<TickOutcome, ObjectError> {
+        let outcome = self.grasp_loop.idle()?;
+        self.report.add_last(&outcome);
+        self.hear(&outcome);
+        let TickOutcome { events, answers, unanswered, notices, .. } = outcome;
+        let state = self.last.state.map(|_| self.grasp_loop.state());
+        Ok(TickOutcome { events, answers, unanswered, notices, state, ..self.last.clone() })
+    }
+
+    /// Does what a person asks, or takes it in hand; [`Session::take_notices`] tells what has become
+    /// of it. When ticks are played is the concern of whoever plays them: pause, step and stop
+    /// change nothing here.
+    pub fn apply(&mut self, control: Control) {
+        let refused = match control {
+            Control::KeepShape => self.command(Command::KeepShape),
+            Control::Detach => self.command(Command::Release),
+            Control::ReturnHome => self.command(Command::ReturnHome),
+            Control::UndoKeepShape => self.grasp_loop.undo_keep_shape(),
+            Control::Save(path) => self.save(path),
+            Control::ReplaceObject(loaded) => self.replace_object(&loaded),
+            Control::ReplaceHand(hand) => self.replace_hand(*hand),
+            Control::TurnObject(rotation) => self.turn_object(rotation),
+            Control::Restart => self.restart(),
+            Control::Mouse(input) => {
+                if let HandSource::Mouse(hand) = &mut self.hand {
+                    hand.take(input);
+                }
+                Ok(())
+            }
+            Control::SetMethod(method) => {
+                self.notices.push(Notice::done(format!("solved by {method} from now on")));
+                self.grasp_loop.set_method(method);
+                Ok(())
+            }
+            Control::SetMaxError(max_error) => self.set_max_error(max_error),
+            Control::SetForces(forces) => {
+                self.grasp_loop.wishes_mut().forces = forces;
+                Ok(())
+            }
+            Control::SetWhole(whole) => {
+                let subscription = if whole { Subscription::Whole } else { Subscription::Surface };
+                self.grasp_loop.set_subscription(subscription);
+                Ok(())
+            }
+            Control::EndWithScript => {
+                self.ends_with_script = true;
+                Ok(())
+            }
+            Control::Pause | Control::Resume | Control::Step | Control::Stop => Ok(()),
+        };
+        self.notices.extend(refused.err());
     }
 
     /// Counts ticks that were missed at the end, after which none is played.
@@ -69,8 +159,21 @@ impl Session {
     }
 
     /// The hand.
-    pub fn hand(&self) -> &ScriptedHand {
+    pub fn hand(&self) -> &HandSource {
         &self.hand
+    }
+
+    /// Whether commands wait for the next tick.
+    pub fn has_commands(&self) -> bool {
+        !self.commands.is_empty()
+    }
+
+    /// Sentences for the person since the last call.
+    pub fn take_notices(&mut self) -> Vec<Notice> {
+        if let HandSource::Mouse(hand) = &mut self.hand {
+            self.notices.extend(hand.take_notices());
+        }
+        std::mem::take(&mut self.notices)
     }
 
     /// Waits until the server has answered all, at most so long.
@@ -93,6 +196,101 @@ impl Session {
         self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
         Ok(self.report)
     }
+
+    /// Takes the news of a tick for the person.
+    fn hear(&mut self, outcome: &TickOutcome) {
+        self.notices.extend(outcome.events.iter().filter_map(notice_of));
+        self.notices.extend(outcome.notices.iter().cloned());
+        if let Some(state) = outcome.state {
+            let &TickOutcome { tips, recalled, shown_tick, seen, .. } = outcome;
+            let state = Some(state);
+            self.last =
+                TickOutcome { state, tips, recalled, shown_tick, seen, ..TickOutcome::default() };
+        }
+    }
+
+    fn command(&mut self, command: Command) -> Result<(), Notice> {
+        self.commands.push_back(command);
+        Ok(())
+    }
+
+    fn save(&mut self, path: PathBuf) -> Result<(), Notice> {
+        self.notices.extend(self.grasp_loop.save(path)?);
+        Ok(())
+    }
+
+    fn replace_object(&mut self, loaded: &LoadedObject) -> Result<(), Notice> {
+        let LoadedObject { summary, object, plan } = loaded;
+        let plan = match (plan, self.hand.is_played()) {
+            (Err(error), true) => return Err(Notice::refused(error.to_string())),
+            (plan, _) => plan.as_ref().ok(),
+        };
+        self.grasp_loop.replace_object(Arc::clone(object.rest_shape()), &summary.name)?;
+        self.grasp_loop.let_object_go();
+        match &mut self.hand {
+            HandSource::Scripted(hand) => hand.restart(plan.copied()),
+            HandSource::Mouse(hand) => hand.meet_new_object(),
+        }
+        Ok(())
+    }
+
+    fn replace_hand(&mut self, mut hand: HandSource) -> Result<(), Notice> {
+        self.grasp_loop.let_object_go();
+        if let HandSource::Scripted(hand) = &mut hand {
+            // Scripts are made for an object at home, as it is now.
+            self.grasp_loop.put_object_home();
+            hand.restart(None);
+        }
+        let text = format!("the hand is now {}", hand.name());
+        self.hand = hand;
+        self.notices.push(Notice::done(text));
+        Ok(())
+    }
+
+    fn restart(&mut self) -> Result<(), Notice> {
+        let HandSource::Scripted(hand) = &mut self.hand else {
+            let text = "a hand that a person moves cannot be played again";
+            return Err(Notice::refused(text));
+        };
+        hand.restart(None);
+        self.grasp_loop.put_object_home();
+        Ok(())
+    }
+
+    fn turn_object(&mut self, rotation: UnitQuaternion<f64>) -> Result<(), Notice> {
+        if self.hand.is_played() {
+            let text = "a script grasps the object as it stands; take the mouse hand to turn it";
+            return Err(Notice::refused(text));
+        }
+        let turned = self.grasp_loop.turn_object(rotation);
+        turned.map_err(|error| Notice::refused(format!("the object is not turned: {error}")))
+    }
+
+    fn set_max_error(&mut self, max_error: Option<f64>) -> Result<(), Notice> {
+        if max_error.is_some_and(|error| !(error.is_finite() && error > 0.0)) {
+            let text = "the largest error is not taken: it must be a number above 0";
+            return Err(Notice::refused(text));
+        }
+        self.grasp_loop.wishes_mut().max_error = max_error;
+        Ok(())
+    }
+}
+
+/// What a person wants to be told of an event.
+fn notice_of(event: &LoopEvent) -> Option<Notice> {
+    Some(match event {
+        LoopEvent::Grasp(GraspEvent::ShapeKept) => Notice::done("shape kept"),
+        LoopEvent::Grasp(GraspEvent::Released) => Notice::done("the object is let go"),
+        LoopEvent::Grasp(GraspEvent::ReturnedHome) => Notice::done("the object is back home"),
+        LoopEvent::Grasp(GraspEvent::Ignored(Command::KeepShape)) => {
+            Notice::refused("no shape to keep: close all five fingers on the object first")
+        }
+        LoopEvent::Grasp(GraspEvent::Ignored(command)) => {
+            Notice::refused(format!("{command}: the hand holds nothing"))
+        }
+        LoopEvent::KeepRefused(text) => Notice::refused(text.clone()),
+        LoopEvent::Grasp(_) | LoopEvent::Shape(_) | LoopEvent::Server(_) => return None,
+    })
 }
 
 /// Real-time priority for the ticks of an object that follows its answers within half of what such

@@ -35,7 +35,8 @@ impl SoftObject {
     }
 
     /// The same object with its `rest_shapes`-th rest shape, at rest in it.
-    pub fn at_rest(rest: RestShape, rest_shapes: u64) -> Self {
+    pub fn at_rest(rest: impl Into<Arc<RestShape>>, rest_shapes: u64) -> Self {
+        let rest = rest.into();
         let shape = rest.mesh().vertices().to_vec();
         Self {
             displacement: vec![[0.0; 3]; shape.len()],
@@ -45,7 +46,7 @@ impl SoftObject {
             tree: rest.tree().clone(),
             normals: rest.normals().to_vec(),
             rest_shapes,
-            rest: Arc::new(rest),
+            rest,
         }
     }
 

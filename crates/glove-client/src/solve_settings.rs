@@ -27,3 +27,13 @@ pub enum Subscription {
     /// Every node: the whole object is written down.
     Whole,
 }
+
+/// What the answers of ticks are to hold and how good they are to be, as far as a person asks for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AnswerWishes {
+    /// Largest relative error that is acceptable; `None` leaves it to the method.
+    pub max_error: Option<f64>,
+    /// Whether the forces of the fingertips are wanted: every answer has them, and on the wire they
+    /// take room (`GraspLoop::fingertip_forces`).
+    pub forces: bool,
+}

@@ -2,6 +2,7 @@
 
 use softgrasp_core::grasp::{GraspEvent, StateName};
 
+use crate::notice::Notice;
 use crate::scripted::Seen;
 use crate::solve_report::SolveSummary;
 use crate::unanswered::Unanswered;
@@ -13,6 +14,8 @@ pub enum LoopEvent {
     Grasp(GraspEvent),
     /// A shape was to be kept, but cannot be.
     KeepRefused(String),
+    /// The object was changed, replaced or saved.
+    Shape(String),
     /// The server came, went, or refused.
     Server(String),
 }
@@ -36,4 +39,6 @@ pub struct TickOutcome {
     pub shown_tick: Option<u64>,
     /// What the person sees next.
     pub seen: Seen,
+    /// Sentences for the person.
+    pub notices: Vec<Notice>,
 }

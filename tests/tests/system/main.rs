@@ -8,13 +8,17 @@
 
 mod bad_requests;
 mod bad_streams;
+mod control;
+mod controlled;
 mod crowd;
 mod disturbed_links;
 mod engine;
+mod forces;
 mod keep_shape;
 mod many_clients;
 mod masks;
 mod memory;
+mod mouse;
 mod real_time;
 mod same_bits;
 mod start;

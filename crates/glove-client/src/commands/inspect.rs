@@ -8,11 +8,12 @@ use softgrasp_core::mesh::Surface;
 use softgrasp_core::mesh_io::{self, MeshFile, keeps_labels};
 use softgrasp_core::solve::memory::Bytes;
 
-use super::mesh::encode_mesh;
-use super::output::{print, write_file};
+use super::output::print;
 use crate::connection::OwnMachine;
+use crate::file_writing::write_file;
 use crate::inspection::Inspection;
 use crate::mesh_file::read_mesh_file;
+use crate::mesh_writing::encode_mesh;
 use crate::progress::Progress;
 
 /// Tell what is in a mesh file, whether it can be used, and what an answer would cost.
@@ -76,7 +77,7 @@ impl InspectCommand {
 fn repair(read: &MeshFile, out: &Path) -> anyhow::Result<String> {
     let MeshFile { mesh, findings, .. } = read;
     let labels = &findings.region_labels;
-    let bytes = encode_mesh(out, mesh, labels, &Surface::from_mesh(mesh))?;
+    let bytes = encode_mesh(out, mesh, labels, &Surface::from_mesh(mesh), &[])?;
     let name = out.display().to_string();
     let again = mesh_io::parse(&name, &bytes, &mut |_| None)
         .context("the mended mesh cannot be read back")?;

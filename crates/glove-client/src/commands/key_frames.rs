@@ -7,9 +7,8 @@ use anyhow::Context;
 use softgrasp_core::grasp::{GraspEvent, StateName};
 use softgrasp_core::mesh_io::{PointField, write_vtu};
 
-use super::output::write_file;
 use crate::beside::Beside;
-
+use crate::file_writing::write_file;
 use crate::rest_shape::RestShape;
 use crate::soft_object::SoftObject;
 use crate::tick_outcome::{LoopEvent, TickOutcome};
@@ -93,6 +92,6 @@ impl KeyFrames {
 impl Picture {
     fn write(self) -> anyhow::Result<()> {
         let field = PointField { name: "displacement", values: &self.displacement };
-        write_file(&self.path, &write_vtu(self.rest.mesh(), &[field])?)
+        Ok(write_file(&self.path, &write_vtu(self.rest.mesh(), &[field])?)?)
     }
 }

@@ -2,15 +2,13 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, bail};
 use clap::Args;
-use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
-use softgrasp_core::mesh_io::{
-    write_msh41_labelled, write_thesis_lists_labelled, write_vtu_labelled,
-};
+use softgrasp_core::mesh::{BuiltIn, Surface, generate};
 
 use super::numbers::count;
-use super::output::{print, write_file};
+use super::output::print;
+use crate::file_writing::write_file;
+use crate::mesh_writing::encode_mesh;
 use crate::progress::Progress;
 
 /// Generate a built-in object and write it to a file.
@@ -37,7 +35,7 @@ impl MeshCommand {
             generate(self.shape, self.nodes)?
         };
         let surface = Surface::from_mesh(&mesh);
-        write_file(&self.out, &encode_mesh(&self.out, &mesh, &[], &surface)?)?;
+        write_file(&self.out, &encode_mesh(&self.out, &mesh, &[], &surface, &[])?)?;
         print(&format!(
             "{}: {} nodes, {} tetrahedra, {} surface triangles written to {}\n",
             self.shape,
@@ -46,29 +44,5 @@ impl MeshCommand {
             surface.triangles.len(),
             self.out.display()
         ))
-    }
-}
-
-/// A mesh in the format that the file's extension names.
-///
-/// Shapes: `labels` empty or one per region.
-///
-/// # Errors
-/// An extension that names none.
-pub(crate) fn encode_mesh(
-    path: &std::path::Path,
-    mesh: &TetMesh,
-    labels: &[String],
-    surface: &Surface,
-) -> anyhow::Result<Vec<u8>> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("msh") => Ok(write_msh41_labelled(mesh, labels)),
-        Some("vtu") => write_vtu_labelled(mesh, labels, &[]).context("cannot form the VTU file"),
-        Some("txt") => Ok(write_thesis_lists_labelled(mesh, labels, &surface.triangles)?),
-        _ => bail!(
-            "{}: the extension names no format to write; use .msh (Gmsh 4.1), .vtu or .txt (the \
-             three lists of the thesis)",
-            path.display()
-        ),
     }
 }

@@ -11,13 +11,18 @@ use softgrasp_core::fem::{Element, Material as ElasticMaterial};
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
+use super::display_arguments::DisplayArguments;
 use super::numbers::{count, poisson, positive, ticks};
 use crate::connection::ServerChoice;
 use crate::contact_model::ContactModel;
+use crate::hand_reader::HandSetup;
+use crate::loading::ObjectRequest;
 use crate::pace::Pace;
 use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile};
 use crate::scripted::ScriptName;
 use crate::solve_settings::{SolveSettings, Subscription};
+#[cfg(feature = "window")]
+use crate::view::action::HandWish;
 
 /// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
 #[derive(Args, Clone, Default)]
@@ -34,7 +39,7 @@ pub struct RunArguments {
     /// Longest extent of the object, m [default: 0.08 for a mesh file, its own for a built-in].
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     pub(super) object_size: Option<f64>,
-    /// The hand: scripted[:approach|attach|squeeze|release|regrasp].
+    /// The hand: scripted[:approach|attach|squeeze|release|regrasp], or mouse (in a window).
     #[arg(long, value_name = "SOURCE")]
     pub(super) hand: Option<HandChoice>,
     /// Where to solve: HOST:PORT, or embedded [default: embedded].
@@ -69,6 +74,9 @@ pub struct RunArguments {
     /// No window.
     #[arg(long)]
     pub(super) headless: bool,
+    /// What is seen.
+    #[command(flatten)]
+    pub(super) shown: DisplayArguments,
     /// Folder for the deformed object at key frames (VTU).
     #[arg(long, value_name = "D")]
     pub(super) out_dir: Option<PathBuf>,
@@ -78,10 +86,23 @@ pub struct RunArguments {
 }
 
 /// Where the hand comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HandChoice {
     /// Played by the program, as device bytes.
     Scripted(ScriptName),
+    /// Driven by mouse and keyboard, in a window.
+    Mouse,
+}
+
+impl HandChoice {
+    /// The same as a menu has it.
+    #[cfg(feature = "window")]
+    pub(super) fn wish(self) -> HandWish {
+        match self {
+            Self::Scripted(script) => HandWish::Scripted(script),
+            Self::Mouse => HandWish::Mouse,
+        }
+    }
 }
 
 impl FromStr for HandChoice {
@@ -91,8 +112,10 @@ impl FromStr for HandChoice {
         match text.split_once(':').unwrap_or((text, "")) {
             ("scripted", "") => Ok(Self::Scripted(ScriptName::default())),
             ("scripted", name) => Ok(Self::Scripted(name.parse().map_err(|e| format!("{e}"))?)),
+            ("mouse", "") => Ok(Self::Mouse),
             _ => {
-                Err("there is scripted and scripted:NAME; gloves and recordings come later".into())
+                Err("there is scripted, scripted:NAME and mouse; gloves and recordings come later"
+                    .into())
             }
         }
     }
@@ -116,6 +139,7 @@ fn element_for_frames(choice: ElementChoice, poisson: f64) -> anyhow::Result<Ele
 }
 
 /// A run after flags and scene file have been put together.
+#[derive(Clone)]
 pub(super) struct RunPlan {
     /// What is grasped.
     pub(super) object: ObjectChoice,
@@ -127,8 +151,8 @@ pub(super) struct RunPlan {
     pub(super) settings: SolveSettings,
     /// Where to solve.
     pub(super) server: ServerChoice,
-    /// What the hand plays.
-    pub(super) script: ScriptName,
+    /// Where the hand comes from.
+    pub(super) hand: HandChoice,
     /// Whether ticks wait for answers.
     pub(super) pace: Pace,
     /// From tick to tick, in real time.
@@ -141,6 +165,11 @@ const WATCHED_RATE_HZ: f64 = 60.0;
 const PERIOD_MAX_S: f64 = 3600.0;
 
 impl RunArguments {
+    /// Whether the run is played without a window: pictures are drawn tick by tick.
+    pub(super) fn is_without_window(&self) -> bool {
+        self.headless || self.shown.wants_pictures()
+    }
+
     /// Puts flags and scene file together.
     ///
     /// # Errors
@@ -177,10 +206,9 @@ impl RunArguments {
             (None, Some(name)) => name.parse().context("the scene's contact")?,
             (None, None) => ContactModel::default(),
         };
-        let HandChoice::Scripted(script) =
-            self.hand.clone().unwrap_or(HandChoice::Scripted(ScriptName::default()));
+        let hand = self.hand.unwrap_or(HandChoice::Scripted(ScriptName::default()));
         // A person at a terminal watches; a pipe wants the result.
-        let watched = console_is_watched() && !self.headless;
+        let watched = console_is_watched() && !self.is_without_window();
         let rate = self.rate.or(watched.then_some(WATCHED_RATE_HZ));
         let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
         Ok(RunPlan {
@@ -192,16 +220,50 @@ impl RunArguments {
                 element: element_for_frames(element, material.poisson)?,
                 method,
                 contact,
-                subscription: match self.out_dir {
-                    Some(_) => Subscription::Whole,
-                    None => Subscription::Surface,
+                subscription: match (&self.out_dir, self.shown.display().shading.needs_inside()) {
+                    (None, false) => Subscription::Surface,
+                    (Some(_), _) | (_, true) => Subscription::Whole,
                 },
             },
             server: self.server.clone().unwrap_or(ServerChoice::Embedded),
-            script,
+            hand,
             pace: if period.is_some() { Pace::Free } else { Pace::Lockstep },
             period,
         })
+    }
+}
+
+impl RunPlan {
+    /// From tick to tick of a hand that a person moves or watches, s.
+    pub(super) fn tick_s(&self) -> f64 {
+        self.period.map_or(1.0 / WATCHED_RATE_HZ, |period| period.as_secs_f64())
+    }
+
+    /// The same run for a person who watches: in real time.
+    #[cfg(feature = "window")]
+    pub(super) fn for_window(&self) -> Self {
+        let period = Some(Duration::from_secs_f64(self.tick_s()));
+        Self { pace: Pace::Free, period, ..self.clone() }
+    }
+
+    /// Its material as the solver knows it.
+    ///
+    /// # Errors
+    /// Not seen: the plan was made of a good one.
+    #[cfg(feature = "window")]
+    pub(super) fn elastic_material(&self) -> anyhow::Result<ElasticMaterial> {
+        let Material { young, poisson } = self.settings.material;
+        Ok(ElasticMaterial::try_new(young, poisson)?)
+    }
+
+    /// The object, for the hand that is to grasp it.
+    pub(super) fn object_request(&self, setup: &HandSetup) -> ObjectRequest {
+        ObjectRequest {
+            choice: self.object.clone(),
+            nodes: self.nodes,
+            size_m: self.object_size,
+            setup: setup.clone(),
+        }
     }
 }
 

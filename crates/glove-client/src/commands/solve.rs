@@ -15,12 +15,13 @@ use softgrasp_protocol::{
 };
 
 use super::numbers::{count, poisson, positive};
-use super::output::{print, write_file, write_json};
+use super::output::{print, write_json};
 use crate::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
 use crate::discretisation::DiscretisationEstimate;
 use crate::displacement_table::{
     DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError, read_table, write_displacements,
 };
+use crate::file_writing::write_file;
 use crate::mesh_file::read_mesh_file;
 use crate::model_upload::mesh_data;
 use crate::progress::Progress;

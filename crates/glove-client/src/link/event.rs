@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use softgrasp_protocol::{ModelReady, NodeChoice, SolveReport};
+use softgrasp_protocol::{DofValue, ModelReady, NodeChoice, SolveReport};
 
 use crate::unanswered::Unanswered;
 
@@ -46,6 +46,10 @@ pub struct Reached {
     pub nodes: NodeChoice,
     /// Displacement of these nodes, m.
     pub displacement: Vec<[f64; 3]>,
+    /// Forces at the known degrees of freedom, N; empty if not asked for.
+    pub reactions: Vec<DofValue>,
+    /// Force of each mask, N, in the order of the question; empty if not asked for.
+    pub mask_forces: Vec<[f64; 3]>,
     /// What it cost and how wrong it can be.
     pub report: Box<SolveReport>,
     /// From sending to having the answer.

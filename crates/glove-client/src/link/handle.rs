@@ -7,7 +7,7 @@ use std::time::Duration;
 use softgrasp_protocol::Question;
 
 use super::event::{LinkEvent, RequestEnd};
-use super::outbox::{LinkState, Shared, TickRequest};
+use super::outbox::{Activity, LinkState, Shared, TickRequest};
 use super::worker::Worker;
 use crate::model_upload::ModelUpload;
 use crate::prefetch::Hint;
@@ -76,6 +76,11 @@ impl Link {
         let losses = state.losses;
         let waits = |state: &mut LinkState| !state.is_idle() && state.losses == losses;
         self.shared.wait_while(state, at_most, waits).is_idle()
+    }
+
+    /// Whether the server is being given the model: it assembles, orders and factors.
+    pub fn is_giving_model(&self) -> bool {
+        self.shared.lock().activity == Activity::Uploading
     }
 
     /// Whether the server is there.

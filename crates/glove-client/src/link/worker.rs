@@ -263,6 +263,8 @@ impl Session {
                 round_trip,
                 nodes: answer.nodes,
                 displacement: answer.displacements.into_f64(),
+                reactions: answer.reactions,
+                mask_forces: answer.mask_forces,
                 report: Box::new(answer.report),
             },
             other => return Err(unexpected("Frame", &other)),

@@ -8,7 +8,7 @@ use softgrasp_core::hand::Finger;
 
 use super::approach::PalmPath;
 use super::plan::{GraspPlan, Posture, angles};
-use super::planner::{PlanRequest, Planner};
+use super::planner::{NoGrasp, PlanRequest, Planner};
 use super::script::{ScriptName, Step};
 use crate::hand_reader::HandSetup;
 use crate::soft_object::SoftObject;
@@ -18,6 +18,8 @@ use crate::soft_object::SoftObject;
 pub struct Seen {
     /// Whether each tip is inside the object, thumb first.
     pub inside: [bool; 5],
+    /// Where the object is.
+    pub world_from_object: Isometry3<f64>,
     /// State of the grasp, once there is one.
     pub state: Option<StateName>,
     /// The shape is being kept beside the ticks; the hand holds still until it is.
@@ -37,32 +39,15 @@ pub struct Sent {
     pub over: bool,
 }
 
-/// The hand found no way to grasp.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum NoGrasp {
-    /// No palm pose is good.
-    #[error(
-        "the scripted hand found no palm pose from which all five fingertips reach this object \
-         ({extent_m:.3} m long); try another --object-size"
-    )]
-    OutOfReach {
-        /// Longest extent of the object.
-        extent_m: f64,
-    },
-    /// Five tips need five nodes.
-    #[error("the object has {nodes} surface nodes; five fingertips need five different ones")]
-    TooFewNodes {
-        /// Nodes on its surface.
-        nodes: usize,
-    },
-}
-
 /// The scripted hand.
 pub struct ScriptedHand {
     setup: HandSetup,
     planner: Planner,
     /// A plan has been asked for and is not there yet.
     planning: bool,
+    /// The script begins with a plan for the object as it is then.
+    plans_first: bool,
+    name: ScriptName,
     steps: Vec<Step>,
     at: usize,
     step_tick: u32,
@@ -103,15 +88,18 @@ impl ScriptedHand {
     ) -> Result<Self, NoGrasp> {
         let object = Arc::clone(object.rest_shape());
         let request = PlanRequest { object, setup, avoid_gaze: None };
-        let PlanRequest { object, setup, .. } = &request;
-        let plan = request.plan().ok_or_else(|| match object.surface().nodes.len() {
-            nodes @ ..5 => NoGrasp::TooFewNodes { nodes },
-            _ => NoGrasp::OutOfReach { extent_m: object.mesh().size() },
-        })?;
-        Ok(Self {
-            setup: setup.clone(),
+        let plan = request.grip()?;
+        Ok(Self::following(name, request.setup, plan))
+    }
+
+    /// A hand that follows a plan which was made elsewhere.
+    pub fn following(name: ScriptName, setup: HandSetup, plan: GraspPlan) -> Self {
+        Self {
+            setup,
             planner: Planner::waited(),
             planning: false,
+            plans_first: false,
+            name,
             steps: name.steps(),
             at: 0,
             step_tick: 0,
@@ -122,7 +110,23 @@ impl ScriptedHand {
             closure: [0.0; 5],
             closure_before: [0.0; 5],
             lift: 0.0,
-        })
+        }
+    }
+
+    /// Plays the script again from its beginning, by this plan; `None` lets the hand plan for the
+    /// object as it is then.
+    pub fn restart(&mut self, plan: Option<GraspPlan>) {
+        self.planner.abandon();
+        self.planning = false;
+        self.plans_first = plan.is_none();
+        self.plan = plan.unwrap_or(self.plan);
+        (self.at, self.step_tick, self.progress, self.rested) = (0, 0, 0.0, 0);
+        (self.closure, self.closure_before, self.lift) = ([0.0; 5], [0.0; 5], 0.0);
+    }
+
+    /// Which script it plays.
+    pub fn script(&self) -> ScriptName {
+        self.name
     }
 
     /// The same hand with another place to plan its later approaches.
@@ -194,9 +198,11 @@ impl ScriptedHand {
         step == Step::Keep
     }
 
-    /// Whether the step can go on: turning to the other side needs a plan of what follows.
+    /// Whether the step can go on: turning to the other side needs a plan of what follows, and so
+    /// does the beginning where the object may have changed.
     fn is_ready_for(&mut self, step: Step, object: &SoftObject) -> bool {
-        if step != Step::TurnToOtherSide || self.step_tick > 0 {
+        let begins = self.plans_first && self.at == 0;
+        if self.step_tick > 0 || !(begins || step == Step::TurnToOtherSide) {
             return true;
         }
         if !self.planning {
@@ -205,11 +211,11 @@ impl ScriptedHand {
             self.planner.ask(PlanRequest {
                 object: Arc::clone(object.rest_shape()),
                 setup: self.setup.clone(),
-                avoid_gaze: Some(self.plan.path.gaze()),
+                avoid_gaze: (!begins).then(|| self.plan.path.gaze()),
             });
         }
         let Some(planned) = self.planner.take() else { return false };
-        self.planning = false;
+        (self.planning, self.plans_first) = (false, false);
         // A shape that cannot be grasped any more is reached for as before.
         self.plan = planned.unwrap_or(self.plan);
         true

@@ -7,7 +7,7 @@ mod planner;
 mod script;
 
 pub use approach::PalmPath;
-pub use hand::{NoGrasp, ScriptedHand, Seen, Sent};
+pub use hand::{ScriptedHand, Seen, Sent};
 pub use plan::{GraspPlan, Posture, angles, plan_grasp};
-pub use planner::{PlanRequest, Planner};
+pub use planner::{NoGrasp, PlanRequest, Planner};
 pub use script::{ScriptName, UnknownScript};

@@ -20,6 +20,26 @@ pub struct PlanRequest {
     pub avoid_gaze: Option<Vector3<f64>>,
 }
 
+/// The hand found no way to grasp.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoGrasp {
+    /// No palm pose is good.
+    #[error(
+        "the scripted hand found no palm pose from which all five fingertips reach this object \
+         ({extent_m:.3} m long); try another --object-size"
+    )]
+    OutOfReach {
+        /// Longest extent of the object.
+        extent_m: f64,
+    },
+    /// Five tips need five nodes.
+    #[error("the object has {nodes} surface nodes; five fingertips need five different ones")]
+    TooFewNodes {
+        /// Nodes on its surface.
+        nodes: usize,
+    },
+}
+
 impl PlanRequest {
     /// The best plan; one that does not avoid the gaze where no other is found; `None` where the
     /// object cannot be grasped. Takes up to seconds.
@@ -31,10 +51,30 @@ impl PlanRequest {
             plan_grasp(&self.object, &self.setup, depth, None)
         })
     }
+
+    /// The same with the reason where the object cannot be grasped.
+    ///
+    /// # Errors
+    /// [`NoGrasp`].
+    pub fn grip(&self) -> Result<GraspPlan, NoGrasp> {
+        self.plan().ok_or_else(|| match self.object.surface().nodes.len() {
+            nodes @ ..5 => NoGrasp::TooFewNodes { nodes },
+            _ => NoGrasp::OutOfReach { extent_m: self.object.mesh().size() },
+        })
+    }
 }
 
 /// Plans approaches one at a time.
-pub enum Planner {
+pub struct Planner {
+    way: Way,
+    /// A plan was asked for and has not been taken.
+    asked: bool,
+    /// Plans under way that nobody wants any more.
+    abandoned: usize,
+}
+
+/// Where the planning is done.
+enum Way {
     /// While the tick waits: the plan is there in the tick that asks for it.
     Waited(Option<Option<GraspPlan>>),
     /// On a thread of its own: the ticks go on.
@@ -44,7 +84,7 @@ pub enum Planner {
 impl Planner {
     /// A planner that lets the ticks wait.
     pub const fn waited() -> Self {
-        Self::Waited(None)
+        Self { way: Way::Waited(None), asked: false, abandoned: 0 }
     }
 
     /// A planner beside the ticks.
@@ -62,28 +102,46 @@ impl Planner {
     pub fn beside_by(
         plan: impl FnMut(PlanRequest) -> Option<GraspPlan> + Send + 'static,
     ) -> std::io::Result<Self> {
-        Ok(Self::Beside(Beside::start("planner", plan)?))
+        let way = Way::Beside(Beside::start("planner", plan)?);
+        Ok(Self { way, asked: false, abandoned: 0 })
     }
 
     /// Asks for a plan.
-    pub(super) fn ask(&mut self, request: PlanRequest) {
-        match self {
-            Self::Waited(planned) => *planned = Some(request.plan()),
-            Self::Beside(beside) => beside.begin(request),
+    pub fn ask(&mut self, request: PlanRequest) {
+        self.asked = true;
+        match &mut self.way {
+            Way::Waited(planned) => *planned = Some(request.plan()),
+            Way::Beside(beside) => beside.begin(request),
         }
     }
 
+    /// The plan that was asked for is not wanted any more.
+    pub fn abandon(&mut self) {
+        self.abandoned += usize::from(self.asked);
+        self.asked = false;
+    }
+
     /// The plan that was asked for, once it is there; its inner `None` says that there is none.
-    pub(super) fn take(&mut self) -> Option<Option<GraspPlan>> {
-        match self {
-            Self::Waited(planned) => planned.take(),
-            Self::Beside(beside) => match beside.take() {
-                Some(planned) => Some(planned),
-                None if beside.is_busy() => None,
-                // The thread is gone; the hand goes on as it would without another way to grasp.
-                None => Some(None),
+    pub fn take(&mut self) -> Option<Option<GraspPlan>> {
+        let taken = match &mut self.way {
+            Way::Waited(planned) => {
+                // A newer plan has replaced those that were abandoned.
+                self.abandoned = 0;
+                planned.take()
+            }
+            Way::Beside(beside) => loop {
+                match beside.take() {
+                    Some(_) if self.abandoned > 0 => self.abandoned -= 1,
+                    Some(planned) => break Some(planned),
+                    None if beside.is_busy() => break None,
+                    // The thread is gone; the hand goes on as it would without another way to
+                    // grasp.
+                    None => break Some(None),
+                }
             },
-        }
+        };
+        self.asked &= taken.is_none();
+        taken
     }
 }
 
@@ -102,4 +160,38 @@ fn press_depth(object: &RestShape) -> f64 {
     });
     let spacing = edges.sum::<f64>() / mesh.tets().len() as f64;
     (PRESS_SHARE * mesh.size()).min(PRESS_SPACING_SHARE * spacing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::soft_object::SoftObject;
+    use softgrasp_core::mesh::{BuiltIn, generate};
+
+    #[test]
+    fn abandoned_plan_is_never_taken() {
+        let cube = SoftObject::try_new(generate(BuiltIn::Cube, 64).unwrap()).unwrap();
+        let request = |avoid_gaze| PlanRequest {
+            object: Arc::clone(cube.rest_shape()),
+            setup: HandSetup::default(),
+            avoid_gaze,
+        };
+        // Plans are told apart by whether there is one; a real plan is made once.
+        let plan = request(None).plan();
+        assert!(plan.is_some());
+        let mut planner =
+            Planner::beside_by(move |asked: PlanRequest| asked.avoid_gaze.and(plan)).unwrap();
+        planner.ask(request(None));
+        planner.abandon();
+        planner.ask(request(Some(Vector3::x())));
+        let taken = loop {
+            if let Some(taken) = planner.take() {
+                break taken;
+            }
+            std::thread::yield_now();
+        };
+        assert_eq!(taken, plan);
+        planner.abandon();
+        assert_eq!(planner.take(), Some(None), "nothing is under way");
+    }
 }

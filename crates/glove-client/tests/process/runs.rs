@@ -76,3 +76,12 @@ fn refused_model_is_told_once_and_ends_with_exit_code_1() {
         }
     }
 }
+
+#[test]
+fn mouse_hand_without_a_window_is_refused_in_one_sentence() {
+    let said = crate::start::fail(1, &["run", "--headless", "--hand", "mouse"]);
+    assert_eq!(said.lines().count(), 1, "{said}");
+    for part in ["needs the window", "--hand scripted"] {
+        assert!(said.contains(part), "{said}");
+    }
+}

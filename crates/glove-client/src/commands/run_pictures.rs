@@ -1,0 +1,177 @@
+//! Pictures of a run without a window: one moment, every tick, or a moving picture.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+
+use super::display_arguments::DisplayArguments;
+use super::run_arguments::{RunArguments, RunPlan};
+use crate::file_writing::write_file;
+use crate::grasp_loop::GraspLoop;
+use crate::pace::Due;
+use crate::tick_outcome::TickOutcome;
+use crate::view::camera::ViewCamera;
+use crate::view::display::{Display, Level};
+use crate::view::frame::ViewFrame;
+use crate::view::moment::{Moment, Watch};
+use crate::view::object_skin::Look;
+use crate::view::observer::Observer;
+use crate::window::{Animation, Pictures, RgbImage, png};
+
+/// Draws what was asked for, tick by tick.
+pub(super) struct RunPictures {
+    pictures: Pictures,
+    display: Display,
+    /// `None` until the first hand places the eye.
+    camera: Option<ViewCamera>,
+    observer: Observer,
+    snapshot: Option<Snapshot>,
+    frames_dir: Option<PathBuf>,
+    animation: Option<(PathBuf, Animation)>,
+}
+
+/// A picture of one moment.
+struct Snapshot {
+    path: PathBuf,
+    watch: Watch,
+    /// The tick that is the moment if no later one is.
+    kept: Option<Box<ViewFrame>>,
+    /// Paths of light a pixel, where light is traced.
+    paths: Option<u32>,
+    /// What was asked for, for the sentence that says that it did not come.
+    moment: Option<Moment>,
+}
+
+/// Ticks from one picture of an animation to the next: 15 a second where there are 60 ticks.
+const ANIMATED_TICKS: u64 = 4;
+
+impl RunPictures {
+    /// Begins to draw, if pictures were asked for.
+    ///
+    /// # Errors
+    /// A sentence, where nothing can draw or the folder cannot be made.
+    pub(super) fn start(arguments: &RunArguments, plan: &RunPlan) -> anyhow::Result<Option<Self>> {
+        let shown = &arguments.shown;
+        if !shown.wants_pictures() {
+            return Ok(None);
+        }
+        let size = shown.size();
+        let look = Look::of(&plan.object.to_string());
+        let material = plan.elastic_material()?;
+        let pictures = Pictures::try_new(size.width, size.height, look, material)
+            .context("no pictures can be drawn")?;
+        if let Some(folder) = &shown.frames_dir {
+            std::fs::create_dir_all(folder)
+                .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        }
+        let snapshot = shown.snapshot.as_ref().map(|path| Snapshot {
+            path: path.clone(),
+            watch: Watch::new(shown.at.unwrap_or(Moment::Tick(u64::MAX))),
+            kept: None,
+            paths: shown.paths,
+            moment: shown.at,
+        });
+        Ok(Some(Self {
+            display: Display { level: level(shown, &pictures), ..shown.display() },
+            pictures,
+            camera: shown.eye.map(|_| shown.camera()),
+            observer: Observer::default(),
+            snapshot,
+            frames_dir: shown.frames_dir.clone(),
+            animation: shown.animation.as_ref().map(|path| (path.clone(), Animation::default())),
+        }))
+    }
+
+    /// Takes a tick.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(super) fn add(
+        &mut self,
+        due: Due,
+        now_s: f64,
+        outcome: &TickOutcome,
+        grasp_loop: &GraspLoop,
+    ) -> anyhow::Result<()> {
+        self.observer.note(due, outcome);
+        let frame = self.observer.frame(due, now_s, outcome, grasp_loop);
+        let camera = self.camera(&frame);
+        let animates = self.animation.is_some() && due.tick.is_multiple_of(ANIMATED_TICKS);
+        if self.frames_dir.is_some() || animates {
+            let picture = self.pictures.draw(&frame, &self.display, &camera);
+            if let Some(folder) = &self.frames_dir {
+                write_picture(&folder.join(format!("{:05}.png", due.tick)), &picture)?;
+            }
+            if let (true, Some((_, animation))) = (animates, &mut self.animation) {
+                animation.add(picture);
+            }
+        }
+        let Some(snapshot) = &mut self.snapshot else { return Ok(()) };
+        let (keeps, done) = snapshot.watch.see(due.tick, frame.grasp.state);
+        if done {
+            return self.take_snapshot();
+        }
+        if keeps {
+            snapshot.kept = Some(Box::new(frame));
+        }
+        Ok(())
+    }
+
+    /// Writes what is left to write.
+    ///
+    /// # Errors
+    /// A file that cannot be written, or a moment that did not come.
+    pub(super) fn finish(mut self) -> anyhow::Result<()> {
+        self.take_snapshot()?;
+        if let Some((path, animation)) = self.animation {
+            let period_s = ANIMATED_TICKS as f64 / 60.0;
+            let bytes = animation.encode(period_s).context("cannot form the animation")?;
+            write_file(&path, &bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Where the eye is: where it was asked to be, or beside the first hand.
+    fn camera(&mut self, frame: &ViewFrame) -> ViewCamera {
+        if let (None, Some(hand)) = (self.camera, &frame.hand) {
+            self.camera = Some(ViewCamera::beside_hand(
+                frame.object.world_from_object * frame.object.rest.centre(),
+                &hand.world_from_palm,
+                hand.dimensions.handedness,
+            ));
+        }
+        self.camera.unwrap_or_default()
+    }
+
+    /// Draws and writes the moment that was kept.
+    fn take_snapshot(&mut self) -> anyhow::Result<()> {
+        let Some(Snapshot { path, kept, paths, moment, .. }) = self.snapshot.take() else {
+            return Ok(());
+        };
+        let moment = moment.map_or("a tick".to_owned(), |moment| moment.to_string());
+        let frame = kept.with_context(|| {
+            format!("no picture was taken: the run did not come to {moment} (--at)")
+        })?;
+        let camera = self.camera(&frame);
+        let picture = match paths {
+            Some(paths) => self.pictures.trace(&frame, &self.display, &camera, paths),
+            None => self.pictures.draw(&frame, &self.display, &camera),
+        };
+        write_picture(&path, &picture)
+    }
+}
+
+/// What was asked for; else single pictures are drawn well, and many where the processor draws so
+/// that they come soon.
+fn level(shown: &DisplayArguments, pictures: &Pictures) -> Level {
+    let draws_many = shown.frames_dir.is_some() || shown.animation.is_some();
+    match shown.light {
+        Some(level) => level,
+        None if draws_many && pictures.is_software() => Level::Plain,
+        None => Level::default(),
+    }
+}
+
+fn write_picture(path: &Path, picture: &RgbImage) -> anyhow::Result<()> {
+    Ok(write_file(path, &png(picture).context("cannot form the picture")?)?)
+}

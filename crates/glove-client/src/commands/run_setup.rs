@@ -1,0 +1,113 @@
+//! Makes a run ready: the object, the hand, the server, the session that plays them.
+
+use std::io::IsTerminal as _;
+
+use anyhow::Context;
+use nalgebra::Isometry3;
+use softgrasp_core::grasp::Grasp;
+
+use super::run_arguments::{HandChoice, RunPlan};
+use crate::connection::Host;
+use crate::grasp_loop::GraspLoop;
+use crate::hand_reader::{HandReader, HandSetup};
+use crate::hand_source::HandSource;
+use crate::interruption;
+use crate::link::Link;
+use crate::loading::{LoadStage, LoadedObject, load};
+use crate::mouse::MouseHand;
+use crate::pace::Pace;
+use crate::run_report::RunReport;
+use crate::scripted::{Planner, ScriptedHand};
+use crate::session::{Session, priority_for};
+use crate::soft_object::SoftObject;
+use crate::tick_budget::Priority;
+
+/// A run that can be played.
+pub(super) struct ReadyRun {
+    /// The run.
+    pub(super) session: Session,
+    /// The server, if it runs in this process; it must live as long as the run.
+    pub(super) host: Host,
+}
+
+/// What is being made ready.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SetupStage {
+    /// The object.
+    Object(LoadStage),
+    /// The server and the connection to it.
+    Server,
+}
+
+/// How a run is to be made ready.
+pub(super) struct Setup {
+    /// Threads of an embedded server; `None` takes one per processor.
+    pub(super) threads: Option<usize>,
+    /// Whether it ends with the script.
+    pub(super) ends_with_script: bool,
+    /// Ticks per second of a hand that is moved by a person.
+    pub(super) tick_s: f64,
+}
+
+/// Makes a run ready; says at which stage it is. `seen` is shown the object before the first tick.
+///
+/// # Errors
+/// One line each: what happened, where, and what to do.
+pub(super) fn make_ready(
+    plan: &RunPlan,
+    setup: &Setup,
+    at: impl Fn(SetupStage),
+    seen: impl FnOnce(&SoftObject) -> anyhow::Result<()>,
+) -> anyhow::Result<ReadyRun> {
+    let hand_setup = HandSetup::default();
+    let goes_on = |stage| {
+        at(SetupStage::Object(stage));
+        true
+    };
+    let loaded = load(&plan.object_request(&hand_setup), goes_on)?;
+    let LoadedObject { summary, mut object, plan: grip } =
+        loaded.context("the object was called off")?;
+    seen(&object)?;
+    let planner = || Planner::beside().context("cannot start the planner's thread");
+    let hand: HandSource = match (plan.hand, plan.pace) {
+        (HandChoice::Mouse, _) => {
+            MouseHand::new(hand_setup.clone(), planner()?, setup.tick_s).into()
+        }
+        (HandChoice::Scripted(script), Pace::Lockstep) => {
+            ScriptedHand::following(script, hand_setup.clone(), grip?).into()
+        }
+        (HandChoice::Scripted(script), Pace::Free) => {
+            let hand = ScriptedHand::following(script, hand_setup.clone(), grip?);
+            hand.with_planner(planner()?).into()
+        }
+    };
+    let priority = match plan.pace {
+        Pace::Lockstep => Priority::Ordinary,
+        Pace::Free => priority_for(&mut object)?,
+    };
+    at(SetupStage::Server);
+    let host = Host::open(&plan.server, setup.threads)?;
+    // A wrong address is a wrong address; a server that goes later is survived.
+    drop(host.connect(None)?);
+    // From here on an interruption ends the run with its report.
+    interruption::hear();
+    let link =
+        Link::start(host.address(), priority).context("cannot start the link to the server")?;
+    if std::io::stderr().is_terminal() {
+        summary.notes.iter().for_each(|note| eprintln!("glove-client: {note}"));
+    }
+    let report = RunReport::new(
+        summary,
+        hand.name(),
+        plan.server.to_string(),
+        plan.pace,
+        plan.settings.contact,
+    );
+    let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M)?;
+    let reader = HandReader::new(hand_setup);
+    let settings = plan.settings.clone();
+    let grasp_loop = GraspLoop::try_new(reader, object, grasp, link, settings, plan.pace)
+        .context("cannot start a thread beside the ticks")?;
+    let session = Session::new(grasp_loop, hand, report, priority, setup.ends_with_script);
+    Ok(ReadyRun { session, host })
+}

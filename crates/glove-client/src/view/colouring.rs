@@ -1,0 +1,97 @@
+//! The colours of the object in a frame, with the legend that explains them.
+
+use std::sync::Arc;
+
+use softgrasp_core::fem::Material;
+
+use super::colour_map::ColourMap;
+use super::frame::ObjectView;
+use super::legend::Legend;
+use super::shaded_object::ShadedObject;
+use super::shading::Shading;
+
+/// Colours of an object, frame after frame.
+pub struct Colouring {
+    map: ColourMap,
+    legend: Legend,
+    shaded: Option<Shaded>,
+    material: Material,
+    shares: Vec<f64>,
+    /// What the legend has to say besides its numbers.
+    remark: String,
+}
+
+struct Shaded {
+    /// Rest shape that it is made for.
+    of: u64,
+    object: ShadedObject,
+}
+
+impl Colouring {
+    /// Colours for objects of a material.
+    pub fn new(material: Material) -> Self {
+        Self {
+            map: ColourMap::new(),
+            legend: Legend::new(Shading::Plain),
+            shaded: None,
+            material,
+            shares: Vec::new(),
+            remark: String::new(),
+        }
+    }
+
+    /// Works out the colours of a frame.
+    ///
+    /// Units: `now_s` s.
+    pub fn follow(&mut self, object: &ObjectView, shading: Shading, now_s: f64) {
+        self.shares.clear();
+        self.remark.clear();
+        if self.legend.shading() != shading {
+            self.legend = Legend::new(shading);
+        }
+        if shading == Shading::Plain {
+            return;
+        }
+        let of = object.rest_shapes;
+        if self.shaded.as_ref().is_none_or(|shaded| shaded.of != of) {
+            let made = ShadedObject::new(Arc::clone(&object.rest), self.material);
+            self.shaded = Some(Shaded { of, object: made });
+        }
+        let Some(Shaded { object: shaded, .. }) = &mut self.shaded else { return };
+        if shading.needs_inside() && !object.whole {
+            "waiting for an answer with the nodes inside".clone_into(&mut self.remark);
+            return;
+        }
+        // A frame whose displacements are another mesh's shows no colours.
+        if shaded.shade(shading, &object.displacement).is_err() {
+            return;
+        }
+        self.legend.follow(shaded.largest_seen(), now_s);
+        let legend = &self.legend;
+        self.shares.extend(shaded.values().iter().map(|value| legend.fraction(*value)));
+        if let Some(error) = shaded.error_of_whole() {
+            let text = shading.text(error);
+            self.remark = format!("whole object, energy norm: {text} (an estimate, no bound)");
+        }
+    }
+
+    /// Share of the legend's range at each node; empty where nothing is coloured.
+    pub fn shares(&self) -> &[f64] {
+        &self.shares
+    }
+
+    /// The colours.
+    pub fn map(&self) -> &ColourMap {
+        &self.map
+    }
+
+    /// The legend.
+    pub fn legend(&self) -> &Legend {
+        &self.legend
+    }
+
+    /// What the legend has to say besides its numbers; empty if nothing.
+    pub fn remark(&self) -> &str {
+        &self.remark
+    }
+}

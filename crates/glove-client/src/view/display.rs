@@ -1,0 +1,199 @@
+//! What of a frame is to be shown, and how richly.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::shading::Shading;
+use super::toggle::Toggle;
+
+/// How much is spent on the light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Level {
+    /// No shadows, no smoothed edges: for machines that draw with the processor.
+    Plain,
+    /// Shadows and smoothed edges.
+    #[default]
+    Fair,
+    /// Softer and finer shadows, and shade in corners.
+    Full,
+}
+
+/// A word that names no such thing.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{got}' is not {what}; there are {known}")]
+pub struct UnknownDisplay {
+    got: String,
+    what: &'static str,
+    known: &'static str,
+}
+
+impl Level {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Fair, Self::Full];
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Plain => "plain",
+            Self::Fair => "fair",
+            Self::Full => "full",
+        })
+    }
+}
+
+impl FromStr for Level {
+    type Err = UnknownDisplay;
+
+    fn from_str(text: &str) -> Result<Self, UnknownDisplay> {
+        let found = Self::ALL.into_iter().find(|level| level.to_string() == text);
+        found.ok_or_else(|| UnknownDisplay {
+            got: text.to_owned(),
+            what: "a level of drawing",
+            known: "plain, fair and full",
+        })
+    }
+}
+
+/// Which spheres of the sphere tree are shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Spheres {
+    /// None.
+    #[default]
+    Hidden,
+    /// Those of a level (thesis Figure 4.13); 0 is the one around everything.
+    Level(usize),
+    /// Those that the search for the index finger looks at (thesis Figure 4.21).
+    Search,
+}
+
+/// What is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Display {
+    /// How much is spent on the light.
+    pub level: Level,
+    /// What the colour of the object shows.
+    pub shading: Shading,
+    /// The edges of the elements on the surface.
+    pub wireframe: bool,
+    /// The rest shape as a ghost.
+    pub ghost: bool,
+    /// The hand's skin.
+    pub skin: bool,
+    /// Cylinders, spheres and contact points that the search uses.
+    pub colliders: bool,
+    /// Where each fingertip holds.
+    pub contacts: bool,
+    /// The force of each fingertip.
+    pub forces: bool,
+    /// Spheres of the sphere tree.
+    pub spheres: Spheres,
+}
+
+impl Default for Display {
+    fn default() -> Self {
+        Self {
+            level: Level::default(),
+            shading: Shading::Plain,
+            wireframe: false,
+            ghost: false,
+            skin: true,
+            colliders: false,
+            contacts: true,
+            forces: true,
+            spheres: Spheres::Hidden,
+        }
+    }
+}
+
+impl Display {
+    /// Whether something is shown; the pages over the scene are not the scene's concern.
+    pub fn shows(&self, toggle: Toggle) -> bool {
+        match toggle {
+            Toggle::Wireframe => self.wireframe,
+            Toggle::Ghost => self.ghost,
+            Toggle::Skin => self.skin,
+            Toggle::Colliders => self.colliders,
+            Toggle::Contacts => self.contacts,
+            Toggle::Forces => self.forces,
+            Toggle::Help | Toggle::Information | Toggle::Timings => false,
+        }
+    }
+
+    /// Shows something, or does not any more.
+    pub fn toggle(&mut self, toggle: Toggle) {
+        let shown = match toggle {
+            Toggle::Wireframe => &mut self.wireframe,
+            Toggle::Ghost => &mut self.ghost,
+            Toggle::Skin => &mut self.skin,
+            Toggle::Colliders => &mut self.colliders,
+            Toggle::Contacts => &mut self.contacts,
+            Toggle::Forces => &mut self.forces,
+            Toggle::Help | Toggle::Information | Toggle::Timings => return,
+        };
+        *shown = !*shown;
+    }
+
+    /// Shows the next level of a tree that has so many; after the last one the search, then none.
+    pub fn next_spheres(&mut self, levels: usize) {
+        self.spheres = match self.spheres {
+            Spheres::Hidden => Spheres::Level(0),
+            Spheres::Level(level) if level + 1 < levels => Spheres::Level(level + 1),
+            Spheres::Level(_) => Spheres::Search,
+            Spheres::Search => Spheres::Hidden,
+        };
+    }
+
+    /// Shows the next quantity in colours.
+    pub fn next_shading(&mut self) {
+        let all = Shading::ALL;
+        let now = all.iter().position(|shading| *shading == self.shading).unwrap_or(0);
+        self.shading = all[(now + 1) % all.len()];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_of_the_tree_are_shown_one_after_the_other_then_the_search_then_none() {
+        let mut display = Display::default();
+        let mut shown = Vec::new();
+        for _ in 0..4 {
+            display.next_spheres(2);
+            shown.push(display.spheres);
+        }
+        use Spheres::{Hidden, Level, Search};
+        assert_eq!(shown, [Level(0), Level(1), Search, Hidden]);
+    }
+
+    #[test]
+    fn every_part_of_the_scene_is_toggled_and_nothing_else() {
+        for toggle in [
+            Toggle::Wireframe,
+            Toggle::Ghost,
+            Toggle::Skin,
+            Toggle::Colliders,
+            Toggle::Contacts,
+            Toggle::Forces,
+        ] {
+            let mut display = Display::default();
+            display.toggle(toggle);
+            assert_ne!(display.shows(toggle), Display::default().shows(toggle));
+            display.toggle(toggle);
+            assert_eq!(display, Display::default());
+        }
+        let mut display = Display::default();
+        (0..Shading::ALL.len()).for_each(|_| display.next_shading());
+        assert_eq!(display, Display::default());
+    }
+
+    #[test]
+    fn levels_are_read_as_they_are_written() {
+        for level in Level::ALL {
+            assert_eq!(level.to_string().parse(), Ok(level));
+        }
+        assert!("ultra".parse::<Level>().unwrap_err().to_string().contains("plain, fair and full"));
+    }
+}

@@ -1,0 +1,98 @@
+//! One thing to draw: triangles, where they are now, and what they are made of.
+
+use super::colour::texel;
+
+/// Triangles of one material.
+///
+/// Shapes: `positions`, `normals` and `uvs` one per vertex; `triangles` index them,
+/// counter-clockwise seen from outside. Units: m. Frame: the object's.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// What it is, in a word.
+    pub name: &'static str,
+    /// Vertex indices.
+    pub triangles: Vec<[u32; 3]>,
+    /// Where the vertices are now.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals, outward.
+    pub normals: Vec<[f32; 3]>,
+    /// Places in the textures; (0, 0) is the first texel of the first row.
+    pub uvs: Vec<[f32; 2]>,
+    /// What it is made of.
+    pub material: SurfaceMaterial,
+}
+
+/// How a surface takes the light, in the terms of physically based rendering.
+#[derive(Clone, Debug)]
+pub struct SurfaceMaterial {
+    /// Linear red, green, blue; multiplies the texture (white where there is one).
+    pub colour: [f32; 3],
+    /// 0 is a mirror, 1 is chalk.
+    pub roughness: f32,
+    /// 0 is no metal.
+    pub metallic: f32,
+    /// Strength and roughness of a clear layer on top.
+    pub clearcoat: (f32, f32),
+    /// How much light comes through from behind, 0 to 1.
+    pub subsurface: f32,
+    /// Colours, encoded as sRGB.
+    pub texture: Option<Texture>,
+    /// Slopes of a fine relief as a normal map: linear values, red along −u, green along +v.
+    ///
+    /// It belongs to the same `uvs` as the texture; who puts other values there drops both.
+    pub relief: Option<Texture>,
+    /// Whether the back of a triangle can be seen.
+    pub two_sided: bool,
+}
+
+impl SurfaceMaterial {
+    /// A plain surface without texture.
+    pub(super) fn plain(colour: [f32; 3], roughness: f32) -> Self {
+        Self {
+            colour,
+            roughness,
+            metallic: 0.0,
+            clearcoat: (0.0, 0.0),
+            subsurface: 0.0,
+            texture: None,
+            relief: None,
+            two_sided: false,
+        }
+    }
+}
+
+/// A picture, row by row from (0, 0), four bytes a texel: red, green, blue, alpha.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Texture {
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width` × `height` × 4 bytes.
+    pub rgba: Vec<u8>,
+}
+
+impl Texture {
+    /// Texels in a row, and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// A picture whose texel at the place (u, v) has the colour `paint(u, v)`, 0 to 1 each.
+    pub(super) fn painted(width: u32, height: u32, paint: impl Fn(f64, f64) -> [f64; 3]) -> Self {
+        let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
+        for row in 0..height {
+            for column in 0..width {
+                let u = (f64::from(column) + 0.5) / f64::from(width);
+                let v = (f64::from(row) + 0.5) / f64::from(height);
+                rgba.extend_from_slice(&texel(paint(u, v)));
+            }
+        }
+        Self { width, height, rgba }
+    }
+}
+
+/// Three single-precision numbers of a vector.
+pub(super) fn single(v: &nalgebra::Vector3<f64>) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}

@@ -1,0 +1,108 @@
+//! The way of the frames from the ticks to the window: the newest wins, and nobody waits.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::frame::ViewFrame;
+
+/// A place for one frame.
+#[derive(Clone, Default)]
+struct Slot(Arc<Mutex<Option<Box<ViewFrame>>>>);
+
+/// The ticks' end.
+pub struct Outlet {
+    slot: Slot,
+    /// No more often than this: a display shows no more.
+    every: Duration,
+    published: Option<Instant>,
+    /// A frame for which the slot was being looked into; the next one carries its news.
+    kept_back: Option<Box<ViewFrame>>,
+}
+
+/// The window's end.
+pub struct Inlet {
+    slot: Slot,
+}
+
+/// Both ends of a way on which frames are offered at most so often.
+pub fn outlet(every: Duration) -> (Outlet, Inlet) {
+    let slot = Slot::default();
+    (Outlet { slot: slot.clone(), every, published: None, kept_back: None }, Inlet { slot })
+}
+
+impl Outlet {
+    /// Whether a frame should be offered now.
+    pub fn is_due(&self) -> bool {
+        self.published.is_none_or(|then| then.elapsed() >= self.every)
+    }
+
+    /// Offers a frame in the place of the one before; never waits.
+    pub fn publish(&mut self, mut frame: Box<ViewFrame>) {
+        self.published = Some(Instant::now());
+        if let Some(kept_back) = self.kept_back.take() {
+            frame.carry_over(*kept_back);
+        }
+        // Poisoned or not, what is in it is a whole frame.
+        let slot = match self.slot.0.try_lock() {
+            Ok(slot) => Some(slot),
+            Err(std::sync::TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+            Err(std::sync::TryLockError::WouldBlock) => None,
+        };
+        match slot {
+            Some(mut slot) => {
+                if let Some(unseen) = slot.take() {
+                    frame.carry_over(*unseen);
+                }
+                *slot = Some(frame);
+            }
+            None => self.kept_back = Some(frame),
+        }
+    }
+}
+
+impl Inlet {
+    /// The newest frame that has not been taken.
+    pub fn take(&self) -> Option<Box<ViewFrame>> {
+        self.slot.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::frame::samples::frame_with_news;
+
+    fn texts(frame: &ViewFrame) -> Vec<&str> {
+        frame.news.iter().map(|news| news.text.as_str()).collect()
+    }
+
+    #[test]
+    fn newest_frame_wins_and_brings_the_news_of_those_that_nobody_saw() {
+        let (mut out, inlet) = outlet(Duration::ZERO);
+        assert!(inlet.take().is_none());
+        out.publish(Box::new(frame_with_news(1, "a")));
+        out.publish(Box::new(frame_with_news(2, "b")));
+        let seen = inlet.take().unwrap();
+        assert_eq!((seen.tick, texts(&seen)), (2, vec!["a", "b"]));
+        assert!(inlet.take().is_none());
+    }
+
+    #[test]
+    fn tick_does_not_wait_while_the_window_looks() {
+        let (mut out, inlet) = outlet(Duration::ZERO);
+        let looking = inlet.slot.0.lock().unwrap();
+        out.publish(Box::new(frame_with_news(1, "a")));
+        drop(looking);
+        assert!(inlet.take().is_none(), "the frame was kept back");
+        out.publish(Box::new(frame_with_news(2, "b")));
+        assert_eq!(texts(&inlet.take().unwrap()), ["a", "b"]);
+    }
+
+    #[test]
+    fn frames_are_due_no_more_often_than_asked_for() {
+        let (mut out, _inlet) = outlet(Duration::from_secs(3600));
+        assert!(out.is_due());
+        out.publish(Box::new(frame_with_news(1, "a")));
+        assert!(!out.is_due());
+    }
+}

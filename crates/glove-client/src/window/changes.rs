@@ -1,0 +1,104 @@
+//! Changes that take their time: another object, another hand; made beside window and ticks.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+use crate::control::Control;
+use crate::hand_reader::HandSetup;
+use crate::hand_source::HandSource;
+use crate::loading::{LoadStage, LoadedObject, Loading, ObjectRequest};
+use crate::mouse::MouseHand;
+use crate::rest_shape::RestShape;
+use crate::scene::ObjectChoice;
+use crate::scripted::{PlanRequest, Planner, ScriptedHand};
+use crate::view::action::HandWish;
+
+/// A change on its way.
+#[derive(Default)]
+pub enum Change {
+    /// None.
+    #[default]
+    None,
+    /// An object that is being loaded.
+    Object(Loading, ObjectChoice),
+    /// A hand that is being made.
+    Hand(Receiver<Result<HandSource, String>>, HandWish),
+}
+
+/// What has become of a change.
+pub enum Changed {
+    /// The object is there, and is to be handed to the ticks.
+    Object(Box<LoadedObject>, ObjectChoice),
+    /// The hand is there.
+    Hand(Control, HandWish),
+    /// There is neither; why, in a sentence.
+    Failed(String),
+}
+
+impl Change {
+    /// Begins to load an object.
+    pub fn object(request: ObjectRequest) -> Result<Self, String> {
+        let choice = request.choice.clone();
+        match Loading::start(request) {
+            Ok(loading) => Ok(Self::Object(loading, choice)),
+            Err(error) => Err(format!("cannot load {choice}: {error}")),
+        }
+    }
+
+    /// Begins to make a hand for an object at rest.
+    pub fn hand(wish: HandWish, object: Arc<RestShape>, tick_s: f64) -> Self {
+        let (made, result) = channel();
+        let thread = std::thread::Builder::new().name("hand".to_owned());
+        let started = thread.spawn(move || {
+            // Nobody may be waiting any more.
+            let _ = made.send(hand(wish, object, tick_s));
+        });
+        if let Err(error) = started {
+            tracing::warn!(%error, "cannot start a thread that makes a hand");
+        }
+        Self::Hand(result, wish)
+    }
+
+    /// The stage of an object that is being loaded, and its name.
+    pub fn stage(&self) -> Option<(LoadStage, String)> {
+        match self {
+            Self::Object(loading, choice) => Some((loading.stage(), choice.to_string())),
+            Self::None | Self::Hand(..) => None,
+        }
+    }
+
+    /// What has become of it, once that is known.
+    pub fn take(&mut self) -> Option<Changed> {
+        let changed = match self {
+            Self::None => return None,
+            Self::Object(loading, choice) => match loading.take()? {
+                Ok(loaded) => Changed::Object(Box::new(loaded), choice.clone()),
+                Err(error) => Changed::Failed(format!("{error}; choose another file")),
+            },
+            Self::Hand(result, wish) => match result.try_recv() {
+                Err(TryRecvError::Empty) => return None,
+                Ok(Ok(hand)) => Changed::Hand(Control::ReplaceHand(Box::new(hand)), *wish),
+                Ok(Err(text)) => Changed::Failed(text),
+                Err(TryRecvError::Disconnected) => {
+                    Changed::Failed("the hand could not be made; choose it again".to_owned())
+                }
+            },
+        };
+        *self = Self::None;
+        Some(changed)
+    }
+}
+
+/// A hand that plans its approaches beside the ticks.
+fn hand(wish: HandWish, object: Arc<RestShape>, tick_s: f64) -> Result<HandSource, String> {
+    let setup = HandSetup::default();
+    let planner = Planner::beside().map_err(|error| format!("cannot start a thread: {error}"))?;
+    match wish {
+        HandWish::Mouse => Ok(MouseHand::new(setup, planner, tick_s).into()),
+        HandWish::Scripted(script) => {
+            let request = PlanRequest { object, setup: setup.clone(), avoid_gaze: None };
+            let grip = request.grip().map_err(|error| error.to_string())?;
+            Ok(ScriptedHand::following(script, setup, grip).with_planner(planner).into())
+        }
+    }
+}

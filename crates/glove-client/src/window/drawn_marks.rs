@@ -1,0 +1,161 @@
+//! Marks of the contacts: where each fingertip holds, what it covers, and how hard it presses.
+
+use kiss3d::prelude::{Color, SceneNode3d, Vec3};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::units::{UNITS_PER_M, drawn_point, rotation_from_y};
+use crate::view::frame::{HandView, ViewFrame};
+
+/// One mark for each fingertip, thumb first.
+pub struct DrawnMarks {
+    marks: Vec<Mark>,
+}
+
+/// What belongs to one fingertip.
+struct Mark {
+    /// Where it holds.
+    node: SceneNode3d,
+    /// What it covers.
+    patch: SceneNode3d,
+    shaft: SceneNode3d,
+    head: SceneNode3d,
+}
+
+const NODE: Color = Color::new(1.0, 0.85, 0.1, 1.0);
+const PATCH: Color = Color::new(1.0, 0.80, 0.1, 0.35);
+const FORCE: Color = Color::new(0.10, 0.35, 0.95, 1.0);
+const NODE_RADIUS_M: f32 = 0.0010;
+const SHAFT_RADIUS_M: f32 = 0.0011;
+const HEAD_LENGTH_M: f32 = 0.006;
+/// Length of the longest arrow, m; see [`newtons_per_arrow`].
+const ARROW_M: f64 = 0.05;
+
+impl DrawnMarks {
+    /// Marks that are not seen before their first frame.
+    pub fn new(scene: &mut SceneNode3d) -> Self {
+        let mark = |_| {
+            let mut node = scene.add_sphere(NODE_RADIUS_M * UNITS_PER_M);
+            node.set_color(NODE).set_emissive(Color::new(0.35, 0.28, 0.02, 1.0));
+            let mut patch = scene.add_sphere(1.0);
+            patch.set_color(PATCH).set_casts_shadows(false);
+            let (mut shaft, mut head) = (scene.add_cylinder(1.0, 1.0), scene.add_cone(1.0, 1.0));
+            for part in [&mut shaft, &mut head] {
+                part.set_color(FORCE).set_roughness(0.4);
+            }
+            let mut mark = Mark { node, patch, shaft, head };
+            mark.hide();
+            mark
+        };
+        Self { marks: (0..5).map(mark).collect() }
+    }
+
+    /// Follows a frame.
+    ///
+    /// Units: `shape` m, object frame.
+    pub fn follow(
+        &mut self,
+        frame: &ViewFrame,
+        shape: &[Point3<f64>],
+        contacts: bool,
+        forces: bool,
+    ) {
+        let world_from_object = &frame.object.world_from_object;
+        let scale = frame.grasp.forces.as_ref().map(newtons_per_arrow);
+        for (finger, mark) in self.marks.iter_mut().enumerate() {
+            let contact = frame.grasp.contacts[finger];
+            let place = contact.and_then(|contact| shape.get(contact.node as usize));
+            mark.hide();
+            let Some(place) = place else { continue };
+            let place = world_from_object * place;
+            if contacts {
+                let radius = frame.hand.as_ref().map_or(0.006, |hand| tip_radius(hand, finger));
+                let normal = contact.map_or(Vector3::y(), |c| c.normal_in_object);
+                mark.show_contact(&place, &(world_from_object * normal), radius);
+            }
+            if let (true, Some(all), Some(scale)) = (forces, &frame.grasp.forces, scale) {
+                mark.show_force(&place, &arrow(&all[finger], scale, world_from_object));
+            }
+        }
+    }
+}
+
+fn tip_radius(hand: &HandView, finger: usize) -> f64 {
+    hand.dimensions.tip_radii()[finger]
+}
+
+/// Force that an arrow of full length stands for: the next of 1, 2, 5 × 10ⁿ above the largest.
+///
+/// Units: N.
+pub fn newtons_per_arrow(forces: &[Vector3<f64>; 5]) -> f64 {
+    let largest = forces.iter().map(Vector3::norm).fold(0.0, f64::max);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return 1.0;
+    }
+    let decade = 10.0_f64.powf(largest.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].map(|n| n * decade).into_iter().find(|n| *n >= largest).unwrap_or(largest)
+}
+
+/// The arrow of a force in the world, m.
+fn arrow(
+    force_in_object: &Vector3<f64>,
+    newtons: f64,
+    world_from_object: &Isometry3<f64>,
+) -> Vector3<f64> {
+    world_from_object * force_in_object * (ARROW_M / newtons)
+}
+
+impl Mark {
+    fn hide(&mut self) {
+        for part in [&mut self.node, &mut self.patch, &mut self.shaft, &mut self.head] {
+            part.set_visible(false);
+        }
+    }
+
+    /// A ball on the node and a flat disc on what the tip covers.
+    fn show_contact(&mut self, place: &Point3<f64>, normal: &Vector3<f64>, radius: f64) {
+        self.node.set_visible(true).set_position(drawn_point(place));
+        self.patch.set_visible(true).set_position(drawn_point(place));
+        self.patch.set_rotation(rotation_from_y(normal));
+        set_size(&mut self.patch, radius as f32, 0.24 * radius as f32);
+    }
+
+    /// An arrow whose point is at the place.
+    fn show_force(&mut self, place: &Point3<f64>, arrow: &Vector3<f64>) {
+        let length = arrow.norm() as f32;
+        if length < 1e-4 {
+            return;
+        }
+        let rotation = rotation_from_y(arrow);
+        let towards = rotation * Vec3::Y;
+        let at = drawn_point(place);
+        let head = HEAD_LENGTH_M.min(0.6 * length);
+        let shaft = length - head;
+        self.head.set_visible(true).set_rotation(rotation);
+        self.head.set_position(at - towards * (0.5 * head * UNITS_PER_M));
+        set_size(&mut self.head, 2.6 * SHAFT_RADIUS_M, head);
+        self.shaft.set_visible(true).set_rotation(rotation);
+        self.shaft.set_position(at - towards * ((head + 0.5 * shaft) * UNITS_PER_M));
+        set_size(&mut self.shaft, SHAFT_RADIUS_M, shaft);
+    }
+}
+
+/// Sizes a round body along Y; the renderer's own have the diameter 1 and the height 1.
+///
+/// Units: m.
+fn set_size(node: &mut SceneNode3d, radius: f32, height: f32) {
+    let (wide, high) = (2.0 * radius * UNITS_PER_M, height * UNITS_PER_M);
+    node.set_local_scale(wide, high, wide);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn longest_arrow_stands_for_a_round_number_of_newtons() {
+        let with = |n: f64| newtons_per_arrow(&[Vector3::new(0.0, n, 0.0); 5]);
+        assert_eq!([with(0.9), with(0.011), with(3.0), with(20.0)], [1.0, 0.02, 5.0, 20.0]);
+        assert_eq!(with(0.0), 1.0);
+        assert_eq!(with(f64::NAN), 1.0);
+    }
+}

@@ -1,0 +1,102 @@
+//! A triangle mesh on the graphics card whose vertices move.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use image::{DynamicImage, RgbaImage};
+use kiss3d::prelude::{GpuMesh3d, SceneNode3d, Texture, TextureManager, Vec2, Vec3};
+
+use super::units::UNITS_PER_M;
+
+/// A mesh in metres; its node has the scale of the scene.
+pub struct DrawnMesh {
+    node: SceneNode3d,
+}
+
+impl DrawnMesh {
+    /// A mesh below a node.
+    ///
+    /// Shapes: one normal and one place in the texture for each position.
+    /// Units: m. Frame: that of the node it hangs below.
+    pub fn new(
+        parent: &mut SceneNode3d,
+        triangles: &[[u32; 3]],
+        positions: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        uvs: &[[f32; 2]],
+    ) -> Self {
+        let vectors = |all: &[[f32; 3]]| all.iter().map(|v| Vec3::from_array(*v)).collect();
+        let uvs = uvs.iter().map(|uv| Vec2::from_array(*uv)).collect();
+        let mesh = GpuMesh3d::new(
+            vectors(positions),
+            triangles.to_vec(),
+            Some(vectors(normals)),
+            Some(uvs),
+            true,
+        );
+        let node = parent.add_mesh(Rc::new(RefCell::new(mesh)), Vec3::splat(UNITS_PER_M));
+        Self { node }
+    }
+
+    /// Its node, for material and visibility.
+    pub fn node(&mut self) -> &mut SceneNode3d {
+        &mut self.node
+    }
+
+    /// Moves the vertices.
+    ///
+    /// Shapes: as in [`DrawnMesh::new`].
+    pub fn set(&mut self, positions: &[[f32; 3]], normals: &[[f32; 3]]) {
+        self.node.modify_vertices(&mut |vertices| copy(positions, vertices));
+        self.node.modify_normals(&mut |all| copy(normals, all));
+    }
+
+    /// Sets the vertices' places in the texture.
+    pub fn set_uvs(&mut self, uvs: &[[f32; 2]]) {
+        self.node.modify_uvs(&mut |all| {
+            all.clear();
+            all.extend(uvs.iter().map(|uv| Vec2::from_array(*uv)));
+        });
+    }
+
+    /// Takes the mesh out of the scene.
+    pub fn remove(mut self) {
+        self.node.remove();
+    }
+}
+
+fn copy(from: &[[f32; 3]], to: &mut Vec<Vec3>) {
+    to.clear();
+    to.extend(from.iter().map(|v| Vec3::from_array(*v)));
+}
+
+/// Puts a picture on a mesh; the name says which picture it is.
+///
+/// Shapes: `rgba` four bytes (sRGB) for each of `size.0` × `size.1` pixels, row by row.
+pub fn set_texture(node: &mut SceneNode3d, name: &str, size: (u32, u32), rgba: &[u8]) {
+    if let Some(texture) = texture(name, size, rgba, true) {
+        node.set_texture(texture);
+    }
+}
+
+/// Gives a mesh a fine relief by a picture of its slopes.
+///
+/// Shapes: as in [`set_texture`], linear values.
+pub fn set_relief(node: &mut SceneNode3d, name: &str, size: (u32, u32), rgba: &[u8]) {
+    if let Some(texture) = texture(name, size, rgba, false) {
+        node.set_normal_map(texture);
+    }
+}
+
+/// `None` for a picture of another size than announced; the mesh keeps its colour then.
+fn texture(name: &str, size: (u32, u32), rgba: &[u8], is_colour: bool) -> Option<Arc<Texture>> {
+    let picture = RgbaImage::from_raw(size.0, size.1, rgba.to_vec())?;
+    Some(TextureManager::get_global_manager(|textures| {
+        // Without them fine print falls apart from afar.
+        textures.set_generate_mipmaps(true);
+        textures.set_anisotropy(8);
+        let picture = DynamicImage::ImageRgba8(picture.clone());
+        textures.add_image_with_color_space(picture, name, is_colour)
+    }))
+}

@@ -1,0 +1,132 @@
+//! Whether this machine can draw, and with what.
+
+use std::cell::Cell;
+use std::sync::Once;
+
+use kiss3d::prelude::Context;
+
+/// What draws.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Graphics {
+    /// Name of the graphics card or of the program that stands in for it.
+    pub name: String,
+    /// Whether the processor draws.
+    pub is_software: bool,
+}
+
+/// Why nothing can be drawn.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoGraphics {
+    /// There is no display.
+    #[error("there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)")]
+    NoDisplay,
+    /// No driver was found.
+    #[error(
+        "no graphics driver was found; on Debian, `apt install mesa-vulkan-drivers libvulkan1` \
+         draws with the processor"
+    )]
+    NoDriver,
+    /// The window could not be opened.
+    #[error("the window cannot be shown: {reason}")]
+    Window {
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl Graphics {
+    /// What would draw.
+    ///
+    /// # Errors
+    /// [`NoGraphics::NoDriver`].
+    pub fn find() -> Result<Self, NoGraphics> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends: wgpu::Backends::all(),
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        });
+        let adapter = instance.request_adapter(&wgpu::RequestAdapterOptions::default());
+        let adapter = pollster::block_on(adapter).map_err(|_| NoGraphics::NoDriver)?;
+        Ok(Self::of(&adapter.get_info()))
+    }
+
+    /// What draws in the window or picture that is open.
+    pub fn in_use() -> Self {
+        Self::of(&Context::get().adapter.get_info())
+    }
+
+    fn of(info: &wgpu::AdapterInfo) -> Self {
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        Self { name: format!("{} ({})", info.name, info.backend), is_software }
+    }
+}
+
+/// Whether a display is named; it may still not answer.
+///
+/// # Errors
+/// [`NoGraphics::NoDisplay`].
+pub fn check_display() -> Result<(), NoGraphics> {
+    if !cfg!(all(unix, not(target_os = "macos"))) {
+        return Ok(());
+    }
+    let names = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
+    let is_set = |name: &&str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    if names.iter().any(is_set) { Ok(()) } else { Err(NoGraphics::NoDisplay) }
+}
+
+/// Panics that become a sentence are not told besides.
+static HOOK: Once = Once::new();
+
+thread_local! {
+    /// Whether this thread is in [`without_panic`].
+    static CAUGHT_HERE: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does something that ends in a panic where the system's part of it fails, and says why in a
+/// sentence: the libraries that open windows know no other way.
+///
+/// # Errors
+/// [`NoGraphics::Window`].
+pub fn without_panic<T>(work: impl FnOnce() -> T) -> Result<T, NoGraphics> {
+    HOOK.call_once(|| {
+        let hook = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !CAUGHT_HERE.get() {
+                hook(panic);
+            }
+        }));
+    });
+    CAUGHT_HERE.set(true);
+    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
+    CAUGHT_HERE.set(false);
+    done.map_err(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+        NoGraphics::Window { reason: reason(text.unwrap_or("the system gave no reason")) }
+    })
+}
+
+/// What a panic says, as far as a person can use it.
+fn reason(panic: &str) -> String {
+    let first = panic.lines().next().unwrap_or("");
+    if first.contains("event loop") {
+        return "the display does not answer; look at DISPLAY or WAYLAND_DISPLAY".to_owned();
+    }
+    if first.contains("adapter") || first.contains("device") {
+        return NoGraphics::NoDriver.to_string();
+    }
+    // Behind a colon follow the names of types and source files.
+    first.split(':').next().unwrap_or(first).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panic_of_a_library_becomes_a_sentence() {
+        let failed = without_panic(|| panic!("Failed to create window: Os({})", 7)).unwrap_err();
+        let NoGraphics::Window { reason } = &failed else { panic!("{failed}") };
+        assert_eq!(reason, "Failed to create window");
+        assert_eq!(without_panic(|| 3), Ok(3));
+    }
+}

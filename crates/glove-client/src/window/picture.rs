@@ -1,0 +1,84 @@
+//! Pictures without a window: the same scene, drawn into memory.
+
+use image::RgbImage;
+use kiss3d::prelude::{CanvasSetup, NumSamples, OrbitCamera3d, RayTracer, Window};
+use softgrasp_core::fem::Material;
+
+use super::environment::studio;
+use super::graphics::{Graphics, NoGraphics};
+use super::scene::Scene;
+use super::stage::{drawn_camera, place_camera};
+use crate::view::camera::ViewCamera;
+use crate::view::colouring::Colouring;
+use crate::view::display::Display;
+use crate::view::frame::ViewFrame;
+use crate::view::object_skin::Look;
+
+/// Draws frames into memory. The scene goes before the window that it is part of.
+pub struct Pictures {
+    scene: Scene,
+    camera: OrbitCamera3d,
+    window: Window,
+    colouring: Colouring,
+}
+
+impl Pictures {
+    /// Pictures of a size in pixels.
+    ///
+    /// # Errors
+    /// [`NoGraphics`] where nothing on this machine can draw.
+    pub fn try_new(
+        width: u32,
+        height: u32,
+        look: Look,
+        material: Material,
+    ) -> Result<Self, NoGraphics> {
+        Graphics::find()?;
+        let setup =
+            CanvasSetup { samples: NumSamples::Four, vsync: false, ..CanvasSetup::default() };
+        let mut window = pollster::block_on(Window::new_headless_with_setup(width, height, setup));
+        let mut scene = Scene::new(&mut window);
+        scene.set_look(look);
+        Ok(Self { scene, camera: drawn_camera(), window, colouring: Colouring::new(material) })
+    }
+
+    /// Whether the processor draws. Mesa's driver of that kind keeps some megabytes for each picture
+    /// that is not drawn at the level `plain` (seen with 22.3).
+    pub fn is_software(&self) -> bool {
+        Graphics::in_use().is_software
+    }
+
+    /// The picture of a frame by tracing so many paths of light a pixel.
+    pub fn trace(
+        &mut self,
+        frame: &ViewFrame,
+        display: &Display,
+        camera: &ViewCamera,
+        paths: u32,
+    ) -> RgbImage {
+        self.follow(frame, display, camera);
+        let Self { scene, camera, window, .. } = self;
+        let mut tracer = RayTracer::new();
+        tracer.set_max_bounces(5);
+        tracer.set_environment_image(&studio());
+        for _ in 0..paths {
+            pollster::block_on(window.raytrace_3d(scene.root(), camera, &mut tracer));
+        }
+        window.snap_image()
+    }
+
+    /// The picture of a frame.
+    pub fn draw(&mut self, frame: &ViewFrame, display: &Display, camera: &ViewCamera) -> RgbImage {
+        self.follow(frame, display, camera);
+        let Self { scene, camera, window, .. } = self;
+        pollster::block_on(window.render_3d(scene.root(), camera));
+        window.snap_image()
+    }
+
+    /// Makes everything ready for the picture of a frame.
+    fn follow(&mut self, frame: &ViewFrame, display: &Display, camera: &ViewCamera) {
+        self.colouring.follow(&frame.object, display.shading, frame.at_s);
+        self.scene.follow(&mut self.window, frame, display, &self.colouring);
+        place_camera(&mut self.camera, camera);
+    }
+}

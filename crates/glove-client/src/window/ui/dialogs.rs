@@ -1,0 +1,273 @@
+//! The dialogs that ask for a file: which mesh to read, under which name to save.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
+
+use egui::{Align2, Context, Key, ScrollArea, TextEdit, Ui};
+
+use super::{places, theme};
+
+/// The dialog that is open.
+#[derive(Default)]
+pub enum Dialog {
+    /// None.
+    #[default]
+    Closed,
+    /// Which mesh is to be read.
+    Read(FileQuestion),
+    /// Under which name the object is to be saved.
+    Save(FileQuestion),
+    /// Whether a file is to be replaced.
+    Replace(PathBuf),
+}
+
+/// A question for a file.
+pub struct FileQuestion {
+    typed: String,
+    /// Meshes in the folder.
+    offered: Vec<String>,
+    /// The native dialog, while it is open.
+    native: Option<Receiver<Option<PathBuf>>>,
+    is_new: bool,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FileAnswer {
+    /// Read this.
+    Read(PathBuf),
+    /// Write this; it is not there yet, or may be replaced.
+    Save(PathBuf),
+}
+
+/// Formats that are written, by extension.
+pub const WRITTEN: [&str; 3] = ["msh", "vtu", "txt"];
+/// Formats that are read.
+const READ: [&str; 12] =
+    ["msh", "vtu", "vtk", "inp", "mesh", "txt", "node", "ele", "xml", "json", "off", "gz"];
+/// Files offered at most.
+const OFFERED_MAX: usize = 60;
+
+impl Dialog {
+    /// Asks which mesh is to be read.
+    pub fn read() -> Self {
+        Self::Read(FileQuestion::new(String::new()))
+    }
+
+    /// Asks for a name, with a proposal.
+    pub fn save(object: &str) -> Self {
+        Self::Save(FileQuestion::new(free_name(object)))
+    }
+
+    /// Whether none is open.
+    pub fn is_closed(&self) -> bool {
+        matches!(self, Self::Closed)
+    }
+
+    /// Shows the dialog; the answer, once there is one.
+    pub fn show(&mut self, context: &Context) -> Option<FileAnswer> {
+        let (next, answer) = match std::mem::take(self) {
+            Self::Closed => (Self::Closed, None),
+            Self::Read(mut question) => match question.ask(context, false) {
+                Step::Stay => (Self::Read(question), None),
+                Step::Close => (Self::Closed, None),
+                Step::Chosen(path) => (Self::Closed, Some(FileAnswer::Read(path))),
+            },
+            Self::Save(mut question) => match question.ask(context, true) {
+                Step::Stay => (Self::Save(question), None),
+                Step::Close => (Self::Closed, None),
+                Step::Chosen(path) if path.exists() => (Self::Replace(path), None),
+                Step::Chosen(path) => (Self::Closed, Some(FileAnswer::Save(path))),
+            },
+            Self::Replace(path) => match ask_to_replace(context, &path) {
+                None => (Self::Replace(path), None),
+                Some(true) => (Self::Closed, Some(FileAnswer::Save(path))),
+                Some(false) => (Self::Closed, None),
+            },
+        };
+        *self = next;
+        answer
+    }
+}
+
+/// What has come of a look at a dialog.
+enum Step {
+    Stay,
+    Close,
+    Chosen(PathBuf),
+}
+
+impl FileQuestion {
+    fn new(typed: String) -> Self {
+        Self { typed, offered: meshes_in(Path::new(".")), native: None, is_new: true }
+    }
+
+    fn ask(&mut self, context: &Context, is_save: bool) -> Step {
+        if let Some(native) = &self.native {
+            match native.try_recv() {
+                Ok(Some(path)) => return Step::Chosen(path),
+                // Closed without a choice, or there is no native dialog here: the typed name stays.
+                Ok(None) | Err(std::sync::mpsc::TryRecvError::Disconnected) => self.native = None,
+                Err(std::sync::mpsc::TryRecvError::Empty) => {}
+            }
+        }
+        let mut step = Step::Stay;
+        let title = if is_save { "Save as" } else { "Read file" };
+        theme::card(context, title, Align2::CENTER_CENTER, [0.0, -20.0], |ui| {
+            ui.set_width(440.0);
+            ui.heading(title);
+            step = self.content(ui, is_save);
+        });
+        if context.input(|input| input.key_pressed(Key::Escape)) {
+            step = Step::Close;
+        }
+        step
+    }
+
+    fn content(&mut self, ui: &mut Ui, is_save: bool) -> Step {
+        let mut chosen = self.name_field(ui, is_save);
+        if is_save {
+            self.formats(ui);
+        } else {
+            chosen = self.offers(ui).or(chosen);
+        }
+        ui.separator();
+        let mut step = Step::Stay;
+        ui.horizontal(|ui| {
+            let verb = if is_save { "Save" } else { "Read" };
+            let button = ui.add_enabled(!self.typed.trim().is_empty(), egui::Button::new(verb));
+            places::tell(ui.ctx(), verb, &button);
+            if button.clicked() {
+                chosen = Some(PathBuf::from(self.typed.trim()));
+            }
+            if ui.add_enabled(self.native.is_none(), egui::Button::new("Browse …")).clicked() {
+                self.native = Some(browse(is_save, self.typed.clone()));
+            }
+            let cancel = ui.button("Cancel");
+            places::tell(ui.ctx(), "Cancel", &cancel);
+            if cancel.clicked() {
+                step = Step::Close;
+            }
+        });
+        chosen.map_or(step, Step::Chosen)
+    }
+
+    fn name_field(&mut self, ui: &mut Ui, is_save: bool) -> Option<PathBuf> {
+        let hint = if is_save { "name.msh" } else { "path of a mesh file" };
+        let field =
+            TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(f32::INFINITY);
+        let response = ui.add(field);
+        places::tell(ui.ctx(), "file name", &response);
+        // The first pictures of a card only measure it: the wish is repeated until it is heard.
+        if self.is_new {
+            response.request_focus();
+            self.is_new = !response.has_focus();
+        }
+        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        let typed = self.typed.trim();
+        (entered && !typed.is_empty()).then(|| PathBuf::from(typed))
+    }
+
+    /// The formats as buttons: each sets the extension.
+    fn formats(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.label(theme::quiet("format"));
+            for extension in WRITTEN {
+                let path = PathBuf::from(self.typed.trim());
+                let is_chosen = path.extension().is_some_and(|e| e == extension);
+                let about = match extension {
+                    "msh" => "Gmsh 4.1",
+                    "vtu" => "VTK, with the displacement",
+                    _ => "the three lists of the thesis",
+                };
+                let response =
+                    ui.selectable_label(is_chosen, format!(".{extension}")).on_hover_text(about);
+                places::tell(ui.ctx(), extension, &response);
+                if response.clicked() {
+                    self.typed = path.with_extension(extension).to_string_lossy().into_owned();
+                }
+            }
+        });
+    }
+
+    /// Meshes of the folder, to be clicked.
+    fn offers(&mut self, ui: &mut Ui) -> Option<PathBuf> {
+        let mut chosen = None;
+        if self.offered.is_empty() {
+            ui.label(theme::quiet("there is no mesh file in this folder"));
+        }
+        ScrollArea::vertical().max_height(220.0).show(ui, |ui| {
+            for name in &self.offered {
+                let response = ui.selectable_label(self.typed == *name, name);
+                places::tell(ui.ctx(), name, &response);
+                if response.clicked() {
+                    self.typed.clone_from(name);
+                }
+                if response.double_clicked() {
+                    chosen = Some(PathBuf::from(name));
+                }
+            }
+        });
+        chosen
+    }
+}
+
+fn ask_to_replace(context: &Context, path: &Path) -> Option<bool> {
+    theme::card(context, "replace", Align2::CENTER_CENTER, [0.0, -20.0], |ui| {
+        ui.set_width(400.0);
+        ui.heading("Replace the file?");
+        ui.label(format!("{} is there already.", path.display()));
+        ui.horizontal(|ui| {
+            let replace = ui.button("Replace");
+            places::tell(ui.ctx(), "Replace", &replace);
+            let keep = ui.button("Keep the old one");
+            places::tell(ui.ctx(), "Keep the old one", &keep);
+            if replace.clicked() { Some(true) } else { keep.clicked().then_some(false) }
+        })
+        .inner
+    })
+}
+
+/// Opens the system's own dialog on a thread, so that the window stays alive.
+fn browse(is_save: bool, proposal: String) -> Receiver<Option<PathBuf>> {
+    let (answer, answered) = channel();
+    let thread = std::thread::Builder::new().name("file dialog".to_owned());
+    let started = thread.spawn(move || {
+        let dialog = rfd::FileDialog::new();
+        let path = if is_save {
+            dialog.add_filter("mesh", &WRITTEN).set_file_name(proposal).save_file()
+        } else {
+            dialog.add_filter("mesh", &READ).pick_file()
+        };
+        // Nobody may be waiting any more.
+        let _ = answer.send(path);
+    });
+    if let Err(error) = started {
+        tracing::warn!(%error, "cannot open the system's file dialog");
+    }
+    answered
+}
+
+fn meshes_in(folder: &Path) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let is_mesh =
+        |path: &Path| path.extension().and_then(|e| e.to_str()).is_some_and(|e| READ.contains(&e));
+    let mut names: Vec<String> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.is_file() && is_mesh(path))
+        .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    names.truncate(OFFERED_MAX);
+    names
+}
+
+/// A name that is not taken: the object's, with a number.
+fn free_name(object: &str) -> String {
+    let stem = Path::new(object).file_stem().map_or("object".into(), |s| s.to_string_lossy());
+    let stem = stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '-');
+    (2..1000)
+        .map(|n| format!("{stem}-{n}.msh"))
+        .find(|name| !Path::new(name).exists())
+        .unwrap_or_else(|| format!("{stem}.msh"))
+}

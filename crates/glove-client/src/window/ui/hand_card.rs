@@ -1,0 +1,91 @@
+//! The panel that moves the mouse hand: aim, reach, close the fingers.
+
+use egui::{Align2, Context, Response, Slider, Ui};
+use softgrasp_core::hand::Finger;
+
+use super::{places, theme};
+use crate::mouse::{CLOSING_MAX, Digits, MouseInput};
+
+/// How far each finger is to be closed, thumb first; see [`MouseInput`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FingerSliders {
+    closing: [f64; 5],
+}
+
+impl FingerSliders {
+    /// Follows fingers that were closed by keys.
+    pub fn step(&mut self, digits: Digits, by: f64) {
+        for finger in Finger::ALL {
+            if matches!(digits, Digits::All) || digits == Digits::One(finger) {
+                let closing = &mut self.closing[finger.index()];
+                *closing = (*closing + by).clamp(0.0, CLOSING_MAX);
+            }
+        }
+    }
+
+    /// All open: the hand goes somewhere else.
+    pub fn open(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Shows the panel at the left; what was asked for.
+    pub fn show(&mut self, context: &Context) -> Vec<MouseInput> {
+        let mut wishes = Vec::new();
+        let offset = [theme::MARGIN, -60.0];
+        theme::card(context, "mouse hand", Align2::LEFT_CENTER, offset, |ui| {
+            ui.set_width(190.0);
+            ui.strong("Your hand");
+            let go = [
+                ("Reach", MouseInput::Reach, "goes to the object and opens"),
+                ("Back off", MouseInput::Retreat, "opens and goes away"),
+                ("Other side", MouseInput::AimElsewhere, "aims from another side"),
+            ];
+            for (name, wish, about) in go {
+                if button(ui, name).on_hover_text(about).clicked() {
+                    self.open();
+                    wishes.push(wish);
+                }
+            }
+            ui.separator();
+            self.all(ui, &mut wishes);
+            ui.separator();
+            for finger in Finger::ALL {
+                let name = finger.to_string();
+                let closing = &mut self.closing[finger.index()];
+                if slider(ui, &name, closing) {
+                    wishes.push(MouseInput::CloseTo(Digits::One(finger), *closing));
+                }
+            }
+        });
+        wishes
+    }
+
+    /// One slider for all fingers, which stands where most of them are.
+    fn all(&mut self, ui: &mut Ui, wishes: &mut Vec<MouseInput>) {
+        let mut closing = self.closing.iter().sum::<f64>() / 5.0;
+        if slider(ui, "close all", &mut closing) {
+            self.closing = [closing; 5];
+            wishes.push(MouseInput::CloseTo(Digits::All, closing));
+        }
+        ui.label(theme::quiet("1 touches, 2 squeezes").small());
+    }
+}
+
+fn button(ui: &mut Ui, name: &str) -> Response {
+    let wide = egui::Vec2::new(ui.available_width(), 0.0);
+    let response = ui.add(egui::Button::new(name).min_size(wide));
+    places::tell(ui.ctx(), name, &response);
+    response
+}
+
+fn slider(ui: &mut Ui, name: &str, closing: &mut f64) -> bool {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().slider_width = 96.0;
+        let slider = Slider::new(closing, 0.0..=CLOSING_MAX).show_value(false);
+        let response = ui.add(slider);
+        places::tell(ui.ctx(), name, &response);
+        ui.label(name);
+        response.changed()
+    })
+    .inner
+}

@@ -1,0 +1,47 @@
+//! The legend of the colours: what they show, in which unit, from nothing to the most.
+
+use egui::{Align2, Color32, Context, Pos2, Rect, Sense, Vec2};
+
+use super::theme;
+use crate::view::colour_map::ColourMap;
+
+/// What the legend says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LegendText {
+    /// The quantity.
+    pub title: String,
+    /// Share of the range and what is written there.
+    pub labels: Vec<(f64, String)>,
+    /// What has to be said besides; empty if nothing.
+    pub remark: String,
+}
+
+const SIZE: Vec2 = Vec2::new(22.0, 180.0);
+
+/// Shows the legend at the right.
+pub fn show(context: &Context, map: &ColourMap, text: &LegendText) {
+    let offset = [-theme::MARGIN, -30.0];
+    theme::card(context, "legend", Align2::RIGHT_CENTER, offset, |ui| {
+        ui.strong(&text.title);
+        ui.add_space(4.0);
+        let room = Vec2::new(110.0, SIZE.y + 14.0);
+        let (rect, _) = ui.allocate_exact_size(room, Sense::hover());
+        let bar = Rect::from_min_size(rect.min + Vec2::new(0.0, 7.0), SIZE);
+        let painter = ui.painter();
+        let rows = SIZE.y as usize;
+        for row in 0..rows {
+            let [r, g, b, _] = map.colour(1.0 - row as f64 / (rows - 1) as f64);
+            let top = bar.top() + row as f32;
+            let line = Rect::from_min_size(Pos2::new(bar.left(), top), Vec2::new(SIZE.x, 1.5));
+            painter.rect_filled(line, 0.0, Color32::from_rgb(r, g, b));
+        }
+        for (share, label) in &text.labels {
+            let at = Pos2::new(bar.right() + 8.0, bar.bottom() - *share as f32 * SIZE.y);
+            let font = egui::FontId::proportional(13.0);
+            painter.text(at, Align2::LEFT_CENTER, label, font, Color32::from_gray(40));
+        }
+        if !text.remark.is_empty() {
+            ui.label(theme::quiet(&text.remark).small());
+        }
+    });
+}

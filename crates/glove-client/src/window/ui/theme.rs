@@ -1,0 +1,85 @@
+//! Colours, letters and frames of everything that lies over the scene.
+
+use egui::{
+    Align2, Area, Color32, Context, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Order,
+    RichText, Shadow, Stroke, TextStyle, Ui, Vec2, Visuals,
+};
+
+/// Good, on time.
+pub const GOOD: Color32 = Color32::from_rgb(0x1B, 0x87, 0x4B);
+/// Late, or to be looked at.
+pub const CAUTION: Color32 = Color32::from_rgb(0xB8, 0x6E, 0x00);
+/// Wrong, or old.
+pub const BAD: Color32 = Color32::from_rgb(0xC6, 0x28, 0x28);
+/// What is chosen.
+pub const ACCENT: Color32 = Color32::from_rgb(0x1F, 0x5F, 0xBF);
+/// Letters that are not read first.
+pub const QUIET: Color32 = Color32::from_rgb(0x5B, 0x63, 0x6E);
+/// A fingertip that touches nothing.
+pub const IDLE: Color32 = Color32::from_rgb(0xC9, 0xCE, 0xD6);
+
+/// Distance of the cards from the edge of the window, points.
+pub const MARGIN: f32 = 12.0;
+
+/// Sets letters and colours once.
+pub fn set_up(context: &Context) {
+    context.set_visuals(Visuals::light());
+    context.all_styles_mut(|style| {
+        let font = |size| FontId::new(size, FontFamily::Proportional);
+        style.text_styles = [
+            (TextStyle::Heading, font(18.0)),
+            (TextStyle::Body, font(14.0)),
+            (TextStyle::Button, font(14.0)),
+            (TextStyle::Small, font(12.0)),
+            (TextStyle::Monospace, FontId::new(13.0, FontFamily::Monospace)),
+        ]
+        .into();
+        style.spacing.item_spacing = Vec2::new(8.0, 5.0);
+        style.spacing.button_padding = Vec2::new(9.0, 4.0);
+        style.interaction.selectable_labels = false;
+    });
+}
+
+/// A card with content at an edge or corner of the window.
+pub fn card<R>(
+    context: &Context,
+    name: &str,
+    anchor: Align2,
+    offset: [f32; 2],
+    content: impl FnOnce(&mut Ui) -> R,
+) -> R {
+    Area::new(Id::new(name))
+        .anchor(anchor, Vec2::from(offset))
+        .order(Order::Middle)
+        .show(context, |ui| card_frame().show(ui, content).inner)
+        .inner
+}
+
+/// The frame of a card.
+pub fn card_frame() -> Frame {
+    Frame::new()
+        .fill(Color32::from_rgba_unmultiplied(255, 255, 255, 236))
+        .stroke(Stroke::new(1.0, Color32::from_rgba_unmultiplied(0, 0, 0, 26)))
+        .corner_radius(CornerRadius::same(8))
+        .inner_margin(Margin::symmetric(12, 9))
+        .shadow(Shadow {
+            offset: [0, 2],
+            blur: 10,
+            spread: 0,
+            color: Color32::from_rgba_unmultiplied(0, 0, 0, 40),
+        })
+}
+
+/// Letters that are not read first.
+pub fn quiet(text: impl Into<String>) -> RichText {
+    RichText::new(text).color(QUIET)
+}
+
+/// A word on a coloured ground.
+pub fn chip(ui: &mut Ui, text: &str, ground: Color32) {
+    Frame::new()
+        .fill(ground)
+        .corner_radius(CornerRadius::same(9))
+        .inner_margin(Margin::symmetric(8, 2))
+        .show(ui, |ui| ui.label(RichText::new(text).color(Color32::WHITE).strong()));
+}

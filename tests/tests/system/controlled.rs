@@ -1,0 +1,147 @@
+//! A run in lockstep that a test controls as a person would: by wishes between the ticks.
+
+use std::time::Duration;
+
+use fea_server::RunningServer;
+use glove_client::contact_model::ContactModel;
+use glove_client::control::Control;
+use glove_client::grasp_loop::GraspLoop;
+use glove_client::hand_reader::{HandReader, HandSetup};
+use glove_client::hand_source::HandSource;
+use glove_client::link::Link;
+use glove_client::mouse::MouseHand;
+use glove_client::notice::{Notice, NoticeKind};
+use glove_client::pace::{Due, Pace};
+use glove_client::run_report::{ObjectSummary, RunReport};
+use glove_client::scripted::{Planner, ScriptName, ScriptedHand};
+use glove_client::session::Session;
+use glove_client::soft_object::SoftObject;
+use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::tick_budget::Priority;
+use glove_client::tick_outcome::TickOutcome;
+use nalgebra::Isometry3;
+use softgrasp_core::grasp::{Grasp, StateName};
+use softgrasp_core::mesh::TetMesh;
+use softgrasp_protocol::{ElementName, Material, MethodName};
+
+use crate::start::server;
+
+/// What the object is made of in these tests.
+pub const MATERIAL: Material = Material { young: 2.0e4, poisson: 0.4 };
+/// Ticks after which nothing that is waited for can still come.
+const TICKS_MAX: usize = 3000;
+
+/// A run, its server, and what has been told.
+pub struct Controlled {
+    pub session: Session,
+    pub notices: Vec<Notice>,
+    tick: u64,
+    _server: RunningServer,
+}
+
+/// A summary for the report.
+pub fn summary(object: &SoftObject) -> ObjectSummary {
+    ObjectSummary {
+        name: "an object".to_owned(),
+        nodes: object.shape().len(),
+        tets: object.rest().tets().len(),
+        size_m: object.rest().size(),
+        notes: Vec::new(),
+    }
+}
+
+impl Controlled {
+    /// A mouse hand before an object.
+    pub fn by_mouse(mesh: TetMesh) -> Self {
+        let mouse = MouseHand::new(HandSetup::default(), Planner::waited(), 1.0 / 60.0);
+        Self::new(SoftObject::try_new(mesh).unwrap(), mouse.into())
+    }
+
+    /// A script before an object.
+    pub fn by_script(mesh: TetMesh, script: ScriptName) -> Self {
+        let object = SoftObject::try_new(mesh).unwrap();
+        let hand = ScriptedHand::try_new(script, HandSetup::default(), &object).unwrap();
+        Self::new(object, hand.into())
+    }
+
+    fn new(object: SoftObject, hand: HandSource) -> Self {
+        let server = server(1);
+        let settings = SolveSettings {
+            material: MATERIAL,
+            element: ElementName::T4,
+            method: MethodName::auto(),
+            contact: ContactModel::Mask,
+            subscription: Subscription::Surface,
+        };
+        let report = RunReport::new(
+            summary(&object),
+            hand.name(),
+            "embedded".to_owned(),
+            Pace::Lockstep,
+            settings.contact,
+        );
+        let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
+        let link = Link::start(&server.address().to_string(), Priority::Ordinary).unwrap();
+        let reader = HandReader::new(HandSetup::default());
+        let grasp_loop =
+            GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();
+        let session = Session::new(grasp_loop, hand, report, Priority::Ordinary, false);
+        session.wait_idle(Duration::from_secs(60));
+        Self { session, notices: Vec::new(), tick: 0, _server: server }
+    }
+
+    /// One tick.
+    pub fn tick(&mut self) -> TickOutcome {
+        let due = Due { tick: self.tick, skipped: 0 };
+        self.tick += 1;
+        let outcome = self.session.play(due, due.tick as f64 / 60.0).unwrap().unwrap();
+        self.notices.extend(self.session.take_notices());
+        outcome
+    }
+
+    /// Asks for something and plays a tick.
+    pub fn ask(&mut self, control: Control) -> TickOutcome {
+        self.session.apply(control);
+        self.tick()
+    }
+
+    /// Plays until something is so.
+    pub fn until(&mut self, what: &str, done: impl Fn(&Self, &TickOutcome) -> bool) {
+        for _ in 0..TICKS_MAX {
+            let outcome = self.tick();
+            if done(self, &outcome) {
+                return;
+            }
+        }
+        panic!("never came: {what}; told: {:?}", self.notices);
+    }
+
+    /// Plays until the grasp is in a state.
+    pub fn until_state(&mut self, state: StateName) {
+        self.until(&format!("{state}"), |_, outcome| outcome.state == Some(state));
+    }
+
+    /// Plays until the object has been deformed for so many ticks.
+    pub fn deform(&mut self, ticks: usize) {
+        self.until_state(StateName::Deforming);
+        for _ in 0..ticks {
+            assert_eq!(self.tick().state, Some(StateName::Deforming));
+        }
+    }
+
+    /// The object as it is now.
+    pub fn object(&self) -> &SoftObject {
+        self.session.grasp_loop().object()
+    }
+
+    /// The last thing that was told, which must be of this kind and hold these words.
+    pub fn assert_told(&self, kind: NoticeKind, words: &str) {
+        let last = self.notices.last().expect("nothing was told");
+        assert!(last.kind == kind && last.text.contains(words), "{:?}", self.notices);
+    }
+
+    /// The end.
+    pub fn finish(self) -> RunReport {
+        self.session.finish(false).unwrap()
+    }
+}

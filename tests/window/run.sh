@@ -1,0 +1,524 @@
+#!/usr/bin/env bash
+# Drives the window of glove-client from outside, with mouse and keys only: opens the menu, reads a
+# mesh, grasps it, keeps the shape, saves it, reads it back and compares, exits; then the runs that
+# find no display, and a user who clicks anywhere. The window stands in a display without a screen
+# (Xvfb), and the processor draws it. Ends with 0 when everything holds, and with 0 and one line
+# where a part is missing and cannot be installed.
+#
+#   BIN_DIR=target/debug tests/window/run.sh     takes a client that is built already (the default)
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+here=$(pwd)
+
+say() { printf 'window: %s\n' "$*"; }
+
+# -- What it needs
+
+packages=(xvfb mesa-vulkan-drivers libvulkan1 libgl1-mesa-dri libxkbcommon-x11-0 libxcursor1
+    libxi6 libxrandr2 xdotool)
+
+missing() {
+    local tool
+    for tool in Xvfb xdotool; do
+        command -v "$tool" >/dev/null || { echo "$tool"; return; }
+    done
+    compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null ||
+        compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null || echo "a Vulkan driver"
+}
+
+if [ -n "$(missing)" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    say "installing ${packages[*]}"
+    {
+        timeout 300 apt-get update &&
+            DEBIAN_FRONTEND=noninteractive timeout 600 \
+                apt-get install -y --no-install-recommends "${packages[@]}"
+    } >/dev/null 2>&1 </dev/null || true
+fi
+if [ -n "$(missing)" ]; then
+    say "skipped: $(missing) is not there and could not be installed (Debian: apt-get install ${packages[*]})"
+    exit 0
+fi
+bin_dir="${BIN_DIR:-target/debug}"
+client="$(cd "$bin_dir" 2>/dev/null && pwd)/glove-client"
+if [ ! -x "$client" ]; then
+    say "there is no glove-client in $bin_dir; build it first (cargo build --bin glove-client)"
+    exit 1
+fi
+
+# -- The folder, the display, and how everything ends
+
+work=$(mktemp -d)
+screens=0 display_pid="" client_pid="" log="" step="beginning"
+
+kill_quietly() {
+    [ -n "$1" ] || return 0
+    kill "$1" 2>/dev/null || return 0
+    local n
+    for n in $(seq 30); do
+        kill -0 "$1" 2>/dev/null || return 0
+        sleep 0.1
+    done
+    kill -9 "$1" 2>/dev/null || true
+    wait "$1" 2>/dev/null || true
+}
+
+clean_up() {
+    kill_quietly "$client_pid"
+    kill_quietly "$display_pid"
+    cd "$here"
+    rm -rf "$work"
+}
+trap clean_up EXIT
+trap 'exit 1' INT TERM
+
+# A picture of the screen that outlives the run, and its log.
+picture_of_screen() {
+    local file
+    file=$(mktemp "${TMPDIR:-/tmp}/window-test-XXXXXX")
+    if command -v import >/dev/null && import -window root "png:$file.png" 2>/dev/null; then
+        rm -f "$file"
+        echo "$file.png"
+    elif command -v xwd >/dev/null && xwd -silent -root -out "$file.xwd" 2>/dev/null; then
+        rm -f "$file"
+        echo "$file.xwd"
+    else
+        rm -f "$file"
+        echo "none (install imagemagick or x11-apps for one)"
+    fi
+}
+
+fail() {
+    # Not on standard output: what a function prints there may be read by the script itself.
+    exec >&2
+    say "FAILED at: $step: $*"
+    if [ -n "$log" ] && [ -f "$log" ]; then
+        cp "$log" "${TMPDIR:-/tmp}/window-test.log"
+        say "its log is ${TMPDIR:-/tmp}/window-test.log; the last lines:"
+        tail -n 25 "$log" | sed 's/^/    /'
+    fi
+    say "the screen: $(picture_of_screen)"
+    exit 1
+}
+
+step() {
+    step="$1"
+    say "$step ($SECONDS s)"
+}
+
+open_display() {
+    Xvfb -displayfd 3 -screen 0 1400x900x24 -nolisten tcp 3>"$work/display" >/dev/null 2>&1 &
+    display_pid=$!
+    local n
+    for n in $(seq 100); do
+        [ -s "$work/display" ] && break
+        sleep 0.1
+    done
+    [ -s "$work/display" ] || fail "Xvfb does not begin"
+    DISPLAY=":$(cat "$work/display")"
+    export DISPLAY
+    : >"$work/display"
+}
+
+# -- The program: to begin it, to read its log, to see that it ended
+
+# Seconds that anything may take.
+patience=60
+
+# begin NAME ARGUMENT...: opens a window; its log is NAME.log, its output NAME.out.
+begin() {
+    local name="$1"
+    shift
+    log="$work/$name.log" out="$work/$name.out" told=0
+    RUST_LOG=warn,glove_client=info,glove_client::places=debug NO_COLOR=1 \
+        "$client" "$@" >"$out" 2>"$log" &
+    client_pid=$!
+    local end=$((SECONDS + patience))
+    while ! window=$(xdotool search --name '^Softgrasp$' 2>/dev/null | head -n 1) || [ -z "$window" ]; do
+        alive
+        [ $SECONDS -lt $end ] || fail "no window after $patience s"
+        sleep 0.1
+    done
+    await 'places: name="File"'
+    # Nothing else on this display gives the keys to a window.
+    xdotool windowfocus "$window"
+    # A small window is drawn faster.
+    xdotool windowsize "$window" 800 600
+    settle 4
+}
+
+alive() {
+    kill -0 "$client_pid" 2>/dev/null || fail "the program has ended"
+}
+
+# From here on the log is new.
+mark() {
+    told=$(wc -l <"$log")
+}
+
+new_lines() {
+    tail -n "+$((told + 1))" "$log"
+}
+
+# await PATTERN [SECONDS]: until a new line of the log has it.
+await() {
+    local pattern="$1" limit="${2:-$patience}"
+    local end=$((SECONDS + limit))
+    until new_lines | grep -qE "$pattern"; do
+        alive
+        [ $SECONDS -lt $end ] || fail "the log does not say '$pattern' within $limit s"
+        sleep 0.1
+    done
+}
+
+# settle [PICTURES]: waits until so many pictures (two) have been drawn; what was pressed before the
+# first is shown by the second. The log tells each picture.
+settle() {
+    local from pictures="${1:-2}" end=$((SECONDS + patience))
+    from=$(wc -l <"$log")
+    until [ "$(tail -n "+$((from + 1))" "$log" | grep -c 'places: picture=')" -ge "$pictures" ]; do
+        alive
+        [ $SECONDS -lt $end ] || fail "the window is not drawn anew within $patience s"
+        sleep 0.05
+    done
+}
+
+# place NAME: centre and width of something that can be clicked, as the log told it last.
+place() {
+    local line
+    line=$(grep -F "places: name=\"$1\" x=" "$log" | tail -n 1) || fail "there is no '$1'"
+    sed -E 's/.* x=(-?[0-9]+) y=(-?[0-9]+) width=([0-9]+) .*/\1 \2 \3/' <<<"$line"
+}
+
+# click NAME: with the left button.
+click() {
+    local at x y width
+    at=$(place "$1") || exit 1
+    read -r x y width <<<"$at"
+    xdotool mousemove "$x" "$y" click 1
+    [ "$1" = Exit ] || settle 5
+}
+
+# menu [ENTRY]: the pop-up menu of the right button, and an entry of it; the log is new from here.
+menus=0
+menu() {
+    # Each time at another place, so that the log tells it again.
+    menus=$((menus + 1))
+    xdotool mousemove $((450 + menus)) $((200 + 2 * menus))
+    settle
+    mark
+    xdotool click 3
+    await 'places: name="Exit"'
+    [ -n "${1:-}" ] || return 0
+    # A menu is measured before it stands where it stays.
+    settle
+    click "$1"
+    # A dialog is measured before it stands where it stays.
+    [ "$1" = Exit ] || settle 5
+}
+
+# write_name NAME: into the field of a dialog, in place of what stands there.
+write_name() {
+    click "file name"
+    xdotool key End key --delay 15 --repeat 40 BackSpace
+    xdotool type --delay 15 "$1"
+    settle
+}
+
+# notice PATTERN: the window says so, in a sentence.
+notice() {
+    await "notice text=\"[^\"]*$1"
+}
+
+# ended: waits for the end of the program; fails where it is not in order.
+ended() {
+    local end=$((SECONDS + patience)) code=0
+    while kill -0 "$client_pid" 2>/dev/null; do
+        [ $SECONDS -lt $end ] || fail "the program does not end within $patience s"
+        sleep 0.1
+    done
+    wait "$client_pid" || code=$?
+    client_pid=""
+    [ "$code" = 0 ] || fail "the program ended with $code"
+    no_panic
+}
+
+no_panic() {
+    ! grep -qE 'panicked|RUST_BACKTRACE' "$log" || fail "the program panicked"
+}
+
+# -- Meshes: node coordinates of a Gmsh 4.1 file, and how far two files differ
+
+# nodes FILE: tag and coordinates.
+nodes() {
+    awk '
+        /^\$Nodes/ { inside = 1; getline; next }
+        /^\$EndNodes/ { exit }
+        inside {
+            count = $4
+            for (i = 0; i < count; i++) { getline; tag[i] = $1 }
+            for (i = 0; i < count; i++) { getline; print tag[i], $1, $2, $3 }
+        }' "$1" | sort -n
+}
+
+# apart FILE FILE: largest distance of a node of one file from the nearest of the other, as a share
+# of the longest extent, both brought to the same centre and size. Reading a mesh does that to it,
+# and may number its nodes anew.
+apart() {
+    paste -d ' ' <(nodes "$1") <(nodes "$2") | awk '
+        NF != 8 { print "other nodes"; wrong = 1; exit }
+        {
+            for (i = 0; i < 6; i++) {
+                v = $(i < 3 ? i + 2 : i + 3)
+                value[NR, i] = v
+                if (NR == 1 || v < low[i]) low[i] = v
+                if (NR == 1 || v > high[i]) high[i] = v
+            }
+        }
+        END {
+            if (wrong) exit
+            if (!NR) { print "no nodes"; exit }
+            for (i = 0; i < 6; i++) {
+                f = i < 3 ? 0 : 1
+                if (high[i] - low[i] > size[f]) size[f] = high[i] - low[i]
+            }
+            for (n = 1; n <= NR; n++)
+                for (i = 0; i < 6; i++)
+                    value[n, i] = (value[n, i] - (low[i] + high[i]) / 2) / size[i < 3 ? 0 : 1]
+            for (n = 1; n <= NR; n++) {
+                least = 3
+                for (m = 1; m <= NR && least > 0; m++) {
+                    sum = (value[n, 0] - value[m, 3]) ^ 2
+                    if (sum >= least) continue
+                    sum += (value[n, 1] - value[m, 4]) ^ 2 + (value[n, 2] - value[m, 5]) ^ 2
+                    if (sum < least) least = sum
+                }
+                if (least > most) most = least
+            }
+            printf "%.3e\n", sqrt(most)
+        }'
+}
+
+# holds CONDITION: arithmetic with fractions.
+holds() {
+    awk "BEGIN { exit !($1) }"
+}
+
+# -- The steps
+
+# Reaches, and closes all fingers with the slider until the object deforms.
+grasp() {
+    mark
+    click "Reach"
+    # The hand is on its way for about two seconds and takes no other wish meanwhile.
+    sleep 3
+    local at x y width left share
+    at=$(place "close all") || exit 1
+    read -r x y width <<<"$at"
+    # The knob stands at the left end of the slider.
+    left=$((x - width / 2 + 5))
+    xdotool mousemove "$left" "$y" mousedown 1
+    settle
+    for share in 20 30 35 40 45 50 55 60 65 70; do
+        xdotool mousemove $((left + (width - 10) * share / 100)) "$y"
+        settle 1
+        sleep 0.3
+        ! new_lines | grep -q 'entered Deforming' || break
+    done
+    await 'news .*entered Deforming' 20
+    # A little further, so that the shape differs plainly.
+    xdotool mousemove $((left + (width - 10) * (share + 8) / 100)) "$y"
+    settle
+    sleep 1
+    xdotool mouseup 1
+    settle
+}
+
+cd "$work"
+export XDG_RUNTIME_DIR="$work/runtime"
+mkdir -m 700 "$XDG_RUNTIME_DIR"
+unset WAYLAND_DISPLAY
+"$client" mesh toothpaste --nodes 600 --out toothpaste.msh >/dev/null
+open_display
+
+step "the window opens, and the right button opens the menu"
+begin main run --hand mouse --object cube --report report.json
+menu
+xdotool key Escape
+settle
+
+step "a name that is no file is refused in a sentence"
+menu "Read file …"
+write_name nothing.msh
+xdotool key Return
+await 'notice .*is_refusal=true'
+new_lines | grep 'is_refusal=true' | grep -q 'nothing.msh' ||
+    fail "the sentence does not name the file"
+
+step "a mesh is read by mouse"
+menu "Read file …"
+click "toothpaste.msh"
+click "Read"
+notice "the object is now toothpaste"
+
+step "the hand grasps it by mouse"
+grasp
+
+step "the shape is kept"
+menu "Keep shape"
+notice "shape kept"
+
+step "the shape is saved under a new name"
+menu "Save as …"
+click "vtu"
+click "Save"
+notice "saved [^\"]*\.vtu"
+compgen -G '*.vtu' >/dev/null || fail "there is no VTU file"
+menu "Save as …"
+click "msh"
+write_name squeezed.msh
+click "Save"
+notice "saved squeezed.msh"
+[ -s squeezed.msh ] || fail "there is no squeezed.msh"
+moved=$(apart toothpaste.msh squeezed.msh)
+holds "$moved > 1e-3" 2>/dev/null || fail "the kept shape is the old one ($moved apart)"
+
+step "a file is not replaced without a question"
+before=$(stat -c '%i %y %s' squeezed.msh)
+for answer in "Keep the old one" "Replace"; do
+    menu "Save as …"
+    write_name squeezed.msh
+    click "Save"
+    click "$answer"
+    if [ "$answer" = Replace ]; then
+        notice "saved squeezed.msh"
+        [ "$(stat -c '%i %y %s' squeezed.msh)" != "$before" ] || fail "the file was not replaced"
+    else
+        sleep 2
+        alive
+        [ "$(stat -c '%i %y %s' squeezed.msh)" = "$before" ] || fail "the file was replaced"
+        ! new_lines | grep -q 'notice text="saved' || fail "the file was replaced"
+    fi
+done
+
+step "a snapshot by key"
+mark
+xdotool key p
+notice "picture written"
+compgen -G 'softgrasp*.png' >/dev/null || fail "there is no picture"
+
+step "exit by the menu"
+menu "Exit"
+ended
+for said in '"Deforming"' 'shape kept' 'the object is now toothpaste'; do
+    grep -q "$said" report.json || fail "the report does not say: $said"
+done
+
+step "what was saved is read back, and is the same"
+begin again run --hand mouse --object cube
+menu "Read file …"
+click "squeezed.msh"
+click "Read"
+notice "the object is now squeezed"
+menu "Save as …"
+write_name once-more.msh
+click "Save"
+notice "saved once-more.msh"
+moved=$(apart squeezed.msh once-more.msh)
+holds "$moved < 1e-9" 2>/dev/null || fail "it comes back as another shape ($moved apart)"
+
+step "other sizes of the window, and none"
+for size in "300 200" "60 40" "1 1" "1400 900" "800 600"; do
+    # shellcheck disable=SC2086
+    xdotool windowsize "$window" $size
+    sleep 1
+    alive
+done
+xdotool windowunmap "$window"
+sleep 2
+alive
+xdotool windowmap "$window"
+sleep 1
+xdotool windowfocus "$window"
+settle
+menu "Exit"
+ended
+
+step "a user who clicks and types anywhere"
+begin hostile run --hand mouse --object cube
+RANDOM=1998
+keys=(space x Left Right Up Down Prior Next a d q e k ctrl+z BackSpace Home p c t f Return period
+    comma w g h l o n F1 F2 F3 Tab Escape 1 2 3 4 5 ctrl+o ctrl+s Delete ctrl+a shift+1)
+end=$((SECONDS + 20))
+while [ $SECONDS -lt $end ] && kill -0 "$client_pid" 2>/dev/null; do
+    x=$((RANDOM % 1280)) y=$((RANDOM % 800))
+    case $((RANDOM % 6)) in
+        0) xdotool mousemove $x $y click 1 ;;
+        1) xdotool mousemove $x $y click 3 ;;
+        2) xdotool mousemove $x $y click $((4 + RANDOM % 2)) ;;
+        3) xdotool mousemove $x $y mousedown 1 mousemove $((RANDOM % 1280)) $((RANDOM % 800)) mouseup 1 ;;
+        4) xdotool mousemove $x $y mousedown 2 mousemove $((RANDOM % 1280)) $((RANDOM % 800)) mouseup 2 ;;
+        5) xdotool key "${keys[RANDOM % ${#keys[@]}]}" ;;
+    esac
+    sleep 0.05
+done
+no_panic
+# A click may have hit Exit; then the end must have been in order.
+end=$((SECONDS + patience))
+while kill -0 "$client_pid" 2>/dev/null && [ $SECONDS -lt $end ]; do
+    # What is open closes first: in a field for a name, keys are letters.
+    xdotool key Escape sleep 1 key ctrl+q sleep 1
+done
+ended
+
+step "without arguments: the strawberry is squeezed within ten seconds, Ctrl+Q ends"
+begin plain
+opened=$(grep -F 'places: name="File"' "$log" | head -n 1 | cut -d ' ' -f 1)
+told=0
+await 'news .*entered Deforming'
+squeezed=$(new_lines | grep 'entered Deforming' | head -n 1 | cut -d ' ' -f 1)
+took=$(($(date -d "$squeezed" +%s) - $(date -d "$opened" +%s)))
+[ $took -le 10 ] || fail "the strawberry was squeezed only after $took s"
+xdotool key ctrl+q
+ended
+grep -q 'strawberry' "$out" || fail "the summary does not name the strawberry"
+
+# -- No window: one sentence, and the run goes on without it
+
+# without NAME ENVIRONMENT...: a run in an environment that has no window.
+without() {
+    local name="$1" code=0
+    shift
+    log="$work/without.log"
+    timeout $patience env "$@" "$client" run --object cube --nodes 200 \
+        --report without.json >without.out 2>"$log" || code=$?
+    [ $code = 0 ] || fail "$name: the run ended with $code"
+    no_panic
+    [ "$(grep -c 'without a window' "$log")" = 1 ] || fail "$name: there is no sentence"
+    grep -q '"Deforming"' without.json || fail "$name: nothing was grasped"
+    rm -f without.json
+}
+
+step "no display: a sentence, and a run without a window"
+without "no display" -u DISPLAY -u WAYLAND_DISPLAY
+without "a display that is not there" DISPLAY=:9999
+
+step "no graphics driver: a sentence, and a run without a window"
+without "no driver" VK_DRIVER_FILES=/nonexistent VK_ICD_FILENAMES=/nonexistent \
+    LIBGL_DRIVERS_PATH=/nonexistent __EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent
+
+# The library that talks to the display ends the program then, with a sentence of its own; without
+# that the run would go on or end in order. It must neither hang nor panic.
+step "the display is lost: a sentence, and an end"
+begin lost run --object cube --frames 3000 --report lost.json
+kill_quietly "$display_pid"
+display_pid=""
+end=$((SECONDS + patience))
+while kill -0 "$client_pid" 2>/dev/null; do
+    [ $SECONDS -lt $end ] || fail "the program does not end within $patience s"
+    sleep 0.1
+done
+client_pid=""
+no_panic
+grep -qE 'X connection to .* broken|glove-client: ' "$log" || fail "there is no sentence"
+
+say "passed ($SECONDS s)"
