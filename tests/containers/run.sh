@@ -248,7 +248,7 @@ if [ -n "${BIN_DIR:-}" ]; then
     bin_dir="$(cd "$BIN_DIR" && pwd)"
 else
     say "building the programs"
-    cargo build --release --locked --bins --package fea-server --package glove-client
+    cargo build --release --locked --bins --package fea-server --package glove-client --no-default-features
     bin_dir="$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)"
 fi
 say "building images on stand-in bases"
