@@ -308,21 +308,27 @@ holds() {
 # Reaches, and closes all fingers with the slider until the object deforms.
 grasp() {
     mark
-    click "Reach"
-    # The hand is on its way for about two seconds and takes no other wish meanwhile.
-    sleep 3
-    local at x y width left share
+    local at x y width left share try
     at=$(place "close all") || exit 1
     read -r x y width <<<"$at"
     # The knob stands at the left end of the slider.
     left=$((x - width / 2 + 5))
-    xdotool mousemove "$left" "$y" mousedown 1
-    settle
-    for share in 20 30 35 40 45 50 55 60 65 70; do
-        xdotool mousemove $((left + (width - 10) * share / 100)) "$y"
-        settle 1
-        sleep 0.3
-        ! new_lines | grep -q 'entered Deforming' || break
+    # A hand that is still being shown how to hold a new object goes there first: asked again, it
+    # reaches.
+    for try in 1 2 3; do
+        click "Reach"
+        # The hand is on its way for about two seconds and takes no other wish meanwhile.
+        sleep $((2 + 2 * try))
+        xdotool mousemove "$left" "$y" mousedown 1
+        settle
+        for share in 20 30 35 40 45 50 55 60 65 70; do
+            xdotool mousemove $((left + (width - 10) * share / 100)) "$y"
+            settle 1
+            sleep 0.3
+            ! new_lines | grep -q 'entered Deforming' || break 2
+        done
+        xdotool mouseup 1
+        settle
     done
     await 'news .*entered Deforming' 20
     # A little further, so that the shape differs plainly.
