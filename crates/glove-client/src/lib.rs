@@ -16,6 +16,7 @@ pub mod displacement_table;
 pub mod file_writing;
 pub mod forecast;
 pub mod grasp_loop;
+pub mod hand_choice;
 pub mod hand_reader;
 pub mod hand_source;
 pub mod inspection;

@@ -172,18 +172,6 @@ impl Drop for Loading {
     }
 }
 
-impl LoadStage {
-    /// What to show while it lasts.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Mesh => "reading and checking the mesh",
-            Self::Tree => "building the sphere tree",
-            Self::Plan => "looking for a way to grasp it",
-            Self::Ready => "ready",
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

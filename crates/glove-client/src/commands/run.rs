@@ -8,12 +8,13 @@ use clap::Args;
 
 use super::key_frames::KeyFrames;
 use super::output::{print, write_json};
-use super::run_arguments::{HandChoice, RunArguments, RunPlan};
+use super::run_arguments::{RunArguments, RunPlan};
 use super::run_pictures::RunPictures;
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 #[cfg(feature = "window")]
 use super::run_window;
 use crate::control::Control;
+use crate::hand_choice::HandChoice;
 use crate::interruption;
 use crate::pace::Pace;
 use crate::progress::Progress;
@@ -77,7 +78,6 @@ impl RunCommand {
         let setup = Setup {
             threads: self.arguments.threads,
             ends_with_script: self.arguments.frames.is_none(),
-            tick_s: plan.tick_s(),
         };
         let at = |stage| match stage {
             SetupStage::Object(_) => {}

@@ -2,7 +2,6 @@
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -15,14 +14,13 @@ use super::display_arguments::DisplayArguments;
 use super::numbers::{count, poisson, positive, ticks};
 use crate::connection::ServerChoice;
 use crate::contact_model::ContactModel;
+use crate::hand_choice::HandChoice;
 use crate::hand_reader::HandSetup;
 use crate::loading::ObjectRequest;
 use crate::pace::Pace;
 use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile};
 use crate::scripted::ScriptName;
 use crate::solve_settings::{SolveSettings, Subscription};
-#[cfg(feature = "window")]
-use crate::view::action::HandWish;
 
 /// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
 #[derive(Args, Clone, Default)]
@@ -83,42 +81,6 @@ pub struct RunArguments {
     /// File for a JSON report.
     #[arg(long, value_name = "F.json")]
     pub(super) report: Option<PathBuf>,
-}
-
-/// Where the hand comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HandChoice {
-    /// Played by the program, as device bytes.
-    Scripted(ScriptName),
-    /// Driven by mouse and keyboard, in a window.
-    Mouse,
-}
-
-impl HandChoice {
-    /// The same as a menu has it.
-    #[cfg(feature = "window")]
-    pub(super) fn wish(self) -> HandWish {
-        match self {
-            Self::Scripted(script) => HandWish::Scripted(script),
-            Self::Mouse => HandWish::Mouse,
-        }
-    }
-}
-
-impl FromStr for HandChoice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':').unwrap_or((text, "")) {
-            ("scripted", "") => Ok(Self::Scripted(ScriptName::default())),
-            ("scripted", name) => Ok(Self::Scripted(name.parse().map_err(|e| format!("{e}"))?)),
-            ("mouse", "") => Ok(Self::Mouse),
-            _ => {
-                Err("there is scripted, scripted:NAME and mouse; gloves and recordings come later"
-                    .into())
-            }
-        }
-    }
 }
 
 /// The element that ticks are solved with; they need one whose system is condensed.

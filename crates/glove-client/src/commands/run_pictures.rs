@@ -133,13 +133,7 @@ impl RunPictures {
 
     /// Where the eye is: where it was asked to be, or beside the first hand.
     fn camera(&mut self, frame: &ViewFrame) -> ViewCamera {
-        if let (None, Some(hand)) = (self.camera, &frame.hand) {
-            self.camera = Some(ViewCamera::beside_hand(
-                frame.object.world_from_object * frame.object.rest.centre(),
-                &hand.world_from_palm,
-                hand.dimensions.handedness,
-            ));
-        }
+        self.camera = self.camera.or_else(|| frame.eye_beside_hand());
         self.camera.unwrap_or_default()
     }
 

@@ -6,9 +6,10 @@ use anyhow::Context;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::Grasp;
 
-use super::run_arguments::{HandChoice, RunPlan};
+use super::run_arguments::RunPlan;
 use crate::connection::Host;
 use crate::grasp_loop::GraspLoop;
+use crate::hand_choice::HandChoice;
 use crate::hand_reader::{HandReader, HandSetup};
 use crate::hand_source::HandSource;
 use crate::interruption;
@@ -45,8 +46,6 @@ pub(super) struct Setup {
     pub(super) threads: Option<usize>,
     /// Whether it ends with the script.
     pub(super) ends_with_script: bool,
-    /// Ticks per second of a hand that is moved by a person.
-    pub(super) tick_s: f64,
 }
 
 /// Makes a run ready; says at which stage it is. `seen` is shown the object before the first tick.
@@ -71,7 +70,7 @@ pub(super) fn make_ready(
     let planner = || Planner::beside().context("cannot start the planner's thread");
     let hand: HandSource = match (plan.hand, plan.pace) {
         (HandChoice::Mouse, _) => {
-            MouseHand::new(hand_setup.clone(), planner()?, setup.tick_s).into()
+            MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).into()
         }
         (HandChoice::Scripted(script), Pace::Lockstep) => {
             ScriptedHand::following(script, hand_setup.clone(), grip?).into()

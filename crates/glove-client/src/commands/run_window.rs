@@ -52,8 +52,7 @@ pub(super) fn show(
 /// Begins the run beside the window.
 fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
     let plan = plan.for_window();
-    let setup =
-        Setup { threads: arguments.threads, ends_with_script: false, tick_s: plan.tick_s() };
+    let setup = Setup { threads: arguments.threads, ends_with_script: false };
     let timing = Timing { period: plan.period, ticks_max: arguments.frames };
     Start::begin(move |at| {
         let ReadyRun { session, host } =
@@ -63,7 +62,7 @@ fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
             server: plan.server.to_string(),
             contact: plan.settings.contact.to_string(),
             material: plan.elastic_material()?,
-            hand: plan.hand.wish(),
+            hand: plan.hand,
             method: plan.settings.method.to_string(),
             max_error: None,
             tick_s: plan.tick_s(),
@@ -88,10 +87,8 @@ fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
 /// The step of the loading card.
 fn step(stage: SetupStage) -> usize {
     match stage {
-        SetupStage::Object(LoadStage::Mesh) => 0,
-        SetupStage::Object(LoadStage::Tree) => 1,
-        SetupStage::Object(LoadStage::Plan | LoadStage::Ready) => 2,
-        SetupStage::Server => 3,
+        SetupStage::Object(stage) => stage as usize,
+        SetupStage::Server => LoadStage::Ready as usize,
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::display::Level;
 use super::shading::Shading;
-use super::toggle::Toggle;
+use super::toggle::{Page, Toggle};
+use crate::hand_choice::HandChoice;
 use crate::scene::ObjectChoice;
-use crate::scripted::ScriptName;
 
 /// One wish.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,13 +30,15 @@ pub enum Action {
     /// End the program.
     Exit,
     /// Let another hand act.
-    Hand(HandWish),
+    Hand(HandChoice),
     /// Solve by another method.
     Method(String),
     /// Accept errors up to this share, or only those of rounding.
     MaxError(Option<f64>),
-    /// Show or hide something.
+    /// Show or hide a part of the scene.
     Toggle(Toggle),
+    /// Show or hide a page.
+    Page(Page),
     /// Show a quantity in colours.
     Shade(Shading),
     /// Spend so much on the light.
@@ -55,15 +57,6 @@ pub enum Action {
     Restart,
 }
 
-/// A hand that can be chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HandWish {
-    /// Played by the program.
-    Scripted(ScriptName),
-    /// Moved with mouse and keyboard.
-    Mouse,
-}
-
 impl Action {
     /// What the menu calls it.
     pub fn label(&self) -> String {
@@ -78,12 +71,13 @@ impl Action {
             Self::Snapshot => "Snapshot".to_owned(),
             Self::Record => "Record pictures".to_owned(),
             Self::Exit => "Exit".to_owned(),
-            Self::Hand(HandWish::Mouse) => "Mouse and keyboard".to_owned(),
-            Self::Hand(HandWish::Scripted(script)) => format!("Script: {script}"),
+            Self::Hand(HandChoice::Mouse) => "Mouse and keyboard".to_owned(),
+            Self::Hand(HandChoice::Scripted(script)) => format!("Script: {script}"),
             Self::Method(name) => name.clone(),
             Self::MaxError(None) => "rounding only".to_owned(),
             Self::MaxError(Some(share)) => format!("{} %", 100.0 * share),
             Self::Toggle(toggle) => toggle.label().to_owned(),
+            Self::Page(page) => page.label().to_owned(),
             Self::Shade(shading) => shading.title().to_owned(),
             Self::Light(level) => capitalised(&level.to_string()),
             Self::NextShading => "Next colouring".to_owned(),
@@ -114,6 +108,7 @@ impl Action {
             Self::Step => ".",
             Self::Restart => ",",
             Self::Toggle(toggle) => toggle.key(),
+            Self::Page(page) => page.key(),
             _ => "",
         }
     }
@@ -132,18 +127,8 @@ mod tests {
 
     #[test]
     fn no_two_actions_share_a_key() {
-        let toggles = [
-            Toggle::Wireframe,
-            Toggle::Ghost,
-            Toggle::Skin,
-            Toggle::Colliders,
-            Toggle::Contacts,
-            Toggle::Forces,
-            Toggle::Help,
-            Toggle::Information,
-            Toggle::Timings,
-        ];
-        let mut actions: Vec<Action> = toggles.map(Action::Toggle).to_vec();
+        let mut actions: Vec<Action> = Toggle::ALL.map(Action::Toggle).to_vec();
+        actions.extend(Page::ALL.map(Action::Page));
         actions.extend([
             Action::ReadFile,
             Action::KeepShape,

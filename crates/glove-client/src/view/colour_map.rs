@@ -6,6 +6,8 @@
 
 use std::f64::consts::PI;
 
+use super::texture::Texture;
+
 /// Colours of the ramp.
 pub const COLOUR_COUNT: usize = 256;
 
@@ -30,19 +32,6 @@ type OkLab = [f64; 3];
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColourMap {
     table: Vec<[u8; 4]>,
-}
-
-/// An image of the ramp, from zero on the left to the most on the right.
-///
-/// Shapes: `rgba` four bytes (sRGB, opaque) for each pixel, row by row.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RampImage {
-    /// Pixels in a row.
-    pub width: u32,
-    /// Rows, all alike.
-    pub height: u32,
-    /// Pixels.
-    pub rgba: Vec<u8>,
 }
 
 impl Default for ColourMap {
@@ -75,9 +64,9 @@ impl ColourMap {
     }
 
     /// The ramp as a texture; [`texture_u`] finds a fraction in it.
-    pub fn image(&self, height: u32) -> RampImage {
+    pub fn image(&self, height: u32) -> Texture {
         let rgba = self.table.as_flattened().repeat(height as usize);
-        RampImage { width: COLOUR_COUNT as u32, height, rgba }
+        Texture { width: COLOUR_COUNT as u32, height, rgba }
     }
 }
 

@@ -107,7 +107,7 @@ impl Default for Display {
 }
 
 impl Display {
-    /// Whether something is shown; the pages over the scene are not the scene's concern.
+    /// Whether a part of the scene is shown.
     pub fn shows(&self, toggle: Toggle) -> bool {
         match toggle {
             Toggle::Wireframe => self.wireframe,
@@ -116,11 +116,10 @@ impl Display {
             Toggle::Colliders => self.colliders,
             Toggle::Contacts => self.contacts,
             Toggle::Forces => self.forces,
-            Toggle::Help | Toggle::Information | Toggle::Timings => false,
         }
     }
 
-    /// Shows something, or does not any more.
+    /// Shows a part of the scene, or does not any more.
     pub fn toggle(&mut self, toggle: Toggle) {
         let shown = match toggle {
             Toggle::Wireframe => &mut self.wireframe,
@@ -129,7 +128,6 @@ impl Display {
             Toggle::Colliders => &mut self.colliders,
             Toggle::Contacts => &mut self.contacts,
             Toggle::Forces => &mut self.forces,
-            Toggle::Help | Toggle::Information | Toggle::Timings => return,
         };
         *shown = !*shown;
     }
@@ -170,14 +168,7 @@ mod tests {
 
     #[test]
     fn every_part_of_the_scene_is_toggled_and_nothing_else() {
-        for toggle in [
-            Toggle::Wireframe,
-            Toggle::Ghost,
-            Toggle::Skin,
-            Toggle::Colliders,
-            Toggle::Contacts,
-            Toggle::Forces,
-        ] {
+        for toggle in Toggle::ALL {
             let mut display = Display::default();
             display.toggle(toggle);
             assert_ne!(display.shows(toggle), Display::default().shows(toggle));

@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use softgrasp_core::grasp::{Contact, HandSegments, StateName};
 use softgrasp_core::hand::{HandColliders, HandDimensions, pose_of_segments};
 
+use super::camera::ViewCamera;
 use crate::rest_shape::RestShape;
 use crate::solve_report::SolveSummary;
 
@@ -204,6 +205,13 @@ impl ViewFrame {
     /// Whether the object can be turned: nothing holds it.
     pub fn can_be_turned(&self) -> bool {
         !matches!(self.grasp.state, Some(StateName::Attached | StateName::Deforming))
+    }
+
+    /// An eye that sees the hand and what it is about to grasp; `None` without a hand.
+    pub fn eye_beside_hand(&self) -> Option<ViewCamera> {
+        let hand = self.hand.as_ref()?;
+        let object = self.object.world_from_object * self.object.rest.centre();
+        Some(ViewCamera::beside_hand(object, &hand.world_from_palm, hand.dimensions.handedness))
     }
 
     /// How many ticks old the shape is that the object shows; `None` while nothing deforms it.

@@ -1,13 +1,12 @@
 //! The range of the colours and its labels: nice numbers that do not flicker from frame to frame.
 
+use super::nice_number::nice_above;
 use super::shading::{DisplayUnit, Shading};
 
 /// A range that falls is held for so long, s.
 const HOLD_S: f64 = 2.0;
 /// Values below this part of the range let it fall.
 const LOW_PART: f64 = 1.0 / 3.0;
-/// Steps of the mantissa of a range.
-const NICE: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 
 /// The range of one shading, from zero to a nice number.
 ///
@@ -101,17 +100,6 @@ impl Legend {
             Tick { fraction, text: self.unit().text(fraction * self.most) }
         })
     }
-}
-
-/// The least of 1, 2, 5 times a power of ten that is not below a value above 0.
-fn nice_above(value: f64) -> f64 {
-    let power = value.log10().floor() as i32;
-    // A negative power of ten is not exact, and its inverse is.
-    let times = |mantissa: f64| match power < 0 {
-        true => mantissa / 10f64.powi(-power),
-        false => mantissa * 10f64.powi(power),
-    };
-    NICE.into_iter().map(times).find(|nice| *nice >= value * (1.0 - 1e-12)).unwrap_or(value)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What a person sees, worked out without a window: frames of the run, the eye, skins, colours.
 
 pub mod action;
+pub mod blend;
 pub mod camera;
 pub mod colour_map;
 pub mod colouring;
@@ -10,10 +11,13 @@ pub mod hand_skin;
 pub mod history;
 pub mod legend;
 pub mod moment;
+pub mod nice_number;
 pub mod object_skin;
 pub mod observer;
 pub mod outlet;
 pub mod pointer;
+pub mod ray_hit;
 pub mod shaded_object;
 pub mod shading;
+pub mod texture;
 pub mod toggle;

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 use softgrasp_core::shape::Cylinder;
 
 use super::frame::{HandView, ViewFrame};
+use super::ray_hit::ray_hit;
 
 /// What lies under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,59 +87,16 @@ fn object_distance(
     let shape = frame.shape();
     let triangles = frame.object.rest.surface().triangles.iter();
     let hits = triangles.filter_map(|corners| {
-        triangle_distance(corners.map(|node| shape[node as usize]), &origin, &direction)
+        let corners = corners.map(|node| shape[node as usize]);
+        ray_hit(&corners, &origin, &direction).map(|(distance, _)| distance)
     });
     hits.min_by(f64::total_cmp)
 }
 
-/// Distance along the ray to a triangle.
-///
-/// Source: Möller & Trumbore (1997), Journal of Graphics Tools 2(1).
-fn triangle_distance(
-    [a, b, c]: [Point3<f64>; 3],
-    origin: &Point3<f64>,
-    direction: &Vector3<f64>,
-) -> Option<f64> {
-    let (ab, ac, from_a) = (b - a, c - a, origin - a);
-    let p = direction.cross(&ac);
-    let determinant = ab.dot(&p);
-    if determinant.abs() < f64::MIN_POSITIVE {
-        return None;
-    }
-    let u = from_a.dot(&p) / determinant;
-    let q = from_a.cross(&ab);
-    let v = direction.dot(&q) / determinant;
-    let along = ac.dot(&q) / determinant;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && along > 0.0).then_some(along)
-}
-
 #[cfg(test)]
 mod tests {
-    use nalgebra::Unit;
-    use proptest::prelude::*;
-
     use super::*;
-
-    proptest! {
-        #[test]
-        fn ray_aimed_into_a_triangle_meets_it_there(
-            corners in prop::array::uniform3(prop::array::uniform3(-1.0..1.0f64)),
-            weights in prop::array::uniform3(0.05..1.0f64),
-            from in prop::array::uniform3(2.0..3.0f64),
-        ) {
-            let corners = corners.map(Point3::from);
-            let sum: f64 = weights.iter().sum();
-            let inside = (0..3).fold(Vector3::zeros(), |p, i| p + corners[i].coords * (weights[i] / sum));
-            let area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
-            let origin = Point3::from(from);
-            let way = Point3::from(inside) - origin;
-            let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).dot(&way).abs();
-            prop_assume!(area > 1e-2 && across > 1e-2);
-            let met = triangle_distance(corners, &origin, &way.normalize()).unwrap();
-            prop_assert!((met - way.norm()).abs() < 1e-9);
-            prop_assert!(triangle_distance(corners, &origin, &-way.normalize()).is_none());
-        }
-    }
+    use nalgebra::Unit;
 
     #[test]
     fn what_lies_in_front_is_what_is_pointed_at() {

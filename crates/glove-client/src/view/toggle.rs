@@ -1,6 +1,6 @@
-//! The things of the scene that are shown or not.
+//! The parts of the scene, and the pages over it, that are shown or not.
 
-/// Something that is shown or not.
+/// A part of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Toggle {
     /// The edges of the elements.
@@ -15,15 +15,24 @@ pub enum Toggle {
     Contacts,
     /// How hard they press.
     Forces,
-    /// The page that explains keys and mouse.
+}
+
+/// A page over the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Page {
+    /// Explains keys and mouse.
     Help,
-    /// The page that says what runs and where.
+    /// Says what runs and where.
     Information,
     /// The graph of times.
     Timings,
 }
 
 impl Toggle {
+    /// All of them, in the order of a menu.
+    pub const ALL: [Self; 6] =
+        [Self::Wireframe, Self::Ghost, Self::Skin, Self::Colliders, Self::Contacts, Self::Forces];
+
     /// What the menu calls it.
     pub const fn label(self) -> &'static str {
         match self {
@@ -33,9 +42,6 @@ impl Toggle {
             Self::Colliders => "Colliders",
             Self::Contacts => "Contacts",
             Self::Forces => "Forces",
-            Self::Help => "Help",
-            Self::Information => "Information",
-            Self::Timings => "Timings",
         }
     }
 
@@ -48,6 +54,26 @@ impl Toggle {
             Self::Colliders => "L",
             Self::Contacts => "O",
             Self::Forces => "N",
+        }
+    }
+}
+
+impl Page {
+    /// All of them, in the order of a menu.
+    pub const ALL: [Self; 3] = [Self::Help, Self::Information, Self::Timings];
+
+    /// What the menu calls it.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Help => "Help",
+            Self::Information => "Information",
+            Self::Timings => "Timings",
+        }
+    }
+
+    /// Its key.
+    pub const fn key(self) -> &'static str {
+        match self {
             Self::Help => "F1",
             Self::Information => "F2",
             Self::Timings => "F3",

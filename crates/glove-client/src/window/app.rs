@@ -22,16 +22,16 @@ use super::stage::{drawn_camera, place_camera};
 use super::start::{Start, Started};
 use super::ui::dialogs::{Dialog, FileAnswer};
 use crate::control::Control;
+use crate::hand_choice::HandChoice;
 use crate::loading::ObjectRequest;
 use crate::mouse::MouseInput;
 use crate::run_report::RunReport;
 use crate::scene::ObjectChoice;
-use crate::view::action::{Action, HandWish};
+use crate::view::action::Action;
 use crate::view::camera::ViewCamera;
 use crate::view::colouring::Colouring;
 use crate::view::display::{Display, Level};
 use crate::view::object_skin::Look;
-use crate::view::toggle::Toggle;
 
 /// What a window is opened for.
 pub struct Opening {
@@ -225,13 +225,8 @@ impl App {
         }
         let Some(frame) = running.frame() else { return };
         let frame = Arc::clone(frame);
-        if let (Some(hand), false) = (&frame.hand, self.eye_is_placed) {
-            self.camera = ViewCamera::beside_hand(
-                frame.object.world_from_object * frame.object.rest.centre(),
-                &hand.world_from_palm,
-                hand.dimensions.handedness,
-            );
-            self.eye_is_placed = true;
+        if let (Some(eye), false) = (frame.eye_beside_hand(), self.eye_is_placed) {
+            (self.camera, self.eye_is_placed) = (eye, true);
         }
         self.colouring.follow(&frame.object, self.display.shading, frame.at_s);
         self.scene.follow(&mut self.window, &frame, &self.display, &self.colouring);
@@ -299,9 +294,7 @@ impl App {
                 let said = self.recordings.begin_or_end();
                 self.panels.notices.add_result(said);
             }
-            Action::Toggle(page @ (Toggle::Help | Toggle::Information | Toggle::Timings)) => {
-                self.panels.toggle(page);
-            }
+            Action::Page(page) => self.panels.toggle(page),
             Action::Toggle(toggle) => self.display.toggle(toggle),
             Action::Light(level) => self.display.level = level,
             Action::Shade(shading) => {
@@ -347,7 +340,7 @@ impl App {
                 }
             }
             Action::PlayOrPause | Action::Step | Action::Restart
-                if running.about.hand == HandWish::Mouse =>
+                if running.about.hand == HandChoice::Mouse =>
             {
                 self.panels.notices.add("a hand that a person moves cannot be paused", true);
             }
@@ -419,7 +412,7 @@ impl App {
                 _ => {}
             }
         }
-        let is_mouse = self.running.as_ref().is_some_and(|r| r.about.hand == HandWish::Mouse);
+        let is_mouse = self.running.as_ref().is_some_and(|r| r.about.hand == HandChoice::Mouse);
         if is_mouse {
             let axes = self.camera.axes();
             for input in self.keys.inputs(axes) {
@@ -433,7 +426,7 @@ impl App {
     }
 
     fn take_key(&mut self, key: Key, modifiers: kiss3d::prelude::Modifiers) {
-        let is_mouse = self.running.as_ref().is_some_and(|r| r.about.hand == HandWish::Mouse);
+        let is_mouse = self.running.as_ref().is_some_and(|r| r.about.hand == HandChoice::Mouse);
         match key {
             Key::Escape if self.panels.escape() => {}
             Key::Tab if is_mouse => {
@@ -483,7 +476,8 @@ impl App {
     /// What a drag that begins at a place in the window moves.
     fn grip_at(&self, at: Vector2<f64>) -> Grip {
         let Some(running) = &self.running else { return Grip::View };
-        let Some(frame) = running.frame().filter(|_| running.about.hand == HandWish::Mouse) else {
+        let Some(frame) = running.frame().filter(|_| running.about.hand == HandChoice::Mouse)
+        else {
             return Grip::View;
         };
         let size = Vector2::new(self.window.width(), self.window.height()).map(f64::from);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use crate::control::Control;
+use crate::hand_choice::HandChoice;
 use crate::hand_reader::HandSetup;
 use crate::hand_source::HandSource;
 use crate::loading::{LoadStage, LoadedObject, Loading, ObjectRequest};
@@ -11,7 +12,6 @@ use crate::mouse::MouseHand;
 use crate::rest_shape::RestShape;
 use crate::scene::ObjectChoice;
 use crate::scripted::{PlanRequest, Planner, ScriptedHand};
-use crate::view::action::HandWish;
 
 /// A change on its way.
 #[derive(Default)]
@@ -22,7 +22,7 @@ pub enum Change {
     /// An object that is being loaded.
     Object(Loading, ObjectChoice),
     /// A hand that is being made.
-    Hand(Receiver<Result<HandSource, String>>, HandWish),
+    Hand(Receiver<Result<HandSource, String>>, HandChoice),
 }
 
 /// What has become of a change.
@@ -30,7 +30,7 @@ pub enum Changed {
     /// The object is there, and is to be handed to the ticks.
     Object(Box<LoadedObject>, ObjectChoice),
     /// The hand is there.
-    Hand(Control, HandWish),
+    Hand(Control, HandChoice),
     /// There is neither; why, in a sentence.
     Failed(String),
 }
@@ -46,7 +46,7 @@ impl Change {
     }
 
     /// Begins to make a hand for an object at rest.
-    pub fn hand(wish: HandWish, object: Arc<RestShape>, tick_s: f64) -> Self {
+    pub fn hand(wish: HandChoice, object: Arc<RestShape>, tick_s: f64) -> Self {
         let (made, result) = channel();
         let thread = std::thread::Builder::new().name("hand".to_owned());
         let started = thread.spawn(move || {
@@ -90,12 +90,12 @@ impl Change {
 }
 
 /// A hand that plans its approaches beside the ticks.
-fn hand(wish: HandWish, object: Arc<RestShape>, tick_s: f64) -> Result<HandSource, String> {
+fn hand(wish: HandChoice, object: Arc<RestShape>, tick_s: f64) -> Result<HandSource, String> {
     let setup = HandSetup::default();
     let planner = Planner::beside().map_err(|error| format!("cannot start a thread: {error}"))?;
     match wish {
-        HandWish::Mouse => Ok(MouseHand::new(setup, planner, tick_s).into()),
-        HandWish::Scripted(script) => {
+        HandChoice::Mouse => Ok(MouseHand::new(setup, planner, tick_s).into()),
+        HandChoice::Scripted(script) => {
             let request = PlanRequest { object, setup: setup.clone(), avoid_gaze: None };
             let grip = request.grip().map_err(|error| error.to_string())?;
             Ok(ScriptedHand::following(script, setup, grip).with_planner(planner).into())

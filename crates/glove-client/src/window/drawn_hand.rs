@@ -26,11 +26,10 @@ impl DrawnHand {
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
         skin.pose(&hand.world_from_palm, &hand.world_from_segment, &mut positions, &mut normals);
         let mut drawn = DrawnMesh::new(scene, skin.triangles(), &positions, &normals, skin.uvs());
-        let picture = HandSkin::texture();
         let node = drawn.node();
         node.set_color(Color::new(1.0, 1.0, 1.0, 1.0));
         node.set_roughness(0.55).set_metallic(0.0).set_subsurface(0.25, 0.0);
-        set_texture(node, "skin", (picture.width, picture.height), &picture.rgba);
+        set_texture(node, "skin", &HandSkin::texture());
         let colliders = DrawnColliders::new(scene, &hand.colliders());
         Self { dimensions: hand.dimensions, skin, drawn, colliders, positions, normals }
     }

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::units::{UNITS_PER_M, drawn_point, rotation_from_y};
 use crate::view::frame::{HandView, ViewFrame};
+use crate::view::nice_number::nice_above;
 
 /// One mark for each fingertip, thumb first.
 pub struct DrawnMarks {
@@ -88,11 +89,7 @@ fn tip_radius(hand: &HandView, finger: usize) -> f64 {
 /// Units: N.
 pub fn newtons_per_arrow(forces: &[Vector3<f64>; 5]) -> f64 {
     let largest = forces.iter().map(Vector3::norm).fold(0.0, f64::max);
-    if !(largest > 0.0 && largest.is_finite()) {
-        return 1.0;
-    }
-    let decade = 10.0_f64.powf(largest.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].map(|n| n * decade).into_iter().find(|n| *n >= largest).unwrap_or(largest)
+    if largest > 0.0 && largest.is_finite() { nice_above(largest) } else { 1.0 }
 }
 
 /// The arrow of a force in the world, m.

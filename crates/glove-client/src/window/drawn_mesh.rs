@@ -8,6 +8,7 @@ use image::{DynamicImage, RgbaImage};
 use kiss3d::prelude::{GpuMesh3d, SceneNode3d, Texture, TextureManager, Vec2, Vec3};
 
 use super::units::UNITS_PER_M;
+use crate::view::texture::Texture as Picture;
 
 /// A mesh in metres; its node has the scale of the scene.
 pub struct DrawnMesh {
@@ -73,25 +74,25 @@ fn copy(from: &[[f32; 3]], to: &mut Vec<Vec3>) {
 
 /// Puts a picture on a mesh; the name says which picture it is.
 ///
-/// Shapes: `rgba` four bytes (sRGB) for each of `size.0` × `size.1` pixels, row by row.
-pub fn set_texture(node: &mut SceneNode3d, name: &str, size: (u32, u32), rgba: &[u8]) {
-    if let Some(texture) = texture(name, size, rgba, true) {
+/// Colours: sRGB.
+pub fn set_texture(node: &mut SceneNode3d, name: &str, picture: &Picture) {
+    if let Some(texture) = texture(name, picture, true) {
         node.set_texture(texture);
     }
 }
 
 /// Gives a mesh a fine relief by a picture of its slopes.
 ///
-/// Shapes: as in [`set_texture`], linear values.
-pub fn set_relief(node: &mut SceneNode3d, name: &str, size: (u32, u32), rgba: &[u8]) {
-    if let Some(texture) = texture(name, size, rgba, false) {
+/// Values: linear.
+pub fn set_relief(node: &mut SceneNode3d, name: &str, picture: &Picture) {
+    if let Some(texture) = texture(name, picture, false) {
         node.set_normal_map(texture);
     }
 }
 
 /// `None` for a picture of another size than announced; the mesh keeps its colour then.
-fn texture(name: &str, size: (u32, u32), rgba: &[u8], is_colour: bool) -> Option<Arc<Texture>> {
-    let picture = RgbaImage::from_raw(size.0, size.1, rgba.to_vec())?;
+fn texture(name: &str, picture: &Picture, is_colour: bool) -> Option<Arc<Texture>> {
+    let picture = RgbaImage::from_raw(picture.width, picture.height, picture.rgba.clone())?;
     Some(TextureManager::get_global_manager(|textures| {
         // Without them fine print falls apart from afar.
         textures.set_generate_mipmaps(true);

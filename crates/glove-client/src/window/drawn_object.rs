@@ -96,8 +96,7 @@ impl DrawnObject {
             let uv = |share: &f32| [texture_u(f64::from(*share)), 0.5];
             drawn.set_uvs(&of_body.iter().map(uv).collect::<Vec<_>>());
             if !self.is_coloured {
-                let ramp = map.image(4);
-                set_texture(drawn.node(), "ramp", (ramp.width, ramp.height), &ramp.rgba);
+                set_texture(drawn.node(), "ramp", &map.image(4));
                 drawn.node().clear_normal_map();
                 drawn.node().set_color(Color::new(1.0, 1.0, 1.0, 1.0));
                 drawn.node().set_roughness(0.65).set_clearcoat(0.0, 0.5).set_subsurface(0.0, 0.0);
@@ -152,10 +151,10 @@ fn set_material(node: &mut SceneNode3d, object: &str, part: &str, material: &Sur
     node.set_subsurface(material.subsurface, 0.0);
     node.enable_backface_culling(!material.two_sided);
     if let Some(picture) = &material.texture {
-        set_texture(node, &format!("{object}, {part}"), picture.size(), &picture.rgba);
+        set_texture(node, &format!("{object}, {part}"), picture);
     }
     if let Some(relief) = &material.relief {
-        set_relief(node, &format!("{object}, relief of {part}"), relief.size(), &relief.rgba);
+        set_relief(node, &format!("{object}, relief of {part}"), relief);
     }
 }
 

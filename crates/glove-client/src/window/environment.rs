@@ -1,5 +1,6 @@
 //! The light around the scene: a photographer's studio, painted by formula.
 
+use crate::view::blend::smooth_step;
 use image::{DynamicImage, ImageBuffer, Rgb, Rgb32FImage};
 
 /// Width of the picture of the surroundings; half of it is its height.
@@ -24,20 +25,16 @@ fn radiance(azimuth: f64, elevation: f64) -> [f32; 3] {
     let up = elevation.sin();
     // The wall grows darker upward, the ground stays as it is.
     let shade = if up > 0.0 { 1.0 - 0.62 * up.powf(0.8) } else { 1.0 + 0.5 * up };
-    let above = smooth(0.66, 0.86, up);
+    let above = smooth_step(0.66, 0.86, up);
     // Lamps at the sides hang high, where no wall behind the scene is seen.
     let side = |centre: f64| {
         let off = (azimuth - centre).cos();
-        smooth(0.90, 0.97, off) * smooth(0.30, 0.42, up) * (1.0 - smooth(0.58, 0.68, up))
+        smooth_step(0.90, 0.97, off)
+            * smooth_step(0.30, 0.42, up)
+            * (1.0 - smooth_step(0.58, 0.68, up))
     };
     let lamp = 2.4 * above + 2.6 * side(0.6) + 1.4 * side(3.9);
     std::array::from_fn(|i| HORIZON[i] * shade as f32 + lamp as f32)
-}
-
-/// 0 below `from`, 1 above `to`, smooth between.
-fn smooth(from: f64, to: f64, x: f64) -> f64 {
-    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

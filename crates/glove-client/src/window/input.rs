@@ -6,7 +6,7 @@ use kiss3d::prelude::{Action as Press, Key, Modifiers, MouseButton, WindowEvent}
 use nalgebra::Vector2;
 
 use crate::view::action::Action;
-use crate::view::toggle::Toggle;
+use crate::view::toggle::{Page, Toggle};
 
 /// What the mouse did to the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,9 +132,9 @@ pub fn wish_of_key(key: Key, modifiers: Modifiers) -> Option<Action> {
         (Key::L, _) => Action::Toggle(Toggle::Colliders),
         (Key::O, _) => Action::Toggle(Toggle::Contacts),
         (Key::N, _) => Action::Toggle(Toggle::Forces),
-        (Key::F1, _) => Action::Toggle(Toggle::Help),
-        (Key::F2, _) => Action::Toggle(Toggle::Information),
-        (Key::F3, _) => Action::Toggle(Toggle::Timings),
+        (Key::F1, _) => Action::Page(Page::Help),
+        (Key::F2, _) => Action::Page(Page::Information),
+        (Key::F3, _) => Action::Page(Page::Timings),
         _ => return None,
     })
 }

@@ -14,13 +14,13 @@ use super::ui::notices::Notices;
 use super::ui::timeline::{self, Playing, TimelineWish};
 use super::ui::timings_card::Timings;
 use super::ui::{help_card, loading_card, status_card, theme};
-use crate::loading::LoadStage;
+use crate::hand_choice::HandChoice;
 use crate::mouse::MouseInput;
-use crate::view::action::{Action, HandWish};
+use crate::view::action::Action;
 use crate::view::colouring::Colouring;
 use crate::view::display::Display;
 use crate::view::shading::Shading;
-use crate::view::toggle::Toggle;
+use crate::view::toggle::Page;
 
 /// What lies over the scene, from picture to picture.
 #[derive(Default)]
@@ -97,14 +97,13 @@ impl Panels {
     }
 
     /// Shows a page, or does not any more.
-    pub fn toggle(&mut self, page: Toggle) {
+    pub fn toggle(&mut self, page: Page) {
         match page {
-            Toggle::Help => self.help = !self.help,
-            Toggle::Information => self.information = !self.information,
-            Toggle::Timings => self.shows_timings = !self.shows_timings,
-            _ => {}
+            Page::Help => self.help = !self.help,
+            Page::Information => self.information = !self.information,
+            Page::Timings => self.shows_timings = !self.shows_timings,
         }
-        self.hint_gone |= page == Toggle::Help;
+        self.hint_gone |= page == Page::Help;
     }
 
     /// The hint has been understood.
@@ -125,7 +124,7 @@ impl Panels {
             self.show_run(context, seen, running, &mut asked);
         }
         if let Some((stage, name)) = seen.change.stage() {
-            asked.cancel |= loading_card::show(context, &name, step_of(stage));
+            asked.cancel |= loading_card::show(context, &name, stage as usize);
         }
         asked.file = self.dialog.show(context);
         self.notices.show(context);
@@ -142,7 +141,7 @@ impl Panels {
         let facts = menu_facts(seen, running);
         asked.actions.extend(menu::bar(context, &facts));
         asked.actions.extend(self.pop_up.show(context, &facts));
-        let is_played = matches!(running.about.hand, HandWish::Scripted(_));
+        let is_played = matches!(running.about.hand, HandChoice::Scripted(_));
         if is_played {
             self.show_timeline(context, running, asked);
         } else {
@@ -205,8 +204,8 @@ fn run_facts(running: &Running, graphics: &str) -> RunFacts {
         contact: about.contact.clone(),
         server: about.server.clone(),
         hand: match about.hand {
-            HandWish::Mouse => "mouse and keyboard".to_owned(),
-            HandWish::Scripted(script) => format!("scripted ({script})"),
+            HandChoice::Mouse => "mouse and keyboard".to_owned(),
+            HandChoice::Scripted(script) => format!("scripted ({script})"),
         },
         graphics: graphics.to_owned(),
     }
@@ -218,15 +217,5 @@ fn legend_text(colouring: &Colouring) -> LegendText {
         title: legend.shading().title().to_owned(),
         labels: legend.ticks().map(|tick| (tick.fraction, tick.text)).to_vec(),
         remark: colouring.remark().to_owned(),
-    }
-}
-
-/// The step of the loading card at a stage of loading.
-pub fn step_of(stage: LoadStage) -> usize {
-    match stage {
-        LoadStage::Mesh => 0,
-        LoadStage::Tree => 1,
-        LoadStage::Plan => 2,
-        LoadStage::Ready => 3,
     }
 }

@@ -7,10 +7,10 @@ use softgrasp_core::fem::Material;
 use softgrasp_protocol::MethodName;
 
 use crate::control::Control;
+use crate::hand_choice::HandChoice;
 use crate::notice::{Notice, NoticeKind};
 use crate::run_report::RunReport;
 use crate::tick_thread::{RunError, TickThread};
-use crate::view::action::HandWish;
 use crate::view::frame::{News, NewsKind, TickTiming, ViewFrame};
 use crate::view::history::History;
 use crate::view::outlet::Inlet;
@@ -41,7 +41,7 @@ pub struct About {
     /// Material.
     pub material: Material,
     /// The hand that acts.
-    pub hand: HandWish,
+    pub hand: HandChoice,
     /// Method asked for.
     pub method: String,
     /// Error budget.
@@ -66,7 +66,7 @@ pub struct Arrived {
 impl Running {
     /// A run whose frames come through an inlet.
     pub fn new(ticks: TickThread, inlet: Inlet, about: About) -> Self {
-        let waits_for_picture = matches!(about.hand, HandWish::Scripted(_));
+        let waits_for_picture = matches!(about.hand, HandChoice::Scripted(_));
         if waits_for_picture {
             ticks.ask(Control::Pause);
         }
@@ -180,7 +180,7 @@ impl Running {
     }
 
     /// Another hand acts from now on.
-    pub fn hand_is(&mut self, hand: HandWish) {
+    pub fn hand_is(&mut self, hand: HandChoice) {
         (self.is_paused, self.looked_at) = (false, None);
         self.about.hand = hand;
     }

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::bind_pose::BindPose;
 use super::hand_body::HandBody;
-use super::round_cone::smooth_step;
+use crate::view::blend::smooth_step;
 
 /// The palm, two metacarpals that cup, three segments for each of five digits.
 pub(super) const BONE_COUNT: usize = 18;

@@ -4,21 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::bind_pose::BindPose;
 use super::palm_body::SLEEVE_MM;
-use super::round_cone::{smooth_intersection, smooth_step};
-
-/// A picture to be laid over a surface.
-///
-/// Shapes: `width · height` pixels of red, green, blue, alpha in sRGB, row by row from the top;
-/// (u, v) = (0, 0) is the first pixel's corner and v grows downward.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Texture {
-    /// Pixels in a row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Pixels.
-    pub rgba: Vec<u8>,
-}
+use super::round_cone::smooth_intersection;
+use crate::view::blend::{mix, smooth_step};
+use crate::view::texture::Texture;
 
 /// Across: sleeve up to here, then skin from pale to reddened.
 const SLEEVE_EDGE: f64 = 0.15;
@@ -154,17 +142,7 @@ fn nail_depth(bind: &BindPose, digit: usize, q: &Point3<f64>, out: &Vector3<f64>
 
 /// The picture of skin tones.
 pub(super) fn skin_texture() -> Texture {
-    let mut rgba = Vec::with_capacity((WIDTH * HEIGHT * 4) as usize);
-    for row in 0..HEIGHT {
-        for column in 0..WIDTH {
-            let u = (f64::from(column) + 0.5) / f64::from(WIDTH);
-            let v = (f64::from(row) + 0.5) / f64::from(HEIGHT);
-            let colour = colour(u, v);
-            rgba.extend(colour.map(|c| c.round().clamp(0.0, 255.0) as u8));
-            rgba.push(255);
-        }
-    }
-    Texture { width: WIDTH, height: HEIGHT, rgba }
+    Texture::painted(WIDTH, HEIGHT, |u, v| colour(u, v).map(|c| c / 255.0))
 }
 
 type Rgb = [f64; 3];
@@ -195,10 +173,6 @@ fn colour(u: f64, v: f64) -> Rgb {
     let edge = 1.0 - 0.16 * (-(nail_mm / 0.35).powi(2)).exp();
     let hand = hand.map(|c| c * edge);
     mix(SLEEVE, hand, smooth_step(SLEEVE_EDGE - 0.012, SLEEVE_EDGE, u))
-}
-
-fn mix(a: Rgb, b: Rgb, share: f64) -> Rgb {
-    [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * share)
 }
 
 #[cfg(test)]

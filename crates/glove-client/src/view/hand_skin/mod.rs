@@ -19,5 +19,4 @@ mod surface_net;
 #[cfg(test)]
 mod tests;
 
-pub use complexion::Texture;
 pub use skin::HandSkin;

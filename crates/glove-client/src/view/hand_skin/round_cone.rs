@@ -80,12 +80,6 @@ pub(super) fn smooth_intersection(a: f64, b: f64, round: f64) -> f64 {
     -smooth_union(-a, -b, round)
 }
 
-/// From 0 at `low` to 1 at `high` with level ends; constant beyond.
-pub(super) fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,14 +5,15 @@ use softgrasp_core::hand::{HandDimensions, Handedness};
 
 use super::bind_pose::BindPose;
 use super::bone_weights::{BONE_COUNT, BoneWeights, METACARPALS, bone_of_segment};
-use super::complexion::{Texture, skin_texture, uvs};
+use super::complexion::{skin_texture, uvs};
 use super::fairing::fair;
 use super::grid::{Grid, planes};
 use super::hand_body::HandBody;
 use super::palm_body::{CUT_MM, SLEEVE_MM};
 use super::rigid_motion::RigidMotion;
-use super::round_cone::smooth_step;
 use super::surface_net::SurfaceNet;
+use crate::view::blend::smooth_step;
+use crate::view::texture::Texture;
 
 /// Cell size on the fingers, and along the arm where nothing is narrow, mm of the default hand.
 const CELL_MM: f64 = 3.05;

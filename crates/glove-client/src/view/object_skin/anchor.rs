@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::curved_surface::{CurvedSurface, PlaceWeights};
+use crate::view::ray_hit::ray_hit;
 
 /// A place on the curved surface, with a direction along it.
 pub(super) struct Anchor {
@@ -76,30 +77,6 @@ impl AnchorFrame {
     }
 }
 
-/// Distance along a ray to a triangle, and where it is met.
-///
-/// Source: Möller and Trumbore, 1997.
-fn ray_hit(
-    [a, b, c]: &[Point3<f64>; 3],
-    origin: &Point3<f64>,
-    direction: &Vector3<f64>,
-) -> Option<(f64, [f64; 3])> {
-    let (side_b, side_c) = (b - a, c - a);
-    let normal_c = direction.cross(&side_c);
-    let determinant = side_b.dot(&normal_c);
-    if determinant.abs() < f64::MIN_POSITIVE {
-        return None;
-    }
-    let from_a = origin - a;
-    let v = from_a.dot(&normal_c) / determinant;
-    let normal_b = from_a.cross(&side_b);
-    let w = direction.dot(&normal_b) / determinant;
-    let distance = side_c.dot(&normal_b) / determinant;
-    // A ray through an edge belongs to both sides rather than to neither.
-    let is_inside = v >= -EDGE_SLACK && w >= -EDGE_SLACK && v + w <= 1.0 + EDGE_SLACK;
-    (is_inside && distance > 0.0).then_some((distance, [1.0 - v - w, v, w]))
-}
-
 /// Change of barycentric coordinates that goes along a direction, as far as it lies in the plane.
 fn barycentric_step([a, b, c]: &[Point3<f64>; 3], direction: &Vector3<f64>) -> [f64; 3] {
     let (side_b, side_c) = (b - a, c - a);
@@ -118,7 +95,6 @@ fn any_perpendicular(normal: &Vector3<f64>) -> Vector3<f64> {
 
 /// Step from an anchor to the place ahead of it, in barycentric coordinates.
 const AHEAD: f64 = 0.02;
-const EDGE_SLACK: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::colour::texel;
-use super::part::Texture;
+use crate::view::texture::Texture;
+use crate::view::texture::texel;
 
 /// What a place of the surface looks like.
 #[derive(Clone, Copy)]

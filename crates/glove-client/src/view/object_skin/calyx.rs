@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 
 use super::anchor::Anchor;
 use super::body::Body;
-use super::part::{Part, SurfaceMaterial, Texture, single};
+use super::part::{Part, SurfaceMaterial, single};
+use crate::view::texture::Texture;
 
 /// Leaves and stalk, fixed to the skin below them.
 pub(super) struct Calyx {

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::bake::Paint;
-use super::colour::{mix, smooth_step};
+use crate::view::blend::{mix, smooth_step};
 
 /// Colours and dimples of one fruit.
 pub(super) struct FruitPaint {
@@ -28,7 +28,7 @@ impl FruitPaint {
         let height = (p.y - self.low) / (self.high - self.low);
         let cloud = clouds(&(p.coords / self.scale));
         // Ripe below, paler in a ring below the leaves, palest in the dent.
-        let pale = smooth_step((height + 0.03 * cloud - 0.90) / 0.14);
+        let pale = smooth_step(0.0, 1.0, (height + 0.03 * cloud - 0.90) / 0.14);
         let mut colour = mix(RIPE, BRIGHT, 0.5 + 0.5 * cloud);
         colour = mix(colour, PALE, 0.7 * pale);
         let (shade, slope) = self.dimples(&p.coords);

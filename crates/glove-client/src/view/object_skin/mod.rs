@@ -5,7 +5,6 @@ mod bake;
 mod body;
 mod calyx;
 mod cap;
-mod colour;
 mod crease;
 mod curved_surface;
 mod fruit_paint;
@@ -24,5 +23,5 @@ mod unwrap;
 mod tests;
 
 pub use look::Look;
-pub use part::{Part, SurfaceMaterial, Texture};
+pub use part::{Part, SurfaceMaterial};
 pub use skin::ObjectSkin;

@@ -1,6 +1,6 @@
 //! One thing to draw: triangles, where they are now, and what they are made of.
 
-use super::colour::texel;
+use crate::view::texture::Texture;
 
 /// Triangles of one material.
 ///
@@ -58,37 +58,6 @@ impl SurfaceMaterial {
             relief: None,
             two_sided: false,
         }
-    }
-}
-
-/// A picture, row by row from (0, 0), four bytes a texel: red, green, blue, alpha.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Texture {
-    /// Texels in a row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// `width` × `height` × 4 bytes.
-    pub rgba: Vec<u8>,
-}
-
-impl Texture {
-    /// Texels in a row, and rows.
-    pub fn size(&self) -> (u32, u32) {
-        (self.width, self.height)
-    }
-
-    /// A picture whose texel at the place (u, v) has the colour `paint(u, v)`, 0 to 1 each.
-    pub(super) fn painted(width: u32, height: u32, paint: impl Fn(f64, f64) -> [f64; 3]) -> Self {
-        let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
-        for row in 0..height {
-            for column in 0..width {
-                let u = (f64::from(column) + 0.5) / f64::from(width);
-                let v = (f64::from(row) + 0.5) / f64::from(height);
-                rgba.extend_from_slice(&texel(paint(u, v)));
-            }
-        }
-        Self { width, height, rgba }
     }
 }
 

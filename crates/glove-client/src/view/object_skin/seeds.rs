@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 
 use super::anchor::Anchor;
 use super::body::{Body, SpreadBody};
-use super::part::{Part, SurfaceMaterial, Texture, single};
+use super::part::{Part, SurfaceMaterial, single};
+use crate::view::texture::Texture;
 
 /// Seeds, evenly spread, each fixed to the surface.
 pub(super) struct Seeds {

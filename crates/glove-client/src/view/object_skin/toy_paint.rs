@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
 use super::bake::Paint;
-use super::colour::{mix, smooth_step};
-use super::part::Texture;
+use crate::view::blend::{mix, smooth_step};
+use crate::view::texture::Texture;
 
 /// A ball about a centre: segments in two colours, a round cap at each end. Units: m.
 pub(super) fn ball(centre: &Point3<f64>, p: &Point3<f64>) -> Paint {
@@ -21,7 +21,7 @@ pub(super) fn ball(centre: &Point3<f64>, p: &Point3<f64>) -> Paint {
     let turn = (angle / TAU * SEGMENTS).rem_euclid(2.0) - 1.0;
     let in_segment = (0.5 - (turn.abs() - 0.5).abs()) * turn.signum() * across * TAU / SEGMENTS;
     let in_cap = across - CAP;
-    let edge = |length: f64| smooth_step(0.5 + length / BLUR);
+    let edge = |length: f64| smooth_step(0.0, 1.0, 0.5 + length / BLUR);
     let colour = mix(CREAM, TEAL, edge(in_segment));
     let colour = mix(CORAL, colour, edge(in_cap));
     // A fine groove where two colours meet.
@@ -34,7 +34,7 @@ pub(super) fn foam() -> Texture {
     Texture::painted(1024, 1024, |u, v| {
         let line = |x: f64, count: f64, half: f64| {
             let from_line = ((x * count + 0.5).fract() - 0.5).abs() / count;
-            smooth_step(0.5 + (half - from_line) / 0.0022)
+            smooth_step(0.0, 1.0, 0.5 + (half - from_line) / 0.0022)
         };
         let strong = line(u, 4.0, 0.0042).max(line(v, 4.0, 0.0042));
         let fine = line(u, 16.0, 0.0016).max(line(v, 16.0, 0.0016));

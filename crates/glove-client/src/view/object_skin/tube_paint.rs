@@ -4,9 +4,9 @@ use nalgebra::{Point3, Vector3};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::bake::Paint;
-use super::colour::{mix, smooth_step};
 use super::lettering::{distance_to_word, word_width};
 use super::tube_profile::{TubePlace, TubeProfile};
+use crate::view::blend::{mix, smooth_step};
 
 /// The print of one tube, the same on its front and on its back.
 pub(super) struct TubePaint {
@@ -31,8 +31,8 @@ impl TubePaint {
         let up = from_middle * FRAC_PI_2 * height.hypot(width) / 2f64.sqrt() / length;
         // On the back one reads with the nozzle to the right.
         let reading = if is_back { 1.0 - along } else { along };
-        let mut colour = mix(WHITE, MINT, smooth_step((along - 0.80) / 0.12));
-        colour = mix(colour, MINT, smooth_step((0.155 - along) / 0.03));
+        let mut colour = mix(WHITE, MINT, smooth_step(0.0, 1.0, (along - 0.80) / 0.12));
+        colour = mix(colour, MINT, smooth_step(0.0, 1.0, (0.155 - along) / 0.03));
         colour = swoosh(colour, along, up);
         let word = [
             (reading - 0.5 - if is_back { -WORD_MIDDLE } else { WORD_MIDDLE }) / LETTER_HEIGHT
@@ -40,8 +40,8 @@ impl TubePaint {
             up / LETTER_HEIGHT + WORD_BASE,
         ];
         let pen = distance_to_word(NAME, word) - PEN;
-        colour = mix(colour, INK, smooth_step(0.5 - pen * LETTER_HEIGHT / SHARPNESS));
-        let crimp = smooth_step((along - CRIMP_BEGINS) / 0.008);
+        colour = mix(colour, INK, smooth_step(0.0, 1.0, 0.5 - pen * LETTER_HEIGHT / SHARPNESS));
+        let crimp = smooth_step(0.0, 1.0, (along - CRIMP_BEGINS) / 0.008);
         let ridge = p.z * TAU / (RIDGE * length);
         colour = mix(colour, SHADE, 0.22 * crimp * (0.5 - 0.5 * ridge.cos()));
         let slope = Vector3::z() * (-0.55 * crimp * ridge.sin());
@@ -55,7 +55,8 @@ fn swoosh(colour: [f64; 3], along: f64, up: f64) -> [f64; 3] {
     let taper = (t * (1.0 - t) * 4.0).powf(0.7);
     let middle = -0.083 + 0.011 * (t * TAU * 0.6).cos();
     let edge = |centre: f64, half: f64| {
-        smooth_step(0.5 + (half * taper - (up - centre).abs()) / SHARPNESS) * f64::from(taper > 0.0)
+        smooth_step(0.0, 1.0, 0.5 + (half * taper - (up - centre).abs()) / SHARPNESS)
+            * f64::from(taper > 0.0)
     };
     let wide = edge(middle, 0.016);
     let thin = edge(middle - 0.027 + 0.008 * t, 0.0055);

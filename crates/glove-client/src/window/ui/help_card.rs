@@ -3,7 +3,7 @@
 use egui::{Align2, Context, Grid, RichText, Ui};
 
 use super::theme;
-use crate::view::action::HandWish;
+use crate::hand_choice::HandChoice;
 
 /// What mouse and keys do whatever hand acts.
 const ALWAYS: [(&str, &str); 13] = [
@@ -37,15 +37,15 @@ const MOUSE: [(&str, &str); 6] = [
 ];
 
 /// Shows the page.
-pub fn show(context: &Context, hand: HandWish) {
+pub fn show(context: &Context, hand: HandChoice) {
     theme::card(context, "help", Align2::CENTER_CENTER, [0.0, 0.0], |ui| {
         ui.heading("Mouse and keys");
         ui.add_space(4.0);
         rows(ui, "always", &ALWAYS);
         ui.separator();
         match hand {
-            HandWish::Scripted(_) => rows(ui, "played", &PLAYED),
-            HandWish::Mouse => rows(ui, "mouse", &MOUSE),
+            HandChoice::Scripted(_) => rows(ui, "played", &PLAYED),
+            HandChoice::Mouse => rows(ui, "mouse", &MOUSE),
         }
         ui.add_space(4.0);
         ui.label(theme::quiet("F1 closes this page."));
@@ -63,12 +63,12 @@ fn rows(ui: &mut Ui, name: &str, rows: &[(&str, &str)]) {
 }
 
 /// One line at the top for whoever sees the window for the first time.
-pub fn hint(context: &Context, hand: HandWish) {
+pub fn hint(context: &Context, hand: HandChoice) {
     let text = match hand {
-        HandWish::Mouse => {
+        HandChoice::Mouse => {
             "Press Reach, then hold Space or draw “close all” to grasp.  Right button: menu.  F1: help."
         }
-        HandWish::Scripted(_) => {
+        HandChoice::Scripted(_) => {
             "A scripted hand grasps. Right button: menu.  Menu Hand, Mouse and keyboard: do it yourself.  F1: help."
         }
     };

@@ -4,7 +4,7 @@ use egui::{Align2, Context, RichText};
 
 use super::{places, theme};
 
-/// The steps of loading, in order.
+/// The steps of loading, in order: those of [`crate::loading::LoadStage`], then the server's.
 pub const STEPS: [&str; 6] = [
     "read and check the mesh",
     "build the sphere tree",

@@ -5,19 +5,20 @@ use softgrasp_core::mesh::BuiltIn;
 
 use super::places;
 use super::theme;
+use crate::hand_choice::HandChoice;
 use crate::scene::ObjectChoice;
 use crate::scripted::ScriptName;
-use crate::view::action::{Action, HandWish};
+use crate::view::action::Action;
 use crate::view::display::{Display, Level};
 use crate::view::shading::Shading;
-use crate::view::toggle::Toggle;
+use crate::view::toggle::{Page, Toggle};
 
 /// What the menus have to know.
 pub struct MenuFacts<'a> {
     /// What is shown.
     pub display: &'a Display,
     /// The hand that acts.
-    pub hand: HandWish,
+    pub hand: HandChoice,
     /// The object.
     pub object: &'a str,
     /// The method asked for.
@@ -175,10 +176,10 @@ fn objects(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
 
 fn hands(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     let mut chosen = None;
-    let mouse = Action::Hand(HandWish::Mouse);
-    chosen = choice(ui, mouse, facts.hand == HandWish::Mouse).or(chosen);
+    let mouse = Action::Hand(HandChoice::Mouse);
+    chosen = choice(ui, mouse, facts.hand == HandChoice::Mouse).or(chosen);
     for script in ScriptName::ALL {
-        let wish = HandWish::Scripted(script);
+        let wish = HandChoice::Scripted(script);
         chosen = choice(ui, Action::Hand(wish), facts.hand == wish).or(chosen);
     }
     chosen
@@ -208,14 +209,7 @@ fn views(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
         chosen = choice(ui, action, display.shading == shading).or(chosen);
     }
     ui.separator();
-    for toggle in [
-        Toggle::Wireframe,
-        Toggle::Ghost,
-        Toggle::Skin,
-        Toggle::Colliders,
-        Toggle::Contacts,
-        Toggle::Forces,
-    ] {
+    for toggle in Toggle::ALL {
         let mut on = display.shows(toggle);
         let text = format!("{}   ({})", toggle.label(), toggle.key());
         let response = ui.checkbox(&mut on, text);
@@ -241,9 +235,9 @@ fn views(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
 
 fn help(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     let mut chosen = None;
-    for toggle in [Toggle::Help, Toggle::Information, Toggle::Timings] {
-        if plain_entry(ui, facts, &Action::Toggle(toggle), true) {
-            chosen = Some(Action::Toggle(toggle));
+    for action in Page::ALL.map(Action::Page) {
+        if plain_entry(ui, facts, &action, true) {
+            chosen = Some(action);
         }
     }
     chosen

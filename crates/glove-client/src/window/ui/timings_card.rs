@@ -6,6 +6,7 @@ use egui::{Align2, Color32, Context, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2}
 
 use super::theme;
 use crate::view::frame::TickTiming;
+use crate::view::nice_number::nice_above;
 
 /// The newest times.
 #[derive(Default)]
@@ -99,9 +100,7 @@ impl Timings {
     fn top_ms(&self) -> f64 {
         let mut all: Vec<f64> = self.newest.iter().map(|t| t.round_trip).collect();
         all.sort_by(f64::total_cmp);
-        let most = all.get(all.len() * 49 / 50).copied().unwrap_or(1.0).max(0.01);
-        let decade = 10.0_f64.powf(most.log10().floor());
-        [1.0, 2.0, 5.0, 10.0].map(|n| n * decade).into_iter().find(|n| *n >= most).unwrap_or(most)
+        nice_above(all.get(all.len() * 49 / 50).copied().unwrap_or(1.0).max(0.01))
     }
 }
 
