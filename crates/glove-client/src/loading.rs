@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
+use crate::contact_model::ContactModel;
 use crate::hand_reader::HandSetup;
 use crate::rest_shape::ObjectError;
 use crate::run_report::ObjectSummary;
@@ -23,6 +24,8 @@ pub struct ObjectRequest {
     pub size_m: Option<f64>,
     /// The hand.
     pub setup: HandSetup,
+    /// What its fingertips hold.
+    pub contact: ContactModel,
 }
 
 /// An object ready for the hand.
@@ -77,7 +80,7 @@ pub fn load(
     request: &ObjectRequest,
     mut goes_on: impl FnMut(LoadStage) -> bool,
 ) -> Result<Option<LoadedObject>, LoadError> {
-    let ObjectRequest { choice, nodes, size_m, setup } = request;
+    let ObjectRequest { choice, nodes, size_m, setup, contact } = request;
     let mut size = *size_m;
     loop {
         if !goes_on(LoadStage::Mesh) {
@@ -99,7 +102,9 @@ pub fn load(
             return Ok(None);
         }
         let rest = Arc::clone(object.rest_shape());
-        let plan = PlanRequest { object: rest, setup: setup.clone(), avoid_gaze: None }.grip();
+        let plan =
+            PlanRequest { object: rest, setup: setup.clone(), contact: *contact, avoid_gaze: None };
+        let plan = plan.grip();
         match plan {
             Err(NoGrasp::OutOfReach { extent_m })
                 if size_m.is_none()
@@ -182,6 +187,7 @@ mod tests {
             nodes: 64,
             size_m: None,
             setup: HandSetup::default(),
+            contact: ContactModel::default(),
         }
     }
 

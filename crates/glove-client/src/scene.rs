@@ -176,7 +176,7 @@ pub fn load_object(
     };
     let Some(size_m) = size_m else { return Ok(SceneObject { mesh, notes }) };
     let factor = size_m / mesh.size();
-    notes.push(format!("scaled by {factor:.4e} to {size_m} m and centred (--object-size)"));
+    notes.push(format!("scaled by {factor:.3} to {size_m} m and centred (--object-size)"));
     let mesh =
         scaled_and_centred(&mesh, factor).map_err(|source| SceneError::Scale { size_m, source })?;
     Ok(SceneObject { mesh, notes })

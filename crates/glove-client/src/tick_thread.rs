@@ -1,6 +1,7 @@
 //! A run on a thread of its own, so that no tick waits for a window.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use crate::control::Control;
@@ -16,7 +17,13 @@ use crate::tick_outcome::TickOutcome;
 pub struct TickThread {
     controls: Sender<Control>,
     notices: Receiver<Notice>,
-    thread: Option<JoinHandle<Result<RunReport, RunError>>>,
+    end: RunEnd,
+}
+
+/// The end of a run, which one of those who share it may wait for.
+#[derive(Clone)]
+pub struct RunEnd {
+    thread: Arc<Mutex<Option<JoinHandle<Result<RunReport, RunError>>>>>,
 }
 
 /// A run that did not come to its report.
@@ -54,7 +61,8 @@ impl TickThread {
             Ok(session.finish(ended)?)
         };
         let thread = std::thread::Builder::new().name("ticks".to_owned()).spawn(work)?;
-        Ok(Self { controls, notices, thread: Some(thread) })
+        let end = RunEnd { thread: Arc::new(Mutex::new(Some(thread))) };
+        Ok(Self { controls, notices, end })
     }
 
     /// Asks for something; a run that is over does not hear it. Never waits.
@@ -72,27 +80,52 @@ impl TickThread {
         self.notices.try_recv().ok()
     }
 
+    /// The end of the run, for another thread.
+    pub fn run_end(&self) -> RunEnd {
+        self.end.clone()
+    }
+
     /// Whether the run is over and [`TickThread::join`] does not wait.
     pub fn is_over(&self) -> bool {
-        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+        self.end.is_there()
     }
 
     /// Waits for the end of the run; returns its report.
     ///
     /// # Errors
     /// [`RunError`].
-    pub fn join(mut self) -> Result<RunReport, RunError> {
-        let Some(thread) = self.thread.take() else { return Err(RunError::Lost) };
-        thread.join().unwrap_or(Err(RunError::Lost))
+    pub fn join(self) -> Result<RunReport, RunError> {
+        self.end.wait()
     }
 }
 
 impl Drop for TickThread {
     fn drop(&mut self) {
-        let Some(thread) = self.thread.take() else { return };
+        let Some(thread) = self.end.take() else { return };
         self.ask(Control::Stop);
         if thread.join().is_err() {
             tracing::error!("the thread of the ticks ended abnormally");
         }
+    }
+}
+
+impl RunEnd {
+    /// Whether it is there, or somebody waits for it already.
+    pub fn is_there(&self) -> bool {
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
+        thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Waits for it; returns the report of the run.
+    ///
+    /// # Errors
+    /// [`RunError`]; [`RunError::Lost`] too where somebody else waits for it.
+    pub fn wait(&self) -> Result<RunReport, RunError> {
+        let Some(thread) = self.take() else { return Err(RunError::Lost) };
+        thread.join().unwrap_or(Err(RunError::Lost))
+    }
+
+    fn take(&self) -> Option<JoinHandle<Result<RunReport, RunError>>> {
+        self.thread.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }

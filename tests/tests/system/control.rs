@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
+use glove_client::contact_model::ContactModel;
 use glove_client::control::Control;
 use glove_client::hand_reader::HandSetup;
 use glove_client::loading::LoadedObject;
@@ -30,7 +31,13 @@ fn model_hash(object: &SoftObject) -> ModelHash {
 fn loaded(mesh: TetMesh) -> Box<LoadedObject> {
     let object = SoftObject::try_new(mesh).unwrap();
     let rest = std::sync::Arc::clone(object.rest_shape());
-    let plan = PlanRequest { object: rest, setup: HandSetup::default(), avoid_gaze: None }.grip();
+    let plan = PlanRequest {
+        object: rest,
+        setup: HandSetup::default(),
+        contact: ContactModel::default(),
+        avoid_gaze: None,
+    }
+    .grip();
     Box::new(LoadedObject { summary: summary(&object), object, plan })
 }
 

@@ -14,3 +14,4 @@ mod run_setup;
 #[cfg(feature = "window")]
 mod run_window;
 pub mod solve;
+mod tell_report;

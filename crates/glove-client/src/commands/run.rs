@@ -7,12 +7,12 @@ use anyhow::bail;
 use clap::Args;
 
 use super::key_frames::KeyFrames;
-use super::output::{print, write_json};
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_pictures::RunPictures;
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 #[cfg(feature = "window")]
 use super::run_window;
+use super::tell_report::tell;
 use crate::control::Control;
 use crate::hand_choice::HandChoice;
 use crate::interruption;
@@ -41,7 +41,7 @@ impl RunCommand {
     pub fn run(&self) -> anyhow::Result<()> {
         let plan = self.arguments.plan()?;
         match self.in_window(&plan)? {
-            Shown::InWindow(Some(report)) => self.tell(&report),
+            Shown::InWindow(Some(report)) => tell(self.arguments.report.as_deref(), &report),
             Shown::InWindow(None) => Ok(()),
             Shown::Not => self.without_window(&plan),
         }
@@ -120,22 +120,7 @@ impl RunCommand {
         if let Some(pictures) = pictures {
             pictures.finish()?;
         }
-        self.tell(&session.finish(interrupted)?)
-    }
-
-    /// Writes and prints the report.
-    fn tell(&self, report: &RunReport) -> anyhow::Result<()> {
-        if let Some(path) = &self.arguments.report {
-            write_json(path, report)?;
-        }
-        // The reason comes first: whoever reads standard error and standard output together sees it.
-        match report.failure() {
-            Some(failure) => {
-                print(&report.describe())?;
-                bail!(failure)
-            }
-            None => print(&report.describe()),
-        }
+        tell(self.arguments.report.as_deref(), &session.finish(interrupted)?)
     }
 }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::Args;
 use softgrasp_core::fem::{Element, Material as ElasticMaterial};
+use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
@@ -34,7 +35,8 @@ pub struct RunArguments {
     /// Nodes of a built-in object [default: 1000].
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub(super) nodes: Option<usize>,
-    /// Longest extent of the object, m [default: 0.08 for a mesh file, its own for a built-in].
+    /// Longest extent of the object, m [default: 0.08 for a strawberry and a mesh file, its own for
+    /// other built-ins].
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     pub(super) object_size: Option<f64>,
     /// The hand: scripted[:approach|attach|squeeze|release|regrasp], or mouse (in a window).
@@ -173,10 +175,12 @@ impl RunArguments {
         let watched = console_is_watched() && !self.is_without_window();
         let rate = self.rate.or(watched.then_some(WATCHED_RATE_HZ));
         let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
+        let object_size =
+            self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
         Ok(RunPlan {
             object,
             nodes: self.nodes.or(scene.nodes).unwrap_or(NODES_DEFAULT),
-            object_size: self.object_size.or(scene.object_size_m),
+            object_size,
             settings: SolveSettings {
                 material,
                 element: element_for_frames(element, material.poisson)?,
@@ -225,7 +229,17 @@ impl RunPlan {
             nodes: self.nodes,
             size_m: self.object_size,
             setup: setup.clone(),
+            contact: self.settings.contact,
         }
+    }
+}
+
+/// Longest extent of a built-in object that the hand grips best, m, where that is not its own: round
+/// a small strawberry the thumb comes to lie beside the fingers and not before them.
+fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
+    match object {
+        ObjectChoice::BuiltIn(BuiltIn::Strawberry) => Some(0.08),
+        ObjectChoice::BuiltIn(_) | ObjectChoice::File(_) => None,
     }
 }
 

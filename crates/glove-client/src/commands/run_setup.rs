@@ -68,16 +68,17 @@ pub(super) fn make_ready(
         loaded.context("the object was called off")?;
     seen(&object)?;
     let planner = || Planner::beside().context("cannot start the planner's thread");
+    let contact = plan.settings.contact;
     let hand: HandSource = match (plan.hand, plan.pace) {
         (HandChoice::Mouse, _) => {
-            MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).into()
+            MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).holding(contact).into()
         }
         (HandChoice::Scripted(script), Pace::Lockstep) => {
-            ScriptedHand::following(script, hand_setup.clone(), grip?).into()
+            ScriptedHand::following(script, hand_setup.clone(), grip?).holding(contact).into()
         }
         (HandChoice::Scripted(script), Pace::Free) => {
             let hand = ScriptedHand::following(script, hand_setup.clone(), grip?);
-            hand.with_planner(planner()?).into()
+            hand.holding(contact).with_planner(planner()?).into()
         }
     };
     let priority = match plan.pace {

@@ -1,11 +1,15 @@
 //! A run in a window: the window on the main thread, the ticks on one of their own.
 
+use std::path::PathBuf;
+use std::process::exit;
 use std::time::Duration;
 
 use anyhow::Context;
+use softgrasp_os::one_line;
 
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
+use super::tell_report::tell;
 use crate::connection::{Host, ServerChoice};
 use crate::hand_reader::HandSetup;
 use crate::interruption;
@@ -15,7 +19,7 @@ use crate::tick_loop::Timing;
 use crate::tick_thread::TickThread;
 use crate::view::observer::Observer;
 use crate::view::outlet::outlet;
-use crate::window::{About, App, Opening, Start, Started};
+use crate::window::{About, App, Opening, Start, Started, WhenLost};
 
 /// Frames are offered to the window so often.
 const FRAMES_EVERY: Duration = Duration::from_millis(7);
@@ -36,6 +40,7 @@ pub(super) fn show(
         level_is_chosen: arguments.shown.light.is_some(),
         object: plan.object_request(&HandSetup::default()),
         material: plan.elastic_material()?,
+        when_lost: when_lost(arguments.report.clone()),
     };
     let app = match App::open(opening) {
         Ok(app) => app,
@@ -47,6 +52,17 @@ pub(super) fn show(
     interruption::hear();
     let start = start(arguments, plan).context("cannot start the thread that begins the run")?;
     Ok(Some(app.show(start, interruption::asked)?))
+}
+
+/// Tells how a run ended whose display was lost, and ends the process with its exit code.
+fn when_lost(report: Option<PathBuf>) -> WhenLost {
+    Box::new(move |ended| {
+        let told = ended.map_err(anyhow::Error::from).and_then(|ran| tell(report.as_deref(), &ran));
+        if let Err(error) = &told {
+            eprintln!("glove-client: {}", one_line(error.as_ref()));
+        }
+        exit(i32::from(told.is_err()))
+    })
 }
 
 /// Begins the run beside the window.

@@ -10,6 +10,7 @@ use super::glide::{Glide, Station};
 use super::grip::Grip;
 use super::input::{Digits, MouseInput};
 use super::speed::limited;
+use crate::contact_model::ContactModel;
 use crate::hand_reader::HandSetup;
 use crate::notice::Notice;
 use crate::scripted::{GraspPlan, PalmPath, PlanRequest, Planner, Posture, Seen, Sent, angles};
@@ -20,6 +21,7 @@ use crate::soft_object::SoftObject;
 /// It begins with an errand: to aim at the object.
 pub struct MouseHand {
     setup: HandSetup,
+    contact: ContactModel,
     planner: Planner,
     tick_s: f64,
     plan: Option<Planned>,
@@ -77,6 +79,7 @@ impl MouseHand {
         let world_from_palm = start.backed_off(AROUND_OFF).world_from_palm(Point3::origin());
         Self {
             setup,
+            contact: ContactModel::default(),
             planner,
             tick_s,
             plan: None,
@@ -89,6 +92,12 @@ impl MouseHand {
             grip: Grip::default(),
             notices: Vec::new(),
         }
+    }
+
+    /// The same hand, whose approaches are planned for fingertips that hold this.
+    #[must_use]
+    pub fn holding(self, contact: ContactModel) -> Self {
+        Self { contact, ..self }
     }
 
     /// Takes a wish. Moving or turning ends what the hand does by itself.
@@ -225,6 +234,7 @@ impl MouseHand {
             self.planner.ask(PlanRequest {
                 object: Arc::clone(object.rest_shape()),
                 setup: self.setup.clone(),
+                contact: self.contact,
                 avoid_gaze: last,
             });
             self.planning_for = Some(rest_shape);

@@ -10,6 +10,7 @@ use super::approach::PalmPath;
 use super::plan::{GraspPlan, Posture, angles};
 use super::planner::{NoGrasp, PlanRequest, Planner};
 use super::script::{ScriptName, Step};
+use crate::contact_model::ContactModel;
 use crate::hand_reader::HandSetup;
 use crate::soft_object::SoftObject;
 
@@ -42,6 +43,7 @@ pub struct Sent {
 /// The scripted hand.
 pub struct ScriptedHand {
     setup: HandSetup,
+    contact: ContactModel,
     planner: Planner,
     /// A plan has been asked for and is not there yet.
     planning: bool,
@@ -87,7 +89,8 @@ impl ScriptedHand {
         object: &SoftObject,
     ) -> Result<Self, NoGrasp> {
         let object = Arc::clone(object.rest_shape());
-        let request = PlanRequest { object, setup, avoid_gaze: None };
+        let contact = ContactModel::default();
+        let request = PlanRequest { object, setup, contact, avoid_gaze: None };
         let plan = request.grip()?;
         Ok(Self::following(name, request.setup, plan))
     }
@@ -96,6 +99,7 @@ impl ScriptedHand {
     pub fn following(name: ScriptName, setup: HandSetup, plan: GraspPlan) -> Self {
         Self {
             setup,
+            contact: ContactModel::default(),
             planner: Planner::waited(),
             planning: false,
             plans_first: false,
@@ -133,6 +137,12 @@ impl ScriptedHand {
     #[must_use]
     pub fn with_planner(self, planner: Planner) -> Self {
         Self { planner, ..self }
+    }
+
+    /// The same hand, whose later approaches are planned for fingertips that hold this.
+    #[must_use]
+    pub fn holding(self, contact: ContactModel) -> Self {
+        Self { contact, ..self }
     }
 
     /// The plan being followed.
@@ -211,6 +221,7 @@ impl ScriptedHand {
             self.planner.ask(PlanRequest {
                 object: Arc::clone(object.rest_shape()),
                 setup: self.setup.clone(),
+                contact: self.contact,
                 avoid_gaze: (!begins).then(|| self.plan.path.gaze()),
             });
         }

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::plan::{GraspPlan, plan_grasp};
 use crate::beside::Beside;
+use crate::contact_model::ContactModel;
 use crate::hand_reader::HandSetup;
 use crate::rest_shape::RestShape;
 
@@ -16,6 +17,8 @@ pub struct PlanRequest {
     pub object: Arc<RestShape>,
     /// The hand.
     pub setup: HandSetup,
+    /// What a fingertip holds: how deep it may press.
+    pub contact: ContactModel,
     /// Direction of an earlier grasp, to be avoided where another one is possible.
     pub avoid_gaze: Option<Vector3<f64>>,
 }
@@ -44,7 +47,7 @@ impl PlanRequest {
     /// The best plan; one that does not avoid the gaze where no other is found; `None` where the
     /// object cannot be grasped. Takes up to seconds.
     pub fn plan(&self) -> Option<GraspPlan> {
-        let depth = press_depth(&self.object);
+        let depth = press_depth(&self.object, self.contact);
         let planned = plan_grasp(&self.object, &self.setup, depth, self.avoid_gaze);
         planned.or_else(|| {
             self.avoid_gaze?;
@@ -145,21 +148,29 @@ impl Planner {
     }
 }
 
-/// A squeeze presses this share of the object's extent …
-const PRESS_SHARE: f64 = 0.05;
-/// … but not more than this share of the spacing of its nodes: one node pushed past its
-/// neighbours would turn elements inside out.
-const PRESS_SPACING_SHARE: f64 = 0.45;
+/// A squeeze presses this share of the object's extent where a tip holds a part of the surface: deep
+/// enough to be seen, and not so deep that a kept shape has elements that are inside out …
+const PRESS_SHARE: f64 = 0.08;
+/// … and this share where it holds a single node, but not more than …
+const VERTEX_PRESS_SHARE: f64 = 0.05;
+/// … this share of the spacing of its nodes: one node pushed past its neighbours would turn elements
+/// inside out.
+const VERTEX_PRESS_SPACING_SHARE: f64 = 0.45;
 
 /// How far a squeeze presses, m.
-fn press_depth(object: &RestShape) -> f64 {
+fn press_depth(object: &RestShape, contact: ContactModel) -> f64 {
     let mesh = object.mesh();
-    let edges = mesh.tets().iter().map(|t| {
-        let (a, b) = (mesh.vertices()[t[0] as usize], mesh.vertices()[t[1] as usize]);
-        (a - b).norm()
-    });
-    let spacing = edges.sum::<f64>() / mesh.tets().len() as f64;
-    (PRESS_SHARE * mesh.size()).min(PRESS_SPACING_SHARE * spacing)
+    match contact {
+        ContactModel::Patch | ContactModel::Mask => PRESS_SHARE * mesh.size(),
+        ContactModel::Vertex => {
+            let edges = mesh.tets().iter().map(|t| {
+                let (a, b) = (mesh.vertices()[t[0] as usize], mesh.vertices()[t[1] as usize]);
+                (a - b).norm()
+            });
+            let spacing = edges.sum::<f64>() / mesh.tets().len() as f64;
+            (VERTEX_PRESS_SHARE * mesh.size()).min(VERTEX_PRESS_SPACING_SHARE * spacing)
+        }
+    }
 }
 
 #[cfg(test)]
@@ -174,6 +185,7 @@ mod tests {
         let request = |avoid_gaze| PlanRequest {
             object: Arc::clone(cube.rest_shape()),
             setup: HandSetup::default(),
+            contact: ContactModel::default(),
             avoid_gaze,
         };
         // Plans are told apart by whether there is one; a real plan is made once.

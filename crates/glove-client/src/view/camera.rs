@@ -23,11 +23,11 @@ pub const FIELD_OF_VIEW: f64 = 0.60;
 /// Straight up and down are left out: there is no up at the poles.
 const PITCH_MAX: f64 = 1.53;
 /// Middle of a grasping hand, seen from the object against the fingers' direction.
-const HAND_OFF_M: f64 = 0.035;
+const HAND_OFF_M: f64 = 0.02;
 /// A grasped object is lifted about twice as far.
 const LIFTED_M: f64 = 0.016;
 /// Radius of the ball around object and hand.
-const SEEN_RADIUS_M: f64 = 0.1;
+const SEEN_RADIUS_M: f64 = 0.075;
 const DISTANCE_RANGE: (f64, f64) = (0.03, 4.0);
 
 impl Default for ViewCamera {

@@ -21,6 +21,9 @@ pub struct Colouring {
     remark: String,
 }
 
+/// The legend of strain, stress and error ends above so large a share of the surface's nodes.
+const COLOURED_SHARE: f64 = 0.9;
+
 struct Shaded {
     /// Rest shape that it is made for.
     of: u64,
@@ -66,12 +69,21 @@ impl Colouring {
         if shaded.shade(shading, &object.displacement).is_err() {
             return;
         }
-        self.legend.follow(shaded.largest_seen(), now_s);
+        let largest = shaded.largest_seen();
+        let coloured = match shading {
+            Shading::Displacement | Shading::Plain => largest,
+            Shading::Strain | Shading::VonMises | Shading::Error => {
+                shaded.seen_by_share(COLOURED_SHARE)
+            }
+        };
+        self.legend.follow(coloured, now_s);
         let legend = &self.legend;
         self.shares.extend(shaded.values().iter().map(|value| legend.fraction(*value)));
         if let Some(error) = shaded.error_of_whole() {
             let text = shading.text(error);
             self.remark = format!("whole object, energy norm: {text} (an estimate, no bound)");
+        } else if largest > legend.most() {
+            self.remark = format!("highest: {}", legend.unit().text(largest));
         }
     }
 

@@ -77,8 +77,23 @@ impl ShadedObject {
 
     /// The largest value that is seen, that is, of the surface; 0 without values.
     pub fn largest_seen(&self) -> f64 {
+        self.seen().fold(0.0, f64::max)
+    }
+
+    /// The value that so large a share of the surface's nodes does not exceed; 0 without values.
+    ///
+    /// Strain and stress are highest at few nodes under a fingertip, and higher the finer the mesh
+    /// is: a range up to the largest would leave the rest without colour.
+    pub fn seen_by_share(&self, share: f64) -> f64 {
+        let mut seen: Vec<f64> = self.seen().collect();
+        let Some(last) = seen.len().checked_sub(1) else { return 0.0 };
+        let at = ((share * last as f64).round() as usize).min(last);
+        *seen.select_nth_unstable_by(at, f64::total_cmp).1
+    }
+
+    fn seen(&self) -> impl Iterator<Item = f64> {
         let seen = self.rest.surface().nodes.iter();
-        seen.filter_map(|&node| self.values.get(node as usize)).copied().fold(0.0, f64::max)
+        seen.filter_map(|&node| self.values.get(node as usize)).copied()
     }
 
     /// Estimated error of the stress of the whole object in the energy norm, relative; `None`
@@ -119,6 +134,12 @@ mod tests {
             let seen = object.largest_seen();
             assert!((seen - expected).abs() <= 0.02 * expected + 1e-9, "{shading}: {seen}");
             assert_eq!(object.error_of_whole().is_some(), shading == Shading::Error);
+            assert_eq!(object.seen_by_share(1.0), seen, "{shading}");
+            let half = object.seen_by_share(0.5);
+            let not_above = object.seen().filter(|value| *value <= half).count();
+            let below = object.seen().filter(|value| *value < half).count();
+            let all = object.seen().count();
+            assert!(2 * not_above >= all && 2 * below <= all, "{shading}: {below}, {not_above}");
         }
         object.shade(Shading::Plain, &u).unwrap();
         assert!(object.values().is_empty() && object.largest_seen() == 0.0);

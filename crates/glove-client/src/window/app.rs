@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use kiss3d::prelude::{
     Action as Press, CanvasSetup, Key, NumSamples, OrbitCamera3d, Window, WindowEvent,
 };
@@ -14,6 +14,8 @@ use super::finger_keys::FingerKeys;
 use super::graphics::{Graphics, NoGraphics, check_display, without_panic};
 use super::grips::{Grip, Grips};
 use super::input::{DragButton, Gesture, Mouse, wish_of_key};
+use super::lost_display;
+use super::opening::{Opening, WhenLost};
 use super::panels::{Asked, Panels, Seen};
 use super::recorder::Recordings;
 use super::running::Running;
@@ -31,23 +33,8 @@ use crate::view::action::Action;
 use crate::view::camera::ViewCamera;
 use crate::view::colouring::Colouring;
 use crate::view::display::{Display, Level};
+use crate::view::eye_place::EyePlace;
 use crate::view::object_skin::Look;
-
-/// What a window is opened for.
-pub struct Opening {
-    /// What is shown at first.
-    pub display: Display,
-    /// Where the eye is at first.
-    pub camera: ViewCamera,
-    /// Whether the person chose where the eye is; else the first hand does.
-    pub eye_is_chosen: bool,
-    /// Whether the person chose the level of drawing; else the machine does.
-    pub level_is_chosen: bool,
-    /// The object, for other objects of the same size.
-    pub object: ObjectRequest,
-    /// Material of the object.
-    pub material: softgrasp_core::fem::Material,
-}
 
 /// An open window and what belongs to it.
 pub struct App {
@@ -68,8 +55,10 @@ pub struct App {
     object: ObjectRequest,
     recordings: Recordings,
     pace: DrawingPace,
-    /// Whether the eye is where it is to be; the first hand places it.
-    eye_is_placed: bool,
+    eye_place: EyePlace,
+    /// The person chose where the eye is.
+    eye_is_chosen: bool,
+    when_lost: Option<WhenLost>,
     ends: bool,
 }
 
@@ -82,14 +71,22 @@ impl App {
     /// [`NoGraphics`], in a sentence, where there is no display or nothing draws.
     pub fn open(opening: Opening) -> Result<Self, NoGraphics> {
         check_display()?;
+        lost_display::hear();
         Graphics::find()?;
         let mut window = without_panic(|| {
             let setup = CanvasSetup { samples: NumSamples::Four, ..CanvasSetup::default() };
             pollster::block_on(Window::new_with_setup(TITLE, SIZE.0, SIZE.1, setup))
         })?;
         let graphics = Graphics::in_use();
-        let Opening { mut display, camera, eye_is_chosen, level_is_chosen, object, material } =
-            opening;
+        let Opening {
+            mut display,
+            camera,
+            eye_is_chosen,
+            level_is_chosen,
+            object,
+            material,
+            when_lost,
+        } = opening;
         if graphics.is_software && !level_is_chosen {
             display.level = Level::Plain;
         }
@@ -113,7 +110,9 @@ impl App {
             change: Change::None,
             object,
             recordings: Recordings::default(),
-            eye_is_placed: eye_is_chosen,
+            eye_place: if eye_is_chosen { EyePlace::Taken } else { EyePlace::AtOnce },
+            eye_is_chosen,
+            when_lost: Some(when_lost),
             ends: false,
         })
     }
@@ -142,14 +141,16 @@ impl App {
             }
         };
         self.pace.tell();
-        let Some(running) = self.running.take() else { return Ok(None) };
-        match lost {
-            None => Ok(Some(running.end()?)),
-            Some(lost) => {
-                eprintln!("glove-client: {lost}; the run goes on without it");
-                Ok(Some(running.go_on()?))
-            }
-        }
+        lost_display::clear_rest();
+        let running = self.running.take();
+        let Some(lost) = lost else {
+            return Ok(running.map(Running::end).transpose()?);
+        };
+        // Closing a window whose display is gone would fail as drawing did.
+        std::mem::forget(self);
+        let Some(running) = running else { bail!(lost) };
+        eprintln!("glove-client: {lost}; the run goes on without it");
+        Ok(Some(running.go_on()?))
     }
 
     /// One picture; false when the window is closed.
@@ -180,6 +181,9 @@ impl App {
         let ticks = play().context("cannot start the thread of the ticks")?;
         let running = Running::new(ticks, inlet, about);
         running.ask(Control::SetForces(true));
+        if let Some(when_lost) = self.when_lost.take() {
+            lost_display::set_rest(Box::new(running.rest(when_lost)));
+        }
         self.running = Some(running);
         self.ask_for_what_is_shown();
         Ok(())
@@ -199,6 +203,9 @@ impl App {
                 running.about.object = choice.to_string();
                 self.object.choice = choice;
                 running.look_at_newest();
+                if let (Some(frame), false) = (running.newest(), self.eye_is_chosen) {
+                    self.eye_place = EyePlace::after(frame);
+                }
                 running.ask(Control::ReplaceObject(loaded));
                 self.panels.sliders.open();
             }
@@ -225,8 +232,8 @@ impl App {
         }
         let Some(frame) = running.frame() else { return };
         let frame = Arc::clone(frame);
-        if let (Some(eye), false) = (frame.eye_beside_hand(), self.eye_is_placed) {
-            (self.camera, self.eye_is_placed) = (eye, true);
+        if let Some(eye) = self.eye_place.eye(&frame) {
+            self.camera = eye;
         }
         self.colouring.follow(&frame.object, self.display.shading, frame.at_s);
         self.scene.follow(&mut self.window, &frame, &self.display, &self.colouring);
@@ -242,6 +249,7 @@ impl App {
             starting: self.start.as_ref().map(|start| (start.step(), object.as_str())),
             graphics: (&self.graphics.name, self.pace.fps()),
             is_recording: self.recordings.is_recording(),
+            newtons_per_m: self.scene.newtons_per_m(),
         };
         let mut asked = Asked::default();
         let panels = &mut self.panels;
@@ -336,7 +344,7 @@ impl App {
             Action::Hand(wish) => {
                 if let Some(frame) = running.newest() {
                     let (rest, tick_s) = (Arc::clone(&frame.object.rest), running.about.tick_s);
-                    self.change = Change::hand(wish, rest, tick_s);
+                    self.change = Change::hand(wish, rest, self.object.contact, tick_s);
                 }
             }
             Action::PlayOrPause | Action::Step | Action::Restart

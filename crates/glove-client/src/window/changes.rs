@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
+use crate::contact_model::ContactModel;
 use crate::control::Control;
 use crate::hand_choice::HandChoice;
 use crate::hand_reader::HandSetup;
@@ -45,13 +46,18 @@ impl Change {
         }
     }
 
-    /// Begins to make a hand for an object at rest.
-    pub fn hand(wish: HandChoice, object: Arc<RestShape>, tick_s: f64) -> Self {
+    /// Begins to make a hand for an object at rest; `contact` is what its fingertips hold.
+    pub fn hand(
+        wish: HandChoice,
+        object: Arc<RestShape>,
+        contact: ContactModel,
+        tick_s: f64,
+    ) -> Self {
         let (made, result) = channel();
         let thread = std::thread::Builder::new().name("hand".to_owned());
         let started = thread.spawn(move || {
             // Nobody may be waiting any more.
-            let _ = made.send(hand(wish, object, tick_s));
+            let _ = made.send(hand(wish, object, contact, tick_s));
         });
         if let Err(error) = started {
             tracing::warn!(%error, "cannot start a thread that makes a hand");
@@ -90,15 +96,21 @@ impl Change {
 }
 
 /// A hand that plans its approaches beside the ticks.
-fn hand(wish: HandChoice, object: Arc<RestShape>, tick_s: f64) -> Result<HandSource, String> {
+fn hand(
+    wish: HandChoice,
+    object: Arc<RestShape>,
+    contact: ContactModel,
+    tick_s: f64,
+) -> Result<HandSource, String> {
     let setup = HandSetup::default();
     let planner = Planner::beside().map_err(|error| format!("cannot start a thread: {error}"))?;
     match wish {
-        HandChoice::Mouse => Ok(MouseHand::new(setup, planner, tick_s).into()),
+        HandChoice::Mouse => Ok(MouseHand::new(setup, planner, tick_s).holding(contact).into()),
         HandChoice::Scripted(script) => {
-            let request = PlanRequest { object, setup: setup.clone(), avoid_gaze: None };
+            let request = PlanRequest { object, setup: setup.clone(), contact, avoid_gaze: None };
             let grip = request.grip().map_err(|error| error.to_string())?;
-            Ok(ScriptedHand::following(script, setup, grip).with_planner(planner).into())
+            let hand = ScriptedHand::following(script, setup, grip);
+            Ok(hand.holding(contact).with_planner(planner).into())
         }
     }
 }

@@ -5,11 +5,13 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::units::{UNITS_PER_M, drawn_point, rotation_from_y};
 use crate::view::frame::{HandView, ViewFrame};
-use crate::view::nice_number::nice_above;
+use crate::view::steady_range::SteadyRange;
 
 /// One mark for each fingertip, thumb first.
 pub struct DrawnMarks {
     marks: Vec<Mark>,
+    /// Force that an arrow of full length stands for, N.
+    newtons: SteadyRange,
 }
 
 /// What belongs to one fingertip.
@@ -28,8 +30,10 @@ const FORCE: Color = Color::new(0.10, 0.35, 0.95, 1.0);
 const NODE_RADIUS_M: f32 = 0.0010;
 const SHAFT_RADIUS_M: f32 = 0.0011;
 const HEAD_LENGTH_M: f32 = 0.006;
-/// Length of the longest arrow, m; see [`newtons_per_arrow`].
+/// Length of the longest arrow, m.
 const ARROW_M: f64 = 0.05;
+/// Forces that are all smaller have short arrows, N.
+const LEAST_NEWTONS: f64 = 0.05;
 
 impl DrawnMarks {
     /// Marks that are not seen before their first frame.
@@ -47,7 +51,12 @@ impl DrawnMarks {
             mark.hide();
             mark
         };
-        Self { marks: (0..5).map(mark).collect() }
+        Self { marks: (0..5).map(mark).collect(), newtons: SteadyRange::new(LEAST_NEWTONS) }
+    }
+
+    /// Force that a metre of arrow stands for, N/m.
+    pub fn newtons_per_m(&self) -> f64 {
+        self.newtons.most() / ARROW_M
     }
 
     /// Follows a frame.
@@ -61,7 +70,11 @@ impl DrawnMarks {
         forces: bool,
     ) {
         let world_from_object = &frame.object.world_from_object;
-        let scale = frame.grasp.forces.as_ref().map(newtons_per_arrow);
+        if let Some(all) = &frame.grasp.forces {
+            let largest = all.iter().map(Vector3::norm).fold(0.0, f64::max);
+            self.newtons.follow(largest, frame.at_s);
+        }
+        let scale = self.newtons.most();
         for (finger, mark) in self.marks.iter_mut().enumerate() {
             let contact = frame.grasp.contacts[finger];
             let place = contact.and_then(|contact| shape.get(contact.node as usize));
@@ -73,7 +86,7 @@ impl DrawnMarks {
                 let normal = contact.map_or(Vector3::y(), |c| c.normal_in_object);
                 mark.show_contact(&place, &(world_from_object * normal), radius);
             }
-            if let (true, Some(all), Some(scale)) = (forces, &frame.grasp.forces, scale) {
+            if let (true, Some(all)) = (forces, &frame.grasp.forces) {
                 mark.show_force(&place, &arrow(&all[finger], scale, world_from_object));
             }
         }
@@ -82,14 +95,6 @@ impl DrawnMarks {
 
 fn tip_radius(hand: &HandView, finger: usize) -> f64 {
     hand.dimensions.tip_radii()[finger]
-}
-
-/// Force that an arrow of full length stands for: the next of 1, 2, 5 × 10ⁿ above the largest.
-///
-/// Units: N.
-pub fn newtons_per_arrow(forces: &[Vector3<f64>; 5]) -> f64 {
-    let largest = forces.iter().map(Vector3::norm).fold(0.0, f64::max);
-    if largest > 0.0 && largest.is_finite() { nice_above(largest) } else { 1.0 }
 }
 
 /// The arrow of a force in the world, m.
@@ -142,17 +147,4 @@ impl Mark {
 fn set_size(node: &mut SceneNode3d, radius: f32, height: f32) {
     let (wide, high) = (2.0 * radius * UNITS_PER_M, height * UNITS_PER_M);
     node.set_local_scale(wide, high, wide);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn longest_arrow_stands_for_a_round_number_of_newtons() {
-        let with = |n: f64| newtons_per_arrow(&[Vector3::new(0.0, n, 0.0); 5]);
-        assert_eq!([with(0.9), with(0.011), with(3.0), with(20.0)], [1.0, 0.02, 5.0, 20.0]);
-        assert_eq!(with(0.0), 1.0);
-        assert_eq!(with(f64::NAN), 1.0);
-    }
 }

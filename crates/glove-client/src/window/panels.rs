@@ -11,9 +11,10 @@ use super::ui::information_card::{self, RunFacts};
 use super::ui::legend_card::{self, LegendText};
 use super::ui::menu::{self, MenuFacts, PopUp};
 use super::ui::notices::Notices;
+use super::ui::status_card::{self, Told};
 use super::ui::timeline::{self, Playing, TimelineWish};
 use super::ui::timings_card::Timings;
-use super::ui::{help_card, loading_card, status_card, theme};
+use super::ui::{help_card, loading_card, theme};
 use crate::hand_choice::HandChoice;
 use crate::mouse::MouseInput;
 use crate::view::action::Action;
@@ -75,6 +76,8 @@ pub struct Seen<'a> {
     pub graphics: (&'a str, f64),
     /// Whether pictures are being written.
     pub is_recording: bool,
+    /// Force that a metre of arrow stands for, N/m.
+    pub newtons_per_m: f64,
 }
 
 /// The hint goes after so many ticks of a hand that is played.
@@ -150,7 +153,12 @@ impl Panels {
             self.hint_gone |= asked.mouse.iter().any(closes);
         }
         if let Some(frame) = running.frame() {
-            status_card::show(context, frame, running.about.tick_s, (running.about.server_stage)());
+            let told = Told {
+                tick_s: running.about.tick_s,
+                preparing: (running.about.server_stage)(),
+                newtons_per_m: seen.display.forces.then_some(seen.newtons_per_m),
+            };
+            status_card::show(context, frame, &told);
             self.hint_gone |= is_played && frame.tick > HINT_TICKS;
         }
         if seen.display.shading != Shading::Plain {

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use softgrasp_core::fem::Material;
 use softgrasp_protocol::MethodName;
 
 use crate::control::Control;
 use crate::hand_choice::HandChoice;
+use crate::interruption;
 use crate::notice::{Notice, NoticeKind};
 use crate::run_report::RunReport;
 use crate::tick_thread::{RunError, TickThread};
@@ -29,6 +31,9 @@ pub struct Running {
     /// What can be said of it.
     pub about: About,
 }
+
+/// A run without its window is looked at so often.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// What a window says of a run.
 pub struct About {
@@ -205,6 +210,26 @@ impl Running {
     pub fn set_max_error(&mut self, max_error: Option<f64>) {
         self.ask(Control::SetMaxError(max_error));
         self.about.max_error = max_error;
+    }
+
+    /// What is left to do when the display is lost: the run goes on to the end of its script, then
+    /// `tell` is given its report. It can be done on any thread, and is sent there.
+    pub fn rest(
+        &self,
+        tell: impl FnOnce(Result<RunReport, RunError>) + Send + 'static,
+    ) -> impl FnOnce() + Send + 'static {
+        let (controls, end) = (self.ticks.controls(), self.ticks.run_end());
+        move || {
+            // A run that is over does not hear it.
+            let _ = controls.send(Control::EndWithScript);
+            while !end.is_there() {
+                if interruption::asked() {
+                    let _ = controls.send(Control::Stop);
+                }
+                std::thread::sleep(LOOK_EVERY);
+            }
+            tell(end.wait());
+        }
     }
 
     /// Lets the run go on to the end of its script, without a window; its report.

@@ -46,6 +46,11 @@ impl Scene {
         &mut self.root
     }
 
+    /// Force that a metre of arrow stands for, N/m.
+    pub fn newtons_per_m(&self) -> f64 {
+        self.marks.newtons_per_m()
+    }
+
     /// Shows a frame.
     pub fn follow(
         &mut self,

@@ -28,6 +28,20 @@ impl FingerSliders {
         *self = Self::default();
     }
 
+    fn mean(&self) -> f64 {
+        self.closing.iter().sum::<f64>() / 5.0
+    }
+
+    /// Closes or opens all together: fingers that hold something keep their lead over those that do
+    /// not, until all are open or closed.
+    fn shift_to(&mut self, mean: f64) {
+        let by = mean - self.mean();
+        let is_at_end = mean <= 0.0 || mean >= CLOSING_MAX;
+        for closing in &mut self.closing {
+            *closing = if is_at_end { mean } else { *closing + by }.clamp(0.0, CLOSING_MAX);
+        }
+    }
+
     /// Shows the panel at the left; what was asked for.
     pub fn show(&mut self, context: &Context) -> Vec<MouseInput> {
         let mut wishes = Vec::new();
@@ -60,12 +74,14 @@ impl FingerSliders {
         wishes
     }
 
-    /// One slider for all fingers, which stands where most of them are.
+    /// One slider for all fingers, which stands at their mean.
     fn all(&mut self, ui: &mut Ui, wishes: &mut Vec<MouseInput>) {
-        let mut closing = self.closing.iter().sum::<f64>() / 5.0;
-        if slider(ui, "close all", &mut closing) {
-            self.closing = [closing; 5];
-            wishes.push(MouseInput::CloseTo(Digits::All, closing));
+        let mut mean = self.mean();
+        if slider(ui, "close all", &mut mean) {
+            self.shift_to(mean);
+            wishes.extend(Finger::ALL.map(|finger| {
+                MouseInput::CloseTo(Digits::One(finger), self.closing[finger.index()])
+            }));
         }
         ui.label(theme::quiet("1 touches, 2 squeezes").small());
     }
@@ -88,4 +104,22 @@ fn slider(ui: &mut Ui, name: &str, closing: &mut f64) -> bool {
         response.changed()
     })
     .inner
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closing_all_does_not_open_the_three_fingers_that_hold() {
+        let mut sliders = FingerSliders { closing: [0.0, 1.5, 1.5, 1.5, 0.0] };
+        sliders.shift_to(sliders.mean() + 0.25);
+        for (closing, expected) in sliders.closing.iter().zip([0.25, 1.75, 1.75, 1.75, 0.25]) {
+            assert!((closing - expected).abs() < 1e-12, "{sliders:?}");
+        }
+        sliders.shift_to(0.0);
+        assert_eq!(sliders.closing, [0.0; 5]);
+        sliders.shift_to(CLOSING_MAX);
+        assert_eq!(sliders.closing, [CLOSING_MAX; 5]);
+    }
 }

@@ -7,10 +7,19 @@ use softgrasp_core::hand::Finger;
 use super::theme::{self, ACCENT, BAD, CAUTION, GOOD, IDLE, QUIET};
 use crate::view::frame::{LinkHealth, ViewFrame};
 
+/// What the card tells besides the frame.
+pub struct Told<'a> {
+    /// From tick to tick, s.
+    pub tick_s: f64,
+    /// What the server does to a new object meanwhile.
+    pub preparing: &'a str,
+    /// Force that a metre of arrow stands for, N/m, where arrows are shown.
+    pub newtons_per_m: Option<f64>,
+}
+
 /// Shows the card at the lower left.
-///
-/// `preparing` says what the server does to a new object meanwhile.
-pub fn show(context: &Context, frame: &ViewFrame, tick_s: f64, preparing: &str) {
+pub fn show(context: &Context, frame: &ViewFrame, told: &Told<'_>) {
+    let Told { tick_s, preparing, newtons_per_m } = *told;
     let offset = [theme::MARGIN, -theme::MARGIN];
     theme::card(context, "status", Align2::LEFT_BOTTOM, offset, |ui| {
         ui.horizontal(|ui| {
@@ -37,7 +46,7 @@ pub fn show(context: &Context, frame: &ViewFrame, tick_s: f64, preparing: &str) 
         Grid::new("status grid")
             .num_columns(2)
             .spacing([14.0, 3.0])
-            .show(ui, |ui| facts(ui, frame));
+            .show(ui, |ui| facts(ui, frame, newtons_per_m));
     });
 }
 
@@ -71,7 +80,7 @@ fn fingertips(ui: &mut Ui, tips: [bool; 5]) {
     }
 }
 
-fn facts(ui: &mut Ui, frame: &ViewFrame) {
+fn facts(ui: &mut Ui, frame: &ViewFrame, newtons_per_m: Option<f64>) {
     let mut row = |name: &str, value: RichText| {
         ui.label(theme::quiet(name));
         ui.label(value);
@@ -92,6 +101,14 @@ fn facts(ui: &mut Ui, frame: &ViewFrame) {
             (None, _) => "not proven yet".to_owned(),
         };
         row("error bound", RichText::new(bound));
+    }
+    if let (Some(forces), Some(per_m)) = (&frame.grasp.forces, newtons_per_m) {
+        let strongest = forces.iter().map(|force| force.norm()).fold(0.0, f64::max);
+        let per_cm = 0.01 * per_m;
+        row(
+            "forces",
+            RichText::new(format!("up to {strongest:.2} N (1 cm of arrow: {per_cm:.2} N)")),
+        );
     }
     let dropped = frame.server.ticks_skipped + frame.server.device_faults;
     row("dropped samples", RichText::new(dropped.to_string()));

@@ -1,0 +1,26 @@
+//! The end of a run: its report is written, its summary printed.
+
+use std::path::Path;
+
+use anyhow::bail;
+
+use super::output::{print, write_json};
+use crate::run_report::RunReport;
+
+/// Writes and prints the report.
+///
+/// # Errors
+/// One line: that the report cannot be written, or why the run failed.
+pub(super) fn tell(path: Option<&Path>, report: &RunReport) -> anyhow::Result<()> {
+    if let Some(path) = path {
+        write_json(path, report)?;
+    }
+    // The reason comes first: whoever reads standard error and standard output together sees it.
+    match report.failure() {
+        Some(failure) => {
+            print(&report.describe())?;
+            bail!(failure)
+        }
+        None => print(&report.describe()),
+    }
+}
