@@ -12,6 +12,7 @@ pub mod collision;
 pub mod contact;
 pub mod echo;
 pub mod fit;
+pub mod flicker;
 pub mod frame;
 pub mod frontier;
 pub mod hard_cases;
@@ -64,6 +65,8 @@ pub enum ReportName {
     Collision,
     /// Every way through hard cases, against what was promised.
     HardCases,
+    /// Noise of the devices against the hysteresis of the grasp.
+    Flicker,
     /// Random grips: the proven bound against the true error.
     Bound,
 }
@@ -84,6 +87,7 @@ impl ReportName {
             Self::Collision => "collision",
             Self::HardCases => "hard-cases",
             Self::Bound => "bound",
+            Self::Flicker => "flicker",
         }
     }
 }
@@ -107,6 +111,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Collision => collision::measure(options)?,
         ReportName::HardCases => hard_cases::measure(options)?,
         ReportName::Bound => bound::measure(options)?,
+        ReportName::Flicker => flicker::measure(options)?,
     };
     report.end();
     let files = report.write(&options.out)?;

@@ -43,6 +43,9 @@ pub enum ReportError {
         "the stiffness of the held object could not be factored, so there is no sparse solve to compare with"
     )]
     NoFactor,
+    /// A hand could not be followed.
+    #[error("{0:#}")]
+    Hand(anyhow::Error),
     /// No threads.
     #[error("no pool of {threads} threads: {source}")]
     Threads {

@@ -11,18 +11,19 @@ use softgrasp_core::grasp::{
 use softgrasp_core::hand::{HandColliders, HandPose};
 use softgrasp_protocol::{NodeChoice, Precision, Question, Want};
 
+use crate::arrival::Device;
 use crate::contact_model::{HeldNodes, PrescribedDisplacements};
+use crate::digest::request_digest;
 use crate::hand_reader::HandReader;
-use crate::link::{Link, LinkEvent, Reached, RequestEnd};
+use crate::link::{Link, RequestEnd};
 use crate::model_upload::ModelUpload;
-use crate::object_changes::{ObjectChanges, UNCOUNTED};
+use crate::object_changes::ObjectChanges;
 use crate::object_work::{KeptShape, ObjectDone, ObjectJob, ObjectWork};
 use crate::pace::Pace;
 use crate::prefetch::Prefetched;
 use crate::rest_shape::ObjectError;
-use crate::scripted::Sent;
+use crate::sent::{RecordedAnswers, Sent};
 use crate::soft_object::SoftObject;
-use crate::solve_report::SolveSummary;
 use crate::solve_settings::{AnswerWishes, SolveSettings, Subscription};
 use crate::tick_outcome::{LoopEvent, TickOutcome};
 use crate::unanswered::Unanswered;
@@ -35,7 +36,7 @@ pub struct GraspLoop {
     pub(crate) link: Link,
     pub(crate) settings: SolveSettings,
     pub(crate) wishes: AnswerWishes,
-    pace: Pace,
+    pub(crate) pace: Pace,
     /// Tick in which the grip began, to tell answers of an earlier grip from those of this one.
     pub(crate) deforming_since: Option<u64>,
     /// Tick whose answer the object shows.
@@ -52,6 +53,15 @@ pub struct GraspLoop {
     pub(crate) world_from_object: Isometry3<f64>,
     hand: Option<HandPose>,
     shown_segments: HandSegments,
+    /// Devices that were silent in the last tick.
+    silent: Vec<Device>,
+    /// Whether digests of requests are wanted.
+    digests: bool,
+    /// What the tick did with answers when it was recorded, while it is played again.
+    pub(crate) recorded: Option<RecordedAnswers>,
+    /// Requests that have ended and whose time to be taken has not come, while ticks are played
+    /// again.
+    pub(crate) held_back: Vec<RequestEnd>,
 }
 
 /// How far the wish to keep the shape has come.
@@ -68,7 +78,7 @@ pub(crate) enum Keep {
 
 impl Keep {
     /// Whether the object stays as it is until its next rest shape is there.
-    fn freezes(&self) -> bool {
+    pub(crate) fn freezes(&self) -> bool {
         matches!(self, Self::BeingMade | Self::Made(_))
     }
 }
@@ -76,7 +86,7 @@ impl Keep {
 /// What a report says when the server has prepared the model of a rest shape.
 pub const MODEL_READY: &str = "model ready";
 /// Longest wait of a lockstep tick; a server that takes longer is overtaken.
-const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
+pub(crate) const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
 
 impl GraspLoop {
     /// A loop around an object at the origin; its model is sent to the server at once. To be made
@@ -114,7 +124,21 @@ impl GraspLoop {
             world_from_object: Isometry3::identity(),
             hand: None,
             shown_segments: [[Isometry3::identity(); 3]; 5],
+            silent: Vec::new(),
+            digests: false,
+            recorded: None,
+            held_back: Vec::new(),
         })
+    }
+
+    /// Whether ticks wait for answers.
+    pub fn pace(&self) -> Pace {
+        self.pace
+    }
+
+    /// From now on every outcome has the digest of what was asked.
+    pub fn want_digests(&mut self) {
+        self.digests = true;
     }
 
     /// The object as it is now.
@@ -199,9 +223,11 @@ impl GraspLoop {
     /// [`ObjectError`] when the object cannot be shown any more.
     pub fn tick(&mut self, tick: u64, now_s: f64, sent: &Sent) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
-        self.reader.feed(&sent.glove, &sent.tracker, now_s);
+        self.reader.feed(&sent.arrivals, now_s);
+        self.recorded.clone_from(&sent.recorded);
         self.pick_up(&mut outcome)?;
         self.save_when_whole(&mut outcome);
+        self.look_at_devices(now_s, &mut outcome);
         // Until both devices have spoken there is no hand to act with.
         let Some(hand) = self.reader.hand(now_s) else { return Ok(outcome) };
         self.take_work(&mut outcome);
@@ -220,6 +246,22 @@ impl GraspLoop {
         outcome.recalled = step.recalled;
         outcome.shown_tick = self.shown_tick;
         Ok(outcome)
+    }
+
+    /// Tells when a device falls silent, and when it speaks again. A hand that is not heard of stays
+    /// where it was, and so does what it holds.
+    fn look_at_devices(&mut self, now_s: f64, outcome: &mut TickOutcome) {
+        outcome.silent = self.reader.silent(now_s);
+        let silent = &outcome.silent;
+        let fallen = silent.iter().filter(|device| !self.silent.contains(device));
+        let tell = |device: &Device| {
+            format!("the {} is silent: the hand is held where it was", device.name())
+        };
+        outcome.events.extend(fallen.map(tell).map(LoopEvent::Device));
+        let back = self.silent.iter().filter(|device| !silent.contains(device));
+        let tell = |device: &Device| format!("the {} speaks again", device.name());
+        outcome.events.extend(back.map(tell).map(LoopEvent::Device));
+        self.silent.clone_from(&outcome.silent);
     }
 
     /// A command for the grasp, unless the shape that is to be kept cannot be, or not yet.
@@ -258,7 +300,8 @@ impl GraspLoop {
 
     /// Takes what has been done beside the ticks.
     pub(crate) fn take_work(&mut self, outcome: &mut TickOutcome) {
-        while let Some(done) = self.work.take() {
+        while let Some(done) = self.take_done() {
+            outcome.took_work |= matches!(done, ObjectDone::Kept(_) | ObjectDone::Replacement(_));
             match done {
                 ObjectDone::Prefetch { rest_shapes, hint } => {
                     if rest_shapes == self.object.rest_shapes() {
@@ -281,6 +324,15 @@ impl GraspLoop {
             let text = "the work on the new rest shape failed; this is a fault of the program";
             outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
         }
+    }
+
+    /// The next piece of work that is done. A tick that is played again takes rest shapes only if it
+    /// did so before.
+    fn take_done(&mut self) -> Option<ObjectDone> {
+        let takes_shapes = self.recorded.as_ref().is_none_or(|recorded| recorded.took_work);
+        self.work.take_if(|done| {
+            takes_shapes || !matches!(done, ObjectDone::Kept(_) | ObjectDone::Replacement(_))
+        })
     }
 
     fn step(
@@ -329,11 +381,10 @@ impl GraspLoop {
                 }
                 self.last_known = Some(*known);
                 let question = self.question(known);
-                self.link.ask(tick, grip, question);
-                if self.pace == Pace::Lockstep {
-                    self.link.wait_idle(LOCKSTEP_WAIT_MAX);
-                    self.pick_up(outcome)?;
+                if self.digests {
+                    outcome.request_digest = Some(request_digest(&question));
                 }
+                self.ask(tick, grip, question, outcome)?;
             }
             // A tick whose input was ignored keeps the shape as it is.
             None if step.state == StateName::Deforming => {
@@ -380,59 +431,6 @@ impl GraspLoop {
             want: Want { nodes, reactions: self.wishes.forces, precision: Precision::F64 },
             max_error: self.wishes.max_error,
             ..Question::default()
-        }
-    }
-
-    /// Takes what has come from the server.
-    pub(crate) fn pick_up(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
-        let (events, ended) = self.link.take();
-        for event in events {
-            let text = match event {
-                LinkEvent::Connected { server } => format!("connected to {server}"),
-                LinkEvent::Refused { text } => format!("refused {text}"),
-                LinkEvent::Lost { text } => format!("lost: {text}"),
-                LinkEvent::ModelReady(ready) => {
-                    tracing::info!(model = %ready.model, "model ready");
-                    MODEL_READY.to_owned()
-                }
-            };
-            outcome.events.push(LoopEvent::Server(text));
-        }
-        for RequestEnd { tick, reached } in ended {
-            match reached {
-                Ok(reached) => self.show(tick, *reached, outcome)?,
-                Err(_) if tick == UNCOUNTED => self.refuse_to_save_unanswered(outcome),
-                Err(why) => outcome.unanswered.push((tick, why)),
-            }
-        }
-        Ok(())
-    }
-
-    /// Shows an answer if it belongs to the grasp that is going on, and to a shape that may change.
-    fn show(
-        &mut self,
-        tick: u64,
-        reached: Reached,
-        outcome: &mut TickOutcome,
-    ) -> Result<(), ObjectError> {
-        let Reached { rest_shape, nodes, displacement, reactions, mask_forces, report, round_trip } =
-            reached;
-        let ms = round_trip.as_secs_f64() * 1e3;
-        if tick != UNCOUNTED {
-            outcome.answers.push((tick, SolveSummary::new(&report, ms)));
-        }
-        let current = rest_shape == self.object.rest_shapes()
-            && self.deforming_since.is_some_and(|since| tick >= since)
-            && !self.keep.freezes();
-        if current && tick != UNCOUNTED {
-            self.shown_tick = Some(tick);
-            // The touched nodes stay the same as long as the grip that the answer belongs to.
-            self.shown_forces = self.held.fingertip_forces(&reactions, &mask_forces);
-        }
-        match nodes {
-            _ if !current => Ok(()),
-            NodeChoice::All => self.object.apply(displacement),
-            NodeChoice::Nodes(_) => self.object.apply_to_surface(&displacement),
         }
     }
 

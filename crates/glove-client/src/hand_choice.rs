@@ -1,6 +1,4 @@
-//! Which hand acts, as it is chosen on the command line and in a menu.
-
-use std::str::FromStr;
+//! Which kind of hand acts.
 
 use crate::scripted::ScriptName;
 
@@ -11,20 +9,15 @@ pub enum HandChoice {
     Scripted(ScriptName),
     /// Driven by mouse and keyboard, in a window.
     Mouse,
+    /// A person's own hand, through a glove and a tracker, or tracked otherwise.
+    Live,
+    /// A recording that is played again.
+    Replay,
 }
 
-impl FromStr for HandChoice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':').unwrap_or((text, "")) {
-            ("scripted", "") => Ok(Self::Scripted(ScriptName::default())),
-            ("scripted", name) => Ok(Self::Scripted(name.parse().map_err(|e| format!("{e}"))?)),
-            ("mouse", "") => Ok(Self::Mouse),
-            _ => {
-                Err("there is scripted, scripted:NAME and mouse; gloves and recordings come later"
-                    .into())
-            }
-        }
+impl HandChoice {
+    /// Whether it is played, so that it can be paused; a person cannot.
+    pub fn is_played(self) -> bool {
+        matches!(self, Self::Scripted(_) | Self::Replay)
     }
 }

@@ -1,7 +1,11 @@
-//! Where the hand comes from: a script, or mouse and keyboard.
+//! Where the hand comes from: a script, mouse and keyboard, devices, or a recording.
 
+use crate::foreign_recording::ForeignHand;
+use crate::live_hand::LiveHand;
 use crate::mouse::MouseHand;
-use crate::scripted::{ScriptedHand, Seen, Sent};
+use crate::recording::ReplayHand;
+use crate::scripted::{ScriptedHand, Seen};
+use crate::sent::Sent;
 use crate::soft_object::SoftObject;
 
 /// A source of device bytes.
@@ -10,14 +14,29 @@ pub enum HandSource {
     Scripted(ScriptedHand),
     /// A person with a mouse.
     Mouse(MouseHand),
+    /// A person with a glove, or with another hand that is tracked.
+    Live(Box<LiveHand>),
+    /// A recording that is played again.
+    Replay(ReplayHand),
+    /// A recording that another program made.
+    Foreign(ForeignHand),
 }
 
 impl HandSource {
-    /// Moves on by the time of so many ticks and says what the devices send then.
-    pub fn next_after(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Sent {
+    /// Moves on by the time of so many ticks and says what the devices send then. A recording moves
+    /// on by one tick, whatever was missed.
+    ///
+    /// Units: `now_s` s on the client's clock, now.
+    pub fn next_after(&mut self, ticks: u64, now_s: f64, seen: &Seen, object: &SoftObject) -> Sent {
         match self {
             Self::Scripted(hand) => hand.next_after(ticks, seen, object),
             Self::Mouse(hand) => hand.next_after(ticks, seen, object),
+            Self::Live(hand) => Sent { arrivals: hand.take(now_s), ..Sent::default() },
+            Self::Foreign(hand) => hand.next_after(ticks),
+            Self::Replay(hand) => match hand.next_tick() {
+                Some(replayed) => replayed.sent,
+                None => Sent { over: true, ..Sent::default() },
+            },
         }
     }
 
@@ -26,6 +45,9 @@ impl HandSource {
         match self {
             Self::Scripted(hand) => format!("scripted:{}", hand.script()),
             Self::Mouse(_) => "mouse".to_owned(),
+            Self::Live(hand) => hand.name().to_owned(),
+            Self::Replay(hand) => format!("replay:{}", hand.name()),
+            Self::Foreign(hand) => format!("replay:{}", hand.name()),
         }
     }
 
@@ -34,12 +56,18 @@ impl HandSource {
         match self {
             Self::Scripted(hand) => hand.is_planning(),
             Self::Mouse(hand) => hand.is_planning(),
+            Self::Live(_) | Self::Replay(_) | Self::Foreign(_) => false,
         }
     }
 
-    /// Whether it is played, so that it can be paused and played again; a person cannot.
+    /// Whether it is played, so that it can be paused; a person cannot.
     pub fn is_played(&self) -> bool {
-        matches!(self, Self::Scripted(_))
+        matches!(self, Self::Scripted(_) | Self::Replay(_) | Self::Foreign(_))
+    }
+
+    /// Whether it can go on without a window.
+    pub fn needs_window(&self) -> bool {
+        matches!(self, Self::Mouse(_))
     }
 }
 
@@ -52,5 +80,23 @@ impl From<ScriptedHand> for HandSource {
 impl From<MouseHand> for HandSource {
     fn from(hand: MouseHand) -> Self {
         Self::Mouse(hand)
+    }
+}
+
+impl From<ReplayHand> for HandSource {
+    fn from(hand: ReplayHand) -> Self {
+        Self::Replay(hand)
+    }
+}
+
+impl From<LiveHand> for HandSource {
+    fn from(hand: LiveHand) -> Self {
+        Self::Live(Box::new(hand))
+    }
+}
+
+impl From<ForeignHand> for HandSource {
+    fn from(hand: ForeignHand) -> Self {
+        Self::Foreign(hand)
     }
 }

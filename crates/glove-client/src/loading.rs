@@ -32,6 +32,8 @@ pub struct ObjectRequest {
 pub struct LoadedObject {
     /// What it is, for reports.
     pub summary: ObjectSummary,
+    /// Longest extent that the mesh was brought to, m; `None` where it kept its own.
+    pub brought_to_m: Option<f64>,
     /// The object, at rest.
     pub object: SoftObject,
     /// How the hand grasps it, or why it cannot.
@@ -115,7 +117,12 @@ pub fn load(
             }
             plan => {
                 let wanted = goes_on(LoadStage::Ready);
-                return Ok(wanted.then_some(LoadedObject { summary, object, plan }));
+                return Ok(wanted.then_some(LoadedObject {
+                    summary,
+                    brought_to_m: size,
+                    object,
+                    plan,
+                }));
             }
         }
     }

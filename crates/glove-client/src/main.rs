@@ -4,8 +4,13 @@ use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use glove_client::commands::align::AlignCommand;
+use glove_client::commands::calibrate::CalibrateCommand;
+use glove_client::commands::devices::DevicesCommand;
+use glove_client::commands::emulate::EmulateCommand;
 use glove_client::commands::inspect::InspectCommand;
 use glove_client::commands::mesh::MeshCommand;
+use glove_client::commands::replay::ReplayCommand;
 use glove_client::commands::run::RunCommand;
 use glove_client::commands::solve::SolveCommand;
 use glove_client::interruption;
@@ -25,6 +30,11 @@ enum Command {
     Solve(SolveCommand),
     Inspect(InspectCommand),
     Mesh(MeshCommand),
+    Replay(ReplayCommand),
+    Devices(DevicesCommand),
+    Emulate(EmulateCommand),
+    Calibrate(CalibrateCommand),
+    Align(AlignCommand),
 }
 
 fn main() -> ExitCode {
@@ -36,6 +46,11 @@ fn main() -> ExitCode {
         Command::Solve(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Mesh(command) => command.run(),
+        Command::Replay(command) => command.run(),
+        Command::Devices(command) => command.run(),
+        Command::Emulate(command) => command.run(),
+        Command::Calibrate(command) => command.run(),
+        Command::Align(command) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

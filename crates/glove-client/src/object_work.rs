@@ -146,6 +146,16 @@ impl ObjectWork {
         }
     }
 
+    /// The same, if it is to be taken now; else it stays the next. Work beside the ticks is always
+    /// taken.
+    pub fn take_if(&mut self, is_due: impl FnOnce(&ObjectDone) -> bool) -> Option<ObjectDone> {
+        match self {
+            Self::AtOnce(done) if done.front().is_some_and(is_due) => done.pop_front(),
+            Self::AtOnce(_) => None,
+            Self::Beside(beside) => beside.take(),
+        }
+    }
+
     /// Waits until all work that was handed over is done; the outcomes are still to be taken.
     pub fn settle(&mut self) {
         if let Self::Beside(beside) = self {

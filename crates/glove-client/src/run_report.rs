@@ -7,7 +7,9 @@ use softgrasp_core::grasp::{GraspEvent, StateName};
 
 use crate::contact_model::ContactModel;
 use crate::hand_reader::DeviceFaults;
+use crate::latency::LatencySummary;
 use crate::pace::{Due, Pace};
+use crate::recording::{Difference, ReplayCheck, ReplayHand};
 use crate::solve_report::{SCHEMA, SolveSummary};
 use crate::tick_budget::TickBudget;
 use crate::tick_outcome::{LoopEvent, TickOutcome};
@@ -41,6 +43,31 @@ pub struct RunReport {
     pub played: Vec<TickRecord>,
     /// The run in a few numbers.
     pub summary: RunSummary,
+    /// How a replay agrees with its recording; null for other hands.
+    pub replay: Option<ReplaySummary>,
+    /// Why the recording of this run is not complete; null where it is, or none was made.
+    pub recording_failed: Option<String>,
+}
+
+/// How a replay agrees with its recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReplaySummary {
+    /// Ticks that were compared.
+    pub ticks: u64,
+    /// Ticks with known displacements among them.
+    pub requests: u64,
+    /// Tick and stage of the first difference; null when there is none.
+    pub difference: Option<Difference>,
+    /// Why the recording ends before its file does; null for one that is whole.
+    pub cut: Option<String>,
+}
+
+impl ReplaySummary {
+    /// What a hand that was played again has found.
+    pub fn of(hand: &ReplayHand) -> Self {
+        let ReplayCheck { ticks, requests, difference } = hand.check.clone();
+        Self { ticks, requests, difference, cut: hand.recording().cut.clone() }
+    }
 }
 
 /// What was grasped.
@@ -111,6 +138,9 @@ pub struct RunSummary {
     pub ticks_over_1_ms: u64,
     /// Longest time for which a tick computed, ms.
     pub compute_ms_max: f64,
+    /// From the first byte of a sample to the displacement that it causes, by stage; null for a run
+    /// whose ticks wait for their answers, or in which nothing was deformed.
+    pub latency: Option<LatencySummary>,
     /// Largest relative residual.
     pub residual_rel_max: f64,
     /// Median round trip, ms.
@@ -127,6 +157,12 @@ pub struct RunSummary {
     pub peak_rss_bytes: u64,
     /// Times a shape was kept.
     pub shapes_kept: usize,
+    /// Ticks in which a device was silent and the hand was held where it was.
+    pub ticks_held: u64,
+    /// Jumps of the tracker to the opposite side of its field.
+    pub hemisphere_flips: u64,
+    /// Bad lines of joints, and lines that no hand fits.
+    pub joint_faults: u64,
     /// Bad records of the glove.
     pub glove_faults: u64,
     /// Bad records of the tracker.
@@ -156,6 +192,8 @@ impl RunReport {
             events: Vec::new(),
             played: Vec::new(),
             summary: RunSummary::default(),
+            replay: None,
+            recording_failed: None,
         }
     }
 
@@ -181,6 +219,7 @@ impl RunReport {
             shown_tick: outcome.shown_tick,
             compute_ms: 0.0,
         });
+        self.summary.ticks_held += u64::from(!outcome.silent.is_empty());
         self.add_outcome(due.tick, at_ms, outcome);
     }
 
@@ -236,15 +275,7 @@ impl RunReport {
 
     fn add_events(&mut self, tick: u64, at_ms: f64, events: &[LoopEvent]) {
         self.events.extend(events.iter().map(|event| {
-            let (kind, what) = match event {
-                LoopEvent::Grasp(GraspEvent::TipTouched(finger, node)) => {
-                    ("grasp", format!("{finger} touched node {node}"))
-                }
-                LoopEvent::Grasp(event) => ("grasp", event.to_string()),
-                LoopEvent::KeepRefused(text) => ("shape", format!("keep shape refused: {text}")),
-                LoopEvent::Shape(text) => ("shape", text.clone()),
-                LoopEvent::Server(text) => ("server", text.clone()),
-            };
+            let (kind, what) = event.kind_and_words();
             EventRecord { tick, at_ms, kind, what }
         }));
     }
@@ -276,6 +307,8 @@ impl RunReport {
             ticks_skipped: counted.ticks_skipped,
             ticks_over_1_ms: budget.over(),
             compute_ms_max: budget.longest().as_secs_f64() * 1e3,
+            // Booked by whoever plays the ticks.
+            latency: None,
             residual_rel_max: most(|s| s.residual_rel),
             round_trip_ms_p50: quantile(0.5),
             round_trip_ms_p99: quantile(0.99),
@@ -284,95 +317,12 @@ impl RunReport {
             max_strain: most(|s| s.max_strain),
             peak_rss_bytes: solves.iter().map(|s| s.peak_rss_bytes).max().unwrap_or(0),
             shapes_kept: self.events.iter().filter(|e| e.what == kept).count(),
+            ticks_held: counted.ticks_held,
+            hemisphere_flips: faults.hemisphere_flips,
+            joint_faults: faults.joints,
             glove_faults: faults.glove,
             tracker_faults: faults.tracker,
         };
-    }
-
-    /// Why the run is a failure: answers were asked for and none came. `None` if it is none.
-    pub fn failure(&self) -> Option<String> {
-        let s = &self.summary;
-        if s.solves > 0 || s.deforming_ticks == 0 || self.interrupted {
-            return None;
-        }
-        let said = |event: &&EventRecord| {
-            event.kind == "server"
-                && ["refused ", "lost: "].iter().any(|w| event.what.starts_with(w))
-        };
-        let why = match self.events.iter().rfind(said) {
-            Some(event) => format!("the server {}", event.what.replacen("lost", "was lost", 1)),
-            None => {
-                s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
-            }
-        };
-        Some(format!("none of {} deforming ticks was answered: {why}", s.deforming_ticks))
-    }
-
-    /// One screen for a person who has never seen the program.
-    pub fn describe(&self) -> String {
-        let s = &self.summary;
-        let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
-        let solve = self.played.iter().rev().find_map(|record| record.solve.as_ref());
-        let mut text = format!(
-            "\n{} ({} nodes, {} tetrahedra, {:.0} mm) in the {} hand, held by {}, solved by {}\n",
-            self.object.name,
-            self.object.nodes,
-            self.object.tets,
-            1e3 * self.object.size_m,
-            self.hand,
-            self.contact,
-            self.server
-        );
-        for note in &self.object.notes {
-            text.push_str(&format!("  {note}\n"));
-        }
-        text.push_str("\nWhat happened:\n");
-        for event in &self.events {
-            text.push_str(&format!("  tick {:>5}  {}\n", event.tick, event.what));
-        }
-        text.push_str(&format!("\n  ticks               {}", self.ticks));
-        if s.ticks_skipped > 0 {
-            text.push_str(&format!(
-                ", of which {} came too late and were skipped",
-                s.ticks_skipped
-            ));
-        }
-        text.push_str(&format!("\n  grasp states        {}\n", self.states_reached.join(", ")));
-        text.push_str(&format!(
-            "  deforming ticks     {} of {} answered\n",
-            s.solves, s.deforming_ticks
-        ));
-        for (why, count) in s.unanswered.by_count() {
-            text.push_str(&format!("    not answered      {count}: {why}\n"));
-        }
-        // A tick that waits for plans and kept shapes may compute for as long as they take.
-        if s.ticks_over_1_ms > 0 && self.pace == Pace::Free.name() {
-            text.push_str(&format!(
-                "  long ticks          {} computed for more than 1 ms ({:.1} ms at most)\n",
-                s.ticks_over_1_ms, s.compute_ms_max
-            ));
-        }
-        if let Some(solve) = solve {
-            text.push_str(&format!(
-                "  equations           {} unknown, {} prescribed, by {}\n  \
-                 answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
-                 residual            {:.1e} at most\n  \
-                 shape               turned by {:.1} degrees, strained by {:.0} % at most\n",
-                solve.unknown_dofs,
-                solve.known_dofs,
-                solve.method,
-                ms(s.round_trip_ms_p50),
-                ms(s.round_trip_ms_p99),
-                ms(s.round_trip_ms_max),
-                s.residual_rel_max,
-                s.max_rotation_deg,
-                100.0 * s.max_strain,
-            ));
-        }
-        if self.interrupted {
-            text.push_str("  ended by the user\n");
-        }
-        text
     }
 }
 

@@ -123,6 +123,15 @@ impl SceneFile {
     }
 }
 
+/// Longest extent of a built-in object that the hand grips best, m, where that is not its own: round
+/// a small strawberry the thumb comes to lie beside the fingers and not before them.
+pub fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
+    match object {
+        ObjectChoice::BuiltIn(BuiltIn::Strawberry) => Some(0.08),
+        ObjectChoice::BuiltIn(_) | ObjectChoice::File(_) => None,
+    }
+}
+
 /// An object ready for the hand, and what was done to make it so.
 #[derive(Debug)]
 pub struct SceneObject {

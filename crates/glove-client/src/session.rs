@@ -4,20 +4,23 @@
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use nalgebra::UnitQuaternion;
-use softgrasp_core::grasp::{Command, GraspEvent};
+use nalgebra::{Quaternion, UnitQuaternion};
+use softgrasp_core::grasp::{Command, GraspEvent, StateName};
 
 use crate::control::Control;
 use crate::grasp_loop::GraspLoop;
 use crate::hand_source::HandSource;
+use crate::latency::LatencyLedger;
 use crate::loading::LoadedObject;
 use crate::notice::Notice;
-use crate::pace::Due;
+use crate::pace::{Due, Pace};
+use crate::recording::{Intervention, Recorder, Replayed, StageDigests};
 use crate::rest_shape::ObjectError;
-use crate::run_report::RunReport;
+use crate::run_report::{ReplaySummary, RunReport};
 use crate::scripted::Seen;
+use crate::sent::Sent;
 use crate::soft_object::SoftObject;
 use crate::solve_settings::Subscription;
 use crate::tick_budget::{LIMIT, Priority, TickBudget};
@@ -36,6 +39,8 @@ pub struct Session {
     notices: Vec<Notice>,
     /// State, tips and segments after the last tick, without its news.
     last: TickOutcome,
+    recorder: Option<Recorder>,
+    latency: LatencyLedger,
 }
 
 impl Session {
@@ -48,9 +53,13 @@ impl Session {
         priority: Priority,
         ends_with_script: bool,
     ) -> Self {
+        let (mut grasp_loop, hand) = (grasp_loop, hand.into());
+        if matches!(hand, HandSource::Replay(_)) {
+            grasp_loop.want_digests();
+        }
         Self {
             grasp_loop,
-            hand: hand.into(),
+            hand,
             seen: Seen::default(),
             report,
             budget: TickBudget::new(priority),
@@ -58,6 +67,8 @@ impl Session {
             commands: VecDeque::new(),
             notices: Vec::new(),
             last: TickOutcome::default(),
+            recorder: None,
+            latency: LatencyLedger::default(),
         }
     }
 
@@ -70,10 +81,10 @@ impl Session {
     /// [`ObjectError`] when the object cannot be shown any more.
     pub fn play(&mut self, due: Due, now_s: f64) -> Result<Option<TickOutcome>, ObjectError> {
         self.budget.begin();
+        let began = Instant::now();
         // Between the ticks the object may have been turned or replaced.
         self.seen.world_from_object = *self.grasp_loop.world_from_object();
-        let object = self.grasp_loop.object();
-        let mut sent = self.hand.next_after(due.skipped + 1, &self.seen, object);
+        let (due, now_s, mut sent) = self.next(due, now_s);
         if sent.over && self.ends_with_script {
             self.report.add_skipped(due.skipped);
             return Ok(None);
@@ -82,12 +93,82 @@ impl Session {
             sent.command = self.commands.pop_front();
         }
         let outcome = self.grasp_loop.tick(due.tick, now_s, &sent)?;
+        self.record(due, now_s, &sent, &outcome);
         self.seen = outcome.seen;
         self.hear(&outcome);
         self.report.add(due, now_s, &outcome);
         let computed = self.budget.end();
+        self.note_latency(due.tick, now_s, began.elapsed(), &outcome);
         self.report.add_computed(computed);
         Ok(Some(outcome))
+    }
+
+    /// What comes into a tick; one that is played again has the number and the time it had before.
+    fn next(&mut self, due: Due, now_s: f64) -> (Due, f64, Sent) {
+        if let HandSource::Replay(hand) = &mut self.hand {
+            let Some(replayed) = hand.next_tick() else {
+                return (due, now_s, Sent { over: true, ..Sent::default() });
+            };
+            let Replayed { due, now_s, interventions, sent } = replayed;
+            interventions.into_iter().for_each(|done| self.repeat(done));
+            return (due, now_s, sent);
+        }
+        let object = self.grasp_loop.object();
+        let sent = self.hand.next_after(due.skipped + 1, now_s, &self.seen, object);
+        (due, now_s, sent)
+    }
+
+    /// Does again what a person did to the object between two ticks.
+    fn repeat(&mut self, done: Intervention) {
+        let repeated = match done {
+            Intervention::Turn([x, y, z, w]) => {
+                let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+                self.grasp_loop.turn_object(rotation).map_err(|error| error.to_string())
+            }
+            Intervention::UndoKeepShape => {
+                self.grasp_loop.undo_keep_shape().map_err(|notice| notice.text)
+            }
+            Intervention::NotReplayed(what) => Err(format!("a replay cannot repeat this: {what}")),
+        };
+        self.notices.extend(repeated.err().map(Notice::refused));
+    }
+
+    /// Writes down what a tick did, and holds it against what was written down.
+    fn record(&mut self, due: Due, now_s: f64, sent: &Sent, outcome: &TickOutcome) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.tick(due, now_s, sent, outcome, &self.grasp_loop);
+        }
+        if let HandSource::Replay(hand) = &mut self.hand {
+            hand.compare(&StageDigests::of(&self.grasp_loop, outcome));
+        }
+    }
+
+    /// Books when the samples came, the question was asked and the answers were shown.
+    fn note_latency(&mut self, tick: u64, now_s: f64, computed: Duration, outcome: &TickOutcome) {
+        // Ticks that wait for their answers have no time of their own.
+        if self.grasp_loop.pace() == Pace::Lockstep {
+            return;
+        }
+        let end_s = now_s + computed.as_secs_f64();
+        for (asked, solve) in &outcome.answers {
+            self.latency.shown(*asked, solve.round_trip_ms, end_s);
+        }
+        let sample_s = self.grasp_loop.reader().sample_time_s(now_s);
+        if let (Some(StateName::Deforming), Some(sample_s)) = (outcome.state, sample_s) {
+            self.latency.asked(tick, sample_s, now_s, end_s);
+        }
+    }
+
+    /// From now on every tick is recorded.
+    pub fn record_to(&mut self, recorder: Recorder) {
+        self.grasp_loop.want_digests();
+        self.recorder = Some(recorder);
+    }
+
+    fn intervened(&mut self, intervention: Intervention) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.intervene(intervention);
+        }
     }
 
     /// Goes on with what is under way while no tick is played. The outcome repeats what the last
@@ -97,6 +178,9 @@ impl Session {
     /// As [`Session::play`].
     pub fn idle(&mut self) -> Result<TickOutcome, ObjectError> {
         let outcome = self.grasp_loop.idle()?;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.idle(&outcome);
+        }
         self.report.add_last(&outcome);
         self.hear(&outcome);
         let TickOutcome { events, answers, unanswered, notices, .. } = outcome;
@@ -112,7 +196,13 @@ impl Session {
             Control::KeepShape => self.command(Command::KeepShape),
             Control::Detach => self.command(Command::Release),
             Control::ReturnHome => self.command(Command::ReturnHome),
-            Control::UndoKeepShape => self.grasp_loop.undo_keep_shape(),
+            Control::UndoKeepShape => {
+                let begun = self.grasp_loop.undo_keep_shape();
+                if begun.is_ok() {
+                    self.intervened(Intervention::UndoKeepShape);
+                }
+                begun
+            }
             Control::Save(path) => self.save(path),
             Control::ReplaceObject(loaded) => self.replace_object(&loaded),
             Control::ReplaceHand(hand) => self.replace_hand(*hand),
@@ -194,6 +284,13 @@ impl Session {
         self.report.add_last(&self.grasp_loop.take_last()?);
         self.report.interrupted = interrupted;
         self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
+        self.report.summary.latency = self.latency.summary();
+        if let HandSource::Replay(hand) = self.hand {
+            self.report.replay = Some(ReplaySummary::of(&hand));
+        }
+        if let Some(Err(error)) = self.recorder.map(Recorder::finish) {
+            self.report.recording_failed = Some(error.to_string());
+        }
         Ok(self.report)
     }
 
@@ -220,7 +317,10 @@ impl Session {
     }
 
     fn replace_object(&mut self, loaded: &LoadedObject) -> Result<(), Notice> {
-        let LoadedObject { summary, object, plan } = loaded;
+        if matches!(self.hand, HandSource::Replay(_)) {
+            return Err(Notice::refused("a recording is of the object that it was made with"));
+        }
+        let LoadedObject { summary, object, plan, .. } = loaded;
         let plan = match (plan, self.hand.is_played()) {
             (Err(error), true) => return Err(Notice::refused(error.to_string())),
             (plan, _) => plan.as_ref().ok(),
@@ -230,7 +330,10 @@ impl Session {
         match &mut self.hand {
             HandSource::Scripted(hand) => hand.restart(plan.copied()),
             HandSource::Mouse(hand) => hand.meet_new_object(),
+            HandSource::Foreign(hand) => hand.restart(),
+            HandSource::Live(_) | HandSource::Replay(_) => {}
         }
+        self.intervened(Intervention::NotReplayed(format!("the object became {}", summary.name)));
         Ok(())
     }
 
@@ -241,6 +344,8 @@ impl Session {
             self.grasp_loop.put_object_home();
             hand.restart(None);
         }
+        let what = format!("the hand became {}", hand.name());
+        self.intervened(Intervention::NotReplayed(what));
         let text = format!("the hand is now {}", hand.name());
         self.hand = hand;
         self.notices.push(Notice::done(text));
@@ -249,11 +354,12 @@ impl Session {
 
     fn restart(&mut self) -> Result<(), Notice> {
         let HandSource::Scripted(hand) = &mut self.hand else {
-            let text = "a hand that a person moves cannot be played again";
+            let text = "only a script can be played again from its beginning";
             return Err(Notice::refused(text));
         };
         hand.restart(None);
         self.grasp_loop.put_object_home();
+        self.intervened(Intervention::NotReplayed("the script began again".to_owned()));
         Ok(())
     }
 
@@ -263,6 +369,9 @@ impl Session {
             return Err(Notice::refused(text));
         }
         let turned = self.grasp_loop.turn_object(rotation);
+        if turned.is_ok() {
+            self.intervened(Intervention::Turn(rotation.coords.into()));
+        }
         turned.map_err(|error| Notice::refused(format!("the object is not turned: {error}")))
     }
 
@@ -289,6 +398,7 @@ fn notice_of(event: &LoopEvent) -> Option<Notice> {
             Notice::refused(format!("{command}: the hand holds nothing"))
         }
         LoopEvent::KeepRefused(text) => Notice::refused(text.clone()),
+        LoopEvent::Device(text) => Notice::refused(text.clone()),
         LoopEvent::Grasp(_) | LoopEvent::Shape(_) | LoopEvent::Server(_) => return None,
     })
 }

@@ -183,7 +183,7 @@ impl<'a> TickLoop<'a> {
         }
         match (control, self.mode) {
             (Control::Stop, _) | (_, Mode::Stopped) => self.mode = Mode::Stopped,
-            (Control::EndWithScript, _) if !self.session.hand().is_played() => {
+            (Control::EndWithScript, _) if self.session.hand().needs_window() => {
                 self.mode = Mode::Stopped;
             }
             (Control::EndWithScript, mode) => {

@@ -2,6 +2,7 @@
 
 use softgrasp_core::grasp::{GraspEvent, StateName};
 
+use crate::arrival::Device;
 use crate::notice::Notice;
 use crate::scripted::Seen;
 use crate::solve_report::SolveSummary;
@@ -18,6 +19,24 @@ pub enum LoopEvent {
     Shape(String),
     /// The server came, went, or refused.
     Server(String),
+    /// A device fell silent, or speaks again.
+    Device(String),
+}
+
+impl LoopEvent {
+    /// `grasp`, `shape` or `server`, and what happened in words.
+    pub fn kind_and_words(&self) -> (&'static str, String) {
+        match self {
+            Self::Grasp(GraspEvent::TipTouched(finger, node)) => {
+                ("grasp", format!("{finger} touched node {node}"))
+            }
+            Self::Grasp(event) => ("grasp", event.to_string()),
+            Self::KeepRefused(text) => ("shape", format!("keep shape refused: {text}")),
+            Self::Shape(text) => ("shape", text.clone()),
+            Self::Server(text) => ("server", text.clone()),
+            Self::Device(text) => ("device", text.clone()),
+        }
+    }
 }
 
 /// One tick, for the status line and the report.
@@ -37,6 +56,12 @@ pub struct TickOutcome {
     pub unanswered: Vec<(u64, Unanswered)>,
     /// Tick whose answer the object shows now; `None` while it shows none of this grip.
     pub shown_tick: Option<u64>,
+    /// Devices that are silent: the hand is held where it was.
+    pub silent: Vec<Device>,
+    /// Whether a rest shape that was made beside the ticks was taken.
+    pub took_work: bool,
+    /// Digest of what the server is asked, where that is recorded or held against a recording.
+    pub request_digest: Option<String>,
     /// What the person sees next.
     pub seen: Seen,
     /// Sentences for the person.

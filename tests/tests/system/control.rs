@@ -38,7 +38,7 @@ fn loaded(mesh: TetMesh) -> Box<LoadedObject> {
         avoid_gaze: None,
     }
     .grip();
-    Box::new(LoadedObject { summary: summary(&object), object, plan })
+    Box::new(LoadedObject { summary: summary(&object), brought_to_m: None, object, plan })
 }
 
 #[test]

@@ -18,7 +18,10 @@ fn wish(run: &mut Controlled, input: MouseInput) {
 fn arrive(run: &mut Controlled) {
     let on_its_way = |run: &Controlled| match run.session.hand() {
         HandSource::Mouse(hand) => hand.is_on_its_way(),
-        HandSource::Scripted(_) => false,
+        HandSource::Scripted(_)
+        | HandSource::Live(_)
+        | HandSource::Replay(_)
+        | HandSource::Foreign(_) => false,
     };
     run.until("the hand is there", |run, _| !on_its_way(run));
 }

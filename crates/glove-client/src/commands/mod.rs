@@ -1,17 +1,31 @@
 //! The commands of `glove-client`, one file each; `main` only parses and prints the error.
 
+pub mod align;
+mod arm_recording;
+pub mod calibrate;
+mod collecting;
+pub mod devices;
 mod display_arguments;
+pub mod emulate;
+mod gestures;
+mod hand_files;
 pub mod inspect;
 mod key_frames;
+mod live_samples;
 pub mod mesh;
 mod numbers;
 mod output;
+mod recorded_samples;
+mod recorded_settings;
+pub mod replay;
 pub mod run;
 mod run_arguments;
 #[cfg_attr(not(feature = "window"), path = "no_pictures.rs")]
 mod run_pictures;
+mod run_recording;
 mod run_setup;
 #[cfg(feature = "window")]
 mod run_window;
+mod sensor_bars;
 pub mod solve;
 mod tell_report;

@@ -1,5 +1,6 @@
 //! Numbers on the command line: a value that can never work is refused with the option's name.
 
+use nalgebra::Point3;
 use softgrasp_core::fem::Material;
 
 /// A finite number above 0.
@@ -22,6 +23,25 @@ pub fn count(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(number) if number > 0 => Ok(number),
         _ => Err("it must be a whole number, 1 or above".to_owned()),
+    }
+}
+
+/// A speed: 0 or above.
+pub fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a finite number, 0 or above".to_owned()),
+    }
+}
+
+/// A place: three numbers with commas, m.
+pub fn place(text: &str) -> Result<Point3<f64>, String> {
+    let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, z] if text.split(',').count() == 3 && [x, y, z].iter().all(|n| n.abs() <= 10.0) => {
+            Ok(Point3::new(x, y, z))
+        }
+        _ => Err("it must be three numbers with commas, at most 10 m each".to_owned()),
     }
 }
 

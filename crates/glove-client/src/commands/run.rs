@@ -14,7 +14,7 @@ use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 use super::run_window;
 use super::tell_report::tell;
 use crate::control::Control;
-use crate::hand_choice::HandChoice;
+use crate::hand_request::HandRequest;
 use crate::interruption;
 use crate::pace::Pace;
 use crate::progress::Progress;
@@ -26,7 +26,7 @@ use crate::tick_loop::{TickLoop, Timing};
 #[derive(Args, Default)]
 pub struct RunCommand {
     #[command(flatten)]
-    arguments: RunArguments,
+    pub(super) arguments: RunArguments,
 }
 
 /// Longest wait for the server to prepare the object before a lockstep run begins.
@@ -43,7 +43,10 @@ impl RunCommand {
         match self.in_window(&plan)? {
             Shown::InWindow(Some(report)) => tell(self.arguments.report.as_deref(), &report),
             Shown::InWindow(None) => Ok(()),
-            Shown::Not => self.without_window(&plan),
+            Shown::Not => {
+                let report = self.without_window(&plan)?;
+                tell(self.arguments.report.as_deref(), &report)
+            }
         }
     }
 
@@ -66,8 +69,8 @@ impl RunCommand {
     }
 
     /// Plays without a window; shows one line on a terminal.
-    fn without_window(&self, plan: &RunPlan) -> anyhow::Result<()> {
-        if plan.hand == HandChoice::Mouse {
+    pub(super) fn without_window(&self, plan: &RunPlan) -> anyhow::Result<RunReport> {
+        if plan.hand == HandRequest::Mouse {
             bail!(
                 "--hand mouse needs the window: a run without one has nothing to be moved by; \
                    take --hand scripted"
@@ -76,6 +79,7 @@ impl RunCommand {
         let mut pictures = RunPictures::start(&self.arguments, plan)?;
         let progress = Progress::start("preparing the object");
         let setup = Setup {
+            record: self.arguments.record.clone(),
             threads: self.arguments.threads,
             ends_with_script: self.arguments.frames.is_none(),
         };
@@ -120,7 +124,7 @@ impl RunCommand {
         if let Some(pictures) = pictures {
             pictures.finish()?;
         }
-        tell(self.arguments.report.as_deref(), &session.finish(interrupted)?)
+        Ok(session.finish(interrupted)?)
     }
 }
 

@@ -1,25 +1,32 @@
 //! The arguments of `glove-client run`, and the run that they and the scene file describe.
 
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::Args;
+use nalgebra::{Isometry3, Point3, Translation3};
 use softgrasp_core::fem::{Element, Material as ElasticMaterial};
-use softgrasp_core::mesh::BuiltIn;
+use softgrasp_core::hand::HandDimensions;
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
 use super::display_arguments::DisplayArguments;
-use super::numbers::{count, poisson, positive, ticks};
+use super::hand_files::read_configuration;
+use super::numbers::{count, place, poisson, positive, speed, ticks};
+use super::recorded_settings::{recorded_hand, recorded_place, recorded_settings};
 use crate::connection::ServerChoice;
 use crate::contact_model::ContactModel;
-use crate::hand_choice::HandChoice;
+use crate::foreign_recording::is_foreign;
 use crate::hand_reader::HandSetup;
+use crate::hand_request::HandRequest;
+use crate::hand_setup::HandConfiguration;
 use crate::loading::ObjectRequest;
 use crate::pace::Pace;
-use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile};
+use crate::recording::{Recording, read_recording};
+use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile, size_to_hold};
 use crate::scripted::ScriptName;
 use crate::solve_settings::{SolveSettings, Subscription};
 
@@ -39,9 +46,23 @@ pub struct RunArguments {
     /// other built-ins].
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     pub(super) object_size: Option<f64>,
-    /// The hand: scripted[:approach|attach|squeeze|release|regrasp], or mouse (in a window).
+    /// The hand: scripted[:approach|attach|squeeze|release|regrasp], mouse (in a window),
+    /// serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, or replay:F.mcap.
     #[arg(long, value_name = "SOURCE")]
-    pub(super) hand: Option<HandChoice>,
+    pub(super) hand: Option<HandRequest>,
+    /// Configuration of the hand, its glove and its tracker (hand.toml, made by `calibrate` and
+    /// `align`).
+    #[arg(long, value_name = "F.toml")]
+    pub(super) hand_setup: Option<PathBuf>,
+    /// Length of the hand, m: wrist crease to tip of the middle finger [default: 0.185].
+    #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
+    pub(super) hand_length: Option<f64>,
+    /// Breadth of the hand, m: across the knuckles, without the thumb [default: 0.084].
+    #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
+    pub(super) hand_breadth: Option<f64>,
+    /// Place of the object in the frame of a sender of joints, m [default: before its first hand].
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    pub(super) joints_origin: Option<Point3<f64>>,
     /// Where to solve: HOST:PORT, or embedded [default: embedded].
     #[arg(long, value_name = "ADDR|embedded")]
     pub(super) server: Option<ServerChoice>,
@@ -68,6 +89,10 @@ pub struct RunArguments {
     /// Ticks per second, in real time; without it a scripted hand waits for each answer.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_hyphen_values = true)]
     pub(super) rate: Option<f64>,
+    /// How fast a recording is played again: 1 as it was, 0 as fast as it goes [default: 1 where a
+    /// person watches, else 0].
+    #[arg(long, value_name = "FACTOR", value_parser = speed, allow_hyphen_values = true)]
+    pub(super) speed: Option<f64>,
     /// Ticks to play [default: until the script ends].
     #[arg(long, value_name = "N", value_parser = ticks, allow_hyphen_values = true)]
     pub(super) frames: Option<u64>,
@@ -80,6 +105,9 @@ pub struct RunArguments {
     /// Folder for the deformed object at key frames (VTU).
     #[arg(long, value_name = "D")]
     pub(super) out_dir: Option<PathBuf>,
+    /// Records the run: device bytes, poses, contacts, requests, answers (MCAP).
+    #[arg(long, value_name = "F.mcap")]
+    pub(super) record: Option<PathBuf>,
     /// File for a JSON report.
     #[arg(long, value_name = "F.json")]
     pub(super) report: Option<PathBuf>,
@@ -116,11 +144,19 @@ pub(super) struct RunPlan {
     /// Where to solve.
     pub(super) server: ServerChoice,
     /// Where the hand comes from.
-    pub(super) hand: HandChoice,
+    pub(super) hand: HandRequest,
     /// Whether ticks wait for answers.
     pub(super) pace: Pace,
     /// From tick to tick, in real time.
     pub(super) period: Option<Duration>,
+    /// The hand, its glove and its tracker.
+    pub(super) hand_configuration: HandConfiguration,
+    /// Whether devices send what they will.
+    pub(super) is_live: bool,
+    /// Where a sender of joints is placed; `None` places its first hand before the object.
+    pub(super) world_from_sender: Option<Isometry3<f64>>,
+    /// The recording that is played again.
+    pub(super) recording: Option<Arc<Recording>>,
 }
 
 /// Ticks per second where a person watches.
@@ -139,6 +175,11 @@ impl RunArguments {
     /// # Errors
     /// A scene that cannot be read, or that asks for what cannot be.
     pub(super) fn plan(&self) -> anyhow::Result<RunPlan> {
+        if let Some(HandRequest::Replay(path)) = &self.hand
+            && !is_foreign(path)
+        {
+            return self.plan_of_recording(path);
+        }
         let scene = match &self.scene {
             Some(path) => SceneFile::read(path)?,
             None => SceneFile::default(),
@@ -170,10 +211,11 @@ impl RunArguments {
             (None, Some(name)) => name.parse().context("the scene's contact")?,
             (None, None) => ContactModel::default(),
         };
-        let hand = self.hand.unwrap_or(HandChoice::Scripted(ScriptName::default()));
+        let hand = self.hand.clone().unwrap_or(HandRequest::Scripted(ScriptName::default()));
         // A person at a terminal watches; a pipe wants the result.
         let watched = console_is_watched() && !self.is_without_window();
-        let rate = self.rate.or(watched.then_some(WATCHED_RATE_HZ));
+        // Devices have a time of their own.
+        let rate = self.rate.or((watched || hand.is_live()).then_some(WATCHED_RATE_HZ));
         let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
         let object_size =
             self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
@@ -192,9 +234,55 @@ impl RunArguments {
                 },
             },
             server: self.server.clone().unwrap_or(ServerChoice::Embedded),
-            hand,
             pace: if period.is_some() { Pace::Free } else { Pace::Lockstep },
             period,
+            is_live: hand.is_live(),
+            hand,
+            hand_configuration: self.hand_configuration()?,
+            world_from_sender: self.joints_origin.map(|at| Translation3::from(-at.coords).into()),
+            recording: None,
+        })
+    }
+
+    /// The hand of the file that was named, in the size that was given.
+    fn hand_configuration(&self) -> anyhow::Result<HandConfiguration> {
+        let mut configuration = match &self.hand_setup {
+            Some(path) => read_configuration(path)?,
+            None => HandConfiguration::default(),
+        };
+        let old = configuration.setup.dimensions;
+        if self.hand_length.is_some() || self.hand_breadth.is_some() {
+            let length_m = self.hand_length.unwrap_or(old.hand_length);
+            let size =
+                HandDimensions::scaled(length_m, self.hand_breadth.unwrap_or(old.hand_breadth))?;
+            configuration.setup.dimensions = size.with_handedness(old.handedness);
+        }
+        Ok(configuration)
+    }
+
+    /// The run of a recording, whatever the scene file says: object, material and solving are those
+    /// that were recorded.
+    fn plan_of_recording(&self, path: &Path) -> anyhow::Result<RunPlan> {
+        let recording = read_recording(path)?;
+        let setup = &recording.setup;
+        let recorded_s = setup.period_s.unwrap_or(1.0 / WATCHED_RATE_HZ);
+        let watched = console_is_watched() && !self.is_without_window();
+        let speed = self.speed.unwrap_or(if watched { 1.0 } else { 0.0 });
+        let period = (speed > 0.0).then(|| (recorded_s / speed).min(PERIOD_MAX_S));
+        Ok(RunPlan {
+            object: self.object.clone().map_or_else(|| setup.object.parse(), Ok)?,
+            nodes: setup.nodes,
+            object_size: setup.size_m,
+            settings: recorded_settings(setup)?,
+            server: self.server.clone().unwrap_or(ServerChoice::Embedded),
+            hand: HandRequest::Replay(path.to_owned()),
+            // Each tick waits for the answers that it took before.
+            pace: Pace::Lockstep,
+            period: period.map(Duration::from_secs_f64),
+            hand_configuration: recorded_hand(setup)?,
+            is_live: setup.is_live,
+            world_from_sender: recorded_place(setup),
+            recording: Some(Arc::new(recording)),
         })
     }
 }
@@ -209,7 +297,8 @@ impl RunPlan {
     #[cfg(feature = "window")]
     pub(super) fn for_window(&self) -> Self {
         let period = Some(Duration::from_secs_f64(self.tick_s()));
-        Self { pace: Pace::Free, period, ..self.clone() }
+        let pace = if self.recording.is_some() { self.pace } else { Pace::Free };
+        Self { pace, period, ..self.clone() }
     }
 
     /// Its material as the solver knows it.
@@ -231,15 +320,6 @@ impl RunPlan {
             setup: setup.clone(),
             contact: self.settings.contact,
         }
-    }
-}
-
-/// Longest extent of a built-in object that the hand grips best, m, where that is not its own: round
-/// a small strawberry the thumb comes to lie beside the fingers and not before them.
-fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
-    match object {
-        ObjectChoice::BuiltIn(BuiltIn::Strawberry) => Some(0.08),
-        ObjectChoice::BuiltIn(_) | ObjectChoice::File(_) => None,
     }
 }
 

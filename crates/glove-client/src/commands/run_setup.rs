@@ -1,24 +1,31 @@
 //! Makes a run ready: the object, the hand, the server, the session that plays them.
 
 use std::io::IsTerminal as _;
+use std::path::PathBuf;
 
 use anyhow::Context;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::Grasp;
 
 use super::run_arguments::RunPlan;
+use super::run_recording::{check_object, start_recorder};
 use crate::connection::Host;
+use crate::foreign_recording::{ForeignHand, is_foreign};
 use crate::grasp_loop::GraspLoop;
-use crate::hand_choice::HandChoice;
-use crate::hand_reader::{HandReader, HandSetup};
+use crate::hand_reader::HandReader;
+use crate::hand_request::HandRequest;
 use crate::hand_source::HandSource;
 use crate::interruption;
+use crate::joints::JointsListener;
 use crate::link::Link;
+use crate::live_hand::LiveHand;
 use crate::loading::{LoadStage, LoadedObject, load};
 use crate::mouse::MouseHand;
 use crate::pace::Pace;
+use crate::recording::ReplayHand;
 use crate::run_report::RunReport;
 use crate::scripted::{Planner, ScriptedHand};
+use crate::serial::{SerialDevices, SerialSettings};
 use crate::session::{Session, priority_for};
 use crate::soft_object::SoftObject;
 use crate::tick_budget::Priority;
@@ -42,6 +49,8 @@ pub(super) enum SetupStage {
 
 /// How a run is to be made ready.
 pub(super) struct Setup {
+    /// File that the run is recorded to.
+    pub(super) record: Option<PathBuf>,
     /// Threads of an embedded server; `None` takes one per processor.
     pub(super) threads: Option<usize>,
     /// Whether it ends with the script.
@@ -58,27 +67,48 @@ pub(super) fn make_ready(
     at: impl Fn(SetupStage),
     seen: impl FnOnce(&SoftObject) -> anyhow::Result<()>,
 ) -> anyhow::Result<ReadyRun> {
-    let hand_setup = HandSetup::default();
+    let hand_setup = plan.hand_configuration.setup.clone();
     let goes_on = |stage| {
         at(SetupStage::Object(stage));
         true
     };
     let loaded = load(&plan.object_request(&hand_setup), goes_on)?;
-    let LoadedObject { summary, mut object, plan: grip } =
-        loaded.context("the object was called off")?;
+    let loaded = loaded.context("the object was called off")?;
+    if let Some(recording) = &plan.recording {
+        check_object(&recording.setup, &loaded)?;
+    }
+    let recorder = setup.record.as_deref();
+    let hand_name = plan.hand.to_string();
+    let recorder =
+        recorder.map(|path| start_recorder(path, plan, &loaded, hand_name)).transpose()?;
+    let LoadedObject { summary, mut object, plan: grip, .. } = loaded;
     seen(&object)?;
     let planner = || Planner::beside().context("cannot start the planner's thread");
     let contact = plan.settings.contact;
-    let hand: HandSource = match (plan.hand, plan.pace) {
-        (HandChoice::Mouse, _) => {
+    let hand: HandSource = match (&plan.hand, plan.pace) {
+        (HandRequest::Mouse, _) => {
             MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).holding(contact).into()
         }
-        (HandChoice::Scripted(script), Pace::Lockstep) => {
-            ScriptedHand::following(script, hand_setup.clone(), grip?).holding(contact).into()
+        (HandRequest::Scripted(script), Pace::Lockstep) => {
+            ScriptedHand::following(*script, hand_setup.clone(), grip?).holding(contact).into()
         }
-        (HandChoice::Scripted(script), Pace::Free) => {
-            let hand = ScriptedHand::following(script, hand_setup.clone(), grip?);
+        (HandRequest::Scripted(script), Pace::Free) => {
+            let hand = ScriptedHand::following(*script, hand_setup.clone(), grip?);
             hand.holding(contact).with_planner(planner()?).into()
+        }
+        (HandRequest::Serial(source), _) => {
+            let settings = SerialSettings::of_hand(source, &plan.hand_configuration);
+            LiveHand::serial(SerialDevices::open(settings)?, plan.hand.to_string()).into()
+        }
+        (HandRequest::Joints(address), _) => {
+            LiveHand::joints(JointsListener::bind(*address)?, plan.hand.to_string()).into()
+        }
+        (HandRequest::Replay(path), _) if is_foreign(path) => {
+            ForeignHand::read(path, &hand_setup, plan.tick_s())?.into()
+        }
+        (HandRequest::Replay(path), _) => {
+            let recording = plan.recording.clone().context("the recording has not been read")?;
+            ReplayHand::new(recording, path.display().to_string()).into()
         }
     };
     let priority = match plan.pace {
@@ -104,10 +134,16 @@ pub(super) fn make_ready(
         plan.settings.contact,
     );
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M)?;
-    let reader = HandReader::new(hand_setup);
+    let reader = match plan.is_live {
+        true => HandReader::of_devices(hand_setup, plan.world_from_sender),
+        false => HandReader::new(hand_setup),
+    };
     let settings = plan.settings.clone();
     let grasp_loop = GraspLoop::try_new(reader, object, grasp, link, settings, plan.pace)
         .context("cannot start a thread beside the ticks")?;
-    let session = Session::new(grasp_loop, hand, report, priority, setup.ends_with_script);
+    let mut session = Session::new(grasp_loop, hand, report, priority, setup.ends_with_script);
+    if let Some(recorder) = recorder {
+        session.record_to(recorder);
+    }
     Ok(ReadyRun { session, host })
 }

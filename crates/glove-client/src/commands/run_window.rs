@@ -68,7 +68,8 @@ fn when_lost(report: Option<PathBuf>) -> WhenLost {
 /// Begins the run beside the window.
 fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
     let plan = plan.for_window();
-    let setup = Setup { threads: arguments.threads, ends_with_script: false };
+    let record = arguments.record.clone();
+    let setup = Setup { record, threads: arguments.threads, ends_with_script: false };
     let timing = Timing { period: plan.period, ticks_max: arguments.frames };
     Start::begin(move |at| {
         let ReadyRun { session, host } =
@@ -78,7 +79,7 @@ fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
             server: plan.server.to_string(),
             contact: plan.settings.contact.to_string(),
             material: plan.elastic_material()?,
-            hand: plan.hand,
+            hand: plan.hand.choice(),
             method: plan.settings.method.to_string(),
             max_error: None,
             tick_s: plan.tick_s(),

@@ -13,7 +13,8 @@ use super::speed::limited;
 use crate::contact_model::ContactModel;
 use crate::hand_reader::HandSetup;
 use crate::notice::Notice;
-use crate::scripted::{GraspPlan, PalmPath, PlanRequest, Planner, Posture, Seen, Sent, angles};
+use crate::scripted::{GraspPlan, PalmPath, PlanRequest, Planner, Posture, Seen, angles};
+use crate::sent::Sent;
 use crate::soft_object::SoftObject;
 
 /// The mouse hand.
@@ -152,8 +153,8 @@ impl MouseHand {
         }
         self.grip.advance(seconds, self.plan.as_ref().map(|planned| &planned.plan));
         let joint_angles = angles(self.grip.closure(), self.posture);
-        let (glove, tracker) = self.setup.bytes_of(&joint_angles, &self.world_from_palm);
-        Sent { glove, tracker, ..Sent::default() }
+        let arrivals = self.setup.arrivals_of(&joint_angles, &self.world_from_palm);
+        Sent { arrivals, ..Sent::default() }
     }
 
     /// Closing of each finger that is wished for, thumb first, for a slider.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use softgrasp_core::grasp::{Command, StateName};
-use softgrasp_core::hand::Finger;
+use softgrasp_core::hand::{Finger, JointAngles};
 
 use super::approach::PalmPath;
 use super::plan::{GraspPlan, Posture, angles};
@@ -12,6 +12,7 @@ use super::planner::{NoGrasp, PlanRequest, Planner};
 use super::script::{ScriptName, Step};
 use crate::contact_model::ContactModel;
 use crate::hand_reader::HandSetup;
+use crate::sent::Sent;
 use crate::soft_object::SoftObject;
 
 /// What the person behind the hand sees before moving on.
@@ -27,17 +28,32 @@ pub struct Seen {
     pub keeping: bool,
 }
 
-/// What the devices send in one tick, and what the person asks for.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sent {
-    /// Bytes of the glove.
-    pub glove: Vec<u8>,
-    /// Bytes of the tracker.
-    pub tracker: Vec<u8>,
+/// How the hand stands at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moment {
+    /// How far each finger is closed, 0 to 1, thumb first.
+    pub(super) closure: [f64; 5],
+    /// How the hand is set.
+    pub(super) posture: Posture,
+    /// The palm.
+    pub(super) world_from_palm: Isometry3<f64>,
+}
+
+impl Moment {
+    /// The joint angles.
+    pub(super) fn angles(&self) -> JointAngles {
+        angles(&self.closure, self.posture)
+    }
+}
+
+/// What has been played of a script.
+pub(super) struct Played {
+    /// How the hand stands now.
+    pub(super) moment: Moment,
     /// Menu command.
-    pub command: Option<Command>,
-    /// The script is over; the hand rests.
-    pub over: bool,
+    pub(super) command: Option<Command>,
+    /// The script is over.
+    pub(super) over: bool,
 }
 
 /// The scripted hand.
@@ -163,6 +179,13 @@ impl ScriptedHand {
     /// Moves on by the time of so many ticks, of which only the last is played, and says what the
     /// devices send then.
     pub fn next_after(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Sent {
+        let Played { moment, command, over } = self.play(ticks, seen, object);
+        let arrivals = self.setup.arrivals_of(&moment.angles(), &moment.world_from_palm);
+        Sent { arrivals, command, over, recorded: None }
+    }
+
+    /// The same before anything is sent.
+    pub(super) fn play(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Played {
         let mut command = None;
         let mut step = None;
         for _ in 0..ticks {
@@ -180,10 +203,12 @@ impl ScriptedHand {
                 break;
             }
         }
-        let world_from_palm = self.world_from_palm(step, object.rest_shape().centre());
-        let joint_angles = angles(&self.closure, self.posture(step));
-        let (glove, tracker) = self.setup.bytes_of(&joint_angles, &world_from_palm);
-        Sent { glove, tracker, command, over: step.is_none() }
+        let moment = Moment {
+            closure: self.closure,
+            posture: self.posture(step),
+            world_from_palm: self.world_from_palm(step, object.rest_shape().centre()),
+        };
+        Played { moment, command, over: step.is_none() }
     }
 
     /// Whether the hand holds still because the shape is being kept.
@@ -344,7 +369,7 @@ mod tests {
         for tick in 0..95 {
             let sent = hand.next(&seen, &object);
             let now_s = f64::from(tick) / 60.0;
-            reader.feed(&sent.glove, &sent.tracker, now_s);
+            reader.feed(&sent.arrivals, now_s);
             let palm = reader.hand(now_s).unwrap().world_from_palm;
             if let Some(before) = before {
                 let moved = (palm.translation.vector - before.translation.vector).norm();
@@ -362,8 +387,8 @@ mod tests {
         let (free, keeping) = (Seen::default(), Seen { keeping: true, ..Seen::default() });
         let first = hand.next(&free, &object);
         let resting: Vec<Sent> = (0..REST_MAX).map(|_| hand.next(&keeping, &object)).collect();
-        assert!(resting.iter().all(|sent| !sent.glove.is_empty() && *sent == resting[0]));
-        assert!(resting[0].tracker == first.tracker);
-        assert!(hand.next(&keeping, &object).tracker != first.tracker);
+        assert!(resting.iter().all(|sent| !sent.arrivals.is_empty() && *sent == resting[0]));
+        assert!(resting[0].arrivals == first.arrivals);
+        assert!(hand.next(&keeping, &object).arrivals != first.arrivals);
     }
 }

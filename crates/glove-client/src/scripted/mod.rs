@@ -4,10 +4,12 @@ mod approach;
 mod hand;
 mod plan;
 mod planner;
+mod rehearsal;
 mod script;
 
 pub use approach::PalmPath;
-pub use hand::{ScriptedHand, Seen, Sent};
+pub use hand::{ScriptedHand, Seen};
 pub use plan::{GraspPlan, Posture, angles, plan_grasp};
 pub use planner::{NoGrasp, PlanRequest, Planner};
+pub use rehearsal::Rehearsal;
 pub use script::{ScriptName, UnknownScript};

@@ -73,6 +73,8 @@ impl Action {
             Self::Exit => "Exit".to_owned(),
             Self::Hand(HandChoice::Mouse) => "Mouse and keyboard".to_owned(),
             Self::Hand(HandChoice::Scripted(script)) => format!("Script: {script}"),
+            Self::Hand(HandChoice::Live) => "Your own hand".to_owned(),
+            Self::Hand(HandChoice::Replay) => "Recording".to_owned(),
             Self::Method(name) => name.clone(),
             Self::MaxError(None) => "rounding only".to_owned(),
             Self::MaxError(Some(share)) => format!("{} %", 100.0 * share),

@@ -7,6 +7,7 @@ use softgrasp_core::grasp::{Contact, HandSegments, StateName};
 use softgrasp_core::hand::{HandColliders, HandDimensions, pose_of_segments};
 
 use super::camera::ViewCamera;
+use crate::arrival::Device;
 use crate::rest_shape::RestShape;
 use crate::solve_report::SolveSummary;
 
@@ -83,6 +84,8 @@ pub struct GraspView {
     pub forces: Option<[Vector3<f64>; 5]>,
     /// Whether the shape is being made the next rest shape.
     pub keeping: bool,
+    /// Devices that are silent: the hand is held where it was.
+    pub silent: Vec<Device>,
 }
 
 /// The link and what came over it.

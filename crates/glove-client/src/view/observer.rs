@@ -65,6 +65,7 @@ impl Observer {
                 contacts: grasp_loop.contacts(),
                 forces: grasp_loop.fingertip_forces(),
                 keeping: outcome.seen.keeping,
+                silent: outcome.silent.clone(),
             },
             server: ServerView {
                 link: health(grasp_loop, due.tick, outcome),
@@ -94,6 +95,7 @@ fn news(tick: u64, event: &LoopEvent) -> News {
     let (text, kind) = match event {
         LoopEvent::Grasp(event) => (event.to_string(), NewsKind::Grasp),
         LoopEvent::KeepRefused(text) => (text.clone(), NewsKind::Refusal),
+        LoopEvent::Device(text) => (text.clone(), NewsKind::Information),
         LoopEvent::Server(text) if text.starts_with("lost") || text.starts_with("refused") => {
             (format!("the server: {text}"), NewsKind::Refusal)
         }

@@ -106,6 +106,10 @@ fn hand(
     let planner = Planner::beside().map_err(|error| format!("cannot start a thread: {error}"))?;
     match wish {
         HandChoice::Mouse => Ok(MouseHand::new(setup, planner, tick_s).holding(contact).into()),
+        HandChoice::Live | HandChoice::Replay => {
+            Err("name the devices or the recording with --hand when you start the program"
+                .to_owned())
+        }
         HandChoice::Scripted(script) => {
             let request = PlanRequest { object, setup: setup.clone(), contact, avoid_gaze: None };
             let grip = request.grip().map_err(|error| error.to_string())?;

@@ -12,7 +12,7 @@ pub struct DrawnSpheres {
 }
 
 /// Spheres that are passed by.
-pub const PASSED: Color = Color::new(0.25, 0.45, 0.85, 0.13);
+pub const PASSED: Color = Color::new(0.16, 0.36, 0.80, 0.26);
 /// Spheres that are looked into.
 pub const ENTERED: Color = Color::new(0.95, 0.45, 0.10, 0.30);
 

@@ -144,10 +144,10 @@ impl Panels {
         let facts = menu_facts(seen, running);
         asked.actions.extend(menu::bar(context, &facts));
         asked.actions.extend(self.pop_up.show(context, &facts));
-        let is_played = matches!(running.about.hand, HandChoice::Scripted(_));
+        let is_played = running.about.hand.is_played();
         if is_played {
             self.show_timeline(context, running, asked);
-        } else {
+        } else if running.about.hand == HandChoice::Mouse {
             asked.mouse = self.sliders.show(context);
             let closes = |input: &MouseInput| matches!(input, MouseInput::CloseTo(..));
             self.hint_gone |= asked.mouse.iter().any(closes);
@@ -214,6 +214,8 @@ fn run_facts(running: &Running, graphics: &str) -> RunFacts {
         hand: match about.hand {
             HandChoice::Mouse => "mouse and keyboard".to_owned(),
             HandChoice::Scripted(script) => format!("scripted ({script})"),
+            HandChoice::Live => "your own".to_owned(),
+            HandChoice::Replay => "a recording".to_owned(),
         },
         graphics: graphics.to_owned(),
     }

@@ -71,7 +71,7 @@ pub struct Arrived {
 impl Running {
     /// A run whose frames come through an inlet.
     pub fn new(ticks: TickThread, inlet: Inlet, about: About) -> Self {
-        let waits_for_picture = matches!(about.hand, HandChoice::Scripted(_));
+        let waits_for_picture = about.hand.is_played();
         if waits_for_picture {
             ticks.ask(Control::Pause);
         }

@@ -9,9 +9,13 @@
 mod admission;
 mod agreement;
 mod commands;
+mod devices;
 mod discretisation;
+mod emulator;
 mod interruption;
 mod numbers;
+mod recordings;
 mod references;
 mod runs;
+mod serial_runs;
 mod start;

@@ -3,6 +3,7 @@
 use softgrasp_core::hand::Handedness;
 
 use super::linear::{Calibration, DipRule, SensorCalibration};
+use super::thumb::ThumbCoupling;
 use crate::devices::cyberglove::Sensor;
 
 impl Default for Calibration {
@@ -24,7 +25,13 @@ impl Default for Calibration {
                 dead: false,
             }
         });
-        Self { hand: Handedness::Right, dip_rule: DipRule::default(), middle_bias: 0.5, sensors }
+        Self {
+            hand: Handedness::Right,
+            dip_rule: DipRule::default(),
+            middle_bias: 0.5,
+            thumb_coupling: ThumbCoupling::default(),
+            sensors,
+        }
     }
 }
 

@@ -3,44 +3,13 @@
 use serde::{Deserialize, Serialize};
 use softgrasp_core::hand::Handedness;
 
+use super::checks::{CalibrationError, check, check_sensor};
 use super::linear::{Calibration, DipRule, SensorCalibration};
+use super::thumb::ThumbCoupling;
 use crate::devices::cyberglove::Sensor;
 
 /// Version of the text; raised when an old reader would misread a new file.
 const FORMAT: u32 = 1;
-
-/// Why a text is not a calibration.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CalibrationError {
-    /// Not TOML, or not with these fields.
-    #[error("not a calibration: {0}")]
-    Syntax(String),
-    /// Written by another version.
-    #[error("calibration format {found}, this program reads {FORMAT}")]
-    Format {
-        /// The file's format.
-        found: u32,
-    },
-    /// A sensor is listed twice.
-    #[error("sensor {0:?} is listed twice")]
-    Twice(Sensor),
-    /// A sensor is not listed.
-    #[error("sensor {0:?} is missing")]
-    Missing(Sensor),
-    /// A number that no calibration can have.
-    #[error("{field} of sensor {sensor:?} is {value}, which cannot be")]
-    Value {
-        /// Whose line.
-        sensor: Sensor,
-        /// Which field.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// The share of the middle finger is not between 0 and 1.
-    #[error("middle_bias is {0}, it must be 0 to 1")]
-    MiddleBias(f64),
-}
 
 /// The words of the file.
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -57,6 +26,9 @@ struct CalibrationText {
     hand: Hand,
     dip_rule: DipRule,
     middle_bias: f64,
+    // Files written before there was a coupling have none.
+    #[serde(default, skip_serializing_if = "ThumbCoupling::is_none")]
+    thumb_coupling: ThumbCoupling,
     sensor: Vec<SensorCalibration>,
 }
 
@@ -69,14 +41,11 @@ impl Calibration {
         let read: CalibrationText =
             toml::from_str(text).map_err(|e| CalibrationError::Syntax(e.to_string()))?;
         if read.format != FORMAT {
-            return Err(CalibrationError::Format { found: read.format });
-        }
-        if !(0.0..=1.0).contains(&read.middle_bias) {
-            return Err(CalibrationError::MiddleBias(read.middle_bias));
+            return Err(CalibrationError::Format { found: read.format, reads: FORMAT });
         }
         let mut lines: [Option<SensorCalibration>; 22] = [None; 22];
         for line in read.sensor {
-            check(&line)?;
+            check_sensor(&line)?;
             if lines[line.sensor.index()].replace(line).is_some() {
                 return Err(CalibrationError::Twice(line.sensor));
             }
@@ -86,15 +55,18 @@ impl Calibration {
             let line = lines[sensor.index()].ok_or(CalibrationError::Missing(sensor))?;
             sensors[sensor.index()] = line;
         }
-        Ok(Self {
+        let calibration = Self {
             hand: match read.hand {
                 Hand::Right => Handedness::Right,
                 Hand::Left => Handedness::Left,
             },
             dip_rule: read.dip_rule,
             middle_bias: read.middle_bias,
+            thumb_coupling: read.thumb_coupling,
             sensors,
-        })
+        };
+        check(&calibration)?;
+        Ok(calibration)
     }
 
     /// The calibration as TOML text; every number comes back exactly.
@@ -110,6 +82,7 @@ impl Calibration {
             },
             dip_rule: self.dip_rule,
             middle_bias: self.middle_bias,
+            thumb_coupling: self.thumb_coupling,
             sensor: self.sensors.to_vec(),
         };
         toml::to_string(&text).map_err(|e| CalibrationError::Syntax(e.to_string()))
@@ -120,30 +93,9 @@ impl Calibration {
     /// # Errors
     /// [`CalibrationError::Value`] if a number of the line cannot be.
     pub fn with_sensor(mut self, line: SensorCalibration) -> Result<Self, CalibrationError> {
-        check(&line)?;
         self.sensors[line.sensor.index()] = line;
+        check(&self)?;
         Ok(self)
-    }
-}
-
-/// Whether a line can turn every raw value into a finite angle and back.
-fn check(line: &SensorCalibration) -> Result<(), CalibrationError> {
-    let sensor = line.sensor;
-    let [low, high] = line.limits_rad;
-    let rules = [
-        ("offset_counts", line.offset_counts, line.offset_counts.abs() <= 1000.0),
-        (
-            "gain_rad_per_count",
-            line.gain_rad_per_count,
-            (1e-5..=1.0).contains(&line.gain_rad_per_count.abs()),
-        ),
-        ("limits_rad", low, low.abs() <= 4.0),
-        ("limits_rad", high, high.abs() <= 4.0 && low <= high),
-        ("rest_rad", line.rest_rad, (low..=high).contains(&line.rest_rad)),
-    ];
-    match rules.into_iter().find(|(_, _, holds)| !holds) {
-        None => Ok(()),
-        Some((field, value, _)) => Err(CalibrationError::Value { sensor, field, value }),
     }
 }
 
@@ -162,6 +114,26 @@ mod tests {
         assert_eq!(Calibration::from_toml(&text()).unwrap(), default);
         let left = Calibration { hand: Handedness::Left, dip_rule: DipRule::TwoThirds, ..default };
         assert_eq!(Calibration::from_toml(&left.to_toml().unwrap()).unwrap(), left);
+        let thumb_coupling = ThumbCoupling {
+            rotation_rad_per_abduction_count: 0.001,
+            abduction_rad_per_rotation_count: -0.002,
+        };
+        let coupled = Calibration { thumb_coupling, ..left };
+        assert_eq!(Calibration::from_toml(&coupled.to_toml().unwrap()).unwrap(), coupled);
+    }
+
+    #[test]
+    fn a_text_without_a_coupling_is_an_older_file_and_has_none() {
+        assert!(!text().contains("coupling"));
+        assert!(Calibration::from_toml(&text()).unwrap().thumb_coupling.is_none());
+        let merged = text().replacen(
+            "middle_bias = 0.5",
+            "middle_bias = 0.5\nthumb_coupling = { rotation_rad_per_abduction_count = 0.01584, \
+             abduction_rad_per_rotation_count = 0.00502 }",
+            1,
+        );
+        let error = Calibration::from_toml(&merged).unwrap_err();
+        assert_eq!(error, CalibrationError::ThumbCoupling(0.01584, 0.00502));
     }
 
     #[test]
@@ -171,7 +143,10 @@ mod tests {
             assert_ne!(changed, text(), "{from} is in the text");
             Calibration::from_toml(&changed).unwrap_err()
         };
-        assert_eq!(refused("format = 1", "format = 2"), CalibrationError::Format { found: 2 });
+        assert_eq!(
+            refused("format = 1", "format = 2"),
+            CalibrationError::Format { found: 2, reads: 1 }
+        );
         assert_eq!(
             refused("\"thumb_mcp\"", "\"thumb_rotation\""),
             CalibrationError::Twice(Sensor::ThumbRotation)
@@ -210,7 +185,7 @@ mod tests {
             damaged[place] = byte;
             if let Ok(read) = Calibration::from_toml(std::str::from_utf8(&damaged).unwrap()) {
                 for line in &read.sensors {
-                    prop_assert!(check(line).is_ok());
+                    prop_assert!(check_sensor(line).is_ok());
                 }
             }
         }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use softgrasp_core::hand::{FingerAngles, Handedness, JointAngles, ThumbAngles};
 
+use super::thumb::{THUMB_ROOT, ThumbCoupling};
 use crate::devices::cyberglove::{RawSensors, Sensor, SensorCount, SensorSet};
 
 /// How a glove without distal sensors gets the DIJ from the PIJ.
@@ -54,14 +55,28 @@ pub struct SensorCalibration {
 
 impl SensorCalibration {
     fn angle(&self, raw: u8) -> f64 {
-        let [low, high] = self.limits_rad;
-        ((f64::from(raw) - self.offset_counts) * self.gain_rad_per_count).clamp(low, high)
+        self.believed(self.counts(raw) * self.gain_rad_per_count)
     }
 
     fn raw(&self, angle: f64) -> u8 {
-        let counts = (self.offset_counts + angle / self.gain_rad_per_count).round();
+        self.raw_at(angle / self.gain_rad_per_count)
+    }
+
+    /// Counts above the offset.
+    fn counts(&self, raw: u8) -> f64 {
+        f64::from(raw) - self.offset_counts
+    }
+
+    /// An angle held inside the believed range.
+    fn believed(&self, angle: f64) -> f64 {
+        let [low, high] = self.limits_rad;
+        angle.clamp(low, high)
+    }
+
+    /// The reading this many counts above the offset.
+    fn raw_at(&self, counts: f64) -> u8 {
         // A cast saturates and turns NaN into zero, so this is total.
-        (counts as i64).clamp(1, 255) as u8
+        ((self.offset_counts + counts).round() as i64).clamp(1, 255) as u8
     }
 }
 
@@ -81,6 +96,8 @@ pub struct Calibration {
     /// Share of the difference of both spreads that turns the middle finger itself; one half
     /// keeps index and ring finger symmetric.
     pub middle_bias: f64,
+    /// What the two sensors at the root of the thumb add to each other; none by default.
+    pub thumb_coupling: ThumbCoupling,
     /// One line per sensor, in the order of [`Sensor::ALL`].
     pub(super) sensors: [SensorCalibration; 22],
 }
@@ -95,12 +112,13 @@ impl Calibration {
     ///
     /// `dead` comes on top of the sensors the calibration itself calls dead.
     pub fn angles(&self, raw: &RawSensors, dead: SensorSet) -> JointAngles {
+        let live = |sensor: Sensor| {
+            let alive = !self.sensor(sensor).dead && !dead.contains(sensor);
+            raw.get(sensor).filter(|_| alive)
+        };
         let angle = |sensor: Sensor| {
             let line = self.sensor(sensor);
-            match raw.get(sensor) {
-                Some(value) if !line.dead && !dead.contains(sensor) => line.angle(value),
-                _ => line.rest_rad,
-            }
+            live(sensor).map_or(line.rest_rad, |value| line.angle(value))
         };
         let dip = |sensor: Sensor, pip: f64| match raw.count() {
             SensorCount::TwentyTwo => angle(sensor),
@@ -124,10 +142,11 @@ impl Calibration {
         let middle = (spread_ring - spread_index) * self.middle_bias;
         let ring = middle - spread_ring;
         let little = ring - angle(Sensor::LittleRingAbduction);
+        let [rotation, thumb_abduction] = self.thumb_root_angles(THUMB_ROOT.map(live));
         JointAngles {
             thumb: ThumbAngles {
-                rotation: angle(Sensor::ThumbRotation),
-                abduction: angle(Sensor::ThumbAbduction),
+                rotation,
+                abduction: thumb_abduction,
                 mcp_flexion: angle(Sensor::ThumbMcp),
                 ip_flexion: angle(Sensor::ThumbIp),
             },
@@ -148,7 +167,38 @@ impl Calibration {
     ///
     /// The glove feels spreads only, so turning all fingers sideways together leaves no trace.
     pub fn raw_from_angles(&self, angles: &JointAngles, count: SensorCount) -> RawSensors {
-        RawSensors::from_fn(count, |sensor| self.sensor(sensor).raw(sensor_angle(angles, sensor)))
+        let wanted = THUMB_ROOT.map(|sensor| sensor_angle(angles, sensor));
+        let thumb = self.thumb_coupling.counts(self.thumb_gains(), wanted);
+        RawSensors::from_fn(count, |sensor| {
+            let line = self.sensor(sensor);
+            match THUMB_ROOT.iter().position(|&s| s == sensor) {
+                Some(place) => line.raw_at(thumb[place]),
+                None => line.raw(sensor_angle(angles, sensor)),
+            }
+        })
+    }
+
+    /// Own gains of the sensors of the thumb's rotation and abduction.
+    pub(super) fn thumb_gains(&self) -> [f64; 2] {
+        THUMB_ROOT.map(|sensor| self.sensor(sensor).gain_rad_per_count)
+    }
+
+    /// Rotation and abduction of the thumb from its two sensors; `None` for a dead one.
+    fn thumb_root_angles(&self, live: [Option<u8>; 2]) -> [f64; 2] {
+        let lines = THUMB_ROOT.map(|sensor| self.sensor(sensor));
+        let gains = self.thumb_gains();
+        let coupling = &self.thumb_coupling;
+        let angles = match live {
+            [Some(r), Some(a)] => coupling.angles(gains, [lines[0].counts(r), lines[1].counts(a)]),
+            [Some(r), None] => {
+                coupling.angles_beside_dead(gains, 1, lines[1].rest_rad, lines[0].counts(r))
+            }
+            [None, Some(a)] => {
+                coupling.angles_beside_dead(gains, 0, lines[0].rest_rad, lines[1].counts(a))
+            }
+            [None, None] => lines.map(|line| line.rest_rad),
+        };
+        [lines[0].believed(angles[0]), lines[1].believed(angles[1])]
     }
 
     /// The sensors the calibration itself calls dead.
@@ -327,6 +377,28 @@ mod tests {
         let raw = RawSensors::from_fn(SensorCount::TwentyTwo, |_| 1);
         let angles = Calibration::default().angles(&raw, SensorSet::EMPTY);
         assert_eq!(angles.thumb.rotation, -0.5);
+    }
+
+    #[test]
+    fn coupled_thumb_angles_come_back_from_their_counts() {
+        let thumb_coupling = ThumbCoupling {
+            rotation_rad_per_abduction_count: 0.002,
+            abduction_rad_per_rotation_count: -0.0015,
+        };
+        let calibration = Calibration { thumb_coupling, ..Calibration::default() };
+        let mut angles = JointAngles::flat();
+        (angles.thumb.rotation, angles.thumb.abduction) = (0.6, 0.25);
+        let raw = calibration.raw_from_angles(&angles, SensorCount::TwentyTwo);
+        let alone = Calibration::default().raw_from_angles(&angles, SensorCount::TwentyTwo);
+        assert_ne!(raw, alone, "the coupling moves the counts");
+        let back = calibration.angles(&raw, SensorSet::EMPTY).thumb;
+        // Half a count of each sensor through both terms.
+        assert!((back.rotation - 0.6).abs() <= 0.5 * (0.01584 + 0.002));
+        assert!((back.abduction - 0.25).abs() <= 0.5 * (0.00502 + 0.0015));
+        let dead: SensorSet = [Sensor::ThumbRotation].into_iter().collect();
+        let held = calibration.angles(&raw, dead).thumb;
+        assert_eq!(held.rotation, 0.0);
+        assert!((held.abduction - back.abduction).abs() < 0.1, "{}", held.abduction);
     }
 
     #[test]

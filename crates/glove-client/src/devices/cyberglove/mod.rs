@@ -6,7 +6,10 @@ mod sensor;
 mod sensor_health;
 
 pub use parser::{GloveError, GloveEvent, GloveFault, GloveFaultKind, GloveParser};
-pub use record::{GloveRecord, GloveStatus, GloveTicks, RecordKind, RecordOptions, encode_record};
+pub use record::{
+    GloveEncoding, GloveRecord, GloveStatus, GloveTicks, RecordKind, RecordOptions, encode_line,
+    encode_record,
+};
 pub use sensor::{RawSensors, RawSensorsError, Sensor, SensorCount, SensorSet};
 pub use sensor_health::SensorHealth;
 pub(in crate::devices) use sensor_health::is_rail;

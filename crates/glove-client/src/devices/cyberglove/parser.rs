@@ -1,6 +1,8 @@
 //! Splits the glove's byte stream, which arrives in pieces of any size, into records and faults.
 
-use super::record::{GloveRecord, RecordError, RecordOptions, decode_frame};
+use super::record::{
+    GloveEncoding, GloveRecord, RecordError, RecordOptions, decode_frame, decode_line,
+};
 use super::sensor::SensorCount;
 use crate::devices::feeding::feed_all;
 use crate::devices::inbox::Inbox;
@@ -61,6 +63,14 @@ pub enum GloveFaultKind {
         /// The byte.
         byte: u8,
     },
+    /// A line whose numbers are too few, too many, or none that a sensor sends.
+    #[error("a line of {got} numbers, {expected} from 1 to 255 are a record")]
+    WrongNumbers {
+        /// Fields of the line.
+        got: usize,
+        /// Sensors of the glove.
+        expected: usize,
+    },
     /// The status byte lacks its always-set bit.
     #[error("status byte {byte:#04x} lacks bit 7")]
     BadStatus {
@@ -102,6 +112,7 @@ pub enum GloveEvent {
 pub struct GloveParser {
     count: SensorCount,
     options: RecordOptions,
+    encoding: GloveEncoding,
     inbox: Inbox,
     /// Set while inside a frame that is already too long: bytes of it dropped since the last
     /// fault.
@@ -115,7 +126,15 @@ const REPORT_EVERY: usize = 1024;
 impl GloveParser {
     /// Parser for one glove, empty.
     pub fn new(count: SensorCount, options: RecordOptions) -> Self {
-        Self { count, options, inbox: Inbox::default(), overlong: None, pending: None }
+        let inbox = Inbox::default();
+        let encoding = GloveEncoding::Binary;
+        Self { count, options, encoding, inbox, overlong: None, pending: None }
+    }
+
+    /// Parser of records that are lines of decimal numbers, empty.
+    pub fn of_lines(count: SensorCount) -> Self {
+        let plain = Self::new(count, RecordOptions::default());
+        Self { encoding: GloveEncoding::Ascii, ..plain }
     }
 
     /// Takes bytes from the line and returns how many it took.
@@ -133,7 +152,10 @@ impl GloveParser {
 
     /// Longest possible piece before a NUL: a record with an error text.
     fn longest(&self) -> usize {
-        self.options.frame_length(self.count) + 2
+        match self.encoding {
+            GloveEncoding::Binary => self.options.frame_length(self.count) + 2,
+            GloveEncoding::Ascii => line_length_max(self.count),
+        }
     }
 
     /// Drops up to `available` bytes of an overlong frame; `ends` if the last of them is its NUL.
@@ -174,7 +196,11 @@ impl Iterator for GloveParser {
         if self.overlong.is_some() || end > self.longest() {
             return self.drop_overlong(end + 1, true);
         }
-        let (event, pending) = read_frame(&waiting[..end], self.count, self.options);
+        let frame = &waiting[..end];
+        let (event, pending) = match self.encoding {
+            GloveEncoding::Binary => read_frame(frame, self.count, self.options),
+            GloveEncoding::Ascii => read_line(frame, self.count),
+        };
         self.inbox.consume(end + 1);
         self.pending = pending;
         Some(event)
@@ -218,6 +244,39 @@ fn read_frame(
         Err(RecordError::Status(byte)) => fault(GloveFaultKind::BadStatus { byte }),
         Err(RecordError::Sensors) => {
             fault(GloveFaultKind::WrongLength { got: frame.len(), expected })
+        }
+    }
+}
+
+/// Longest line before its NUL: letter, numbers of three digits, error text, CR LF.
+fn line_length_max(count: SensorCount) -> usize {
+    1 + 4 * count.number() + 2 + 2
+}
+
+/// The meaning of a line of decimal numbers, and what follows it at once.
+fn read_line(line: &[u8], count: SensorCount) -> (GloveEvent, Option<GloveEvent>) {
+    let bytes_skipped = line.len() + 1;
+    let fault = |kind, bytes_skipped| GloveEvent::Fault(GloveFault { kind, bytes_skipped });
+    let plain = line.trim_ascii_end();
+    let (body, text) = plain.split_at(plain.len().saturating_sub(2));
+    let complaint = GloveError::from_text(text);
+    let values = match complaint {
+        Some(GloveError::SamplingTooFast) if body.len() > 1 => body,
+        Some(error) => return (fault(GloveFaultKind::Device(error), bytes_skipped), None),
+        None => plain,
+    };
+    match decode_line(values, count) {
+        Ok(record) => {
+            let late = complaint.map(|error| fault(GloveFaultKind::Device(error), 0));
+            (GloveEvent::Record(record), late)
+        }
+        Err(RecordError::Letter(byte)) => {
+            (fault(GloveFaultKind::UnknownStart { byte }, bytes_skipped), None)
+        }
+        Err(_) => {
+            let got = values.split(|&byte| byte == b' ').count().saturating_sub(1);
+            let kind = GloveFaultKind::WrongNumbers { got, expected: count.number() };
+            (fault(kind, bytes_skipped), None)
         }
     }
 }

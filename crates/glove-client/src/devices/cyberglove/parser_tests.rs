@@ -233,3 +233,51 @@ fn wrong_letter_and_wrong_status_are_named() {
     let kind = GloveFaultKind::BadStatus { byte: 0x05 };
     assert_eq!(events, [GloveEvent::Fault(GloveFault { kind, bytes_skipped: 25 })]);
 }
+
+fn line_events(bytes: &[u8], size: usize) -> Vec<GloveEvent> {
+    let mut parser = GloveParser::of_lines(SensorCount::TwentyTwo);
+    let mut events = Vec::new();
+    bytes.chunks(size).for_each(|piece| parser.feed_all(piece, |event| events.push(event)));
+    events
+}
+
+#[test]
+fn a_line_of_a_real_glove_is_read() {
+    // Published by an owner of a glove: palm arch at the end of its range.
+    let line = b"g 1 76 93 113 89 42 20 77 98 106 117 81 62 23 52 60 34 68 57 254 92 26\r\n\0";
+    for size in [1, 7, 200] {
+        let events = line_events(&line.repeat(2), size);
+        let [GloveEvent::Record(record), GloveEvent::Record(again)] = events[..] else {
+            panic!("{events:?}")
+        };
+        assert_eq!((record.kind, record), (RecordKind::Polled, again));
+        assert_eq!(&record.sensors.as_slice()[..3], [1, 76, 93]);
+        assert_eq!(record.sensors.as_slice()[19..], [254, 92, 26]);
+        assert_eq!(crate::devices::cyberglove::encode_line(&record), line);
+    }
+}
+
+#[test]
+fn damaged_lines_cost_themselves_only() {
+    let good = b"s 1 76 93 113 89 42 20 77 98 106 117 81 62 23 52 60 34 68 57 254 92 26\r\n\0";
+    let kinds = |bytes: &[u8]| -> Vec<GloveFaultKind> {
+        let events = line_events(&[bytes, good].concat(), 5);
+        assert!(matches!(events.last(), Some(GloveEvent::Record(_))), "{events:?}");
+        let fault = |event: &GloveEvent| match event {
+            GloveEvent::Fault(fault) => Some(fault.kind),
+            GloveEvent::Record(_) => None,
+        };
+        events.iter().filter_map(fault).collect()
+    };
+    let numbers = |got| GloveFaultKind::WrongNumbers { got, expected: 22 };
+    assert_eq!(kinds(b"g 1 2 3\r\n\0"), [numbers(3)]);
+    assert_eq!(kinds(&[&b"g"[..], &b" 0".repeat(22), b"\r\n\0"].concat()), [numbers(22)]);
+    assert_eq!(kinds(&[&b"g"[..], &b" 256".repeat(22), b"\r\n\0"].concat()), [numbers(22)]);
+    assert_eq!(kinds(b"G 1\0"), [GloveFaultKind::UnknownStart { byte: b'G' }]);
+    assert_eq!(kinds(b"e?\0"), [GloveFaultKind::Device(GloveError::UnknownCommand)]);
+    let unplugged = [&b"g"[..], &b" 9".repeat(22), b"eg\r\n\0"].concat();
+    assert_eq!(kinds(&unplugged), [GloveFaultKind::Device(GloveError::NotPluggedIn)]);
+    assert_eq!(kinds(&[&[b'g'; 300][..], b"\0"].concat()), [GloveFaultKind::NoTerminator]);
+    let late = [&b"g"[..], &b" 9".repeat(22), b"es\r\n\0"].concat();
+    assert_eq!(line_events(&late, 9).len(), 2);
+}

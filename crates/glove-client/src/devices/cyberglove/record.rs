@@ -30,6 +30,17 @@ impl RecordKind {
     }
 }
 
+/// How records are written on the line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GloveEncoding {
+    /// A byte per sensor (commands `G` and `S`).
+    #[default]
+    Binary,
+    /// Decimal numbers (commands `g` and `s`), without time stamp and status: how those are written
+    /// is not documented.
+    Ascii,
+}
+
 /// What the interface unit was told to append to the sensor bytes (commands `D` and `U`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RecordOptions {
@@ -80,7 +91,7 @@ impl GloveTicks {
     }
 
     /// The inverse of [`GloveTicks::decode`]; no byte of the result is zero.
-    fn encode(self) -> [u8; 5] {
+    pub(in crate::devices) fn encode(self) -> [u8; 5] {
         let mut bytes = [0x80, 0, 0, 0, 0];
         for (k, byte) in self.0.to_le_bytes().into_iter().enumerate() {
             if byte == 0 {
@@ -109,7 +120,7 @@ impl GloveStatus {
         bit(7).then(|| Self { plugged_in: bit(0), switch_on: bit(1), light_on: bit(2) })
     }
 
-    fn encode(self) -> u8 {
+    pub(in crate::devices) fn encode(self) -> u8 {
         0x80 | u8::from(self.plugged_in)
             | u8::from(self.switch_on) << 1
             | u8::from(self.light_on) << 2
@@ -160,6 +171,23 @@ pub(super) fn decode_frame(
     Ok(GloveRecord { kind, sensors, timestamp, status })
 }
 
+/// Reads one line of decimal numbers, letter to last byte before the NUL.
+///
+/// Shapes: a small letter and one number per sensor, separated by blanks, CR LF.
+pub(super) fn decode_line(line: &[u8], count: SensorCount) -> Result<GloveRecord, RecordError> {
+    let (&letter, rest) = line.split_first().ok_or(RecordError::Letter(0))?;
+    let kind = match letter {
+        b'g' | b's' => RecordKind::from_letter(letter.to_ascii_uppercase()),
+        _ => None,
+    };
+    let kind = kind.ok_or(RecordError::Letter(letter))?;
+    let text = std::str::from_utf8(rest).map_err(|_| RecordError::Sensors)?;
+    let values: Result<Vec<u8>, _> = text.split_ascii_whitespace().map(str::parse).collect();
+    let values = values.map_err(|_| RecordError::Sensors)?;
+    let sensors = RawSensors::try_new(count, &values).map_err(|_| RecordError::Sensors)?;
+    Ok(GloveRecord { kind, sensors, timestamp: None, status: None })
+}
+
 /// The bytes of one record as the interface unit sends them, NUL included.
 pub fn encode_record(record: &GloveRecord) -> Vec<u8> {
     let mut bytes = vec![record.kind.letter()];
@@ -171,6 +199,16 @@ pub fn encode_record(record: &GloveRecord) -> Vec<u8> {
         bytes.push(status.encode());
     }
     bytes.push(0);
+    bytes
+}
+
+/// The same as a line of decimal numbers; time stamp and status are left out.
+pub fn encode_line(record: &GloveRecord) -> Vec<u8> {
+    let mut bytes = vec![record.kind.letter().to_ascii_lowercase()];
+    for value in record.sensors.as_slice() {
+        bytes.extend_from_slice(format!(" {value}").as_bytes());
+    }
+    bytes.extend_from_slice(b"\r\n\0");
     bytes
 }
 

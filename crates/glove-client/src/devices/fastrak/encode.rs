@@ -38,17 +38,30 @@ pub fn encode_record(record: &FastrakRecord, encoding: Encoding) -> Result<Vec<u
     let numbers = record.position.iter().chain(&attitude[..attitude_count]);
     for (index, &value) in numbers.enumerate() {
         let decimals = if quaternion && index >= 3 { 4 } else { 2 };
-        let text = format!("{value:7.decimals$}");
-        if !value.is_finite() || value.abs() >= NUMBER_LIMIT || text.len() > 7 {
+        if !push_number(&mut bytes, value, decimals, encoding) {
             return Err(EncodeError::OutOfRange { index, value });
-        }
-        match encoding {
-            Encoding::Ascii => bytes.extend_from_slice(text.as_bytes()),
-            Encoding::Binary => bytes.extend_from_slice(&(value as f32).to_le_bytes()),
         }
     }
     bytes.extend_from_slice(b"\r\n");
     Ok(bytes)
+}
+
+/// Writes one number of a record; `false`, and nothing written, if it fits no column.
+pub(in crate::devices) fn push_number(
+    bytes: &mut Vec<u8>,
+    value: f64,
+    decimals: usize,
+    encoding: Encoding,
+) -> bool {
+    let text = format!("{value:7.decimals$}");
+    if !value.is_finite() || value.abs() >= NUMBER_LIMIT || text.len() > 7 {
+        return false;
+    }
+    match encoding {
+        Encoding::Ascii => bytes.extend_from_slice(text.as_bytes()),
+        Encoding::Binary => bytes.extend_from_slice(&(value as f32).to_le_bytes()),
+    }
+    true
 }
 
 #[cfg(test)]

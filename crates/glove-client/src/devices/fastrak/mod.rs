@@ -7,6 +7,7 @@ mod flip;
 mod parser;
 mod record;
 
+pub(in crate::devices) use encode::push_number;
 pub use encode::{EncodeError, encode_record};
 pub use fault::{FastrakFault, FastrakFaultKind};
 pub use flip::{FlipWatch, HemisphereFlip};

@@ -168,7 +168,7 @@ impl Attitude {
     }
 
     /// Its numbers in the order of the record.
-    pub(super) fn numbers(&self) -> ([f64; 4], usize) {
+    pub(in crate::devices) fn numbers(&self) -> ([f64; 4], usize) {
         match *self {
             Self::EulerDeg { azimuth_deg, elevation_deg, roll_deg } => {
                 ([azimuth_deg, elevation_deg, roll_deg, 0.0], 3)
@@ -199,6 +199,12 @@ impl FastrakRecord {
     /// Position in the transmitter frame, in m.
     pub fn position_in_transmitter(&self) -> Vector3<f64> {
         Vector3::from(self.position) * self.units.metres()
+    }
+
+    /// The record of the opposite place, which the tracker's field cannot tell from this one.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        Self { position: self.position.map(|x| -x), ..self }
     }
 
     /// Receiver frame in the transmitter frame, in m.

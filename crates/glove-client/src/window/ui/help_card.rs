@@ -44,8 +44,9 @@ pub fn show(context: &Context, hand: HandChoice) {
         rows(ui, "always", &ALWAYS);
         ui.separator();
         match hand {
-            HandChoice::Scripted(_) => rows(ui, "played", &PLAYED),
+            HandChoice::Scripted(_) | HandChoice::Replay => rows(ui, "played", &PLAYED),
             HandChoice::Mouse => rows(ui, "mouse", &MOUSE),
+            HandChoice::Live => {}
         }
         ui.add_space(4.0);
         ui.label(theme::quiet("F1 closes this page."));
@@ -68,6 +69,10 @@ pub fn hint(context: &Context, hand: HandChoice) {
         HandChoice::Mouse => {
             "Press Reach, then hold Space or draw “close all” to grasp.  Right button: menu.  F1: help."
         }
+        HandChoice::Live => {
+            "Touch with index, middle and ring finger to hold, with all five to squeeze.  Right button: menu.  F1: help."
+        }
+        HandChoice::Replay => "A recording is played again.  Right button: menu.  F1: help.",
         HandChoice::Scripted(_) => {
             "A scripted hand grasps. Right button: menu.  Menu Hand, Mouse and keyboard: do it yourself.  F1: help."
         }

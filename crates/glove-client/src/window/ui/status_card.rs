@@ -27,6 +27,10 @@ pub fn show(context: &Context, frame: &ViewFrame, told: &Told<'_>) {
             theme::chip(ui, name, ground);
             fingertips(ui, frame.grasp.tips);
         });
+        for device in &frame.grasp.silent {
+            let text = format!("● the {} is silent: the hand is held", device.name());
+            ui.label(RichText::new(text).color(BAD).strong());
+        }
         if frame.answer_is_old() {
             let text = match frame.answer_age_ticks() {
                 Some(age) => format!(

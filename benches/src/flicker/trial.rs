@@ -1,0 +1,161 @@
+//! One hand with noise: how often a grasp that is held changes, and how late it lets go.
+
+use anyhow::Context;
+use glove_client::arrival::Arrival;
+use glove_client::contact_model::ContactModel;
+use glove_client::hand_reader::{HandReader, HandSetup};
+use glove_client::loading::{LoadedObject, ObjectRequest, load};
+use glove_client::scene::{ObjectChoice, size_to_hold};
+use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
+use nalgebra::Isometry3;
+use softgrasp_core::grasp::{Grasp, StateName, StepInput, sense};
+use softgrasp_core::hand::HandColliders;
+use softgrasp_core::mesh::BuiltIn;
+
+use super::noise::Noise;
+
+/// Ticks per second.
+pub const RATE_HZ: f64 = 60.0;
+
+/// An object and the plan to grasp it.
+pub struct Stage {
+    loaded: LoadedObject,
+}
+
+/// A grasp that follows bytes, without a server: what the fingers hold does not depend on it.
+struct Follower<'a> {
+    stage: &'a Stage,
+    grasp: Grasp,
+    reader: HandReader,
+    tick: u64,
+    seen: Seen,
+}
+
+impl Stage {
+    /// The strawberry of the default run.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub fn strawberry() -> anyhow::Result<Self> {
+        let choice = ObjectChoice::BuiltIn(BuiltIn::Strawberry);
+        let request = ObjectRequest {
+            nodes: 1000,
+            size_m: size_to_hold(&choice),
+            setup: HandSetup::default(),
+            contact: ContactModel::default(),
+            choice,
+        };
+        let loaded = load(&request, |_| true)?.context("the object was called off")?;
+        Ok(Self { loaded })
+    }
+
+    fn hand(&self, script: ScriptName) -> anyhow::Result<ScriptedHand> {
+        let plan = self.loaded.plan.clone()?;
+        Ok(ScriptedHand::following(script, HandSetup::default(), plan))
+    }
+
+    fn follower(&self, margin_m: f64) -> anyhow::Result<Follower<'_>> {
+        Ok(Follower {
+            stage: self,
+            grasp: Grasp::try_new(Isometry3::identity(), margin_m)?,
+            reader: HandReader::new(HandSetup::default()),
+            tick: 0,
+            seen: Seen::default(),
+        })
+    }
+
+    /// How often the grasp changes while the hand that has just come into a state rests, with noise.
+    ///
+    /// Units: `margin_m` m.
+    ///
+    /// # Errors
+    /// The script does not come to the state.
+    pub fn changes(
+        &self,
+        margin_m: f64,
+        state: StateName,
+        ticks: u64,
+        seed: u64,
+    ) -> anyhow::Result<u64> {
+        let mut hand = self.hand(ScriptName::Squeeze)?;
+        let mut follower = self.follower(margin_m)?;
+        let arrivals = follower.play_until(&mut hand, |at| at == Some(state))?;
+        let mut noise = Noise::new(seed);
+        let (mut changes, mut before) = (0, Some(state));
+        for _ in 0..ticks {
+            let now = follower.follow(&noise.on(&arrivals));
+            changes += u64::from(now != before);
+            before = now;
+        }
+        Ok(changes)
+    }
+
+    /// How long after the hand has begun to open the object is let go, s.
+    ///
+    /// # Errors
+    /// The script does not come so far.
+    pub fn release_s(&self, margin_m: f64) -> anyhow::Result<f64> {
+        let mut hand = self.hand(ScriptName::Release)?;
+        let mut follower = self.follower(margin_m)?;
+        follower.play_until(&mut hand, |at| at == Some(StateName::Deforming))?;
+        let object = &self.loaded.object;
+        let mut before = follower.play_until(&mut hand, |_| true)?;
+        let (mut opening, mut pressed) = (None, 0);
+        for _ in 0..500 {
+            let sent = hand.next(&follower.seen, object);
+            let state = follower.follow(&sent.arrivals);
+            // The hand presses, holds still, and opens: it opens when it moves again.
+            let moves = sent.arrivals != before;
+            before = sent.arrivals;
+            pressed += u64::from(!moves);
+            if moves && pressed > 5 {
+                opening.get_or_insert(follower.tick);
+            }
+            if let (Some(begun), true) = (opening, state != Some(StateName::Deforming)) {
+                return Ok((follower.tick - begun) as f64 / RATE_HZ);
+            }
+        }
+        anyhow::bail!("the hand with a margin of {margin_m} m never lets go")
+    }
+}
+
+impl Follower<'_> {
+    /// Plays a script until the grasp is as wanted; the bytes of that tick.
+    fn play_until(
+        &mut self,
+        hand: &mut ScriptedHand,
+        holds: impl Fn(Option<StateName>) -> bool,
+    ) -> anyhow::Result<Vec<Arrival>> {
+        for _ in 0..1000 {
+            let sent = hand.next(&self.seen, &self.stage.loaded.object);
+            let state = self.follow(&sent.arrivals);
+            if holds(state) {
+                return Ok(sent.arrivals);
+            }
+        }
+        anyhow::bail!("the script does not come to the state")
+    }
+
+    fn follow(&mut self, arrivals: &[Arrival]) -> Option<StateName> {
+        let now_s = self.tick as f64 / RATE_HZ;
+        self.tick += 1;
+        self.reader.feed(arrivals, now_s);
+        let hand = self.reader.hand(now_s)?;
+        let object = &self.stage.loaded.object;
+        let colliders = HandColliders::new(&self.reader.setup().dimensions, &hand);
+        let world_from_object = self.grasp.world_from_object(&hand.world_from_palm);
+        let margin = self.grasp.release_margin();
+        let fingers =
+            sense(object.tree(), object.normals(), &colliders, &world_from_object, margin);
+        self.seen.inside = std::array::from_fn(|i| fingers[i].tip_hits[0].is_some());
+        let step = self.grasp.step(&StepInput {
+            world_from_palm: hand.world_from_palm,
+            world_from_segment: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
+            fingers,
+            command: None,
+        });
+        self.seen.state = Some(step.state);
+        self.seen.world_from_object = step.world_from_object;
+        Some(step.state)
+    }
+}

@@ -1,0 +1,132 @@
+//! Samples of live devices for `calibrate` and `align`: the one place that opens ports for them.
+
+use std::time::{Duration, Instant};
+
+use anyhow::bail;
+use nalgebra::Isometry3;
+
+use crate::arrival::Arrival;
+use crate::devices::HandSample;
+use crate::devices::cyberglove::RawSensors;
+use crate::hand_reader::HandReader;
+use crate::hand_setup::HandConfiguration;
+use crate::serial::{SerialDevices, SerialSettings, SerialSource};
+
+/// Gives the next reading of the glove; waits for it a short while, `None` if none came.
+pub(super) type NextReading = Box<dyn FnMut() -> Option<RawSensors>>;
+
+/// Gives the next sample of the arm; waits for it a short while, `None` if none came.
+pub(super) type NextArmSample = Box<dyn FnMut() -> Option<ArmSample>>;
+
+/// What the devices say about the arm at one time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ArmSample {
+    /// The receiver in the transmitter's Y-up frame, m.
+    pub(super) stand_from_receiver: Isometry3<f64>,
+    /// The glove, where there is one.
+    pub(super) glove: Option<RawSensors>,
+}
+
+/// A device that has not sent a reading for so long is told to be silent for now.
+const WAIT: Duration = Duration::from_millis(300);
+/// Devices are looked at so often.
+const LOOK_EVERY: Duration = Duration::from_millis(2);
+
+/// Glove and tracker on their ports, and a reader of what they send.
+struct Live {
+    devices: SerialDevices,
+    reader: HandReader,
+    begun: Instant,
+}
+
+impl Live {
+    fn open(
+        configuration: &HandConfiguration,
+        ports: Option<&SerialSource>,
+    ) -> anyhow::Result<Self> {
+        let Some(ports) = ports else {
+            bail!(
+                "name the ports, --ports glove=PATH[@BAUD],tracker=PATH[@BAUD] (`glove-client \
+                 devices` lists them), or recorded bytes, --from FOLDER"
+            )
+        };
+        let devices = SerialDevices::open(SerialSettings::of_hand(ports, configuration))?;
+        let reader = HandReader::of_devices(configuration.setup.clone(), None);
+        Ok(Self { devices, reader, begun: Instant::now() })
+    }
+
+    /// Takes what has come; the samples with when they came, newest first of each.
+    fn sample(&mut self) -> HandSample {
+        let at = |arrived: Instant| arrived.saturating_duration_since(self.begun).as_secs_f64();
+        let arrivals: Vec<Arrival> = self
+            .devices
+            .take()
+            .into_iter()
+            .map(|piece| Arrival {
+                device: piece.device,
+                at_s: Some(at(piece.arrived)),
+                is_datagram: false,
+                bytes: piece.bytes,
+            })
+            .collect();
+        let now_s = self.begun.elapsed().as_secs_f64();
+        self.reader.feed(&arrivals, now_s);
+        self.reader.sample(now_s)
+    }
+
+    /// Waits until something is newer than it was.
+    fn next<T>(&mut self, mut newer: impl FnMut(&HandSample) -> Option<T>) -> Option<T> {
+        let until = Instant::now() + WAIT;
+        loop {
+            let sample = self.sample();
+            if let Some(found) = newer(&sample) {
+                return Some(found);
+            }
+            if Instant::now() >= until {
+                return None;
+            }
+            std::thread::sleep(LOOK_EVERY);
+        }
+    }
+}
+
+/// The glove on its port.
+///
+/// # Errors
+/// A sentence, where no port is named or the system gives no thread. A glove that is not there is
+/// waited for.
+pub(super) fn live_glove(
+    configuration: &HandConfiguration,
+    ports: Option<&SerialSource>,
+) -> anyhow::Result<NextReading> {
+    let mut live = Live::open(configuration, ports)?;
+    let mut last_s = f64::NEG_INFINITY;
+    Ok(Box::new(move || {
+        live.next(|sample| {
+            let reading = sample.glove.filter(|reading| reading.time_s > last_s)?;
+            last_s = reading.time_s;
+            Some(reading.sensors)
+        })
+    }))
+}
+
+/// The tracker and the glove on their ports.
+///
+/// # Errors
+/// As [`live_glove`].
+pub(super) fn live_arm(
+    configuration: &HandConfiguration,
+    ports: Option<&SerialSource>,
+) -> anyhow::Result<NextArmSample> {
+    let mut live = Live::open(configuration, ports)?;
+    let mut last_s = f64::NEG_INFINITY;
+    Ok(Box::new(move || {
+        live.next(|sample| {
+            let reading = sample.tracker.filter(|reading| reading.time_s > last_s)?;
+            last_s = reading.time_s;
+            // Readings are in the transmitter's Y-up frame until the stand places them.
+            let stand_from_receiver = reading.world_from_receiver;
+            Some(ArmSample { stand_from_receiver, glove: sample.glove.map(|g| g.sensors) })
+        })
+    }))
+}

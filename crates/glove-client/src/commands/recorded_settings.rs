@@ -1,0 +1,51 @@
+//! The settings of a recorded run, for playing it again.
+
+use anyhow::Context;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use softgrasp_protocol::{ElementName, Material};
+
+use crate::devices::calibration::Calibration;
+use crate::hand_setup::HandConfiguration;
+use crate::recording::RecordedSetup;
+use crate::solve_settings::{SolveSettings, Subscription};
+
+/// The settings of a recorded run.
+///
+/// # Errors
+/// A name that this program does not know.
+pub(super) fn recorded_settings(setup: &RecordedSetup) -> anyhow::Result<SolveSettings> {
+    let said = "the recording's";
+    Ok(SolveSettings {
+        material: Material { young: setup.young_pa, poisson: setup.poisson },
+        element: recorded_element(&setup.element)?,
+        method: setup.method.parse().with_context(|| format!("{said} method"))?,
+        contact: setup.contact.parse().with_context(|| format!("{said} contact"))?,
+        subscription: if setup.whole { Subscription::Whole } else { Subscription::Surface },
+    })
+}
+
+fn recorded_element(name: &str) -> anyhow::Result<ElementName> {
+    let known = [ElementName::T4, ElementName::T4Anp, ElementName::T10];
+    let found = known.into_iter().find(|element| element.to_string() == name);
+    found.with_context(|| format!("the recording's element is '{name}', which is none"))
+}
+
+/// The hand of a recorded run, its glove and its tracker.
+///
+/// # Errors
+/// A text that this program cannot read.
+pub(super) fn recorded_hand(setup: &RecordedSetup) -> anyhow::Result<HandConfiguration> {
+    let read = HandConfiguration::read(&setup.hand_setup);
+    let mut configuration = read.context("the recording's hand")?;
+    let calibration = Calibration::from_toml(&setup.calibration);
+    configuration.setup.calibration = calibration.context("the recording's calibration")?;
+    Ok(configuration)
+}
+
+/// Where the sender of joints was placed in a recorded run.
+pub(super) fn recorded_place(setup: &RecordedSetup) -> Option<Isometry3<f64>> {
+    let [x, y, z, qx, qy, qz, qw] = setup.world_from_sender?;
+    // The quaternion is one already: it comes back with its bits.
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(qw, qx, qy, qz));
+    Some(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+}

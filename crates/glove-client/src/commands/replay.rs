@@ -1,0 +1,68 @@
+//! `glove-client replay`: plays a recording again, and says whether the same came out.
+
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::Args;
+
+use super::numbers::{count, speed};
+use super::run::RunCommand;
+use super::run_arguments::RunArguments;
+use super::tell_report::tell;
+use crate::connection::ServerChoice;
+use crate::hand_request::HandRequest;
+
+/// Play a recording again without a window, and hold what comes out against it.
+#[derive(Args)]
+pub struct ReplayCommand {
+    /// The recording (MCAP), made with `run --record`.
+    #[arg(value_name = "F.mcap")]
+    recording: PathBuf,
+    /// Ends with exit code 1 if anything differs, and names the tick and the first stage that does:
+    /// pose, contacts, request or displacement.
+    #[arg(long)]
+    check: bool,
+    /// How fast: 1 as it was, 0 as fast as it goes.
+    #[arg(long, value_name = "FACTOR", value_parser = speed, default_value = "0", allow_hyphen_values = true)]
+    speed: f64,
+    /// Where to solve: HOST:PORT, or embedded [default: embedded].
+    #[arg(long, value_name = "ADDR|embedded")]
+    server: Option<ServerChoice>,
+    /// Threads of the embedded server [default: one per processor].
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    threads: Option<usize>,
+    /// File for a JSON report.
+    #[arg(long, value_name = "F.json")]
+    report: Option<PathBuf>,
+}
+
+impl ReplayCommand {
+    /// Plays it.
+    ///
+    /// # Errors
+    /// One line: why it cannot be played, or what differs.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let arguments = RunArguments {
+            hand: Some(HandRequest::Replay(self.recording.clone())),
+            speed: Some(self.speed),
+            server: self.server.clone(),
+            threads: self.threads,
+            report: self.report.clone(),
+            headless: true,
+            ..RunArguments::default()
+        };
+        let run = RunCommand { arguments };
+        let report = run.without_window(&run.arguments.plan()?)?;
+        tell(self.report.as_deref(), &report)?;
+        let difference = report.replay.as_ref().and_then(|replay| replay.difference.as_ref());
+        match difference {
+            Some(difference) if self.check => {
+                bail!("the replay differs from its recording in {difference}")
+            }
+            Some(_) | None if report.interrupted && self.check => {
+                bail!("the replay was ended before the recording was over")
+            }
+            Some(_) | None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! The recording of a run: what is written at its head, and whether an object is that of a recording.
+
+use std::path::Path;
+
+use anyhow::ensure;
+use softgrasp_core::mesh::TetMesh;
+
+use super::run_arguments::RunPlan;
+use crate::digest::Digest;
+use crate::loading::LoadedObject;
+use crate::recording::{RecordedSetup, Recorder, VERSION};
+use crate::solve_settings::{SolveSettings, Subscription};
+
+/// Begins the recording of a run.
+///
+/// # Errors
+/// The file cannot be written.
+pub(super) fn start_recorder(
+    path: &Path,
+    plan: &RunPlan,
+    loaded: &LoadedObject,
+    hand: String,
+) -> anyhow::Result<Recorder> {
+    let SolveSettings { material, element, method, contact, subscription } = &plan.settings;
+    let setup = RecordedSetup {
+        version: VERSION,
+        program: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
+        object: plan.object.to_string(),
+        nodes: plan.nodes,
+        size_m: loaded.brought_to_m,
+        mesh: mesh_digest(loaded.object.rest()),
+        young_pa: material.young,
+        poisson: material.poisson,
+        element: element.to_string(),
+        method: method.to_string(),
+        contact: contact.to_string(),
+        whole: *subscription == Subscription::Whole,
+        hand,
+        period_s: plan.period.map(|period| period.as_secs_f64()),
+        hand_setup: plan.hand_configuration.to_text(),
+        calibration: plan.hand_configuration.setup.calibration.to_toml()?,
+        is_live: plan.is_live,
+        world_from_sender: plan.world_from_sender.as_ref().map(|pose| {
+            let ([x, y, z], [qx, qy, qz, qw]): ([f64; 3], [f64; 4]) =
+                (pose.translation.vector.into(), pose.rotation.coords.into());
+            [x, y, z, qx, qy, qz, qw]
+        }),
+    };
+    Ok(Recorder::start(path, setup)?)
+}
+
+/// Holds the object that was loaded against the one that was recorded.
+///
+/// # Errors
+/// It is another one.
+pub(super) fn check_object(setup: &RecordedSetup, loaded: &LoadedObject) -> anyhow::Result<()> {
+    ensure!(
+        mesh_digest(loaded.object.rest()) == setup.mesh,
+        "the recording was made with another {}: its mesh has changed since, or a flag asks for \
+         another object",
+        setup.object
+    );
+    Ok(())
+}
+
+/// Digest of places and elements.
+fn mesh_digest(mesh: &TetMesh) -> String {
+    let mut digest = Digest::new();
+    mesh.vertices().iter().for_each(|vertex| digest.numbers(vertex.coords.as_slice()));
+    mesh.tets().iter().flatten().for_each(|node| digest.count(u64::from(*node)));
+    digest.end()
+}

@@ -1,0 +1,64 @@
+//! Digests of numbers, so that two runs can be compared bit by bit.
+
+use nalgebra::Isometry3;
+use softgrasp_protocol::{NodeChoice, Question};
+
+/// 128 bits of a BLAKE3 hash over the exact bits of numbers, in the making.
+pub struct Digest(blake3::Hasher);
+
+impl Digest {
+    /// An empty one.
+    pub fn new() -> Self {
+        Self(blake3::Hasher::new())
+    }
+
+    /// Adds a count.
+    pub fn count(&mut self, count: u64) {
+        self.0.update(&count.to_le_bytes());
+    }
+
+    /// Adds the bits of numbers.
+    pub fn numbers(&mut self, numbers: &[f64]) {
+        for number in numbers {
+            self.0.update(&number.to_le_bytes());
+        }
+    }
+
+    /// Adds a text.
+    pub fn text(&mut self, text: &str) {
+        self.count(text.len() as u64);
+        self.0.update(text.as_bytes());
+    }
+
+    /// Adds a pose: translation, then quaternion.
+    pub fn isometry(&mut self, pose: &Isometry3<f64>) {
+        self.numbers(pose.translation.vector.as_slice());
+        self.numbers(pose.rotation.coords.as_slice());
+    }
+
+    /// Its 32 hexadecimal digits.
+    pub fn end(self) -> String {
+        self.0.finalize().to_hex()[..32].to_owned()
+    }
+}
+
+/// Digest of what a question asks: known displacements and the partition that follows from them.
+pub fn request_digest(question: &Question) -> String {
+    let mut digest = Digest::new();
+    for known in &question.known {
+        digest.count(u64::from(known.dof));
+        digest.numbers(&[known.value]);
+    }
+    digest.count(question.masks.len() as u64);
+    for (nodes, weights) in question.masks.iter() {
+        digest.count(nodes.len() as u64);
+        nodes.iter().for_each(|node| digest.count(u64::from(*node)));
+        digest.numbers(weights);
+    }
+    question.mask_displacements.iter().for_each(|u| digest.numbers(u));
+    match &question.want.nodes {
+        NodeChoice::All => digest.text("all"),
+        NodeChoice::Nodes(nodes) => digest.count(nodes.len() as u64),
+    }
+    digest.end()
+}

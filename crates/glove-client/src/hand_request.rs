@@ -1,0 +1,78 @@
+//! The hand that is asked for on the command line.
+
+use std::fmt;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use crate::hand_choice::HandChoice;
+use crate::scripted::ScriptName;
+use crate::serial::SerialSource;
+
+/// A hand, and where it comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HandRequest {
+    /// Played by the program.
+    Scripted(ScriptName),
+    /// Driven by mouse and keyboard, in a window.
+    Mouse,
+    /// A recording that is played again.
+    Replay(PathBuf),
+    /// Glove and tracker on serial ports.
+    Serial(SerialSource),
+    /// A stream of joints that arrives here, over TCP or UDP.
+    Joints(SocketAddr),
+}
+
+impl HandRequest {
+    /// Which kind of hand it is.
+    pub fn choice(&self) -> HandChoice {
+        match self {
+            Self::Scripted(script) => HandChoice::Scripted(*script),
+            Self::Mouse => HandChoice::Mouse,
+            Self::Replay(_) => HandChoice::Replay,
+            Self::Serial(_) | Self::Joints(_) => HandChoice::Live,
+        }
+    }
+}
+
+impl HandRequest {
+    /// Whether devices send what they will, when they will.
+    pub fn is_live(&self) -> bool {
+        matches!(self, Self::Serial(_) | Self::Joints(_))
+    }
+}
+
+impl FromStr for HandRequest {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':').unwrap_or((text, "")) {
+            ("scripted", "") => Ok(Self::Scripted(ScriptName::default())),
+            ("scripted", name) => Ok(Self::Scripted(name.parse().map_err(|e| format!("{e}"))?)),
+            ("mouse", "") => Ok(Self::Mouse),
+            ("replay", "") => Err("replay needs the file of a recording: replay:F.mcap".into()),
+            ("replay", path) => Ok(Self::Replay(path.into())),
+            ("serial", source) => Ok(Self::Serial(source.parse().map_err(|e| format!("{e}"))?)),
+            ("joints", address) => {
+                let address = address.parse();
+                Ok(Self::Joints(address.map_err(|_| "joints needs IP:PORT to listen on")?))
+            }
+            _ => Err("there are scripted[:NAME], mouse, replay:F.mcap, \
+                      serial:glove=PATH[@BAUD],tracker=PATH[@BAUD] and joints:IP:PORT"
+                .into()),
+        }
+    }
+}
+
+impl fmt::Display for HandRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scripted(script) => write!(f, "scripted:{script}"),
+            Self::Mouse => f.write_str("mouse"),
+            Self::Replay(path) => write!(f, "replay:{}", path.display()),
+            Self::Serial(source) => write!(f, "serial:{source}"),
+            Self::Joints(address) => write!(f, "joints:{address}"),
+        }
+    }
+}

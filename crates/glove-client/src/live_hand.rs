@@ -1,0 +1,101 @@
+//! A person's own hand: glove and tracker on serial ports, or a stream of joints.
+
+use std::time::Instant;
+
+use crate::arrival::{Arrival, Device};
+use crate::joints::JointsListener;
+use crate::serial::{DeviceState, SerialDevices};
+
+/// Devices that are open, and whose bytes come by themselves.
+pub struct LiveHand {
+    source: Source,
+    name: String,
+}
+
+enum Source {
+    Serial(SerialDevices),
+    Joints(JointsListener),
+}
+
+impl LiveHand {
+    /// Glove and tracker; `name` stands in reports.
+    pub fn serial(devices: SerialDevices, name: String) -> Self {
+        Self { source: Source::Serial(devices), name }
+    }
+
+    /// A stream of joints; `name` stands in reports.
+    pub fn joints(listener: JointsListener, name: String) -> Self {
+        Self { source: Source::Joints(listener), name }
+    }
+
+    /// Its name in reports.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What has come since the last call; never waits.
+    ///
+    /// Units: `now_s` s on the client's clock, now.
+    pub fn take(&mut self, now_s: f64) -> Vec<Arrival> {
+        let now = Instant::now();
+        let at =
+            |arrived: Instant| Some(now_s - now.saturating_duration_since(arrived).as_secs_f64());
+        match &mut self.source {
+            Source::Serial(devices) => {
+                let pieces = devices.take().into_iter();
+                let arrival = |piece: crate::serial::Arrived| Arrival {
+                    device: piece.device,
+                    at_s: at(piece.arrived),
+                    is_datagram: false,
+                    bytes: piece.bytes,
+                };
+                pieces.map(arrival).collect()
+            }
+            Source::Joints(listener) => {
+                let pieces = listener.take().into_iter();
+                let arrival = |piece: crate::joints::ArrivedBytes| Arrival {
+                    device: Device::Joints,
+                    at_s: at(piece.arrived),
+                    is_datagram: piece.datagram,
+                    bytes: piece.bytes,
+                };
+                pieces.map(arrival).collect()
+            }
+        }
+    }
+
+    /// Pieces that were dropped because no tick took them in time.
+    pub fn dropped(&self) -> u64 {
+        match &self.source {
+            Source::Serial(devices) => devices.dropped(),
+            Source::Joints(listener) => listener.dropped(),
+        }
+    }
+
+    /// What is wrong with its devices, a sentence each; none while all talk.
+    pub fn complaints(&self) -> Vec<String> {
+        match &self.source {
+            Source::Serial(devices) => {
+                let states = devices.states().into_iter();
+                let named = states.zip([Device::Glove, Device::Tracker]);
+                named.filter_map(|(state, device)| complaint(device, &state)).collect()
+            }
+            Source::Joints(listener) if listener.senders() == 0 => {
+                vec![format!("nobody sends joints to {}", listener.local_addr())]
+            }
+            Source::Joints(_) => Vec::new(),
+        }
+    }
+}
+
+/// What a person has to know of a device.
+fn complaint(device: Device, state: &DeviceState) -> Option<String> {
+    let name = device.name();
+    Some(match state {
+        DeviceState::NotUsed | DeviceState::Talking => return None,
+        DeviceState::Absent { why } => format!("the {name} is not there: {why}"),
+        DeviceState::SettingUp => format!("the {name} is being set up"),
+        DeviceState::Silent { for_s } => format!("the {name} has been silent for {for_s:.1} s"),
+        DeviceState::Lost { why } => format!("the {name} is lost: {why}"),
+    })
+}

@@ -1,0 +1,118 @@
+//! The channels of a recording: topics, and the JSON Schema of their messages.
+
+use serde_json::{Value, json};
+
+use crate::arrival::Device;
+
+/// A channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// How the run was set up; one message, the first.
+    Setup,
+    /// Raw bytes of a device.
+    Device(Device),
+    /// Pose of the hand, for other programs; a replay does not need it.
+    Pose,
+    /// Something happened.
+    Event,
+    /// What the server was asked.
+    Request,
+    /// What it answered.
+    Answer,
+    /// A tick is over; what came since the one before belongs to it.
+    Tick,
+}
+
+impl Channel {
+    /// All channels.
+    pub const ALL: [Self; 9] = [
+        Self::Setup,
+        Self::Device(Device::Glove),
+        Self::Device(Device::Tracker),
+        Self::Device(Device::Joints),
+        Self::Pose,
+        Self::Event,
+        Self::Request,
+        Self::Answer,
+        Self::Tick,
+    ];
+
+    /// Its topic.
+    pub const fn topic(self) -> &'static str {
+        match self {
+            Self::Setup => "/setup",
+            Self::Device(Device::Glove) => "/glove",
+            Self::Device(Device::Tracker) => "/tracker",
+            Self::Device(Device::Joints) => "/joints",
+            Self::Pose => "/pose",
+            Self::Event => "/event",
+            Self::Request => "/request",
+            Self::Answer => "/answer",
+            Self::Tick => "/tick",
+        }
+    }
+
+    /// The channel of a topic.
+    pub fn of_topic(topic: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|channel| channel.topic() == topic)
+    }
+
+    /// Name of its messages.
+    pub const fn schema_name(self) -> &'static str {
+        match self {
+            Self::Setup => "softgrasp.Setup",
+            Self::Device(_) => "softgrasp.DeviceBytes",
+            Self::Pose => "softgrasp.HandPose",
+            Self::Event => "softgrasp.Event",
+            Self::Request => "softgrasp.Request",
+            Self::Answer => "softgrasp.Answer",
+            Self::Tick => "softgrasp.Tick",
+        }
+    }
+
+    /// JSON Schema of its messages.
+    pub fn schema(self) -> Value {
+        let number = json!({"type": "number"});
+        let integer = json!({"type": "integer"});
+        let text = json!({"type": "string"});
+        let flag = json!({"type": "boolean"});
+        let list = |of: &Value| json!({"type": "array", "items": of});
+        let properties = match self {
+            Self::Setup => json!({
+                "version": integer, "program": text, "object": text, "nodes": integer,
+                "size_m": {"type": ["number", "null"]}, "mesh": text, "young_pa": number, "poisson": number,
+                "element": text, "method": text, "contact": text, "whole": flag, "hand": text,
+                "period_s": {"type": ["number", "null"]}, "hand_setup": text,
+                "calibration": text, "is_live": flag,
+                "world_from_sender": {"type": ["array", "null"], "items": number},
+            }),
+            Self::Device(_) => json!({
+                "at_s": {"type": ["number", "null"]}, "datagram": flag, "hex": text,
+            }),
+            Self::Pose => json!({
+                "tick": integer, "palm_m": list(&number), "palm_xyzw": list(&number),
+                "fingertips_m": list(&list(&number)), "object_m": list(&number),
+                "object_xyzw": list(&number),
+            }),
+            Self::Event => json!({"tick": integer, "kind": text, "what": text}),
+            Self::Request => json!({
+                "tick": integer, "digest": text,
+            }),
+            Self::Answer => json!({
+                "tick": integer, "method": text, "element": text, "residual_rel": number,
+                "round_trip_ms": number,
+            }),
+            Self::Tick => json!({
+                "tick": integer, "skipped": integer, "now_s": number,
+                "command": {"type": ["string", "null"]}, "interventions": list(&json!({})),
+                "answers": list(&integer), "took_work": flag,
+                "state": {"type": ["string", "null"]},
+                "contacts": list(&json!({"type": ["integer", "null"]})),
+                "stages": {"type": "object", "properties": {
+                    "pose": text, "contacts": text, "request": text, "displacement": text,
+                }},
+            }),
+        };
+        json!({"type": "object", "title": self.schema_name(), "properties": properties})
+    }
+}

@@ -1,0 +1,144 @@
+//! Reads a recording, up to where it was cut off.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use mcap::McapError;
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+
+use super::channels::Channel;
+use super::file::{DeviceBytes, bytes_of};
+use super::tick::{AnswerSeen, RecordedSetup, RecordedTick, TickSeen};
+use crate::arrival::Arrival;
+
+/// A recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// How the run was set up.
+    pub setup: RecordedSetup,
+    /// Its ticks, in order.
+    pub ticks: Vec<RecordedTick>,
+    /// Why reading ended before the end of the file, if it did.
+    pub cut: Option<String>,
+}
+
+/// Why there is no recording.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file cannot be read.
+    #[error("cannot read the recording {path}: {source}")]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// It is no MCAP file.
+    #[error("{path} is no recording: {source}")]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+        /// What was found.
+        source: McapError,
+    },
+    /// It does not say how the run was set up.
+    #[error("{path} is no recording of this program: it has no /setup message that can be read")]
+    NoSetup {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It was written by a newer program.
+    #[error("{path} is of version {found}; this program reads {VERSION}")]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+}
+
+/// Version of the messages; raised when an old reader would misread a new file.
+pub const VERSION: u32 = 1;
+/// No message of ours is longer; a file that says so is not followed.
+const RECORD_MAX: usize = 64 << 20;
+
+/// Reads a recording. One that was cut off is read up to the last whole tick.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
+    let path = path.to_owned();
+    let file = match File::open(&path) {
+        Ok(file) => file,
+        Err(source) => return Err(ReadError::Open { path, source }),
+    };
+    let options = LinearReaderOptions::default().with_record_length_limit(RECORD_MAX);
+    let messages = MessageReader::new_with_options(BufReader::new(file), options);
+    let mut setup: Option<RecordedSetup> = None;
+    let mut ticks: Vec<RecordedTick> = Vec::new();
+    let mut next = RecordedTick::default();
+    let mut answers: Vec<AnswerSeen> = Vec::new();
+    let mut cut = None;
+    for message in messages {
+        let message = match message {
+            Ok(message) => message,
+            Err(source) if setup.is_none() => return Err(ReadError::NotMcap { path, source }),
+            Err(error) => {
+                cut = Some(error.to_string());
+                break;
+            }
+        };
+        let data = message.data.as_ref();
+        let taken = match Channel::of_topic(&message.channel.topic) {
+            Some(Channel::Setup) => {
+                setup = serde_json::from_slice(data).ok();
+                setup.is_some()
+            }
+            Some(Channel::Device(device)) => {
+                let arrival = serde_json::from_slice::<DeviceBytes>(data).ok().and_then(|read| {
+                    let DeviceBytes { at_s, datagram: is_datagram, hex } = read;
+                    Some(Arrival { device, at_s, is_datagram, bytes: bytes_of(&hex)? })
+                });
+                next.arrivals.extend(arrival.clone());
+                arrival.is_some()
+            }
+            Some(Channel::Answer) => {
+                let answer: Option<AnswerSeen> = serde_json::from_slice(data).ok();
+                answers.extend(answer.clone());
+                answer.is_some()
+            }
+            Some(Channel::Tick) => match serde_json::from_slice::<TickSeen>(data) {
+                Ok(seen) => {
+                    next.seen = seen;
+                    ticks.push(std::mem::take(&mut next));
+                    true
+                }
+                Err(_) => false,
+            },
+            Some(Channel::Pose | Channel::Event | Channel::Request) | None => true,
+        };
+        if !taken {
+            cut = Some(format!("a message on {} makes no sense", message.channel.topic));
+            break;
+        }
+    }
+    let Some(setup) = setup else { return Err(ReadError::NoSetup { path }) };
+    if setup.version != VERSION {
+        return Err(ReadError::Version { path, found: setup.version });
+    }
+    join_answers(&mut ticks, &answers);
+    Ok(Recording { setup, ticks, cut })
+}
+
+/// Tells each tick which method answered what it asked, where a tick took the answer.
+fn join_answers(ticks: &mut [RecordedTick], answers: &[AnswerSeen]) {
+    let taken: BTreeSet<u64> = ticks.iter().flat_map(|tick| tick.seen.answers.clone()).collect();
+    for answer in answers.iter().filter(|answer| taken.contains(&answer.tick)) {
+        if let Ok(at) = ticks.binary_search_by_key(&answer.tick, |tick| tick.seen.tick) {
+            ticks[at].answered_by = Some(answer.method.clone());
+        }
+    }
+}
