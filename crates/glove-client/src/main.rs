@@ -10,6 +10,7 @@ use glove_client::commands::devices::DevicesCommand;
 use glove_client::commands::emulate::EmulateCommand;
 use glove_client::commands::inspect::InspectCommand;
 use glove_client::commands::mesh::MeshCommand;
+use glove_client::commands::record::RecordCommand;
 use glove_client::commands::replay::ReplayCommand;
 use glove_client::commands::run::RunCommand;
 use glove_client::commands::solve::SolveCommand;
@@ -30,6 +31,7 @@ enum Command {
     Solve(SolveCommand),
     Inspect(InspectCommand),
     Mesh(MeshCommand),
+    Record(RecordCommand),
     Replay(ReplayCommand),
     Devices(DevicesCommand),
     Emulate(EmulateCommand),
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
         Command::Solve(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Mesh(command) => command.run(),
+        Command::Record(command) => command.run(),
         Command::Replay(command) => command.run(),
         Command::Devices(command) => command.run(),
         Command::Emulate(command) => command.run(),

@@ -15,6 +15,7 @@ mod live_samples;
 pub mod mesh;
 mod numbers;
 mod output;
+pub mod record;
 mod recorded_samples;
 mod recorded_settings;
 pub mod replay;

@@ -49,9 +49,12 @@ fn recording_of_a_replay_is_the_recording() {
     let again = folder.path("again.mcap");
     let hand = format!("replay:{path}");
     succeed(&["run", "--headless", "--hand", &hand, "--record", &again]);
-    let [first, second] =
-        [&path, &again].map(|path| glove_client::recording::read_recording(path.as_ref()).unwrap());
-    assert!(!first.ticks.is_empty() && first.ticks == second.ticks);
+    let third = folder.path("third.mcap");
+    succeed(&["record", &third, "--headless", "--hand", &hand]);
+    let [first, second, third] = [&path, &again, &third]
+        .map(|path| glove_client::recording::read_recording(path.as_ref()).unwrap());
+    assert!(!first.ticks.is_empty());
+    assert!(first.ticks == second.ticks && first.ticks == third.ticks);
 }
 
 #[test]

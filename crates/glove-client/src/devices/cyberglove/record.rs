@@ -91,7 +91,7 @@ impl GloveTicks {
     }
 
     /// The inverse of [`GloveTicks::decode`]; no byte of the result is zero.
-    pub(in crate::devices) fn encode(self) -> [u8; 5] {
+    pub(crate) fn encode(self) -> [u8; 5] {
         let mut bytes = [0x80, 0, 0, 0, 0];
         for (k, byte) in self.0.to_le_bytes().into_iter().enumerate() {
             if byte == 0 {
@@ -120,7 +120,7 @@ impl GloveStatus {
         bit(7).then(|| Self { plugged_in: bit(0), switch_on: bit(1), light_on: bit(2) })
     }
 
-    pub(in crate::devices) fn encode(self) -> u8 {
+    pub(crate) fn encode(self) -> u8 {
         0x80 | u8::from(self.plugged_in)
             | u8::from(self.switch_on) << 1
             | u8::from(self.light_on) << 2

@@ -168,7 +168,7 @@ impl Attitude {
     }
 
     /// Its numbers in the order of the record.
-    pub(in crate::devices) fn numbers(&self) -> ([f64; 4], usize) {
+    pub(crate) fn numbers(&self) -> ([f64; 4], usize) {
         match *self {
             Self::EulerDeg { azimuth_deg, elevation_deg, roll_deg } => {
                 ([azimuth_deg, elevation_deg, roll_deg, 0.0], 3)
