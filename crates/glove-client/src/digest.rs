@@ -4,14 +4,10 @@ use nalgebra::Isometry3;
 use softgrasp_protocol::{NodeChoice, Question};
 
 /// 128 bits of a BLAKE3 hash over the exact bits of numbers, in the making.
+#[derive(Default)]
 pub struct Digest(blake3::Hasher);
 
 impl Digest {
-    /// An empty one.
-    pub fn new() -> Self {
-        Self(blake3::Hasher::new())
-    }
-
     /// Adds a count.
     pub fn count(&mut self, count: u64) {
         self.0.update(&count.to_le_bytes());
@@ -44,7 +40,7 @@ impl Digest {
 
 /// Digest of what a question asks: known displacements and the partition that follows from them.
 pub fn request_digest(question: &Question) -> String {
-    let mut digest = Digest::new();
+    let mut digest = Digest::default();
     for known in &question.known {
         digest.count(u64::from(known.dof));
         digest.numbers(&[known.value]);

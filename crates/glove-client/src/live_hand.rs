@@ -13,14 +13,14 @@ pub struct LiveHand {
 }
 
 enum Source {
-    Serial(SerialDevices),
+    Serial(Box<SerialDevices>),
     Joints(JointsListener),
 }
 
 impl LiveHand {
     /// Glove and tracker; `name` stands in reports.
     pub fn serial(devices: SerialDevices, name: String) -> Self {
-        Self { source: Source::Serial(devices), name }
+        Self { source: Source::Serial(Box::new(devices)), name }
     }
 
     /// A stream of joints; `name` stands in reports.

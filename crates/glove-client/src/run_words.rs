@@ -87,6 +87,16 @@ impl RunReport {
                 100.0 * s.max_strain,
             ));
         }
+        text.push_str(&self.words_of_devices());
+        if self.interrupted {
+            text.push_str("  ended by the user\n");
+        }
+        text
+    }
+
+    /// What is to be said of silent devices, of the way of a sample, and of a replay.
+    fn words_of_devices(&self) -> String {
+        let (s, mut text) = (&self.summary, String::new());
         if s.ticks_held > 0 {
             text.push_str(&format!(
                 "  hand held           {} ticks, while a device was silent\n",
@@ -101,9 +111,6 @@ impl RunReport {
         }
         if let Some(replay) = &self.replay {
             text.push_str(&replay.words());
-        }
-        if self.interrupted {
-            text.push_str("  ended by the user\n");
         }
         text
     }

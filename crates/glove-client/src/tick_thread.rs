@@ -20,10 +20,13 @@ pub struct TickThread {
     end: RunEnd,
 }
 
+/// The thread of a run.
+type Ticks = JoinHandle<Result<RunReport, RunError>>;
+
 /// The end of a run, which one of those who share it may wait for.
 #[derive(Clone)]
 pub struct RunEnd {
-    thread: Arc<Mutex<Option<JoinHandle<Result<RunReport, RunError>>>>>,
+    thread: Arc<Mutex<Option<Ticks>>>,
 }
 
 /// A run that did not come to its report.
@@ -125,7 +128,7 @@ impl RunEnd {
         thread.join().unwrap_or(Err(RunError::Lost))
     }
 
-    fn take(&self) -> Option<JoinHandle<Result<RunReport, RunError>>> {
+    fn take(&self) -> Option<Ticks> {
         self.thread.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }

@@ -65,7 +65,7 @@ pub(super) fn check_object(setup: &RecordedSetup, loaded: &LoadedObject) -> anyh
 
 /// Digest of places and elements.
 fn mesh_digest(mesh: &TetMesh) -> String {
-    let mut digest = Digest::new();
+    let mut digest = Digest::default();
     mesh.vertices().iter().for_each(|vertex| digest.numbers(vertex.coords.as_slice()));
     mesh.tets().iter().flatten().for_each(|node| digest.count(u64::from(*node)));
     digest.end()

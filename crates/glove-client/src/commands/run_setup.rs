@@ -24,7 +24,7 @@ use crate::mouse::MouseHand;
 use crate::pace::Pace;
 use crate::recording::ReplayHand;
 use crate::run_report::RunReport;
-use crate::scripted::{Planner, ScriptedHand};
+use crate::scripted::{GraspPlan, NoGrasp, Planner, ScriptedHand};
 use crate::serial::{SerialDevices, SerialSettings};
 use crate::session::{Session, priority_for};
 use crate::soft_object::SoftObject;
@@ -83,34 +83,7 @@ pub(super) fn make_ready(
         recorder.map(|path| start_recorder(path, plan, &loaded, hand_name)).transpose()?;
     let LoadedObject { summary, mut object, plan: grip, .. } = loaded;
     seen(&object)?;
-    let planner = || Planner::beside().context("cannot start the planner's thread");
-    let contact = plan.settings.contact;
-    let hand: HandSource = match (&plan.hand, plan.pace) {
-        (HandRequest::Mouse, _) => {
-            MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).holding(contact).into()
-        }
-        (HandRequest::Scripted(script), Pace::Lockstep) => {
-            ScriptedHand::following(*script, hand_setup.clone(), grip?).holding(contact).into()
-        }
-        (HandRequest::Scripted(script), Pace::Free) => {
-            let hand = ScriptedHand::following(*script, hand_setup.clone(), grip?);
-            hand.holding(contact).with_planner(planner()?).into()
-        }
-        (HandRequest::Serial(source), _) => {
-            let settings = SerialSettings::of_hand(source, &plan.hand_configuration);
-            LiveHand::serial(SerialDevices::open(settings)?, plan.hand.to_string()).into()
-        }
-        (HandRequest::Joints(address), _) => {
-            LiveHand::joints(JointsListener::bind(*address)?, plan.hand.to_string()).into()
-        }
-        (HandRequest::Replay(path), _) if is_foreign(path) => {
-            ForeignHand::read(path, &hand_setup, plan.tick_s())?.into()
-        }
-        (HandRequest::Replay(path), _) => {
-            let recording = plan.recording.clone().context("the recording has not been read")?;
-            ReplayHand::new(recording, path.display().to_string()).into()
-        }
-    };
+    let hand = hand_of(plan, grip)?;
     let priority = match plan.pace {
         Pace::Lockstep => Priority::Ordinary,
         Pace::Free => priority_for(&mut object)?,
@@ -146,4 +119,37 @@ pub(super) fn make_ready(
         session.record_to(recorder);
     }
     Ok(ReadyRun { session, host })
+}
+
+/// The hand of a run; `grip` is how the scripted one grasps the object.
+fn hand_of(plan: &RunPlan, grip: Result<GraspPlan, NoGrasp>) -> anyhow::Result<HandSource> {
+    let hand_setup = &plan.hand_configuration.setup;
+    let planner = || Planner::beside().context("cannot start the planner's thread");
+    let contact = plan.settings.contact;
+    Ok(match (&plan.hand, plan.pace) {
+        (HandRequest::Mouse, _) => {
+            MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).holding(contact).into()
+        }
+        (HandRequest::Scripted(script), Pace::Lockstep) => {
+            ScriptedHand::following(*script, hand_setup.clone(), grip?).holding(contact).into()
+        }
+        (HandRequest::Scripted(script), Pace::Free) => {
+            let hand = ScriptedHand::following(*script, hand_setup.clone(), grip?);
+            hand.holding(contact).with_planner(planner()?).into()
+        }
+        (HandRequest::Serial(source), _) => {
+            let settings = SerialSettings::of_hand(source, &plan.hand_configuration);
+            LiveHand::serial(SerialDevices::open(settings)?, plan.hand.to_string()).into()
+        }
+        (HandRequest::Joints(address), _) => {
+            LiveHand::joints(JointsListener::bind(*address)?, plan.hand.to_string()).into()
+        }
+        (HandRequest::Replay(path), _) if is_foreign(path) => {
+            ForeignHand::read(path, hand_setup, plan.tick_s())?.into()
+        }
+        (HandRequest::Replay(path), _) => {
+            let recording = plan.recording.clone().context("the recording has not been read")?;
+            ReplayHand::new(recording, path.display().to_string()).into()
+        }
+    })
 }

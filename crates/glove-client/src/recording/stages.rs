@@ -49,19 +49,19 @@ impl StageDigests {
     /// Digests of a tick that has just been played.
     pub fn of(grasp_loop: &GraspLoop, outcome: &TickOutcome) -> Self {
         let Some(hand) = grasp_loop.hand() else { return Self::default() };
-        let mut pose = Digest::new();
+        let mut pose = Digest::default();
         pose.isometry(&hand.world_from_palm);
         for segment in hand.fingers.iter().flat_map(|finger| &finger.segments) {
             pose.isometry(&segment.world_from_segment);
         }
-        let mut contacts = Digest::new();
+        let mut contacts = Digest::default();
         contacts.text(&outcome.state.map_or(String::new(), |state| state.to_string()));
         for contact in grasp_loop.contacts() {
             contacts.count(contact.map_or(u64::MAX, |contact| u64::from(contact.node)));
         }
         contacts.isometry(grasp_loop.world_from_object());
         grasp_loop.shown_segments().iter().flatten().for_each(|s| contacts.isometry(s));
-        let mut displacement = Digest::new();
+        let mut displacement = Digest::default();
         displacement.count(grasp_loop.object().rest_shapes());
         grasp_loop.object().displacement().iter().for_each(|u| displacement.numbers(u));
         Self {

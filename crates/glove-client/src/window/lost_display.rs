@@ -31,10 +31,8 @@ fn lock() -> std::sync::MutexGuard<'static, Option<Rest>> {
 pub fn hear() {
     let Ok(xlib) = x11_dl::xlib::Xlib::open() else { return };
     // SAFETY: the function stores a pointer to a function of the signature it asks for, which
-    // lives as long as the process; Xlib allows the call at any time, before others too.
+    // lives as long as the process, and so does the library, which is never unloaded; Xlib allows the call at any time, before others too.
     unsafe { (xlib.XSetIOErrorHandler)(Some(display_is_lost)) };
-    // The library stays loaded as long as its handler may be called.
-    std::mem::forget(xlib);
 }
 
 /// Other systems have no Xlib.
