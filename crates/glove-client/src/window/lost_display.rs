@@ -1,8 +1,7 @@
 //! What is done when the X server goes away while a window is open.
 //!
 //! Xlib, which the window stands on, calls a handler then and ends the process when it returns. So
-//! what is left to do is done inside that handler, on the thread that drew, and the handler ends the
-//! process itself.
+//! the handler never returns: what is left to do is done beside it, and ends the process.
 
 use std::sync::Mutex;
 
@@ -40,15 +39,26 @@ pub fn hear() {
 pub fn hear() {}
 
 /// Called by Xlib on the thread that uses the display; nothing may unwind through its frames.
+///
+/// What is left is done on another thread, which ends the process: on this one the libraries of the
+/// window would tidy up then, and fail at it without a display.
 #[cfg(all(unix, not(target_os = "macos")))]
 extern "C" fn display_is_lost(_display: *mut x11_dl::xlib::Display) -> std::ffi::c_int {
     let rest = lock().take();
-    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| match rest {
-        Some(rest) => {
-            eprintln!("glove-client: the display was lost; the run goes on without it");
-            rest();
-        }
-        None => eprintln!("glove-client: the display was lost"),
-    }));
-    std::process::exit(if done.is_ok() { 1 } else { 101 })
+    let work = move || {
+        let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| match rest {
+            Some(rest) => {
+                eprintln!("glove-client: the display was lost; the run goes on without it");
+                rest();
+            }
+            None => eprintln!("glove-client: the display was lost"),
+        }));
+        std::process::exit(if done.is_ok() { 1 } else { 101 })
+    };
+    if std::thread::Builder::new().name("without display".to_owned()).spawn(work).is_err() {
+        std::process::abort();
+    }
+    loop {
+        std::thread::park();
+    }
 }
