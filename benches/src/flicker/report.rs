@@ -26,8 +26,9 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
          noise: tracker 0.8 mm and 0.15° (standard deviation, each axis), every sensor of the \
          glove off by −1, 0 or +1 count. It rests at the very first touch, which is the worst \
          place. Counted are changes of the state of the grasp. `release_ms`: from the tick in \
-         which the hand begins to open, without noise, to the tick that lets the object go; what \
-         a margin adds to that of none is its price. The product has a margin of {} mm.",
+         which the hand begins to open, without noise, to the tick in which the object is not \
+         deformed any more, blank where a smaller margin had let go before; the differences are the \
+         price of the margin. All margins follow the same bytes. The product has a margin of {} mm.",
         1e3 * PRODUCT
     ));
     let columns =
@@ -45,9 +46,10 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
             }
             rates.push(changes as f64 / (seeds as f64 * minutes));
         }
-        let release_ms = 1e3 * stage.release_s(margin_m).map_err(ReportError::Hand)?;
-        let row = [1e3 * margin_m, rates[0], rates[1], release_ms];
-        table.push(row.map(Cell::Number));
+        let release_s = stage.release_s(margin_m).map_err(ReportError::Hand)?;
+        let release = release_s.map_or(Cell::Blank, |s| Cell::Number(1e3 * s));
+        let row = [1e3 * margin_m, rates[0], rates[1]].map(Cell::Number);
+        table.push(row.into_iter().chain([release]));
         if margin_m == PRODUCT && rates.iter().any(|rate| *rate > 0.0) {
             report.fault(format!("margin {} mm: the state flickers", 1e3 * margin_m));
         }

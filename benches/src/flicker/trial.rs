@@ -64,6 +64,30 @@ impl Stage {
         })
     }
 
+    /// The bytes of a script, tick by tick, until the grasp of the product is as wanted, or to its
+    /// end.
+    fn script(
+        &self,
+        script: ScriptName,
+        holds: impl Fn(Option<StateName>) -> bool,
+    ) -> anyhow::Result<Vec<Vec<Arrival>>> {
+        let mut hand = self.hand(script)?;
+        let mut follower = self.follower(Grasp::RELEASE_MARGIN_M)?;
+        let mut played = Vec::new();
+        for _ in 0..1000 {
+            let sent = hand.next(&follower.seen, &self.loaded.object);
+            if sent.over {
+                return Ok(played);
+            }
+            let state = follower.follow(&sent.arrivals);
+            played.push(sent.arrivals);
+            if holds(state) {
+                return Ok(played);
+            }
+        }
+        anyhow::bail!("the script does not come to the state")
+    }
+
     /// How often the grasp changes while the hand that has just come into a state rests, with noise.
     ///
     /// Units: `margin_m` m.
@@ -77,42 +101,39 @@ impl Stage {
         ticks: u64,
         seed: u64,
     ) -> anyhow::Result<u64> {
-        let mut hand = self.hand(ScriptName::Squeeze)?;
+        let approach = self.script(ScriptName::Squeeze, |at| at == Some(state))?;
         let mut follower = self.follower(margin_m)?;
-        let arrivals = follower.play_until(&mut hand, |at| at == Some(state))?;
+        let mut before = None;
+        approach.iter().for_each(|arrivals| before = follower.follow(arrivals));
+        let last = approach.last().context("the script is empty")?;
         let mut noise = Noise::new(seed);
-        let (mut changes, mut before) = (0, Some(state));
+        let mut changes = 0;
         for _ in 0..ticks {
-            let now = follower.follow(&noise.on(&arrivals));
+            let now = follower.follow(&noise.on(last));
             changes += u64::from(now != before);
             before = now;
         }
         Ok(changes)
     }
 
-    /// How long after the hand has begun to open the object is let go, s.
+    /// How long after the hand has begun to open the object is not deformed any more, s; `None` if a
+    /// grasp with this margin has let go before.
     ///
     /// # Errors
     /// The script does not come so far.
-    pub fn release_s(&self, margin_m: f64) -> anyhow::Result<f64> {
-        let mut hand = self.hand(ScriptName::Release)?;
+    pub fn release_s(&self, margin_m: f64) -> anyhow::Result<Option<f64>> {
+        let played = self.script(ScriptName::Release, |_| false)?;
+        let held = self.script(ScriptName::Release, |at| at == Some(StateName::Deforming))?.len();
+        // The hand presses, holds still, and opens: it opens when it moves again.
+        let still = |tick: &usize| played[*tick] == played[*tick - 1];
+        let rests = (held..played.len()).find(still).context("the hand never holds still")?;
+        let opens = (rests..played.len()).find(|tick| !still(tick));
+        let opens = opens.context("the hand never opens")?;
         let mut follower = self.follower(margin_m)?;
-        follower.play_until(&mut hand, |at| at == Some(StateName::Deforming))?;
-        let object = &self.loaded.object;
-        let mut before = follower.play_until(&mut hand, |_| true)?;
-        let (mut opening, mut pressed) = (None, 0);
-        for _ in 0..500 {
-            let sent = hand.next(&follower.seen, object);
-            let state = follower.follow(&sent.arrivals);
-            // The hand presses, holds still, and opens: it opens when it moves again.
-            let moves = sent.arrivals != before;
-            before = sent.arrivals;
-            pressed += u64::from(!moves);
-            if moves && pressed > 5 {
-                opening.get_or_insert(follower.tick);
-            }
-            if let (Some(begun), true) = (opening, state != Some(StateName::Deforming)) {
-                return Ok((follower.tick - begun) as f64 / RATE_HZ);
+        for (tick, arrivals) in played.iter().enumerate() {
+            let holds = follower.follow(arrivals) == Some(StateName::Deforming);
+            if tick >= opens && !holds {
+                return Ok((tick > opens).then(|| (tick - opens + 1) as f64 / RATE_HZ));
             }
         }
         anyhow::bail!("the hand with a margin of {margin_m} m never lets go")
@@ -120,22 +141,6 @@ impl Stage {
 }
 
 impl Follower<'_> {
-    /// Plays a script until the grasp is as wanted; the bytes of that tick.
-    fn play_until(
-        &mut self,
-        hand: &mut ScriptedHand,
-        holds: impl Fn(Option<StateName>) -> bool,
-    ) -> anyhow::Result<Vec<Arrival>> {
-        for _ in 0..1000 {
-            let sent = hand.next(&self.seen, &self.stage.loaded.object);
-            let state = self.follow(&sent.arrivals);
-            if holds(state) {
-                return Ok(sent.arrivals);
-            }
-        }
-        anyhow::bail!("the script does not come to the state")
-    }
-
     fn follow(&mut self, arrivals: &[Arrival]) -> Option<StateName> {
         let now_s = self.tick as f64 / RATE_HZ;
         self.tick += 1;
