@@ -7,7 +7,7 @@ use crate::report::{Options, Report, ReportError, progress};
 use crate::table::{Cell, Table};
 
 /// Release margins, m.
-const MARGINS_M: [f64; 7] = [0.0, 0.0005, 0.001, 0.002, 0.003, 0.004, 0.006];
+const MARGINS_M: [f64; 8] = [0.0, 0.0005, 0.001, 0.002, 0.0025, 0.003, 0.004, 0.006];
 /// Margin of the product, in the form of a table.
 const PRODUCT: f64 = Grasp::RELEASE_MARGIN_M;
 
@@ -28,7 +28,9 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
          place. Counted are changes of the state of the grasp. `release_ms`: from the tick in \
          which the hand begins to open, without noise, to the tick in which the object is not \
          deformed any more, blank where a smaller margin had let go before; the differences are the \
-         price of the margin. All margins follow the same bytes. The product has a margin of {} mm.",
+         price of the margin. All margins follow the same bytes, \
+         those of a hand that saw the product's grasp: with the smallest margins the grasp drops out \
+         of the state before the noise begins, which leaves little to change. The product has a margin of {} mm.",
         1e3 * PRODUCT
     ));
     let columns =

@@ -14,6 +14,8 @@ use softgrasp_core::mesh::BuiltIn;
 
 use super::noise::Noise;
 
+/// A hand that holds still does so for more ticks than this; one that closes slowly stops for fewer.
+const STILL_TICKS: usize = 8;
 /// Ticks per second.
 pub const RATE_HZ: f64 = 60.0;
 
@@ -126,7 +128,9 @@ impl Stage {
         let held = self.script(ScriptName::Release, |at| at == Some(StateName::Deforming))?.len();
         // The hand presses, holds still, and opens: it opens when it moves again.
         let still = |tick: &usize| played[*tick] == played[*tick - 1];
-        let rests = (held..played.len()).find(still).context("the hand never holds still")?;
+        let rests = |from: &usize| (*from..*from + STILL_TICKS).all(|tick| still(&tick));
+        let rests = (held..played.len() - STILL_TICKS).find(rests);
+        let rests = rests.context("the hand never holds still")?;
         let opens = (rests..played.len()).find(|tick| !still(tick));
         let opens = opens.context("the hand never opens")?;
         let mut follower = self.follower(margin_m)?;
