@@ -92,10 +92,10 @@ impl LiveHand {
 fn complaint(device: Device, state: &DeviceState) -> Option<String> {
     let name = device.name();
     Some(match state {
-        DeviceState::NotUsed | DeviceState::Talking => return None,
+        // A device that falls silent is told by its samples.
+        DeviceState::NotUsed | DeviceState::Talking | DeviceState::Silent { .. } => return None,
         DeviceState::Absent { why } => format!("the {name} is not there: {why}"),
         DeviceState::SettingUp => format!("the {name} is being set up"),
-        DeviceState::Silent { for_s } => format!("the {name} has been silent for {for_s:.1} s"),
         DeviceState::Lost { why } => format!("the {name} is lost: {why}"),
     })
 }

@@ -41,7 +41,12 @@ pub struct Session {
     last: TickOutcome,
     recorder: Option<Recorder>,
     latency: LatencyLedger,
+    /// What was wrong with devices when they were looked at last.
+    complaints: Vec<String>,
 }
+
+/// Devices are looked at every so many ticks.
+const COMPLAIN_EVERY: u64 = 30;
 
 impl Session {
     /// A run that has not begun. The thread that plays it gets the priority with the first tick.
@@ -69,6 +74,7 @@ impl Session {
             last: TickOutcome::default(),
             recorder: None,
             latency: LatencyLedger::default(),
+            complaints: Vec::new(),
         }
     }
 
@@ -92,7 +98,8 @@ impl Session {
         if sent.command.is_none() {
             sent.command = self.commands.pop_front();
         }
-        let outcome = self.grasp_loop.tick(due.tick, now_s, &sent)?;
+        let mut outcome = self.grasp_loop.tick(due.tick, now_s, &sent)?;
+        self.complain(due.tick, &mut outcome);
         self.record(due, now_s, &sent, &outcome);
         self.seen = outcome.seen;
         self.hear(&outcome);
@@ -131,6 +138,18 @@ impl Session {
             Intervention::NotReplayed(what) => Err(format!("a replay cannot repeat this: {what}")),
         };
         self.notices.extend(repeated.err().map(Notice::refused));
+    }
+
+    /// Tells what is wrong with devices that were open before, or never were.
+    fn complain(&mut self, tick: u64, outcome: &mut TickOutcome) {
+        let HandSource::Live(hand) = &self.hand else { return };
+        if tick % COMPLAIN_EVERY != COMPLAIN_EVERY - 1 {
+            return;
+        }
+        let complaints = hand.complaints();
+        let new = complaints.iter().filter(|text| !self.complaints.contains(text));
+        outcome.events.extend(new.cloned().map(LoopEvent::Device));
+        self.complaints = complaints;
     }
 
     /// Writes down what a tick did, and holds it against what was written down.

@@ -152,3 +152,14 @@ fn raw_records_of_devices_that_answer_nothing_move_the_hand_while_a_cable_is_pul
     }
     assert_replays(&folder);
 }
+
+#[test]
+fn devices_that_are_not_there_are_named_while_the_run_waits_for_them() {
+    let folder = Folder::new();
+    let mut run = run(&folder, &folder.path("nowhere"), "60");
+    assert_eq!(run.wait().unwrap().code(), Some(0));
+    let report = report(&folder, "run.json");
+    for words in ["the glove is not there", "the tracker is not there"] {
+        assert!(happened(&report, words), "{words}: {}", report["events"]);
+    }
+}
