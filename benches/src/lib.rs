@@ -22,6 +22,7 @@ pub mod methods;
 
 pub mod onset;
 pub mod plot;
+mod random;
 pub mod reference;
 pub mod report;
 pub mod report_error;

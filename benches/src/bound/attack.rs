@@ -4,9 +4,10 @@ use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Delivery, Touched};
 
 use super::exact::Exact;
-use super::grips::{Kind, Random, contacts, pushes};
+use super::grips::{Kind, contacts, pushes};
 use super::scenes::Scene;
 use super::tally::{Bound, Tally};
+use crate::random::Random;
 use crate::report::ReportError;
 
 /// How much is tried.

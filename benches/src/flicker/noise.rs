@@ -1,5 +1,6 @@
 //! Noise of a glove and a tracker, put on the bytes that they send.
 
+use crate::random::Random;
 use glove_client::arrival::{Arrival, Device};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -8,30 +9,18 @@ const POSITION_CM: f64 = 0.08;
 /// Standard deviation of the tracker's attitude about each axis, rad (0.15°).
 const ATTITUDE_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 
-/// A sequence of numbers that is the same in every run (splitmix64).
-pub struct Noise(u64);
+/// Noise that is the same in every run.
+pub struct Noise(Random);
 
 impl Noise {
-    /// A sequence of its own for each seed.
+    /// Noise of its own for each seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x2545_F491_4F6C_DD1D) ^ 0x9E37_79B9_7F4A_7C15)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Even in 0 to 1.
-    fn even(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+        Self(Random(seed.wrapping_mul(0x2545_F491_4F6C_DD1D)))
     }
 
     /// Normal, of standard deviation 1 (Box and Muller 1958).
     fn normal(&mut self) -> f64 {
-        let (radius, angle) = (self.even().max(1e-300), self.even());
+        let (radius, angle) = (self.0.share().max(1e-300), self.0.share());
         (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
     }
 
@@ -57,7 +46,7 @@ impl Noise {
 
     fn on_glove(&mut self, sensors: &mut [u8]) {
         for sensor in sensors {
-            let off = (self.next() % 3) as i16 - 1;
+            let off = self.0.below(3) as i16 - 1;
             *sensor = (i16::from(*sensor) + off).clamp(1, 255) as u8;
         }
     }
