@@ -1,6 +1,7 @@
 //! Reads a hand from a stream of joints.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
+use serde::Serialize;
 use softgrasp_core::hand::{HandDimensions, HandPose, pose};
 
 use crate::joints::{
@@ -21,7 +22,7 @@ pub struct JointsReader {
 }
 
 /// How well the hand fits, over a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FitErrors {
     /// Records that were fitted.
     pub records: u64,

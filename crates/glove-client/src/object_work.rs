@@ -138,16 +138,8 @@ impl ObjectWork {
         }
     }
 
-    /// The next piece of work that is done, in the order it was handed over; never waits.
-    pub fn take(&mut self) -> Option<ObjectDone> {
-        match self {
-            Self::AtOnce(done) => done.pop_front(),
-            Self::Beside(beside) => beside.take(),
-        }
-    }
-
-    /// The same, if it is to be taken now; else it stays the next. Work beside the ticks is always
-    /// taken.
+    /// The next piece of work that is done, in the order it was handed over, if it is to be taken now;
+    /// else it stays the next. Never waits. Work beside the ticks is always taken.
     pub fn take_if(&mut self, is_due: impl FnOnce(&ObjectDone) -> bool) -> Option<ObjectDone> {
         match self {
             Self::AtOnce(done) if done.front().is_some_and(is_due) => done.pop_front(),

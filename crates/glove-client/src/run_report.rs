@@ -7,6 +7,7 @@ use softgrasp_core::grasp::{GraspEvent, StateName};
 
 use crate::contact_model::ContactModel;
 use crate::hand_reader::DeviceFaults;
+use crate::joints_reader::FitErrors;
 use crate::latency::LatencySummary;
 use crate::pace::{Due, Pace};
 use crate::recording::{Difference, ReplayCheck, ReplayHand};
@@ -163,6 +164,10 @@ pub struct RunSummary {
     pub hemisphere_flips: u64,
     /// Bad lines of joints, and lines that no hand fits.
     pub joint_faults: u64,
+    /// How well the hand fits a sender's joints; null where none came.
+    pub joint_fit: Option<FitErrors>,
+    /// Pieces of device bytes that were dropped because no tick took them in time.
+    pub pieces_dropped: u64,
     /// Bad records of the glove.
     pub glove_faults: u64,
     /// Bad records of the tracker.
@@ -309,6 +314,8 @@ impl RunReport {
             compute_ms_max: budget.longest().as_secs_f64() * 1e3,
             // Booked by whoever plays the ticks.
             latency: None,
+            joint_fit: None,
+            pieces_dropped: 0,
             residual_rel_max: most(|s| s.residual_rel),
             round_trip_ms_p50: quantile(0.5),
             round_trip_ms_p99: quantile(0.99),

@@ -103,6 +103,13 @@ impl RunReport {
                 s.ticks_held
             ));
         }
+        if let Some(fit) = &s.joint_fit {
+            text.push_str(&format!(
+                "  hand fits joints    to {:.1} mm (root mean square), {:.1} mm at most\n",
+                1e3 * fit.rms_m,
+                1e3 * fit.most_m
+            ));
+        }
         if let Some(latency) = &s.latency {
             text.push_str(&format!(
                 "  sample to shape     {:.1} ms (median), {:.1} ms (99 %)\n",

@@ -304,6 +304,11 @@ impl Session {
         self.report.interrupted = interrupted;
         self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
         self.report.summary.latency = self.latency.summary();
+        let fit = self.grasp_loop.reader().fit_errors();
+        self.report.summary.joint_fit = (fit.records > 0).then_some(fit);
+        if let HandSource::Live(hand) = &self.hand {
+            self.report.summary.pieces_dropped = hand.dropped();
+        }
         if let HandSource::Replay(hand) = self.hand {
             self.report.replay = Some(ReplaySummary::of(&hand));
         }

@@ -140,5 +140,8 @@ fn recordings_of_other_programs_move_the_hand() {
         let states = report["states_reached"].as_array().unwrap();
         assert!(states.iter().any(|state| state == "Free"), "{file}: {states:?}");
         assert_eq!(report["summary"]["joint_faults"], 0, "{file}");
+        let fit = &report["summary"]["joint_fit"];
+        assert_eq!(fit.is_null(), file.ends_with(".traj"), "{file}: {fit}");
+        assert!(fit["rms_m"].as_f64().is_none_or(|rms_m| rms_m < 0.01), "{file}: {fit}");
     }
 }
