@@ -17,6 +17,7 @@ pub mod frame;
 pub mod frontier;
 pub mod hard_cases;
 pub mod hold;
+pub mod large;
 pub mod machine;
 pub mod methods;
 
@@ -68,6 +69,8 @@ pub enum ReportName {
     HardCases,
     /// Noise of the devices against the hysteresis of the grasp.
     Flicker,
+    /// Large deformation: error against time of frames, and random walks of the hand.
+    Large,
     /// Random grips: the proven bound against the true error.
     Bound,
 }
@@ -89,6 +92,7 @@ impl ReportName {
             Self::HardCases => "hard-cases",
             Self::Bound => "bound",
             Self::Flicker => "flicker",
+            Self::Large => "large",
         }
     }
 }
@@ -113,6 +117,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::HardCases => hard_cases::measure(options)?,
         ReportName::Bound => bound::measure(options)?,
         ReportName::Flicker => flicker::measure(options)?,
+        ReportName::Large => large::measure(options)?,
     };
     report.end();
     let files = report.write(&options.out)?;

@@ -3,10 +3,13 @@
 use std::path::PathBuf;
 
 use glove_client::connection::LinkError;
+use softgrasp_core::contact::MaskError;
 use softgrasp_core::fem::MaterialError;
 use softgrasp_core::mesh::{GenerateError, MeshError};
 use softgrasp_core::model::ModelError;
-use softgrasp_core::solve::SolveError;
+use softgrasp_core::solve::condensed::CondensedError;
+use softgrasp_core::solve::equilibrium::NoEquilibrium;
+use softgrasp_core::solve::{FrontError, SolveError};
 use softgrasp_core::sphere_tree::TreeError;
 
 use crate::plot::PlotError;
@@ -29,6 +32,18 @@ pub enum ReportError {
     /// A method failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// Nodes and weights that make no mask.
+    #[error(transparent)]
+    Mask(#[from] MaskError),
+    /// Contacts that do not hold.
+    #[error(transparent)]
+    Condensed(#[from] CondensedError),
+    /// A factor.
+    #[error(transparent)]
+    Front(#[from] FrontError),
+    /// An equilibrium that was not found.
+    #[error(transparent)]
+    NoEquilibrium(#[from] NoEquilibrium),
     /// A sphere tree could not be built or refitted.
     #[error(transparent)]
     Tree(#[from] TreeError),

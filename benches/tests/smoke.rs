@@ -112,6 +112,44 @@ fn every_element_comes_nearer_to_closed_forms_on_finer_meshes() {
     for figure in ["accuracy-waves.svg", "accuracy-sphere.svg", "accuracy-cases.svg"] {
         assert!(folder.path().join(figure).is_file(), "{figure}");
     }
+    large_deformation_is_beside_its_closed_forms(folder.path());
+}
+
+fn large_deformation_is_beside_its_closed_forms(folder: &Path) {
+    let of = |name| column(folder, "accuracy-large.csv", name);
+    let (cases, elements, errors) = (of("case"), of("element"), of("error_rel"));
+    let errors_of = |case: &str, element: &str| -> Vec<f64> {
+        let rows = cases.iter().zip(&elements).zip(&errors);
+        let of_both = rows.filter(|((c, e), _)| *c == case && *e == element);
+        of_both.map(|(_, error)| error.parse().unwrap()).collect()
+    };
+    for element in ["t4", "t4-anp", "t10"] {
+        for (case, rows, error_max) in [
+            ("uniaxial", 12, 1e-11),
+            ("equibiaxial", 4, 1e-11),
+            ("simple shear", 8, 1e-11),
+            ("turned", 8, 1e-13),
+        ] {
+            let errors = errors_of(case, element);
+            assert_eq!(errors.len(), rows, "{case} {element}");
+            assert!(errors.iter().all(|&e| e < error_max), "{case} {element}: {errors:?}");
+        }
+    }
+    for (case, error_max) in [
+        ("torsion", 0.1),
+        ("hollow sphere", 0.1),
+        ("elastica", 1e-3),
+        ("45° bend", 0.025),
+        ("Cook's membrane", 0.25),
+        ("compressed block", 0.25),
+    ] {
+        let errors = errors_of(case, "t10");
+        assert!(!errors.is_empty() && errors.iter().all(|&e| e < error_max), "{case}: {errors:?}");
+    }
+    let orders = column(folder, "accuracy-large-torsion.csv", "order");
+    let orders: Vec<f64> = orders.iter().filter_map(|o| o.parse().ok()).collect();
+    assert!(orders.len() == 4 && orders.iter().all(|&o| o > 0.3), "{orders:?}");
+    assert!(folder.join("accuracy-large.svg").is_file());
 }
 
 #[test]

@@ -86,6 +86,7 @@ impl Heard {
         match reply {
             Reply::Welcome(_) => Self::Welcome,
             Reply::Answer(answer) => Self::Answer(AnswerBits::of(answer)),
+            Reply::LargeAnswer(answered) => Self::Answer(AnswerBits::of(&answered.answer)),
             Reply::ModelState { .. } => Self::ModelState,
             Reply::ModelReady(ready) => Self::ModelReady {
                 model: ready.model,

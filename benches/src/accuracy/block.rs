@@ -51,7 +51,10 @@ pub fn block(
 const PATHS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 /// A mesh of tetrahedra whose corners are in any order.
-fn turned(vertices: Vec<Point3<f64>>, mut tets: Vec<[u32; 4]>) -> Result<TetMesh, MeshError> {
+pub(super) fn turned(
+    vertices: Vec<Point3<f64>>,
+    mut tets: Vec<[u32; 4]>,
+) -> Result<TetMesh, MeshError> {
     for tet in &mut tets {
         if signed_volume(&tet.map(|n| vertices[n as usize])) < 0.0 {
             tet.swap(2, 3);

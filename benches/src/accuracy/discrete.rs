@@ -59,6 +59,16 @@ impl Discrete {
         Ok(Self { element, nodes, of_elements, surface, model })
     }
 
+    /// The model of it.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The element.
+    pub fn element(&self) -> Element {
+        self.element
+    }
+
     /// Coordinates of every node.
     pub fn nodes(&self) -> &[Point3<f64>] {
         &self.nodes
@@ -66,8 +76,18 @@ impl Discrete {
 
     /// For every node, whether it is on the surface.
     pub fn on_surface(&self) -> Vec<bool> {
+        self.on_triangles(|_| true)
+    }
+
+    /// For every node, whether it is on a triangle of the surface that `is_meant` picks by its
+    /// corners.
+    pub fn on_triangles(&self, is_meant: impl Fn(&[Point3<f64>; 3]) -> bool) -> Vec<bool> {
         let mut on = vec![false; self.nodes.len()];
-        self.surface.iter().flatten().for_each(|&n| on[n as usize] = true);
+        for triangle in &self.surface {
+            if is_meant(&[0, 1, 2].map(|i| self.nodes[triangle[i] as usize])) {
+                triangle.iter().for_each(|&n| on[n as usize] = true);
+            }
+        }
         on
     }
 

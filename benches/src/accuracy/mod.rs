@@ -9,6 +9,7 @@ mod clamped_block;
 mod discrete;
 mod elements;
 mod indentation;
+mod large;
 mod membrane;
 mod mirror;
 mod outcome;

@@ -4,7 +4,7 @@ use softgrasp_core::fem::Element;
 
 use super::outcome::Outcome;
 use super::{
-    ELEMENTS, bar, cantilever, clamped_block, indentation, membrane, mirror, order, patch,
+    ELEMENTS, bar, cantilever, clamped_block, indentation, large, membrane, mirror, order, patch,
     thick_sphere, waves,
 };
 use crate::axis::Scale;
@@ -97,6 +97,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     for (stem, title, caption, cases) in FIGURES {
         report.figure(stem, caption, figure(title, &outcomes, cases)?);
     }
+    large::add_to(&mut report, options)?;
     Ok(report)
 }
 

@@ -69,7 +69,9 @@ pub(super) fn play(
             let report = folder.join(format!("{name}.json"));
             let rate = RATE_HZ.to_string();
             let mut arguments: Vec<&OsStr> =
-                ["run", "--headless", "--rate", &rate, "--server"].map(OsStr::new).to_vec();
+                ["run", "--headless", "--deformation", "linear", "--rate", &rate, "--server"]
+                    .map(OsStr::new)
+                    .to_vec();
             arguments.extend([OsStr::new(address), OsStr::new("--report"), report.as_os_str()]);
             let threads = threads.to_string();
             if server.is_none() {

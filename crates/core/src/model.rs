@@ -1,9 +1,12 @@
 //! The finite element model of a body: mesh, stiffness, connected parts, fixed degrees of freedom.
 
+mod large;
+
 use std::sync::Arc;
 
 use crate::contact::{Mask, MaskError};
 pub use crate::fem::Element;
+use crate::fem::hyperelastic::YieldError;
 use crate::fem::{
     AssemblyError, Material, NodalPatches, QuadraticMesh, Stiffness, StiffnessPattern,
     StrainSummary, TooManyNodes, assemble, assemble_nodal_pressure, assemble_quadratic,
@@ -11,6 +14,7 @@ use crate::fem::{
 };
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::condensed::{Base, CondensedError};
+use crate::solve::equilibrium::Dependent;
 use crate::solve::memory::model_bytes;
 use crate::solve::{
     Analysed, Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition,
@@ -27,6 +31,7 @@ pub struct Model {
     element: Element,
     /// The same elements with mid-edge nodes behind the corners, for ten-node elements.
     quadratic: Option<QuadraticMesh>,
+    materials: Vec<Material>,
     bodies: Bodies,
     rigid: RigidBodies,
     /// For every node of the system (corners first), whether an element uses it.
@@ -79,6 +84,12 @@ pub enum ModelError {
     /// The condensed engine failed.
     #[error(transparent)]
     Condensed(#[from] CondensedError),
+    /// Elements that cannot yield, or not so.
+    #[error(transparent)]
+    Yield(#[from] YieldError),
+    /// A mask that says what is said already.
+    #[error(transparent)]
+    Dependent(#[from] Dependent),
 }
 
 /// A partition and the known displacements in its order.
@@ -132,7 +143,19 @@ impl Model {
         };
         let stiffness = Arc::new(stiffness);
         let used_count = used.iter().filter(|used| **used).count();
-        Ok(Self { mesh, element, quadratic, bodies, rigid, used, used_count, stiffness, fixed })
+        let materials = materials.to_vec();
+        Ok(Self {
+            mesh,
+            element,
+            quadratic,
+            materials,
+            bodies,
+            rigid,
+            used,
+            used_count,
+            stiffness,
+            fixed,
+        })
     }
 
     /// The element it is made of.

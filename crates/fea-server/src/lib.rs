@@ -14,6 +14,7 @@ mod config;
 mod held_models;
 mod lock;
 mod machine_memory;
+mod paths;
 mod plan;
 mod refusal;
 mod request;

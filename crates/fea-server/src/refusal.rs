@@ -4,7 +4,8 @@ use softgrasp_core::fem::MaterialError;
 use softgrasp_core::mesh::MeshError;
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;
-use softgrasp_core::solve::{SolveError, UnknownMethod};
+use softgrasp_core::solve::equilibrium::NoEquilibrium;
+use softgrasp_core::solve::{Method, SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
 
 use crate::plan::PlanError;
@@ -63,6 +64,15 @@ pub(crate) enum Refusal {
          lower Poisson's ratio"
     )]
     Uncertain { method: String, error_rel: f64, condition: f64 },
+    #[error(transparent)]
+    NoEquilibrium(#[from] NoEquilibrium),
+    #[error(
+        "large deformation is solved by newton with a factor of front or front-mixed, or auto; \
+         {method} cannot"
+    )]
+    LargeMethod { method: Method },
+    #[error("a yield stress is {value} Pa; it must be a finite number above 0, or be left out")]
+    Yield { value: f64 },
     #[error("this server wants a token (--token-file); say Hello with the right one first")]
     Token,
     #[error("the server is at fault: the work on this request ended abnormally")]
@@ -92,7 +102,7 @@ impl Refusal {
             Self::Plan(error) => code_of_plan(error),
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
-            Self::Uncertain { .. } => RejectCode::Uncertain,
+            Self::Uncertain { .. } | Self::NoEquilibrium(_) => RejectCode::Uncertain,
             Self::Token => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,
             Self::Limit(_) => RejectCode::TooLarge,

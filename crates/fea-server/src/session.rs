@@ -11,10 +11,14 @@ use softgrasp_protocol::{
 use tokio::net::TcpStream;
 use tokio::sync::{Semaphore, watch};
 
-use crate::answer::{Readiness, answer_frame, prefetch, prove, readiness, solve_once, upload};
+use crate::answer::{
+    Readiness, answer_frame, answer_large_frame, prefetch, prove, readiness, solve_large,
+    solve_once, upload,
+};
 use crate::client_connection::{ClientConnection, SessionError};
 use crate::clock::{StageClock, ms_since};
 use crate::held_models::HeldModels;
+use crate::paths::{Paths, Seat};
 use crate::refusal::Refusal;
 use crate::resources::Resources;
 use crate::uploads::Uploads;
@@ -54,6 +58,7 @@ pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut server: Serve
         limits,
         authorised: server.resources.config.token.is_none(),
         held: HeldModels::new(Arc::clone(&server.resources)),
+        paths: Paths::default(),
         out: Vec::new(),
     };
     tracing::info!(%peer, "session begins");
@@ -73,6 +78,8 @@ struct Session {
     limits: Limits,
     authorised: bool,
     held: HeldModels,
+    /// The equilibria that this session follows.
+    paths: Paths,
     /// Encoded reply, kept so that its memory is reused.
     out: Vec<u8>,
 }
@@ -173,6 +180,7 @@ impl Session {
             Request::Ping { nonce } => Reply::Pong { nonce },
             Request::HaveModel(hash) => Reply::ModelState { known: self.held.hold(hash) },
             Request::Drop(hash) => {
+                self.paths.leave(hash);
                 self.held.drop_model(hash);
                 return Ok(None);
             }
@@ -183,6 +191,15 @@ impl Session {
             Request::SolveOnce(once) => {
                 let work = move || solve_once(&resources, *once, clock());
                 Reply::Answer(Box::new(workers.run(work).await??))
+            }
+            Request::SolveLarge(once) => {
+                let work = move || solve_large(&resources, *once, clock());
+                Reply::LargeAnswer(Box::new(workers.run(work).await??))
+            }
+            Request::LargeFrame(request) => {
+                let seat = self.seat(request.model);
+                let work = move || answer_large_frame(&resources, &seat, *request, clock());
+                Reply::LargeAnswer(Box::new(workers.run(work).await??))
             }
             Request::UploadModel(model) => {
                 let hashed = workers.run(move || (ModelHash::of(&model), model)).await?;
@@ -214,6 +231,12 @@ impl Session {
                 Reply::Answer(Box::new(answer?))
             }
         }))
+    }
+
+    /// The path of a model that this session holds from now on.
+    fn seat(&mut self, model: ModelHash) -> Seat {
+        self.held.hold(model);
+        self.paths.seat(model)
     }
 
     fn welcome(&mut self, hello: &Hello, server: &ServerHandle) -> Result<Reply, Refusal> {

@@ -20,6 +20,7 @@ pub(crate) struct Workers {
     places: Arc<Semaphore>,
     background: Arc<Semaphore>,
     beside: mpsc::Sender<Task>,
+    factors: Arc<rayon::ThreadPool>,
 }
 
 /// Work for the thread beside the frames.
@@ -52,6 +53,14 @@ impl Workers {
             places: Arc::new(Semaphore::new(QUEUE_DEPTH)),
             background: Arc::new(Semaphore::new(BACKGROUND_MAX)),
             beside: start_beside()?,
+            factors: Arc::new(
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(1)
+                    .thread_name(|_| "factors".to_owned())
+                    .stack_size(STACK_BYTES)
+                    .build()
+                    .map_err(std::io::Error::other)?,
+            ),
         })
     }
 
@@ -70,6 +79,14 @@ impl Workers {
         self.pool.spawn(move || {
             let _ = caught("in the background", work);
             drop(place);
+        });
+    }
+
+    /// Makes a factor on a thread of its own, one after the other, while frames go on with the older
+    /// one: on the pool they would wait behind its pieces.
+    pub fn factor_beside(&self, work: impl FnOnce() + Send + 'static) {
+        self.factors.spawn(move || {
+            let _ = caught("on a factor beside the frames", work);
         });
     }
 

@@ -1,13 +1,15 @@
 //! Questions of ticks and their answers: what is asked, when an answer is taken, and which is shown.
 
-use softgrasp_protocol::{NodeChoice, Question};
+use softgrasp_protocol::{LargeAsk, NodeChoice, Pace as FramePace, PathChoice, Question};
 
+use crate::deformation::Deformation;
 use crate::grasp_loop::{GraspLoop, LOCKSTEP_WAIT_MAX, MODEL_READY};
 use crate::link::{LinkEvent, Reached, RequestEnd};
 use crate::object_changes::UNCOUNTED;
 use crate::pace::Pace;
 use crate::rest_shape::ObjectError;
 use crate::solve_report::SolveSummary;
+use crate::springback::SPRINGBACK;
 use crate::tick_outcome::{LoopEvent, TickOutcome};
 use crate::unanswered::Unanswered;
 
@@ -26,16 +28,35 @@ impl GraspLoop {
                 outcome.unanswered.push((tick, Unanswered::AnswerLate));
                 return Ok(());
             };
-            if let Ok(method) = method.parse() {
+            // At large deformation the path decides, and it is followed again.
+            if self.settings.elasticity.deformation == Deformation::Linear
+                && let Ok(method) = method.parse()
+            {
                 question.method = method;
             }
         }
-        self.link.ask(tick, grip, question);
+        self.link.ask(tick, grip, question, self.large_ask());
+        self.wait_in_lockstep(outcome)
+    }
+
+    /// In lockstep the tick waits for the answer.
+    pub(crate) fn wait_in_lockstep(
+        &mut self,
+        outcome: &mut TickOutcome,
+    ) -> Result<(), ObjectError> {
         if self.pace == Pace::Lockstep {
             self.link.wait_idle(LOCKSTEP_WAIT_MAX);
             self.pick_up(outcome)?;
         }
         Ok(())
+    }
+
+    /// What is asked of large deformation. Where bits are to repeat, nothing may depend on the
+    /// clock: in lockstep, and while a run is recorded or played again.
+    pub(crate) fn large_ask(&self) -> Option<LargeAsk> {
+        let repeats = self.pace == Pace::Lockstep || self.digests || self.recorded.is_some();
+        let pace = if repeats { FramePace::Repeatable } else { FramePace::Timely };
+        self.settings.elasticity.ask(PathChoice::Continue, pace)
     }
 
     /// Requests that have ended and that the tick takes: all, or when it is played again those that
@@ -68,6 +89,8 @@ impl GraspLoop {
         }
         for RequestEnd { tick, reached } in self.take_ended(ended) {
             match reached {
+                Ok(reached) if tick == SPRINGBACK => self.take_springback(*reached, outcome)?,
+                Err(_) if tick == SPRINGBACK => self.refuse_springback(outcome)?,
                 Ok(reached) => self.show(tick, *reached, outcome)?,
                 Err(_) if tick == UNCOUNTED => self.refuse_to_save_unanswered(outcome),
                 Err(why) => outcome.unanswered.push((tick, why)),
@@ -83,11 +106,19 @@ impl GraspLoop {
         reached: Reached,
         outcome: &mut TickOutcome,
     ) -> Result<(), ObjectError> {
-        let Reached { rest_shape, nodes, displacement, reactions, mask_forces, report, round_trip } =
-            reached;
+        let Reached {
+            rest_shape,
+            nodes,
+            displacement,
+            reactions,
+            mask_forces,
+            report,
+            large,
+            round_trip,
+        } = reached;
         let ms = round_trip.as_secs_f64() * 1e3;
         if tick != UNCOUNTED {
-            outcome.answers.push((tick, SolveSummary::new(&report, ms)));
+            outcome.answers.push((tick, SolveSummary::new(&report, ms).with_large(large.as_ref())));
         }
         let current = rest_shape == self.object.rest_shapes()
             && self.deforming_since.is_some_and(|since| tick >= since)
@@ -96,6 +127,7 @@ impl GraspLoop {
             self.shown_tick = Some(tick);
             // The touched nodes stay the same as long as the grip that the answer belongs to.
             self.shown_forces = self.held.fingertip_forces(&reactions, &mask_forces);
+            self.has_flowed = large.is_some_and(|large| large.plastic_strain > 0.0);
         }
         match nodes {
             _ if !current => Ok(()),

@@ -132,12 +132,35 @@ pub fn write_displacements(displacements: &[[f64; 3]]) -> String {
     out
 }
 
+/// Table of forces: every node that has one along some axis, zero along the others.
+///
+/// Shapes: `forces` ascending by degree of freedom. Units: N.
+pub fn write_reactions(forces: &[DofValue]) -> String {
+    let mut out = String::with_capacity(64 * forces.len() + 16);
+    out.push_str("node,fx,fy,fz\n");
+    for of_node in forces.chunk_by(|a, b| a.dof / 3 == b.dof / 3) {
+        let mut f = [0.0; 3];
+        of_node.iter().for_each(|force| f[force.dof as usize % 3] = force.value);
+        let node = of_node[0].dof / 3;
+        // Writing to a String cannot fail.
+        let _ = writeln!(out, "{node},{:e},{:e},{:e}", f[0], f[1], f[2]);
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Vec<DofValue>, TableError> {
         read_table("K.csv", text.as_bytes(), DISPLACEMENT_COLUMNS, 10)
+    }
+
+    #[test]
+    fn reactions_stand_node_by_node() {
+        let force = |dof, value| DofValue { dof, value };
+        let table = write_reactions(&[force(3, 1.5), force(5, -2.0), force(7, 0.25)]);
+        assert_eq!(table, "node,fx,fy,fz\n1,1.5e0,0e0,-2e0\n2,0e0,2.5e-1,0e0\n");
     }
 
     #[test]

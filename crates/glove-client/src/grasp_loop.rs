@@ -15,10 +15,11 @@ use crate::arrival::Device;
 use crate::contact_model::{HeldNodes, PrescribedDisplacements};
 use crate::digest::request_digest;
 use crate::hand_reader::HandReader;
+use crate::keep::Keep;
 use crate::link::{Link, RequestEnd};
 use crate::model_upload::ModelUpload;
 use crate::object_changes::ObjectChanges;
-use crate::object_work::{KeptShape, ObjectDone, ObjectJob, ObjectWork};
+use crate::object_work::{ObjectJob, ObjectWork};
 use crate::pace::Pace;
 use crate::prefetch::Prefetched;
 use crate::rest_shape::ObjectError;
@@ -45,6 +46,8 @@ pub struct GraspLoop {
     pub(crate) shown_forces: Option<[Vector3<f64>; 5]>,
     pub(crate) held: HeldNodes,
     pub(crate) keep: Keep,
+    /// Whether the shape that the object shows has flowed, so that it will not go back to rest.
+    pub(crate) has_flowed: bool,
     /// What the fingers held the object by in the last tick that asked.
     pub(crate) last_known: Option<[KnownNode; 5]>,
     pub(crate) changes: ObjectChanges,
@@ -56,31 +59,12 @@ pub struct GraspLoop {
     /// Devices that were silent in the last tick.
     silent: Vec<Device>,
     /// Whether digests of requests are wanted.
-    digests: bool,
+    pub(crate) digests: bool,
     /// What the tick did with answers when it was recorded, while it is played again.
     pub(crate) recorded: Option<RecordedAnswers>,
     /// Requests that have ended and whose time to be taken has not come, while ticks are played
     /// again.
     pub(crate) held_back: Vec<RequestEnd>,
-}
-
-/// How far the wish to keep the shape has come.
-pub(crate) enum Keep {
-    /// Nobody wishes to.
-    NotWanted,
-    /// The next answer is asked for whole: those so far brought the surface only.
-    WhenWhole,
-    /// The next rest shape is being made; the object keeps the shape it has.
-    BeingMade,
-    /// It is made, and the grasp is told in this tick.
-    Made(Box<KeptShape>),
-}
-
-impl Keep {
-    /// Whether the object stays as it is until its next rest shape is there.
-    pub(crate) fn freezes(&self) -> bool {
-        matches!(self, Self::BeingMade | Self::Made(_))
-    }
 }
 
 /// What a report says when the server has prepared the model of a rest shape.
@@ -102,7 +86,7 @@ impl GraspLoop {
         settings: SolveSettings,
         pace: Pace,
     ) -> std::io::Result<Self> {
-        let SolveSettings { material, element, .. } = settings;
+        let SolveSettings { material, element, max_error, .. } = settings;
         link.set_model(ModelUpload::new(object.rest(), object.rest_shapes(), material, element));
         Ok(Self {
             reader,
@@ -110,13 +94,14 @@ impl GraspLoop {
             grasp,
             link,
             settings,
-            wishes: AnswerWishes::default(),
+            wishes: AnswerWishes { max_error, ..AnswerWishes::default() },
             pace,
             deforming_since: None,
             shown_tick: None,
             shown_forces: None,
             held: HeldNodes::default(),
             keep: Keep::NotWanted,
+            has_flowed: false,
             last_known: None,
             changes: ObjectChanges::default(),
             work: ObjectWork::start(pace)?,
@@ -264,77 +249,6 @@ impl GraspLoop {
         self.silent.clone_from(&outcome.silent);
     }
 
-    /// A command for the grasp, unless the shape that is to be kept cannot be, or not yet.
-    fn allowed(&mut self, command: Option<Command>, outcome: &mut TickOutcome) -> Option<Command> {
-        if !matches!(command, None | Some(Command::KeepShape)) || self.deforming_since.is_none() {
-            return command;
-        }
-        if command.is_some() && self.changes.are_under_way() {
-            let text = "the object is being changed; keep the shape after that";
-            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
-            return None;
-        }
-        let wanted = command.is_some() || matches!(self.keep, Keep::WhenWhole);
-        if wanted && matches!(self.keep, Keep::NotWanted | Keep::WhenWhole) {
-            if self.object.is_whole() {
-                self.begin_to_keep(outcome);
-            } else {
-                self.keep = Keep::WhenWhole;
-            }
-        }
-        matches!(self.keep, Keep::Made(_)).then_some(Command::KeepShape)
-    }
-
-    /// Begins to make the shape as it is now the next rest shape.
-    fn begin_to_keep(&mut self, outcome: &mut TickOutcome) {
-        self.keep = Keep::BeingMade;
-        self.work.begin(ObjectJob::Keep {
-            rest: Arc::clone(self.object.rest_shape()),
-            vertices: self.object.shape().to_vec(),
-            rest_shapes: self.object.rest_shapes(),
-            material: self.settings.material,
-            element: self.settings.element,
-        });
-        self.take_work(outcome);
-    }
-
-    /// Takes what has been done beside the ticks.
-    pub(crate) fn take_work(&mut self, outcome: &mut TickOutcome) {
-        while let Some(done) = self.take_done() {
-            outcome.took_work |= matches!(done, ObjectDone::Kept(_) | ObjectDone::Replacement(_));
-            match done {
-                ObjectDone::Prefetch { rest_shapes, hint } => {
-                    if rest_shapes == self.object.rest_shapes() {
-                        self.link.prefetch(&hint);
-                    }
-                }
-                ObjectDone::Replacement(made) => self.put_in_place(*made, outcome),
-                ObjectDone::Saved(saved) => self.tell_saved(saved, outcome),
-                // The hand has let go meanwhile.
-                ObjectDone::Kept(_) if !matches!(self.keep, Keep::BeingMade) => {}
-                ObjectDone::Kept(Ok(kept)) => self.keep = Keep::Made(kept),
-                ObjectDone::Kept(Err(error)) => {
-                    self.keep = Keep::NotWanted;
-                    outcome.events.push(LoopEvent::KeepRefused(error.to_string()));
-                }
-            }
-        }
-        if matches!(self.keep, Keep::BeingMade) && !self.work.is_busy() {
-            self.keep = Keep::NotWanted;
-            let text = "the work on the new rest shape failed; this is a fault of the program";
-            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
-        }
-    }
-
-    /// The next piece of work that is done. A tick that is played again takes rest shapes only if it
-    /// did so before.
-    fn take_done(&mut self) -> Option<ObjectDone> {
-        let takes_shapes = self.recorded.as_ref().is_none_or(|recorded| recorded.took_work);
-        self.work.take_if(|done| {
-            takes_shapes || !matches!(done, ObjectDone::Kept(_) | ObjectDone::Replacement(_))
-        })
-    }
-
     fn step(
         &mut self,
         hand: &HandPose,
@@ -397,7 +311,15 @@ impl GraspLoop {
 
     /// The fingers do not deform the object (any more).
     fn let_go(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
+        if let Some(grip) = self.deforming_since
+            && self.springs_back()
+        {
+            return self.begin_to_spring_back(grip, outcome);
+        }
         self.deforming_since = None;
+        if self.keep.is_dent() {
+            return Ok(());
+        }
         (self.shown_tick, self.shown_forces) = (None, None);
         if !matches!(self.keep, Keep::NotWanted) {
             self.keep = Keep::NotWanted;
@@ -429,7 +351,7 @@ impl GraspLoop {
             mask_displacements: of_masks,
             method: self.settings.method.clone(),
             want: Want { nodes, reactions: self.wishes.forces, precision: Precision::F64 },
-            max_error: self.wishes.max_error,
+            max_error: self.wishes.max_error.or(self.settings.error_of_frames()),
             ..Question::default()
         }
     }

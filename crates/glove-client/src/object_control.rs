@@ -8,7 +8,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use softgrasp_core::grasp::GraspError;
 use softgrasp_protocol::{MethodName, NodeChoice};
 
-use crate::grasp_loop::{GraspLoop, Keep};
+use crate::grasp_loop::GraspLoop;
+use crate::keep::Keep;
 use crate::notice::Notice;
 use crate::object_changes::{Replacement, UNCOUNTED};
 use crate::object_work::{KeptShape, ObjectJob};
@@ -130,7 +131,7 @@ impl GraspLoop {
             let mut question = self.question(&known);
             question.want.nodes = NodeChoice::All;
             self.changes.asked_whole = true;
-            self.link.ask(UNCOUNTED, grip, question);
+            self.link.ask(UNCOUNTED, grip, question, self.large_ask());
         }
         Ok(outcome)
     }
@@ -139,7 +140,7 @@ impl GraspLoop {
     pub(crate) fn show_from_now_on(&mut self, made: KeptShape) {
         self.object = made.object;
         (self.shown_tick, self.shown_forces) = (None, None);
-        self.last_known = None;
+        (self.last_known, self.has_flowed) = (None, false);
         self.held.clear();
         self.prefetched.clear();
         self.link.set_model(made.model);

@@ -154,6 +154,15 @@ pub struct RunSummary {
     pub max_rotation_deg: f64,
     /// Largest strain of an element.
     pub max_strain: f64,
+    /// Answers that were solved with the equations of large deformation; the others were linear.
+    pub large_solves: usize,
+    /// Largest estimated error of an answer over its largest displacement; null where none was
+    /// estimated.
+    pub error_estimate_rel_max: Option<f64>,
+    /// Smallest ratio of an element's volume to that at rest; null without large deformation.
+    pub min_jacobian: Option<f64>,
+    /// Equilibria that jumped.
+    pub jumps: usize,
     /// Largest resident memory of the server, bytes.
     pub peak_rss_bytes: u64,
     /// Times a shape was kept.
@@ -301,6 +310,8 @@ impl RunReport {
             round_trips.get((q * last as f64).round() as usize).copied()
         };
         let most = |of: fn(&SolveSummary) -> f64| solves.iter().map(|s| of(s)).fold(0.0, f64::max);
+        let is_large = |s: &&&SolveSummary| s.deformation == "large";
+        let large = || solves.iter().filter(is_large).filter_map(|s| s.large.as_ref());
         let deforming = self.played.iter().filter(|record| record.deforms()).count() as u64;
         let kept = GraspEvent::ShapeKept.to_string();
         let counted = &self.summary;
@@ -322,6 +333,13 @@ impl RunReport {
             round_trip_ms_max: quantile(1.0),
             max_rotation_deg: most(|s| s.max_rotation_deg),
             max_strain: most(|s| s.max_strain),
+            large_solves: large().count(),
+            error_estimate_rel_max: solves
+                .iter()
+                .filter_map(|s| s.error_estimate_rel)
+                .max_by(f64::total_cmp),
+            min_jacobian: large().map(|large| large.min_jacobian).min_by(f64::total_cmp),
+            jumps: large().filter(|large| large.jumped).count(),
             peak_rss_bytes: solves.iter().map(|s| s.peak_rss_bytes).max().unwrap_or(0),
             shapes_kept: self.events.iter().filter(|e| e.what == kept).count(),
             ticks_held: counted.ticks_held,

@@ -87,9 +87,26 @@ impl RunReport {
                 100.0 * s.max_strain,
             ));
         }
+        text.push_str(&self.words_of_large());
         text.push_str(&self.words_of_devices());
         if self.interrupted {
             text.push_str("  ended by the user\n");
+        }
+        text
+    }
+
+    /// What is to be said of large deformation.
+    fn words_of_large(&self) -> String {
+        let s = &self.summary;
+        let Some(min_jacobian) = s.min_jacobian else { return String::new() };
+        let error = s.error_estimate_rel_max.unwrap_or(0.0);
+        let mut text = format!(
+            "  large deformation   {} of {} answers; off by {error:.1e} at most (estimated), volumes \
+             down to {min_jacobian:.2} of those at rest\n",
+            s.large_solves, s.solves
+        );
+        if s.jumps > 0 {
+            text.push_str(&format!("                      the shape jumped {} times\n", s.jumps));
         }
         text
     }

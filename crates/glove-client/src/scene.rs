@@ -55,6 +55,12 @@ pub struct SceneFile {
     pub element: Option<String>,
     /// vertex, patch or mask.
     pub contact: Option<String>,
+    /// linear, large or auto.
+    pub deformation: Option<String>,
+    /// Law of large deformation: neo-hookean or neo-hookean-log.
+    pub material: Option<String>,
+    /// Yield stress, Pa.
+    pub yield_pa: Option<f64>,
 }
 
 /// Why there is no scene.

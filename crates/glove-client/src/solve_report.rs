@@ -1,7 +1,7 @@
 //! The part of every JSON report about one solve: method, times, residual, error bound.
 
 use serde::Serialize;
-use softgrasp_protocol::{SolveReport, StageMs};
+use softgrasp_protocol::{DeformationName, LargeReport, SolveReport, StageMs};
 
 /// Version of the JSON reports; changes when a field changes its meaning or goes.
 pub const SCHEMA: u32 = 1;
@@ -49,6 +49,54 @@ pub struct SolveSummary {
     pub warnings: Vec<String>,
     /// Largest resident memory of the server so far, bytes.
     pub peak_rss_bytes: u64,
+    /// `linear` or `large`: the equations that were solved.
+    pub deformation: &'static str,
+    /// What is known of an equilibrium at large deformation; its fields are left out for a linear
+    /// question.
+    #[serde(flatten)]
+    pub large: Option<LargeSummary>,
+}
+
+/// One equilibrium at large deformation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LargeSummary {
+    /// Steps with a tangent, or with a correction of one.
+    pub newton_steps: u32,
+    /// Solves with a factor.
+    pub linear_solves: u32,
+    /// Frames since the shape that the newest factor belongs to.
+    pub factor_age: u32,
+    /// Pieces that the motion of the known displacements was cut into.
+    pub substeps: u32,
+    /// Smallest ratio of an element's volume to that at rest.
+    pub min_jacobian: f64,
+    /// Estimated error in the energy norm, or null.
+    pub energy_error_rel: Option<f64>,
+    /// Largest principal stretch of an element.
+    pub max_stretch: f64,
+    /// The equilibrium jumped.
+    pub jumped: bool,
+    /// The residual is rounding or below 1e-8.
+    pub settled: bool,
+    /// Largest plastic strain; 0 without yield stress.
+    pub plastic_strain: f64,
+}
+
+impl LargeSummary {
+    fn new(report: &LargeReport) -> Self {
+        Self {
+            newton_steps: report.newton_steps,
+            linear_solves: report.linear_solves,
+            factor_age: report.factor_age,
+            substeps: report.substeps,
+            min_jacobian: report.min_jacobian,
+            energy_error_rel: report.energy_error_rel,
+            max_stretch: report.max_stretch,
+            jumped: report.jumped,
+            settled: report.settled,
+            plastic_strain: report.plastic_strain,
+        }
+    }
 }
 
 /// Milliseconds by stage.
@@ -99,6 +147,14 @@ impl SolveSummary {
             chosen_because: report.chosen_because.clone(),
             warnings: report.warnings.clone(),
             peak_rss_bytes: report.peak_rss_bytes,
+            deformation: DeformationName::Linear.as_str(),
+            large: None,
         }
+    }
+
+    /// The same with what was reported of an equilibrium at large deformation, if it was one.
+    pub fn with_large(self, large: Option<&LargeReport>) -> Self {
+        let deformation = large.map_or(self.deformation, |large| large.deformation.as_str());
+        Self { deformation, large: large.map(LargeSummary::new), ..self }
     }
 }

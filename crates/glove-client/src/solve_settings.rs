@@ -3,6 +3,7 @@
 use softgrasp_protocol::{ElementName, Material, MethodName};
 
 use crate::contact_model::ContactModel;
+use crate::deformation::{Deformation, Elasticity};
 
 /// What the object is made of and how it is to be solved.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +18,24 @@ pub struct SolveSettings {
     pub contact: ContactModel,
     /// Nodes whose displacements each tick asks for.
     pub subscription: Subscription,
+    /// Which equations, and by which law.
+    pub elasticity: Elasticity,
+    /// Largest relative error that is acceptable; `None` leaves it to the method, at large
+    /// deformation [`ERROR_OF_FRAMES`].
+    pub max_error: Option<f64>,
 }
+
+impl SolveSettings {
+    /// The error that frames may have where nobody says how much.
+    pub fn error_of_frames(&self) -> Option<f64> {
+        let is_linear = self.elasticity.deformation == Deformation::Linear;
+        (!is_linear).then_some(ERROR_OF_FRAMES)
+    }
+}
+
+/// Estimated error of a frame at large deformation, over the largest displacement, unless another is
+/// asked for: a hundredth of what linear elasticity is off by.
+pub const ERROR_OF_FRAMES: f64 = 2e-3;
 
 /// Nodes whose displacements each tick asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -58,6 +58,8 @@ pub struct TickOutcome {
     pub shown_tick: Option<u64>,
     /// Devices that are silent: the hand is held where it was.
     pub silent: Vec<Device>,
+    /// Whether the answer to what the object springs back to was taken.
+    pub sprung_back: bool,
     /// Whether a rest shape that was made beside the ticks was taken.
     pub took_work: bool,
     /// Digest of what the server is asked, where that is recorded or held against a recording.

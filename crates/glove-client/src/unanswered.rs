@@ -16,6 +16,8 @@ pub enum Unanswered {
     ServerLost,
     /// The server refused the model, or the request.
     Refused,
+    /// No equilibrium was found there; the shape stays where it was.
+    NoEquilibrium,
     /// The tick was not played: its time was over.
     TickSkipped,
     /// The shape was being made the new rest shape.
@@ -37,6 +39,7 @@ impl Unanswered {
             Self::AnswerLate => "answer_late",
             Self::ServerLost => "server_lost",
             Self::Refused => "refused",
+            Self::NoEquilibrium => "no_equilibrium",
             Self::TickSkipped => "tick_skipped",
             Self::KeepingShape => "keeping_shape",
             Self::InputIgnored => "input_ignored",
@@ -54,6 +57,7 @@ impl fmt::Display for Unanswered {
             Self::AnswerLate => "the answer before it was late",
             Self::ServerLost => "the server was not there",
             Self::Refused => "the server refused",
+            Self::NoEquilibrium => "no equilibrium was found, so the shape stayed",
             Self::TickSkipped => "the tick came too late and was skipped",
             Self::KeepingShape => "the shape was being kept",
             Self::InputIgnored => "a measurement was not a finite number",

@@ -22,6 +22,10 @@ pub enum Kind {
     Drop = 0x0007,
     /// Are you there?
     Ping = 0x0008,
+    /// As `SolveOnce`, for large deformation.
+    SolveLarge = 0x0009,
+    /// As `Frame`, for large deformation; goes on from the session's last shape.
+    LargeFrame = 0x000a,
     /// Server introduces itself.
     Welcome = 0x8001,
     /// Displacements and what they cost.
@@ -34,11 +38,13 @@ pub enum Kind {
     Rejected = 0x8005,
     /// I am here.
     Pong = 0x8008,
+    /// As `Answer`, for large deformation.
+    LargeAnswer = 0x8009,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 17] = [
         Self::Hello,
         Self::SolveOnce,
         Self::HaveModel,
@@ -47,12 +53,15 @@ impl Kind {
         Self::Prefetch,
         Self::Drop,
         Self::Ping,
+        Self::SolveLarge,
+        Self::LargeFrame,
         Self::Welcome,
         Self::Answer,
         Self::ModelState,
         Self::ModelReady,
         Self::Rejected,
         Self::Pong,
+        Self::LargeAnswer,
     ];
 
     /// Number in the header.

@@ -50,6 +50,17 @@ impl Ccx {
     /// # Panics
     /// If it fails, takes too long, or does not print every node; with what it said.
     pub fn run(&self, folder: &Path, deck: &str, system: &System) -> Results {
+        self.try_run(folder, deck, system).unwrap_or_else(|said| panic!("{said}"))
+    }
+
+    /// Runs one deck that CalculiX may give up on, as it does where its iterations do not converge.
+    ///
+    /// # Errors
+    /// What it said, if it ends with an error.
+    ///
+    /// # Panics
+    /// If it takes too long, or ends well without printing every node.
+    pub fn try_run(&self, folder: &Path, deck: &str, system: &System) -> Result<Results, String> {
         let results = folder.join("referee.dat");
         // A result of the run before must not be taken for one of this run.
         let _ = std::fs::remove_file(&results);
@@ -63,18 +74,19 @@ impl Ccx {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        let said = wait(child);
+        let said = wait(child)?;
         let text = std::fs::read_to_string(&results).unwrap_or_default();
         let read = |title| read_block(&text, title, system);
         match (read("displacements"), read("forces")) {
-            (Some(displacement), Some(force)) => Results { displacement, force },
+            (Some(displacement), Some(force)) => Ok(Results { displacement, force }),
             _ => panic!("ccx ({}) has not printed every node; it said:\n{said}", self.version),
         }
     }
 }
 
-/// Waits for the end of the program, which closes its output; what it said.
-fn wait(mut child: Child) -> String {
+/// Waits for the end of the program, which closes its output; what it said, as an error if the
+/// program ended with one.
+fn wait(mut child: Child) -> Result<String, String> {
     let mut output = child.stdout.take().unwrap();
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
@@ -90,8 +102,11 @@ fn wait(mut child: Child) -> String {
     };
     let status = child.wait().unwrap();
     let said = String::from_utf8_lossy(&said.unwrap()).into_owned();
-    assert!(status.success(), "ccx ended with {status}; it said:\n{said}");
-    said
+    if status.success() {
+        Ok(said)
+    } else {
+        Err(format!("ccx ended with {status}; it said:\n{said}"))
+    }
 }
 
 /// Rows `node x y z` under the heading that begins with `title`, if every node used has one.

@@ -22,7 +22,7 @@ use std::path::Path;
 use softgrasp_core::fem::Element;
 
 use crate::agreement::Agreement;
-use crate::ccx::Ccx;
+use crate::ccx::{Ccx, Results};
 use crate::deck::System;
 use crate::object::{Object, is_full};
 use crate::question::{Question, questions};
@@ -81,6 +81,67 @@ fn files_of_others_agree_to_the_digits_that_calculix_prints() {
     let Some(objects) = object::files() else { return };
     let folder = tempfile::tempdir().unwrap();
     compare(&ccx, folder.path(), &Asked::new(), &objects);
+}
+
+/// Share of the largest number by which answers at large deformation may differ. CalculiX stops its
+/// iterations at a residual of 1e-9 and sums its increments.
+const LARGE_AGREE: f64 = 1e-5;
+
+/// Halvings of a motion until CalculiX must have followed it.
+const HALVINGS: usize = 2;
+
+/// The question with the largest of its motion, its half and its quarter that CalculiX follows to
+/// the end, and what it printed. On some meshes its iterations do not converge for the whole of it,
+/// however small it makes its increments.
+fn followed(ccx: &Ccx, folder: &Path, system: &System, asked: Question) -> (Question, Results) {
+    let mut question = asked;
+    for _ in 0..HALVINGS {
+        match ccx.try_run(folder, &deck::deck(system, &question), system) {
+            Ok(printed) => return (question, printed),
+            Err(said) => {
+                let why = said.lines().filter(|line| line.contains("*ERROR")).collect::<String>();
+                println!("Poisson {}: half the motion, since ccx gave up:{why}", question.poisson);
+            }
+        }
+        question = question.halved();
+    }
+    let printed = ccx.run(folder, &deck::deck(system, &question), system);
+    (question, printed)
+}
+
+/// Both at large deformation: NLGEOM on one side, `--deformation large` on the other, five objects.
+#[test]
+fn large_deformation_agrees_with_calculix() {
+    let Some(ccx) = Ccx::find() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let asked = Asked::new();
+    let nodes = if is_full() { 400 } else { 100 };
+    let mut objects = object::built_in(folder.path(), nodes);
+    let small = |object: &Object| object.mesh.node_count() < 400;
+    objects.extend(object::files().unwrap_or_default().into_iter().filter(small).take(3));
+    let mut table = Table::default();
+    for object in &objects {
+        for element in ELEMENTS {
+            let system = System::new(&object.mesh, element);
+            let mut of_object = Agreement::default();
+            for question in question::large_questions(object) {
+                let (question, printed) = followed(&ccx, folder.path(), &system, question);
+                let found = asked.answer(object, &system, &question, folder.path());
+                let agreement = Agreement::of(&printed, &found, &question);
+                let worst =
+                    agreement.displacement.difference_rel.max(agreement.force.difference_rel);
+                assert!(
+                    worst < LARGE_AGREE,
+                    "{}, {element:?}, Poisson {}: {agreement}",
+                    object.name,
+                    question.poisson
+                );
+                of_object.add(&agreement);
+            }
+            table.push(object, &system, &of_object);
+        }
+    }
+    println!("{table}");
 }
 
 /// The comparison is worth something only if it notices a difference that is small.

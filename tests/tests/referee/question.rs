@@ -21,6 +21,8 @@ pub struct Question {
     pub known: Vec<(u32, f64)>,
     /// On degrees of freedom that are not known.
     pub forces: Vec<(u32, f64)>,
+    /// Whether it is one of large deformation.
+    pub is_large: bool,
 }
 
 /// Displacements of a set, as a part of the size of the object.
@@ -42,6 +44,7 @@ pub fn questions(object: &Object, system: &System) -> Vec<Question> {
         poisson: 0.3,
         known: corners.few(|_, _| true),
         forces: Vec::new(),
+        is_large: false,
     };
     let one_axis = Question {
         name: "every second node along one axis only",
@@ -51,6 +54,7 @@ pub fn questions(object: &Object, system: &System) -> Vec<Question> {
         poisson: 0.49,
         known: corners.few(|place, axis| place % 2 == 0 || axis == place / 2 % 3),
         forces: Vec::new(),
+        is_large: false,
     };
     let pushed = Question {
         name: "low nodes held, high ones pushed",
@@ -72,6 +76,38 @@ pub fn questions(object: &Object, system: &System) -> Vec<Question> {
     let all = [few, one_axis, pushed, pulled].into_iter();
     // Where every node is held no force moves anything.
     all.filter(|q| q.known.iter().chain(&q.forces).any(|(_, value)| *value != 0.0)).collect()
+}
+
+/// Low nodes held, high ones pushed by several per cent of the size: the object bends and is
+/// compressed far beyond what linear elasticity is for.
+pub fn large_questions(object: &Object) -> Vec<Question> {
+    let pushed = |poisson: f64| {
+        let mut known = Corners::new(object).held_and_pushed(true);
+        known.iter_mut().for_each(|(_, value)| *value *= LARGE_OVER_SMALL);
+        Question {
+            name: "low nodes held, high ones pushed far",
+            way: Way::Program,
+            is_short: true,
+            young: 2e4,
+            poisson,
+            known,
+            forces: Vec::new(),
+            is_large: true,
+        }
+    };
+    let all = [0.3, 0.45].map(pushed).into_iter();
+    all.filter(|q| q.known.iter().any(|(_, value)| *value != 0.0)).collect()
+}
+
+/// Motion of a question of large deformation over that of the others.
+const LARGE_OVER_SMALL: f64 = 8.0;
+
+impl Question {
+    /// The same question with half the motion.
+    pub fn halved(mut self) -> Self {
+        self.known.iter_mut().for_each(|(_, value)| *value /= 2.0);
+        self
+    }
 }
 
 /// The corners of an object that elements use.

@@ -133,13 +133,39 @@ fn by_program(object: &Object, system: &System, question: &Question, folder: &Pa
         std::fs::write(&forces, rows("node,fx,fy,fz", &question.forces)).unwrap();
         arguments.extend(["--forces", &forces]);
     }
+    let reactions = path("R.csv");
+    if question.is_large {
+        arguments.extend(["--deformation", "large", "--material", "neo-hookean"]);
+        arguments.extend(["--reactions", &reactions]);
+    }
     SolveArguments::parse_from(arguments).solve.run().unwrap();
-    let text = std::fs::read_to_string(&out).unwrap();
-    let row = |line: &str| {
-        let cells: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().unwrap()).collect();
-        <[f64; 3]>::try_from(cells).unwrap()
+    let displacement = read_table(&out).into_iter().map(|(_, u)| u).collect();
+    let reaction = match question.is_large {
+        true => reactions_at(&read_table(&reactions), &question.known),
+        false => Vec::new(),
     };
-    Found { displacement: text.lines().skip(1).map(row).collect(), reaction: Vec::new() }
+    Found { displacement, reaction }
+}
+
+/// Rows of a table: node and three numbers.
+fn read_table(file: &str) -> Vec<(u32, [f64; 3])> {
+    let text = std::fs::read_to_string(file).unwrap();
+    let row = |line: &str| {
+        let mut cells = line.split(',');
+        let node = cells.next().unwrap().parse().unwrap();
+        let values: Vec<f64> = cells.map(|cell| cell.parse().unwrap()).collect();
+        (node, <[f64; 3]>::try_from(values).unwrap())
+    };
+    text.lines().skip(1).map(row).collect()
+}
+
+/// Forces at the known degrees of freedom, in their order.
+fn reactions_at(table: &[(u32, [f64; 3])], known: &[(u32, f64)]) -> Vec<f64> {
+    let at = |dof: u32| {
+        let row = table.binary_search_by_key(&(dof / 3), |row| row.0).unwrap();
+        table[row].1[dof as usize % 3]
+    };
+    known.iter().map(|(dof, _)| at(*dof)).collect()
 }
 
 /// A table with a row per node; directions that are not named stay empty.

@@ -5,6 +5,7 @@ use std::time::Duration;
 use fea_server::RunningServer;
 use glove_client::contact_model::ContactModel;
 use glove_client::control::Control;
+use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::hand_source::HandSource;
@@ -72,6 +73,8 @@ impl Controlled {
             method: MethodName::auto(),
             contact: ContactModel::Mask,
             subscription: Subscription::Surface,
+            elasticity: Elasticity::LINEAR,
+            max_error: None,
         };
         let report = RunReport::new(
             summary(&object),

@@ -2,6 +2,7 @@
 //! object, and they are there as long as the hand deforms it.
 
 use glove_client::contact_model::ContactModel;
+use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
@@ -29,6 +30,8 @@ fn squeeze(contact: ContactModel, forces: bool, mut see: impl FnMut(&GraspLoop, 
         method: MethodName::auto(),
         contact,
         subscription: Subscription::Surface,
+        elasticity: Elasticity::LINEAR,
+        max_error: None,
     };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
     let link = Link::start(&server.address().to_string(), Priority::Ordinary).unwrap();

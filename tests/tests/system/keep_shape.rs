@@ -2,6 +2,7 @@
 //! inside out is not kept.
 
 use glove_client::contact_model::ContactModel;
+use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
@@ -78,6 +79,8 @@ fn shape_with_elements_inside_out_is_not_kept_and_the_grasp_goes_on() {
         method: MethodName::auto(),
         contact: ContactModel::Vertex,
         subscription: Subscription::Surface,
+        elasticity: Elasticity::LINEAR,
+        max_error: None,
     };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
     let (reader, link) =

@@ -11,6 +11,7 @@ mod bad_streams;
 mod control;
 mod controlled;
 mod crowd;
+mod dent;
 mod disturbed_links;
 mod engine;
 mod forces;

@@ -8,6 +8,7 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use glove_client::contact_model::ContactModel;
+use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
@@ -49,6 +50,8 @@ impl Play {
             method: MethodName::auto(),
             contact: ContactModel::Mask,
             subscription: Subscription::Surface,
+            elasticity: Elasticity::LINEAR,
+            max_error: None,
         };
         let summary = ObjectSummary {
             name: "cube".to_owned(),

@@ -122,13 +122,13 @@ pub fn assemble_nodal_pressure(
 }
 
 /// Row and column of the nine entries of a block.
-const ROWS_AND_COLUMNS: [(usize, usize); 9] =
+pub(super) const ROWS_AND_COLUMNS: [(usize, usize); 9] =
     [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)];
 
 /// Sums every block row over the elements around its node, in element order.
 ///
 /// `element_row(tet, local)` gives the blocks of one row of an element's stiffness.
-fn assemble_rows<const K: usize>(
+pub(super) fn assemble_rows<const K: usize>(
     pattern: &StiffnessPattern,
     element_row: impl Fn(usize, usize) -> [[f64; 9]; K] + Sync,
 ) -> Vec<[f64; 9]> {
@@ -147,7 +147,7 @@ fn assemble_rows<const K: usize>(
 }
 
 /// Calls `fill(node, blocks of its row)` for every row, rows in parallel.
-fn for_each_row(
+pub(super) fn for_each_row(
     pattern: &StiffnessPattern,
     blocks: &mut [[f64; 9]],
     fill: impl Fn(usize, &mut [[f64; 9]]) + Sync,
@@ -163,13 +163,14 @@ fn for_each_row(
 }
 
 /// `(λ, μ)` of every element; one material serves every label.
-struct LameByRegion<'a> {
+pub(super) struct LameByRegion<'a> {
     regions: &'a [u32],
     lame: Vec<(f64, f64)>,
 }
 
 impl<'a> LameByRegion<'a> {
-    fn try_new(
+    /// Makes sure that every region has a material.
+    pub fn try_new(
         regions: &'a [u32],
         tet_count: usize,
         materials: &[Material],
@@ -194,6 +195,37 @@ impl<'a> LameByRegion<'a> {
 }
 
 impl Stiffness {
+    /// A matrix of blocks on their pattern.
+    pub(super) fn of_blocks(pattern: &Arc<StiffnessPattern>, blocks: Vec<[f64; 9]>) -> Self {
+        assert_eq!(blocks.len(), pattern.block_count(), "the blocks are those of another pattern");
+        Self { pattern: Arc::clone(pattern), blocks }
+    }
+
+    /// Adds springs to the ground: `(degree of freedom, N/m)`.
+    ///
+    /// # Panics
+    /// If a degree of freedom belongs to no element.
+    pub fn add_springs(&mut self, springs: &[(u32, f64)]) {
+        for &(dof, spring) in springs {
+            let (node, axis) = (dof as usize / 3, dof as usize % 3);
+            let columns = self.pattern.columns(node);
+            let place =
+                self.pattern.row(node).start + columns.partition_point(|&c| (c as usize) < node);
+            self.blocks[place][4 * axis] += spring;
+        }
+    }
+
+    /// The diagonal, 3N, N/m; zero for nodes that no element uses.
+    pub fn diagonal(&self) -> Vec<f64> {
+        let mut diagonal = vec![0.0; 3 * self.node_count()];
+        for node in 0..self.node_count() {
+            for (column, block) in self.row(node).filter(|(column, _)| *column == node) {
+                (0..3).for_each(|axis| diagonal[3 * column + axis] = block[4 * axis]);
+            }
+        }
+        diagonal
+    }
+
     /// The pattern this matrix lives on.
     pub fn pattern(&self) -> &Arc<StiffnessPattern> {
         &self.pattern

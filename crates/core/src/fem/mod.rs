@@ -4,6 +4,7 @@ mod assembly;
 mod dofs;
 mod element;
 mod elements_around;
+pub mod hyperelastic;
 mod material;
 mod nodal_patches;
 mod pattern;
@@ -13,6 +14,7 @@ mod stress_recovery;
 pub mod tet10;
 pub mod tet4;
 
+use assembly::LameByRegion;
 pub use assembly::{
     AssemblyError, Stiffness, assemble, assemble_nodal_pressure, assemble_quadratic,
 };

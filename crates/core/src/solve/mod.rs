@@ -3,7 +3,9 @@
 mod certainty;
 pub mod choose;
 pub mod condensed;
+mod definite;
 mod direct;
+pub mod equilibrium;
 mod front;
 mod gauss_jordan;
 mod gauss_jordan_plain;

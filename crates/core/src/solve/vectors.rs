@@ -34,6 +34,11 @@ fn sum_of_squares(v: &[f64], scaled: impl Fn(f64) -> f64) -> f64 {
     sums.iter().sum()
 }
 
+/// Largest absolute value.
+pub(super) fn largest(v: &[f64]) -> f64 {
+    v.iter().fold(0.0, |most: f64, x| most.max(x.abs()))
+}
+
 /// `aᵀ b`.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
@@ -49,4 +54,11 @@ pub(super) fn add_scaled(x: &mut [f64], scale: f64, y: &[f64]) {
     for (x, y) in x.iter_mut().zip(y) {
         *x += scale * y;
     }
+}
+
+/// Length of the longest of 3-vectors that stand one behind the other; of the unknown, where some
+/// axes of a node are known, that of neighbours, which is of the same size.
+pub(super) fn node_max(v: &[f64]) -> f64 {
+    let length = |node: &[f64]| node.iter().map(|x| x * x).sum::<f64>();
+    v.chunks(3).map(length).fold(0.0, f64::max).sqrt()
 }

@@ -4,10 +4,15 @@ mod condensed;
 mod direct;
 mod factor;
 mod frame;
+mod large;
+mod large_frame;
+mod large_once;
 mod once;
 mod upload;
 mod warnings;
 
 pub(crate) use frame::{Readiness, answer_frame, readiness};
+pub(crate) use large_frame::answer_large_frame;
+pub(crate) use large_once::solve_large;
 pub(crate) use once::solve_once;
 pub(crate) use upload::{prefetch, prove, upload};

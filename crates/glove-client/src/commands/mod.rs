@@ -6,6 +6,7 @@ pub mod calibrate;
 mod collecting;
 pub mod devices;
 mod display_arguments;
+mod elasticity_arguments;
 pub mod emulate;
 mod gestures;
 mod hand_files;

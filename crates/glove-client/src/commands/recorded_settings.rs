@@ -2,8 +2,9 @@
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use softgrasp_protocol::{ElementName, Material};
+use softgrasp_protocol::{ElementName, LawName, Material};
 
+use crate::deformation::Elasticity;
 use crate::devices::calibration::Calibration;
 use crate::hand_setup::HandConfiguration;
 use crate::recording::RecordedSetup;
@@ -21,6 +22,18 @@ pub(super) fn recorded_settings(setup: &RecordedSetup) -> anyhow::Result<SolveSe
         method: setup.method.parse().with_context(|| format!("{said} method"))?,
         contact: setup.contact.parse().with_context(|| format!("{said} contact"))?,
         subscription: if setup.whole { Subscription::Whole } else { Subscription::Surface },
+        elasticity: Elasticity {
+            deformation: setup
+                .deformation
+                .parse()
+                .with_context(|| format!("{said} deformation"))?,
+            law: match setup.law.as_str() {
+                "" => LawName::default(),
+                law => law.parse().with_context(|| format!("{said} law"))?,
+            },
+            yield_stress: setup.yield_pa,
+        },
+        max_error: setup.max_error,
     })
 }
 

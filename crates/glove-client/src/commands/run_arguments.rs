@@ -14,6 +14,7 @@ use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
 use super::display_arguments::DisplayArguments;
+use super::elasticity_arguments::ElasticityArguments;
 use super::hand_files::read_configuration;
 use super::numbers::{count, place, poisson, positive, speed, ticks};
 use super::recorded_settings::{recorded_hand, recorded_place, recorded_settings};
@@ -86,6 +87,11 @@ pub struct RunArguments {
     /// Poisson's ratio [default: 0.4].
     #[arg(long, value_name = "NU", value_parser = poisson, allow_hyphen_values = true)]
     pub(super) poisson: Option<f64>,
+    #[command(flatten)]
+    pub(super) elasticity: ElasticityArguments,
+    /// Largest relative error of an answer wanted [default: at large deformation 2e-3].
+    #[arg(long, value_name = "REL", value_parser = positive, allow_hyphen_values = true)]
+    pub(super) max_error: Option<f64>,
     /// Ticks per second, in real time; without it a scripted hand waits for each answer.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_hyphen_values = true)]
     pub(super) rate: Option<f64>,
@@ -211,6 +217,7 @@ impl RunArguments {
             (None, Some(name)) => name.parse().context("the scene's contact")?,
             (None, None) => ContactModel::default(),
         };
+        let elasticity = self.elasticity.of_run(&scene, &method)?;
         let hand = self.hand.clone().unwrap_or(HandRequest::Scripted(ScriptName::default()));
         // A person at a terminal watches; a pipe wants the result.
         let watched = console_is_watched() && !self.is_without_window();
@@ -232,6 +239,8 @@ impl RunArguments {
                     (None, false) => Subscription::Surface,
                     (Some(_), _) | (_, true) => Subscription::Whole,
                 },
+                elasticity,
+                max_error: self.max_error,
             },
             server: self.server.clone().unwrap_or(ServerChoice::Embedded),
             pace: if period.is_some() { Pace::Free } else { Pace::Lockstep },

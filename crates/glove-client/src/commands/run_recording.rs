@@ -21,7 +21,8 @@ pub(super) fn start_recorder(
     loaded: &LoadedObject,
     hand: String,
 ) -> anyhow::Result<Recorder> {
-    let SolveSettings { material, element, method, contact, subscription } = &plan.settings;
+    let SolveSettings { material, element, method, contact, subscription, elasticity, max_error } =
+        &plan.settings;
     let setup = RecordedSetup {
         version: VERSION,
         program: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -35,6 +36,10 @@ pub(super) fn start_recorder(
         method: method.to_string(),
         contact: contact.to_string(),
         whole: *subscription == Subscription::Whole,
+        deformation: elasticity.deformation.to_string(),
+        law: elasticity.law.to_string(),
+        yield_pa: elasticity.yield_stress,
+        max_error: *max_error,
         hand,
         period_s: plan.period.map(|period| period.as_secs_f64()),
         hand_setup: plan.hand_configuration.to_text(),

@@ -6,20 +6,26 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::Args;
 use serde::Serialize;
+use softgrasp_core::fem::Element;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::mesh_io::{MeshFile, PointField, write_vtu};
 use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, ElementChoice, Material, MethodName, NodeChoice, Precision,
-    Question, Reply, Request, SolveOnce, Want,
+    Answer, Displacements, DofValue, ElementChoice, LargeAnswer, LargeAsk, LargeReport, Material,
+    MethodName, NodeChoice, Pace, PathChoice, Precision, Question, Reply, Request, SolveLarge,
+    SolveOnce, Want,
 };
 
+use super::elasticity_arguments::ElasticityArguments;
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
+use crate::calculix_deck::CalculixDeck;
 use crate::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
+use crate::deformation::{Deformation, Elasticity};
 use crate::discretisation::DiscretisationEstimate;
 use crate::displacement_table::{
     DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError, read_table, write_displacements,
+    write_reactions,
 };
 use crate::file_writing::write_file;
 use crate::mesh_file::read_mesh_file;
@@ -70,6 +76,8 @@ pub struct SolveCommand {
     /// Time wanted, ms: auto takes the most exact method that is predicted to be in time.
     #[arg(long, value_name = "MS", value_parser = positive, allow_hyphen_values = true)]
     deadline: Option<f64>,
+    #[command(flatten)]
+    elasticity: ElasticityArguments,
     /// Solve once more with the other element and report the difference: an estimate of the
     /// mesh's own error.
     #[arg(long)]
@@ -77,6 +85,14 @@ pub struct SolveCommand {
     /// File for the displacements: .csv or .vtu.
     #[arg(long, value_name = "U.csv|U.vtu", value_parser = parse_out)]
     out: PathBuf,
+    /// File for the forces that hold the body: node,fx,fy,fz of every node with a known
+    /// displacement, N.
+    #[arg(long, value_name = "R.csv")]
+    reactions: Option<PathBuf>,
+    /// File for the same question as an input deck of CalculiX (and Abaqus): t4 and t10, linear or
+    /// neo-hookean. Nodes count from 1 in it.
+    #[arg(long, value_name = "F.inp")]
+    export_deck: Option<PathBuf>,
     /// File for a JSON report.
     #[arg(long, value_name = "F.json")]
     report: Option<PathBuf>,
@@ -126,6 +142,10 @@ impl SolveCommand {
         let progress = Progress::start("reading the mesh");
         let file = read_mesh_file(&self.mesh)?;
         let question = self.question(&file.mesh)?;
+        let elasticity = self.elasticity.of_request()?;
+        if let Some(path) = &self.export_deck {
+            write_file(path, self.deck(&file.mesh, &question, &elasticity)?.as_bytes())?;
+        }
         progress.now("starting");
         if self.memory_limit.is_some() && self.server != ServerChoice::Embedded {
             bail!(
@@ -142,6 +162,9 @@ impl SolveCommand {
             ServerChoice::At(address) => format!("solving for {nodes} nodes at {address}"),
         });
         progress.watch(host.stage());
+        if self.estimate_discretisation && elasticity.deformation != Deformation::Linear {
+            bail!("--estimate-discretisation compares linear answers; leave out --deformation");
+        }
         let request = SolveOnce {
             mesh: mesh_data(&file.mesh),
             materials: vec![Material { young: self.young, poisson: self.poisson }],
@@ -149,14 +172,18 @@ impl SolveCommand {
             question,
         };
         let start = Instant::now();
-        let mut answer = ask(&mut connection, &request)?;
+        let large = elasticity.ask(PathChoice::FromRest, Pace::Repeatable);
+        let (mut answer, large) = ask(&mut connection, &request, large)?;
         let round_trip_ms = start.elapsed().as_secs_f64() * 1e3;
         progress.now("writing");
-        let summary = SolveSummary::new(&answer.report, round_trip_ms);
+        let summary = SolveSummary::new(&answer.report, round_trip_ms).with_large(large.as_ref());
         let displacements =
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
         let displacements = displacements.into_f64();
         write_file(&self.out, &encode(&self.out, &file.mesh, &displacements)?)?;
+        if let Some(path) = &self.reactions {
+            write_file(path, write_reactions(&answer.reactions).as_bytes())?;
+        }
         let discretisation = match self.estimate_discretisation {
             true => {
                 progress.now("solving again with the other element");
@@ -192,11 +219,43 @@ impl SolveCommand {
             known,
             forces,
             method: self.method.clone(),
-            want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+            want: Want {
+                nodes: NodeChoice::All,
+                reactions: self.reactions.is_some(),
+                precision: Precision::F64,
+            },
             max_error: self.max_error,
             deadline_ms: self.deadline,
             ..Question::default()
         })
+    }
+
+    /// The same question for another program.
+    fn deck(
+        &self,
+        mesh: &TetMesh,
+        question: &Question,
+        elasticity: &Elasticity,
+    ) -> anyhow::Result<String> {
+        let element = match self.element {
+            ElementChoice::T4 => Element::Tet4,
+            ElementChoice::T4Anp => Element::Tet4Anp,
+            ElementChoice::T10 => Element::Tet10,
+            ElementChoice::Auto => bail!("--export-deck needs an element: --element t4 or t10"),
+        };
+        if elasticity.yield_stress.is_some() {
+            bail!("--export-deck has no yield stress; leave out --yield or the deck");
+        }
+        let is_linear = elasticity.deformation == Deformation::Linear;
+        let deck = CalculixDeck {
+            mesh,
+            element,
+            material: Material { young: self.young, poisson: self.poisson },
+            law: (!is_linear).then_some(elasticity.law),
+            known: &question.known,
+            forces: &question.forces,
+        };
+        Ok(deck.text()?)
     }
 
     fn report(
@@ -231,10 +290,26 @@ impl SolveCommand {
     }
 }
 
-fn ask(connection: &mut ServerConnection, request: &SolveOnce) -> Result<Box<Answer>, LinkError> {
-    match connection.ask(&Request::SolveOnce(Box::new(request.clone())))? {
-        Reply::Answer(answer) => Ok(answer),
-        other => Err(unexpected("SolveOnce", &other)),
+/// The answer, and what is reported of large deformation if that was asked for.
+fn ask(
+    connection: &mut ServerConnection,
+    request: &SolveOnce,
+    large: Option<LargeAsk>,
+) -> Result<(Box<Answer>, Option<LargeReport>), LinkError> {
+    let Some(large) = large else {
+        return match connection.ask(&Request::SolveOnce(Box::new(request.clone())))? {
+            Reply::Answer(answer) => Ok((answer, None)),
+            other => Err(unexpected("SolveOnce", &other)),
+        };
+    };
+    let SolveOnce { mesh, materials, element, question } = request.clone();
+    let request = SolveLarge { mesh, materials, element, large, question };
+    match connection.ask(&Request::SolveLarge(Box::new(request)))? {
+        Reply::LargeAnswer(answered) => {
+            let LargeAnswer { answer, large } = *answered;
+            Ok((Box::new(answer), Some(large)))
+        }
+        other => Err(unexpected("SolveLarge", &other)),
     }
 }
 
@@ -285,6 +360,7 @@ fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
         summary.max_rotation_deg,
         100.0 * summary.max_strain,
     );
+    text.push_str(&describe_large(summary));
     let findings = &file.findings;
     for (count, what) in [
         (findings.flipped.len(), "inverted tetrahedra were turned"),
@@ -298,4 +374,22 @@ fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
     }
     text.push_str(&format!("displacements written to {}\n", out.display()));
     text
+}
+
+/// What is known of an equilibrium at large deformation.
+fn describe_large(summary: &SolveSummary) -> String {
+    let Some(large) = &summary.large else { return String::new() };
+    if summary.deformation == Deformation::Linear.as_str() {
+        return format!("linear, because {}\n", summary.chosen_because);
+    }
+    format!(
+        "large deformation: {} pieces, {} steps, {} solves; estimated error {:.1e}; stretch up to \
+         {:.2}, volumes down to {:.2} of those at rest\n",
+        large.substeps,
+        large.newton_steps,
+        large.linear_solves,
+        summary.error_estimate_rel.unwrap_or(0.0),
+        large.max_stretch,
+        large.min_jacobian,
+    )
 }

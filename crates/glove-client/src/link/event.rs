@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use softgrasp_protocol::{DofValue, ModelReady, NodeChoice, SolveReport};
+use softgrasp_protocol::{DofValue, LargeReport, ModelReady, NodeChoice, SolveReport};
 
 use crate::unanswered::Unanswered;
 
@@ -52,6 +52,8 @@ pub struct Reached {
     pub mask_forces: Vec<[f64; 3]>,
     /// What it cost and how wrong it can be.
     pub report: Box<SolveReport>,
+    /// What is reported of large deformation; `None` for an answer to a linear question.
+    pub large: Option<LargeReport>,
     /// From sending to having the answer.
     pub round_trip: Duration,
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use softgrasp_protocol::Question;
+use softgrasp_protocol::{LargeAsk, Question};
 
 use super::event::{LinkEvent, RequestEnd};
 use super::outbox::{Activity, LinkState, Shared, TickRequest};
@@ -47,9 +47,10 @@ impl Link {
     }
 
     /// Asks for the displacements of a tick; a request that has not been sent yet is replaced.
-    /// `grip` is the tick in which the grip began.
-    pub fn ask(&self, tick: u64, grip: u64, question: Question) {
-        self.shared.lock().replace_request(TickRequest { tick, grip, question });
+    /// `grip` is the tick in which the grip began; at large deformation its first answer begins at
+    /// the shape at rest, the others where the one before ended.
+    pub fn ask(&self, tick: u64, grip: u64, question: Question, large: Option<LargeAsk>) {
+        self.shared.lock().replace_request(TickRequest { tick, grip, question, large });
         self.shared.notify();
     }
 

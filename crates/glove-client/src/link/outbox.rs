@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use softgrasp_protocol::Question;
+use softgrasp_protocol::{LargeAsk, Question};
 
 use super::event::{LinkEvent, RequestEnd};
 use crate::model_upload::ModelUpload;
@@ -19,6 +19,9 @@ pub struct TickRequest {
     pub grip: u64,
     /// What is asked.
     pub question: Question,
+    /// What is asked of large deformation; `None` for a linear answer. Where its path begins is the
+    /// link's to say.
+    pub large: Option<LargeAsk>,
 }
 
 /// What the link's thread is doing.
@@ -164,7 +167,7 @@ mod tests {
     use super::*;
 
     fn request(tick: u64) -> TickRequest {
-        TickRequest { tick, grip: 0, question: Question::default() }
+        TickRequest { tick, grip: 0, question: Question::default(), large: None }
     }
 
     #[test]

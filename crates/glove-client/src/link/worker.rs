@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
-    FrameRequest, ModelHash, Prefetch, RejectCode, Rejected, Reply, Request, UploadModel,
+    Answer, FrameRequest, LargeAsk, LargeFrame, LargeReport, ModelHash, PathChoice, Prefetch,
+    RejectCode, Rejected, Reply, Request, UploadModel,
 };
 
 use super::event::{LinkEvent, Reached, RequestEnd};
@@ -40,6 +41,8 @@ struct Session {
     refusal: Option<Refusal>,
     /// Grip whose first answer has come.
     answered_grip: Option<u64>,
+    /// Grip of which it has been told that an equilibrium was not found.
+    told_grip: Option<u64>,
 }
 
 /// What the server has refused, so that it is not asked again.
@@ -150,6 +153,11 @@ impl Worker {
         }
         let Some(request) = &job.request else { return Ok(()) };
         let reached = match session.answer(&job.model, request, shared, budget) {
+            // The shape stays where it was, and the next tick may ask for less.
+            Err(LinkError::Rejected(rejected)) if request.is_passing(&rejected) => {
+                session.tell_no_equilibrium(shared, request.grip, &rejected);
+                Err(Unanswered::NoEquilibrium)
+            }
             Err(LinkError::Rejected(rejected)) if stays(rejected.code) => {
                 let refusal = Refusal { model: hash, grip: Some(request.grip) };
                 session.refuse(shared, "the request", &rejected, refusal);
@@ -175,7 +183,7 @@ impl Session {
         let mut state = shared.lock();
         (state.connected, state.lost, state.model_refused) = (true, false, false);
         state.tell(LinkEvent::Connected { server });
-        Ok(Self { connection, model: None, refusal: None, answered_grip: None })
+        Ok(Self { connection, model: None, refusal: None, answered_grip: None, told_grip: None })
     }
 
     /// Whether the server has refused this before, and nothing has changed since.
@@ -200,6 +208,15 @@ impl Session {
         state.model_refused |= newest && refusal.grip.is_none();
         drop(state);
         self.refusal = Some(refusal);
+    }
+
+    /// Tells once in a grip that an equilibrium was not found, and why.
+    fn tell_no_equilibrium(&mut self, shared: &Shared, grip: u64, rejected: &Rejected) {
+        tracing::info!(text = rejected.text, "no equilibrium");
+        if self.told_grip.replace(grip) != Some(grip) {
+            let text = format!("a shape ({}): {}", rejected.code, shortened(&rejected.text));
+            shared.lock().tell(LinkEvent::Refused { text });
+        }
     }
 
     /// Sends the model unless the server knows it.
@@ -254,19 +271,30 @@ impl Session {
         budget.begin();
         let question = request.question.clone();
         let start = Instant::now();
-        let asked = Request::Frame(FrameRequest { model: model.hash, question });
+        let asked = match request.large {
+            None => Request::Frame(FrameRequest { model: model.hash, question }),
+            Some(large) => {
+                let is_first = self.answered_grip != Some(request.grip);
+                let path = if is_first { PathChoice::FromRest } else { PathChoice::Continue };
+                let large = LargeAsk { path, ..large };
+                Request::LargeFrame(Box::new(LargeFrame { model: model.hash, large, question }))
+            }
+        };
         let reply = self.connection.ask_awake(&asked);
         let round_trip = start.elapsed();
+        let reached = |answer: Answer, large: Option<LargeReport>| Reached {
+            rest_shape: model.rest_shape,
+            round_trip,
+            nodes: answer.nodes,
+            displacement: answer.displacements.into_f64(),
+            reactions: answer.reactions,
+            mask_forces: answer.mask_forces,
+            report: Box::new(answer.report),
+            large,
+        };
         let reached = match reply? {
-            Reply::Answer(answer) => Reached {
-                rest_shape: model.rest_shape,
-                round_trip,
-                nodes: answer.nodes,
-                displacement: answer.displacements.into_f64(),
-                reactions: answer.reactions,
-                mask_forces: answer.mask_forces,
-                report: Box::new(answer.report),
-            },
+            Reply::Answer(answer) => reached(*answer, None),
+            Reply::LargeAnswer(answered) => reached(answered.answer, Some(answered.large)),
             other => return Err(unexpected("Frame", &other)),
         };
         budget.end();
@@ -295,6 +323,13 @@ fn lose(state: &mut LinkState, error: &LinkError, job: Job) {
 fn end(shared: &Shared, request: Option<TickRequest>, reached: Result<Box<Reached>, Unanswered>) {
     if let Some(TickRequest { tick, .. }) = request {
         shared.lock().end(RequestEnd { tick, reached });
+    }
+}
+
+impl TickRequest {
+    /// Whether a refusal is about where this tick would have gone, not about the grip.
+    fn is_passing(&self, rejected: &Rejected) -> bool {
+        self.large.is_some() && rejected.code == RejectCode::Uncertain
     }
 }
 
@@ -327,7 +362,8 @@ mod tests {
 
     #[test]
     fn lost_request_waits_for_the_server_and_ends_when_a_newer_one_has_come() {
-        let request = |tick| TickRequest { tick, grip: 0, question: Default::default() };
+        let request =
+            |tick| TickRequest { tick, grip: 0, question: Default::default(), large: None };
         let upload = UploadModel {
             mesh: softgrasp_protocol::MeshData { vertices: vec![], tets: vec![], regions: vec![] },
             materials: vec![],

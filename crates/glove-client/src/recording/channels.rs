@@ -82,6 +82,8 @@ impl Channel {
                 "version": integer, "program": text, "object": text, "nodes": integer,
                 "size_m": {"type": ["number", "null"]}, "mesh": text, "young_pa": number, "poisson": number,
                 "element": text, "method": text, "contact": text, "whole": flag, "hand": text,
+                "deformation": text, "law": text, "yield_pa": {"type": ["number", "null"]},
+                "max_error": {"type": ["number", "null"]},
                 "period_s": {"type": ["number", "null"]}, "hand_setup": text,
                 "calibration": text, "is_live": flag,
                 "world_from_sender": {"type": ["array", "null"], "items": number},

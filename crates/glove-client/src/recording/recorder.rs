@@ -17,6 +17,7 @@ use crate::arrival::Arrival;
 use crate::grasp_loop::GraspLoop;
 use crate::pace::Due;
 use crate::sent::Sent;
+use crate::springback::SPRINGBACK;
 use crate::tick_outcome::{LoopEvent, TickOutcome};
 
 /// A recording that is being written.
@@ -186,13 +187,21 @@ impl Drop for Recorder {
 }
 
 fn answers(outcome: &TickOutcome) -> impl Iterator<Item = AnswerSeen> {
-    outcome.answers.iter().map(|(tick, solve)| AnswerSeen {
+    let of_ticks = outcome.answers.iter().map(|(tick, solve)| AnswerSeen {
         tick: *tick,
         method: solve.method.clone(),
         element: solve.element.to_owned(),
         residual_rel: solve.residual_rel,
         round_trip_ms: solve.round_trip_ms,
-    })
+    });
+    let springback = outcome.sprung_back.then(|| AnswerSeen {
+        tick: SPRINGBACK,
+        method: "springback".to_owned(),
+        element: String::new(),
+        residual_rel: 0.0,
+        round_trip_ms: 0.0,
+    });
+    of_ticks.chain(springback)
 }
 
 fn pose(tick: u64, grasp_loop: &GraspLoop) -> Option<Pose> {

@@ -32,6 +32,18 @@ pub struct RecordedSetup {
     pub contact: String,
     /// Whether each tick asked for every node.
     pub whole: bool,
+    /// Equations: `linear`, `large` or `auto`; recordings from before there was a choice are linear.
+    #[serde(default = "linear")]
+    pub deformation: String,
+    /// Law of large deformation; empty where there was no choice.
+    #[serde(default)]
+    pub law: String,
+    /// Yield stress, Pa.
+    #[serde(default)]
+    pub yield_pa: Option<f64>,
+    /// Largest relative error asked for.
+    #[serde(default)]
+    pub max_error: Option<f64>,
     /// Where the hand came from.
     pub hand: String,
     /// From tick to tick in real time, s.
@@ -45,6 +57,10 @@ pub struct RecordedSetup {
     /// Where a sender of joints was placed: m, then quaternion x y z w; `None` where its first hand
     /// was placed before the object.
     pub world_from_sender: Option<[f64; 7]>,
+}
+
+fn linear() -> String {
+    "linear".to_owned()
 }
 
 /// What a person did to the object between two ticks.

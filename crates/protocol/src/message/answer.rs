@@ -38,8 +38,9 @@ pub struct Answer {
     pub mask_forces: Vec<[f64; 3]>,
 }
 
+/// Announces the arrays of an [`Answer`].
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
-struct AnswerPart {
+pub(super) struct AnswerPart {
     report: SolveReport,
     listed: bool,
     precision: Precision,
@@ -90,7 +91,7 @@ impl Displacements {
 }
 
 impl Answer {
-    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+    pub(super) fn part(&self) -> Result<AnswerPart, EncodeError> {
         let expected = self.displacements.node_count();
         let listed = match &self.nodes {
             NodeChoice::All => false,
@@ -104,16 +105,20 @@ impl Answer {
             Displacements::F64(_) => (Precision::F64, 1.0),
             Displacements::F32Quantised { scale, .. } => (Precision::F32Quantised, scale),
         };
-        writer.part(&AnswerPart {
+        Ok(AnswerPart {
             // A few hundred bytes; the arrays are not copied.
             report: self.report.clone(),
             listed,
             precision,
             scale,
             node_count: count_of("displacements", expected)?,
-            reaction_count: count_of("reaction forces", self.reactions.len())?,
-            mask_force_count: count_of("forces of masks", self.mask_forces.len())?,
-        })?;
+            reaction_count: count_of(REACTIONS, self.reactions.len())?,
+            mask_force_count: count_of(MASK_FORCES, self.mask_forces.len())?,
+        })
+    }
+
+    /// Arrays: nodes if listed, displacements, reactions, forces of masks.
+    pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         if let NodeChoice::Nodes(nodes) = &self.nodes {
             writer.array(nodes);
         }
@@ -123,20 +128,14 @@ impl Answer {
         }
         writer.dof_values(&self.reactions);
         writer.array(&self.mask_forces);
-        Ok(())
     }
 
-    pub(super) fn read(
+    /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
+    pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
-        limits: &Limits,
+        part: AnswerPart,
     ) -> Result<Self, DecodeError> {
-        let part: AnswerPart = reader.part()?;
-        part.report.check(limits)?;
-        let count = check_count("displacements", part.node_count, limits.node_count_max)?;
-        let what = "reaction forces";
-        let reaction_count = check_count(what, part.reaction_count, limits.dof_count_max)?;
-        let of_masks = "forces of masks";
-        let mask_force_count = check_count(of_masks, part.mask_force_count, limits.dof_count_max)?;
+        let count = part.node_count as usize;
         let nodes = if part.listed {
             NodeChoice::Nodes(reader.array("answered nodes", count)?)
         } else {
@@ -149,11 +148,39 @@ impl Answer {
                 Displacements::F32Quantised { scale: part.scale, values }
             }
         };
-        let reactions = reader.dof_values(what, reaction_count)?;
-        let mask_forces = reader.array(of_masks, mask_force_count)?;
+        let reactions = reader.dof_values(REACTIONS, part.reaction_count as usize)?;
+        let mask_forces = reader.array(MASK_FORCES, part.mask_force_count as usize)?;
         Ok(Self { report: part.report, nodes, displacements, reactions, mask_forces })
     }
+
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        writer.part(&self.part()?)?;
+        self.write_arrays(writer);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: AnswerPart = reader.part()?;
+        part.check(limits)?;
+        Self::read_arrays(reader, part)
+    }
 }
+
+impl AnswerPart {
+    pub(super) fn check(&self, limits: &Limits) -> Result<(), DecodeError> {
+        self.report.check(limits)?;
+        check_count("displacements", self.node_count, limits.node_count_max)?;
+        check_count(REACTIONS, self.reaction_count, limits.dof_count_max)?;
+        check_count(MASK_FORCES, self.mask_force_count, limits.dof_count_max)?;
+        Ok(())
+    }
+}
+
+const REACTIONS: &str = "reaction forces";
+const MASK_FORCES: &str = "forces of masks";
 
 #[cfg(test)]
 mod tests {

@@ -2,6 +2,8 @@
 
 mod answer;
 mod dof_value;
+mod large;
+mod large_ask;
 mod masks;
 mod mesh;
 mod model;
@@ -15,6 +17,10 @@ mod session;
 
 pub use answer::{Answer, Displacements};
 pub use dof_value::DofValue;
+pub use large::{DeformationName, LargeAnswer, LargeFrame, LargeReport, SolveLarge};
+pub use large_ask::{
+    DeformationChoice, DeformationChoiceError, LargeAsk, LawName, LawNameError, Pace, PathChoice,
+};
 pub use masks::Masks;
 pub use mesh::{Material, MeshData};
 pub use model::{FrameRequest, ModelHash, ModelHashError, ModelReady, Prefetch, UploadModel};

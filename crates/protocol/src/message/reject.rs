@@ -50,7 +50,8 @@ pub enum RejectCode {
     /// The server does not speak the client's protocol version.
     #[wincode(tag = 13)]
     UnsupportedVersion = 13,
-    /// The answer would have no certain digit: what is known holds the body too weakly.
+    /// The answer would have no certain digit: what is known holds the body too weakly, or, with
+    /// large deformation, no equilibrium was found.
     #[wincode(tag = 14)]
     Uncertain = 14,
 }

@@ -1,6 +1,7 @@
 //! All messages of a server as one type.
 
 use super::answer::Answer;
+use super::large::LargeAnswer;
 use super::model::ModelReady;
 use super::reject::Rejected;
 use super::session::Welcome;
@@ -28,6 +29,8 @@ pub enum Reply {
         /// The number of the `Ping`.
         nonce: u64,
     },
+    /// Answer to `SolveLarge` and `LargeFrame`.
+    LargeAnswer(Box<LargeAnswer>),
 }
 
 impl Reply {
@@ -40,6 +43,7 @@ impl Reply {
             Self::ModelReady(_) => Kind::ModelReady,
             Self::Rejected(_) => Kind::Rejected,
             Self::Pong { .. } => Kind::Pong,
+            Self::LargeAnswer(_) => Kind::LargeAnswer,
         }
     }
 
@@ -61,6 +65,7 @@ impl Reply {
             Self::ModelReady(ready) => writer.part(ready),
             Self::Rejected(rejected) => writer.part(rejected),
             Self::Pong { nonce } => writer.part(nonce),
+            Self::LargeAnswer(answer) => answer.write(writer),
         })
     }
 
@@ -86,6 +91,9 @@ impl Reply {
                 Self::Rejected(rejected)
             }
             Kind::Pong => Self::Pong { nonce: reader.part()? },
+            Kind::LargeAnswer => {
+                Self::LargeAnswer(Box::new(LargeAnswer::read(&mut reader, limits)?))
+            }
             Kind::Hello
             | Kind::SolveOnce
             | Kind::HaveModel
@@ -93,7 +101,9 @@ impl Reply {
             | Kind::Frame
             | Kind::Prefetch
             | Kind::Drop
-            | Kind::Ping => return Err(DecodeError::WrongDirection { kind }),
+            | Kind::Ping
+            | Kind::SolveLarge
+            | Kind::LargeFrame => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;
         Ok(reply)

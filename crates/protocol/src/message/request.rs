@@ -1,5 +1,6 @@
 //! All messages of a client as one type.
 
+use super::large::{LargeFrame, SolveLarge};
 use super::model::{FrameRequest, ModelHash, Prefetch, UploadModel};
 use super::question::SolveOnce;
 use super::session::Hello;
@@ -28,6 +29,10 @@ pub enum Request {
         /// Any number.
         nonce: u64,
     },
+    /// One self-contained solve for large deformation; answered by `LargeAnswer`.
+    SolveLarge(Box<SolveLarge>),
+    /// Large deformation of a kept model; answered by `LargeAnswer`.
+    LargeFrame(Box<LargeFrame>),
 }
 
 impl Request {
@@ -42,6 +47,8 @@ impl Request {
             Self::Prefetch(_) => Kind::Prefetch,
             Self::Drop(_) => Kind::Drop,
             Self::Ping { .. } => Kind::Ping,
+            Self::SolveLarge(_) => Kind::SolveLarge,
+            Self::LargeFrame(_) => Kind::LargeFrame,
         }
     }
 
@@ -66,6 +73,8 @@ impl Request {
             Self::Frame(frame) => frame.write(writer),
             Self::Prefetch(prefetch) => prefetch.write(writer),
             Self::Ping { nonce } => writer.part(nonce),
+            Self::SolveLarge(solve) => solve.write(writer),
+            Self::LargeFrame(frame) => frame.write(writer),
         })
     }
 
@@ -89,12 +98,15 @@ impl Request {
             Kind::Prefetch => Self::Prefetch(Prefetch::read(&mut reader, limits)?),
             Kind::Drop => Self::Drop(reader.part()?),
             Kind::Ping => Self::Ping { nonce: reader.part()? },
+            Kind::SolveLarge => Self::SolveLarge(Box::new(SolveLarge::read(&mut reader, limits)?)),
+            Kind::LargeFrame => Self::LargeFrame(Box::new(LargeFrame::read(&mut reader, limits)?)),
             Kind::Welcome
             | Kind::Answer
             | Kind::ModelState
             | Kind::ModelReady
             | Kind::Rejected
-            | Kind::Pong => return Err(DecodeError::WrongDirection { kind }),
+            | Kind::Pong
+            | Kind::LargeAnswer => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;
         Ok(request)

@@ -27,22 +27,60 @@ fn the_document_is_about_this_version() {
     assert!(!DOCUMENT.contains("magic, version 2"), "notes of the examples");
 }
 
+/// Names of a structure's fields, from its `{:#?}`, which has them in the order of the wire.
+fn fields(debug: &str) -> Vec<String> {
+    let lines = debug.lines().filter(|line| line.starts_with("    ") && !line.starts_with("     "));
+    lines.filter_map(|line| Some(line.trim().split_once(": ")?.0.to_owned())).collect()
+}
+
+/// First cells of the rows under the heading `title`.
+fn first_cells(title: &str) -> Vec<String> {
+    table(title).iter().map(|row| row[0].trim_matches('`').to_owned()).collect()
+}
+
 #[test]
 fn the_document_lists_every_field_of_the_report_in_order() {
-    // `Debug` of a structure names its fields in the order in which they are written.
-    let named = |debug: String| -> Vec<String> {
-        let lines =
-            debug.lines().filter(|line| line.starts_with("    ") && !line.starts_with("     "));
-        lines.filter_map(|line| Some(line.trim().split_once(": ")?.0.to_owned())).collect()
-    };
-    let rows = table("SolveReport");
-    let written: Vec<String> = rows.iter().map(|row| row[0].trim_matches('`').to_owned()).collect();
-    let known = named(format!("{:#?}", SolveReport::default()));
-    let stages = named(format!("{:#?}", StageMs::default()));
+    let known = fields(&format!("{:#?}", SolveReport::default()));
+    let stages = fields(&format!("{:#?}", StageMs::default()));
     assert!(!known.is_empty() && !stages.is_empty());
     // The second table of the section, with its head, is that of the stages.
     let head = ["Field".to_owned(), "---".to_owned()];
-    assert_eq!(written, [known, head.to_vec(), stages].concat());
+    assert_eq!(first_cells("SolveReport"), [known, head.to_vec(), stages].concat());
+}
+
+#[test]
+fn the_document_lists_every_field_of_ask_and_report_of_large_deformation() {
+    let ask = fields(&format!("{:#?}", LargeAsk::default()));
+    let report = fields(&format!("{:#?}", LargeReport::default()));
+    assert_eq!((ask.len(), report.len()), (5, 11));
+    assert_eq!(first_cells("LargeAsk"), ask);
+    assert_eq!(first_cells("LargeReport"), report);
+}
+
+/// Variants as the document writes them: number on the wire and name, separated by commas.
+fn numbered<T>(variants: &[T]) -> String
+where
+    T: std::fmt::Debug + wincode::Serialize<Src = T>,
+{
+    let text = |variant: &T| {
+        let bytes = wincode::serialize(variant).unwrap();
+        format!("{} {variant:?}", u32::from_le_bytes(bytes.try_into().unwrap()))
+    };
+    variants.iter().map(text).collect::<Vec<_>>().join(", ")
+}
+
+#[test]
+fn the_document_numbers_the_choices_of_large_deformation() {
+    let known = [
+        ("LargeAsk", 0, numbered(&[DeformationChoice::Large, DeformationChoice::Auto])),
+        ("LargeAsk", 1, numbered(&[LawName::NeoHookean, LawName::NeoHookeanLog])),
+        ("LargeAsk", 3, numbered(&[PathChoice::Continue, PathChoice::FromRest])),
+        ("LargeAsk", 4, numbered(&[Pace::Repeatable, Pace::Timely])),
+        ("LargeReport", 0, numbered(&[DeformationName::Linear, DeformationName::Large])),
+    ];
+    for (title, row, variants) in known {
+        assert_eq!(table(title)[row][1], format!("enum: {variants}"));
+    }
 }
 
 #[test]
@@ -90,7 +128,8 @@ fn the_examples_of_the_document_are_real_frames() {
         let message = conversation().into_iter().find(|message| message.kind() == kind).unwrap();
         hex(&message.encode())
     };
-    assert_eq!(shown, [frames(Kind::Ping), frames(Kind::SolveOnce), frames(Kind::Answer)]);
+    let kinds = [Kind::Ping, Kind::SolveOnce, Kind::LargeFrame, Kind::LargeAnswer, Kind::Answer];
+    assert_eq!(shown, kinds.map(frames));
 }
 
 /// The bytes of a block whose lines may end in `; a note`.

@@ -8,6 +8,8 @@ mod chunking;
 mod document;
 mod golden;
 mod hostile;
+mod large;
+mod random_messages;
 mod raw;
 mod round_trip;
 mod samples;

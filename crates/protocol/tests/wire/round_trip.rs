@@ -3,8 +3,9 @@
 use proptest::prelude::*;
 use softgrasp_protocol::*;
 
+use crate::random_messages::any_message;
 use crate::raw::{only_frame, raw_frame};
-use crate::samples::{Message, any_message, conversation};
+use crate::samples::{Message, conversation};
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
@@ -91,5 +92,19 @@ fn lists_that_do_not_fit_together_are_not_sent() {
     answer.nodes = NodeChoice::Nodes(vec![1]);
     let error = Reply::Answer(answer).encode_into(1, &Limits::default(), &mut out);
     assert!(matches!(error, Err(EncodeError::CountMismatch { count: 1, expected: 3, .. })));
+    assert!(out.is_empty(), "nothing is appended");
+}
+
+#[test]
+fn a_large_answer_that_does_not_fit_together_is_not_sent() {
+    let answer = conversation().into_iter().find_map(|message| match message {
+        Message::Reply(_, Reply::LargeAnswer(answer)) => Some(answer),
+        _ => None,
+    });
+    let mut answer = answer.unwrap();
+    answer.answer.nodes = NodeChoice::Nodes(vec![]);
+    let mut out = vec![];
+    let error = Reply::LargeAnswer(answer).encode_into(1, &Limits::default(), &mut out);
+    assert!(matches!(error, Err(EncodeError::CountMismatch { count: 0, expected: 1, .. })));
     assert!(out.is_empty(), "nothing is appended");
 }

@@ -1,0 +1,10 @@
+//! Report `large`: error against time of frames at large deformation, and random walks of the hand.
+
+mod frames;
+mod rates;
+mod report;
+mod squeeze;
+mod walk;
+
+pub use report::measure;
+pub use walk::{Walk, WalkFault};

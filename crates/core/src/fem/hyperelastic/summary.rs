@@ -1,0 +1,104 @@
+//! The largest rotation, stretch and compression of an element at large deformation.
+
+use nalgebra::Matrix3;
+
+use super::Elements;
+use super::elements::Shape;
+
+/// What a displacement field does to the elements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LargeSummary {
+    /// Largest rotation of an element, of the polar decomposition `F = R U`, rad.
+    pub rotation_max: f64,
+    /// Largest `|λ − 1|` of a principal stretch.
+    pub strain_max: f64,
+    /// Largest principal stretch.
+    pub stretch_max: f64,
+    /// Smallest principal stretch.
+    pub stretch_min: f64,
+    /// Smallest volume ratio.
+    pub jacobian_min: f64,
+}
+
+impl Default for LargeSummary {
+    fn default() -> Self {
+        Self {
+            rotation_max: 0.0,
+            strain_max: 0.0,
+            stretch_max: 1.0,
+            stretch_min: 1.0,
+            jacobian_min: f64::INFINITY,
+        }
+    }
+}
+
+impl LargeSummary {
+    fn joined(self, other: &Self) -> Self {
+        Self {
+            rotation_max: self.rotation_max.max(other.rotation_max),
+            strain_max: self.strain_max.max(other.strain_max),
+            stretch_max: self.stretch_max.max(other.stretch_max),
+            stretch_min: self.stretch_min.min(other.stretch_min),
+            jacobian_min: self.jacobian_min.min(other.jacobian_min),
+        }
+    }
+
+    fn see(&mut self, h: &Matrix3<f64>) {
+        let f = h + Matrix3::identity();
+        self.jacobian_min = self.jacobian_min.min(f.determinant());
+        let eigen = (f.transpose() * f).symmetric_eigen();
+        let stretches = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+        self.stretch_max = self.stretch_max.max(stretches.max());
+        self.stretch_min = self.stretch_min.min(stretches.min());
+        let strain = stretches.iter().map(|stretch| (stretch - 1.0).abs()).fold(0.0, f64::max);
+        self.strain_max = self.strain_max.max(strain);
+        // tr R with R = F U⁻¹, U⁻¹ = Σ λ⁻¹ n nᵀ.
+        let mut cosine = -1.0;
+        for (stretch, n) in stretches.iter().zip(eigen.eigenvectors.column_iter()) {
+            cosine += n.dot(&(f * n)) / stretch;
+        }
+        let angle = (0.5 * cosine).clamp(-1.0, 1.0).acos();
+        self.rotation_max = self.rotation_max.max(angle);
+    }
+}
+
+impl Elements {
+    /// Largest change of a deformation gradient (Frobenius norm) that a step makes.
+    ///
+    /// Shapes: `step` 3N. Units: m; result 1.
+    pub fn gradient_change_max(&self, step: &[f64]) -> f64 {
+        match &self.shape {
+            Shape::Linear(locals) | Shape::Averaged(locals, _) => {
+                self.change_of_groups(locals, step)
+            }
+            Shape::Quadratic(_) => self.change_one_by_one(step),
+        }
+    }
+
+    /// [`Elements::gradient_change_max`] of any elements.
+    pub(super) fn change_one_by_one(&self, step: &[f64]) -> f64 {
+        let pieces = self.by_pieces(step, |_, _, h, most: &mut f64| {
+            *most = most.max(h.norm_squared());
+        });
+        pieces.into_iter().fold(0.0, f64::max).sqrt()
+    }
+
+    /// Largest rotation and stretches of a displacement field, in parallel.
+    ///
+    /// Shapes: `u` 3N. Units: m.
+    pub fn summary(&self, u: &[f64]) -> LargeSummary {
+        let pieces = self.by_pieces(u, |_, _, h, piece: &mut LargeSummary| piece.see(h));
+        pieces.iter().fold(LargeSummary::default(), LargeSummary::joined)
+    }
+
+    /// The same on the calling thread alone, with a call of `pause` every 200 µs or so.
+    pub fn summary_with_pauses(&self, u: &[f64], pause: &mut dyn FnMut()) -> LargeSummary {
+        let mut summary = LargeSummary::default();
+        for piece in 0..self.piece_count() {
+            let see = &|_: usize, _: usize, h: &Matrix3<f64>, all: &mut LargeSummary| all.see(h);
+            summary = summary.joined(&self.piece(u, piece, see));
+            pause();
+        }
+        summary
+    }
+}

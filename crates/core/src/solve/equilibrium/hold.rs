@@ -1,0 +1,202 @@
+//! What holds a body: known degrees of freedom, masks, and springs where these leave it free.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use crate::contact::Mask;
+use crate::fem::Stiffness;
+use crate::mesh::{Bodies, TetMesh};
+use crate::solve::definite::held_for_definiteness;
+use crate::solve::front::FrontAnalysis;
+use crate::solve::partition::AXIS_NAMES;
+use crate::solve::{Partition, RigidBodies};
+
+/// What holds a body, ordered and analysed for factors of any tangent.
+///
+/// Shapes: n unknown degrees of freedom, c = 3 × masks constraints.
+pub struct Hold {
+    pub(super) partition: Arc<Partition>,
+    pub(super) analysis: Arc<FrontAnalysis>,
+    masks: Vec<Mask>,
+    /// Row of `C` for each axis of each mask: places among the unknown, weights.
+    pub(super) rows: Vec<Vec<(u32, f64)>>,
+    /// What known degrees of freedom add to each row.
+    known_parts: Vec<Vec<(u32, f64)>>,
+    /// `(C Cᵀ)⁻¹`: forces of the masks from forces of their nodes.
+    gram_inverse: DMatrix<f64>,
+    /// Degrees of freedom that springs hold while a factor is made, because masks alone hold the
+    /// body; what the springs carry is taken out again.
+    pub(super) sprung: Vec<u32>,
+}
+
+/// A mask whose mean displacement follows from what else is held.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "along {axis}, mask {mask} (from 0) says what other masks or known nodes say already, so its \
+     force is not determined; leave it out or move it"
+)]
+pub struct Dependent {
+    /// The mask, in the order given.
+    pub mask: usize,
+    /// Axis name.
+    pub axis: char,
+}
+
+/// The body that is held.
+#[derive(Clone, Copy)]
+pub struct HoldOf<'a> {
+    /// Its mesh.
+    pub mesh: &'a TetMesh,
+    /// Its connected bodies.
+    pub bodies: &'a Bodies,
+    /// Their rigid parts.
+    pub rigid: &'a RigidBodies,
+    /// A stiffness with the pattern of every tangent.
+    pub stiffness: &'a Stiffness,
+}
+
+/// Share of a mask's weights that must be its own.
+const OWN_SHARE_MIN: f64 = 1e-10;
+
+impl Hold {
+    /// A hold by known degrees of freedom (fixed ones among them) and masks, which together must
+    /// hold every body; `before` lends its order and analysis if it is by the same degrees of
+    /// freedom.
+    ///
+    /// # Errors
+    /// [`Dependent`] naming a mask.
+    pub fn try_new(
+        body: HoldOf<'_>,
+        partition: Partition,
+        masks: Vec<Mask>,
+        before: Option<&Self>,
+    ) -> Result<Self, Dependent> {
+        let lends = |before: &&Self| {
+            before.partition.known() == partition.known()
+                && before.masks.is_empty() == masks.is_empty()
+        };
+        let (partition, analysis, sprung) = match before.filter(lends) {
+            Some(Self { partition, analysis, sprung, .. }) => {
+                (Arc::clone(partition), Arc::clone(analysis), sprung.clone())
+            }
+            None => {
+                let HoldOf { mesh, bodies, rigid, stiffness } = body;
+                let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
+                let sprung = match masks.is_empty() {
+                    true => Vec::new(),
+                    false => held_for_definiteness(mesh, bodies, rigid, partition.known()),
+                };
+                (Arc::new(partition), analysis, sprung)
+            }
+        };
+        let mut rows = Vec::with_capacity(3 * masks.len());
+        let mut known_parts = Vec::with_capacity(3 * masks.len());
+        for mask in &masks {
+            for axis in 0..3 {
+                let dof = |node: u32| 3 * node + axis;
+                let entries = mask.entries().iter();
+                let (unknown, known): (Vec<_>, Vec<_>) = entries
+                    .map(|&(node, weight)| (dof(node), weight))
+                    .partition(|&(dof, _)| partition.row_of(dof as usize).is_some());
+                let placed = unknown.into_iter().filter_map(|(dof, weight)| {
+                    partition.row_of(dof as usize).map(|row| (row as u32, weight))
+                });
+                rows.push(placed.collect::<Vec<_>>());
+                known_parts.push(known);
+            }
+        }
+        let gram_inverse = gram_inverse(&rows)?;
+        Ok(Self { partition, analysis, masks, rows, known_parts, gram_inverse, sprung })
+    }
+
+    /// Whether this is the hold by these degrees of freedom and masks.
+    pub fn is_by(&self, dofs: &[u32], masks: &[Mask]) -> bool {
+        self.partition.known() == dofs && self.masks == masks
+    }
+
+    /// Known degrees of freedom, ascending.
+    pub fn dofs(&self) -> &[u32] {
+        self.partition.known()
+    }
+
+    /// Order and analysis of factors.
+    pub fn analysis(&self) -> &Arc<FrontAnalysis> {
+        &self.analysis
+    }
+
+    /// Constraints: three for each mask.
+    pub(super) fn constraint_count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Means of the masks of a displacement field of 3N.
+    pub(super) fn means(&self, q: &[f64]) -> Vec<f64> {
+        let unknown = self.partition.unknown();
+        let of_rows = self.rows.iter().zip(&self.known_parts);
+        of_rows
+            .map(|(row, known)| {
+                let free: f64 =
+                    row.iter().map(|&(at, w)| w * q[unknown[at as usize] as usize]).sum();
+                free + known.iter().map(|&(dof, w)| w * q[dof as usize]).sum::<f64>()
+            })
+            .collect()
+    }
+
+    /// `C v` for a vector over the unknown.
+    pub(super) fn constrained(&self, v: &[f64]) -> Vec<f64> {
+        let of_row = |row: &Vec<(u32, f64)>| row.iter().map(|&(at, w)| w * v[at as usize]).sum();
+        self.rows.iter().map(of_row).collect()
+    }
+
+    /// Forces of the masks that come nearest to forces on the unknown: least squares `Cᵀ λ = f`.
+    pub(super) fn mask_forces(&self, f: &[f64]) -> Vec<f64> {
+        let sums = nalgebra::DVector::from_vec(self.constrained(f));
+        (&self.gram_inverse * sums).as_slice().to_vec()
+    }
+
+    /// Subtracts `Cᵀ λ` from forces on the unknown.
+    pub(super) fn subtract_mask_forces(&self, lambda: &[f64], f: &mut [f64]) {
+        for (row, lambda) in self.rows.iter().zip(lambda) {
+            row.iter().for_each(|&(at, w)| f[at as usize] -= w * lambda);
+        }
+    }
+
+    /// Adds springs as stiff as the matrix is where they stand; gives them.
+    pub(super) fn add_springs(&self, stiffness: &mut Stiffness) -> Vec<f64> {
+        if self.sprung.is_empty() {
+            return Vec::new();
+        }
+        let diagonal = stiffness.diagonal();
+        let springs: Vec<(u32, f64)> =
+            self.sprung.iter().map(|&dof| (dof, diagonal[dof as usize].abs())).collect();
+        stiffness.add_springs(&springs);
+        springs.into_iter().map(|(_, spring)| spring).collect()
+    }
+}
+
+/// `(C Cᵀ)⁻¹`, or which constraint follows from the ones before it.
+fn gram_inverse(rows: &[Vec<(u32, f64)>]) -> Result<DMatrix<f64>, Dependent> {
+    let c = rows.len();
+    let product = |a: &[(u32, f64)], b: &[(u32, f64)]| -> f64 {
+        let other = |at: u32| b.binary_search_by_key(&at, |e| e.0).map_or(0.0, |i| b[i].1);
+        a.iter().map(|&(at, w)| w * other(at)).sum()
+    };
+    let gram = DMatrix::from_fn(c, c, |i, j| product(&rows[i], &rows[j]));
+    let mut factor = gram.clone();
+    for k in 0..c {
+        let own: f64 = (0..k).map(|i| factor[(k, i)] * factor[(k, i)]).sum();
+        let pivot = gram[(k, k)] - own;
+        if pivot <= OWN_SHARE_MIN * gram[(k, k)] || pivot.is_nan() {
+            return Err(Dependent { mask: k / 3, axis: AXIS_NAMES[k % 3] });
+        }
+        factor[(k, k)] = pivot.sqrt();
+        for r in k + 1..c {
+            let sum: f64 = (0..k).map(|i| factor[(r, i)] * factor[(k, i)]).sum();
+            factor[(r, k)] = (gram[(r, k)] - sum) / factor[(k, k)];
+        }
+    }
+    let lower = factor.lower_triangle();
+    let inverse = lower.solve_lower_triangular(&DMatrix::identity(c, c));
+    Ok(inverse.map_or_else(|| DMatrix::zeros(c, c), |inverse| inverse.tr_mul(&inverse)))
+}

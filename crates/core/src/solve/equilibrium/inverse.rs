@@ -1,0 +1,168 @@
+//! The inverse of an older tangent under the constraints of a hold: what corrections are made with.
+
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+use super::hold::Hold;
+use crate::fem::Stiffness;
+use crate::solve::front::{FrontError, FrontFactor};
+use crate::solve::vectors::norm;
+
+/// A factor of a tangent, in one of the precisions.
+pub(super) enum Factor {
+    Double(FrontFactor<f64>),
+    Single(FrontFactor<f32>),
+}
+
+/// Why a tangent has no factor.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FactorError {
+    /// A direction without positive stiffness.
+    #[error("the tangent stiffness is not positive definite")]
+    NotPositive,
+    /// No memory.
+    #[error("no memory for a factor of {bytes} bytes")]
+    OutOfMemory {
+        /// Bytes asked for.
+        bytes: usize,
+    },
+}
+
+impl From<FrontError> for FactorError {
+    fn from(error: FrontError) -> Self {
+        match error {
+            FrontError::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
+            FrontError::NotPositive { .. } | FrontError::OtherPattern => Self::NotPositive,
+        }
+    }
+}
+
+impl Factor {
+    /// A factor of a tangent (with its springs).
+    pub fn try_new(
+        hold: &Hold,
+        stiffness: &Stiffness,
+        is_single: bool,
+    ) -> Result<Self, FactorError> {
+        Ok(match is_single {
+            true => Self::Single(FrontFactor::try_new(&hold.analysis, stiffness)?),
+            false => Self::Double(FrontFactor::try_new(&hold.analysis, stiffness)?),
+        })
+    }
+
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Double(factor) => factor.bytes(),
+            Self::Single(factor) => factor.bytes(),
+        }
+    }
+
+    /// Solves in place for columns of n, each scaled to one, so that small units do not fall below
+    /// single precision's range.
+    fn solve(&self, b: &mut [f64], n: usize) {
+        if n == 0 || b.is_empty() {
+            return;
+        }
+        let columns = b.len() / n;
+        match self {
+            Self::Double(factor) => factor.solve_in_place(b, columns),
+            Self::Single(factor) => {
+                let scales: Vec<f64> = b.chunks(n).map(usable_norm).collect();
+                for (column, scale) in b.chunks_mut(n).zip(&scales) {
+                    column.iter_mut().for_each(|x| *x /= scale);
+                }
+                factor.solve_in_place(b, columns);
+                for (column, scale) in b.chunks_mut(n).zip(&scales) {
+                    column.iter_mut().for_each(|x| *x *= scale);
+                }
+            }
+        }
+    }
+}
+
+fn usable_norm(v: &[f64]) -> f64 {
+    let norm = norm(v);
+    if norm > 0.0 && norm.is_finite() { norm } else { 1.0 }
+}
+
+/// The inverse of a tangent among the displacements that a hold allows.
+///
+/// With springs of stiffness g at some degrees of freedom the tangent K is A − B g Bᵀ, A being what
+/// was factored. The step z of smallest energy with `C z = m` solves
+/// `A z + Cᵀ λ + B μ = r`, `C z = m`, `Bᵀ z + μ/g = 0`: the springs' forces are taken out again, so a
+/// body that masks alone hold is as free as it is.
+pub(super) struct Inverse {
+    factor: Factor,
+    springs: Vec<f64>,
+    /// `A⁻¹ [Cᵀ B]`, columns of n.
+    columns: Vec<f64>,
+    small: Option<LU<f64, Dyn, Dyn>>,
+}
+
+impl Inverse {
+    /// From a factor and the springs that are in it.
+    pub fn new(hold: &Hold, factor: Factor, springs: Vec<f64>) -> Self {
+        let mut inverse = Self { factor, springs, columns: Vec::new(), small: None };
+        inverse.fit(hold);
+        inverse
+    }
+
+    /// Works out the columns of the constraints of a hold with the same known degrees of freedom.
+    pub fn fit(&mut self, hold: &Hold) {
+        let n = hold.partition.unknown().len();
+        let sprung: Vec<usize> =
+            hold.sprung.iter().filter_map(|&dof| hold.partition.row_of(dof as usize)).collect();
+        let c = hold.constraint_count();
+        let count = c + sprung.len();
+        self.columns = vec![0.0; n * count];
+        for (column, row) in self.columns.chunks_mut(n.max(1)).zip(&hold.rows) {
+            row.iter().for_each(|&(at, weight)| column[at as usize] = weight);
+        }
+        for (j, &row) in sprung.iter().enumerate() {
+            self.columns[(c + j) * n + row] = 1.0;
+        }
+        self.factor.solve(&mut self.columns, n);
+        if count == 0 {
+            self.small = None;
+            return;
+        }
+        let mut small = DMatrix::zeros(count, count);
+        for (j, column) in self.columns.chunks(n.max(1)).enumerate() {
+            for (i, value) in pulled(hold, column).into_iter().enumerate() {
+                small[(i, j)] = value;
+            }
+        }
+        for (j, spring) in self.springs.iter().enumerate() {
+            small[(c + j, c + j)] -= 1.0 / spring;
+        }
+        self.small = Some(small.lu());
+    }
+
+    /// The step z with `C z = m` that forces r make.
+    ///
+    /// Shapes: `r` n, `m` c; result n. Units: N, m.
+    pub fn apply(&self, hold: &Hold, mut r: Vec<f64>, m: &[f64]) -> Vec<f64> {
+        let n = r.len();
+        self.factor.solve(&mut r, n);
+        let Some(small) = &self.small else { return r };
+        let mut right = pulled(hold, &r);
+        right.iter_mut().zip(m).for_each(|(right, m)| *right -= m);
+        let Some(forces) = small.solve(&DVector::from_vec(right)) else { return r };
+        for (column, force) in self.columns.chunks(n.max(1)).zip(forces.iter()) {
+            r.iter_mut().zip(column).for_each(|(z, y)| *z -= force * y);
+        }
+        r
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.factor.bytes() + size_of_val(self.columns.as_slice())
+    }
+}
+
+/// `[C; Bᵀ] v`.
+fn pulled(hold: &Hold, v: &[f64]) -> Vec<f64> {
+    let mut pulled = hold.constrained(v);
+    let rows = hold.sprung.iter().filter_map(|&dof| hold.partition.row_of(dof as usize));
+    pulled.extend(rows.map(|row| v[row]));
+    pulled
+}

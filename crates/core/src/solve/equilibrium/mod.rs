@@ -1,0 +1,26 @@
+//! Equilibrium at large deformation: found by corrections with an older factor, followed from frame
+//! to frame, and judged by its own residual.
+
+mod follow;
+mod goal;
+mod hold;
+mod inverse;
+mod motion;
+mod outcome;
+mod path;
+#[cfg(test)]
+mod plastic_tests;
+mod renewal;
+mod secants;
+mod settle;
+#[cfg(test)]
+mod snap_tests;
+#[cfg(test)]
+mod tests;
+
+pub use goal::{Goal, Wish};
+pub use hold::{Dependent, Hold, HoldOf};
+pub use inverse::FactorError;
+pub use outcome::{Equilibrium, NoEquilibrium};
+pub use path::Path;
+pub use renewal::{Renewal, Renewed};

@@ -1,0 +1,72 @@
+//! An equilibrium and what is known of it, or why there is none.
+
+/// What was found.
+///
+/// Units: N, 1.
+#[derive(Clone, Debug)]
+pub struct Equilibrium {
+    /// Forces that hold the body at the known degrees of freedom, in their order, N.
+    pub reactions: Vec<f64>,
+    /// Force of each mask on the body, three each, N.
+    pub mask_forces: Vec<f64>,
+    /// Norm of the forces that are out of balance over that of the forces that hold the body.
+    pub residual_rel: f64,
+    /// Estimated error of a displacement over the largest displacement.
+    pub error_estimate_rel: f64,
+    /// Estimated error in the energy norm over the energy norm of the displacement.
+    pub energy_error_rel: f64,
+    /// Stored energy, J; the elastic one where elements yield, with what a step dissipates as long
+    /// as time cuts it short.
+    pub energy: f64,
+    /// Smallest volume ratio of an element.
+    pub jacobian_min: f64,
+    /// Steps that were taken with a tangent or a correction of one.
+    pub newton_steps: u32,
+    /// Solves with a factor.
+    pub linear_solves: u32,
+    /// Factors made while this was waited for.
+    pub factors: u32,
+    /// Frames since the shape that the newest factor belongs to.
+    pub factor_age: u32,
+    /// Pieces that the motion of the known displacements was cut into.
+    pub substeps: u32,
+    /// The equilibrium lies further from where the tangent led than the tangent led: a snap-through.
+    pub jumped: bool,
+    /// The residual is rounding, or below 1e-8.
+    pub settled: bool,
+    /// Largest accumulated plastic strain of an element's point; 0 without a yield stress.
+    pub plastic_strain: f64,
+}
+
+/// Why no equilibrium was found; the shape stays what it was.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoEquilibrium {
+    /// However small the pieces of the motion are, an element would turn inside out.
+    #[error(
+        "no equilibrium found: after {:.0} % of the motion an element would turn inside out; move \
+         less, or use a finer mesh there", 100.0 * share
+    )]
+    InsideOut {
+        /// Share of the motion that was followed.
+        share: f64,
+    },
+    /// Forces did not come into balance.
+    #[error(
+        "no equilibrium found: after {:.0} % of the motion and {solves} solves the forces are out of \
+         balance by {residual_rel:.1e} of those that hold the body", 100.0 * share
+    )]
+    NotConverged {
+        /// Share of the motion that was followed.
+        share: f64,
+        /// Solves it took.
+        solves: u32,
+        /// Residual that was left.
+        residual_rel: f64,
+    },
+    /// The tangent has no factor.
+    #[error("no equilibrium found: {0}")]
+    Factor(#[from] super::FactorError),
+    /// Numbers too large.
+    #[error("no equilibrium found: displacements or forces are not finite numbers")]
+    NotFinite,
+}

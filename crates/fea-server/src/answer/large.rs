@@ -1,0 +1,204 @@
+//! What answers at large deformation share: what is asked, and how an equilibrium becomes an answer.
+
+use std::time::Instant;
+
+use softgrasp_core::contact::Mask;
+use softgrasp_core::fem::hyperelastic::{LargeSummary, Law};
+use softgrasp_core::model::{Known, Model};
+use softgrasp_core::solve::Method;
+use softgrasp_core::solve::equilibrium::{Equilibrium, Goal, NoEquilibrium, Path, Wish};
+use softgrasp_protocol::{
+    Answer, DeformationName, Displacements, DofValue, LargeAnswer, LargeAsk, LargeReport, LawName,
+    NodeChoice, Question as QuestionMessage, SolveReport, WarningLevel,
+};
+
+use crate::clock::{StageClock, ms_since};
+use crate::machine_memory::last_peak_rss_bytes;
+use crate::refusal::Refusal;
+use crate::request::{checked_forces, checked_masks, name_of, pairs, question_of};
+
+/// Method that reports name.
+const METHOD: &str = "newton";
+/// Error that a linear answer may have where nobody says how much.
+pub(super) const LINEAR_ERROR_REL: f64 = 2e-3;
+/// From so near to incompressible a factor in single precision is a poor inverse.
+const POISSON_FOR_DOUBLE: f64 = 0.48;
+/// Compression of an element beyond which surfaces crease: meshes do not converge to a smooth
+/// answer.
+const CREASE_STRETCH: f64 = 0.6;
+
+/// A question about large deformation, checked against its model.
+pub(super) struct LargeQuestion {
+    pub known: Known,
+    pub masks: Vec<Mask>,
+    pub mask_q: Vec<f64>,
+    pub forces: Vec<f64>,
+    pub is_single: bool,
+    pub max_error: Option<f64>,
+    pub deadline_ms: Option<f64>,
+}
+
+impl LargeQuestion {
+    /// What a message asks of a model.
+    ///
+    /// # Errors
+    /// [`Refusal`] naming the node, the mask or the number.
+    pub fn new(model: &Model, ask: &LargeAsk, message: &QuestionMessage) -> Result<Self, Refusal> {
+        if let Some(value) = ask.yield_stress.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            return Err(Refusal::Yield { value });
+        }
+        let question = question_of(message, Some(model.element()), model.poisson_max())?;
+        let is_single = match question.method {
+            None => model.poisson_max() < POISSON_FOR_DOUBLE,
+            Some(Method::FrontMixed) => true,
+            Some(Method::Front) => false,
+            Some(method) => return Err(Refusal::LargeMethod { method }),
+        };
+        let known = model.known(pairs(&message.known))?;
+        let forces = checked_forces(model, &known, message)?;
+        let (masks, mask_q) = checked_masks(model, message)?;
+        let (max_error, deadline_ms) = (question.max_error, question.deadline_ms);
+        Ok(Self { known, masks, mask_q, forces, is_single, max_error, deadline_ms })
+    }
+
+    /// Moves a path to what is asked for, until it is right enough or the deadline has passed.
+    ///
+    /// # Errors
+    /// [`NoEquilibrium`]; the path is where it was, then.
+    pub fn advance(
+        &self,
+        path: &mut Path,
+        clock: &StageClock,
+    ) -> Result<Equilibrium, NoEquilibrium> {
+        let Self { known, mask_q, forces, .. } = self;
+        let goal = Goal { q_known: &known.q_known, mask_q, forces };
+        let deadline_ms = self.deadline_ms.unwrap_or(f64::INFINITY);
+        let is_late = || clock.elapsed_ms() > deadline_ms;
+        path.advance(&goal, &Wish { error_rel: self.max_error, is_late: &is_late })
+    }
+}
+
+/// The law behind a name on the wire.
+pub(super) fn law_of(name: LawName) -> Law {
+    match name {
+        LawName::NeoHookean => Law::NeoHookean,
+        LawName::NeoHookeanLog => Law::NeoHookeanLog,
+    }
+}
+
+/// How an equilibrium was come to.
+pub(super) struct Found<'a> {
+    pub model: &'a Model,
+    pub path: &'a Path,
+    pub equilibrium: Equilibrium,
+    pub summary: LargeSummary,
+    pub is_single: bool,
+    pub factor_reused: bool,
+    pub chosen_because: String,
+}
+
+impl Found<'_> {
+    /// What was asked for, out of the equilibrium, and what it cost.
+    pub fn answer(
+        &self,
+        question: &LargeQuestion,
+        message: &QuestionMessage,
+        clock: StageClock,
+    ) -> LargeAnswer {
+        let Self { model, path, equilibrium, summary, .. } = self;
+        let mut stage_ms = clock.finish();
+        let start = Instant::now();
+        let displacement = path.displacement();
+        let of = |n: usize| {
+            let u = &displacement[3 * n..3 * n + 3];
+            [u[0], u[1], u[2]]
+        };
+        let rows = match &message.want.nodes {
+            NodeChoice::All => (0..model.mesh().node_count()).map(of).collect(),
+            NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| of(n as usize)).collect(),
+        };
+        let displacements = Displacements::of(rows, message.want.precision);
+        let (mut reactions, mut mask_forces) = (Vec::new(), Vec::new());
+        if message.want.reactions {
+            let pairs = path.hold().dofs().iter().zip(&equilibrium.reactions);
+            reactions = pairs.map(|(&dof, &value)| DofValue { dof, value }).collect();
+            mask_forces = equilibrium.mask_forces.as_chunks().0.to_vec();
+        }
+        stage_ms.encode = ms_since(start);
+        let known_dofs = question.known.dofs.len() + question.mask_q.len();
+        let mut report = SolveReport {
+            method: METHOD.to_owned(),
+            element: name_of(model.element()),
+            unknown_dofs: (model.modelled_dofs() - known_dofs) as u64,
+            known_dofs: known_dofs as u64,
+            stage_ms,
+            residual_rel: equilibrium.residual_rel,
+            error_bound_rel: None,
+            error_bound_why: "no bound is proven at large deformation; estimated is the error of \
+                              the equilibrium"
+                .to_owned(),
+            max_rotation_deg: summary.rotation_max.to_degrees(),
+            max_strain: summary.strain_max,
+            precision: if self.is_single { "f32+f64" } else { "f64" }.to_owned(),
+            error_estimate_rel: Some(equilibrium.error_estimate_rel),
+            peak_rss_bytes: last_peak_rss_bytes(),
+            factor_reused: self.factor_reused,
+            chosen_because: self.chosen_because.clone(),
+            ..SolveReport::default()
+        };
+        add_warnings(equilibrium, summary, question, &mut report);
+        let nodes = message.want.nodes.clone();
+        let answer = Answer { report, nodes, displacements, reactions, mask_forces };
+        LargeAnswer { answer, large: self.large_report() }
+    }
+
+    fn large_report(&self) -> LargeReport {
+        let Self { equilibrium, summary, .. } = self;
+        LargeReport {
+            deformation: DeformationName::Large,
+            newton_steps: equilibrium.newton_steps,
+            linear_solves: equilibrium.linear_solves,
+            factor_age: equilibrium.factor_age,
+            substeps: equilibrium.substeps,
+            min_jacobian: equilibrium.jacobian_min,
+            energy_error_rel: Some(equilibrium.energy_error_rel),
+            max_stretch: summary.stretch_max,
+            jumped: equilibrium.jumped,
+            settled: equilibrium.settled,
+            plastic_strain: equilibrium.plastic_strain,
+        }
+    }
+}
+
+fn add_warnings(
+    equilibrium: &Equilibrium,
+    summary: &LargeSummary,
+    question: &LargeQuestion,
+    report: &mut SolveReport,
+) {
+    let error = equilibrium.error_estimate_rel;
+    if let Some(wanted) = question.max_error.filter(|wanted| error > *wanted) {
+        report.warning_level = WarningLevel::Caution;
+        report.warnings.push(format!(
+            "the equilibrium is estimated to be off by {error:.1e} of the largest displacement; \
+             wanted was {wanted:.1e}"
+        ));
+    }
+    let ms = &report.stage_ms;
+    let took = ms.queue + ms.decode + ms.assemble + ms.order + ms.factor + ms.solve + ms.encode;
+    if let Some(deadline) = question.deadline_ms.filter(|deadline| took > *deadline) {
+        report.warnings.push(format!("it took {took:.2} ms; wanted within {deadline} ms"));
+    }
+    if equilibrium.jumped {
+        report
+            .warnings
+            .push("the equilibrium jumped: the shape snapped to another one on the way".to_owned());
+    }
+    if summary.stretch_min < CREASE_STRETCH {
+        report.warnings.push(format!(
+            "an element is pressed to {:.0} % of its length; surfaces crease from about 60 % on, \
+             and no mesh gives a smooth answer there",
+            100.0 * summary.stretch_min
+        ));
+    }
+}

@@ -1,0 +1,218 @@
+//! Answers one frame at large deformation: the session's path on a kept model goes on.
+
+use std::sync::Arc;
+
+use softgrasp_core::solve::Stage;
+use softgrasp_core::solve::equilibrium::{Hold, Path};
+use softgrasp_protocol::{
+    DeformationChoice, FrameRequest, LargeAnswer, LargeAsk, LargeFrame, ModelHash, NodeChoice,
+    Pace, PathChoice, Question as QuestionMessage, Want,
+};
+
+use super::frame::answer_frame;
+use super::large::{Found, LINEAR_ERROR_REL, LargeQuestion, law_of};
+use super::large_once::{admit_path, linear_answer, promised_error};
+use crate::clock::StageClock;
+use crate::lock::Lock;
+use crate::paths::{ModelPath, Seat, UnderWay};
+use crate::plan::Subject;
+use crate::refusal::Refusal;
+use crate::resources::Resources;
+use crate::store::StoredModel;
+use crate::workers::Rest;
+
+/// One frame on a kept model, from the shape of the session's last one.
+///
+/// # Errors
+/// [`Refusal`]; the path stays where it was, then.
+pub(crate) fn answer_large_frame(
+    resources: &Resources,
+    seat: &Seat,
+    request: LargeFrame,
+    clock: StageClock,
+) -> Result<LargeAnswer, Refusal> {
+    let LargeFrame { model: hash, large: ask, question: message } = request;
+    let stored = resources.models.find(hash).ok_or(Refusal::UnknownModel(hash))?;
+    let question = LargeQuestion::new(&stored.model, &ask, &message)?;
+    let kept = seat.with(Option::take);
+    let goes_on = |kept: &ModelPath| {
+        ask.path == PathChoice::Continue
+            && kept.law == law_of(ask.law)
+            && kept.yield_stress == ask.yield_stress
+    };
+    let kept = kept.filter(|kept| goes_on(kept));
+    let frame = Frame { resources, hash, stored, ask, message, question };
+    if frame.ask.deformation == DeformationChoice::Auto
+        && kept.is_none()
+        && let Some(answer) = frame.linear(&clock)?
+    {
+        return Ok(answer);
+    }
+    let mut clock = clock;
+    let mut path = match kept {
+        Some(path) => path,
+        None => frame.path_at_rest(&mut clock)?,
+    };
+    let answered = frame.advance(&mut path, clock);
+    // A path that found no equilibrium is where it was.
+    seat.with(|seat| *seat = Some(path));
+    resources.models.trim();
+    answered
+}
+
+/// A frame with all that it needs.
+struct Frame<'a> {
+    resources: &'a Resources,
+    hash: ModelHash,
+    stored: Arc<StoredModel>,
+    ask: LargeAsk,
+    message: QuestionMessage,
+    question: LargeQuestion,
+}
+
+impl Frame<'_> {
+    /// The linear answer, if rotation and strain of the whole body promise an error within what is
+    /// allowed.
+    fn linear(&self, clock: &StageClock) -> Result<Option<LargeAnswer>, Refusal> {
+        if self.ask.yield_stress.is_some() {
+            return Ok(None);
+        }
+        let allowed = self.question.max_error.unwrap_or(LINEAR_ERROR_REL);
+        let node_count = self.stored.model.mesh().node_count();
+        let mut question = self.message.clone();
+        question.max_error = None;
+        question.want =
+            Want { nodes: NodeChoice::All, precision: Default::default(), ..question.want };
+        let request = FrameRequest { model: self.hash, question };
+        let mut answer = answer_frame(self.resources, request, clock.clone())?;
+        let all = std::mem::replace(
+            &mut answer.displacements,
+            softgrasp_protocol::Displacements::F64(Vec::new()),
+        );
+        let all = all.into_f64();
+        if self.stored.model.system_node_count() != node_count {
+            // Mid-edge nodes stay with the server: their strain is that of the report.
+            return Ok(None);
+        }
+        let strain = self.stored.model.strain(all.as_flattened());
+        let promised = promised_error(strain.rotation_max, strain.strain_max);
+        if promised > allowed {
+            return Ok(None);
+        }
+        let rows = match &self.message.want.nodes {
+            NodeChoice::All => all,
+            NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| all[n as usize]).collect(),
+        };
+        answer.nodes = self.message.want.nodes.clone();
+        answer.displacements =
+            softgrasp_protocol::Displacements::of(rows, self.message.want.precision);
+        answer.report.max_rotation_deg = strain.rotation_max.to_degrees();
+        answer.report.max_strain = strain.strain_max;
+        answer.report.warnings.clear();
+        Ok(Some(linear_answer(answer, promised)))
+    }
+
+    fn hold(&self, before: Option<&Hold>, clock: &mut StageClock) -> Result<Arc<Hold>, Refusal> {
+        clock.begin(Stage::Order);
+        let LargeQuestion { known, masks, .. } = &self.question;
+        Ok(Arc::new(self.stored.model.hold(&known.dofs, masks.clone(), before)?))
+    }
+
+    fn path_at_rest(&self, clock: &mut StageClock) -> Result<Box<ModelPath>, Refusal> {
+        let model = &self.stored.model;
+        let law = law_of(self.ask.law);
+        clock.begin(Stage::Assemble);
+        let elements = Arc::new(model.yielding(law, self.ask.yield_stress)?);
+        let hold = self.hold(None, clock)?;
+        let reservation = self.resources.budget.reservation();
+        let is_single = self.question.is_single;
+        let subject = Subject::about(model, self.question.known.dofs.len(), Some(self.hash));
+        admit_path(self.resources, &reservation, model, (&hold, is_single), &subject)?;
+        let rest = vec![0.0; 3 * model.system_node_count()];
+        let path = Path::new(elements, model.stiffness(), hold, rest, is_single);
+        Ok(Box::new(ModelPath {
+            law,
+            yield_stress: self.ask.yield_stress,
+            path,
+            reservation,
+            under_way: None,
+            summary: Arc::default(),
+        }))
+    }
+
+    /// Goes on to what is asked for.
+    fn advance(&self, kept: &mut ModelPath, mut clock: StageClock) -> Result<LargeAnswer, Refusal> {
+        let Self { question, message, stored, .. } = self;
+        if !kept.path.hold().is_by(&question.known.dofs, &question.masks) {
+            let hold = self.hold(Some(kept.path.hold()), &mut clock)?;
+            kept.path.hold_by(hold);
+        }
+        self.take_factor(kept, &mut clock);
+        clock.begin(Stage::Solve);
+        let equilibrium = question.advance(&mut kept.path, &clock)?;
+        clock.end();
+        self.begin_factor(kept);
+        self.watch_strain(kept);
+        kept.reservation.settle((kept.path.bytes() + kept.path.elements().bytes()) as u64);
+        let found = Found {
+            model: &stored.model,
+            path: &kept.path,
+            factor_reused: equilibrium.factors == 0,
+            equilibrium,
+            summary: kept.summary.with(|summary| *summary),
+            is_single: question.is_single,
+            chosen_because: match self.ask.deformation {
+                DeformationChoice::Large => "asked for".to_owned(),
+                DeformationChoice::Auto => {
+                    "large: linear elasticity promises no error within what is allowed".to_owned()
+                }
+            },
+        };
+        Ok(found.answer(question, message, clock))
+    }
+
+    /// Takes the factor that was made beside the frames, or makes one now where the clock must not
+    /// decide.
+    fn take_factor(&self, kept: &mut ModelPath, clock: &mut StageClock) {
+        if self.ask.pace == Pace::Repeatable
+            && let Some(renewal) = kept.path.renewal()
+        {
+            clock.begin(Stage::Factor);
+            kept.path.install(renewal.make(), 1);
+        }
+        let Some(mut under_way) = kept.under_way.take() else { return };
+        under_way.frames += 1;
+        match under_way.made.with(Option::take) {
+            Some(made) => kept.path.install(made, under_way.frames),
+            None => kept.under_way = Some(under_way),
+        }
+    }
+
+    /// Begins a factor of the newest shape beside the frames, where the one there is has become old.
+    fn begin_factor(&self, kept: &mut ModelPath) {
+        if self.ask.pace != Pace::Timely || kept.under_way.is_some() {
+            return;
+        }
+        let Some(renewal) = kept.path.renewal() else { return };
+        let made = Arc::new(Lock::default());
+        kept.under_way = Some(UnderWay { made: Arc::clone(&made), frames: 0 });
+        self.resources.workers.factor_beside(move || {
+            let renewed = renewal.make();
+            made.with(|made| *made = Some(renewed));
+        });
+    }
+
+    /// Works out rotation and stretches beside the frames, one at a time.
+    fn watch_strain(&self, kept: &ModelPath) {
+        let Some(claimed) = self.stored.strain_under_way.take() else { return };
+        let elements = Arc::clone(kept.path.elements());
+        let displacement = kept.path.displacement().to_vec();
+        let summary = Arc::clone(&kept.summary);
+        self.resources.workers.beside(move || {
+            let mut rest = Rest::new();
+            let newest = elements.summary_with_pauses(&displacement, &mut || rest.rest());
+            summary.with(|summary| *summary = newest);
+            drop(claimed);
+        });
+    }
+}

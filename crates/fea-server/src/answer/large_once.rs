@@ -1,0 +1,155 @@
+//! Answers one request that holds mesh and known displacements, at large deformation.
+
+use std::sync::Arc;
+
+use softgrasp_core::fem::Element;
+use softgrasp_core::model::Model;
+use softgrasp_core::solve::choose::cheapest_element;
+use softgrasp_core::solve::equilibrium::{Hold, Path};
+use softgrasp_core::solve::memory::Need;
+use softgrasp_core::solve::{Method, Stage};
+use softgrasp_protocol::{
+    DeformationChoice, DeformationName, LargeAnswer, LargeReport, SolveLarge, SolveOnce,
+};
+
+use super::large::{Found, LINEAR_ERROR_REL, LargeQuestion, law_of};
+use super::once::solve_once;
+use crate::budget::Reservation;
+use crate::clock::StageClock;
+use crate::plan::{PlanError, Subject, admit};
+use crate::refusal::Refusal;
+use crate::request::{check_node_count, element_given, model_of, poisson_max};
+use crate::resources::Resources;
+
+/// Mesh, known displacements and law in one request: all that is known moves in proportion from
+/// rest.
+///
+/// # Errors
+/// [`Refusal`].
+pub(crate) fn solve_large(
+    resources: &Resources,
+    once: SolveLarge,
+    mut clock: StageClock,
+) -> Result<LargeAnswer, Refusal> {
+    let why = match once.large.deformation {
+        DeformationChoice::Large => "asked for".to_owned(),
+        DeformationChoice::Auto => match linear_within(resources, &once, clock.clone())? {
+            Linear::Within(answer) => return Ok(*answer),
+            Linear::TooFar { promised } => {
+                format!("linear elasticity promises an error of {promised:.1e} only")
+            }
+        },
+    };
+    let SolveLarge { mesh, materials, element, large, question: message } = once;
+    let element = element_given(element).unwrap_or_else(|| cheapest(poisson_max(&materials)));
+    check_node_count(&mesh, resources.config.max_nodes)?;
+    let subject = Subject::once(&mesh, message.known.len());
+    let reservation = resources.budget.reservation();
+    let needs = subject.predict(element, &[Method::FrontMixed]);
+    admit(&resources.models, &reservation, &needs, &subject).map_err(PlanError::Memory)?;
+    let model = model_of(mesh, &materials, element, Vec::new(), &mut clock)?;
+    let question = LargeQuestion::new(&model, &large, &message)?;
+    let elements = Arc::new(model.yielding(law_of(large.law), large.yield_stress)?);
+    clock.begin(Stage::Order);
+    let hold = Arc::new(model.hold(&question.known.dofs, question.masks.clone(), None)?);
+    admit_path(resources, &reservation, &model, (&hold, question.is_single), &subject)?;
+    clock.begin(Stage::Solve);
+    let rest = vec![0.0; 3 * model.system_node_count()];
+    let mut path = Path::new(elements, model.stiffness(), hold, rest, question.is_single);
+    let equilibrium = question.advance(&mut path, &clock)?;
+    clock.end();
+    let summary = path.elements().summary(path.displacement());
+    let found = Found {
+        model: &model,
+        path: &path,
+        equilibrium,
+        summary,
+        is_single: question.is_single,
+        factor_reused: false,
+        chosen_because: why,
+    };
+    Ok(found.answer(&question, &message, clock))
+}
+
+/// At large strain ten-node elements do not follow as far: linear ones, which do not lock.
+fn cheapest(poisson_max: f64) -> Element {
+    match cheapest_element(poisson_max) {
+        Element::Tet4 => Element::Tet4,
+        _ => Element::Tet4Anp,
+    }
+}
+
+/// A linear answer that is good enough, or how far from it it may be.
+enum Linear {
+    Within(Box<LargeAnswer>),
+    TooFar { promised: f64 },
+}
+
+/// The linear answer, if its rotation and strain promise an error within what is allowed.
+fn linear_within(
+    resources: &Resources,
+    once: &SolveLarge,
+    clock: StageClock,
+) -> Result<Linear, Refusal> {
+    let SolveLarge { mesh, materials, element, question, large } = once.clone();
+    if large.yield_stress.is_some() {
+        return Ok(Linear::TooFar { promised: f64::INFINITY });
+    }
+    let allowed = question.max_error.unwrap_or(LINEAR_ERROR_REL);
+    let linear = SolveOnce { mesh, materials, element, question };
+    let answer = solve_once(resources, linear, clock)?;
+    let report = &answer.report;
+    let promised = promised_error(report.max_rotation_deg.to_radians(), report.max_strain);
+    if promised > allowed {
+        return Ok(Linear::TooFar { promised });
+    }
+    Ok(Linear::Within(Box::new(linear_answer(answer, promised))))
+}
+
+/// What the error of a linear displacement field is promised to be at most, over the largest
+/// displacement: rotation and strain leave out terms as large as themselves.
+///
+/// Units: rad, 1.
+pub(super) fn promised_error(rotation_max: f64, strain_max: f64) -> f64 {
+    rotation_max + strain_max
+}
+
+/// A linear answer as an answer to a question about large deformation.
+pub(super) fn linear_answer(mut answer: softgrasp_protocol::Answer, promised: f64) -> LargeAnswer {
+    let report = &mut answer.report;
+    let of_digits = report.error_estimate_rel.unwrap_or(0.0);
+    report.error_estimate_rel = Some(promised.max(of_digits));
+    report.chosen_because = format!(
+        "{}; linear: rotation and strain promise an error below {promised:.1e}",
+        report.chosen_because
+    );
+    let large = LargeReport {
+        deformation: DeformationName::Linear,
+        linear_solves: 1,
+        min_jacobian: 1.0 - 3.0 * report.max_strain,
+        max_stretch: 1.0 + report.max_strain,
+        settled: true,
+        ..LargeReport::default()
+    };
+    LargeAnswer { answer, large }
+}
+
+/// Reserves what a path takes once its factor is counted.
+///
+/// # Errors
+/// [`PlanError::Memory`].
+pub(super) fn admit_path(
+    resources: &Resources,
+    reservation: &Reservation,
+    model: &Model,
+    (hold, is_single): (&Hold, bool),
+    subject: &Subject,
+) -> Result<(), Refusal> {
+    let method = if is_single { Method::FrontMixed } else { Method::Front };
+    let blocks = model.stiffness().pattern().block_count();
+    // The tangent stands beside the linear stiffness.
+    let held = (model.bytes() + blocks * size_of::<[f64; 9]>()) as u64;
+    let need = Need::counted(model.element(), method, held, blocks, hold.analysis());
+    admit(&resources.models, reservation, &[need], subject).map_err(PlanError::Memory)?;
+    Ok(())
+}

@@ -1,0 +1,214 @@
+//! One question as an input deck of CalculiX or Abaqus: whoever doubts an answer asks another program.
+
+use std::fmt::Write as _;
+
+use nalgebra::Point3;
+use softgrasp_core::fem::{Element, QuadraticMesh, TooManyNodes, tet10};
+use softgrasp_core::mesh::TetMesh;
+use softgrasp_protocol::{DofValue, LawName, Material};
+
+/// A question as another program is to be asked it.
+///
+/// Units: m, N, Pa.
+pub struct CalculixDeck<'a> {
+    /// Nodes and corners of the elements.
+    pub mesh: &'a TetMesh,
+    /// `t4` (C3D4) or `t10` (C3D10); others have no counterpart.
+    pub element: Element,
+    /// Of the whole mesh.
+    pub material: Material,
+    /// Law of large deformation; `None` asks for linear elasticity.
+    pub law: Option<LawName>,
+    /// Known displacements.
+    pub known: &'a [DofValue],
+    /// Forces that keep their directions.
+    pub forces: &'a [DofValue],
+}
+
+/// Why a question has no deck.
+#[derive(Debug, thiserror::Error)]
+pub enum DeckError {
+    /// CalculiX and Abaqus have no such element.
+    #[error("a deck is for t4 (C3D4) or t10 (C3D10); CalculiX has no {}", element.name())]
+    Element {
+        /// The one asked for.
+        element: Element,
+    },
+    /// CalculiX and Abaqus have no such law.
+    #[error("a deck is for the law neo-hookean; CalculiX has no {law}")]
+    Law {
+        /// The one asked for.
+        law: LawName,
+    },
+    /// No mid-edge nodes can be made.
+    #[error(transparent)]
+    Mesh(#[from] TooManyNodes),
+}
+
+/// Nodes and elements as the other program counts them.
+struct Cells {
+    vertices: Vec<Point3<f64>>,
+    /// Nodes of every element in CalculiX's order, from 0.
+    tets: Vec<Vec<u32>>,
+    used: Vec<bool>,
+    name: &'static str,
+}
+
+impl CalculixDeck<'_> {
+    /// The deck: nodes count from 1 in the order of the mesh, mid-edge nodes follow and are free.
+    ///
+    /// A question of large deformation is answered in increments (NLGEOM) with C₁₀ = μ/2 and
+    /// D₁ = 2/κ, which is the law `neo-hookean`.
+    ///
+    /// # Errors
+    /// [`DeckError`] for elements and laws without a counterpart.
+    pub fn text(&self) -> Result<String, DeckError> {
+        let cells = Cells::of(self.mesh, self.element)?;
+        let mut text = cells.cards();
+        text.push_str(&self.material_cards()?);
+        text.push_str("*SOLID SECTION, ELSET=BODY, MATERIAL=SOFT\n");
+        // Far below the digits that are printed.
+        text.push_str(match self.law {
+            Some(_) => {
+                "*STEP, NLGEOM, INC=1000\n*STATIC\n0.1,1.,1e-6,0.1\n\
+                 *CONTROLS, PARAMETERS=FIELD\n1e-9,1e-9\n"
+            }
+            None => "*STEP\n*STATIC\n",
+        });
+        text.push_str("*BOUNDARY\n");
+        for &DofValue { dof, value } in self.known {
+            let (node, axis) = (dof / 3 + 1, dof % 3 + 1);
+            line(&mut text, format_args!("{node},{axis},{axis},{}", card(value)));
+        }
+        if !self.forces.is_empty() {
+            text.push_str("*CLOAD\n");
+        }
+        for &DofValue { dof, value } in self.forces {
+            line(&mut text, format_args!("{},{},{}", dof / 3 + 1, dof % 3 + 1, card(value)));
+        }
+        // The end of the step only.
+        text.push_str("*NODE PRINT, NSET=ALL, FREQUENCY=100000\nU, RF\n*END STEP\n");
+        Ok(text)
+    }
+
+    fn material_cards(&self) -> Result<String, DeckError> {
+        let Material { young, poisson } = self.material;
+        let mut text = String::from("*MATERIAL, NAME=SOFT\n");
+        match self.law {
+            None => line(&mut text, format_args!("*ELASTIC\n{},{}", card(young), card(poisson))),
+            Some(LawName::NeoHookean) => {
+                let c10 = young / (4.0 * (1.0 + poisson));
+                let d1 = 6.0 * (1.0 - 2.0 * poisson) / young;
+                let cards = format!("{},{}", card(c10), card(d1));
+                line(&mut text, format_args!("*HYPERELASTIC, NEO HOOKE\n{cards}"));
+            }
+            Some(law) => return Err(DeckError::Law { law }),
+        }
+        Ok(text)
+    }
+}
+
+impl Cells {
+    fn of(mesh: &TetMesh, element: Element) -> Result<Self, DeckError> {
+        match element {
+            Element::Tet4 => Ok(Self {
+                vertices: mesh.vertices().to_vec(),
+                tets: mesh.tets().iter().map(|&[a, b, c, d]| vec![a, b, d, c]).collect(),
+                used: mesh.used_nodes(),
+                name: "C3D4",
+            }),
+            Element::Tet10 => {
+                let quadratic = QuadraticMesh::try_new(mesh)?;
+                let turned = |t: &[u32; 10]| tet10::MIRRORED.map(|local| t[local]).to_vec();
+                Ok(Self {
+                    vertices: quadratic.vertices().to_vec(),
+                    tets: quadratic.tets().iter().map(turned).collect(),
+                    used: quadratic.used_nodes(),
+                    name: "C3D10",
+                })
+            }
+            element => Err(DeckError::Element { element }),
+        }
+    }
+
+    fn cards(&self) -> String {
+        let mut text = String::from("*NODE, NSET=ALL\n");
+        let used = self.vertices.iter().zip(1..).zip(&self.used).filter(|(_, used)| **used);
+        for ((p, node), _) in used {
+            let [x, y, z] = [p.x, p.y, p.z].map(card);
+            line(&mut text, format_args!("{node},{x},{y},{z}"));
+        }
+        line(&mut text, format_args!("*ELEMENT, TYPE={}, ELSET=BODY", self.name));
+        for (nodes, element) in self.tets.iter().zip(1..) {
+            let nodes: String = nodes.iter().map(|n| format!(",{}", n + 1)).collect();
+            line(&mut text, format_args!("{element}{nodes}"));
+        }
+        text
+    }
+}
+
+fn line(text: &mut String, words: std::fmt::Arguments<'_>) {
+    writeln!(text, "{words}").expect("a string takes everything");
+}
+
+/// Characters of a number that CalculiX reads; further ones it leaves out without a word.
+const CARD: usize = 20;
+
+/// A number as exactly as a card holds it: fourteen digits at least (below 1e100).
+fn card(x: f64) -> String {
+    let exact = format!("{x:e}");
+    if exact.len() <= CARD {
+        return exact;
+    }
+    let mut rounded = (0..17).rev().map(|decimals| format!("{x:.decimals$e}"));
+    rounded.find(|text| text.len() <= CARD).expect("one digit fits")
+}
+
+#[cfg(test)]
+mod tests {
+    use softgrasp_core::mesh::{BuiltIn, generate};
+
+    use super::*;
+
+    fn deck(element: Element, law: Option<LawName>) -> Result<String, DeckError> {
+        let mesh = generate(BuiltIn::Cube, 27).unwrap();
+        let known = [DofValue { dof: 4, value: 1e-3 }];
+        let forces = [DofValue { dof: 8, value: -0.5 }];
+        let material = Material { young: 6e4, poisson: 0.25 };
+        CalculixDeck { mesh: &mesh, element, material, law, known: &known, forces: &forces }.text()
+    }
+
+    #[test]
+    fn numbers_fit_their_cards_with_fourteen_digits() {
+        for x in [0.0, 1.0, -1.0 / 3.0, 2e5 / 3.0, -1e-98 / 3.0, 1e7 / 7.0] {
+            let text = card(x);
+            assert!(text.len() <= CARD, "{text}");
+            let back: f64 = text.parse().unwrap();
+            assert!((back - x).abs() <= 5e-14 * x.abs(), "{x:e} became {text}");
+        }
+    }
+
+    #[test]
+    fn known_displacements_and_forces_stand_at_their_nodes_and_axes() {
+        let text = deck(Element::Tet4, None).unwrap();
+        assert!(text.contains("*ELASTIC\n6e4,2.5e-1\n"), "{text}");
+        assert!(text.contains("*BOUNDARY\n2,2,2,1e-3\n*CLOAD\n3,3,-5e-1\n"), "{text}");
+        assert!(text.contains("TYPE=C3D4"), "{text}");
+    }
+
+    #[test]
+    fn large_deformation_has_its_law_and_its_increments() {
+        let text = deck(Element::Tet10, Some(LawName::NeoHookean)).unwrap();
+        // μ/2 = E/4(1+ν) and 2/κ = 6(1−2ν)/E.
+        assert!(text.contains("*HYPERELASTIC, NEO HOOKE\n1.2e4,5e-5\n"), "{text}");
+        assert!(text.contains("NLGEOM") && text.contains("TYPE=C3D10"), "{text}");
+    }
+
+    #[test]
+    fn what_the_other_program_has_not_is_named() {
+        let element = deck(Element::Tet4Anp, None).unwrap_err().to_string();
+        assert!(element.contains("t4-anp"), "{element}");
+        let law = deck(Element::Tet4, Some(LawName::NeoHookeanLog)).unwrap_err().to_string();
+        assert!(law.contains("neo-hookean-log"), "{law}");
+    }
+}

@@ -1,0 +1,80 @@
+//! The arguments that say how an object deforms: equations, law, yield stress.
+
+use anyhow::{Context, bail};
+use clap::Args;
+use softgrasp_protocol::{LawName, MethodName};
+
+use super::numbers::positive;
+use crate::deformation::{Deformation, Elasticity};
+use crate::scene::SceneFile;
+
+/// How the object deforms.
+#[derive(Args, Clone, Copy, Default)]
+pub(super) struct ElasticityArguments {
+    /// Equations: linear (thesis 3.43), large, or auto, which takes the linear ones where rotation
+    /// and strain promise an error within what is allowed [default: linear for solve; auto for run,
+    /// linear with --method of linear elasticity].
+    #[arg(long, value_name = "linear|large|auto")]
+    deformation: Option<Deformation>,
+    /// Law of large deformation: neo-hookean (that of Abaqus, Ansys, CalculiX) or neo-hookean-log
+    /// (that of FEBio, SOFA) [default: neo-hookean].
+    #[arg(long, value_name = "neo-hookean|neo-hookean-log")]
+    material: Option<LawName>,
+    /// Yield stress, Pa: above it the material flows and stays deformed, in logarithmic strain
+    /// (Hencky); t4 and t10 only.
+    #[arg(long = "yield", value_name = "PA", value_parser = positive, allow_hyphen_values = true)]
+    yield_stress: Option<f64>,
+}
+
+impl ElasticityArguments {
+    /// Those of a run: flags win over the scene, and who names a method of linear elasticity gets
+    /// linear elasticity.
+    ///
+    /// # Errors
+    /// Names in the scene that are none, and large deformation by a linear method.
+    pub fn of_run(&self, scene: &SceneFile, method: &MethodName) -> anyhow::Result<Elasticity> {
+        let named = match (self.deformation, &scene.deformation) {
+            (Some(deformation), _) => Some(deformation),
+            (None, Some(name)) => Some(name.parse().context("the scene's deformation")?),
+            (None, None) => None,
+        };
+        let law = match (self.material, &scene.material) {
+            (Some(law), _) => law,
+            (None, Some(name)) => name.parse().context("the scene's material")?,
+            (None, None) => LawName::default(),
+        };
+        let is_linear_method = !matches!(method.as_str(), "auto" | "front" | "front-mixed");
+        let deformation = match named {
+            Some(deformation) if is_linear_method && deformation != Deformation::Linear => bail!(
+                "--method {method} is of linear elasticity; take auto, front or front-mixed with \
+                 --deformation {deformation}"
+            ),
+            Some(deformation) => deformation,
+            None if method.as_str() == "auto" => Deformation::Auto,
+            None => Deformation::Linear,
+        };
+        let yield_stress = self.yield_stress.or(scene.yield_pa);
+        checked(Elasticity { deformation, law, yield_stress })
+    }
+
+    /// Those of one request: linear where nothing else was named.
+    ///
+    /// # Errors
+    /// A yield stress with linear elasticity.
+    pub fn of_request(&self) -> anyhow::Result<Elasticity> {
+        let usual = match self.yield_stress {
+            None => Deformation::Linear,
+            Some(_) => Deformation::Large,
+        };
+        let deformation = self.deformation.unwrap_or(usual);
+        let law = self.material.unwrap_or_default();
+        checked(Elasticity { deformation, law, yield_stress: self.yield_stress })
+    }
+}
+
+fn checked(elasticity: Elasticity) -> anyhow::Result<Elasticity> {
+    if elasticity.yield_stress.is_some() && elasticity.deformation == Deformation::Linear {
+        bail!("a yield stress needs --deformation large or auto: linear elasticity has none");
+    }
+    Ok(elasticity)
+}

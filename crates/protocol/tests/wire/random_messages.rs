@@ -1,0 +1,269 @@
+//! Random messages of every kind.
+
+use proptest::collection::vec;
+use proptest::option;
+use proptest::prelude::*;
+use softgrasp_protocol::*;
+
+use crate::samples::{Message, masks_of};
+
+/// Any message; no NaN, so that equality can be asked for.
+pub fn any_message() -> impl Strategy<Value = Message> {
+    let request = (any::<u64>(), any_request()).prop_map(|(id, m)| Message::Request(id, m));
+    let reply = (any::<u64>(), any_reply()).prop_map(|(id, m)| Message::Reply(id, m));
+    prop_oneof![request, reply]
+}
+
+fn any_request() -> impl Strategy<Value = Request> {
+    let hello = (text(), option::of(text())).prop_map(|(client, token)| Hello { client, token });
+    let model = || any::<[u8; 32]>().prop_map(ModelHash);
+    let materials = || {
+        let one = (number(), number()).prop_map(|(young, poisson)| Material { young, poisson });
+        vec(one, 0..4)
+    };
+    let large_frame = (model(), large_ask(), question()).prop_map(|(model, large, question)| {
+        Request::LargeFrame(Box::new(LargeFrame { model, large, question }))
+    });
+    let solve_large = (mesh(), materials(), element_choice(), large_ask(), question()).prop_map(
+        |(mesh, materials, element, large, question)| {
+            Box::new(SolveLarge { mesh, materials, element, large, question })
+        },
+    );
+    let solve = (mesh(), materials(), element_choice(), question()).prop_map(
+        |(mesh, materials, element, question)| {
+            Box::new(SolveOnce { mesh, materials, element, question })
+        },
+    );
+    let upload = (mesh(), materials(), element(), vec(any::<u32>(), 0..9)).prop_map(
+        |(mesh, materials, element, fixed)| UploadModel { mesh, materials, element, fixed },
+    );
+    let frame =
+        (model(), question()).prop_map(|(model, question)| FrameRequest { model, question });
+    let prefetch = (model(), vec(any::<u32>(), 0..9), masks())
+        .prop_map(|(model, nodes, masks)| Request::Prefetch(Prefetch { model, nodes, masks }));
+    prop_oneof![
+        hello.prop_map(Request::Hello),
+        solve.prop_map(Request::SolveOnce),
+        model().prop_map(Request::HaveModel),
+        upload.prop_map(Request::UploadModel),
+        frame.prop_map(Request::Frame),
+        prefetch,
+        model().prop_map(Request::Drop),
+        any::<u64>().prop_map(|nonce| Request::Ping { nonce }),
+        solve_large.prop_map(Request::SolveLarge),
+        large_frame,
+    ]
+}
+
+fn any_reply() -> impl Strategy<Value = Reply> {
+    let limits = any::<[u32; 6]>().prop_map(|n| Limits {
+        payload_len_max: n[0],
+        node_count_max: n[1],
+        tet_count_max: n[2],
+        dof_count_max: n[3],
+        material_count_max: n[4],
+        text_len_max: n[5],
+    });
+    let welcome =
+        (text(), text(), any::<u32>(), limits).prop_map(|(server, version, threads, limits)| {
+            Welcome { server, version, threads, limits }
+        });
+    let ready = (any::<[u8; 32]>(), any::<[u64; 2]>(), any::<bool>(), stage_ms()).prop_map(
+        |(model, [unknown_dofs, fixed_dofs], reused, stage_ms)| ModelReady {
+            model: ModelHash(model),
+            unknown_dofs,
+            fixed_dofs,
+            reused,
+            stage_ms,
+        },
+    );
+    let code = prop::sample::select(RejectCode::ALL.to_vec());
+    let rejected =
+        (code, text(), text()).prop_map(|(code, text, detail)| Rejected { code, text, detail });
+    let large_answer = (answer(), large_report())
+        .prop_map(|(answer, large)| Reply::LargeAnswer(Box::new(LargeAnswer { answer, large })));
+    prop_oneof![
+        welcome.prop_map(Reply::Welcome),
+        answer().prop_map(|answer| Reply::Answer(Box::new(answer))),
+        any::<bool>().prop_map(|known| Reply::ModelState { known }),
+        ready.prop_map(Reply::ModelReady),
+        rejected.prop_map(Reply::Rejected),
+        any::<u64>().prop_map(|nonce| Reply::Pong { nonce }),
+        large_answer,
+    ]
+}
+
+fn answer() -> impl Strategy<Value = Answer> {
+    let double = vec(point(), 0..9).prop_map(Displacements::F64);
+    let single =
+        (number(), vec(prop::array::uniform3(any::<i32>()), 0..9)).prop_map(|(scale, v)| {
+            let values = v.iter().map(|u| u.map(|c| c as f32 / 2_f32.powi(31))).collect();
+            Displacements::F32Quantised { scale, values }
+        });
+    let displacements = prop_oneof![double, single];
+    let parts = (report(), displacements, any::<bool>(), dof_values(), vec(point(), 0..4));
+    parts.prop_map(|(report, displacements, all, reactions, mask_forces)| {
+        let count = u32::try_from(displacements.node_count()).unwrap();
+        let nodes = if all {
+            NodeChoice::All
+        } else {
+            NodeChoice::Nodes((0..count).map(|node| node.wrapping_mul(0x9e37_79b9)).collect())
+        };
+        Answer { report, nodes, displacements, reactions, mask_forces }
+    })
+}
+
+fn report() -> impl Strategy<Value = SolveReport> {
+    let texts = (text(), text(), text(), text(), vec(text(), 0..4));
+    let numbers = (prop::array::uniform3(number()), option::of(number()), option::of(number()));
+    let counts = (any::<[u64; 3]>(), any::<u32>(), any::<bool>());
+    (texts, numbers, counts, element(), stage_ms()).prop_map(
+        |(texts, numbers, counts, element, stage_ms)| {
+            let (method, error_bound_why, precision, chosen_because, warnings) = texts;
+            let ([residual_rel, max_rotation_deg, max_strain], bound, condition) = numbers;
+            let ([unknown_dofs, known_dofs, peak_rss_bytes], steps, factor_reused) = counts;
+            SolveReport {
+                method,
+                element,
+                unknown_dofs,
+                known_dofs,
+                stage_ms,
+                residual_rel,
+                error_bound_rel: bound,
+                error_bound_why,
+                refinement_steps: steps,
+                max_rotation_deg,
+                max_strain,
+                precision,
+                condition_estimate: condition,
+                error_estimate_rel: condition.map(|c| 1e-16 * c),
+                warning_level: [WarningLevel::None, WarningLevel::Serious][steps as usize % 2],
+                warnings,
+                peak_rss_bytes,
+                factor_reused,
+                chosen_because,
+            }
+        },
+    )
+}
+
+fn large_ask() -> impl Strategy<Value = LargeAsk> {
+    let deformation = prop::sample::select(vec![DeformationChoice::Large, DeformationChoice::Auto]);
+    let law = prop::sample::select(vec![LawName::NeoHookean, LawName::NeoHookeanLog]);
+    let path = prop::sample::select(vec![PathChoice::Continue, PathChoice::FromRest]);
+    let pace = prop::sample::select(vec![Pace::Repeatable, Pace::Timely]);
+    (deformation, law, option::of(number()), path, pace).prop_map(
+        |(deformation, law, yield_stress, path, pace)| LargeAsk {
+            deformation,
+            law,
+            yield_stress,
+            path,
+            pace,
+        },
+    )
+}
+
+fn large_report() -> impl Strategy<Value = LargeReport> {
+    let deformation = prop::sample::select(vec![DeformationName::Linear, DeformationName::Large]);
+    let counts = any::<[u32; 4]>();
+    let numbers = (prop::array::uniform3(number()), option::of(number()));
+    (deformation, counts, numbers, any::<[bool; 2]>()).prop_map(
+        |(deformation, counts, numbers, [jumped, settled])| {
+            let [newton_steps, linear_solves, factor_age, substeps] = counts;
+            let ([min_jacobian, max_stretch, plastic_strain], energy_error_rel) = numbers;
+            LargeReport {
+                deformation,
+                newton_steps,
+                linear_solves,
+                factor_age,
+                substeps,
+                min_jacobian,
+                energy_error_rel,
+                max_stretch,
+                jumped,
+                settled,
+                plastic_strain,
+            }
+        },
+    )
+}
+
+fn mesh() -> impl Strategy<Value = MeshData> {
+    (vec(point(), 0..9), vec(any::<[u32; 4]>(), 0..9), any::<bool>()).prop_map(
+        |(vertices, tets, labelled)| {
+            let regions = tets.iter().filter(|_| labelled).map(|corners| corners[0] % 5).collect();
+            MeshData { vertices, tets, regions }
+        },
+    )
+}
+
+fn question() -> impl Strategy<Value = Question> {
+    let nodes =
+        prop_oneof![Just(NodeChoice::All), vec(any::<u32>(), 0..9).prop_map(NodeChoice::Nodes),];
+    let precision = prop::sample::select(vec![Precision::F64, Precision::F32Quantised]);
+    let want = (nodes, any::<bool>(), precision).prop_map(|(nodes, reactions, precision)| Want {
+        nodes,
+        reactions,
+        precision,
+    });
+    let method = prop::sample::select(vec!["auto", "gauss-jordan", "pcg", "a_b-9"])
+        .prop_map(|name| name.parse().unwrap());
+    let bounds = (option::of(number()), option::of(number()));
+    (dof_values(), dof_values(), masks(), method, want, bounds).prop_map(
+        |(known, forces, masks, method, want, (max_error, deadline_ms))| Question {
+            known,
+            forces,
+            mask_displacements: (0..masks.len()).map(|i| [i as f64, -0.5, 1e-3]).collect(),
+            masks,
+            method,
+            want,
+            max_error,
+            deadline_ms,
+        },
+    )
+}
+
+fn masks() -> impl Strategy<Value = Masks> {
+    vec(vec((any::<u32>(), number()), 0..5), 0..4)
+        .prop_map(|lists| masks_of(&lists.iter().map(Vec::as_slice).collect::<Vec<_>>()))
+}
+
+fn dof_values() -> impl Strategy<Value = Vec<DofValue>> {
+    vec((any::<u32>(), number()).prop_map(|(dof, value)| DofValue { dof, value }), 0..9)
+}
+
+fn stage_ms() -> impl Strategy<Value = StageMs> {
+    prop::array::uniform7(number()).prop_map(
+        |[decode, assemble, order, factor, solve, encode, queue]| StageMs {
+            decode,
+            assemble,
+            order,
+            factor,
+            solve,
+            encode,
+            queue,
+        },
+    )
+}
+
+fn element() -> impl Strategy<Value = ElementName> {
+    prop::sample::select(vec![ElementName::T4, ElementName::T10, ElementName::T4Anp])
+}
+
+fn element_choice() -> impl Strategy<Value = ElementChoice> {
+    prop::sample::select(vec![ElementChoice::T4, ElementChoice::T10, ElementChoice::Auto])
+}
+
+fn point() -> impl Strategy<Value = [f64; 3]> {
+    prop::array::uniform3(number())
+}
+
+/// Every sort of double except NaN.
+fn number() -> impl Strategy<Value = f64> {
+    use prop::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
+    POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO | INFINITE
+}
+
+fn text() -> impl Strategy<Value = String> {
+    vec(any::<char>(), 0..12).prop_map(|chars| chars.into_iter().collect())
+}
