@@ -135,6 +135,10 @@ impl Report {
             let value = if *name == "command" { format!("`{value}`") } else { value.clone() };
             text.push_str(&format!("- {name}: {value}\n"));
         }
+        if !self.faults.is_empty() {
+            text.push_str("\nWhat was promised and did not hold:\n\n");
+            self.faults.iter().for_each(|row| text.push_str(&format!("- {row}\n")));
+        }
         for section in &self.sections {
             text.push('\n');
             match section {
@@ -245,6 +249,7 @@ mod tests {
         report.records(table);
         assert!(report.check_faults().is_ok());
         report.fault("rod by front: no number");
+        assert!(report.markdown().contains("- rod by front: no number"));
         let error = report.check_faults().unwrap_err();
         assert!(error.to_string().contains("1 of") && error.to_string().contains("rod by front"));
         assert!(report.markdown().contains("Every row (1): [r-rows.csv](r-rows.csv)"));

@@ -24,7 +24,7 @@ const OBJECTS: [(BuiltIn, f64); 5] = [
 /// The bars: a frame costs at most so many solves of `front` in single precision.
 const BARS: [(f64, f64); 2] = [(2e-3, 6.0), (1e-8, 16.0)];
 
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 19] = [
     "object",
     "poisson",
     "nodes",
@@ -41,6 +41,7 @@ const COLUMNS: [&str; 18] = [
     "error_max",
     "estimate_max",
     "error_over_estimate",
+    "elsewhere",
     "factors",
     "factor_ms_max",
 ];
@@ -158,7 +159,7 @@ fn row(
     frames: usize,
     budget: f64,
     measured: &Measured,
-) -> [Cell; 18] {
+) -> [Cell; 19] {
     [
         Cell::Text(object.to_owned()),
         Cell::Number(poisson),
@@ -176,6 +177,7 @@ fn row(
         Cell::Number(measured.error.max),
         Cell::Number(measured.estimate_max),
         Cell::Number(measured.error_over_estimate),
+        Cell::Count(measured.elsewhere as u64),
         Cell::Count(measured.factors as u64),
         Cell::Number(measured.factor_ms),
     ]
@@ -289,7 +291,9 @@ const INTRODUCTION: &str = "\
 Five tips hold parts of the surface (masks), press them in by 8 % of the object's size (15 % of its smallest extent where that is less) and turn by \
 0.2 rad, in so many frames; law `neo-hookean`, linear tetrahedra, 20 kPa. `error` is the largest \
 error of a displacement over the largest displacement, against a path in double precision whose \
-residuals are rounding; `estimate_max` is what the frames said of themselves. A frame is timed from \
+residuals are rounding; `estimate_max` is what the frames said of themselves. A body that buckles has \
+several equilibria: `elsewhere` counts frames that are on another branch than that path, whose error \
+is the way to the equilibrium that they settle to. A frame is timed from \
 the goal to the shape, factors that are made beside the frames excluded (`factors`, \
 `factor_ms_max`); its first frame, which makes the first factor, is not among them. `solve_ms` is a \
 solve of `front` in single precision of the same object, in turn with the frames.";

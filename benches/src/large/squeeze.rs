@@ -114,10 +114,17 @@ impl Squeeze {
     /// # Errors
     /// [`ReportError`] where the tips do not hold the object.
     pub fn path(&self, is_single: bool) -> Result<Path, ReportError> {
+        self.path_from(vec![0.0; 3 * self.model.system_node_count()], is_single)
+    }
+
+    /// A path from a shape on, 3N displacements of the system, m.
+    ///
+    /// # Errors
+    /// [`ReportError`] where the tips do not hold the object.
+    pub fn path_from(&self, shape: Vec<f64>, is_single: bool) -> Result<Path, ReportError> {
         let hold = Arc::new(self.hold()?);
         let elements = Arc::new(self.model.hyperelastic(Law::NeoHookean)?);
-        let rest = vec![0.0; 3 * self.model.system_node_count()];
-        Ok(Path::new(elements, self.model.stiffness(), hold, rest, is_single))
+        Ok(Path::new(elements, self.model.stiffness(), hold, shape, is_single))
     }
 
     fn hold(&self) -> Result<Hold, ReportError> {

@@ -155,6 +155,15 @@ impl Hold {
         (&self.gram_inverse * sums).as_slice().to_vec()
     }
 
+    /// Moves the nodes of masks by what a step misses of `C z = m`: a factor in single precision keeps
+    /// some seven digits of it, and forces of masks would do work on the rest.
+    pub(super) fn meet(&self, m: &[f64], z: &mut [f64]) {
+        let means = self.constrained(z);
+        let missed: Vec<f64> = means.iter().zip(m).map(|(mean, m)| mean - m).collect();
+        let lambda = &self.gram_inverse * nalgebra::DVector::from_vec(missed);
+        self.subtract_mask_forces(lambda.as_slice(), z);
+    }
+
     /// Subtracts `Cᵀ λ` from forces on the unknown.
     pub(super) fn subtract_mask_forces(&self, lambda: &[f64], f: &mut [f64]) {
         for (row, lambda) in self.rows.iter().zip(lambda) {

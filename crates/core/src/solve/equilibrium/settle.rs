@@ -121,10 +121,10 @@ impl Path {
         let hold = std::sync::Arc::clone(&self.hold);
         self.counts.linear_solves += 1;
         let downhill = residual.iter().map(|f| -f).collect();
-        match &self.inverse {
-            Some(inverse) => self.secants.apply(downhill, |r| inverse.apply(&hold, r, means_off)),
-            None => vec![0.0; residual.len()],
-        }
+        let Some(inverse) = &self.inverse else { return vec![0.0; residual.len()] };
+        let mut step = self.secants.apply(downhill, |r| inverse.apply(&hold, r, means_off));
+        hold.meet(means_off, &mut step);
+        step
     }
 
     /// Corrects the shape until it is good enough, balanced, or no better.
