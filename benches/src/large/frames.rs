@@ -84,6 +84,8 @@ pub(super) struct Measured {
     pub error_over_estimate: f64,
     /// Frames that are on another branch of equilibria than the path in double precision.
     pub elsewhere: usize,
+    /// Frames for which no equilibrium was found; the shape stayed.
+    pub refused: usize,
     pub factors: usize,
     pub factor_ms: f64,
     pub bytes: usize,
@@ -94,7 +96,7 @@ pub(super) struct Measured {
 /// is timed, and factors are made between the frames as they are beside them in a run.
 ///
 /// # Errors
-/// [`ReportError`] where a frame has no equilibrium.
+/// [`ReportError`] where the object cannot be held.
 pub(super) fn play(squeeze: &Squeeze, truth: &Truth, budget: f64) -> Result<Measured, ReportError> {
     let mut path = squeeze.path(true)?;
     let stiffness = squeeze.model.stiffness();
@@ -105,20 +107,24 @@ pub(super) fn play(squeeze: &Squeeze, truth: &Truth, budget: f64) -> Result<Meas
     let mut b = vec![1.0; partition.unknown().len()];
     let (mut ms, mut solve_ms, mut solves, mut errors) = (vec![], vec![], vec![], vec![]);
     let (mut estimate_max, mut over) = (0.0f64, 0.0f64);
-    let (mut factors, mut factor_ms, mut elsewhere) = (0, 0.0f64, 0);
+    let (mut factors, mut factor_ms) = (0, 0.0f64);
+    let (mut elsewhere, mut refused) = (0, 0);
     for frame in 0..truth.frames {
         let mask_q = squeeze.at((frame + 1) as f64 / truth.frames as f64);
         let goal = Goal { q_known: &[], mask_q: &mask_q, forces: &[] };
         let wish = Wish { error_rel: Some(budget), ..Wish::EXACT };
         let (took, found) = timed_ms(|| path.advance(&goal, &wish));
-        let found = found?;
+        let Ok(found) = found else {
+            refused += 1;
+            continue;
+        };
         let (solved_ms, ()) = timed_ms(|| front.solve_in_place(&mut b, 1));
         b.iter_mut().for_each(|x| *x = 1.0);
         let mut error = truth.error(frame, path.displacement());
         if error > found.error_estimate_rel.max(ELSEWHERE) {
             // Where the body may buckle there are several equilibria; an error is the way to one's own.
-            let own = settled(squeeze, path.displacement(), &goal)?;
-            if truth.error(frame, &own) > ELSEWHERE {
+            let own = settled(squeeze, path.displacement(), &goal);
+            if let Some(own) = own.ok().filter(|own| truth.error(frame, own) > ELSEWHERE) {
                 elsewhere += 1;
                 error = largest_error(path.displacement(), &own);
             }
@@ -149,6 +155,7 @@ pub(super) fn play(squeeze: &Squeeze, truth: &Truth, budget: f64) -> Result<Meas
         estimate_max,
         error_over_estimate: over,
         elsewhere,
+        refused,
         factors,
         factor_ms,
         bytes: path.bytes() + path.elements().bytes(),

@@ -24,7 +24,7 @@ const OBJECTS: [(BuiltIn, f64); 5] = [
 /// The bars: a frame costs at most so many solves of `front` in single precision.
 const BARS: [(f64, f64); 2] = [(2e-3, 6.0), (1e-8, 16.0)];
 
-const COLUMNS: [&str; 19] = [
+const COLUMNS: [&str; 20] = [
     "object",
     "poisson",
     "nodes",
@@ -42,6 +42,7 @@ const COLUMNS: [&str; 19] = [
     "estimate_max",
     "error_over_estimate",
     "elsewhere",
+    "refused",
     "factors",
     "factor_ms_max",
 ];
@@ -137,12 +138,17 @@ fn by_object(options: &Options) -> Result<Table, ReportError> {
     for (shape, poisson) in OBJECTS {
         let mut squeeze = Squeeze::new(shape, nodes, poisson)?;
         // Thin parts cannot be pressed as deep: half as deep, until there is an equilibrium.
-        while let Err(ReportError::NoEquilibrium(_)) = Truth::new(&squeeze, speeds[0]) {
-            squeeze = squeeze.gentler();
-        }
-        for &frames in speeds {
+        let truths = loop {
+            let truths: Result<Vec<Truth>, ReportError> =
+                speeds.iter().map(|&frames| Truth::new(&squeeze, frames)).collect();
+            match truths {
+                Err(ReportError::NoEquilibrium(_)) => squeeze = squeeze.gentler(),
+                truths => break truths?,
+            }
+        };
+        for truth in truths {
+            let frames = truth.frames;
             progress("large", &format!("{shape} {poisson}, {frames} frames"));
-            let truth = Truth::new(&squeeze, frames)?;
             for (budget, _) in BARS {
                 let measured = play(&squeeze, &truth, budget)?;
                 let name = shape.to_string();
@@ -159,7 +165,7 @@ fn row(
     frames: usize,
     budget: f64,
     measured: &Measured,
-) -> [Cell; 19] {
+) -> [Cell; 20] {
     [
         Cell::Text(object.to_owned()),
         Cell::Number(poisson),
@@ -178,6 +184,7 @@ fn row(
         Cell::Number(measured.estimate_max),
         Cell::Number(measured.error_over_estimate),
         Cell::Count(measured.elsewhere as u64),
+        Cell::Count(measured.refused as u64),
         Cell::Count(measured.factors as u64),
         Cell::Number(measured.factor_ms),
     ]
@@ -293,7 +300,8 @@ Five tips hold parts of the surface (masks), press them in by 8 % of the object'
 error of a displacement over the largest displacement, against a path in double precision whose \
 residuals are rounding; `estimate_max` is what the frames said of themselves. A body that buckles has \
 several equilibria: `elsewhere` counts frames that are on another branch than that path, whose error \
-is the way to the equilibrium that they settle to. A frame is timed from \
+is the way to the equilibrium that they settle to; `refused` counts those for which none was found. A \
+frame is timed from \
 the goal to the shape, factors that are made beside the frames excluded (`factors`, \
 `factor_ms_max`); its first frame, which makes the first factor, is not among them. `solve_ms` is a \
 solve of `front` in single precision of the same object, in turn with the frames.";
