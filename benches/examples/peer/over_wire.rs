@@ -15,7 +15,7 @@ use crate::problem::{POISSON, Problem, YOUNG};
 pub fn run(problem: &Problem, method: &str, threads: usize) -> anyhow::Result<serde_json::Value> {
     // A server of its own each time: nothing is kept from the round before.
     let host = Host::open(&ServerChoice::Embedded, Some(threads))?;
-    let mut connection = host.connect(None)?;
+    let mut connection = host.connect()?;
     let mesh = problem.model.mesh();
     let upload = UploadModel {
         mesh: MeshData {

@@ -83,7 +83,7 @@ struct Asker<'a> {
 
 impl<'a> Asker<'a> {
     fn new(host: &Host, tips: &'a Tips) -> Result<Self, ReportError> {
-        let mut connection = host.connect(None)?;
+        let mut connection = host.connect()?;
         let model = upload(&mut connection, tips.upload())?;
         Ok(Self { tips, model, connection })
     }

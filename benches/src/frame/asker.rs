@@ -116,7 +116,7 @@ pub(super) struct Asker {
 impl Asker {
     /// Connects and makes sure that the server has the model.
     pub fn new(host: &Host, asked: Asked) -> Result<Self, ReportError> {
-        let mut connection = host.connect(None)?;
+        let mut connection = host.connect()?;
         let model = upload(&mut connection, asked.upload.clone())?;
         Ok(Self { asked, model, connection, count: 0 })
     }

@@ -35,7 +35,7 @@ pub(super) fn solve(question: &Question, element: Element, host: &Host) -> Resul
         Element::Tet4Anp => ElementChoice::T4Anp,
     };
     let begin = Instant::now();
-    let mut connection = host.connect(None).map_err(broken)?;
+    let mut connection = host.connect().map_err(broken)?;
     let question = asked(&known, false)?;
     let request = Request::SolveOnce(Box::new(SolveOnce { mesh, materials, element, question }));
     read(ask(&mut connection, &request)?, begin)?.if_certain()
@@ -60,7 +60,7 @@ pub(super) fn frame(
     };
     let fixed = question.fixed.clone();
     let begin = Instant::now();
-    let mut connection = host.connect(None).map_err(broken)?;
+    let mut connection = host.connect().map_err(broken)?;
     let upload = Request::UploadModel(UploadModel { mesh, materials, element, fixed });
     let model = match ask(&mut connection, &upload)? {
         Reply::ModelReady(ready) => ready.model,

@@ -63,7 +63,7 @@ impl<'a> Holder<'a> {
         };
         let server = fea_server::start(config).map_err(LinkError::from)?;
         let host = Host::open(&ServerChoice::At(server.address().to_string()), None)?;
-        let mut connection = host.connect(None)?;
+        let mut connection = host.connect()?;
         let model = upload(&mut connection, scene.upload())?;
         let answer = proven(&mut connection, &request(scene, model, 1.0))?;
         let usual = Duration::ZERO;

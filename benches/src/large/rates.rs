@@ -41,7 +41,7 @@ pub(super) fn hold_rate(
 ) -> Result<Held, ReportError> {
     let squeeze = Squeeze::new(BuiltIn::Strawberry, nodes, 0.4)?;
     let host = Host::open(&ServerChoice::Embedded, Some(threads))?;
-    let mut connection = host.connect(None)?;
+    let mut connection = host.connect()?;
     let model = upload(&mut connection, model_of(&squeeze))?;
     let surface = Surface::from_mesh(squeeze.model.mesh()).nodes;
     // In for two seconds, out for two seconds.

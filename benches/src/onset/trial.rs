@@ -49,7 +49,7 @@ pub(super) struct Toucher<'a> {
 impl<'a> Toucher<'a> {
     /// Uploads the object anew, so that no column is kept, and waits until nothing is worked on.
     pub fn try_new(host: &Host, scene: &'a Pressed) -> Result<Self, ReportError> {
-        let mut connection = host.connect(None)?;
+        let mut connection = host.connect()?;
         let object = scene.upload();
         let known = ModelHash::of(&object);
         if let Reply::ModelState { known: true } = connection.ask(&Request::HaveModel(known))? {

@@ -75,7 +75,7 @@ fn rounds(scene: &Pressed, method: Method, threads: usize) -> Result<Vec<Round>,
     let (model, known) = scene.model()?;
     let reference = Reference::of(&model, &known)?;
     let host = Host::open(&ServerChoice::Embedded, Some(threads))?;
-    let mut connection = host.connect(None)?;
+    let mut connection = host.connect()?;
     let request = Request::SolveOnce(Box::new(scene.solve_once(method)));
     let rest = scene.mesh.vertices();
     let mut tree = SphereTree::try_build(rest, &scene.surface.nodes)?;

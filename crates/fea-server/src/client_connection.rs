@@ -6,14 +6,36 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use softgrasp_protocol::asynchronous::Connection;
-use softgrasp_protocol::{ConnectionError, Frame, Limits};
+use softgrasp_protocol::{ConnectionError, Frame, HEADER_LEN, Limits};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::time::{Instant, timeout};
+use tokio::time::{Instant, timeout_at};
+
+use crate::config::ServerConfig;
 
 /// Frames from and bytes to one client, each with a limit on how long the client may hold it up.
 pub(crate) struct ClientConnection<S> {
     connection: Connection<TimedStream<S>>,
-    stall_limit: Duration,
+    patience: Patience,
+    /// When a client that has not introduced itself yet is given up.
+    stranger_until: Option<Instant>,
+    /// Whether it is known only after it has shown a token.
+    wants_token: bool,
+}
+
+/// How long a client is waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Patience {
+    /// After its last byte, inside a frame.
+    pub stall: Duration,
+    /// For its first request from the beginning, and for a whole header from its first byte.
+    pub greeting: Duration,
+}
+
+impl Patience {
+    /// That of a server.
+    pub fn of(config: &ServerConfig) -> Self {
+        Self { stall: config.stall_limit, greeting: config.greeting_limit }
+    }
 }
 
 /// Why a session is given up.
@@ -23,6 +45,10 @@ pub(crate) enum SessionError {
     Connection(#[from] ConnectionError),
     #[error("the client stopped inside a frame for {} s", .0.as_secs_f64())]
     Stalled(Duration),
+    #[error("the client sent no whole header within {} s", .0.as_secs_f64())]
+    NoHeader(Duration),
+    #[error("the client did not introduce itself within {} s", .0.as_secs_f64())]
+    Stranger(Duration),
     #[error("the client did not take its reply for {} s", WRITE_MAX.as_secs())]
     NotTaken,
 }
@@ -31,36 +57,72 @@ pub(crate) enum SessionError {
 const WRITE_MAX: Duration = Duration::from_secs(60);
 
 impl<S> ClientConnection<S> {
-    /// Wraps a stream; `limits` hold for what is read, `stall_limit` for a pause inside a frame.
-    pub fn new(stream: S, limits: Limits, stall_limit: Duration) -> Self {
-        let stream = TimedStream { stream, last_read: Instant::now() };
-        Self { connection: Connection::new(stream, limits), stall_limit }
+    /// Wraps the stream of a client that is not known yet, until it has spoken or, if a token is
+    /// wanted, has shown it; `limits` hold for what is read from it.
+    pub fn new(stream: S, limits: Limits, patience: Patience, wants_token: bool) -> Self {
+        let now = Instant::now();
+        let stream = TimedStream { stream, first_read: None, last_read: now };
+        let stranger_until = Some(now + patience.greeting);
+        let connection = Connection::new(stream, limits);
+        Self { connection, patience, stranger_until, wants_token }
+    }
+
+    /// The client has introduced itself: it may rest as long as it likes, and send what `limits` allow.
+    pub fn is_known(&mut self, limits: Limits) {
+        if self.stranger_until.take().is_some() {
+            self.connection.set_limits(limits);
+        }
     }
 }
 
 impl<S: AsyncRead + Unpin> ClientConnection<S> {
-    /// Waits for ever between frames, and inside one for `stall_limit` after the last byte.
+    /// Waits for ever between frames of a client that is known, and inside one for as long as its
+    /// patience says.
     ///
     /// May be dropped at any await: bytes that have come stay. Time in which the server did not read,
     /// because it worked on a request, is not held against the client.
     ///
     /// # Errors
-    /// [`SessionError::Stalled`], or what is wrong with the stream.
+    /// [`SessionError`]: how the client was too slow, or what is wrong with the stream.
     pub async fn next_frame(&mut self) -> Result<Option<Frame>, SessionError> {
         let start = Instant::now();
+        self.connection.stream_mut().first_read =
+            self.connection.is_inside_frame().then_some(start);
         loop {
-            let silent = match self.connection.is_inside_frame() {
-                true => self.connection.stream().last_read.max(start).elapsed(),
-                false => Duration::ZERO,
-            };
-            let left = self.stall_limit.saturating_sub(silent);
-            if left.is_zero() {
-                return Err(SessionError::Stalled(self.stall_limit));
+            let (until, too_slow) = self.deadline(start);
+            if until <= Instant::now() {
+                return match too_slow {
+                    Some(error) => Err(error),
+                    None => continue,
+                };
             }
             // Bytes may come meanwhile: then the time begins anew from the last of them.
-            if let Ok(frame) = timeout(left, self.connection.read_frame()).await {
+            if let Ok(frame) = timeout_at(until, self.connection.read_frame()).await {
                 return Ok(frame?);
             }
+        }
+    }
+
+    /// When to look at the client again, and what it is if it has not gone on by then; `None` for one
+    /// that may rest.
+    fn deadline(&self, start: Instant) -> (Instant, Option<SessionError>) {
+        let Patience { stall, greeting } = self.patience;
+        let stream = self.connection.stream();
+        let received = self.connection.received();
+        let has_header = received >= HEADER_LEN;
+        let stalled = (received > 0)
+            .then(|| (stream.last_read.max(start) + stall, SessionError::Stalled(stall)));
+        let first_read = stream.first_read.unwrap_or(start);
+        let no_header = (received > 0 && !has_header)
+            .then(|| (first_read + greeting, SessionError::NoHeader(greeting)));
+        // Without a token a first request may be a large one: its header is waited for so long.
+        let stranger_until = self.stranger_until.filter(|_| self.wants_token || !has_header);
+        let stranger = stranger_until.map(|until| (until, SessionError::Stranger(greeting)));
+        let ends = [stalled, no_header, stranger];
+        match ends.into_iter().flatten().min_by_key(|(until, _)| *until) {
+            Some((until, error)) => (until, Some(error)),
+            // Its next header may begin at any time.
+            None => (Instant::now() + stall.min(greeting), None),
         }
     }
 }
@@ -78,9 +140,11 @@ impl<S: AsyncWrite + Unpin> ClientConnection<S> {
     }
 }
 
-/// A stream that knows when bytes last came.
+/// A stream that knows when bytes came.
 struct TimedStream<S> {
     stream: S,
+    /// First read since it was last set to `None`.
+    first_read: Option<Instant>,
     last_read: Instant,
 }
 
@@ -93,6 +157,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for TimedStream<S> {
         let polled = Pin::new(&mut self.stream).poll_read(context, buffer);
         if polled.is_ready() {
             self.last_read = Instant::now();
+            self.first_read = self.first_read.or(Some(self.last_read));
         }
         polled
     }
@@ -124,7 +189,9 @@ mod tests {
 
     use super::*;
 
-    const LIMIT: Duration = Duration::from_secs(30);
+    const PATIENCE: Patience =
+        Patience { stall: Duration::from_secs(30), greeting: Duration::from_secs(10) };
+    const MOMENT: Duration = Duration::from_millis(2);
 
     /// A connection, the client's end of it, and the bytes of a request. The clock of these tests
     /// stands still, and goes to the next thing that is waited for when all else rests.
@@ -132,7 +199,9 @@ mod tests {
         let (client, server) = duplex(1 << 10);
         let mut bytes = Vec::new();
         Request::Ping { nonce: 7 }.encode_into(1, &Limits::default(), &mut bytes).unwrap();
-        (ClientConnection::new(server, Limits::default(), LIMIT), client, bytes)
+        let mut connection = ClientConnection::new(server, Limits::default(), PATIENCE, true);
+        connection.is_known(Limits::default());
+        (connection, client, bytes)
     }
 
     #[tokio::test(start_paused = true)]
@@ -145,13 +214,10 @@ mod tests {
                 Instant::now()
             };
             let (ended, last_byte) = tokio::join!(connection.next_frame(), sender);
-            assert!(matches!(ended, Err(SessionError::Stalled(LIMIT))));
+            assert!(matches!(ended, Err(SessionError::Stalled(_))), "{ended:?}");
             // The runtime's timer counts milliseconds.
-            let over = last_byte.elapsed().checked_sub(LIMIT).expect("not before its time");
-            assert!(
-                over <= Duration::from_millis(2),
-                "{over:?} late after {idle:?} between frames"
-            );
+            let over = last_byte.elapsed().checked_sub(PATIENCE.stall).expect("not too soon");
+            assert!(over <= MOMENT, "{over:?} late after {idle:?} between frames");
         }
     }
 
@@ -159,8 +225,10 @@ mod tests {
     async fn client_whose_bytes_come_slowly_is_waited_for() {
         let (mut connection, mut client, bytes) = connected();
         let sender = async {
-            for byte in &bytes {
-                sleep(LIMIT - Duration::from_millis(10)).await;
+            let (header, payload) = bytes.split_at(HEADER_LEN);
+            client.write_all(header).await.unwrap();
+            for byte in payload {
+                sleep(PATIENCE.stall - Duration::from_millis(10)).await;
                 client.write_all(&[*byte]).await.unwrap();
             }
         };
@@ -169,17 +237,92 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn time_in_which_the_server_does_not_read_is_not_held_against_the_client() {
+    async fn header_that_comes_byte_by_byte_is_there_in_time_or_given_up() {
+        for (pause_ms, is_in_time) in [(300, true), (350, false)] {
+            for idle in [0, 7, 3600].map(Duration::from_secs) {
+                let (mut connection, mut client, bytes) = connected();
+                let sender = async {
+                    sleep(idle).await;
+                    let start = Instant::now();
+                    for byte in &bytes {
+                        if client.write_all(&[*byte]).await.is_err() {
+                            break;
+                        }
+                        sleep(Duration::from_millis(pause_ms)).await;
+                    }
+                    start
+                };
+                let ended = async {
+                    let ended = connection.next_frame().await;
+                    (ended, Instant::now())
+                };
+                let ((ended, at), start) = tokio::join!(ended, sender);
+                match is_in_time {
+                    true => assert!(ended.unwrap().is_some()),
+                    false => {
+                        assert!(matches!(ended, Err(SessionError::NoHeader(_))), "{ended:?}");
+                        let took = at.duration_since(start);
+                        assert!(took >= PATIENCE.greeting && took <= PATIENCE.greeting + MOMENT);
+                    }
+                }
+            }
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn stranger_that_does_not_speak_is_given_up_and_a_known_client_is_not() {
+        for wants_token in [false, true] {
+            let (client, server) = duplex(1 << 10);
+            let mut connection =
+                ClientConnection::new(server, Limits::default(), PATIENCE, wants_token);
+            let start = Instant::now();
+            let ended = connection.next_frame().await;
+            assert!(matches!(ended, Err(SessionError::Stranger(_))), "{ended:?}");
+            let over = start.elapsed().checked_sub(PATIENCE.greeting).expect("not too soon");
+            assert!(over <= MOMENT);
+            drop(client);
+        }
         let (mut connection, mut client, bytes) = connected();
-        let (first, last) = bytes.split_at(bytes.len() - 1);
-        client.write_all(&[&bytes, first].concat()).await.unwrap();
-        assert!(connection.next_frame().await.unwrap().is_some());
-        sleep(10 * LIMIT).await;
         let sender = async {
-            sleep(LIMIT / 2).await;
-            client.write_all(last).await.unwrap();
+            sleep(Duration::from_secs(24 * 3600)).await;
+            client.write_all(&bytes).await.unwrap();
         };
         let (frame, ()) = tokio::join!(connection.next_frame(), sender);
         assert!(frame.unwrap().is_some());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn first_request_may_be_long_only_where_no_token_is_wanted() {
+        for wants_token in [false, true] {
+            let (mut client, server) = duplex(1 << 10);
+            let (_, _, bytes) = connected();
+            let mut connection =
+                ClientConnection::new(server, Limits::default(), PATIENCE, wants_token);
+            let sender = async {
+                let (first, last) = bytes.split_at(HEADER_LEN);
+                client.write_all(first).await.unwrap();
+                sleep(2 * PATIENCE.greeting).await;
+                let _ = client.write_all(last).await;
+            };
+            let (frame, ()) = tokio::join!(connection.next_frame(), sender);
+            assert_eq!(frame.is_ok(), !wants_token, "{frame:?}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn time_in_which_the_server_does_not_read_is_not_held_against_the_client() {
+        for left in [1, HEADER_LEN] {
+            let (mut connection, mut client, bytes) = connected();
+            let (first, last) = bytes.split_at(bytes.len() - left);
+            client.write_all(&[&bytes, first].concat()).await.unwrap();
+            assert!(connection.next_frame().await.unwrap().is_some());
+            sleep(10 * PATIENCE.stall).await;
+            let sender = async {
+                sleep(PATIENCE.greeting / 2).await;
+                client.write_all(last).await.unwrap();
+            };
+            let (frame, ()) = tokio::join!(connection.next_frame(), sender);
+            assert!(frame.unwrap().is_some());
+        }
     }
 }

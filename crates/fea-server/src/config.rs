@@ -6,6 +6,7 @@ use std::time::Duration;
 use softgrasp_protocol::Limits;
 
 use crate::clock::StageWatch;
+use crate::encryption::Encryption;
 
 /// Settings of one server.
 #[derive(Clone, Debug)]
@@ -18,12 +19,18 @@ pub struct ServerConfig {
     pub max_nodes: u32,
     /// Sessions at the same time; one more is turned away.
     pub max_sessions: usize,
+    /// Sessions at the same time from one address that is not this machine's own.
+    pub max_sessions_per_address: usize,
     /// Bytes that all that is kept between requests and all that requests under way make may take.
     pub memory_limit: u64,
     /// Bytes of compliance columns kept per model.
     pub column_cache: u64,
     /// Shared secret a client must show, if any.
     pub token: Option<String>,
+    /// What sessions are encrypted with, if at all.
+    pub encryption: Option<Encryption>,
+    /// Whether the server may be reached from other machines without token and encryption.
+    pub is_insecure: bool,
     /// Whether the machine's speed is measured at once, beside the first requests, and not by the
     /// first request that needs it.
     pub measure_at_start: bool,
@@ -32,6 +39,8 @@ pub struct ServerConfig {
     pub real_time: bool,
     /// A client that stops inside a frame for this long is given up.
     pub stall_limit: Duration,
+    /// A client whose header, whose first request or whose handshake is not there by then is given up.
+    pub greeting_limit: Duration,
     /// Where the stage of the newest request can be read, for whoever started the server.
     pub stage: StageWatch,
 }
@@ -56,9 +65,20 @@ pub enum ConfigError {
         /// The option's name.
         option: &'static str,
     },
+    /// Everybody who reaches the address could use the server.
+    #[error(
+        "{address} can be reached from other machines: give --token-file and --tls-cert with --tls-key \
+         (--make-certificate makes a pair), or say --insecure if everybody there is trusted"
+    )]
+    Open {
+        /// The address.
+        address: SocketAddr,
+    },
 }
 
 const THREADS_MAX: usize = 1024;
+/// Bytes that a client may send in one frame before it has shown the token.
+const STRANGER_PAYLOAD_MAX: u32 = 64 * 1024;
 
 impl Default for ServerConfig {
     fn default() -> Self {
@@ -67,12 +87,16 @@ impl Default for ServerConfig {
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             max_nodes: Limits::default().node_count_max,
             max_sessions: 64,
+            max_sessions_per_address: 32,
             memory_limit: 8 << 30,
             column_cache: 1 << 30,
             token: None,
+            encryption: None,
+            is_insecure: false,
             measure_at_start: false,
             real_time: false,
             stall_limit: Duration::from_secs(30),
+            greeting_limit: Duration::from_secs(10),
             stage: StageWatch::default(),
         }
     }
@@ -93,15 +117,26 @@ impl ServerConfig {
         for (option, zero) in [
             ("--max-nodes", self.max_nodes == 0),
             ("--max-sessions", self.max_sessions == 0),
+            ("--max-sessions-per-address", self.max_sessions_per_address == 0),
             ("--memory-limit", self.memory_limit == 0),
             ("--column-cache", self.column_cache == 0),
             ("the stall limit", self.stall_limit.is_zero()),
+            ("the greeting limit", self.greeting_limit.is_zero()),
         ] {
             if zero {
                 return Err(ConfigError::Zero { option });
             }
         }
+        let is_guarded = self.token.is_some() && self.encryption.is_some();
+        if !self.listen.ip().is_loopback() && !is_guarded && !self.is_insecure {
+            return Err(ConfigError::Open { address: self.listen });
+        }
         Ok(())
+    }
+
+    /// Limits on what is read from a client that has not introduced itself yet.
+    pub fn limits_of_strangers(&self) -> Limits {
+        Limits { payload_len_max: STRANGER_PAYLOAD_MAX, ..self.limits() }
     }
 
     /// Limits on what is read from a client.
@@ -114,5 +149,33 @@ impl ServerConfig {
             dof_count_max: nodes.saturating_mul(3),
             ..usual
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_that_others_can_reach_wants_token_and_encryption_or_a_word() {
+        let folder = tempfile::tempdir().unwrap();
+        let (certificate, key) = (folder.path().join("certificate"), folder.path().join("key"));
+        crate::make_certificate(&["lab".to_owned()], &certificate, &key).unwrap();
+        let encryption = Some(Encryption::read(&certificate, &key).unwrap());
+        let token = Some("secret".to_owned());
+        let open: SocketAddr = ([0, 0, 0, 0], 7878).into();
+        let config = ServerConfig { listen: open, ..ServerConfig::default() };
+        let refused = Err(ConfigError::Open { address: open });
+        assert_eq!(config.check(), refused);
+        assert_eq!(ServerConfig { token: token.clone(), ..config.clone() }.check(), refused);
+        assert_eq!(
+            ServerConfig { encryption: encryption.clone(), ..config.clone() }.check(),
+            refused
+        );
+        assert_eq!(ServerConfig { token, encryption, ..config.clone() }.check(), Ok(()));
+        assert_eq!(ServerConfig { is_insecure: true, ..config }.check(), Ok(()));
+        assert_eq!(ServerConfig::default().check(), Ok(()));
+        let six = ServerConfig { listen: "[::1]:0".parse().unwrap(), ..ServerConfig::default() };
+        assert_eq!(six.check(), Ok(()));
     }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
-use fea_server::{ServerConfig, StartError};
+use fea_server::{Encryption, ServerConfig, StartError, make_certificate};
 use softgrasp_core::solve::memory::Bytes;
 use tokio::sync::watch;
 
@@ -28,6 +28,9 @@ struct Arguments {
     /// Sessions at the same time.
     #[arg(long, value_name = "N", default_value_t = ServerConfig::default().max_sessions)]
     max_sessions: usize,
+    /// Sessions at the same time from one address, other than this machine's own.
+    #[arg(long, value_name = "N", default_value_t = ServerConfig::default().max_sessions_per_address)]
+    max_sessions_per_address: usize,
     /// Memory for everything that is kept and worked on: bytes, or 8GiB, 512MiB. What needs more is
     /// refused before it is made.
     #[arg(long, value_name = "BYTES", default_value = "8GiB")]
@@ -42,6 +45,20 @@ struct Arguments {
     /// File whose first line is the token a client must show.
     #[arg(long, value_name = "F")]
     token_file: Option<PathBuf>,
+    /// Encrypt with this certificate (chain), PEM.
+    #[arg(long, value_name = "F", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Key of the certificate, PEM.
+    #[arg(long, value_name = "F", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Make a self-signed certificate for these hosts and addresses, write it and its key to the files
+    /// of --tls-cert and --tls-key, and end; clients trust the same file (--tls-ca).
+    #[arg(long, value_name = "HOST,...", value_delimiter = ',', requires = "tls_cert")]
+    make_certificate: Vec<String>,
+    /// Listen on an address that other machines can reach without token and encryption: whoever reaches
+    /// it can use this server and read what others send.
+    #[arg(long)]
+    insecure: bool,
     /// Form of the log on standard error; RUST_LOG sets how much.
     #[arg(long, value_enum, default_value_t = LogForm::Text)]
     log: LogForm,
@@ -88,6 +105,11 @@ fn start_log(form: LogForm) {
 }
 
 fn run(arguments: Arguments) -> anyhow::Result<()> {
+    if let (false, Some(certificate), Some(key)) =
+        (arguments.make_certificate.is_empty(), &arguments.tls_cert, &arguments.tls_key)
+    {
+        return Ok(make_certificate(&arguments.make_certificate, certificate, key)?);
+    }
     let config = config(&arguments)?;
     let (stop, stopped) = watch::channel(false);
     // Before the first thread: all of them leave these signals to the one that waits.
@@ -119,14 +141,21 @@ fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
             Some(first)
         }
     };
+    let encryption = match (&arguments.tls_cert, &arguments.tls_key) {
+        (Some(certificate), Some(key)) => Some(Encryption::read(certificate, key)?),
+        _ => None,
+    };
     Ok(ServerConfig {
         listen: address(&arguments.listen)?,
         threads: arguments.threads.unwrap_or(usual.threads),
         max_nodes: arguments.max_nodes,
         max_sessions: arguments.max_sessions,
+        max_sessions_per_address: arguments.max_sessions_per_address,
         memory_limit: arguments.memory_limit.0,
         column_cache: arguments.column_cache.0,
         token,
+        encryption,
+        is_insecure: arguments.insecure,
         measure_at_start: true,
         real_time: arguments.real_time,
         ..usual

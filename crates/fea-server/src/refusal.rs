@@ -75,6 +75,10 @@ pub(crate) enum Refusal {
     Yield { value: f64 },
     #[error("this server wants a token (--token-file); say Hello with the right one first")]
     Token,
+    #[error(
+        "too many wrong tokens from this address; try again {seconds} s after the last of them"
+    )]
+    Barred { seconds: u64 },
     #[error("the server is at fault: the work on this request ended abnormally")]
     Internal,
 }
@@ -103,7 +107,7 @@ impl Refusal {
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
             Self::Uncertain { .. } | Self::NoEquilibrium(_) => RejectCode::Uncertain,
-            Self::Token => RejectCode::NotAuthorised,
+            Self::Token | Self::Barred { .. } => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,
             Self::Limit(_) => RejectCode::TooLarge,
             _ => RejectCode::BadRequest,

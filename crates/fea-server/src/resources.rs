@@ -1,5 +1,6 @@
 //! The resources that all requests of one server share.
 
+use crate::access::Access;
 use crate::budget::Budget;
 use crate::config::ServerConfig;
 use crate::plan::MeasuredRates;
@@ -9,6 +10,7 @@ use crate::workers::Workers;
 /// Settings, kept models, memory, solving threads and their speed.
 pub(crate) struct Resources {
     pub config: ServerConfig,
+    pub access: Access,
     pub models: ModelStore,
     pub budget: Budget,
     pub workers: Workers,
@@ -20,6 +22,7 @@ impl Resources {
     pub fn new(config: ServerConfig, workers: Workers) -> Self {
         let budget = Budget::new(config.memory_limit);
         let models = ModelStore::new(budget.clone());
-        Self { config, models, budget, workers, rates: MeasuredRates::default() }
+        let access = Access::new(config.token.as_deref());
+        Self { config, access, models, budget, workers, rates: MeasuredRates::default() }
     }
 }

@@ -6,11 +6,13 @@ use std::time::Duration;
 
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{Limits, RejectCode, Rejected, Reply};
+use tokio::io::AsyncWrite;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 use tokio::task::JoinSet;
 
 use crate::config::{ConfigError, ServerConfig};
+use crate::places::{NoPlace, Places};
 use crate::resources::Resources;
 use crate::session::{self, ServerHandle};
 use crate::uploads::Uploads;
@@ -47,6 +49,10 @@ pub enum StartError {
 
 /// Sessions that are still at work this long after a stop are cut off.
 const STOP_GRACE: Duration = Duration::from_secs(2);
+/// A silent peer is asked whether it is there after this long, and again so often; the system gives it
+/// up after some questions without an answer.
+const ALIVE_AFTER: Duration = Duration::from_secs(30);
+const ALIVE_EVERY: Duration = Duration::from_secs(10);
 /// Pause after a failed accept, so that a process out of file descriptors does not spin.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
@@ -67,7 +73,7 @@ pub async fn serve(
     let workers =
         Workers::new(threads).map_err(|source| StartError::Threads { threads, source })?;
     on_ready(listener.local_addr().map_err(listen_error)?);
-    let places = Arc::new(Semaphore::new(config.max_sessions));
+    let places = Places::new(config.max_sessions, config.max_sessions_per_address);
     let measure_at_start = config.measure_at_start;
     let resources = Arc::new(Resources::new(config, workers));
     if measure_at_start {
@@ -76,14 +82,10 @@ pub async fn serve(
             later.rates.get();
         });
     }
-    let server = ServerHandle {
-        resources,
-        uploads: Uploads::default(),
-        places: Arc::clone(&places),
-        stop: stop.clone(),
-    };
+    let server =
+        ServerHandle { resources, uploads: Uploads::default(), places, stop: stop.clone() };
     let mut sessions = JoinSet::new();
-    accept_until_stopped(&listener, &server, &places, stop, &mut sessions).await;
+    accept_until_stopped(&listener, &server, stop, &mut sessions).await;
     drop(listener);
     tracing::info!(sessions = sessions.len(), "stopping");
     let all_done = async { while sessions.join_next().await.is_some() {} };
@@ -97,7 +99,6 @@ pub async fn serve(
 async fn accept_until_stopped(
     listener: &TcpListener,
     server: &ServerHandle,
-    places: &Arc<Semaphore>,
     mut stop: watch::Receiver<bool>,
     sessions: &mut JoinSet<()>,
 ) {
@@ -108,19 +109,12 @@ async fn accept_until_stopped(
             Some(_) = sessions.join_next(), if !sessions.is_empty() => continue,
         };
         match accepted {
-            Ok((stream, peer)) => match Arc::clone(places).try_acquire_owned() {
-                Ok(place) => {
-                    let server = server.clone();
-                    sessions.spawn(async move {
-                        session::serve(stream, peer, server).await;
-                        drop(place);
-                    });
+            Ok((stream, peer)) => {
+                if let Err(error) = make_ready(&stream) {
+                    tracing::warn!(%peer, %error, "a connection could not be set up");
                 }
-                Err(_) => {
-                    tracing::warn!(%peer, "turned away: all sessions are taken");
-                    sessions.spawn(turn_away(stream));
-                }
-            },
+                sessions.spawn(attend(stream, peer, server.clone()));
+            }
             Err(error) => {
                 tracing::error!(%error, "a connection could not be accepted");
                 tokio::time::sleep(ACCEPT_PAUSE).await;
@@ -129,9 +123,45 @@ async fn accept_until_stopped(
     }
 }
 
+/// A frame is sent at once, and a peer that is gone without a word is noticed.
+fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
+    stream.set_nodelay(true)?;
+    let alive = socket2::TcpKeepalive::new().with_time(ALIVE_AFTER).with_interval(ALIVE_EVERY);
+    socket2::SockRef::from(stream).set_tcp_keepalive(&alive)
+}
+
+/// Serves a connection if there is a place for it, encrypted if the server is; else says why not.
+async fn attend(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
+    let place = server.places.take(peer.ip());
+    let config = &server.resources.config;
+    let Some(encryption) = &config.encryption else {
+        return match place {
+            Ok(_place) => session::serve(stream, peer, server).await,
+            Err(why) => turn_away(stream, peer, why).await,
+        };
+    };
+    // A handshake costs: whoever has no place does not get one.
+    let _place = match place {
+        Ok(place) => place,
+        Err(why) => return tracing::warn!(%peer, %why, "turned away"),
+    };
+    let handshake = encryption.acceptor().accept(stream);
+    let mut stop = server.stop.clone();
+    let shaken = tokio::select! {
+        shaken = tokio::time::timeout(config.greeting_limit, handshake) => shaken,
+        () = session::stopped(&mut stop) => return,
+    };
+    match shaken {
+        Ok(Ok(stream)) => session::serve(stream, peer, server).await,
+        Ok(Err(error)) => tracing::warn!(%peer, %error, "TLS could not be agreed on"),
+        Err(_) => tracing::warn!(%peer, "TLS was not agreed on in time"),
+    }
+}
+
 /// Tells a client that there is no place, and closes.
-async fn turn_away(stream: TcpStream) {
-    let text = "all sessions of this server are taken (--max-sessions); try again later".to_owned();
+async fn turn_away<S: AsyncWrite + Unpin>(stream: S, peer: SocketAddr, why: NoPlace) {
+    tracing::warn!(%peer, %why, "turned away");
+    let text = why.to_string();
     let reply = Reply::Rejected(Rejected { code: RejectCode::Busy, text, detail: String::new() });
     let mut bytes = Vec::new();
     if reply.encode_into(0, &Limits::default(), &mut bytes).is_ok() {

@@ -8,17 +8,18 @@ use softgrasp_protocol::{
     ConnectionError, Frame, FrameError, Hello, Kind, Limits, ModelHash, RejectCode, Rejected,
     Reply, Request, Welcome,
 };
-use tokio::net::TcpStream;
-use tokio::sync::{Semaphore, watch};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::sync::watch;
 
 use crate::answer::{
     Readiness, answer_frame, answer_large_frame, prefetch, prove, readiness, solve_large,
     solve_once, upload,
 };
-use crate::client_connection::{ClientConnection, SessionError};
+use crate::client_connection::{ClientConnection, Patience, SessionError};
 use crate::clock::{StageClock, ms_since};
 use crate::held_models::HeldModels;
 use crate::paths::{Paths, Seat};
+use crate::places::Places;
 use crate::refusal::Refusal;
 use crate::resources::Resources;
 use crate::uploads::Uploads;
@@ -29,16 +30,15 @@ use crate::workers::Workers;
 pub(crate) struct ServerHandle {
     pub resources: Arc<Resources>,
     pub uploads: Uploads,
-    /// Places for sessions that are still free.
-    pub places: Arc<Semaphore>,
+    /// Places for sessions.
+    pub places: Places,
     pub stop: watch::Receiver<bool>,
 }
 
 impl ServerHandle {
     /// Whether so few sessions are there that one may use the sockets' thread for a moment.
     fn is_quiet(&self) -> bool {
-        let max = self.resources.config.max_sessions;
-        max.saturating_sub(self.places.available_permits()) <= QUIET_MAX
+        self.places.taken() <= QUIET_MAX
     }
 }
 
@@ -47,16 +47,18 @@ const QUIET_MAX: usize = 4;
 
 /// Serves one connection until the client goes, sends bytes that are no frames, or the server
 /// stops.
-pub(crate) async fn serve(stream: TcpStream, peer: SocketAddr, mut server: ServerHandle) {
-    if let Err(error) = stream.set_nodelay(true) {
-        tracing::warn!(%peer, %error, "TCP_NODELAY could not be set");
-    }
-    let limits = server.resources.config.limits();
-    let stall_limit = server.resources.config.stall_limit;
+pub(crate) async fn serve<S>(stream: S, peer: SocketAddr, mut server: ServerHandle)
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    let config = &server.resources.config;
+    let wants_token = server.resources.access.wants_token();
+    let limits = if wants_token { config.limits_of_strangers() } else { config.limits() };
     let mut session = Session {
-        connection: ClientConnection::new(stream, limits, stall_limit),
-        limits,
-        authorised: server.resources.config.token.is_none(),
+        connection: ClientConnection::new(stream, limits, Patience::of(config), wants_token),
+        peer,
+        limits: config.limits(),
+        authorised: !wants_token,
         held: HeldModels::new(Arc::clone(&server.resources)),
         paths: Paths::default(),
         out: Vec::new(),
@@ -73,8 +75,9 @@ pub(crate) async fn stopped(stop: &mut watch::Receiver<bool>) {
     let _ = stop.wait_for(|stop| *stop).await;
 }
 
-struct Session {
-    connection: ClientConnection<TcpStream>,
+struct Session<S> {
+    connection: ClientConnection<S>,
+    peer: SocketAddr,
     limits: Limits,
     authorised: bool,
     held: HeldModels,
@@ -84,7 +87,7 @@ struct Session {
     out: Vec<u8>,
 }
 
-impl Session {
+impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     async fn run(&mut self, server: &mut ServerHandle) -> Result<(), SessionError> {
         loop {
             let mut stop = server.stop.clone();
@@ -170,6 +173,9 @@ impl Session {
         if !self.authorised && !matches!(request, Request::Hello(_)) {
             return Err(Refusal::Token);
         }
+        if !matches!(request, Request::Hello(_)) {
+            self.connection.is_known(self.limits);
+        }
         let resources = Arc::clone(&server.resources);
         let queued = Instant::now();
         let watch = resources.config.stage.clone();
@@ -240,12 +246,13 @@ impl Session {
     }
 
     fn welcome(&mut self, hello: &Hello, server: &ServerHandle) -> Result<Reply, Refusal> {
-        if let Some(token) = &server.resources.config.token {
-            if !same_secret(token, hello.token.as_deref().unwrap_or("")) {
-                return Err(Refusal::Token);
-            }
-            self.authorised = true;
+        let shown = hello.token.as_deref();
+        if let Err(refusal) = server.resources.access.check(self.peer.ip(), shown, Instant::now()) {
+            tracing::warn!(peer = %self.peer, %refusal, "a token was refused");
+            return Err(refusal);
         }
+        self.authorised = true;
+        self.connection.is_known(self.limits);
         tracing::info!(client = hello.client, "client introduced itself");
         Ok(Reply::Welcome(Welcome {
             server: "fea-server".to_owned(),
@@ -254,9 +261,4 @@ impl Session {
             limits: self.limits,
         }))
     }
-}
-
-/// Compares without telling by the time taken where the first difference is.
-fn same_secret(a: &str, b: &str) -> bool {
-    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |diff, (a, b)| diff | (a ^ b)) == 0
 }

@@ -13,6 +13,9 @@ use softgrasp_protocol::{
     Welcome,
 };
 
+use crate::endpoint::{Endpoint, TrustError};
+use crate::server_stream::ServerStream;
+
 /// Where the finite element server is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ServerChoice {
@@ -66,6 +69,9 @@ pub enum LinkError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// Encryption cannot be used.
+    #[error(transparent)]
+    Encryption(#[from] TrustError),
     /// The connection broke.
     #[error("the connection to the server broke: {0}")]
     Connection(#[from] ConnectionError),
@@ -93,7 +99,7 @@ pub enum LinkError {
 
 /// A connection that has been introduced.
 pub struct ServerConnection {
-    connection: Connection<TcpStream>,
+    connection: Connection<ServerStream>,
     limits: Limits,
     welcome: Welcome,
     request_id: u64,
@@ -102,7 +108,7 @@ pub struct ServerConnection {
 
 /// An address to connect to, and the server behind it if it is this process's own.
 pub struct Host {
-    address: String,
+    endpoint: Endpoint,
     stage: StageWatch,
     // Stops when dropped.
     _embedded: Option<RunningServer>,
@@ -135,9 +141,7 @@ impl Host {
     ) -> Result<Self, LinkError> {
         let stage = StageWatch::default();
         match choice {
-            ServerChoice::At(address) => {
-                Ok(Self { address: address.clone(), stage, _embedded: None })
-            }
+            ServerChoice::At(address) => Ok(Self::at(address.into())),
             ServerChoice::Embedded => {
                 let usual = ServerConfig::default();
                 let config = ServerConfig {
@@ -149,9 +153,15 @@ impl Host {
                     ..usual
                 };
                 let server = fea_server::start(config)?;
-                Ok(Self { address: server.address().to_string(), stage, _embedded: Some(server) })
+                let endpoint = server.address().to_string().into();
+                Ok(Self { endpoint, stage, _embedded: Some(server) })
             }
         }
+    }
+
+    /// A server elsewhere.
+    pub fn at(endpoint: Endpoint) -> Self {
+        Self { endpoint, stage: StageWatch::default(), _embedded: None }
     }
 
     /// What the embedded server is doing now, in a word; empty while it does nothing, and for a
@@ -165,23 +175,24 @@ impl Host {
     ///
     /// # Errors
     /// [`LinkError`].
-    pub fn connect(&self, token: Option<&str>) -> Result<ServerConnection, LinkError> {
-        ServerConnection::connect(&self.address, token)
+    pub fn connect(&self) -> Result<ServerConnection, LinkError> {
+        ServerConnection::connect(&self.endpoint)
     }
 
-    /// Address of the server.
-    pub fn address(&self) -> &str {
-        &self.address
+    /// The server.
+    pub fn endpoint(&self) -> &Endpoint {
+        &self.endpoint
     }
 }
 
 impl ServerConnection {
-    /// Connects to `HOST:PORT` and says hello.
+    /// Connects to a server and says hello, with the token if there is one.
     ///
     /// # Errors
     /// [`LinkError`].
-    pub fn connect(address: &str, token: Option<&str>) -> Result<Self, LinkError> {
-        let stream = open_stream(address)?;
+    pub fn connect(to: impl Into<Endpoint>) -> Result<Self, LinkError> {
+        let endpoint = to.into();
+        let stream = ServerStream::new(open_socket(&endpoint.address)?, &endpoint)?;
         let mut this = Self {
             connection: Connection::new(stream, Limits::default()),
             limits: Limits::default(),
@@ -196,7 +207,7 @@ impl ServerConnection {
         };
         let hello = Hello {
             client: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
-            token: token.map(str::to_owned),
+            token: endpoint.token,
         };
         match this.ask(&Request::Hello(hello))? {
             Reply::Welcome(welcome) => this.welcome = welcome,
@@ -212,17 +223,13 @@ impl ServerConnection {
 
     /// The stream, to set time limits on it or to shut it down.
     pub fn stream(&self) -> &TcpStream {
-        self.connection.stream()
+        self.connection.stream().socket()
     }
 
     /// Whether the server has closed the connection, or has said something that nobody asked for,
     /// as it does before it closes; never waits. To be called while no reply is awaited.
-    pub fn is_closed(&self) -> bool {
-        let stream = self.connection.stream();
-        let peeked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut [0]));
-        let restored = stream.set_nonblocking(false);
-        let quiet = peeked.is_err_and(|e| e.kind() == std::io::ErrorKind::WouldBlock);
-        !quiet || restored.is_err()
+    pub fn is_closed(&mut self) -> bool {
+        !self.connection.stream_mut().is_quiet()
     }
 
     /// Sends a request and waits for its reply; replies to abandoned requests are passed over.
@@ -264,7 +271,7 @@ impl ServerConnection {
     /// Next frame; sleeps only for one that has not come after [`AWAKE_MAX`].
     fn read_frame_awake(&mut self) -> Result<Option<Frame>, ConnectionError> {
         let start = Instant::now();
-        self.connection.stream().set_nonblocking(true)?;
+        self.stream().set_nonblocking(true)?;
         let early = loop {
             match self.connection.read_frame() {
                 Err(ConnectionError::ReadTimedOut { .. }) if start.elapsed() < AWAKE_MAX => {
@@ -275,7 +282,7 @@ impl ServerConnection {
                 frame => break Some(frame),
             }
         };
-        self.connection.stream().set_nonblocking(false)?;
+        self.stream().set_nonblocking(false)?;
         early.unwrap_or_else(|| self.connection.read_frame())
     }
 
@@ -322,7 +329,7 @@ pub fn unexpected(asked: &str, reply: &Reply) -> LinkError {
     LinkError::Unexpected { asked: asked.to_owned(), got: format!("{:?}", reply.kind()) }
 }
 
-fn open_stream(address: &str) -> Result<TcpStream, LinkError> {
+fn open_socket(address: &str) -> Result<TcpStream, LinkError> {
     let found = address
         .to_socket_addrs()
         .map_err(|source| LinkError::Address { address: address.to_owned(), source })?;

@@ -32,6 +32,11 @@ impl<S> Connection<S> {
         &mut self.stream
     }
 
+    /// Other limits on what is read, from the next header on.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.buffer.set_limits(limits);
+    }
+
     /// Whether a frame has begun to come and has not ended; an idle peer may be waited for longer
     /// than one that stops inside a frame.
     pub fn is_inside_frame(&self) -> bool {

@@ -26,6 +26,11 @@ impl<S> Connection<S> {
         &self.stream
     }
 
+    /// The stream below, to look whether something has come.
+    pub fn stream_mut(&mut self) -> &mut S {
+        &mut self.stream
+    }
+
     /// Whether a frame has begun to come and has not ended.
     pub fn is_inside_frame(&self) -> bool {
         self.buffer.received() > 0

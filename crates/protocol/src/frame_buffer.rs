@@ -60,6 +60,11 @@ impl FrameBuffer {
         Self { limits, storage: BytesMut::new(), received: 0, front: None, failed: None }
     }
 
+    /// Other limits from the next header on.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits;
+    }
+
     /// Appends bytes that are in memory already.
     pub fn feed(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {

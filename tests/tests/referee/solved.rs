@@ -74,7 +74,7 @@ impl Asked {
 
     fn by_socket(&self, object: &Object, system: &System, question: &Question) -> Found {
         let address = self.server.address().to_string();
-        let mut connection = ServerConnection::connect(&address, None).unwrap();
+        let mut connection = ServerConnection::connect(&address).unwrap();
         let value = |&(dof, value): &(u32, f64)| DofValue { dof, value };
         let (element, method) = match system.element {
             Element::Tet4 => (ElementChoice::T4, "condensed"),

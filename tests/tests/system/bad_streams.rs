@@ -260,8 +260,10 @@ fn requests_before_the_right_token_are_refused_and_the_token_opens_the_session()
     // The next session starts without.
     refuse(&mut RawSession::open(server.address()), 1, &ping(1));
     let address = server.address().to_string();
-    assert!(ServerConnection::connect(&address, Some("open sesame")).is_ok());
-    let wrong = ServerConnection::connect(&address, Some("wrong")).err();
+    assert!(
+        ServerConnection::connect(Endpoint::from(&address).with_token(Some("open sesame"))).is_ok()
+    );
+    let wrong = ServerConnection::connect(Endpoint::from(&address).with_token(Some("wrong"))).err();
     assert!(matches!(wrong, Some(LinkError::Rejected(r)) if r.code == RejectCode::NotAuthorised));
 }
 
@@ -273,14 +275,14 @@ fn one_session_too_many_is_told_busy_and_a_place_that_is_left_is_given_again() {
         let first = client(&server);
         let mut second = client(&server);
         for _ in 0..20 {
-            let error = ServerConnection::connect(&address, None).err();
+            let error = ServerConnection::connect(&address).err();
             let Some(LinkError::Rejected(rejected)) = error else { panic!("{error:?}") };
             assert_eq!(rejected.code, RejectCode::Busy);
             assert!(rejected.text.contains("--max-sessions"), "{}", rejected.text);
         }
         assert_eq!(second.ask(&ping(5)).unwrap(), Reply::Pong { nonce: 5 });
         drop(first);
-        until(LIMIT, "a free place", || ServerConnection::connect(&address, None).is_ok());
+        until(LIMIT, "a free place", || ServerConnection::connect(&address).is_ok());
     });
 }
 

@@ -6,6 +6,7 @@
     reason = "helpers of tests fail and speak like tests"
 )]
 
+mod access;
 mod bad_requests;
 mod bad_streams;
 mod control;

@@ -1,5 +1,6 @@
 //! The commands of `glove-client`, one file each; `main` only parses and prints the error.
 
+mod access_arguments;
 pub mod align;
 mod arm_recording;
 pub mod calibrate;

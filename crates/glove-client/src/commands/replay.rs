@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use clap::Args;
 
+use super::access_arguments::AccessArguments;
 use super::numbers::{count, speed};
 use super::run::RunCommand;
 use super::run_arguments::RunArguments;
@@ -28,6 +29,8 @@ pub struct ReplayCommand {
     /// Where to solve: HOST:PORT, or embedded [default: embedded].
     #[arg(long, value_name = "ADDR|embedded")]
     server: Option<ServerChoice>,
+    #[command(flatten)]
+    access: AccessArguments,
     /// Threads of the embedded server [default: one per processor].
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     threads: Option<usize>,
@@ -46,6 +49,7 @@ impl ReplayCommand {
             hand: Some(HandRequest::Replay(self.recording.clone())),
             speed: Some(self.speed),
             server: self.server.clone(),
+            access: self.access.clone(),
             threads: self.threads,
             report: self.report.clone(),
             headless: true,

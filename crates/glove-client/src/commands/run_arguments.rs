@@ -13,6 +13,7 @@ use softgrasp_core::hand::HandDimensions;
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
+use super::access_arguments::AccessArguments;
 use super::display_arguments::DisplayArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::hand_files::read_configuration;
@@ -20,6 +21,7 @@ use super::numbers::{count, place, poisson, positive, speed, ticks};
 use super::recorded_settings::{recorded_hand, recorded_place, recorded_settings};
 use crate::connection::ServerChoice;
 use crate::contact_model::ContactModel;
+use crate::endpoint::Endpoint;
 use crate::foreign_recording::is_foreign;
 use crate::hand_reader::HandSetup;
 use crate::hand_request::HandRequest;
@@ -67,6 +69,8 @@ pub struct RunArguments {
     /// Where to solve: HOST:PORT, or embedded [default: embedded].
     #[arg(long, value_name = "ADDR|embedded")]
     pub(super) server: Option<ServerChoice>,
+    #[command(flatten)]
+    pub(super) access: AccessArguments,
     /// Threads of the embedded server [default: one per processor].
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub(super) threads: Option<usize>,
@@ -149,6 +153,8 @@ pub(super) struct RunPlan {
     pub(super) settings: SolveSettings,
     /// Where to solve.
     pub(super) server: ServerChoice,
+    /// How a server elsewhere is spoken to.
+    pub(super) endpoint: Option<Endpoint>,
     /// Where the hand comes from.
     pub(super) hand: HandRequest,
     /// Whether ticks wait for answers.
@@ -226,6 +232,7 @@ impl RunArguments {
         let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
         let object_size =
             self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
+        let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
         Ok(RunPlan {
             object,
             nodes: self.nodes.or(scene.nodes).unwrap_or(NODES_DEFAULT),
@@ -242,7 +249,8 @@ impl RunArguments {
                 elasticity,
                 max_error: self.max_error,
             },
-            server: self.server.clone().unwrap_or(ServerChoice::Embedded),
+            endpoint: self.access.to(&server)?,
+            server,
             pace: if period.is_some() { Pace::Free } else { Pace::Lockstep },
             period,
             is_live: hand.is_live(),
@@ -278,12 +286,14 @@ impl RunArguments {
         let watched = console_is_watched() && !self.is_without_window();
         let speed = self.speed.unwrap_or(if watched { 1.0 } else { 0.0 });
         let period = (speed > 0.0).then(|| (recorded_s / speed).min(PERIOD_MAX_S));
+        let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
         Ok(RunPlan {
             object: self.object.clone().map_or_else(|| setup.object.parse(), Ok)?,
             nodes: setup.nodes,
             object_size: setup.size_m,
             settings: recorded_settings(setup)?,
-            server: self.server.clone().unwrap_or(ServerChoice::Embedded),
+            endpoint: self.access.to(&server)?,
+            server,
             hand: HandRequest::Replay(path.to_owned()),
             // Each tick waits for the answers that it took before.
             pace: Pace::Lockstep,

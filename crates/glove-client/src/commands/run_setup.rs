@@ -89,13 +89,16 @@ pub(super) fn make_ready(
         Pace::Free => priority_for(&mut object)?,
     };
     at(SetupStage::Server);
-    let host = Host::open(&plan.server, setup.threads)?;
+    let host = match &plan.endpoint {
+        Some(endpoint) => Host::at(endpoint.clone()),
+        None => Host::open(&plan.server, setup.threads)?,
+    };
     // A wrong address is a wrong address; a server that goes later is survived.
-    drop(host.connect(None)?);
+    drop(host.connect()?);
     // From here on an interruption ends the run with its report.
     interruption::hear();
     let link =
-        Link::start(host.address(), priority).context("cannot start the link to the server")?;
+        Link::start(host.endpoint(), priority).context("cannot start the link to the server")?;
     if std::io::stderr().is_terminal() {
         summary.notes.iter().for_each(|note| eprintln!("glove-client: {note}"));
     }

@@ -16,6 +16,7 @@ use softgrasp_protocol::{
     SolveOnce, Want,
 };
 
+use super::access_arguments::AccessArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
@@ -49,6 +50,8 @@ pub struct SolveCommand {
     /// Where to solve: HOST:PORT, or embedded.
     #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
     server: ServerChoice,
+    #[command(flatten)]
+    access: AccessArguments,
     /// Threads of the embedded server [default: one per processor].
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     threads: Option<usize>,
@@ -154,8 +157,11 @@ impl SolveCommand {
             );
         }
         let limit = self.memory_limit.map(|Bytes(bytes)| bytes);
-        let host = Host::open_within(&self.server, self.threads, limit)?;
-        let mut connection = host.connect(None)?;
+        let host = match self.access.to(&self.server)? {
+            Some(endpoint) => Host::at(endpoint),
+            None => Host::open_within(&self.server, self.threads, limit)?,
+        };
+        let mut connection = host.connect()?;
         let nodes = file.mesh.node_count();
         progress.now(&match &self.server {
             ServerChoice::Embedded => format!("{nodes} nodes:"),
@@ -280,7 +286,7 @@ impl SolveCommand {
             },
             server: match &self.server {
                 ServerChoice::Embedded => "embedded".to_owned(),
-                ServerChoice::At(_) => host.address().to_owned(),
+                ServerChoice::At(_) => host.endpoint().address.clone(),
             },
             solve,
             discretisation_estimate_rel: discretisation.rel,

@@ -9,6 +9,7 @@ use softgrasp_protocol::{LargeAsk, Question};
 use super::event::{LinkEvent, RequestEnd};
 use super::outbox::{Activity, LinkState, Shared, TickRequest};
 use super::worker::Worker;
+use crate::endpoint::Endpoint;
 use crate::model_upload::ModelUpload;
 use crate::prefetch::Hint;
 use crate::tick_budget::Priority;
@@ -26,9 +27,9 @@ impl Link {
     ///
     /// # Errors
     /// The system's, when it gives no thread.
-    pub fn start(address: &str, priority: Priority) -> std::io::Result<Self> {
+    pub fn start(server: impl Into<Endpoint>, priority: Priority) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
-        let worker = Worker::new(Arc::clone(&shared), address.to_owned(), priority);
+        let worker = Worker::new(Arc::clone(&shared), server.into(), priority);
         let thread = std::thread::Builder::new().name("link".to_owned());
         let thread = thread.spawn(move || worker.work())?;
         Ok(Self { shared, thread: Some(thread) })

@@ -11,6 +11,7 @@ use softgrasp_protocol::{
 use super::event::{LinkEvent, Reached, RequestEnd};
 use super::outbox::{Activity, LinkState, Shared, TickRequest};
 use crate::connection::{LinkError, ServerConnection, unexpected};
+use crate::endpoint::Endpoint;
 use crate::model_upload::ModelUpload;
 use crate::prefetch::Hint;
 use crate::tick_budget::{Priority, TickBudget};
@@ -28,7 +29,7 @@ const REFUSAL_LEN_MAX: usize = 120;
 /// The thread and what it knows of the server.
 pub struct Worker {
     shared: Arc<Shared>,
-    address: String,
+    endpoint: Endpoint,
     budget: TickBudget,
     session: Option<Session>,
 }
@@ -61,8 +62,8 @@ struct Job {
 
 impl Worker {
     /// A worker that has not connected yet.
-    pub fn new(shared: Arc<Shared>, address: String, priority: Priority) -> Self {
-        Self { shared, address, budget: TickBudget::new(priority), session: None }
+    pub fn new(shared: Arc<Shared>, endpoint: Endpoint, priority: Priority) -> Self {
+        Self { shared, endpoint, budget: TickBudget::new(priority), session: None }
     }
 
     /// Works until the link is to end.
@@ -113,12 +114,12 @@ impl Worker {
 
     /// Does a job; the request in it is ended and taken out unless the server was lost.
     fn do_job(&mut self, job: &mut Job) -> Result<(), LinkError> {
-        let Self { shared, address, budget, session } = self;
+        let Self { shared, endpoint, budget, session } = self;
         let session = match session {
             Some(session) => session,
             None => {
                 budget.step_back();
-                session.insert(Session::open(address, shared)?)
+                session.insert(Session::open(endpoint, shared)?)
             }
         };
         let hash = job.model.hash;
@@ -171,9 +172,9 @@ impl Worker {
 }
 
 impl Session {
-    fn open(address: &str, shared: &Shared) -> Result<Self, LinkError> {
+    fn open(endpoint: &Endpoint, shared: &Shared) -> Result<Self, LinkError> {
         shared.lock().activity = Activity::Connecting;
-        let connection = ServerConnection::connect(address, None)?;
+        let connection = ServerConnection::connect(endpoint)?;
         let timed = connection.stream().set_read_timeout(Some(SILENCE_MAX));
         timed.map_err(|e| LinkError::Connection(e.into()))?;
         let welcome = connection.welcome();

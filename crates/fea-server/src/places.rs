@@ -1,0 +1,113 @@
+//! Places for sessions: so many at the same time, and so many of them for one address.
+
+use std::collections::BTreeMap;
+use std::net::IpAddr;
+use std::sync::Arc;
+
+use crate::lock::Lock;
+
+/// Places for sessions that are taken and given back.
+#[derive(Clone)]
+pub(crate) struct Places {
+    taken: Arc<Lock<Taken>>,
+    max: usize,
+    of_address_max: usize,
+}
+
+#[derive(Default)]
+struct Taken {
+    all: usize,
+    by_address: BTreeMap<IpAddr, usize>,
+}
+
+/// A place that is taken until it is dropped.
+pub(crate) struct Place {
+    places: Places,
+    address: IpAddr,
+}
+
+/// Why there is no place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum NoPlace {
+    #[error("all sessions of this server are taken (--max-sessions); try again later")]
+    Server,
+    #[error(
+        "all sessions for your address are taken (--max-sessions-per-address); end one of them first"
+    )]
+    Address,
+}
+
+impl Places {
+    /// `max` places, of which one address may take `of_address_max`.
+    pub fn new(max: usize, of_address_max: usize) -> Self {
+        Self { taken: Arc::default(), max, of_address_max }
+    }
+
+    /// Takes a place. Programs on the server's own machine share all places: they are one address.
+    ///
+    /// # Errors
+    /// [`NoPlace`].
+    pub fn take(&self, address: IpAddr) -> Result<Place, NoPlace> {
+        let address = address.to_canonical();
+        self.taken.with(|taken| {
+            if taken.all >= self.max {
+                return Err(NoPlace::Server);
+            }
+            let of_address = taken.by_address.get(&address).copied().unwrap_or(0);
+            if of_address >= self.of_address_max && !address.is_loopback() {
+                return Err(NoPlace::Address);
+            }
+            taken.all += 1;
+            taken.by_address.insert(address, of_address + 1);
+            Ok(Place { places: self.clone(), address })
+        })
+    }
+
+    /// Places taken now.
+    pub fn taken(&self) -> usize {
+        self.taken.with(|taken| taken.all)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.places.taken.with(|taken| {
+            taken.all -= 1;
+            if let Some(of_address) = taken.by_address.get_mut(&self.address) {
+                *of_address -= 1;
+                if *of_address == 0 {
+                    taken.by_address.remove(&self.address);
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_of_server_and_address_run_out_and_come_back() {
+        let places = Places::new(3, 2);
+        let [a, b] = [[10, 0, 0, 1], [10, 0, 0, 2]].map(IpAddr::from);
+        let first = places.take(a).unwrap();
+        let _second = places.take(a).unwrap();
+        assert_eq!(places.take(a).err(), Some(NoPlace::Address));
+        let _third = places.take(b).unwrap();
+        assert_eq!(places.take(b).err(), Some(NoPlace::Server));
+        assert_eq!(places.taken(), 3);
+        drop(first);
+        assert!(places.take(a).is_ok());
+        assert_eq!(places.taken(), 2);
+        assert_eq!(places.taken.with(|taken| taken.by_address.len()), 2);
+    }
+
+    #[test]
+    fn programs_on_the_same_machine_may_take_all_places() {
+        let places = Places::new(3, 1);
+        let own = [[127, 0, 0, 1], [127, 0, 0, 1], [127, 8, 0, 1]].map(IpAddr::from);
+        let taken: Vec<_> = own.map(|address| places.take(address)).into_iter().collect();
+        assert!(taken.iter().all(Result::is_ok));
+    }
+}

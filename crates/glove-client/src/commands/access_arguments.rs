@@ -1,0 +1,44 @@
+//! The arguments that let a client in at a server: a token, and whose certificates are trusted.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, ensure};
+use clap::Args;
+
+use crate::connection::ServerChoice;
+use crate::endpoint::{Endpoint, Trust};
+
+/// What a server elsewhere wants.
+#[derive(Args, Clone, Default)]
+pub(super) struct AccessArguments {
+    /// File whose first line is the token that the server wants.
+    #[arg(long, value_name = "F")]
+    token_file: Option<PathBuf>,
+    /// Speak TLS, and trust the certificates in this PEM file: those of an authority, or the server's
+    /// own.
+    #[arg(long, value_name = "F.pem")]
+    tls_ca: Option<PathBuf>,
+}
+
+impl AccessArguments {
+    /// How a server is spoken to; the embedded one needs nothing of it.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is empty, and arguments that go with no server elsewhere.
+    pub fn to(&self, server: &ServerChoice) -> anyhow::Result<Option<Endpoint>> {
+        let ServerChoice::At(address) = server else {
+            let is_given = self.token_file.is_some() || self.tls_ca.is_some();
+            ensure!(!is_given, "--token-file and --tls-ca are for --server HOST:PORT");
+            return Ok(None);
+        };
+        let token = self.token_file.as_ref().map(|path| {
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("cannot read the token file {}", path.display()))?;
+            let token = text.lines().next().unwrap_or("").trim().to_owned();
+            ensure!(!token.is_empty(), "the token file {} is empty", path.display());
+            Ok(token)
+        });
+        let trust = self.tls_ca.as_ref().map(|path| Trust::read(path)).transpose()?;
+        Ok(Some(Endpoint { address: address.clone(), token: token.transpose()?, trust }))
+    }
+}
