@@ -8,7 +8,7 @@ use std::time::Duration;
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{ConnectionError, Frame, HEADER_LEN, Limits};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::config::ServerConfig;
 

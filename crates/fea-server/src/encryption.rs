@@ -80,7 +80,7 @@ impl Encryption {
         let provider = Arc::new(crypto::ring::default_provider());
         rustls::ServerConfig::builder_with_provider(provider)
             .with_protocol_versions(&[&version::TLS13])
-            .map(rustls::ConfigBuilder::with_no_client_auth)
+            .map(|builder| builder.with_no_client_auth())
             .and_then(|builder| builder.with_single_cert(chain, private))
             .map(|config| Self(Arc::new(config)))
             .map_err(|e| EncryptionError::Pair {
