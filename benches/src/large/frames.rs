@@ -82,6 +82,8 @@ pub(super) struct Measured {
     pub estimate_max: f64,
     /// Largest true error over its estimate.
     pub error_over_estimate: f64,
+    /// Frames whose true error is more than twice its estimate.
+    pub over_twice: usize,
     /// Frames that are on another branch of equilibria than the path in double precision.
     pub elsewhere: usize,
     /// Frames for which no equilibrium was found; the shape stayed.
@@ -108,7 +110,7 @@ pub(super) fn play(squeeze: &Squeeze, truth: &Truth, budget: f64) -> Result<Meas
     let (mut ms, mut solve_ms, mut solves, mut errors) = (vec![], vec![], vec![], vec![]);
     let (mut estimate_max, mut over) = (0.0f64, 0.0f64);
     let (mut factors, mut factor_ms) = (0, 0.0f64);
-    let (mut elsewhere, mut refused) = (0, 0);
+    let (mut elsewhere, mut refused, mut over_twice) = (0, 0, 0);
     for frame in 0..truth.frames {
         let mask_q = squeeze.at((frame + 1) as f64 / truth.frames as f64);
         let goal = Goal { q_known: &[], mask_q: &mask_q, forces: &[] };
@@ -139,6 +141,7 @@ pub(super) fn play(squeeze: &Squeeze, truth: &Truth, budget: f64) -> Result<Meas
         // Below this both are rounding.
         if found.error_estimate_rel > 1e-11 {
             over = over.max(error / found.error_estimate_rel);
+            over_twice += usize::from(error > 2.0 * found.error_estimate_rel);
         }
         if let Some(renewal) = path.renewal() {
             let (took, made) = timed_ms(|| renewal.make());
@@ -154,6 +157,7 @@ pub(super) fn play(squeeze: &Squeeze, truth: &Truth, budget: f64) -> Result<Meas
         error: Spread::of(errors),
         estimate_max,
         error_over_estimate: over,
+        over_twice,
         elsewhere,
         refused,
         factors,

@@ -24,7 +24,7 @@ const OBJECTS: [(BuiltIn, f64); 5] = [
 /// The bars: a frame costs at most so many solves of `front` in single precision.
 const BARS: [(f64, f64); 2] = [(2e-3, 6.0), (1e-8, 16.0)];
 
-const COLUMNS: [&str; 20] = [
+const COLUMNS: [&str; 21] = [
     "object",
     "poisson",
     "nodes",
@@ -41,6 +41,7 @@ const COLUMNS: [&str; 20] = [
     "error_max",
     "estimate_max",
     "error_over_estimate",
+    "over_twice",
     "elsewhere",
     "refused",
     "factors",
@@ -165,7 +166,7 @@ fn row(
     frames: usize,
     budget: f64,
     measured: &Measured,
-) -> [Cell; 20] {
+) -> [Cell; 21] {
     [
         Cell::Text(object.to_owned()),
         Cell::Number(poisson),
@@ -183,6 +184,7 @@ fn row(
         Cell::Number(measured.error.max),
         Cell::Number(measured.estimate_max),
         Cell::Number(measured.error_over_estimate),
+        Cell::Count(measured.over_twice as u64),
         Cell::Count(measured.elsewhere as u64),
         Cell::Count(measured.refused as u64),
         Cell::Count(measured.factors as u64),
@@ -300,7 +302,8 @@ Five tips hold parts of the surface (masks), press them in by 8 % of the object'
 error of a displacement over the largest displacement, against a path in double precision whose \
 residuals are rounding; `estimate_max` is what the frames said of themselves. A body that buckles has \
 several equilibria: `elsewhere` counts frames that are on another branch than that path, whose error \
-is the way to the equilibrium that they settle to; `refused` counts those for which none was found. A \
+is the way to the equilibrium that they settle to; `refused` counts those for which none was found, `over_twice` those whose true error is more than twice \
+its estimate. A \
 frame is timed from \
 the goal to the shape, factors that are made beside the frames excluded (`factors`, \
 `factor_ms_max`); its first frame, which makes the first factor, is not among them. `solve_ms` is a \

@@ -23,6 +23,8 @@ const STRAYED_MIN: f64 = 1e-2;
 const JUMP_OVER_STEP: f64 = 5.0;
 /// Estimated error at which a frame without motion stops.
 const RESTING_ERROR_REL: f64 = 1e-10;
+/// Estimated error of a shape from which a motion is tried again that could not be followed.
+const SETTLED_ERROR_REL: f64 = 1e-8;
 /// Solves of a frame without motion; more than those of an old factor, so that it gets a new one.
 const SOLVES_AT_REST: u32 = 5;
 /// Solves after which a piece of a motion has no equilibrium.
@@ -46,6 +48,7 @@ impl Path {
         let (mut done, mut piece) = (0.0, 1.0);
         // Whether the factor is that of the shape that was reached.
         let (mut jumped, mut is_fresh, mut failed_pieces) = (false, false, 0);
+        let mut is_settled = false;
         loop {
             let to = if done + piece > 1.0 - 1e-12 { 1.0 } else { done + piece };
             let is_last = to == 1.0;
@@ -82,6 +85,13 @@ impl Path {
                         is_fresh = true;
                         continue;
                     }
+                    // So may a shape that is only nearly in balance: near the end of a branch there is
+                    // nothing beside it to follow.
+                    if !is_settled && !matches!(failed, Failed::Factor(_)) {
+                        is_settled = true;
+                        self.settle_in_place(&motion.at(done).goal(), wish);
+                        continue;
+                    }
                     piece *= 0.5;
                     failed_pieces += 1;
                     if let Failed::Factor(error) = failed {
@@ -108,6 +118,16 @@ impl Path {
         self.commit(&mut settled);
         self.counts.substeps += 1;
         Ok(())
+    }
+
+    /// Brings the shape nearer to its equilibrium where it is, if that can be done.
+    fn settle_in_place(&mut self, here: &Goal<'_>, wish: &Wish<'_>) {
+        let before = (self.q.clone(), self.errors);
+        let wish = Wish { error_rel: Some(SETTLED_ERROR_REL), ..*wish };
+        let evaluated = self.elements.evaluate(&self.q);
+        if self.settle_at(here, &wish, evaluated).is_err() {
+            (self.q, self.errors) = before;
+        }
     }
 
     /// Makes the plastic flow of a shape that was reached permanent; what is stored then is elastic.
