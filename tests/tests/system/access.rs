@@ -9,7 +9,7 @@ use fea_server::{
 };
 use glove_client::connection::{LinkError, ServerConnection};
 use glove_client::endpoint::{Endpoint, Trust};
-use softgrasp_protocol::{RejectCode, Reply, Request};
+use softgrasp_protocol::{RejectCode, Reply, Request, VERSION};
 use softgrasp_tests::heard::Heard;
 use softgrasp_tests::questions::{cube, frame, once, upload};
 use softgrasp_tests::raw_session::{RawSession, raw_header};
@@ -160,7 +160,7 @@ fn before_the_token_is_shown_frames_are_short_and_time_is_too() {
         let greeting_limit = Duration::from_millis(300);
         let settings = ServerConfig { token, greeting_limit, ..config(1) };
         let server = fea_server::start(settings).unwrap();
-        let header = |payload_len| raw_header(2, 1, payload_len, &[]);
+        let header = |payload_len| raw_header(VERSION, 1, 1, payload_len, &[]);
         let mut over = RawSession::open(server.address());
         over.send(&header(64 * 1024 + 1));
         let (_, reply) = over.reply().expect("a word why");

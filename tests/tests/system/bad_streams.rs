@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use fea_server::ServerConfig;
 use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::endpoint::Endpoint;
 use softgrasp_protocol::{Kind, Masks, Prefetch, RejectCode, Reply, Request, VERSION};
 use softgrasp_tests::heard::{AnswerBits, Heard};
 use softgrasp_tests::questions::{cube, frame, once, upload};
