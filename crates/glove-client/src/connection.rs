@@ -9,8 +9,8 @@ use fea_server::{RunningServer, ServerConfig, StageWatch, StartError};
 use softgrasp_core::solve::rates::Rates;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
-    ConnectionError, DecodeError, EncodeError, Frame, Hello, Limits, Rejected, Reply, Request,
-    Welcome,
+    ConnectionError, DecodeError, EncodeError, Frame, FrameError, Hello, Limits, Rejected, Reply,
+    Request, Welcome,
 };
 
 use crate::endpoint::{Endpoint, TrustError};
@@ -69,6 +69,14 @@ pub enum LinkError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The server speaks TLS and this client does not.
+    #[error(
+        "the server at {address} is encrypted; give its certificate or authority with --tls-ca"
+    )]
+    WantsEncryption {
+        /// Address of the server.
+        address: String,
+    },
     /// Encryption cannot be used.
     #[error(transparent)]
     Encryption(#[from] TrustError),
@@ -116,6 +124,8 @@ pub struct Host {
 
 /// A server that does not accept within this time is not there.
 const CONNECT_MAX: Duration = Duration::from_secs(5);
+/// First byte of what a TLS server answers to bytes that are not TLS.
+const TLS_ALERT: u8 = 0x15;
 /// A reply that has not begun to come by then is slept for.
 const AWAKE_MAX: Duration = Duration::from_micros(300);
 
@@ -209,9 +219,15 @@ impl ServerConnection {
             client: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
             token: endpoint.token,
         };
-        match this.ask(&Request::Hello(hello))? {
-            Reply::Welcome(welcome) => this.welcome = welcome,
-            other => return Err(unexpected("Hello", &other)),
+        match this.ask(&Request::Hello(hello)) {
+            Ok(Reply::Welcome(welcome)) => this.welcome = welcome,
+            Ok(other) => return Err(unexpected("Hello", &other)),
+            Err(LinkError::Connection(ConnectionError::Frame(FrameError::Magic { found })))
+                if found.first() == Some(&TLS_ALERT) =>
+            {
+                return Err(LinkError::WantsEncryption { address: endpoint.address });
+            }
+            Err(error) => return Err(error),
         }
         Ok(this)
     }

@@ -77,6 +77,18 @@ fn takes_only_records(stream: &mut StreamOwned<ClientConnection, TcpStream>) -> 
     }
 }
 
+impl Drop for ServerStream {
+    /// Says goodbye in TLS, so that the server can tell an end from a cut; whether it arrives is of no
+    /// matter.
+    fn drop(&mut self) {
+        if let Self::Encrypted(stream) = self {
+            stream.conn.send_close_notify();
+            let _ = stream.sock.set_nonblocking(true);
+            let _ = stream.conn.write_tls(&mut stream.sock);
+        }
+    }
+}
+
 impl Read for ServerStream {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self {
