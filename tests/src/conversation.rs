@@ -57,7 +57,7 @@ impl Conversation {
     /// Holds the conversation; a refusal is a reply, anything else that fails ends it.
     pub fn hold(&self, address: SocketAddr) -> Outcome {
         let mut heard = Vec::new();
-        let mut connection = match ServerConnection::connect(&address.to_string()) {
+        let mut connection = match ServerConnection::connect(address.to_string()) {
             Ok(connection) => connection,
             Err(error) => return Outcome { heard, error: Some(error) },
         };

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_protocol::{
-    ConnectionError, Frame, FrameError, Hello, Kind, Limits, ModelHash, RejectCode, Rejected,
-    Reply, Request, Welcome,
+    Answer, ConnectionError, Frame, FrameError, FrameRequest, Hello, Kind, Limits, ModelHash,
+    RejectCode, Rejected, Reply, Request, Welcome,
 };
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::watch;
@@ -68,6 +68,27 @@ where
         Ok(()) => tracing::info!(%peer, "session ends"),
         Err(error) => tracing::warn!(%peer, %error, "session is given up"),
     }
+}
+
+/// Answers a frame: at once, on the sockets' thread, where all that it needs is there and few sessions
+/// share the server.
+async fn answered_frame(
+    server: &ServerHandle,
+    request: FrameRequest,
+    clock: impl FnOnce() -> StageClock + Send + 'static,
+) -> Result<Answer, Refusal> {
+    let resources = Arc::clone(&server.resources);
+    let workers = &server.resources.workers;
+    let request = match server.is_quiet() {
+        true => match readiness(&resources, request) {
+            Readiness::Ready(kept) => {
+                return Workers::run_here(|| kept.answer(&resources, clock()))?;
+            }
+            Readiness::NotReady(request) => *request,
+        },
+        false => request,
+    };
+    workers.run(move || answer_frame(&resources, request, clock())).await?
 }
 
 /// Ends when the server is to stop, or when nobody is left who could say so.
@@ -221,20 +242,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
             }
             Request::Frame(request) => {
                 self.held.hold(request.model);
-                let answer = match server.is_quiet() {
-                    true => match readiness(&resources, request) {
-                        Readiness::Ready(kept) => {
-                            Workers::run_here(|| kept.answer(&resources, clock()))?
-                        }
-                        Readiness::NotReady(request) => {
-                            workers.run(move || answer_frame(&resources, *request, clock())).await?
-                        }
-                    },
-                    false => {
-                        workers.run(move || answer_frame(&resources, request, clock())).await?
-                    }
-                };
-                Reply::Answer(Box::new(answer?))
+                Reply::Answer(Box::new(answered_frame(server, request, clock).await?))
             }
         }))
     }

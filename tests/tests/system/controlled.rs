@@ -84,7 +84,7 @@ impl Controlled {
             settings.contact,
         );
         let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
-        let link = Link::start(&server.address().to_string(), Priority::Ordinary).unwrap();
+        let link = Link::start(server.address().to_string(), Priority::Ordinary).unwrap();
         let reader = HandReader::new(HandSetup::default());
         let grasp_loop =
             GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();

@@ -38,7 +38,7 @@ fn squeezed(mesh: &TetMesh, yield_stress: f64, pace: Pace) -> (f64, u64) {
         max_error: None,
     };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
-    let link = Link::start(&server.address().to_string(), Priority::Ordinary).unwrap();
+    let link = Link::start(server.address().to_string(), Priority::Ordinary).unwrap();
     let reader = HandReader::new(setup);
     let mut grasp_loop = GraspLoop::try_new(reader, object, grasp, link, settings, pace).unwrap();
     let (mut seen, mut pressed, mut let_go) = (Seen::default(), 0.0f64, false);

@@ -34,7 +34,7 @@ fn squeeze(contact: ContactModel, forces: bool, mut see: impl FnMut(&GraspLoop, 
         max_error: None,
     };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
-    let link = Link::start(&server.address().to_string(), Priority::Ordinary).unwrap();
+    let link = Link::start(server.address().to_string(), Priority::Ordinary).unwrap();
     let reader = HandReader::new(setup);
     let mut grasp_loop =
         GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();

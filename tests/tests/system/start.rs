@@ -22,7 +22,7 @@ pub fn server(threads: usize) -> RunningServer {
 
 /// A client that has said hello.
 pub fn client(server: &RunningServer) -> ServerConnection {
-    ServerConnection::connect(&server.address().to_string()).unwrap()
+    ServerConnection::connect(server.address().to_string()).unwrap()
 }
 
 /// The answer to a request that must be answered.

@@ -72,7 +72,7 @@ fn idle_client_hears_that_the_server_stops() {
         server.stop();
         let error = idle.ask(&Request::Ping { nonce: 1 }).unwrap_err();
         assert!(is_clean(&error), "{error}");
-        let error = ServerConnection::connect(&address.to_string()).err().unwrap();
+        let error = ServerConnection::connect(address.to_string()).err().unwrap();
         assert!(matches!(error, LinkError::Connect { .. }), "{error}");
         assert!(error.to_string().contains("fea-server --listen"), "{error}");
     });
