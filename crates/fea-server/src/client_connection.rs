@@ -68,7 +68,7 @@ impl<S> ClientConnection<S> {
     }
 
     /// The client has introduced itself: it may rest as long as it likes, and send what `limits` allow.
-    pub fn is_known(&mut self, limits: Limits) {
+    pub fn make_known(&mut self, limits: Limits) {
         if self.stranger_until.take().is_some() {
             self.connection.set_limits(limits);
         }
@@ -200,7 +200,7 @@ mod tests {
         let mut bytes = Vec::new();
         Request::Ping { nonce: 7 }.encode_into(1, &Limits::default(), &mut bytes).unwrap();
         let mut connection = ClientConnection::new(server, Limits::default(), PATIENCE, true);
-        connection.is_known(Limits::default());
+        connection.make_known(Limits::default());
         (connection, client, bytes)
     }
 

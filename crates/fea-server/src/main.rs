@@ -131,16 +131,8 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
 
 fn config(arguments: &Arguments) -> anyhow::Result<ServerConfig> {
     let usual = ServerConfig::default();
-    let token = match &arguments.token_file {
-        None => None,
-        Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("cannot read the token file {}", path.display()))?;
-            let first = text.lines().next().unwrap_or("").trim().to_owned();
-            anyhow::ensure!(!first.is_empty(), "the token file {} is empty", path.display());
-            Some(first)
-        }
-    };
+    let token_file = arguments.token_file.as_deref();
+    let token = token_file.map(softgrasp_os::read_token).transpose()?;
     let encryption = match (&arguments.tls_cert, &arguments.tls_key) {
         (Some(certificate), Some(key)) => Some(Encryption::read(certificate, key)?),
         _ => None,

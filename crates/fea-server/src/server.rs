@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{Limits, RejectCode, Rejected, Reply};
-use tokio::io::AsyncWrite;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
@@ -159,7 +158,7 @@ async fn attend(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
 }
 
 /// Tells a client that there is no place, and closes.
-async fn turn_away<S: AsyncWrite + Unpin>(stream: S, peer: SocketAddr, why: NoPlace) {
+async fn turn_away(stream: TcpStream, peer: SocketAddr, why: NoPlace) {
     tracing::warn!(%peer, %why, "turned away");
     let text = why.to_string();
     let reply = Reply::Rejected(Rejected { code: RejectCode::Busy, text, detail: String::new() });

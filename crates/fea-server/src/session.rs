@@ -195,7 +195,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
             return Err(Refusal::Token);
         }
         if !matches!(request, Request::Hello(_)) {
-            self.connection.is_known(self.limits);
+            self.connection.make_known(self.limits);
         }
         let resources = Arc::clone(&server.resources);
         let queued = Instant::now();
@@ -260,7 +260,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
             return Err(refusal);
         }
         self.authorised = true;
-        self.connection.is_known(self.limits);
+        self.connection.make_known(self.limits);
         tracing::info!(client = hello.client, "client introduced itself");
         Ok(Reply::Welcome(Welcome {
             server: "fea-server".to_owned(),

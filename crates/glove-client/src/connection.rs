@@ -149,10 +149,10 @@ impl Host {
         threads: Option<usize>,
         memory_limit: Option<u64>,
     ) -> Result<Self, LinkError> {
-        let stage = StageWatch::default();
         match choice {
             ServerChoice::At(address) => Ok(Self::at(address.into())),
             ServerChoice::Embedded => {
+                let stage = StageWatch::default();
                 let usual = ServerConfig::default();
                 let config = ServerConfig {
                     listen: SocketAddr::from(([127, 0, 0, 1], 0)),

@@ -1,14 +1,17 @@
 //! What the programs share beside the mathematics and the wire: signals that are waited for,
-//! threads that are woken in time, the time a thread computed, errors as one line.
+//! threads that are woken in time, the time a thread computed, errors as one line, the file
+//! of a token.
 
 mod cpu_time;
 mod end;
 mod end_signals;
 mod error_line;
+mod token_file;
 mod urgency;
 
 pub use cpu_time::thread_cpu_time;
 pub use end::end_within;
 pub use end_signals::{EndSignal, on_end_signal};
 pub use error_line::one_line;
+pub use token_file::{TokenFileError, read_token};
 pub use urgency::{NotUrgent, be_ordinary, be_urgent};

@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use fea_server::RunningServer;
-use glove_client::contact_model::ContactModel;
 use glove_client::control::Control;
-use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::hand_source::HandSource;
@@ -17,14 +15,15 @@ use glove_client::run_report::{ObjectSummary, RunReport};
 use glove_client::scripted::{Planner, ScriptName, ScriptedHand};
 use glove_client::session::Session;
 use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::solve_settings::SolveSettings;
 use glove_client::tick_budget::Priority;
 use glove_client::tick_outcome::TickOutcome;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_protocol::{ElementName, Material, MethodName};
+use softgrasp_protocol::Material;
 
+use crate::settings::linear_settings;
 use crate::start::server;
 
 /// What the object is made of in these tests.
@@ -67,15 +66,7 @@ impl Controlled {
 
     fn new(object: SoftObject, hand: HandSource) -> Self {
         let server = server(1);
-        let settings = SolveSettings {
-            material: MATERIAL,
-            element: ElementName::T4,
-            method: MethodName::auto(),
-            contact: ContactModel::Mask,
-            subscription: Subscription::Surface,
-            elasticity: Elasticity::LINEAR,
-            max_error: None,
-        };
+        let settings = SolveSettings { material: MATERIAL, ..linear_settings() };
         let report = RunReport::new(
             summary(&object),
             hand.name(),

@@ -1,6 +1,5 @@
 //! What an object that has flowed looks like when the hand lets go.
 
-use glove_client::contact_model::ContactModel;
 use glove_client::deformation::{Deformation, Elasticity};
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
@@ -8,13 +7,14 @@ use glove_client::link::Link;
 use glove_client::pace::Pace;
 use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
 use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::solve_settings::SolveSettings;
 use glove_client::tick_budget::Priority;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
-use softgrasp_protocol::{ElementName, LawName, Material, MethodName};
+use softgrasp_protocol::LawName;
 
+use crate::settings::linear_settings;
 use crate::start::server;
 
 /// How deep the largest dent of a squeezed strawberry is, over how far it was pressed in, and how
@@ -25,17 +25,12 @@ fn squeezed(mesh: &TetMesh, yield_stress: f64, pace: Pace) -> (f64, u64) {
     let setup = HandSetup::default();
     let mut hand = ScriptedHand::try_new(ScriptName::Release, setup.clone(), &object).unwrap();
     let settings = SolveSettings {
-        material: Material { young: 2.0e4, poisson: 0.4 },
-        element: ElementName::T4,
-        method: MethodName::auto(),
-        contact: ContactModel::Mask,
-        subscription: Subscription::Surface,
         elasticity: Elasticity {
             deformation: Deformation::Auto,
             law: LawName::NeoHookean,
             yield_stress: Some(yield_stress),
         },
-        max_error: None,
+        ..linear_settings()
     };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
     let link = Link::start(server.address().to_string(), Priority::Ordinary).unwrap();

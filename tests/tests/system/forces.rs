@@ -2,20 +2,20 @@
 //! object, and they are there as long as the hand deforms it.
 
 use glove_client::contact_model::ContactModel;
-use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
 use glove_client::pace::Pace;
 use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
 use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::solve_settings::SolveSettings;
 use glove_client::tick_budget::Priority;
 use nalgebra::{Isometry3, Vector3};
 use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_core::mesh::{BuiltIn, generate};
-use softgrasp_protocol::{ElementName, Material, MethodName};
+use softgrasp_protocol::ElementName;
 
+use crate::settings::linear_settings;
 use crate::start::server;
 
 /// Forces of a run by tick and state, until the script is over.
@@ -24,15 +24,7 @@ fn squeeze(contact: ContactModel, forces: bool, mut see: impl FnMut(&GraspLoop, 
     let object = SoftObject::try_new(generate(BuiltIn::Strawberry, 400).unwrap()).unwrap();
     let setup = HandSetup::default();
     let mut hand = ScriptedHand::try_new(ScriptName::Release, setup.clone(), &object).unwrap();
-    let settings = SolveSettings {
-        material: Material { young: 2.0e4, poisson: 0.4 },
-        element: ElementName::T4Anp,
-        method: MethodName::auto(),
-        contact,
-        subscription: Subscription::Surface,
-        elasticity: Elasticity::LINEAR,
-        max_error: None,
-    };
+    let settings = SolveSettings { element: ElementName::T4Anp, contact, ..linear_settings() };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
     let link = Link::start(server.address().to_string(), Priority::Ordinary).unwrap();
     let reader = HandReader::new(setup);

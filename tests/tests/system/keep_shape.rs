@@ -2,24 +2,24 @@
 //! inside out is not kept.
 
 use glove_client::contact_model::ContactModel;
-use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
 use glove_client::pace::Pace;
 use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
 use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::solve_settings::SolveSettings;
 use glove_client::tick_budget::Priority;
 use glove_client::tick_outcome::LoopEvent;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::{Command, Grasp, StateName};
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_protocol::{ElementName, Material, MethodName, ModelHash, Reply, Request};
+use softgrasp_protocol::{ModelHash, Reply, Request};
 use softgrasp_tests::fake_server::start_fake_server;
 use softgrasp_tests::questions::{cube, frame, upload};
 use softgrasp_tests::raw_session::{RawSession, request_frame};
 
+use crate::settings::linear_settings;
 use crate::start::{answer, client, server};
 
 /// The same mesh after a squeeze: another rest shape, another model.
@@ -73,15 +73,7 @@ fn shape_with_elements_inside_out_is_not_kept_and_the_grasp_goes_on() {
 
     let setup = HandSetup::default();
     let mut hand = ScriptedHand::try_new(ScriptName::Squeeze, setup.clone(), &object).unwrap();
-    let settings = SolveSettings {
-        material: Material { young: 2.0e4, poisson: 0.4 },
-        element: ElementName::T4,
-        method: MethodName::auto(),
-        contact: ContactModel::Vertex,
-        subscription: Subscription::Surface,
-        elasticity: Elasticity::LINEAR,
-        max_error: None,
-    };
+    let settings = SolveSettings { contact: ContactModel::Vertex, ..linear_settings() };
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
     let (reader, link) =
         (HandReader::new(setup), Link::start(&address, Priority::Ordinary).unwrap());

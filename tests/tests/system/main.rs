@@ -23,6 +23,7 @@ mod memory;
 mod mouse;
 mod real_time;
 mod same_bits;
+mod settings;
 mod start;
 mod stopping;
 mod wishes;

@@ -7,8 +7,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use glove_client::contact_model::ContactModel;
-use glove_client::deformation::Elasticity;
 use glove_client::grasp_loop::GraspLoop;
 use glove_client::hand_reader::{HandReader, HandSetup};
 use glove_client::link::Link;
@@ -17,17 +15,15 @@ use glove_client::run_report::{ObjectSummary, RunReport};
 use glove_client::scripted::{Planner, ScriptName, ScriptedHand};
 use glove_client::session::Session;
 use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::{SolveSettings, Subscription};
 use glove_client::tick_budget::Priority;
 use glove_client::tick_outcome::TickOutcome;
 use nalgebra::Isometry3;
 use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_protocol::blocking::Connection;
-use softgrasp_protocol::{
-    ElementName, Limits, Material, MethodName, RejectCode, Rejected, Reply, Request, Welcome,
-};
+use softgrasp_protocol::{Limits, RejectCode, Rejected, Reply, Request, Welcome};
 use softgrasp_tests::questions::cube;
 
+use crate::settings::linear_settings;
 use crate::start::server;
 
 /// Longer than anything takes.
@@ -44,15 +40,7 @@ impl Play {
         let object = SoftObject::try_new(cube(216)).unwrap();
         let setup = HandSetup::default();
         let hand = ScriptedHand::try_new(script, setup.clone(), &object).unwrap();
-        let settings = SolveSettings {
-            material: Material { young: 2.0e4, poisson: 0.4 },
-            element: ElementName::T4,
-            method: MethodName::auto(),
-            contact: ContactModel::Mask,
-            subscription: Subscription::Surface,
-            elasticity: Elasticity::LINEAR,
-            max_error: None,
-        };
+        let settings = linear_settings();
         let summary = ObjectSummary {
             name: "cube".to_owned(),
             nodes: 216,

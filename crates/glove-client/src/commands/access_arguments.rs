@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use clap::Args;
 
 use crate::connection::ServerChoice;
@@ -31,14 +31,8 @@ impl AccessArguments {
             ensure!(!is_given, "--token-file and --tls-ca are for --server HOST:PORT");
             return Ok(None);
         };
-        let token = self.token_file.as_ref().map(|path| {
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("cannot read the token file {}", path.display()))?;
-            let token = text.lines().next().unwrap_or("").trim().to_owned();
-            ensure!(!token.is_empty(), "the token file {} is empty", path.display());
-            Ok(token)
-        });
-        let trust = self.tls_ca.as_ref().map(|path| Trust::read(path)).transpose()?;
-        Ok(Some(Endpoint { address: address.clone(), token: token.transpose()?, trust }))
+        let token = self.token_file.as_deref().map(softgrasp_os::read_token).transpose()?;
+        let trust = self.tls_ca.as_deref().map(Trust::read).transpose()?;
+        Ok(Some(Endpoint { address: address.clone(), token, trust }))
     }
 }

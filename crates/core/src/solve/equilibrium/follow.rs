@@ -73,30 +73,30 @@ impl Path {
                 Err(failed) => {
                     (self.q, self.q_before) = before;
                     self.secants.clear();
+                    if let Failed::Factor(error) = failed {
+                        return Err(error.into());
+                    }
                     // What was let go of goes its way first, before the rest is moved.
-                    if self.was_held_otherwise && !matches!(failed, Failed::Factor(_)) {
+                    if self.was_held_otherwise {
                         self.was_held_otherwise = false;
                         self.let_go_in_place(&motion.at(0.0).goal(), &way)?;
                         continue;
                     }
                     // A step of an older tangent may have led astray: one of this shape first.
-                    if !is_fresh && !matches!(failed, Failed::Factor(_)) {
+                    if !is_fresh {
                         self.factor_here()?;
                         is_fresh = true;
                         continue;
                     }
                     // So may a shape that is only nearly in balance: near the end of a branch there is
                     // nothing beside it to follow.
-                    if !is_settled && !matches!(failed, Failed::Factor(_)) {
+                    if !is_settled {
                         is_settled = true;
                         self.settle_in_place(&motion.at(done).goal(), wish);
                         continue;
                     }
                     piece *= 0.5;
                     failed_pieces += 1;
-                    if let Failed::Factor(error) = failed {
-                        return Err(error.into());
-                    }
                     if piece < PIECE_MIN || failed_pieces > FAILED_PIECES_MAX {
                         let solves = self.counts.linear_solves;
                         return Err(failed.after(done, solves));
