@@ -218,7 +218,7 @@ start_run_in_real_time() {
     quietly 60 "${compose[@]}" rm --force --stop client
     start_server
     SOFTGRASP_CLIENT_COMMAND="run --headless --server server:7878 --rate 60 --frames $1 \
-        --report /out/r.json" quietly 60 "${compose[@]}" up -d client
+        --hand scripted:${2:-regrasp} --report /out/r.json" quietly 60 "${compose[@]}" up -d client
     wait_until 30 server_has_sessions 2 || fail "no link to the server within 30 s"
 }
 
@@ -244,6 +244,26 @@ restarted_server_is_found_again() {
     say "server killed and started again: found again, frames solved"
 }
 
+# Takes a container (of the server or of the client) off the network in the middle of a grasp, and puts it back.
+parted_container_is_found_again() {
+    local container network="${name}_grasp" missed
+    # The object is deformed to the end.
+    start_run_in_real_time 720 squeeze
+    container="$(container_of "$1")"
+    sleep 2
+    docker network disconnect "$network" "$container"
+    sleep 3
+    # With the name by which the other one knows it.
+    docker network connect --alias "$1" "$network" "$container"
+    take_report 720
+    missed="$(grep -oE '"(answer_late|server_lost)": [0-9]+' "$work/r.json" |
+        { total=0; while read -r _ count; do total=$((total + count)); done; echo "$total"; })"
+    [ "$missed" -ge 120 ] || fail "the $1 was parted for 3 s, and only $missed ticks have no answer"
+    grep '"solve":' "$work/r.json" | tail -n 10 | grep -q '{' ||
+        fail "nothing was answered at the end, 6 s after the $1 came back"
+    say "$1 off the network for 3 s: all 720 ticks played, $missed without an answer, then answers again"
+}
+
 if [ -n "${BIN_DIR:-}" ]; then
     bin_dir="$(cd "$BIN_DIR" && pwd)"
 else
@@ -258,4 +278,6 @@ lost_server_ends_solve_with_one_line
 whole_run_through_the_compose_file
 lost_server_never_stops_a_tick
 restarted_server_is_found_again
+parted_container_is_found_again server
+parted_container_is_found_again client
 say "passed"

@@ -3,10 +3,15 @@
 use std::net::SocketAddr;
 
 use glove_client::connection::{LinkError, ServerConnection};
-use softgrasp_protocol::{ModelHash, NodeChoice, Precision, Request};
+use softgrasp_protocol::asynchronous::Connection;
+use softgrasp_protocol::{
+    ConnectionError, Hello, Limits, ModelHash, NodeChoice, Precision, Reply, Request,
+};
+use tokio::io::{AsyncRead, AsyncWrite};
 
 use crate::heard::Heard;
 use crate::questions::{cube, frame, once, upload};
+use crate::raw_session::request_frame;
 
 /// Requests asked one after the other on one connection, after the Hello.
 #[derive(Clone, Debug)]
@@ -52,6 +57,43 @@ impl Conversation {
     /// The requests after the Hello.
     pub fn requests(&self) -> &[Request] {
         &self.requests
+    }
+
+    /// The whole conversation with its Hello as frames, one after the other.
+    ///
+    /// # Panics
+    /// If one is too large to be sent.
+    pub fn frames(&self) -> Vec<Vec<u8>> {
+        let hello = Hello { client: "a conversation".to_owned(), token: None };
+        let all = [Request::Hello(hello)].into_iter().chain(self.requests.iter().cloned());
+        (1..).zip(all).map(|(id, request)| request_frame(id, &request)).collect()
+    }
+
+    /// Holds the conversation over any stream; what was heard, and whether it was cut short by an end
+    /// or an error of the stream.
+    ///
+    /// # Panics
+    /// If a sound frame is no reply.
+    pub async fn hold_over(
+        &self,
+        stream: impl AsyncRead + AsyncWrite + Unpin,
+    ) -> (Vec<Heard>, Option<ConnectionError>) {
+        let mut connection = Connection::new(stream, Limits::default());
+        let mut heard = Vec::new();
+        for frame in self.frames() {
+            if let Err(error) = connection.write_bytes(&frame).await {
+                return (heard, Some(error));
+            }
+            match connection.read_frame().await {
+                Ok(Some(reply)) => {
+                    let reply = Reply::decode(&reply, &Limits::default()).expect("a sound reply");
+                    heard.push(Heard::of(&reply));
+                }
+                Ok(None) => return (heard, Some(ConnectionError::Closed { written: 0 })),
+                Err(error) => return (heard, Some(error)),
+            }
+        }
+        (heard, None)
     }
 
     /// Holds the conversation; a refusal is a reply, anything else that fails ends it.

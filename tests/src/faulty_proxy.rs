@@ -55,7 +55,7 @@ pub struct Recorded {
 }
 
 struct State {
-    server: SocketAddr,
+    server: Mutex<SocketAddr>,
     faults: Mutex<Faults>,
     recorded: Mutex<Recorded>,
     stopping: AtomicBool,
@@ -82,7 +82,7 @@ impl FaultyProxy {
         let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a free loopback port");
         let address = listener.local_addr().expect("a bound address");
         let state = Arc::new(State {
-            server,
+            server: Mutex::new(server),
             faults: Mutex::default(),
             recorded: Mutex::default(),
             stopping: AtomicBool::new(false),
@@ -100,6 +100,11 @@ impl FaultyProxy {
     /// Sets what happens to the connections accepted from now on.
     pub fn set(&self, faults: Faults) {
         *lock(&self.state.faults) = faults;
+    }
+
+    /// Passes on to another server from the next connection on.
+    pub fn lead_to(&self, server: SocketAddr) {
+        *lock(&self.state.server) = server;
     }
 
     /// What has passed on the last connection so far.
@@ -130,7 +135,7 @@ fn accept_all(listener: &TcpListener, state: &Arc<State>) {
         }
         let Ok(client) = client else { continue };
         // A server that is not there shows as an early close.
-        let Ok(server) = TcpStream::connect(state.server) else { continue };
+        let Ok(server) = TcpStream::connect(*lock(&state.server)) else { continue };
         let faults = lock(&state.faults).clone();
         *lock(&state.recorded) = Recorded::default();
         let pair = [

@@ -8,7 +8,7 @@ use std::time::Duration;
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{ConnectionError, Frame, HEADER_LEN, Limits};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 use crate::config::ServerConfig;
 
@@ -29,12 +29,17 @@ pub(crate) struct Patience {
     pub stall: Duration,
     /// For its first request from the beginning, and for a whole header from its first byte.
     pub greeting: Duration,
+    /// For its next request; `None`: for ever.
+    pub idle: Option<Duration>,
+    /// For it to take a reply, and a second more for every [`REPLY_BYTES_PER_S`].
+    pub reply: Duration,
 }
 
 impl Patience {
     /// That of a server.
     pub fn of(config: &ServerConfig) -> Self {
-        Self { stall: config.stall_limit, greeting: config.greeting_limit }
+        let ServerConfig { stall_limit, greeting_limit, idle_limit, reply_limit, .. } = *config;
+        Self { stall: stall_limit, greeting: greeting_limit, idle: idle_limit, reply: reply_limit }
     }
 }
 
@@ -49,12 +54,20 @@ pub(crate) enum SessionError {
     NoHeader(Duration),
     #[error("the client did not introduce itself within {} s", .0.as_secs_f64())]
     Stranger(Duration),
-    #[error("the client did not take its reply for {} s", WRITE_MAX.as_secs())]
-    NotTaken,
+    #[error("the client sent nothing for {} s", .0.as_secs_f64())]
+    Idle(Duration),
+    #[error("the client did not take its reply within {} s", .0.as_secs_f64())]
+    NotTaken(Duration),
+    #[error("the client went while its request was worked on")]
+    Gone,
 }
 
-/// A client that does not take its reply for this long is given up.
-const WRITE_MAX: Duration = Duration::from_secs(60);
+/// A client takes its replies at least as fast.
+const REPLY_BYTES_PER_S: u64 = 64 * 1024;
+/// A client that has closed its sending side may still wait for its reply, but not longer.
+const HALF_CLOSED_MAX: Duration = Duration::from_secs(10);
+/// Bytes that are taken from a client whose request is worked on, to see whether it goes.
+const READ_AHEAD_MAX: usize = 64 * 1024;
 
 impl<S> ClientConnection<S> {
     /// Wraps the stream of a client that is not known yet, until it has spoken or, if a token is
@@ -103,10 +116,29 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         }
     }
 
+    /// Ends when the client has gone, while its request is worked on: its connection is broken, or it has
+    /// sent nothing more for so long after it has closed its side. Takes a little of what it sends
+    /// meanwhile.
+    ///
+    /// May be dropped at any await: bytes that have come stay.
+    pub async fn gone(&mut self) -> SessionError {
+        while self.connection.received() < READ_AHEAD_MAX {
+            match self.connection.read_ahead().await {
+                Ok(true) => {}
+                Ok(false) => {
+                    sleep(HALF_CLOSED_MAX).await;
+                    return SessionError::Gone;
+                }
+                Err(_) => return SessionError::Gone,
+            }
+        }
+        std::future::pending().await
+    }
+
     /// When to look at the client again, and what it is if it has not gone on by then; `None` for one
     /// that may rest.
     fn deadline(&self, start: Instant) -> (Instant, Option<SessionError>) {
-        let Patience { stall, greeting } = self.patience;
+        let Patience { stall, greeting, idle, .. } = self.patience;
         let stream = self.connection.stream();
         let received = self.connection.received();
         let has_header = received >= HEADER_LEN;
@@ -118,7 +150,9 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         // Without a token a first request may be a large one: its header is waited for so long.
         let stranger_until = self.stranger_until.filter(|_| self.wants_token || !has_header);
         let stranger = stranger_until.map(|until| (until, SessionError::Stranger(greeting)));
-        let ends = [stalled, no_header, stranger];
+        let idle = idle.filter(|_| received == 0);
+        let idle = idle.map(|limit| (start + limit, SessionError::Idle(limit)));
+        let ends = [stalled, no_header, stranger, idle];
         match ends.into_iter().flatten().min_by_key(|(until, _)| *until) {
             Some((until, error)) => (until, Some(error)),
             // Its next header may begin at any time.
@@ -133,9 +167,11 @@ impl<S: AsyncWrite + Unpin> ClientConnection<S> {
     /// # Errors
     /// [`SessionError`]; the session is to be given up, for a part may have been written.
     pub async fn write_bytes(&mut self, bytes: &[u8]) -> Result<(), SessionError> {
-        match timeout(WRITE_MAX, self.connection.write_bytes(bytes)).await {
+        let for_size = Duration::from_secs(bytes.len() as u64 / REPLY_BYTES_PER_S);
+        let limit = self.patience.reply + for_size;
+        match timeout(limit, self.connection.write_bytes(bytes)).await {
             Ok(written) => Ok(written?),
-            Err(_) => Err(SessionError::NotTaken),
+            Err(_) => Err(SessionError::NotTaken(limit)),
         }
     }
 }
@@ -183,14 +219,16 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for TimedStream<S> {
 
 #[cfg(test)]
 mod tests {
-    use softgrasp_protocol::Request;
-    use tokio::io::{AsyncWriteExt, DuplexStream, duplex};
-    use tokio::time::sleep;
-
     use super::*;
+    use softgrasp_protocol::Request;
+    use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
-    const PATIENCE: Patience =
-        Patience { stall: Duration::from_secs(30), greeting: Duration::from_secs(10) };
+    const PATIENCE: Patience = Patience {
+        stall: Duration::from_secs(30),
+        greeting: Duration::from_secs(10),
+        idle: None,
+        reply: Duration::from_secs(60),
+    };
     const MOMENT: Duration = Duration::from_millis(2);
 
     /// A connection, the client's end of it, and the bytes of a request. The clock of these tests
@@ -324,5 +362,85 @@ mod tests {
             let (frame, ()) = tokio::join!(connection.next_frame(), sender);
             assert!(frame.unwrap().is_some());
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn client_that_rests_is_given_up_when_its_time_is_over_and_not_before() {
+        let limit = Duration::from_secs(50);
+        for (rests, is_in_time) in [(49, true), (51, false)] {
+            let (mut connection, mut client, bytes) = connected();
+            connection.patience.idle = Some(limit);
+            let start = Instant::now();
+            let sender = async {
+                sleep(Duration::from_secs(rests)).await;
+                let _ = client.write_all(&bytes).await;
+            };
+            let ended = async { (connection.next_frame().await, start.elapsed()) };
+            let ((ended, took), ()) = tokio::join!(ended, sender);
+            match is_in_time {
+                true => assert!(ended.unwrap().is_some()),
+                false => {
+                    assert!(matches!(ended, Err(SessionError::Idle(_))), "{ended:?}");
+                    assert!((limit..limit + MOMENT).contains(&took), "{took:?}");
+                }
+            }
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn reply_that_is_not_taken_is_given_up_after_the_time_for_its_size() {
+        // 3 s for its size; the pipe holds the first KiB.
+        let reply = vec![0; 3 * REPLY_BYTES_PER_S as usize];
+        let limit = PATIENCE.reply + Duration::from_secs(3);
+        for (pause, is_taken) in [(limit - MOMENT, true), (limit + MOMENT, false)] {
+            let (mut connection, mut client, _) = connected();
+            let start = Instant::now();
+            let writer = async { (connection.write_bytes(&reply).await, start.elapsed()) };
+            let reader = async {
+                sleep(pause).await;
+                let mut taken = vec![0; reply.len()];
+                client.read_exact(&mut taken).await
+            };
+            let (written, took) = match is_taken {
+                true => tokio::join!(writer, reader).0,
+                false => writer.await,
+            };
+            assert_eq!(written.is_ok(), is_taken, "{written:?} after {took:?}");
+            assert!(is_taken || (limit..limit + MOMENT).contains(&took), "{took:?}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn client_that_goes_during_its_request_is_noticed_and_one_that_waits_is_not() {
+        // It is gone without a word.
+        let (mut connection, client, _) = connected();
+        let start = Instant::now();
+        let goes = async {
+            sleep(Duration::from_secs(3)).await;
+            drop(client);
+        };
+        let (gone, ()) = tokio::join!(connection.gone(), goes);
+        assert!(matches!(gone, SessionError::Gone));
+        assert!(start.elapsed() >= Duration::from_secs(3) + HALF_CLOSED_MAX);
+        // It waits, and has sent its next request meanwhile.
+        let (mut connection, mut client, bytes) = connected();
+        client.write_all(&bytes).await.unwrap();
+        let waits = timeout(Duration::from_secs(3600), connection.gone()).await;
+        assert!(waits.is_err(), "{:?}", waits.map(|gone| gone.to_string()));
+        assert!(connection.next_frame().await.unwrap().is_some(), "nothing is lost");
+        // It sends without end: only a little is taken.
+        let (mut connection, mut client, _) = connected();
+        let sends = async {
+            let mut sent = 0;
+            while let Ok(Ok(())) =
+                timeout(Duration::from_secs(1), client.write_all(&[0; 256])).await
+            {
+                sent += 256;
+            }
+            sent
+        };
+        let gone = timeout(Duration::from_secs(60), connection.gone());
+        let (gone, sent) = tokio::join!(gone, sends);
+        assert!(gone.is_err() && sent <= 4 * READ_AHEAD_MAX, "{sent}");
     }
 }

@@ -7,6 +7,8 @@ use std::time::Instant;
 use softgrasp_core::solve::Stage;
 use softgrasp_protocol::StageMs;
 
+use crate::awaited::Awaited;
+
 /// The stage that the newest request is in, to be looked at from outside.
 #[derive(Clone, Debug, Default)]
 pub struct StageWatch(Arc<AtomicU8>);
@@ -35,26 +37,28 @@ impl StageWatch {
     }
 }
 
-/// Takes the time between the stages that the core announces.
+/// Takes the time between the stages that the core announces, and ends work that nobody waits for.
 #[derive(Clone)]
 pub(crate) struct StageClock {
     decoded: Instant,
     stage_ms: StageMs,
     running: Option<(Stage, Instant)>,
     watch: StageWatch,
+    awaited: Awaited,
 }
 
 impl StageClock {
     /// Starts with what was measured before the core was called.
-    pub fn new(decode_ms: f64, queued: Instant, watch: StageWatch) -> Self {
+    pub fn new(decode_ms: f64, queued: Instant, watch: StageWatch, awaited: Awaited) -> Self {
         let queue = ms_since(queued);
         let stage_ms = StageMs { decode: decode_ms, queue, ..StageMs::default() };
-        Self { decoded: queued, stage_ms, running: None, watch }
+        Self { decoded: queued, stage_ms, running: None, watch, awaited }
     }
 
-    /// Ends the running stage and begins another.
+    /// Ends the running stage and begins another, or ends the work if nobody waits for it any more.
     pub fn begin(&mut self, stage: Stage) {
         self.end();
+        self.awaited.go_on();
         self.watch.set(Some(stage));
         self.running = Some((stage, Instant::now()));
     }

@@ -17,12 +17,20 @@ pub struct ServerConfig {
     pub threads: usize,
     /// Largest number of nodes of a mesh.
     pub max_nodes: u32,
+    /// Largest number of elements of a mesh.
+    pub max_elements: u32,
+    /// Bytes of the largest message.
+    pub max_frame: u32,
     /// Sessions at the same time; one more is turned away.
     pub max_sessions: usize,
     /// Sessions at the same time from one address that is not this machine's own.
     pub max_sessions_per_address: usize,
+    /// Requests of all sessions that wait or are worked on; one more waits in its connection.
+    pub max_queue: usize,
     /// Bytes that all that is kept between requests and all that requests under way make may take.
     pub memory_limit: u64,
+    /// A model that no session holds and nobody has used for this long is forgotten.
+    pub model_idle_limit: Duration,
     /// Bytes of compliance columns kept per model.
     pub column_cache: u64,
     /// Shared secret a client must show, if any.
@@ -41,6 +49,15 @@ pub struct ServerConfig {
     pub stall_limit: Duration,
     /// A client whose header, whose first request or whose handshake is not there by then is given up.
     pub greeting_limit: Duration,
+    /// A client that sends nothing for this long is given up; `None`: it may rest for ever.
+    pub idle_limit: Option<Duration>,
+    /// A client that has not taken its reply by then, and a second more for every 64 KiB of it, is given
+    /// up.
+    pub reply_limit: Duration,
+    /// After a stop the sessions may go on for this long.
+    pub drain: Duration,
+    /// Address of the pages about the server's state, if they are wanted; port 0 picks a free one.
+    pub metrics: Option<SocketAddr>,
     /// Where the stage of the newest request can be read, for whoever started the server.
     pub stage: StageWatch,
 }
@@ -74,6 +91,15 @@ pub enum ConfigError {
         /// The address.
         address: SocketAddr,
     },
+    /// Everybody who reaches the address could read the server's state.
+    #[error(
+        "--metrics {address} can be reached from other machines, and its pages are neither encrypted \
+         nor guarded: take a loopback address, or say --insecure if everybody there is trusted"
+    )]
+    OpenMetrics {
+        /// The address.
+        address: SocketAddr,
+    },
 }
 
 const THREADS_MAX: usize = 1024;
@@ -86,9 +112,13 @@ impl Default for ServerConfig {
             listen: SocketAddr::from(([127, 0, 0, 1], 7878)),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             max_nodes: Limits::default().node_count_max,
+            max_elements: Limits::default().tet_count_max,
+            max_frame: Limits::default().payload_len_max,
             max_sessions: 64,
             max_sessions_per_address: 32,
+            max_queue: 32,
             memory_limit: 8 << 30,
+            model_idle_limit: Duration::from_secs(600),
             column_cache: 1 << 30,
             token: None,
             encryption: None,
@@ -97,6 +127,10 @@ impl Default for ServerConfig {
             real_time: false,
             stall_limit: Duration::from_secs(30),
             greeting_limit: Duration::from_secs(10),
+            idle_limit: None,
+            reply_limit: Duration::from_secs(60),
+            drain: Duration::ZERO,
+            metrics: None,
             stage: StageWatch::default(),
         }
     }
@@ -116,12 +150,18 @@ impl ServerConfig {
         }
         for (option, zero) in [
             ("--max-nodes", self.max_nodes == 0),
+            ("--max-elements", self.max_elements == 0),
+            ("--max-frame", self.max_frame == 0),
+            ("--max-queue", self.max_queue == 0),
             ("--max-sessions", self.max_sessions == 0),
             ("--max-sessions-per-address", self.max_sessions_per_address == 0),
             ("--memory-limit", self.memory_limit == 0),
             ("--column-cache", self.column_cache == 0),
-            ("the stall limit", self.stall_limit.is_zero()),
-            ("the greeting limit", self.greeting_limit.is_zero()),
+            ("--stall-limit", self.stall_limit.is_zero()),
+            ("--greeting-limit", self.greeting_limit.is_zero()),
+            ("--idle-limit", self.idle_limit.is_some_and(|limit| limit.is_zero())),
+            ("--reply-limit", self.reply_limit.is_zero()),
+            ("--model-idle-limit", self.model_idle_limit.is_zero()),
         ] {
             if zero {
                 return Err(ConfigError::Zero { option });
@@ -131,21 +171,29 @@ impl ServerConfig {
         if !self.listen.ip().is_loopback() && !is_guarded && !self.is_insecure {
             return Err(ConfigError::Open { address: self.listen });
         }
-        Ok(())
+        match self.metrics {
+            Some(address) if !address.ip().is_loopback() && !self.is_insecure => {
+                Err(ConfigError::OpenMetrics { address })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Limits on what is read from a client that has not introduced itself yet.
     pub fn limits_of_strangers(&self) -> Limits {
-        Limits { payload_len_max: STRANGER_PAYLOAD_MAX, ..self.limits() }
+        let limits = self.limits();
+        Limits { payload_len_max: limits.payload_len_max.min(STRANGER_PAYLOAD_MAX), ..limits }
     }
 
     /// Limits on what is read from a client.
     pub fn limits(&self) -> Limits {
         let usual = Limits::default();
         let nodes = self.max_nodes.min(usual.node_count_max);
+        let elements = self.max_elements.min(usual.tet_count_max);
         Limits {
+            payload_len_max: self.max_frame.min(usual.payload_len_max),
             node_count_max: nodes,
-            tet_count_max: usual.tet_count_max.min(nodes.saturating_mul(8)),
+            tet_count_max: elements.min(nodes.saturating_mul(8)),
             dof_count_max: nodes.saturating_mul(3),
             ..usual
         }
@@ -175,6 +223,9 @@ mod tests {
         assert_eq!(ServerConfig { token, encryption, ..config.clone() }.check(), Ok(()));
         assert_eq!(ServerConfig { is_insecure: true, ..config }.check(), Ok(()));
         assert_eq!(ServerConfig::default().check(), Ok(()));
+        let pages = ServerConfig { metrics: Some(open), ..ServerConfig::default() };
+        assert_eq!(pages.check(), Err(ConfigError::OpenMetrics { address: open }));
+        assert_eq!(ServerConfig { is_insecure: true, ..pages }.check(), Ok(()));
         let six = ServerConfig { listen: "[::1]:0".parse().unwrap(), ..ServerConfig::default() };
         assert_eq!(six.check(), Ok(()));
     }

@@ -1,30 +1,36 @@
 //! Finite element server of Softgrasp, as a library so that the client can embed it.
 //!
 //! Who may come at all: [`places`] bound the sessions, [`encryption`] hides them, [`access`] wants the
-//! token. The path of a request: [`session`] reads a message from its socket and decodes it, [`workers`]
-//! take it from tokio to the rayon pool through a bounded queue, [`request`] checks what it names,
-//! [`plan`] decides by which method it is answered and reserves the memory, [`answer`] finds the model
-//! (in the [`store`] or in the request) and solves, and the session writes the reply. [`resources`]
-//! are what all requests share.
+//! token. The path of a request: [`session`] reads a message from its socket, [`request_handler`]
+//! decodes it, [`workers`] take it from tokio to a rayon pool through a bounded queue, [`request`] checks
+//! what it names, [`plan`] decides by which method it is answered and reserves the memory, [`answer`]
+//! finds the model (in the [`store`] or in the request) and solves, and the session writes the reply.
+//! [`resources`] are what all requests share; [`status_pages`] tell of them.
 
 mod access;
 mod answer;
+mod awaited;
 mod budget;
 mod client_connection;
 mod clock;
 mod config;
 mod encryption;
 mod held_models;
+mod local_server;
 mod lock;
 mod machine_memory;
+mod metrics;
 mod paths;
 mod places;
 mod plan;
 mod refusal;
 mod request;
+mod request_handler;
 mod resources;
 mod server;
+mod server_handle;
 mod session;
+mod status_pages;
 mod store;
 mod uploads;
 mod workers;
@@ -32,6 +38,7 @@ mod workers;
 pub use clock::StageWatch;
 pub use config::{ConfigError, ServerConfig};
 pub use encryption::{Encryption, EncryptionError, make_certificate};
+pub use local_server::LocalServer;
 pub use machine_memory::available_bytes;
 pub use plan::measure_rates;
-pub use server::{RunningServer, StartError, serve, sockets_runtime, start};
+pub use server::{Listening, RunningServer, StartError, serve, sockets_runtime, start};

@@ -31,6 +31,12 @@ fn bytes_of_line(text: &str, word: &str, unit: u64) -> Option<u64> {
     rest.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(unit)
 }
 
+/// Resident set of this process, bytes; `None` where the system does not tell.
+pub(crate) fn resident_bytes() -> Option<u64> {
+    let status = read_to_string("/proc/self/status").ok()?;
+    bytes_of_line(&status, "VmRSS:", 1024)
+}
+
 /// Largest resident set as last read; reading it takes as long as a small frame.
 static PEAK_RSS: AtomicU64 = AtomicU64::new(0);
 

@@ -99,7 +99,8 @@ impl From<EndedAbnormally> for Refusal {
 }
 
 impl Refusal {
-    fn code(&self) -> RejectCode {
+    /// Why, for the program.
+    pub fn code(&self) -> RejectCode {
         match self {
             Self::UnknownModel(_) => RejectCode::UnknownModel,
             Self::Model(error) => code_of_model(error),

@@ -3,11 +3,12 @@
 use crate::access::Access;
 use crate::budget::Budget;
 use crate::config::ServerConfig;
+use crate::metrics::Metrics;
 use crate::plan::MeasuredRates;
 use crate::store::ModelStore;
 use crate::workers::Workers;
 
-/// Settings, kept models, memory, solving threads and their speed.
+/// Settings, kept models, memory, solving threads and their speed, and what is counted.
 pub(crate) struct Resources {
     pub config: ServerConfig,
     pub access: Access,
@@ -15,6 +16,7 @@ pub(crate) struct Resources {
     pub budget: Budget,
     pub workers: Workers,
     pub rates: MeasuredRates,
+    pub metrics: Metrics,
 }
 
 impl Resources {
@@ -23,6 +25,7 @@ impl Resources {
         let budget = Budget::new(config.memory_limit);
         let models = ModelStore::new(budget.clone());
         let access = Access::new(config.token.as_deref());
-        Self { config, access, models, budget, workers, rates: MeasuredRates::default() }
+        let (rates, metrics) = (MeasuredRates::default(), Metrics::default());
+        Self { config, access, models, budget, workers, rates, metrics }
     }
 }

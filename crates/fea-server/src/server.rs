@@ -1,8 +1,9 @@
 //! Listens for connections, accepts sessions, and stops them.
 
 use std::net::SocketAddr;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{Limits, RejectCode, Rejected, Reply};
@@ -11,10 +12,11 @@ use tokio::sync::watch;
 use tokio::task::JoinSet;
 
 use crate::config::{ConfigError, ServerConfig};
-use crate::places::{NoPlace, Places};
+use crate::places::NoPlace;
 use crate::resources::Resources;
-use crate::session::{self, ServerHandle};
-use crate::uploads::Uploads;
+use crate::server_handle::{ServerHandle, stopped};
+use crate::session;
+use crate::status_pages::StatusPages;
 use crate::workers::Workers;
 
 /// Why a server did not start.
@@ -28,6 +30,14 @@ pub enum StartError {
         "cannot listen on {address}: {source}; is another server running there? (--listen HOST:PORT, port 0 picks a free one)"
     )]
     Listen {
+        /// The address.
+        address: SocketAddr,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The address of the pages about the server's state cannot be listened on.
+    #[error("cannot listen on {address}: {source} (--metrics HOST:PORT, port 0 picks a free one)")]
+    Metrics {
         /// The address.
         address: SocketAddr,
         /// The system's reason.
@@ -52,47 +62,111 @@ const STOP_GRACE: Duration = Duration::from_secs(2);
 /// up after some questions without an answer.
 const ALIVE_AFTER: Duration = Duration::from_secs(30);
 const ALIVE_EVERY: Duration = Duration::from_secs(10);
+/// Unused models are looked for this often: a quarter of their time, within these bounds.
+const FORGET_EVERY_MIN: Duration = Duration::from_millis(100);
+const FORGET_EVERY_MAX: Duration = Duration::from_secs(60);
 /// Pause after a failed accept, so that a process out of file descriptors does not spin.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
-/// Listens and serves until `stop` holds true; `on_ready` hears the address listened on.
+/// Addresses that a server listens on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Listening {
+    /// For clients.
+    pub address: SocketAddr,
+    /// For the pages about its state.
+    pub metrics: Option<SocketAddr>,
+}
+
+/// Listens and serves until `stop` holds true and its sessions have drained; `on_ready` hears the
+/// addresses listened on.
 ///
 /// # Errors
 /// [`StartError`] if it cannot start; once it listens it does not fail.
 pub async fn serve(
     config: ServerConfig,
-    on_ready: impl FnOnce(SocketAddr),
+    on_ready: impl FnOnce(Listening),
     stop: watch::Receiver<bool>,
 ) -> Result<(), StartError> {
     config.check()?;
-    let address = config.listen;
-    let listen_error = |source| StartError::Listen { address, source };
-    let listener = TcpListener::bind(address).await.map_err(listen_error)?;
-    let threads = config.threads;
+    let Listeners { clients, pages, listening } = Listeners::open(&config).await?;
+    let (threads, queue, drain) = (config.threads, config.max_queue, config.drain);
     let workers =
-        Workers::new(threads).map_err(|source| StartError::Threads { threads, source })?;
-    on_ready(listener.local_addr().map_err(listen_error)?);
-    let places = Places::new(config.max_sessions, config.max_sessions_per_address);
-    let measure_at_start = config.measure_at_start;
-    let resources = Arc::new(Resources::new(config, workers));
-    if measure_at_start {
-        let later = Arc::clone(&resources);
-        resources.workers.in_background(move || {
+        Workers::new(threads, queue).map_err(|source| StartError::Threads { threads, source })?;
+    let (end_sessions, sessions_end) = watch::channel(false);
+    let server = ServerHandle::new(config, workers, sessions_end);
+    let is_stopping = Arc::new(AtomicBool::new(false));
+    // Ends with this function.
+    let mut beside = JoinSet::new();
+    let (resources, places) = (Arc::clone(&server.resources), server.places.clone());
+    beside.spawn(forget_unused_models(Arc::clone(&resources)));
+    if let Some(listener) = pages {
+        let is_stopping = Arc::clone(&is_stopping);
+        beside.spawn(StatusPages { resources, places, is_stopping }.serve(listener));
+    }
+    on_ready(listening);
+    if server.resources.config.measure_at_start {
+        let later = Arc::clone(&server.resources);
+        server.resources.workers.in_background(move || {
             later.rates.get();
         });
     }
-    let server =
-        ServerHandle { resources, uploads: Uploads::default(), places, stop: stop.clone() };
     let mut sessions = JoinSet::new();
-    accept_until_stopped(&listener, &server, stop, &mut sessions).await;
-    drop(listener);
-    tracing::info!(sessions = sessions.len(), "stopping");
-    let all_done = async { while sessions.join_next().await.is_some() {} };
-    if tokio::time::timeout(STOP_GRACE, all_done).await.is_err() {
-        tracing::warn!("sessions still at work are cut off");
-        sessions.abort_all();
+    accept_until_stopped(&clients, &server, stop, &mut sessions).await;
+    drop(clients);
+    is_stopping.store(true, Ordering::Relaxed);
+    tracing::info!(sessions = sessions.len(), drain_s = drain.as_secs_f64(), "stopping");
+    if !all_end_within(&mut sessions, drain).await {
+        let _ = end_sessions.send(true);
+        if !all_end_within(&mut sessions, STOP_GRACE).await {
+            tracing::warn!("sessions still at work are cut off");
+            sessions.abort_all();
+        }
     }
     Ok(())
+}
+
+/// The sockets that a server listens on, and their addresses.
+struct Listeners {
+    clients: TcpListener,
+    pages: Option<TcpListener>,
+    listening: Listening,
+}
+
+impl Listeners {
+    async fn open(config: &ServerConfig) -> Result<Self, StartError> {
+        let address = config.listen;
+        let failed = |source| StartError::Listen { address, source };
+        let clients = TcpListener::bind(address).await.map_err(failed)?;
+        let address = clients.local_addr().map_err(failed)?;
+        let Some(wanted) = config.metrics else {
+            return Ok(Self {
+                clients,
+                pages: None,
+                listening: Listening { address, metrics: None },
+            });
+        };
+        let failed = |source| StartError::Metrics { address: wanted, source };
+        let pages = TcpListener::bind(wanted).await.map_err(failed)?;
+        let metrics = Some(pages.local_addr().map_err(failed)?);
+        Ok(Self { clients, pages: Some(pages), listening: Listening { address, metrics } })
+    }
+}
+
+/// Waits for all sessions to end, but not longer; whether they have.
+async fn all_end_within(sessions: &mut JoinSet<()>, limit: Duration) -> bool {
+    let all_end = async { while sessions.join_next().await.is_some() {} };
+    tokio::time::timeout(limit, all_end).await.is_ok()
+}
+
+/// Forgets models that no session holds, again and again.
+async fn forget_unused_models(resources: Arc<Resources>) {
+    let limit = resources.config.model_idle_limit;
+    loop {
+        tokio::time::sleep((limit / 4).clamp(FORGET_EVERY_MIN, FORGET_EVERY_MAX)).await;
+        if let Some(then) = Instant::now().checked_sub(limit) {
+            resources.models.forget_unused_since(then);
+        }
+    }
 }
 
 async fn accept_until_stopped(
@@ -104,7 +178,7 @@ async fn accept_until_stopped(
     loop {
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
-            () = session::stopped(&mut stop) => return,
+            () = stopped(&mut stop) => return,
             Some(_) = sessions.join_next(), if !sessions.is_empty() => continue,
         };
         match accepted {
@@ -136,24 +210,36 @@ async fn attend(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
     let Some(encryption) = &config.encryption else {
         return match place {
             Ok(_place) => session::serve(stream, peer, server).await,
-            Err(why) => turn_away(stream, peer, why).await,
+            Err(why) => {
+                server.resources.metrics.turned_away();
+                turn_away(stream, peer, why).await;
+            }
         };
     };
     // A handshake costs: whoever has no place does not get one.
     let _place = match place {
         Ok(place) => place,
-        Err(why) => return tracing::warn!(%peer, %why, "turned away"),
+        Err(why) => {
+            server.resources.metrics.turned_away();
+            return tracing::warn!(%peer, %why, "turned away");
+        }
     };
     let handshake = encryption.acceptor().accept(stream);
     let mut stop = server.stop.clone();
     let shaken = tokio::select! {
         shaken = tokio::time::timeout(config.greeting_limit, handshake) => shaken,
-        () = session::stopped(&mut stop) => return,
+        () = stopped(&mut stop) => return,
     };
     match shaken {
         Ok(Ok(stream)) => session::serve(stream, peer, server).await,
-        Ok(Err(error)) => tracing::warn!(%peer, %error, "TLS could not be agreed on"),
-        Err(_) => tracing::warn!(%peer, "TLS was not agreed on in time"),
+        Ok(Err(error)) => {
+            server.resources.metrics.turned_away();
+            tracing::warn!(%peer, %error, "TLS could not be agreed on");
+        }
+        Err(_) => {
+            server.resources.metrics.turned_away();
+            tracing::warn!(%peer, "TLS was not agreed on in time");
+        }
     }
 }
 
@@ -191,7 +277,7 @@ pub fn sockets_runtime(config: &ServerConfig) -> std::io::Result<tokio::runtime:
 /// A server on a thread of this process; dropping it stops it.
 #[derive(Debug)]
 pub struct RunningServer {
-    address: SocketAddr,
+    listening: Listening,
     stop: watch::Sender<bool>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
@@ -209,7 +295,7 @@ pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
         .spawn(move || {
             // The first word counts; nobody listens for a second one.
             let say = |outcome| drop(ready.send(outcome));
-            let served = runtime.block_on(serve(config, |address| say(Ok(address)), stopped));
+            let served = runtime.block_on(serve(config, |listening| say(Ok(listening)), stopped));
             // Whatever the threads are at, a stop does not wait for them.
             runtime.shutdown_background();
             if let Err(error) = served {
@@ -218,7 +304,7 @@ pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
         })
         .map_err(StartError::Runtime)?;
     match is_ready.recv() {
-        Ok(Ok(address)) => Ok(RunningServer { address, stop, thread: Some(thread) }),
+        Ok(Ok(listening)) => Ok(RunningServer { listening, stop, thread: Some(thread) }),
         Ok(Err(error)) => Err(error),
         Err(_) => Err(StartError::Runtime(std::io::Error::other("the server's thread ended"))),
     }
@@ -227,7 +313,12 @@ pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
 impl RunningServer {
     /// Address it listens on.
     pub fn address(&self) -> SocketAddr {
-        self.address
+        self.listening.address
+    }
+
+    /// Address of the pages about its state, if it has them.
+    pub fn metrics(&self) -> Option<SocketAddr> {
+        self.listening.metrics
     }
 
     /// Stops it and waits until its sessions have ended.

@@ -1,4 +1,9 @@
-//! Hands work from tokio to a rayon pool of exact size, through a bounded queue.
+//! Hands work from tokio to rayon pools of exact size, through bounded queues.
+//!
+//! There is a pool for frames on what is prepared, and one for everything that may take long. A thread
+//! of a pool that waits inside a parallel loop takes what else waits in that pool; a frame in the same
+//! pool would lie beneath a factor, or wait until all pieces of the factor are done. With pools of their
+//! own, frames share the processors with the long work in the slices of the system's scheduler.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::{Arc, mpsc};
@@ -6,21 +11,30 @@ use std::time::Instant;
 
 use tokio::sync::{Semaphore, oneshot};
 
+use crate::awaited::Abandoned;
 use crate::lock::assert_none_is_held;
 
-/// A rayon pool behind a bounded queue.
+/// The pools, each behind a bounded queue.
 ///
-/// Invariant: requests waiting or running ≤ `QUEUE_DEPTH`; one more waits in its own session, which
-/// stops reading its socket, so TCP slows a client that asks faster than it is answered.
+/// Invariant: requests waiting or running in each pool ≤ `queue_depth`; one more waits in its own
+/// session, which reads no further message, so TCP slows a client that asks faster than it is answered.
 ///
 /// Invariant: no work begins on a thread that holds a [`crate::lock::Lock`].
 #[derive(Clone)]
 pub(crate) struct Workers {
-    pool: Arc<rayon::ThreadPool>,
-    places: Arc<Semaphore>,
+    long: Queue,
+    frames: Queue,
     background: Arc<Semaphore>,
     beside: mpsc::Sender<Task>,
     factors: Arc<rayon::ThreadPool>,
+}
+
+/// A pool and the places in its queue.
+#[derive(Clone)]
+struct Queue {
+    pool: Arc<rayon::ThreadPool>,
+    places: Arc<Semaphore>,
+    depth: usize,
 }
 
 /// Work for the thread beside the frames.
@@ -33,40 +47,25 @@ pub(crate) struct EndedAbnormally;
 
 /// Background tasks that may wait or run at once.
 const BACKGROUND_MAX: usize = 8;
-/// Requests of all sessions that may wait or run at once.
-const QUEUE_DEPTH: usize = 32;
 
 impl Workers {
-    /// A pool of exactly `threads` threads.
+    /// Pools of exactly `threads` threads, with queues of so many requests.
     ///
     /// # Errors
     /// The system's, when it gives no threads.
-    pub fn new(threads: usize) -> std::io::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|i| format!("solve-{i}"))
-            .stack_size(STACK_BYTES)
-            .build()
-            .map_err(std::io::Error::other)?;
+    pub fn new(threads: usize, queue_depth: usize) -> std::io::Result<Self> {
         Ok(Self {
-            pool: Arc::new(pool),
-            places: Arc::new(Semaphore::new(QUEUE_DEPTH)),
+            long: Queue::new("solve", threads, queue_depth)?,
+            frames: Queue::new("frames", threads, queue_depth)?,
             background: Arc::new(Semaphore::new(BACKGROUND_MAX)),
             beside: start_beside()?,
-            factors: Arc::new(
-                rayon::ThreadPoolBuilder::new()
-                    .num_threads(1)
-                    .thread_name(|_| "factors".to_owned())
-                    .stack_size(STACK_BYTES)
-                    .build()
-                    .map_err(std::io::Error::other)?,
-            ),
+            factors: Arc::new(pool("factors", 1)?),
         })
     }
 
     /// Number of threads.
     pub fn threads(&self) -> usize {
-        self.pool.current_num_threads()
+        self.long.pool.current_num_threads()
     }
 
     /// Runs `work` on the pool when a thread is free; nobody waits for it. What is over the bound is
@@ -76,7 +75,7 @@ impl Workers {
             tracing::debug!("a background task is dropped");
             return;
         };
-        self.pool.spawn(move || {
+        self.long.pool.spawn(move || {
             let _ = caught("in the background", work);
             drop(place);
         });
@@ -98,7 +97,16 @@ impl Workers {
         }
     }
 
-    /// Runs `work` on the pool and waits for it without blocking the sockets.
+    /// Requests that wait or are worked on in both pools.
+    pub fn queued(&self) -> usize {
+        [&self.long, &self.frames]
+            .map(|queue| queue.depth - queue.places.available_permits())
+            .iter()
+            .sum()
+    }
+
+    /// Runs `work` that may take long and waits for it without blocking the sockets. Work whose session
+    /// has gone before its turn is not begun.
     ///
     /// # Errors
     /// [`EndedAbnormally`] if the work panicked; the pool lives on.
@@ -106,15 +114,18 @@ impl Workers {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, EndedAbnormally> {
-        let place = Arc::clone(&self.places).acquire_owned().await.map_err(|_| EndedAbnormally)?;
-        let (sender, receiver) = oneshot::channel();
-        self.pool.spawn(move || {
-            let outcome = caught("on a request", work);
-            drop(place);
-            // The session may have gone in the meantime; then nobody waits for this.
-            let _ = sender.send(outcome);
-        });
-        receiver.await.unwrap_or(Err(EndedAbnormally))
+        self.long.run("on a request", work).await
+    }
+
+    /// The same for a frame on what is prepared.
+    ///
+    /// # Errors
+    /// As [`Workers::run`].
+    pub async fn run_frame<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, EndedAbnormally> {
+        self.frames.run("on a frame", work).await
     }
 
     /// Does `work` at once on the calling thread of the sockets: for work that takes less time than
@@ -125,6 +136,42 @@ impl Workers {
     pub fn run_here<T>(work: impl FnOnce() -> T) -> Result<T, EndedAbnormally> {
         caught("on a small frame", work)
     }
+}
+
+impl Queue {
+    fn new(name: &'static str, threads: usize, depth: usize) -> std::io::Result<Self> {
+        let places = Arc::new(Semaphore::new(depth));
+        Ok(Self { pool: Arc::new(pool(name, threads)?), places, depth })
+    }
+
+    async fn run<T: Send + 'static>(
+        &self,
+        place: &'static str,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, EndedAbnormally> {
+        let taken = Arc::clone(&self.places).acquire_owned().await.map_err(|_| EndedAbnormally)?;
+        let (sender, receiver) = oneshot::channel();
+        self.pool.spawn(move || {
+            if sender.is_closed() {
+                tracing::info!("work is not begun, because its session has gone");
+                return;
+            }
+            let outcome = caught(place, work);
+            drop(taken);
+            // The session may have gone in the meantime; then nobody waits for this.
+            let _ = sender.send(outcome);
+        });
+        receiver.await.unwrap_or(Err(EndedAbnormally))
+    }
+}
+
+fn pool(name: &'static str, threads: usize) -> std::io::Result<rayon::ThreadPool> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(move |i| format!("{name}-{i}"))
+        .stack_size(STACK_BYTES)
+        .build()
+        .map_err(std::io::Error::other)
 }
 
 /// A thread that waits in a parallel loop takes other requests from the queue, each on top of the
@@ -171,6 +218,10 @@ fn caught<T>(place: &str, work: impl FnOnce() -> T) -> Result<T, EndedAbnormally
         work()
     };
     std::panic::catch_unwind(AssertUnwindSafe(checked)).map_err(|panic| {
+        if panic.is::<Abandoned>() {
+            tracing::info!("work {place} is ended, because its session has gone");
+            return EndedAbnormally;
+        }
         let text = panic
             .downcast_ref::<String>()
             .map(String::as_str)
@@ -187,7 +238,7 @@ mod tests {
 
     #[tokio::test]
     async fn panic_in_one_request_is_answered_and_the_pool_lives_on() {
-        let workers = Workers::new(1).unwrap();
+        let workers = Workers::new(1, 8).unwrap();
         let broken: Result<(), EndedAbnormally> = workers.run(|| panic!("a fault")).await;
         assert_eq!(broken, Err(EndedAbnormally));
         let broken: Result<(), EndedAbnormally> = Workers::run_here(|| panic!("a fault"));
@@ -198,7 +249,7 @@ mod tests {
 
     #[tokio::test]
     async fn panic_beside_the_frames_does_not_end_their_thread() {
-        let workers = Workers::new(1).unwrap();
+        let workers = Workers::new(1, 8).unwrap();
         workers.beside(|| panic!("a fault"));
         let (sender, receiver) = oneshot::channel();
         workers.beside(move || sender.send(5).unwrap());

@@ -115,10 +115,12 @@ impl GraspLoop {
             report,
             large,
             round_trip,
+            bytes,
         } = reached;
         let ms = round_trip.as_secs_f64() * 1e3;
         if tick != UNCOUNTED {
-            outcome.answers.push((tick, SolveSummary::new(&report, ms).with_large(large.as_ref())));
+            let summary = SolveSummary::new(&report, ms).with_large(large.as_ref());
+            outcome.answers.push((tick, summary.with_bytes(bytes)));
         }
         let current = rest_shape == self.object.rest_shapes()
             && self.deforming_since.is_some_and(|since| tick >= since)

@@ -9,8 +9,8 @@ use fea_server::{RunningServer, ServerConfig, StageWatch, StartError};
 use softgrasp_core::solve::rates::Rates;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
-    ConnectionError, DecodeError, EncodeError, Frame, FrameError, Hello, Limits, Rejected, Reply,
-    Request, Welcome,
+    ConnectionError, DecodeError, EncodeError, Frame, FrameError, HEADER_LEN, Hello, Limits,
+    Rejected, Reply, Request, Welcome,
 };
 
 use crate::endpoint::{Endpoint, TrustError};
@@ -112,6 +112,8 @@ pub struct ServerConnection {
     welcome: Welcome,
     request_id: u64,
     out: Vec<u8>,
+    /// Bytes of the newest reply.
+    reply_bytes: usize,
 }
 
 /// An address to connect to, and the server behind it if it is this process's own.
@@ -123,7 +125,14 @@ pub struct Host {
 }
 
 /// A server that does not accept within this time is not there.
-const CONNECT_MAX: Duration = Duration::from_secs(5);
+const CONNECT_MAX: Duration = Duration::from_secs(2);
+/// A server that says no welcome within this time is not one.
+const WELCOME_MAX: Duration = Duration::from_secs(10);
+/// A server's machine that is silent is asked whether it is there after this long, and again so often.
+const ALIVE_EVERY: Duration = Duration::from_secs(1);
+/// A machine that has confirmed nothing for this long, though it was asked or sent something, is gone.
+/// Links that pause for less are waited for.
+const ALIVE_MAX: Duration = Duration::from_secs(5);
 /// First byte of what a TLS server answers to bytes that are not TLS.
 const TLS_ALERT: u8 = 0x15;
 /// A reply that has not begun to come by then is slept for.
@@ -203,6 +212,7 @@ impl ServerConnection {
     pub fn connect(to: impl Into<Endpoint>) -> Result<Self, LinkError> {
         let endpoint = to.into();
         let stream = ServerStream::new(open_socket(&endpoint.address)?, &endpoint)?;
+        stream.set_read_timeout(Some(WELCOME_MAX)).map_err(|e| LinkError::Connection(e.into()))?;
         let mut this = Self {
             connection: Connection::new(stream, Limits::default()),
             limits: Limits::default(),
@@ -214,6 +224,7 @@ impl ServerConnection {
             },
             request_id: 0,
             out: Vec::new(),
+            reply_bytes: 0,
         };
         let hello = Hello {
             client: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -229,6 +240,8 @@ impl ServerConnection {
             }
             Err(error) => return Err(error),
         }
+        // What a request takes is its own matter.
+        this.stream().set_read_timeout(None).map_err(|e| LinkError::Connection(e.into()))?;
         Ok(this)
     }
 
@@ -277,11 +290,17 @@ impl ServerConnection {
             if frame.request_id() != request_id && frame.request_id() != 0 {
                 continue;
             }
+            self.reply_bytes = HEADER_LEN + frame.payload.len();
             return match Reply::decode(&frame, &Limits::default())? {
                 Reply::Rejected(rejected) => Err(LinkError::Rejected(rejected)),
                 reply => Ok(reply),
             };
         }
+    }
+
+    /// Bytes of the newest request and of its reply, headers included.
+    pub fn bytes_of_exchange(&self) -> [u64; 2] {
+        [self.out.len() as u64, self.reply_bytes as u64]
     }
 
     /// Next frame; sleeps only for one that has not come after [`AWAKE_MAX`].
@@ -353,11 +372,23 @@ fn open_socket(address: &str) -> Result<TcpStream, LinkError> {
     for candidate in found {
         match TcpStream::connect_timeout(&candidate, CONNECT_MAX) {
             Ok(stream) => {
-                stream.set_nodelay(true).map_err(|e| LinkError::Connection(e.into()))?;
+                make_ready(&stream).map_err(|e| LinkError::Connection(e.into()))?;
                 return Ok(stream);
             }
             Err(error) => last = error,
         }
     }
     Err(LinkError::Connect { address: address.to_owned(), source: last })
+}
+
+/// A frame is sent at once, and a machine that is gone without a word is noticed while a reply is awaited,
+/// however long that may take.
+fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
+    stream.set_nodelay(true)?;
+    let socket = socket2::SockRef::from(stream);
+    let alive = socket2::TcpKeepalive::new().with_time(ALIVE_EVERY).with_interval(ALIVE_EVERY);
+    socket.set_tcp_keepalive(&alive)?;
+    #[cfg(target_os = "linux")]
+    socket.set_tcp_user_timeout(Some(ALIVE_MAX))?;
+    Ok(())
 }

@@ -1,6 +1,9 @@
 //! Writes a file completely, or leaves an older one as it was.
 
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A file that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -21,7 +24,9 @@ pub enum FileWriteError {
     },
 }
 
-/// Writes a file; a reader never sees half of it, and a failure leaves an older file as it was.
+/// Writes a file; a reader never sees half of it, and a failure leaves an older file as it was: the bytes
+/// are written beside it, are made to lie on the disk, and take its name then. A name that is a link
+/// leads to the same file afterwards.
 ///
 /// # Errors
 /// [`FileWriteError`] with the path and the system's reason.
@@ -34,13 +39,106 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), FileWriteError> {
     if path.exists() && !path.is_file() {
         return std::fs::write(path, bytes).map_err(system);
     }
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let part = path.with_file_name(name);
-    let written = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
+    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let part = beside(&target);
+    let written = write_and_sync(&part, bytes, &target)
+        .and_then(|()| std::fs::rename(&part, &target))
+        .and_then(|()| sync_folder(&target));
     if written.is_err() {
         // Best effort: the error that matters is the one reported below.
         let _ = std::fs::remove_file(&part);
     }
     written.map_err(system)
+}
+
+/// A name beside a file that no other writer uses, in this process or another.
+fn beside(path: &Path) -> PathBuf {
+    static WRITTEN: AtomicU64 = AtomicU64::new(0);
+    let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.{number}.part", std::process::id()));
+    path.with_file_name(name)
+}
+
+/// Writes the bytes so that they lie on the disk, with the permissions of the file they are to replace.
+fn write_and_sync(part: &Path, bytes: &[u8], replaces: &Path) -> std::io::Result<()> {
+    let mut file = File::create_new(part)?;
+    file.write_all(bytes)?;
+    if let Ok(older) = std::fs::metadata(replaces) {
+        file.set_permissions(older.permissions())?;
+    }
+    file.sync_all()
+}
+
+/// Makes a new name in a folder lie on the disk as well.
+fn sync_folder(path: &Path) -> std::io::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    match cfg!(unix) {
+        true => File::open(folder)?.sync_all(),
+        // Other systems do not open folders as files.
+        false => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn writers_of_one_file_at_once_leave_one_whole_file_and_nothing_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh");
+        std::thread::scope(|scope| {
+            for writer in 0..8 {
+                let path = &path;
+                scope.spawn(move || {
+                    for _ in 0..20 {
+                        write_file(path, &vec![writer; 10_000]).unwrap();
+                        let found = std::fs::read(path).unwrap();
+                        assert!(found.len() == 10_000 && found.iter().all(|b| *b == found[0]));
+                    }
+                });
+            }
+        });
+        assert_eq!(names(folder.path()), ["mesh"]);
+    }
+
+    #[test]
+    fn failure_leaves_the_older_file_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("no such folder").join("mesh");
+        assert!(matches!(write_file(&path, b"new"), Err(FileWriteError::System { .. })));
+        // Its name beside the file would be too long.
+        let path = folder.path().join("m".repeat(250));
+        std::fs::write(&path, b"old").unwrap();
+        assert!(matches!(write_file(&path, b"new"), Err(FileWriteError::System { .. })));
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert!(matches!(write_file(folder.path(), b""), Err(FileWriteError::Directory { .. })));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn link_and_permissions_stay() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [path, link] = ["mesh", "link"].map(|name| folder.path().join(name));
+        std::fs::write(&path, b"old").unwrap();
+        std::fs::set_permissions(&path, PermissionsExt::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        write_file(&link, b"new").unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
+    }
 }

@@ -150,6 +150,17 @@ pub struct RunSummary {
     pub round_trip_ms_p99: Option<f64>,
     /// Longest round trip, ms: the first of a grasp, which computes what the grip needs.
     pub round_trip_ms_max: Option<f64>,
+    /// How old the shape was that a deforming tick showed: time since the tick that had asked for it, ms,
+    /// median; null where none was shown.
+    pub shown_age_ms_p50: Option<f64>,
+    /// 99 % of the shapes were not older, ms.
+    pub shown_age_ms_p99: Option<f64>,
+    /// The oldest shape, ms.
+    pub shown_age_ms_max: Option<f64>,
+    /// Bytes on the wire of all requests that were answered.
+    pub bytes_sent: u64,
+    /// Bytes on the wire of their answers.
+    pub bytes_received: u64,
     /// Largest rotation of an element, degrees.
     pub max_rotation_deg: f64,
     /// Largest strain of an element.
@@ -294,6 +305,15 @@ impl RunReport {
         }));
     }
 
+    /// Ages of the shapes that deforming ticks showed, ms.
+    fn shown_ages_ms(&self) -> impl Iterator<Item = f64> {
+        self.played.iter().filter(|record| record.deforms()).filter_map(|record| {
+            let asked = record.shown_tick?;
+            let at = self.played.binary_search_by_key(&asked, |record| record.tick).ok()?;
+            Some(record.at_ms - self.played.get(at)?.at_ms)
+        })
+    }
+
     /// Fills the summary. What is not answered by now never is.
     pub fn finish(&mut self, faults: DeviceFaults, budget: &TickBudget) {
         let open = |record: &&TickRecord| {
@@ -303,12 +323,8 @@ impl RunReport {
         open.into_iter().for_each(|tick| self.add_unanswered(tick, Unanswered::RunEnded));
         let solves: Vec<&SolveSummary> =
             self.played.iter().filter_map(|record| record.solve.as_ref()).collect();
-        let mut round_trips: Vec<f64> = solves.iter().map(|s| s.round_trip_ms).collect();
-        round_trips.sort_by(f64::total_cmp);
-        let quantile = |q: f64| {
-            let last = round_trips.len().checked_sub(1)?;
-            round_trips.get((q * last as f64).round() as usize).copied()
-        };
+        let round_trips = Sorted::new(solves.iter().map(|s| s.round_trip_ms));
+        let ages = Sorted::new(self.shown_ages_ms());
         let most = |of: fn(&SolveSummary) -> f64| solves.iter().map(|s| of(s)).fold(0.0, f64::max);
         let is_large = |s: &&&SolveSummary| s.deformation == "large";
         let large = || solves.iter().filter(is_large).filter_map(|s| s.large.as_ref());
@@ -328,9 +344,14 @@ impl RunReport {
             joint_fit: None,
             pieces_dropped: 0,
             residual_rel_max: most(|s| s.residual_rel),
-            round_trip_ms_p50: quantile(0.5),
-            round_trip_ms_p99: quantile(0.99),
-            round_trip_ms_max: quantile(1.0),
+            round_trip_ms_p50: round_trips.quantile(0.5),
+            round_trip_ms_p99: round_trips.quantile(0.99),
+            round_trip_ms_max: round_trips.quantile(1.0),
+            shown_age_ms_p50: ages.quantile(0.5),
+            shown_age_ms_p99: ages.quantile(0.99),
+            shown_age_ms_max: ages.quantile(1.0),
+            bytes_sent: solves.iter().map(|s| s.request_bytes).sum(),
+            bytes_received: solves.iter().map(|s| s.answer_bytes).sum(),
             max_rotation_deg: most(|s| s.max_rotation_deg),
             max_strain: most(|s| s.max_strain),
             large_solves: large().count(),
@@ -348,6 +369,23 @@ impl RunReport {
             glove_faults: faults.glove,
             tracker_faults: faults.tracker,
         };
+    }
+}
+
+/// Numbers in ascending order.
+struct Sorted(Vec<f64>);
+
+impl Sorted {
+    fn new(numbers: impl Iterator<Item = f64>) -> Self {
+        let mut numbers: Vec<f64> = numbers.collect();
+        numbers.sort_by(f64::total_cmp);
+        Self(numbers)
+    }
+
+    /// The number that a part `q` of them does not exceed; `None` where there are none.
+    fn quantile(&self, q: f64) -> Option<f64> {
+        let last = self.0.len().checked_sub(1)?;
+        self.0.get((q * last as f64).round() as usize).copied()
     }
 }
 
@@ -408,6 +446,18 @@ mod tests {
         assert_eq!(s.unanswered, counts);
         assert_eq!(s.deforming_ticks, s.solves as u64 + s.unanswered.total());
         assert_eq!(report.failure(), None);
+    }
+
+    #[test]
+    fn age_of_a_shape_is_the_time_since_the_tick_that_asked_for_it() {
+        let mut report = report();
+        for (number, shown_tick) in [(0, None), (1, Some(0)), (2, Some(0)), (3, Some(3))] {
+            tick(&mut report, number, 0, TickOutcome { shown_tick, ..deforming() });
+        }
+        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
+        let RunSummary { shown_age_ms_p50, shown_age_ms_max, .. } = report.summary;
+        assert!((shown_age_ms_p50.unwrap() - 10.0).abs() < 1e-9);
+        assert!((shown_age_ms_max.unwrap() - 20.0).abs() < 1e-9);
     }
 
     #[test]

@@ -87,6 +87,13 @@ impl RunReport {
                 100.0 * s.max_strain,
             ));
         }
+        if let (Some(median), Some(most)) = (s.shown_age_ms_p50, s.shown_age_ms_max)
+            && self.pace == Pace::Free.name()
+        {
+            text.push_str(&format!(
+                "  shape shown         {median:.0} ms old (median), {most:.0} ms at most\n"
+            ));
+        }
         text.push_str(&self.words_of_large());
         text.push_str(&self.words_of_devices());
         if self.interrupted {

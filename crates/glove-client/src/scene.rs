@@ -110,6 +110,14 @@ pub const IMPORTED_SIZE_M: f64 = 0.08;
 pub const NODES_DEFAULT: usize = 1000;
 
 impl SceneFile {
+    /// Reads the text of a scene; a mesh file in it is as it is written there.
+    ///
+    /// # Errors
+    /// The fault with line and column.
+    pub fn of_text(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
+    }
+
     /// Reads a scene; a mesh file in it is taken relative to the scene's folder.
     ///
     /// # Errors
@@ -117,7 +125,7 @@ impl SceneFile {
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let read_error = |source| SceneError::Read { path: path.to_owned(), source };
         let text = std::fs::read_to_string(path).map_err(read_error)?;
-        let mut scene: Self = toml::from_str(&text)
+        let mut scene = Self::of_text(&text)
             .map_err(|e| SceneError::Parse { path: path.to_owned(), source: Box::new(e) })?;
         if let Some(object) = &mut scene.object
             && let Ok(ObjectChoice::File(file)) = object.parse()

@@ -313,7 +313,7 @@ impl Session {
             self.report.replay = Some(ReplaySummary::of(&hand));
         }
         if let Some(Err(error)) = self.recorder.map(Recorder::finish) {
-            self.report.recording_failed = Some(error.to_string());
+            self.report.recording_failed = Some(softgrasp_os::one_line(&error));
         }
         Ok(self.report)
     }

@@ -21,6 +21,10 @@ pub struct SolveSummary {
     pub ms: StageSummary,
     /// Milliseconds from sending the request to having the answer, on the client.
     pub round_trip_ms: f64,
+    /// Bytes of the request on the wire.
+    pub request_bytes: u64,
+    /// Bytes of the answer on the wire.
+    pub answer_bytes: u64,
     /// `‖K11 Q_u − b‖ / ‖b‖`.
     pub residual_rel: f64,
     /// Proven bound on the relative error, or null.
@@ -133,6 +137,8 @@ impl SolveSummary {
             known_dofs: report.known_dofs,
             ms: StageSummary { decode, assemble, order, factor, solve, encode, queue },
             round_trip_ms,
+            request_bytes: 0,
+            answer_bytes: 0,
             residual_rel: report.residual_rel,
             error_bound_rel: report.error_bound_rel,
             error_estimate_rel: report.error_estimate_rel,
@@ -156,5 +162,10 @@ impl SolveSummary {
     pub fn with_large(self, large: Option<&LargeReport>) -> Self {
         let deformation = large.map_or(self.deformation, |large| large.deformation.as_str());
         Self { deformation, large: large.map(LargeSummary::new), ..self }
+    }
+
+    /// The same with the bytes of request and answer on the wire.
+    pub fn with_bytes(self, [request_bytes, answer_bytes]: [u64; 2]) -> Self {
+        Self { request_bytes, answer_bytes, ..self }
     }
 }

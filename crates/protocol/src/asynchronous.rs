@@ -81,6 +81,21 @@ impl<S: AsyncRead + Unpin> Connection<S> {
     }
 }
 
+impl<S: AsyncRead + Unpin> Connection<S> {
+    /// Takes bytes that come while no frame is wanted yet; `false` when the peer sends no more. How much
+    /// is taken is the caller's choice, by [`Connection::received`].
+    ///
+    /// May be dropped at any await: bytes that have come stay in the buffer.
+    ///
+    /// # Errors
+    /// That of the stream: the peer has gone.
+    pub async fn read_ahead(&mut self) -> Result<bool, ConnectionError> {
+        let count = self.stream.read(self.buffer.spare_mut()).await?;
+        self.buffer.advance(count);
+        Ok(count > 0)
+    }
+}
+
 impl<S: AsyncWrite + Unpin> Connection<S> {
     /// Writes all bytes of one or more frames and flushes.
     ///

@@ -27,7 +27,7 @@ const SMALL_PRODUCTS: usize = 1 << 18;
 const TOUCHED_MAX: usize = 1 << 10;
 
 /// A frame with all that its plan needs.
-struct Frame {
+pub(crate) struct PosedFrame {
     hash: ModelHash,
     stored: Arc<StoredModel>,
     message: QuestionMessage,
@@ -39,7 +39,7 @@ struct Frame {
 
 /// A frame whose contact set is kept, with that set: nothing has to be made for its answer.
 pub(crate) struct KeptFrame {
-    frame: Frame,
+    frame: PosedFrame,
     contacts: Contacts,
     prepared: PreparedSet,
 }
@@ -68,7 +68,7 @@ fn kept_frame(resources: &Resources, request: &FrameRequest) -> Option<KeptFrame
     if forces > TOUCHED_MAX || 3 * nodes.len() * forces > SMALL_PRODUCTS {
         return None;
     }
-    let frame = Frame::new(resources, request.clone()).ok()?;
+    let frame = PosedFrame::new(resources, request.clone()).ok()?;
     if frame.plan.method != Method::Condensed {
         return None;
     }
@@ -101,27 +101,15 @@ pub(crate) fn answer_frame(
     request: FrameRequest,
     clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    let mut frame = Frame::new(resources, request)?;
-    if frame.plan.method == Method::Condensed {
-        let answer = frame.by_columns(resources, clock.clone());
-        resources.models.trim();
-        match answer {
-            // What the small system cannot do, a factor of its own may.
-            Err(Refusal::Model(ModelError::Condensed(error)))
-                if frame.question.method.is_none() && frame.message.masks.is_empty() =>
-            {
-                let why = format!("not condensed: {error}");
-                let plan = frame.question.plan(frame.plan.element, Method::Front, why);
-                frame.plan = Plan { instead: Some(Method::FrontMixed), ..plan };
-            }
-            answered => return answered,
-        }
-    }
-    frame.by_factor(resources, clock)
+    PosedFrame::new(resources, request)?.answer(resources, clock)
 }
 
-impl Frame {
-    fn new(resources: &Resources, request: FrameRequest) -> Result<Self, Refusal> {
+impl PosedFrame {
+    /// Checks what a frame names, and plans it.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn new(resources: &Resources, request: FrameRequest) -> Result<Self, Refusal> {
         let FrameRequest { model: hash, question: message } = request;
         let stored = resources.models.find(hash).ok_or(Refusal::UnknownModel(hash))?;
         let model = &stored.model;
@@ -131,6 +119,42 @@ impl Frame {
         let has = (!message.masks.is_empty(), !message.forces.is_empty());
         let plan = plan_frame(&question, &stored, &known, has)?;
         Ok(Self { hash, stored, message, question, known, forces, plan })
+    }
+
+    /// Whether the contact set or the factor that its plan wants is kept: then it takes a product or a
+    /// solve, and otherwise as long as making what is missing.
+    pub fn is_prepared(&self) -> bool {
+        match self.plan.method {
+            Method::Condensed => {
+                let stored = Arc::clone(&self.stored);
+                Contacts::new(stored, &self.message, self.known.clone())
+                    .is_ok_and(|contacts| contacts.kept_set().is_some())
+            }
+            _ => self.kept_factor().is_some(),
+        }
+    }
+
+    /// Answers, and makes first what is missing.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn answer(mut self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {
+        if self.plan.method == Method::Condensed {
+            let answer = self.by_columns(resources, clock.clone());
+            resources.models.trim();
+            match answer {
+                // What the small system cannot do, a factor of its own may.
+                Err(Refusal::Model(ModelError::Condensed(error)))
+                    if self.question.method.is_none() && self.message.masks.is_empty() =>
+                {
+                    let why = format!("not condensed: {error}");
+                    let plan = self.question.plan(self.plan.element, Method::Front, why);
+                    self.plan = Plan { instead: Some(Method::FrontMixed), ..plan };
+                }
+                answered => return answered,
+            }
+        }
+        self.by_factor(resources, clock)
     }
 
     fn by_columns(&self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {

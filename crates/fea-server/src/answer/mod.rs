@@ -11,7 +11,7 @@ mod once;
 mod upload;
 mod warnings;
 
-pub(crate) use frame::{Readiness, answer_frame, readiness};
+pub(crate) use frame::{PosedFrame, Readiness, readiness};
 pub(crate) use large_frame::answer_large_frame;
 pub(crate) use large_once::solve_large;
 pub(crate) use once::solve_once;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 use softgrasp_protocol::ModelHash;
 
@@ -29,6 +30,7 @@ struct Kept {
 
 struct Entry {
     last_use: u64,
+    last_used: Instant,
     stored: Arc<StoredModel>,
 }
 
@@ -45,6 +47,7 @@ impl ModelStore {
             let now = kept.uses;
             let entry = kept.models.get_mut(&hash)?;
             entry.last_use = now;
+            entry.last_used = Instant::now();
             Some(Arc::clone(&entry.stored))
         })
     }
@@ -54,7 +57,7 @@ impl ModelStore {
         self.kept.with(|kept| {
             kept.uses += 1;
             let last_use = kept.uses;
-            kept.models.insert(hash, Entry { last_use, stored });
+            kept.models.insert(hash, Entry { last_use, last_used: Instant::now(), stored });
             drop(reservation);
         });
         self.trim();
@@ -78,9 +81,33 @@ impl ModelStore {
                 *holders -= 1;
                 if *holders == 0 {
                     kept.holders.remove(&hash);
+                    // Nobody has it from now on.
+                    if let Some(entry) = kept.models.get_mut(&hash) {
+                        entry.last_used = Instant::now();
+                    }
                 }
             }
         });
+    }
+
+    /// Forgets the models that no session has held and nobody has used since an instant.
+    pub fn forget_unused_since(&self, then: Instant) {
+        let forgotten = self.kept.with(|kept| {
+            let Kept { models, holders, .. } = kept;
+            let is_forgotten = |hash: &ModelHash, entry: &mut Entry| {
+                !holders.contains_key(hash) && entry.last_used < then
+            };
+            models.extract_if(.., is_forgotten).map(|(_, entry)| entry.stored).collect::<Vec<_>>()
+        });
+        // What they hold is given back outside the lock.
+        if !forgotten.is_empty() {
+            tracing::info!(models = forgotten.len(), "unused models are forgotten");
+        }
+    }
+
+    /// How many models are kept, and the bytes of all that is kept for them.
+    pub fn count_and_bytes(&self) -> (usize, u64) {
+        self.kept.with(|kept| (kept.models.len(), kept.bytes()))
     }
 
     /// Forgets a model that no session holds; requests that are using it finish first.
@@ -224,6 +251,26 @@ mod tests {
         touch(&models[1], 3);
         store.trim();
         assert!(store.find(hash(2)).is_some());
+    }
+
+    #[test]
+    fn model_that_no_session_holds_is_forgotten_when_its_time_is_over() {
+        let store = ModelStore::new(Budget::new(u64::MAX));
+        keep(&store, 1);
+        keep(&store, 2);
+        let kept_until = Instant::now();
+        assert!(store.hold(hash(1)));
+        store.forget_unused_since(kept_until);
+        assert!(store.find(hash(2)).is_none(), "nobody held it");
+        assert_eq!(store.count_and_bytes().0, 1);
+        store.forget_unused_since(Instant::now());
+        assert!(store.hold(hash(1)), "it is held");
+        store.release(hash(1));
+        store.forget_unused_since(kept_until);
+        store.release(hash(1));
+        assert!(store.find(hash(1)).is_some(), "its time begins when the last one lets go");
+        store.forget_unused_since(Instant::now());
+        assert!(store.find(hash(1)).is_none());
     }
 
     #[test]

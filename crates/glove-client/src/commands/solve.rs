@@ -182,7 +182,9 @@ impl SolveCommand {
         let (mut answer, large) = ask(&mut connection, &request, large)?;
         let round_trip_ms = start.elapsed().as_secs_f64() * 1e3;
         progress.now("writing");
-        let summary = SolveSummary::new(&answer.report, round_trip_ms).with_large(large.as_ref());
+        let summary = SolveSummary::new(&answer.report, round_trip_ms)
+            .with_large(large.as_ref())
+            .with_bytes(connection.bytes_of_exchange());
         let displacements =
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
         let displacements = displacements.into_f64();

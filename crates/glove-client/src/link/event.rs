@@ -56,4 +56,6 @@ pub struct Reached {
     pub large: Option<LargeReport>,
     /// From sending to having the answer.
     pub round_trip: Duration,
+    /// Bytes of request and answer.
+    pub bytes: [u64; 2],
 }

@@ -17,12 +17,16 @@ use crate::prefetch::Hint;
 use crate::tick_budget::{Priority, TickBudget};
 use crate::unanswered::Unanswered;
 
-/// First pause before a lost server is looked for again; doubles up to the longest.
-const PAUSE_MIN: Duration = Duration::from_millis(100);
-/// Longest pause.
-const PAUSE_MAX: Duration = Duration::from_secs(2);
-/// A server that is silent for this long within a request is taken for lost.
-const SILENCE_MAX: Duration = Duration::from_secs(60);
+/// A lost server is looked for at once, then after this pause, which doubles up to the longest.
+const PAUSE_MIN: Duration = Duration::from_millis(50);
+/// Longest pause where nobody was found: one who comes back is found at once.
+const PAUSE_MAX: Duration = Duration::from_millis(200);
+/// Longest pause where a server was found that does not want this client now.
+const UNWANTED_PAUSE_MAX: Duration = Duration::from_secs(2);
+/// A server whose machine answers but which is silent for this long is taken for lost: while it prepares
+/// a model or the first answer of a grip, and within a grip.
+const PREPARING_MAX: Duration = Duration::from_secs(1800);
+const SILENCE_MAX: Duration = Duration::from_secs(20);
 /// A refusal is told in one line of at most so many characters.
 const REFUSAL_LEN_MAX: usize = 120;
 
@@ -68,7 +72,7 @@ impl Worker {
 
     /// Works until the link is to end.
     pub fn work(mut self) {
-        let mut pause = PAUSE_MIN;
+        let mut pause = Duration::ZERO;
         while let Some(mut job) = self.next_job() {
             let outcome = self.do_job(&mut job);
             let shared = Arc::clone(&self.shared);
@@ -76,7 +80,7 @@ impl Worker {
             state.busy = false;
             state.activity = Activity::Waiting;
             match outcome {
-                Ok(()) => pause = PAUSE_MIN,
+                Ok(()) => pause = Duration::ZERO,
                 Err(error) => {
                     self.session = None;
                     state.activity = Activity::Connecting;
@@ -84,7 +88,7 @@ impl Worker {
                     shared.notify();
                     // Rests, but ends when the link is to end.
                     state = shared.wait_while(state, pause, |state| !state.stop);
-                    pause = (2 * pause).min(PAUSE_MAX);
+                    pause = (2 * pause).clamp(PAUSE_MIN, pause_max(&error));
                 }
             }
             drop(state);
@@ -175,8 +179,6 @@ impl Session {
     fn open(endpoint: &Endpoint, shared: &Shared) -> Result<Self, LinkError> {
         shared.lock().activity = Activity::Connecting;
         let connection = ServerConnection::connect(endpoint)?;
-        let timed = connection.stream().set_read_timeout(Some(SILENCE_MAX));
-        timed.map_err(|e| LinkError::Connection(e.into()))?;
         let welcome = connection.welcome();
         let server =
             format!("{} {} ({} threads)", welcome.server, welcome.version, welcome.threads);
@@ -223,6 +225,7 @@ impl Session {
     /// Sends the model unless the server knows it.
     fn offer_model(&mut self, model: &ModelUpload, shared: &Shared) -> Result<(), LinkError> {
         shared.lock().activity = Activity::Uploading;
+        self.wait_at_most(PREPARING_MAX)?;
         match self.connection.ask(&Request::HaveModel(model.hash))? {
             Reply::ModelState { known: true } => {}
             Reply::ModelState { known: false } => {
@@ -249,6 +252,7 @@ impl Session {
         let first = self.answered_grip != Some(request.grip);
         let activity = if first { Activity::FirstAnswer } else { Activity::LaterAnswer };
         shared.lock().activity = activity;
+        self.wait_at_most(if first { PREPARING_MAX } else { SILENCE_MAX })?;
         let reached = match self.ask(model, request, budget) {
             // The server made room or was started anew: give it the model again.
             Err(LinkError::Rejected(r)) if r.code == RejectCode::UnknownModel => {
@@ -261,6 +265,11 @@ impl Session {
         };
         self.answered_grip = Some(request.grip);
         Ok(reached)
+    }
+
+    fn wait_at_most(&self, silence: Duration) -> Result<(), LinkError> {
+        let timed = self.connection.stream().set_read_timeout(Some(silence));
+        timed.map_err(|error| LinkError::Connection(error.into()))
     }
 
     fn ask(
@@ -283,9 +292,11 @@ impl Session {
         };
         let reply = self.connection.ask_awake(&asked);
         let round_trip = start.elapsed();
+        let bytes = self.connection.bytes_of_exchange();
         let reached = |answer: Answer, large: Option<LargeReport>| Reached {
             rest_shape: model.rest_shape,
             round_trip,
+            bytes,
             nodes: answer.nodes,
             displacement: answer.displacements.into_f64(),
             reactions: answer.reactions,
@@ -331,6 +342,18 @@ impl TickRequest {
     /// Whether a refusal is about where this tick would have gone, not about the grip.
     fn is_passing(&self, rejected: &Rejected) -> bool {
         self.large.is_some() && rejected.code == RejectCode::Uncertain
+    }
+}
+
+/// The longest pause after a loss.
+fn pause_max(error: &LinkError) -> Duration {
+    match error {
+        // It would have to count and refuse this client again and again.
+        LinkError::Rejected(rejected) if rejected.code != RejectCode::ShuttingDown => {
+            UNWANTED_PAUSE_MAX
+        }
+        LinkError::Encryption(_) | LinkError::WantsEncryption { .. } => UNWANTED_PAUSE_MAX,
+        _ => PAUSE_MAX,
     }
 }
 

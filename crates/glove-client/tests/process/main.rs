@@ -12,6 +12,7 @@ mod commands;
 mod devices;
 mod discretisation;
 mod emulator;
+mod full_disk;
 mod interruption;
 mod numbers;
 mod recordings;

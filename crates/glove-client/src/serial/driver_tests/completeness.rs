@@ -18,20 +18,20 @@ const BEGUN_ANEW_S: f64 = 0.7;
 
 /// Every record that the device made has arrived once, in order.
 fn check_complete<Line: Send + 'static>(what: &str, mut reader: Reader, served: Served<Line>) {
-    let stall_s = served.stall_s();
-    let made = Arc::clone(&served.made);
+    let (made, stall) = (Arc::clone(&served.made), Arc::clone(&served.stall_s));
     // A device that is not served makes no more records, and what it made is on its way.
     let line = served.end();
-    let made = made.load(Ordering::Relaxed);
+    let (made, stall_s) = (made.load(Ordering::Relaxed), *stall.lock().unwrap());
+    if stall_s > BEGUN_ANEW_S {
+        // Setting up anew throws away what has come: the last record may be among it.
+        println!("{what}: the machine stalled for {stall_s:.1} s; gaps are not looked for");
+        return;
+    }
     // The last of a line may not have left it.
     reader.until(what, |reader| reader.numbers.last().is_some_and(|last| last + 3 >= made));
     drop((reader.devices, line));
     let numbers = reader.numbers;
     assert!(numbers.windows(2).all(|pair| pair[0] < pair[1]), "{what}: {numbers:?}");
-    if stall_s > BEGUN_ANEW_S {
-        println!("{what}: the machine stalled for {stall_s:.1} s; gaps are not looked for");
-        return;
-    }
     let all: Vec<usize> = (0..numbers.len()).collect();
     assert_eq!(numbers, all, "{what}");
     // One piece per record, and none for the replies to the set-up, if those came in time.

@@ -8,11 +8,14 @@ use super::served::{
     HANG, Served, glove_line, glove_settings, numbered, open_glove, open_tracker, port,
     tracker_line,
 };
-use crate::devices::cyberglove::{GloveRecord, RecordKind, SensorCount, encode_record};
+use crate::devices::cyberglove::{
+    GloveEncoding, GloveParser, GloveRecord, RecordKind, SensorCount, encode_record,
+};
 use crate::devices::emulator::{EmulatedGloveKind, EmulatedTrackerKind, Fault, FaultSetting};
 use crate::serial::emulate::PseudoTerminal;
 use crate::serial::{
-    DeviceState, GloveFacts, GloveMode, SerialDevices, SerialSettings, TrackerMode, TrackerSettings,
+    DeviceState, GloveFacts, GloveMode, GloveSettings, SerialDevices, SerialSettings, TrackerMode,
+    TrackerSettings,
 };
 
 const COMMON: [(Fault, f64); 5] = [
@@ -43,6 +46,34 @@ fn a_faulty_glove_goes_on_after_each_fault() {
                     let mut reader = Reader::of_glove(devices, SensorCount::TwentyTwo);
                     reader.until_number(&what, 300);
                     check_order(&what, &reader.numbers);
+                });
+            }
+        }
+    });
+}
+
+#[test]
+fn a_glove_that_a_stalled_machine_did_not_serve_is_heard_again_in_every_mode() {
+    std::thread::scope(|scope| {
+        for mode in [GloveMode::Polled { hz: 100.0 }, GloveMode::Streamed { hz: 100.0 }] {
+            for encoding in [GloveEncoding::Binary, GloveEncoding::Ascii] {
+                scope.spawn(move || {
+                    let what = format!("{mode:?} {encoding:?}");
+                    let count = SensorCount::TwentyTwo;
+                    let served = glove_line(EmulatedGloveKind::default(), None);
+                    let settings = GloveSettings { encoding, ..glove_settings(&served.path, mode) };
+                    let parser = match encoding {
+                        GloveEncoding::Binary => GloveParser::new(count, settings.options),
+                        GloveEncoding::Ascii => GloveParser::of_lines(count),
+                    };
+                    let mut reader = Reader::of(open_glove(settings), parser, FORMATS[0]);
+                    reader.until_talking(0);
+                    for pause_ms in [700, 1300, 2400] {
+                        served.pause_ms.store(pause_ms, Ordering::Relaxed);
+                        let before = served.made();
+                        reader.until_number(&what, before + 50);
+                    }
+                    assert!(served.stall_s() >= 2.4);
                 });
             }
         }

@@ -1,7 +1,7 @@
 //! Emulated devices on lines of their own, whose records carry their number.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -28,6 +28,8 @@ pub(super) struct Served<Line> {
     pub(super) made: Arc<AtomicUsize>,
     /// Longest time between two steps, s: how much the machine has stalled.
     pub(super) stall_s: Arc<Mutex<f64>>,
+    /// The line is not served for so long, once, ms.
+    pub(super) pause_ms: Arc<AtomicU64>,
     pub(super) thread: JoinHandle<Line>,
 }
 
@@ -40,6 +42,8 @@ impl<Line: Send + 'static> Served<Line> {
         let (stop, made) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
         let stall_s = Arc::new(Mutex::new(0.0f64));
         let (stopped, count, stall) = (Arc::clone(&stop), Arc::clone(&made), Arc::clone(&stall_s));
+        let pause_ms = Arc::new(AtomicU64::new(0));
+        let pause = Arc::clone(&pause_ms);
         let thread = std::thread::spawn(move || {
             let begun = Instant::now();
             let mut last_s = 0.0;
@@ -50,11 +54,11 @@ impl<Line: Send + 'static> Served<Line> {
                 *stall = stall.max(now_s - last_s);
                 last_s = now_s;
                 drop(stall);
-                std::thread::sleep(Duration::from_millis(1));
+                std::thread::sleep(Duration::from_millis(1 + pause.swap(0, Ordering::Relaxed)));
             }
             line
         });
-        Self { path: path.to_owned(), stop, made, stall_s, thread }
+        Self { path: path.to_owned(), stop, made, stall_s, pause_ms, thread }
     }
 
     pub(super) fn made(&self) -> usize {

@@ -1,0 +1,62 @@
+//! A server without sockets: its sessions are served over pipes in memory, on the caller's runtime.
+//!
+//! For programs that have server and client in one process and want neither a port nor a thread of
+//! sockets, and for tests that set the clock and damage what passes.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+
+use tokio::io::{DuplexStream, duplex};
+use tokio::sync::watch;
+
+use crate::config::ServerConfig;
+use crate::server::StartError;
+use crate::server_handle::ServerHandle;
+use crate::session;
+use crate::status_pages::gauges;
+use crate::workers::Workers;
+
+/// A server whose clients are in the same process; dropping it ends its sessions.
+pub struct LocalServer {
+    server: ServerHandle,
+    // Sessions end when it is dropped.
+    _stop: watch::Sender<bool>,
+}
+
+/// Bytes that lie in a pipe at most.
+const PIPE_BYTES: usize = 64 * 1024;
+/// As whom sessions count.
+const PEER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
+
+impl LocalServer {
+    /// Starts the solving threads; addresses and encryption of the settings are not used.
+    ///
+    /// # Errors
+    /// [`StartError`].
+    pub fn new(config: ServerConfig) -> Result<Self, StartError> {
+        config.check()?;
+        let threads = config.threads;
+        let workers = Workers::new(threads, config.max_queue)
+            .map_err(|source| StartError::Threads { threads, source })?;
+        let (stop, stopped) = watch::channel(false);
+        Ok(Self { server: ServerHandle::new(config, workers, stopped), _stop: stop })
+    }
+
+    /// A new session: the client's end of its pipe, and what serves it, to be spawned or polled beside
+    /// the client. `None` where all sessions are taken.
+    pub fn connect(&self) -> Option<(DuplexStream, impl Future<Output = ()> + Send + use<>)> {
+        let place = self.server.places.take(PEER.ip()).ok()?;
+        let (client, stream) = duplex(PIPE_BYTES);
+        let server = self.server.clone();
+        let serves = async move {
+            session::serve(stream, PEER, server).await;
+            drop(place);
+        };
+        Some((client, serves))
+    }
+
+    /// What the page `/metrics` of a server tells.
+    pub fn metrics(&self) -> String {
+        let ServerHandle { resources, places, .. } = &self.server;
+        resources.metrics.text(&gauges(resources, places, true))
+    }
+}

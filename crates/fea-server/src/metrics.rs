@@ -1,0 +1,260 @@
+//! What the server counts of its work, as text for Prometheus.
+//!
+//! Format: the text exposition format 0.0.4 (prometheus.io, "Exposition formats").
+
+use std::fmt::Write;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use softgrasp_protocol::{Kind, RejectCode};
+
+/// Counters of one server; they only grow.
+#[derive(Default)]
+pub(crate) struct Metrics {
+    sessions: AtomicU64,
+    turned_away: AtomicU64,
+    given_up: AtomicU64,
+    abandoned: AtomicU64,
+    bytes_received: AtomicU64,
+    bytes_sent: AtomicU64,
+    /// By kind, in the order of [`Kind::ALL`].
+    requests: [Durations; Kind::ALL.len()],
+    /// By code, in the order of [`RejectCode::ALL`].
+    refused: [AtomicU64; RejectCode::ALL.len()],
+}
+
+/// How long requests of one kind took, from the last byte of the request to the reply.
+#[derive(Default)]
+struct Durations {
+    /// In each of [`BOUNDS_S`], and above them.
+    counts: [AtomicU64; BOUNDS_S.len() + 1],
+    sum_us: AtomicU64,
+}
+
+/// Upper ends of the ranges that durations are counted in, s.
+const BOUNDS_S: [f64; 12] =
+    [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.016, 0.05, 0.25, 1.0, 10.0];
+
+/// What is read when somebody asks.
+pub(crate) struct Gauges {
+    /// Sessions that are there.
+    pub sessions: usize,
+    /// Requests that wait or are worked on.
+    pub queued: usize,
+    /// Models that are kept.
+    pub models: usize,
+    /// Bytes of the models and of what is kept for them.
+    pub models_bytes: u64,
+    /// Bytes reserved for requests under way.
+    pub reserved_bytes: u64,
+    /// Bytes that both may take together.
+    pub limit_bytes: u64,
+    /// Resident set of the process, bytes; `None` where the system does not tell.
+    pub resident_bytes: Option<u64>,
+    /// Whether new sessions are taken.
+    pub is_ready: bool,
+}
+
+impl Metrics {
+    /// A session has begun.
+    pub fn session_began(&self) {
+        self.sessions.fetch_add(1, Relaxed);
+    }
+
+    /// A connection was turned away: no place, or no agreement on encryption.
+    pub fn turned_away(&self) {
+        self.turned_away.fetch_add(1, Relaxed);
+    }
+
+    /// A session was given up: bad bytes, too slow, or broken.
+    pub fn given_up(&self) {
+        self.given_up.fetch_add(1, Relaxed);
+    }
+
+    /// A request whose client has gone.
+    pub fn abandoned(&self) {
+        self.abandoned.fetch_add(1, Relaxed);
+    }
+
+    /// A whole request has come.
+    pub fn received(&self, bytes: usize) {
+        self.bytes_received.fetch_add(bytes as u64, Relaxed);
+    }
+
+    /// A reply was written.
+    pub fn sent(&self, bytes: usize) {
+        self.bytes_sent.fetch_add(bytes as u64, Relaxed);
+    }
+
+    /// A request has been answered, or refused for a reason.
+    pub fn answered(&self, kind: Option<Kind>, took: Duration, refused: Option<RejectCode>) {
+        let place = kind.and_then(|kind| Kind::ALL.iter().position(|known| *known == kind));
+        if let Some(durations) = place.and_then(|place| self.requests.get(place)) {
+            durations.add(took);
+        }
+        let code = refused.and_then(|code| RejectCode::ALL.iter().position(|c| *c == code));
+        if let Some(count) = code.and_then(|place| self.refused.get(place)) {
+            count.fetch_add(1, Relaxed);
+        }
+    }
+
+    /// Everything as text.
+    pub fn text(&self, gauges: &Gauges) -> String {
+        let mut page = Page(String::new());
+        self.write_counters(&mut page);
+        self.write_requests(&mut page);
+        gauges.write(&mut page);
+        page.0
+    }
+
+    fn write_counters(&self, page: &mut Page) {
+        let counters = [
+            ("sessions_total", "Sessions that have begun.", &self.sessions),
+            ("turned_away_total", "Connections that got no session.", &self.turned_away),
+            ("given_up_total", "Sessions that were given up.", &self.given_up),
+            ("abandoned_total", "Requests whose client has gone.", &self.abandoned),
+            ("received_bytes_total", "Bytes of whole requests.", &self.bytes_received),
+            ("sent_bytes_total", "Bytes of replies.", &self.bytes_sent),
+        ];
+        for (name, help, count) in counters {
+            page.begin(name, "counter", help);
+            page.line(name, "", count.load(Relaxed));
+        }
+        let name = "refused_total";
+        page.begin(name, "counter", "Requests that were refused, by code.");
+        for (code, count) in RejectCode::ALL.iter().zip(&self.refused) {
+            page.line(name, &format!("{{code=\"{code}\"}}"), count.load(Relaxed));
+        }
+    }
+
+    fn write_requests(&self, page: &mut Page) {
+        let name = "request_seconds";
+        page.begin(name, "histogram", "From the last byte of a request to its reply.");
+        for (kind, durations) in Kind::ALL.iter().zip(&self.requests) {
+            // The kinds of replies are never asked.
+            if *kind as u16 & 0x8000 == 0 {
+                durations.write(page, name, &kind.to_string());
+            }
+        }
+    }
+}
+
+impl Durations {
+    fn add(&self, took: Duration) {
+        let place = BOUNDS_S.partition_point(|bound| *bound < took.as_secs_f64());
+        if let Some(count) = self.counts.get(place) {
+            count.fetch_add(1, Relaxed);
+        }
+        self.sum_us.fetch_add(u64::try_from(took.as_micros()).unwrap_or(u64::MAX), Relaxed);
+    }
+
+    fn write(&self, page: &mut Page, name: &str, kind: &str) {
+        let mut sum = 0;
+        let bounds = BOUNDS_S.iter().map(f64::to_string).chain(["+Inf".to_owned()]);
+        for (count, bound) in self.counts.iter().zip(bounds) {
+            sum += count.load(Relaxed);
+            let labels = format!("{{kind=\"{kind}\",le=\"{bound}\"}}");
+            page.line(&format!("{name}_bucket"), &labels, sum);
+        }
+        let labels = format!("{{kind=\"{kind}\"}}");
+        let seconds = self.sum_us.load(Relaxed) as f64 * 1e-6;
+        page.line(&format!("{name}_sum"), &labels, seconds);
+        page.line(&format!("{name}_count"), &labels, sum);
+    }
+}
+
+impl Gauges {
+    fn write(&self, page: &mut Page) {
+        let gauges = [
+            ("sessions", "Sessions that are there.", self.sessions as u64),
+            ("queued_requests", "Requests that wait or are worked on.", self.queued as u64),
+            ("models", "Models that are kept.", self.models as u64),
+            ("models_bytes", "Memory of the models and what is made for them.", self.models_bytes),
+            ("reserved_bytes", "Memory reserved for requests under way.", self.reserved_bytes),
+            ("memory_limit_bytes", "Memory for both together.", self.limit_bytes),
+            ("ready", "1 if new sessions are taken.", u64::from(self.is_ready)),
+        ];
+        for (name, help, value) in gauges {
+            page.begin(name, "gauge", help);
+            page.line(name, "", value);
+        }
+        if let Some(bytes) = self.resident_bytes {
+            // The name that all programs use for it.
+            let _ = writeln!(page.0, "# HELP process_resident_memory_bytes Resident memory.");
+            let _ = writeln!(page.0, "# TYPE process_resident_memory_bytes gauge");
+            let _ = writeln!(page.0, "process_resident_memory_bytes {bytes}");
+        }
+    }
+}
+
+/// A text under way; a text takes everything that is written to it.
+struct Page(String);
+
+impl Page {
+    fn begin(&mut self, name: &str, kind: &str, help: &str) {
+        let _ = writeln!(self.0, "# HELP softgrasp_{name} {help}");
+        let _ = writeln!(self.0, "# TYPE softgrasp_{name} {kind}");
+    }
+
+    fn line(&mut self, name: &str, labels: &str, value: impl std::fmt::Display) {
+        let _ = writeln!(self.0, "softgrasp_{name}{labels} {value}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GAUGES: Gauges = Gauges {
+        sessions: 3,
+        queued: 1,
+        models: 2,
+        models_bytes: 10,
+        reserved_bytes: 5,
+        limit_bytes: 100,
+        resident_bytes: Some(7),
+        is_ready: true,
+    };
+
+    fn value(text: &str, name: &str) -> f64 {
+        let line = text.lines().find(|line| line.rsplit_once(' ').is_some_and(|(n, _)| n == name));
+        line.unwrap_or_else(|| panic!("no {name}")).rsplit_once(' ').unwrap().1.parse().unwrap()
+    }
+
+    #[test]
+    fn every_line_is_a_comment_or_a_name_and_a_number() {
+        let text = Metrics::default().text(&GAUGES);
+        for line in text.lines() {
+            let is_comment = line.starts_with("# HELP ") || line.starts_with("# TYPE ");
+            let number = line.rsplit_once(' ').and_then(|(_, value)| value.parse::<f64>().ok());
+            assert!(is_comment || number.is_some(), "{line}");
+        }
+        assert!(text.ends_with('\n'));
+    }
+
+    #[test]
+    fn requests_are_counted_by_kind_in_ranges_that_add_up() {
+        let metrics = Metrics::default();
+        metrics.answered(Some(Kind::Frame), Duration::from_micros(100), None);
+        metrics.answered(Some(Kind::Frame), Duration::from_micros(101), None);
+        metrics.answered(Some(Kind::Frame), Duration::from_secs(60), Some(RejectCode::Busy));
+        metrics.answered(None, Duration::ZERO, Some(RejectCode::BadRequest));
+        let text = metrics.text(&GAUGES);
+        let of = |le| {
+            value(&text, &format!("softgrasp_request_seconds_bucket{{kind=\"Frame\",le=\"{le}\"}}"))
+        };
+        assert_eq!((of("0.0001"), of("0.00025"), of("10"), of("+Inf")), (1.0, 2.0, 2.0, 3.0));
+        assert_eq!(value(&text, "softgrasp_request_seconds_count{kind=\"Frame\"}"), 3.0);
+        assert_eq!(value(&text, "softgrasp_request_seconds_count{kind=\"Ping\"}"), 0.0);
+        let sum = value(&text, "softgrasp_request_seconds_sum{kind=\"Frame\"}");
+        assert!((sum - 60.000201).abs() < 1e-9);
+        let refused: f64 = text
+            .lines()
+            .filter(|line| line.starts_with("softgrasp_refused_total{"))
+            .map(|line| line.rsplit_once(' ').unwrap().1.parse::<f64>().unwrap())
+            .sum();
+        assert_eq!(refused, 2.0);
+        assert_eq!(value(&text, "softgrasp_sessions"), 3.0);
+        assert_eq!(value(&text, "process_resident_memory_bytes"), 7.0);
+    }
+}

@@ -1,0 +1,232 @@
+//! Everything that takes bytes from outside, as one list: what is fuzzed is also tested.
+//!
+//! Bytes may be refused, but they never panic, hang, or take memory that they only announce; and what is
+//! accepted stays the same when it is written and read again.
+
+use glove_client::devices::calibration::Calibration;
+use glove_client::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
+use glove_client::devices::fastrak::{
+    Encoding, FastrakEvent, FastrakFormat, FastrakParser, LengthUnit, OutputList,
+};
+use glove_client::devices::recordings::{LeapRecording, Trajectory};
+use glove_client::hand_setup::HandConfiguration;
+use glove_client::joints::JointsParser;
+use glove_client::scene::SceneFile;
+use softgrasp_core::mesh_io::{parse, write_msh41};
+use softgrasp_protocol::{Frame, FrameBuffer, Kind, Limits, Reply, Request};
+
+use crate::raw_session::raw_frame;
+
+/// Something that takes bytes from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parser {
+    /// Frames out of a stream; the first byte says how the rest is cut.
+    Frames,
+    /// A request; the first byte chooses the kind.
+    Request,
+    /// A reply; the first byte chooses the kind.
+    Reply,
+    /// A mesh file of any format; what follows a line `--companion--` is the other file it asks for.
+    Mesh,
+    /// Bytes of a glove; the first one chooses sensors and options.
+    Glove,
+    /// Bytes of a tracker; the first one chooses the format.
+    Tracker,
+    /// Lines of joints.
+    Joints,
+    /// A calibration of a glove in any of its forms.
+    Calibration,
+    /// A hand's configuration.
+    HandSetup,
+    /// A scene.
+    Scene,
+    /// Recordings of other programs.
+    Recordings,
+}
+
+/// What separates a mesh file from its other half.
+const COMPANION: &[u8] = b"--companion--\n";
+
+impl Parser {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::Frames,
+        Self::Request,
+        Self::Reply,
+        Self::Mesh,
+        Self::Glove,
+        Self::Tracker,
+        Self::Joints,
+        Self::Calibration,
+        Self::HandSetup,
+        Self::Scene,
+        Self::Recordings,
+    ];
+
+    /// The name of its folder of seeds and of its fuzz target.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Frames => "frames",
+            Self::Request => "request",
+            Self::Reply => "reply",
+            Self::Mesh => "mesh",
+            Self::Glove => "glove",
+            Self::Tracker => "tracker",
+            Self::Joints => "joints",
+            Self::Calibration => "calibration",
+            Self::HandSetup => "hand_setup",
+            Self::Scene => "scene",
+            Self::Recordings => "recordings",
+        }
+    }
+
+    /// Takes any bytes.
+    ///
+    /// # Panics
+    /// If the parser is broken.
+    pub fn take(self, bytes: &[u8]) {
+        match self {
+            Self::Frames => frames(bytes),
+            Self::Request => request(bytes),
+            Self::Reply => reply(bytes),
+            Self::Mesh => mesh(bytes),
+            Self::Glove => glove(bytes),
+            Self::Tracker => tracker(bytes),
+            Self::Joints => JointsParser::new().feed_all(bytes, drop),
+            Self::Calibration => drop(Calibration::read(&String::from_utf8_lossy(bytes))),
+            Self::HandSetup => drop(HandConfiguration::read(&String::from_utf8_lossy(bytes))),
+            Self::Scene => drop(SceneFile::of_text(&String::from_utf8_lossy(bytes))),
+            Self::Recordings => {
+                let text = String::from_utf8_lossy(bytes);
+                drop(Trajectory::parse(&text));
+                drop(LeapRecording::parse(&text));
+            }
+        }
+    }
+}
+
+/// Cut in pieces or not, the same frames come out and the same fault is found.
+fn frames(bytes: &[u8]) {
+    let Some((&cut, stream)) = bytes.split_first() else { return };
+    let piece = usize::from(cut) + 1;
+    let taken = |pieces: &mut dyn Iterator<Item = &[u8]>| {
+        let mut buffer = FrameBuffer::new(Limits::default());
+        let mut frames = Vec::new();
+        let mut fed = 0;
+        for piece in pieces {
+            buffer.feed(piece);
+            fed += piece.len();
+            loop {
+                match buffer.next_frame() {
+                    Ok(Some(frame)) => frames.push(frame),
+                    Ok(None) => break,
+                    Err(fault) => return (frames, Some(fault)),
+                }
+            }
+            assert!(buffer.capacity() <= 4 * fed + 256 * 1024, "memory is taken on announcement");
+        }
+        (frames, buffer.finish().err())
+    };
+    let whole = taken(&mut std::iter::once(stream));
+    let cut = taken(&mut stream.chunks(piece));
+    assert_eq!(whole.0, cut.0);
+    assert_eq!(whole.1.is_some(), cut.1.is_some());
+}
+
+/// The kind that a byte chooses among those of one side, and the payload as a sound frame.
+fn sound_frame(bytes: &[u8], of_server: bool) -> Option<Frame> {
+    let (&choice, payload) = bytes.split_first()?;
+    let kinds: Vec<Kind> =
+        Kind::ALL.into_iter().filter(|kind| (*kind as u16 & 0x8000 != 0) == of_server).collect();
+    let kind = kinds[usize::from(choice) % kinds.len()];
+    let mut buffer = FrameBuffer::new(Limits::default());
+    buffer.feed(&raw_frame(kind as u16, 7, payload));
+    buffer.next_frame().ok().flatten()
+}
+
+fn request(bytes: &[u8]) {
+    let Some(frame) = sound_frame(bytes, false) else { return };
+    let Ok(request) = Request::decode(&frame, &Limits::default()) else { return };
+    let mut written = Vec::new();
+    request.encode_into(7, &Limits::default(), &mut written).expect("what was read can be written");
+    let mut again = Vec::new();
+    let mut buffer = FrameBuffer::new(Limits::default());
+    buffer.feed(&written);
+    let frame = buffer.next_frame().expect("sound").expect("whole");
+    let read = Request::decode(&frame, &Limits::default()).expect("what was written can be read");
+    read.encode_into(7, &Limits::default(), &mut again).expect("small enough");
+    assert_eq!(written, again);
+}
+
+fn reply(bytes: &[u8]) {
+    let Some(frame) = sound_frame(bytes, true) else { return };
+    let Ok(reply) = Reply::decode(&frame, &Limits::default()) else { return };
+    let mut written = Vec::new();
+    reply.encode_into(7, &Limits::default(), &mut written).expect("what was read can be written");
+    let mut buffer = FrameBuffer::new(Limits::default());
+    buffer.feed(&written);
+    let frame = buffer.next_frame().expect("sound").expect("whole");
+    let read = Reply::decode(&frame, &Limits::default()).expect("what was written can be read");
+    let mut again = Vec::new();
+    read.encode_into(7, &Limits::default(), &mut again).expect("small enough");
+    assert_eq!(written, again);
+}
+
+fn mesh(bytes: &[u8]) {
+    let at = bytes.windows(COMPANION.len()).position(|window| window == COMPANION);
+    let (file, other) = match at {
+        Some(at) => (&bytes[..at], Some(&bytes[at + COMPANION.len()..])),
+        None => (bytes, None),
+    };
+    let Ok(read) = parse("fuzzed", file, &mut |_| other.map(<[u8]>::to_vec)) else { return };
+    let count = read.mesh.node_count();
+    assert!(read.mesh.tets().iter().flatten().all(|node| (*node as usize) < count));
+    let again = parse("written", &write_msh41(&read.mesh), &mut |_| None)
+        .expect("what was written can be read");
+    assert_eq!(again.mesh.node_count(), count);
+}
+
+fn glove(bytes: &[u8]) {
+    let Some((&choice, bytes)) = bytes.split_first() else { return };
+    let count = match choice & 1 {
+        0 => SensorCount::Eighteen,
+        _ => SensorCount::TwentyTwo,
+    };
+    let options = RecordOptions { timestamp: choice & 2 != 0, status: choice & 4 != 0 };
+    let parser = || match choice & 8 {
+        0 => GloveParser::new(count, options),
+        _ => GloveParser::of_lines(count),
+    };
+    let records = |pieces: &mut dyn Iterator<Item = &[u8]>| {
+        let (mut parser, mut records) = (parser(), Vec::new());
+        for piece in pieces {
+            parser.feed_all(piece, |event| match event {
+                GloveEvent::Record(record) => records.push(format!("{record:?}")),
+                GloveEvent::Fault(_) => {}
+            });
+        }
+        records
+    };
+    assert_eq!(records(&mut std::iter::once(bytes)), records(&mut bytes.chunks(3)));
+}
+
+fn tracker(bytes: &[u8]) {
+    let Some((&choice, bytes)) = bytes.split_first() else { return };
+    let encoding = if choice & 1 == 0 { Encoding::Ascii } else { Encoding::Binary };
+    let output =
+        if choice & 2 == 0 { OutputList::PositionEuler } else { OutputList::PositionQuaternion };
+    let units = if choice & 4 == 0 { LengthUnit::Inches } else { LengthUnit::Centimetres };
+    let records = |pieces: &mut dyn Iterator<Item = &[u8]>| {
+        let mut parser = FastrakParser::new(FastrakFormat { encoding, output, units });
+        let mut records = Vec::new();
+        for piece in pieces {
+            parser.feed_all(piece, |event| {
+                if let FastrakEvent::Record(record) = event {
+                    records.push(format!("{record:?}"));
+                }
+            });
+        }
+        records
+    };
+    assert_eq!(records(&mut std::iter::once(bytes)), records(&mut bytes.chunks(3)));
+}
