@@ -18,11 +18,12 @@ pub mod frontier;
 pub mod hard_cases;
 pub mod hold;
 pub mod large;
+pub mod load;
 pub mod machine;
 pub mod methods;
-
 pub mod onset;
 pub mod plot;
+mod programs;
 mod random;
 pub mod reference;
 pub mod report;
@@ -37,6 +38,8 @@ pub mod table;
 pub mod tail;
 pub mod thesis;
 pub mod threads;
+pub mod trust;
+mod visitors;
 
 use std::path::PathBuf;
 
@@ -73,6 +76,10 @@ pub enum ReportName {
     Large,
     /// Random grips: the proven bound against the true error.
     Bound,
+    /// How many clients at 60 Hz one server serves in time.
+    Load,
+    /// Malformed frames, hostile connections, restarts and a long run.
+    Trust,
 }
 
 impl ReportName {
@@ -93,6 +100,8 @@ impl ReportName {
             Self::Bound => "bound",
             Self::Flicker => "flicker",
             Self::Large => "large",
+            Self::Load => "load",
+            Self::Trust => "trust",
         }
     }
 }
@@ -118,6 +127,8 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Bound => bound::measure(options)?,
         ReportName::Flicker => flicker::measure(options)?,
         ReportName::Large => large::measure(options)?,
+        ReportName::Load => load::measure(options)?,
+        ReportName::Trust => trust::measure(options)?,
     };
     report.end();
     let files = report.write(&options.out)?;

@@ -93,6 +93,15 @@ type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 pub(crate) type Drawn =
     Result<(), DrawingAreaErrorKind<<SVGBackend<'static> as DrawingBackend>::ErrorType>>;
 
+/// Dots are full; those of series whose colour has been used before are rings.
+fn dot_style(index: usize) -> ShapeStyle {
+    let colour = COLOURS[index % COLOURS.len()];
+    match index < COLOURS.len() {
+        true => colour.filled(),
+        false => colour.stroke_width(2),
+    }
+}
+
 impl Plot {
     /// The figure as the text of an SVG file; equal data give equal text.
     ///
@@ -140,13 +149,14 @@ impl Plot {
             .label_style((FONT, 14))
             .draw()?;
         for (index, series) in self.series.iter().enumerate() {
-            self.draw_series(&mut chart, series, COLOURS[index % COLOURS.len()])?;
+            self.draw_series(&mut chart, series, index)?;
         }
         self.draw_legend(area)?;
         area.present()
     }
 
-    fn draw_series(&self, chart: &mut Chart<'_>, series: &Series, colour: RGBColor) -> Drawn {
+    fn draw_series(&self, chart: &mut Chart<'_>, series: &Series, index: usize) -> Drawn {
+        let colour = COLOURS[index % COLOURS.len()];
         let points: Vec<PlotPoint> =
             self.shown().filter(|(s, _)| std::ptr::eq(*s, series)).map(|(_, p)| p).collect();
         let line = points.iter().map(|p| (p.x, p.y));
@@ -157,7 +167,7 @@ impl Plot {
             Mark::Points => {}
         }
         if series.mark != Mark::Dashed {
-            let dot = |p: &PlotPoint| Circle::new((p.x, p.y), 4, colour.filled());
+            let dot = |p: &PlotPoint| Circle::new((p.x, p.y), 4, dot_style(index));
             chart.draw_series(points.iter().map(dot))?;
         }
         let bars = points.iter().filter_map(|p| {
@@ -172,11 +182,13 @@ impl Plot {
     /// Names of the series beside the plot, where they hide nothing.
     fn draw_legend(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Drawn {
         let left = SIZE.0.saturating_sub(LEGEND_WIDTH) as i32;
-        for ((series, colour), line) in self.series.iter().zip(COLOURS.iter().cycle()).zip(0i32..) {
-            let y = 60 + 22 * line;
-            if series.mark == Mark::Points {
-                area.draw(&Circle::new((left + 12, y), 4, colour.filled()))?;
-            } else {
+        for (index, series) in self.series.iter().enumerate() {
+            let colour = COLOURS[index % COLOURS.len()];
+            let y = 60 + 22 * index as i32;
+            if series.mark == Mark::Points || index >= COLOURS.len() {
+                area.draw(&Circle::new((left + 12, y), 4, dot_style(index)))?;
+            }
+            if series.mark != Mark::Points {
                 let step = if series.mark == Mark::Dashed { 9 } else { 24 };
                 let mut x = left;
                 while x < left + 24 {

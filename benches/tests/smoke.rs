@@ -295,3 +295,29 @@ fn a_session_of_the_real_programs_is_read_from_its_reports() {
     assert_eq!(outcomes[0], "answered");
     assert!(numbers(folder.path(), "session-large.csv", "nodes").iter().all(|&n| n > 900.0));
 }
+
+#[test]
+fn clients_at_an_even_pace_get_right_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    // A wrong answer, or a client that is not served, fails the report.
+    run_quick(ReportName::Load, folder.path());
+    let answers = numbers(folder.path(), "load.csv", "answers");
+    assert!(answers.iter().all(|&count| count > 20.0), "{answers:?}");
+    assert_eq!(numbers(folder.path(), "load.csv", "clients"), [1.0, 2.0]);
+}
+
+#[test]
+fn hostile_connections_and_restarts_cost_no_right_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Trust, folder.path());
+    let (what, measured) = (
+        column(folder.path(), "trust.csv", "what"),
+        numbers(folder.path(), "trust.csv", "measured"),
+    );
+    // Times and memory of so short a form say little; what is counted must be right.
+    let counted = what.iter().zip(&measured).filter(|(what, _)| {
+        what.starts_with("wrong answers") || what.starts_with("connections of the soak")
+    });
+    let counted: Vec<_> = counted.collect();
+    assert!(counted.len() >= 3 && counted.iter().all(|(_, count)| **count == 0.0), "{counted:?}");
+}

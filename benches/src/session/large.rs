@@ -10,7 +10,7 @@ use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{BuiltIn, Surface, generate};
 use softgrasp_core::model::{Element, Model};
 
-use super::programs::Programs;
+use crate::programs::Programs;
 use crate::report::{ReportError, check, progress};
 use crate::scene::presses;
 use crate::table::{Cell, Table};

@@ -1,7 +1,6 @@
 //! Report `session`: what a user of `run` gets in real time, from runs of the real programs.
 
 mod large;
-mod programs;
 mod record;
 mod report;
 mod way;

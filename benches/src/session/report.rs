@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::large;
-use super::programs::Programs;
+
 use super::record::Record;
 use super::way::{Arrangement, Object, RATE_HZ, play};
+use crate::programs::Programs;
 use crate::report::{Options, Report, ReportError, check, progress};
 use crate::sample::Spread;
 use crate::table::{Cell, Table};

@@ -3,8 +3,8 @@
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
-use super::programs::Programs;
 use super::record::Record;
+use crate::programs::Programs;
 use crate::report_error::ReportError;
 
 /// How client and server are arranged.

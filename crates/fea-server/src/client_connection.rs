@@ -74,7 +74,7 @@ impl<S> ClientConnection<S> {
     /// wanted, has shown it; `limits` hold for what is read from it.
     pub fn new(stream: S, limits: Limits, patience: Patience, wants_token: bool) -> Self {
         let now = Instant::now();
-        let stream = TimedStream { stream, first_read: None, last_read: now };
+        let stream = TimedStream { stream, first_read: None, last_read: now, since_rest: 0 };
         let stranger_until = Some(now + patience.greeting);
         let connection = Connection::new(stream, limits);
         Self { connection, patience, stranger_until, wants_token }
@@ -85,6 +85,13 @@ impl<S> ClientConnection<S> {
         if self.stranger_until.take().is_some() {
             self.connection.set_limits(limits);
         }
+    }
+}
+
+impl<S> ClientConnection<S> {
+    /// Whether bytes of the next request are there already.
+    pub fn is_inside_frame(&self) -> bool {
+        self.connection.is_inside_frame()
     }
 }
 
@@ -182,7 +189,12 @@ struct TimedStream<S> {
     /// First read since it was last set to `None`.
     first_read: Option<Instant>,
     last_read: Instant,
+    /// Bytes since other sessions were let in.
+    since_rest: usize,
 }
+
+/// A client that sends without a pause is left for others after so many bytes.
+const REST_EVERY: usize = 128 * 1024;
 
 impl<S: AsyncRead + Unpin> AsyncRead for TimedStream<S> {
     fn poll_read(
@@ -190,7 +202,14 @@ impl<S: AsyncRead + Unpin> AsyncRead for TimedStream<S> {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
+        if self.since_rest >= REST_EVERY {
+            self.since_rest = 0;
+            context.waker().wake_by_ref();
+            return Poll::Pending;
+        }
+        let before = buffer.filled().len();
         let polled = Pin::new(&mut self.stream).poll_read(context, buffer);
+        self.since_rest += buffer.filled().len() - before;
         if polled.is_ready() {
             self.last_read = Instant::now();
             self.first_read = self.first_read.or(Some(self.last_read));

@@ -93,3 +93,24 @@ impl StageClock {
 pub(crate) fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
+
+#[cfg(test)]
+mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    use super::*;
+    use crate::awaited::{Abandoned, Waiting};
+
+    #[test]
+    fn stage_of_work_that_nobody_waits_for_does_not_begin() {
+        let waiting = Waiting::default();
+        let (queued, watch) = (Instant::now(), StageWatch::default());
+        let mut clock = StageClock::new(0.0, queued, watch.clone(), waiting.awaited());
+        clock.begin(Stage::Assemble);
+        assert_eq!(watch.now(), "assembling");
+        drop(waiting);
+        let ended = catch_unwind(AssertUnwindSafe(|| clock.begin(Stage::Factor))).unwrap_err();
+        assert!(ended.is::<Abandoned>());
+        assert_eq!(watch.now(), "");
+    }
+}

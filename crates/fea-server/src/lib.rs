@@ -19,6 +19,7 @@ mod held_models;
 mod local_server;
 mod lock;
 mod machine_memory;
+mod manners;
 mod metrics;
 mod paths;
 mod places;

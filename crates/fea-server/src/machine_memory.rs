@@ -9,11 +9,20 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub fn available_bytes() -> Option<u64> {
     let machine = read_to_string("/proc/meminfo").ok();
     let machine = machine.and_then(|told| bytes_of_line(&told, "MemAvailable:", 1024));
-    let container = left_in(Path::new("/sys/fs/cgroup"));
+    let own = read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let container = left_above(Path::new("/sys/fs/cgroup"), &own);
     match (machine, container) {
         (Some(machine), Some(container)) => Some(machine.min(container)),
         (machine, container) => machine.or(container),
     }
+}
+
+/// What the limits leave of the group that `/proc/self/cgroup` names, and of all groups around it.
+fn left_above(root: &Path, own: &str) -> Option<u64> {
+    // The line of version 2: `0::/system.slice/fea-server.service`.
+    let path = own.lines().find_map(|line| line.strip_prefix("0::/")).unwrap_or_default();
+    let group = root.join(path);
+    group.ancestors().take_while(|group| group.starts_with(root)).filter_map(left_in).min()
 }
 
 /// What the limit of a control group (version 2) leaves; pages of files count as free.
@@ -71,6 +80,26 @@ mod tests {
         assert_eq!(left_in(group.path()), Some(300));
         write("memory.stat", "anon 500\ninactive_file 150\n");
         assert_eq!(left_in(group.path()), Some(450));
+    }
+
+    #[test]
+    fn limit_of_a_service_counts_and_so_do_those_around_it() {
+        let root = tempfile::tempdir().unwrap();
+        let service = root.path().join("system.slice/fea-server.service");
+        std::fs::create_dir_all(&service).unwrap();
+        let write = |folder: &Path, max: &str| {
+            std::fs::write(folder.join("memory.max"), max).unwrap();
+            std::fs::write(folder.join("memory.current"), "100\n").unwrap();
+        };
+        let own = "0::/system.slice/fea-server.service\n";
+        assert_eq!(left_above(root.path(), own), None);
+        write(&service, "1000\n");
+        assert_eq!(left_above(root.path(), own), Some(900));
+        write(&root.path().join("system.slice"), "400\n");
+        assert_eq!(left_above(root.path(), own), Some(300));
+        // A container sees its own group as the root.
+        write(root.path(), "150\n");
+        assert_eq!(left_above(root.path(), "0::/\n"), Some(50));
     }
 
     #[test]

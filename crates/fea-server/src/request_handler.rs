@@ -18,7 +18,7 @@ use crate::clock::{StageClock, ms_since};
 use crate::held_models::HeldModels;
 use crate::paths::Paths;
 use crate::refusal::Refusal;
-use crate::server_handle::ServerHandle;
+use crate::server_handle::{Grasping, ServerHandle};
 use crate::workers::Workers;
 
 /// What one session holds, and the server that works for it.
@@ -30,6 +30,8 @@ pub(crate) struct RequestHandler {
     held: HeldModels,
     /// The equilibria that this session follows.
     paths: Paths,
+    /// Counts this session from its first frame on.
+    grasping: Option<Grasping>,
 }
 
 impl RequestHandler {
@@ -42,6 +44,7 @@ impl RequestHandler {
             is_authorised: !resources.access.wants_token(),
             held: HeldModels::new(Arc::clone(resources)),
             paths: Paths::default(),
+            grasping: None,
             server,
         }
     }
@@ -131,7 +134,8 @@ impl RequestHandler {
         self.held.hold(request.model);
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
-        let request = match self.server.is_quiet() {
+        self.grasping.get_or_insert_with(|| self.server.grasping());
+        let request = match self.server.has_few_frames() {
             true => match readiness(&resources, request) {
                 Readiness::Ready(kept) => {
                     return Workers::run_here(|| kept.answer(&resources, clock()))?;

@@ -175,14 +175,20 @@ async fn accept_until_stopped(
     mut stop: watch::Receiver<bool>,
     sessions: &mut JoinSet<()>,
 ) {
+    let mut pace = AcceptPace::new(Instant::now());
     loop {
+        let next = async {
+            tokio::time::sleep_until(pace.next().into()).await;
+            listener.accept().await
+        };
         let accepted = tokio::select! {
-            accepted = listener.accept() => accepted,
+            accepted = next => accepted,
             () = stopped(&mut stop) => return,
             Some(_) = sessions.join_next(), if !sessions.is_empty() => continue,
         };
         match accepted {
             Ok((stream, peer)) => {
+                pace.accepted(Instant::now());
                 if let Err(error) = make_ready(&stream) {
                     tracing::warn!(%peer, %error, "a connection could not be set up");
                 }
@@ -193,6 +199,33 @@ async fn accept_until_stopped(
                 tokio::time::sleep(ACCEPT_PAUSE).await;
             }
         }
+    }
+}
+
+/// How fast connections are accepted: a crowd that comes and goes without end must not take the sockets'
+/// thread from those who are there.
+struct AcceptPace {
+    /// The next connection is accepted then, or [`ACCEPTS_AT_ONCE`] earlier ones' worth before.
+    due: Instant,
+}
+
+/// Connections that are accepted at once after a pause.
+const ACCEPTS_AT_ONCE: u32 = 64;
+/// Time between two connections after those.
+const ACCEPT_EVERY: Duration = Duration::from_millis(1);
+
+impl AcceptPace {
+    fn new(now: Instant) -> Self {
+        Self { due: now }
+    }
+
+    /// When the next one may be accepted.
+    fn next(&self) -> Instant {
+        self.due.checked_sub(ACCEPTS_AT_ONCE * ACCEPT_EVERY).unwrap_or(self.due)
+    }
+
+    fn accepted(&mut self, now: Instant) {
+        self.due = self.due.max(now) + ACCEPT_EVERY;
     }
 }
 
@@ -339,5 +372,28 @@ impl RunningServer {
 impl Drop for RunningServer {
     fn drop(&mut self) {
         self.stop_and_join();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_burst_is_accepted_at_once_and_an_endless_crowd_at_its_pace() {
+        let start = Instant::now();
+        let mut pace = AcceptPace::new(start);
+        for _ in 0..ACCEPTS_AT_ONCE {
+            assert!(pace.next() <= start);
+            pace.accepted(start);
+        }
+        for more in 0..100 {
+            assert_eq!(pace.next(), start + more * ACCEPT_EVERY);
+            pace.accepted(pace.next());
+        }
+        // After a pause there is room for a burst again.
+        let later = start + Duration::from_secs(10);
+        pace.accepted(later);
+        assert!(pace.next() <= later);
     }
 }

@@ -9,6 +9,7 @@ use softgrasp_protocol::{
 use tokio::io::{AsyncRead, AsyncWrite};
 
 use crate::client_connection::{ClientConnection, Patience, SessionError};
+use crate::manners::Manners;
 use crate::refusal::Refusal;
 use crate::request_handler::RequestHandler;
 use crate::server_handle::{ServerHandle, stopped};
@@ -27,6 +28,8 @@ where
         handler: RequestHandler::new(server.clone(), peer),
         server,
         out: Vec::new(),
+        refused: 0,
+        manners: Manners::default(),
     };
     tracing::info!(%peer, "session begins");
     session.server.resources.metrics.session_began();
@@ -45,7 +48,14 @@ struct Session<S> {
     server: ServerHandle,
     /// Encoded reply, kept so that its memory is reused.
     out: Vec<u8>,
+    /// Requests that were refused.
+    refused: usize,
+    manners: Manners,
 }
+
+/// Refusals of one session that are logged; a client that sends nonsense without end must not fill a
+/// disk.
+const REFUSALS_LOGGED: usize = 20;
 
 /// Memory for replies that a session keeps while it rests, bytes.
 const OUT_KEPT: usize = 1 << 20;
@@ -63,7 +73,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
                 }
             };
             match frame {
-                Ok(Some(frame)) => self.handle(frame).await?,
+                Ok(Some(frame)) => {
+                    self.handle(frame).await?;
+                    self.give_way().await;
+                }
                 Ok(None) => return Ok(()),
                 Err(SessionError::Connection(ConnectionError::Frame(error))) => {
                     self.answer_bad_stream(&error).await;
@@ -112,6 +125,27 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         written
     }
 
+    /// Lets other sessions be served before the next request, and rests for a client without manners.
+    async fn give_way(&mut self) {
+        let is_ahead = self.connection.is_inside_frame();
+        match self.manners.rest(is_ahead, self.server.is_quiet()) {
+            Some(rest) => tokio::time::sleep(rest).await,
+            None => tokio::task::yield_now().await,
+        }
+    }
+
+    fn log(&mut self, refusal: &Refusal) {
+        self.refused += 1;
+        self.manners.refused(refusal.code());
+        match self.refused {
+            ..REFUSALS_LOGGED => tracing::info!(%refusal, "request refused"),
+            REFUSALS_LOGGED => {
+                tracing::info!(%refusal, "request refused; further ones of this session are not logged");
+            }
+            _ => tracing::debug!(%refusal, "request refused"),
+        }
+    }
+
     /// One request: decoded, worked on, answered. A bad request is answered and the session lives; a
     /// client that goes is not worked for any longer.
     async fn handle(&mut self, frame: Frame) -> Result<(), SessionError> {
@@ -137,7 +171,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
             Ok(Some(reply)) => self.write(request_id, &reply).await,
             Ok(None) => Ok(()),
             Err(refusal) => {
-                tracing::info!(%refusal, "request refused");
+                self.log(&refusal);
                 match has_reply {
                     true => self.write(request_id, &Reply::Rejected(refusal.to_message())).await,
                     false => Ok(()),

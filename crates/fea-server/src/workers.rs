@@ -234,6 +234,9 @@ fn caught<T>(place: &str, work: impl FnOnce() -> T) -> Result<T, EndedAbnormally
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::task::{Context, Waker};
+
     use super::*;
 
     #[tokio::test]
@@ -245,6 +248,39 @@ mod tests {
         assert_eq!(broken, Err(EndedAbnormally));
         assert_eq!(workers.run(|| 7).await, Ok(7));
         assert_eq!(workers.threads(), 1);
+    }
+
+    #[tokio::test]
+    async fn work_whose_session_has_gone_is_not_begun() {
+        let workers = Workers::new(1, 8).unwrap();
+        let (gate, passed) = std::sync::mpsc::channel::<()>();
+        let first = workers.run(move || passed.recv());
+        let begun = Arc::new(AtomicBool::new(false));
+        let marks = Arc::clone(&begun);
+        let second = workers.run(move || marks.store(true, Ordering::Relaxed));
+        let (mut first, mut second) = (Box::pin(first), Box::pin(second));
+        // Both are in the queue, and the only thread waits at the gate.
+        assert!(first.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending());
+        assert!(second.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending());
+        drop(second);
+        gate.send(()).unwrap();
+        first.await.unwrap().unwrap();
+        // One thread works in order: by now the second had its turn.
+        workers.run(|| ()).await.unwrap();
+        assert!(!begun.load(Ordering::Relaxed));
+        assert_eq!(workers.queued(), 0);
+    }
+
+    #[tokio::test]
+    async fn frame_does_not_wait_for_long_work() {
+        let workers = Workers::new(1, 8).unwrap();
+        let (gate, passed) = std::sync::mpsc::channel::<()>();
+        let mut long = Box::pin(workers.run(move || passed.recv()));
+        assert!(long.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending());
+        // It would never come back from the same pool.
+        assert_eq!(workers.run_frame(|| 7).await, Ok(7));
+        gate.send(()).unwrap();
+        long.await.unwrap().unwrap();
     }
 
     #[tokio::test]

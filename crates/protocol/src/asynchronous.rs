@@ -61,7 +61,7 @@ impl<S: AsyncRead + Unpin> Connection<S> {
             if let Some(frame) = self.buffer.next_frame()? {
                 return Ok(Some(frame));
             }
-            match self.stream.read(self.buffer.spare_mut()).await {
+            match self.stream.read(read_room(&mut self.buffer)).await {
                 Ok(0) => {
                     self.buffer.finish()?;
                     return Ok(None);
@@ -90,7 +90,7 @@ impl<S: AsyncRead + Unpin> Connection<S> {
     /// # Errors
     /// That of the stream: the peer has gone.
     pub async fn read_ahead(&mut self) -> Result<bool, ConnectionError> {
-        let count = self.stream.read(self.buffer.spare_mut()).await?;
+        let count = self.stream.read(read_room(&mut self.buffer)).await?;
         self.buffer.advance(count);
         Ok(count > 0)
     }
@@ -121,6 +121,15 @@ impl<S: AsyncWrite + Unpin> Connection<S> {
             }
         }
     }
+}
+
+/// Bytes that one read takes at most: a peer that sends as fast as it can is left for others now and then.
+const READ_LEN_MAX: usize = 64 * 1024;
+
+fn read_room(buffer: &mut FrameBuffer) -> &mut [u8] {
+    let room = buffer.spare_mut();
+    let len = room.len().min(READ_LEN_MAX);
+    &mut room[..len]
 }
 
 /// Whether a failed write is to be tried again at once.

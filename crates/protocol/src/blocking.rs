@@ -58,7 +58,7 @@ impl<S: Read> Connection<S> {
                 Err(error) => match error.kind() {
                     ErrorKind::Interrupted => {}
                     // Unix says the former, Windows the latter when a timeout has passed.
-                    ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut if !is_dead(&error) => {
                         let received = self.buffer.received();
                         return Err(ConnectionError::ReadTimedOut { received });
                     }
@@ -93,11 +93,17 @@ impl<S: Write> Connection<S> {
     }
 }
 
+/// Whether the system says that the peer's machine does not answer any more: on Unix a read or write that
+/// only took too long says `WouldBlock`.
+fn is_dead(error: &std::io::Error) -> bool {
+    cfg!(unix) && error.kind() == ErrorKind::TimedOut && error.raw_os_error().is_some()
+}
+
 /// Whether a failed write is to be tried again at once.
 fn keep_writing(error: std::io::Error, written: usize) -> Result<(), ConnectionError> {
     match error.kind() {
         ErrorKind::Interrupted => Ok(()),
-        ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+        ErrorKind::WouldBlock | ErrorKind::TimedOut if !is_dead(&error) => {
             Err(ConnectionError::WriteTimedOut { written })
         }
         _ => Err(error.into()),

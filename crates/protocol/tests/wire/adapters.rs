@@ -326,3 +326,26 @@ fn a_silent_peer_on_a_socket_times_out_and_is_heard_later() {
     drop(far);
     assert!(near.read_frame().unwrap().is_none());
 }
+
+/// A stream whose system says that the peer's machine does not answer any more.
+#[cfg(unix)]
+struct Dead;
+
+#[cfg(unix)]
+impl Read for Dead {
+    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+        // ETIMEDOUT of Linux.
+        Err(io::Error::from_raw_os_error(110))
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn machine_that_does_not_answer_any_more_is_not_called_a_slow_one() {
+    let mut connection = softgrasp_protocol::blocking::Connection::new(Dead, Limits::default());
+    let error = connection.read_frame().unwrap_err();
+    match (cfg!(target_os = "linux"), error) {
+        (true, ConnectionError::Io(_)) | (false, _) => {}
+        (true, other) => panic!("{other:?}"),
+    }
+}

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crate::report_error::ReportError;
 
 /// Where the programs are.
-pub(super) struct Programs {
+pub(crate) struct Programs {
     client: PathBuf,
     server: PathBuf,
 }
@@ -45,9 +45,18 @@ impl Programs {
     /// # Errors
     /// [`ReportError::Process`].
     pub fn serve(&self, threads: usize) -> Result<Server, ReportError> {
+        let threads = threads.to_string();
+        self.serve_as(&["--listen", "127.0.0.1:0", "--real-time", "--threads", &threads])
+    }
+
+    /// Starts a server with these arguments and waits until it listens.
+    ///
+    /// # Errors
+    /// [`ReportError::Process`], and [`ReportError::Ended`] where it does not listen.
+    pub fn serve_as(&self, arguments: &[&str]) -> Result<Server, ReportError> {
         let mut command = Command::new(&self.server);
-        command.args(["--listen", "127.0.0.1:0", "--real-time", "--threads"]);
-        command.arg(threads.to_string()).stdout(Stdio::piped()).stderr(Stdio::null());
+        command.args(arguments);
+        command.stdout(Stdio::piped()).stderr(Stdio::null());
         let failed = |source| ReportError::Process { what: "fea-server".to_owned(), source };
         let mut process = Process(command.spawn().map_err(failed)?);
         let mut line = String::new();
@@ -55,7 +64,7 @@ impl Programs {
             BufReader::new(out).read_line(&mut line).map_err(failed)?;
         }
         match line.trim().strip_prefix("listening on ") {
-            Some(address) => Ok(Server { address: address.to_owned(), _process: process }),
+            Some(address) => Ok(Server { address: address.to_owned(), process }),
             None => Err(ReportError::Ended { what: "fea-server".to_owned(), said: line }),
         }
     }
@@ -93,13 +102,35 @@ impl Drop for Process {
 }
 
 /// A server that runs.
-pub(super) struct Server {
+pub(crate) struct Server {
     pub address: String,
-    _process: Process,
+    process: Process,
+}
+
+/// Ticks of a processor's time in `/proc`, 1/s.
+const CLOCK_TICKS: f64 = 100.0;
+
+impl Server {
+    /// Processor time so far, s; `None` where the system does not tell.
+    pub fn busy_s(&self) -> Option<f64> {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.process.0.id())).ok()?;
+        // The name in brackets may hold spaces.
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        let ticks = |at: usize| fields.get(at)?.parse::<f64>().ok();
+        Some((ticks(11)? + ticks(12)?) / CLOCK_TICKS)
+    }
+
+    /// Resident memory, bytes; `None` where the system does not tell.
+    pub fn resident_bytes(&self) -> Option<f64> {
+        let status =
+            std::fs::read_to_string(format!("/proc/{}/status", self.process.0.id())).ok()?;
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+        Some(line.split_whitespace().next()?.parse::<f64>().ok()? * 1024.0)
+    }
 }
 
 /// A client that runs.
-pub(super) struct Client {
+pub(crate) struct Client {
     what: String,
     said: PathBuf,
     process: Process,
