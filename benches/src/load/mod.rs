@@ -138,6 +138,13 @@ fn write(report: &mut Report, rows: &[Row]) -> Result<(), ReportError> {
          large deformation by the error that it states (at most 2e-3). A row ends a series when its \
          99 % quantile is above 64 ms.",
     );
+    report.text(
+        "All sockets share one thread of the server, so linear frames, whose answers take less than reading \
+         and writing them, keep little more than one processor of it busy however many there are. Where \
+         both columns of processors together are near the machine's number, the machine is used up, \
+         and clients on other machines would leave the server their part. Frames at large deformation \
+         are bound by the solving threads and by the one that makes factors beside them.",
+    );
     let mut best = Table::new(
         "load-limits",
         "Most clients whose 99 % quantile is at most 16 ms",
