@@ -10,8 +10,8 @@ use glove_client::connection::ServerConnection;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::{Limits, Request};
 
+use super::bars::{Amounts, bar, server};
 use super::malformed::malformed;
-use super::{Amounts, bar, server};
 use crate::programs::Programs;
 use crate::random::Random;
 use crate::report::{Report, ReportError};

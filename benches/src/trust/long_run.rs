@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use super::{Amounts, bar, server};
+use super::bars::{Amounts, bar, server};
 use crate::programs::Programs;
 use crate::report::{Report, ReportError};
 use crate::table::Table;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{HEADER_LEN, Kind, VERSION};
 
-use super::{Amounts, bar, server};
+use super::bars::{Amounts, bar, server};
 use crate::programs::Programs;
 use crate::random::Random;
 use crate::report::{Report, ReportError};

@@ -8,7 +8,7 @@ use glove_client::tick_budget::Priority;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::{ModelHash, NodeChoice};
 
-use super::{Amounts, bar, server};
+use super::bars::{Amounts, bar, server};
 use crate::programs::Programs;
 use crate::random::Random;
 use crate::report::{Report, ReportError};

@@ -148,7 +148,7 @@ impl RequestHandler {
         let among_frames = move || match PosedFrame::new(&shared, request) {
             Err(refusal) => Ok(Err(refusal)),
             Ok(frame) if frame.is_prepared() => Ok(frame.answer(&shared, clock())),
-            Ok(frame) => Err((frame, clock)),
+            Ok(frame) => Err((Box::new(frame), clock)),
         };
         match workers.run_frame(among_frames).await? {
             Ok(answered) => answered,

@@ -87,19 +87,23 @@ impl RunReport {
                 100.0 * s.max_strain,
             ));
         }
-        if let (Some(median), Some(most)) = (s.shown_age_ms_p50, s.shown_age_ms_max)
-            && self.pace == Pace::Free.name()
-        {
-            text.push_str(&format!(
-                "  shape shown         {median:.0} ms old (median), {most:.0} ms at most\n"
-            ));
-        }
+        text.push_str(&self.words_of_age());
         text.push_str(&self.words_of_large());
         text.push_str(&self.words_of_devices());
         if self.interrupted {
             text.push_str("  ended by the user\n");
         }
         text
+    }
+
+    /// How old the shape was that was shown, in real time.
+    fn words_of_age(&self) -> String {
+        match (self.summary.shown_age_ms_p50, self.summary.shown_age_ms_max) {
+            (Some(median), Some(most)) if self.pace == Pace::Free.name() => {
+                format!("  shape shown         {median:.0} ms old (median), {most:.0} ms at most\n")
+            }
+            _ => String::new(),
+        }
     }
 
     /// What is to be said of large deformation.
