@@ -2,7 +2,7 @@
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use fea_server::ServerConfig;
 use glove_client::connection::{LinkError, ServerConnection};
@@ -32,12 +32,14 @@ fn server(drain: Duration) -> fea_server::RunningServer {
 #[test]
 fn draining_server_takes_nobody_and_serves_who_is_there_until_its_time_is_over() {
     within(LIMIT, "a drain", || {
-        let server = server(Duration::from_secs(3));
+        let drain = Duration::from_secs(3);
+        let server = server(drain);
         let (address, pages) = (server.address(), server.metrics().unwrap());
         let mesh = cube(27);
         let mut there = client(&server);
         there.ask(&Request::UploadModel(upload(&mesh))).unwrap();
         assert_eq!(page(pages, "/ready").0, "HTTP/1.1 200 OK");
+        let begun = Instant::now();
         let stopping = std::thread::spawn(move || server.stop());
         until(LIMIT, "draining", || page(pages, "/ready").0.contains("503"));
         assert_eq!(page(pages, "/ready").1, "stopping\n");
@@ -52,6 +54,7 @@ fn draining_server_takes_nobody_and_serves_who_is_there_until_its_time_is_over()
                 other => break other,
             }
         };
+        assert!(begun.elapsed() >= drain, "told to go before its time was over");
         match told {
             Err(LinkError::Rejected(rejected)) => {
                 assert_eq!(rejected.code, RejectCode::ShuttingDown);
