@@ -9,7 +9,7 @@ use softgrasp_core::mesh::{GenerateError, MeshError};
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::equilibrium::NoEquilibrium;
-use softgrasp_core::solve::{FrontError, SolveError};
+use softgrasp_core::solve::{FrontError, PartitionError, SolveError};
 use softgrasp_core::sphere_tree::TreeError;
 
 use crate::plot::PlotError;
@@ -38,6 +38,9 @@ pub enum ReportError {
     /// Contacts that do not hold.
     #[error(transparent)]
     Condensed(#[from] CondensedError),
+    /// Known degrees of freedom that do not fit.
+    #[error(transparent)]
+    Partition(#[from] PartitionError),
     /// A factor.
     #[error(transparent)]
     Front(#[from] FrontError),

@@ -87,6 +87,7 @@ impl Heard {
             Reply::Welcome(_) => Self::Welcome,
             Reply::Answer(answer) => Self::Answer(AnswerBits::of(answer)),
             Reply::LargeAnswer(answered) => Self::Answer(AnswerBits::of(&answered.answer)),
+            Reply::SeveralAnswers(answers) => Self::Answer(AnswerBits::of(&answers.answer)),
             Reply::ModelState { .. } => Self::ModelState,
             Reply::ModelReady(ready) => Self::ModelReady {
                 model: ready.model,

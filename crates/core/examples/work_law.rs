@@ -32,13 +32,13 @@ fn main() {
                 let partition = Partition::try_new(&used, &known).expect("nodes are there");
                 let analysis = FrontAnalysis::new(model.stiffness(), &partition);
                 let nodes = model.system_node_count() as f64;
-                let stored = analysis.factor_bytes::<u8>() as f64;
+                let stored = (analysis.factor_bytes::<f64>() / 8) as f64;
                 println!(
                     "{shape:?} {element:?} {corners:6} {nodes:6} {tets:6} {:6.1} {:8.1} {:8.1} {:6.2}",
                     model.stiffness().pattern().block_count() as f64 / nodes,
                     analysis.flops() / nodes.powi(2),
                     stored / nodes.powf(4.0 / 3.0),
-                    analysis.peak_bytes::<u8>() as f64 / stored,
+                    (analysis.peak_bytes::<f64>() / 8) as f64 / stored,
                 );
             }
         }

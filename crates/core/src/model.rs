@@ -120,27 +120,16 @@ impl Model {
         fixed.sort_unstable();
         fixed.dedup();
         Partition::try_new(&mesh.used_nodes(), &fixed)?;
-        let bodies = Bodies::from_mesh(&mesh);
-        let rigid = RigidBodies::new(&mesh, &bodies);
-        let (quadratic, used, stiffness) = match element {
-            Element::Tet4 => {
-                let pattern = Arc::new(StiffnessPattern::new(&mesh));
-                (None, mesh.used_nodes(), assemble(&pattern, &mesh, materials)?)
-            }
-            Element::Tet4Anp => {
-                let patches = NodalPatches::new(&mesh);
-                let pattern = Arc::new(StiffnessPattern::nodal_pressure(&mesh, &patches));
-                let stiffness = assemble_nodal_pressure(&pattern, &mesh, &patches, materials)?;
-                (None, mesh.used_nodes(), stiffness)
-            }
-            Element::Tet10 => {
-                let quadratic = QuadraticMesh::try_new(&mesh)?;
-                let pattern = Arc::new(StiffnessPattern::quadratic(&quadratic));
-                let stiffness = assemble_quadratic(&pattern, &quadratic, materials)?;
-                let used = quadratic.used_nodes();
-                (Some(quadratic), used, stiffness)
-            }
-        };
+        // Neither needs the other, and each is sequential in part.
+        let (system, (bodies, rigid)) = rayon::join(
+            || system(&mesh, element, materials),
+            || {
+                let bodies = Bodies::from_mesh(&mesh);
+                let rigid = RigidBodies::new(&mesh, &bodies);
+                (bodies, rigid)
+            },
+        );
+        let (quadratic, used, stiffness) = system?;
         let stiffness = Arc::new(stiffness);
         let used_count = used.iter().filter(|used| **used).count();
         let materials = materials.to_vec();
@@ -372,6 +361,32 @@ impl Model {
         let partition = self.held_partition(dofs)?;
         Ok(Factored::try_within(&self.stiffness, partition, method, limit, on_stage)?)
     }
+}
+
+/// Ten-node mesh if the element needs one, nodes of the system that are used, and the stiffness.
+type System = (Option<QuadraticMesh>, Vec<bool>, Stiffness);
+
+/// Pattern and stiffness of a mesh with one of the elements.
+fn system(mesh: &TetMesh, element: Element, materials: &[Material]) -> Result<System, ModelError> {
+    Ok(match element {
+        Element::Tet4 => {
+            let pattern = Arc::new(StiffnessPattern::new(mesh));
+            (None, mesh.used_nodes(), assemble(&pattern, mesh, materials)?)
+        }
+        Element::Tet4Anp => {
+            let patches = NodalPatches::new(mesh);
+            let pattern = Arc::new(StiffnessPattern::nodal_pressure(mesh, &patches));
+            let stiffness = assemble_nodal_pressure(&pattern, mesh, &patches, materials)?;
+            (None, mesh.used_nodes(), stiffness)
+        }
+        Element::Tet10 => {
+            let quadratic = QuadraticMesh::try_new(mesh)?;
+            let pattern = Arc::new(StiffnessPattern::quadratic(&quadratic));
+            let stiffness = assemble_quadratic(&pattern, &quadratic, materials)?;
+            let used = quadratic.used_nodes();
+            (Some(quadratic), used, stiffness)
+        }
+    })
 }
 
 #[cfg(test)]

@@ -28,6 +28,16 @@ pub(crate) enum Refusal {
     Method(#[from] UnknownMethod),
     #[error(transparent)]
     Plan(#[from] PlanError),
+    #[error(
+        "several cases are solved with a factor; the method condensed and masks have none: ask for \
+         one case at a time"
+    )]
+    SeveralCondensed,
+    #[error(
+        "{cases} cases take {bytes} bytes beside the factor, {free} are free (--memory-limit); ask \
+         for fewer at a time"
+    )]
+    TooManyCases { cases: usize, bytes: u64, free: u64 },
     #[error("no material was given")]
     NoMaterial,
     #[error(
@@ -107,6 +117,7 @@ impl Refusal {
             Self::Plan(error) => code_of_plan(error),
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
+            Self::TooManyCases { .. } => RejectCode::MemoryLimit,
             Self::Uncertain { .. } | Self::NoEquilibrium(_) => RejectCode::Uncertain,
             Self::Token | Self::Barred { .. } => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,

@@ -11,7 +11,7 @@ use softgrasp_protocol::{
 
 use crate::answer::{
     PosedFrame, Readiness, answer_large_frame, prefetch, prove, readiness, solve_large, solve_once,
-    upload,
+    solve_several, upload,
 };
 use crate::awaited::Waiting;
 use crate::clock::{StageClock, ms_since};
@@ -98,6 +98,10 @@ impl RequestHandler {
             Request::SolveLarge(once) => {
                 let work = move || solve_large(&resources, *once, clock());
                 Reply::LargeAnswer(Box::new(workers.run(work).await??))
+            }
+            Request::SolveSeveral(several) => {
+                let work = move || solve_several(&resources, *several, clock());
+                Reply::SeveralAnswers(Box::new(workers.run(work).await??))
             }
             Request::UploadModel(model) => Reply::ModelReady(self.upload(model, clock).await?),
             Request::Frame(request) => Reply::Answer(Box::new(self.frame(request, clock).await?)),

@@ -26,6 +26,8 @@ pub enum Kind {
     SolveLarge = 0x0009,
     /// As `Frame`, for large deformation; goes on from the session's last shape.
     LargeFrame = 0x000a,
+    /// As `SolveOnce`, for several sets of displacements of one partition.
+    SolveSeveral = 0x000b,
     /// Server introduces itself.
     Welcome = 0x8001,
     /// Displacements and what they cost.
@@ -40,11 +42,13 @@ pub enum Kind {
     Pong = 0x8008,
     /// As `Answer`, for large deformation.
     LargeAnswer = 0x8009,
+    /// As `Answer`, for several sets of displacements.
+    SeveralAnswers = 0x800b,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::Hello,
         Self::SolveOnce,
         Self::HaveModel,
@@ -55,6 +59,7 @@ impl Kind {
         Self::Ping,
         Self::SolveLarge,
         Self::LargeFrame,
+        Self::SolveSeveral,
         Self::Welcome,
         Self::Answer,
         Self::ModelState,
@@ -62,6 +67,7 @@ impl Kind {
         Self::Rejected,
         Self::Pong,
         Self::LargeAnswer,
+        Self::SeveralAnswers,
     ];
 
     /// Number in the header.

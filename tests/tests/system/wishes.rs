@@ -164,7 +164,7 @@ fn auto_takes_ten_nodes_where_linear_elements_lock_and_says_so() {
 
 #[test]
 fn linear_elements_that_lock_are_warned_of() {
-    let small = ServerConfig { memory_limit: 4 << 20, ..config(1) };
+    let small = ServerConfig { memory_limit: 3 << 20, ..config(1) };
     let server = fea_server::start(small).unwrap();
     let mut connection = client(&server);
     let mesh = cube(343);

@@ -14,6 +14,16 @@ pub struct StrainSummary {
     pub strain_max: f64,
 }
 
+impl StrainSummary {
+    /// The larger of both, each by itself.
+    pub fn or_larger(self, other: Self) -> Self {
+        Self {
+            rotation_max: self.rotation_max.max(other.rotation_max),
+            strain_max: self.strain_max.max(other.strain_max),
+        }
+    }
+}
+
 /// Largest rotation and principal strain over all elements.
 ///
 /// Shapes: `displacement` 3N. Units: m. `pause` is called every 50 µs or so: who works this out beside

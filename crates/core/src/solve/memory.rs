@@ -116,7 +116,7 @@ impl Need {
         blocks: usize,
         analysis: &FrontAnalysis,
     ) -> Self {
-        let numbers = analysis.peak_bytes::<u8>() as f64 * number_bytes(method);
+        let numbers = analysis.peak_bytes_of(method) as f64;
         let vectors = VECTORS * (size_of::<f64>() * analysis.row_count()) as f64;
         let factor_bytes = numbers + ORDER_BYTES_PER_BLOCK * blocks as f64 + vectors;
         Self::exact(element, method, model_bytes, factor_bytes as u64)

@@ -39,12 +39,12 @@ pub struct MeshSize {
 /// tubes of 500 to 160 000 corners (linear; ten-node to 8000), which leave the laws by factors of
 /// 0.6 to 1.7 (operations) and 0.75 to 1.35 (numbers).
 const FLOPS: [f64; 2] = [21.0, 13.0];
-const ENTRIES: [f64; 2] = [13.0, 7.8];
+const ENTRIES: [f64; 2] = [15.0, 6.6];
 /// What is held at once while the factor is made, over the factor; from the same count.
-const PEAK_OVER_ENTRIES: f64 = 1.6;
+const PEAK_OVER_ENTRIES: f64 = 1.4;
 /// How much more operations and numbers averaged nodal pressure takes, which couples nodes two
 /// elements apart; from the same count, on 500 to 8000 corners.
-const NODAL_PRESSURE: [f64; 2] = [5.5, 2.6];
+const NODAL_PRESSURE: [f64; 2] = [5.5, 2.4];
 /// Blocks of a row of the stiffness; from the same count.
 const BLOCKS_PER_NODE: [f64; 3] = [13.5, 50.0, 27.0];
 
@@ -82,9 +82,8 @@ impl Work {
         Self {
             unknown_dofs: analysis.row_count() as f64,
             factor_flops: analysis.flops(),
-            // Bytes of numbers of one byte each.
-            factor_entries: analysis.factor_bytes::<u8>() as f64,
-            peak_entries: analysis.peak_bytes::<u8>() as f64,
+            factor_entries: (analysis.factor_bytes::<f64>() / size_of::<f64>()) as f64,
+            peak_entries: (analysis.peak_bytes::<f64>() / size_of::<f64>()) as f64,
             ..self
         }
     }

@@ -2,10 +2,12 @@
 
 use std::time::Instant;
 
+use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Certainty, Factored, Loads, Method, Solution};
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
+    Answer, CaseAnswer, Displacements, DofValue, ElementName, NodeChoice, Question, SeveralAnswers,
+    SolveReport, Want,
 };
 
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
@@ -47,35 +49,84 @@ pub(super) fn answer(
         Some(_) => factored.solve(stiffness, loads, on_stage).map(|solution| (solution, None)),
     }
     .map_err(|error| Refusal::Model(error.into()))?;
-    gather(model, factored, posed, &solution, certainty, clock)
+    let strain = Some(model.strain(&solution.displacement));
+    gather(model, factored, &posed, &solution, (certainty, strain), clock)
+}
+
+/// Solves several cases together; `estimate` whether to work out what only informs.
+///
+/// # Errors
+/// [`Refusal`].
+pub(super) fn answer_several(
+    model: &Model,
+    factored: &Factored,
+    posed: Posed<'_>,
+    cases: &[Known],
+    estimate: bool,
+    mut clock: StageClock,
+) -> Result<SeveralAnswers, Refusal> {
+    let residual_rel = posed.question.max_error.unwrap_or(0.0);
+    let loads: Vec<Loads<'_>> = [&posed.known]
+        .into_iter()
+        .chain(cases)
+        .map(|known| Loads { q_known: &known.q_known, forces: &posed.forces, residual_rel })
+        .collect();
+    let (stiffness, on_stage) = (model.stiffness(), &mut |stage| clock.begin(stage));
+    let (mut solutions, certainty) = match estimate && posed.question.deadline_ms.is_none() {
+        true => factored.solve_several_for_certain(stiffness, &loads, on_stage),
+        false => factored.solve_several(stiffness, &loads, on_stage).map(|found| (found, None)),
+    }
+    .map_err(|error| Refusal::Model(error.into()))?;
+    let strain = estimate.then(|| {
+        let strains = solutions.iter().map(|solution| model.strain(&solution.displacement));
+        strains.fold(StrainSummary::default(), StrainSummary::or_larger)
+    });
+    let worst = |of: fn(&Solution) -> f64| solutions.iter().map(of).fold(0.0, f64::max);
+    let residual_rel = worst(|solution| solution.residual_rel);
+    let steps = solutions.iter().map(|solution| solution.refinement_steps).max();
+    let further = solutions.split_off(1.min(solutions.len()));
+    let further = further
+        .iter()
+        .map(|solution| CaseAnswer {
+            displacements: displacements(model, solution, &posed.question.want).into_f64(),
+            reactions: match posed.question.want.reactions {
+                true => solution.reaction.clone(),
+                false => Vec::new(),
+            },
+        })
+        .collect();
+    let [first] = &solutions[..] else { return Err(Refusal::Internal) };
+    let mut answer = gather(model, factored, &posed, first, (certainty, strain), clock)?;
+    answer.report.residual_rel = residual_rel;
+    answer.report.refinement_steps = steps.unwrap_or(0);
+    Ok(SeveralAnswers { answer, cases: further })
 }
 
 /// What was asked for, out of a solution, and what it cost.
 fn gather(
     model: &Model,
     factored: &Factored,
-    posed: Posed<'_>,
+    posed: &Posed<'_>,
     solution: &Solution,
-    certainty: Option<Certainty>,
+    (certainty, strain): (Option<Certainty>, Option<StrainSummary>),
     clock: StageClock,
 ) -> Result<Answer, Refusal> {
     let Posed { question, known, element, factor_reused, chosen_because, .. } = posed;
-    let strain = model.strain(&solution.displacement);
     let mut stage_ms = clock.finish();
     let start = Instant::now();
     let displacements = displacements(model, solution, &question.want);
     let reactions = match question.want.reactions {
-        true => reactions(&known, solution),
+        true => reactions(known, solution),
         false => Vec::new(),
     };
     stage_ms.encode = ms_since(start);
     let (precision, chosen_because) = match solution.fallback {
-        None => (factored.method().precision(), chosen_because),
+        None => (factored.method().precision(), chosen_because.clone()),
         Some(fallback) => (Method::Front.precision(), format!("{chosen_because}; {fallback}")),
     };
     let mut report = SolveReport {
         method: factored.method().to_string(),
-        element,
+        element: *element,
         unknown_dofs: factored.partition().unknown().len() as u64,
         known_dofs: known.dofs.len() as u64,
         stage_ms,
@@ -83,12 +134,13 @@ fn gather(
         error_bound_rel: None,
         error_bound_why: no_bound(solution.error_estimate_rel),
         refinement_steps: solution.refinement_steps,
-        max_rotation_deg: strain.rotation_max.to_degrees(),
-        max_strain: strain.strain_max,
+        // No number where nobody wanted to know.
+        max_rotation_deg: strain.map_or(f64::NAN, |strain| strain.rotation_max.to_degrees()),
+        max_strain: strain.map_or(f64::NAN, |strain| strain.strain_max),
         precision: precision.to_owned(),
-        warnings: strain_warnings(strain),
+        warnings: strain.map(strain_warnings).unwrap_or_default(),
         peak_rss_bytes: peak_rss_bytes(),
-        factor_reused,
+        factor_reused: *factor_reused,
         chosen_because,
         ..SolveReport::default()
     };

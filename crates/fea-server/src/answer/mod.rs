@@ -8,6 +8,7 @@ mod large;
 mod large_frame;
 mod large_once;
 mod once;
+mod several;
 mod upload;
 mod warnings;
 
@@ -15,4 +16,5 @@ pub(crate) use frame::{PosedFrame, Readiness, readiness};
 pub(crate) use large_frame::answer_large_frame;
 pub(crate) use large_once::solve_large;
 pub(crate) use once::solve_once;
+pub(crate) use several::solve_several;
 pub(crate) use upload::{prefetch, prove, upload};

@@ -23,11 +23,11 @@ use crate::request::{
 use crate::resources::Resources;
 
 /// A request and what its answer may take.
-struct Work<'a> {
-    resources: &'a Resources,
-    reservation: Reservation,
-    request: OnceRequest,
-    message: QuestionMessage,
+pub(super) struct Work<'a> {
+    pub resources: &'a Resources,
+    pub reservation: Reservation,
+    pub request: OnceRequest,
+    pub message: QuestionMessage,
 }
 
 /// Mesh, known displacements and partition in one request (thesis 5.1.1).
@@ -91,19 +91,31 @@ impl Work<'_> {
         forces: Vec<f64>,
         mut clock: StageClock,
     ) -> Result<(Answer, Plan), Refusal> {
+        let (factored, plan, why) = self.factored(plan, model, &known, &mut clock)?;
+        let posed = self.posed(model, known.clone(), forces, why);
+        Ok((direct::answer(model, &factored, posed, clock)?, plan))
+    }
+
+    /// The factor or inverse, the plan as it became, and why.
+    pub(super) fn factored(
+        &self,
+        plan: Plan,
+        model: &Model,
+        known: &Known,
+        clock: &mut StageClock,
+    ) -> Result<(Factored, Plan, String), Refusal> {
         let subject = Subject::about(model, known.dofs.len(), None);
         let factor = self.factor_request(model, &known.dofs, &subject);
         let (factored, plan) = match self.request.is_method_open() && plan.method.has_fronts() {
-            true => self.factor_planned_again(&factor, plan, &mut clock)?,
+            true => self.factor_planned_again(&factor, plan, clock)?,
             false => {
                 let methods: Vec<Method> = [plan.method].into_iter().chain(plan.instead).collect();
-                (factor.factor(&methods, &mut clock)?, plan)
+                (factor.factor(&methods, clock)?, plan)
             }
         };
         let why = because(&self.request, &plan);
         let why = because_of_memory(why, plan.method, factored.method());
-        let posed = self.posed(model, known.clone(), forces, why);
-        Ok((direct::answer(model, &factored, posed, clock)?, plan))
+        Ok((factored, plan, why))
     }
 
     /// Orders, plans again by what is counted, and factors.
@@ -133,7 +145,7 @@ impl Work<'_> {
         FactorRequest { models, reservation, model, dofs, subject, held }
     }
 
-    fn posed(
+    pub(super) fn posed(
         &self,
         model: &Model,
         known: Known,

@@ -31,4 +31,5 @@ mod run_setup;
 mod run_window;
 mod sensor_bars;
 pub mod solve;
+mod solve_cases;
 mod tell_report;

@@ -1,33 +1,31 @@
 //! `glove-client solve`: one request with a mesh, prescribed displacements and forces.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use serde::Serialize;
 use softgrasp_core::fem::Element;
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_core::mesh_io::{MeshFile, PointField, write_vtu};
+use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, ElementChoice, LargeAnswer, LargeAsk, LargeReport, Material,
-    MethodName, NodeChoice, Pace, PathChoice, Precision, Question, Reply, Request, SolveLarge,
-    SolveOnce, Want,
+    Answer, CaseAnswer, Displacements, DofValue, ElementChoice, LargeAnswer, LargeAsk, LargeReport,
+    Material, MethodName, NodeChoice, Pace, PathChoice, Precision, Question, Reply, Request,
+    SolveLarge, SolveOnce, SolveSeveral, Want,
 };
 
 use super::access_arguments::AccessArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
+use super::solve_cases::{CaseFiles, read_values};
 use crate::calculix_deck::CalculixDeck;
 use crate::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
 use crate::deformation::{Deformation, Elasticity};
 use crate::discretisation::DiscretisationEstimate;
-use crate::displacement_table::{
-    DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError, read_table, write_displacements,
-    write_reactions,
-};
+use crate::displacement_table::{DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError};
 use crate::file_writing::write_file;
 use crate::mesh_file::read_mesh_file;
 use crate::model_upload::mesh_data;
@@ -41,9 +39,10 @@ pub struct SolveCommand {
     #[arg(long, value_name = "F")]
     mesh: PathBuf,
     /// Prescribed displacements: node,ux,uy,uz; nodes from 0 in the order of the file, an empty cell
-    /// leaves that direction free.
-    #[arg(long, value_name = "K.csv")]
-    known: PathBuf,
+    /// leaves that direction free. Given several times, with as many --out: one matrix and one factor
+    /// for all of them; they prescribe the same directions of the same nodes.
+    #[arg(long, value_name = "K.csv", required = true)]
+    known: Vec<PathBuf>,
     /// External forces: node,fx,fy,fz.
     #[arg(long, value_name = "F.csv")]
     forces: Option<PathBuf>,
@@ -86,12 +85,16 @@ pub struct SolveCommand {
     #[arg(long)]
     estimate_discretisation: bool,
     /// File for the displacements: .csv or .vtu.
-    #[arg(long, value_name = "U.csv|U.vtu", value_parser = parse_out)]
-    out: PathBuf,
+    /// One for each --known, in their order.
+    #[arg(long, value_name = "U.csv|U.vtu", value_parser = parse_out, required = true)]
+    out: Vec<PathBuf>,
     /// File for the forces that hold the body: node,fx,fy,fz of every node with a known
-    /// displacement, N.
+    /// displacement, N; one for each --known, or none.
     #[arg(long, value_name = "R.csv")]
-    reactions: Option<PathBuf>,
+    reactions: Vec<PathBuf>,
+    /// Leave out what only informs: condition, estimated error, rotation and strain.
+    #[arg(long, conflicts_with = "estimate_discretisation")]
+    no_estimate: bool,
     /// File for the same question as an input deck of CalculiX (and Abaqus): t4 and t10, linear or
     /// neo-hookean. Nodes count from 1 in it.
     #[arg(long, value_name = "F.inp")]
@@ -114,6 +117,9 @@ struct Report {
     /// What the estimate is, or why there is none.
     discretisation_why: String,
     out: String,
+    /// Files of the displacements of all cases, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    outs: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -126,6 +132,16 @@ struct MeshSummary {
     degenerate_dropped: usize,
     repeated_dropped: usize,
     orphans: usize,
+}
+
+/// What the server said.
+struct Asked {
+    /// The first case's answer.
+    answer: Box<Answer>,
+    /// What is known of its large deformation, where that was asked for.
+    large: Option<LargeReport>,
+    /// The cases after the first.
+    further: Vec<CaseAnswer>,
 }
 
 fn parse_out(text: &str) -> Result<PathBuf, String> {
@@ -146,21 +162,13 @@ impl SolveCommand {
         let file = read_mesh_file(&self.mesh)?;
         let question = self.question(&file.mesh)?;
         let elasticity = self.elasticity.of_request()?;
+        self.check_cases(&elasticity)?;
+        let cases = self.cases().further(&file.mesh, &question.known)?;
         if let Some(path) = &self.export_deck {
             write_file(path, self.deck(&file.mesh, &question, &elasticity)?.as_bytes())?;
         }
         progress.now("starting");
-        if self.memory_limit.is_some() && self.server != ServerChoice::Embedded {
-            bail!(
-                "--memory-limit is for the embedded server; {} has its own, set where it is started",
-                self.server
-            );
-        }
-        let limit = self.memory_limit.map(|Bytes(bytes)| bytes);
-        let host = match self.access.to(&self.server)? {
-            Some(endpoint) => Host::at(endpoint),
-            None => Host::open_within(&self.server, self.threads, limit)?,
-        };
+        let host = self.open_host()?;
         let mut connection = host.connect()?;
         let nodes = file.mesh.node_count();
         progress.now(&match &self.server {
@@ -168,9 +176,6 @@ impl SolveCommand {
             ServerChoice::At(address) => format!("solving for {nodes} nodes at {address}"),
         });
         progress.watch(host.stage());
-        if self.estimate_discretisation && elasticity.deformation != Deformation::Linear {
-            bail!("--estimate-discretisation compares linear answers; leave out --deformation");
-        }
         let request = SolveOnce {
             mesh: mesh_data(&file.mesh),
             materials: vec![Material { young: self.young, poisson: self.poisson }],
@@ -179,7 +184,8 @@ impl SolveCommand {
         };
         let start = Instant::now();
         let large = elasticity.ask(PathChoice::FromRest, Pace::Repeatable);
-        let (mut answer, large) = ask(&mut connection, &request, large)?;
+        let Asked { mut answer, large, further } =
+            self.ask_all(&mut connection, &request, large, cases)?;
         let round_trip_ms = start.elapsed().as_secs_f64() * 1e3;
         progress.now("writing");
         let summary = SolveSummary::new(&answer.report, round_trip_ms)
@@ -188,10 +194,8 @@ impl SolveCommand {
         let displacements =
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
         let displacements = displacements.into_f64();
-        write_file(&self.out, &encode(&self.out, &file.mesh, &displacements)?)?;
-        if let Some(path) = &self.reactions {
-            write_file(path, write_reactions(&answer.reactions).as_bytes())?;
-        }
+        self.cases().write(0, &file.mesh, &displacements, &answer.reactions)?;
+        self.write_further(&file.mesh, &answer.reactions, further)?;
         let discretisation = match self.estimate_discretisation {
             true => {
                 progress.now("solving again with the other element");
@@ -213,11 +217,61 @@ impl SolveCommand {
         print(&told)
     }
 
+    /// The embedded server, or the one at an address.
+    fn open_host(&self) -> anyhow::Result<Host> {
+        if self.memory_limit.is_some() && self.server != ServerChoice::Embedded {
+            bail!(
+                "--memory-limit is for the embedded server; {} has its own, set where it is started",
+                self.server
+            );
+        }
+        let limit = self.memory_limit.map(|Bytes(bytes)| bytes);
+        Ok(match self.access.to(&self.server)? {
+            Some(endpoint) => Host::at(endpoint),
+            None => Host::open_within(&self.server, self.threads, limit)?,
+        })
+    }
+
+    /// Asks for all cases.
+    fn ask_all(
+        &self,
+        connection: &mut ServerConnection,
+        request: &SolveOnce,
+        large: Option<LargeAsk>,
+        cases: Vec<Vec<f64>>,
+    ) -> Result<Asked, LinkError> {
+        if self.is_several() {
+            let (answer, further) = ask_several(connection, request, cases, !self.no_estimate)?;
+            return Ok(Asked { answer, large: None, further });
+        }
+        let (answer, large) = ask(connection, request, large)?;
+        Ok(Asked { answer, large, further: Vec::new() })
+    }
+
+    /// Files of the cases after the first; reactions come in the order of the first's.
+    fn write_further(
+        &self,
+        mesh: &TetMesh,
+        known: &[DofValue],
+        further: Vec<CaseAnswer>,
+    ) -> anyhow::Result<()> {
+        for (k, case) in further.into_iter().enumerate() {
+            let reactions: Vec<DofValue> = known
+                .iter()
+                .zip(case.reactions)
+                .map(|(known, value)| DofValue { dof: known.dof, value })
+                .collect();
+            self.cases().write(k + 1, mesh, &case.displacements, &reactions)?;
+        }
+        Ok(())
+    }
+
     fn question(&self, mesh: &TetMesh) -> anyhow::Result<Question> {
         let node_count = mesh.node_count();
-        let known = read_values(&self.known, DISPLACEMENT_COLUMNS, node_count)?;
+        let Some(first) = self.known.first() else { bail!("--known is missing") };
+        let known = read_values(first, DISPLACEMENT_COLUMNS, node_count)?;
         if known.is_empty() {
-            bail!(TableError::Empty { name: self.known.display().to_string() });
+            bail!(TableError::Empty { name: first.display().to_string() });
         }
         let forces = match &self.forces {
             Some(path) => read_values(path, FORCE_COLUMNS, node_count)?,
@@ -229,13 +283,39 @@ impl SolveCommand {
             method: self.method.clone(),
             want: Want {
                 nodes: NodeChoice::All,
-                reactions: self.reactions.is_some(),
+                reactions: !self.reactions.is_empty(),
                 precision: Precision::F64,
             },
             max_error: self.max_error,
             deadline_ms: self.deadline,
             ..Question::default()
         })
+    }
+
+    /// Whether this is a `SolveSeveral`.
+    fn is_several(&self) -> bool {
+        self.known.len() > 1 || self.no_estimate
+    }
+
+    /// What does not go together.
+    fn check_cases(&self, elasticity: &Elasticity) -> anyhow::Result<()> {
+        self.cases().check()?;
+        if self.is_several() && elasticity.deformation != Deformation::Linear {
+            bail!(
+                "several --known and --no-estimate are for linear answers; leave out --deformation"
+            );
+        }
+        if self.estimate_discretisation && elasticity.deformation != Deformation::Linear {
+            bail!("--estimate-discretisation compares linear answers; leave out --deformation");
+        }
+        if self.known.len() > 1 && (self.estimate_discretisation || self.export_deck.is_some()) {
+            bail!("--estimate-discretisation and --export-deck are for one --known");
+        }
+        Ok(())
+    }
+
+    fn cases(&self) -> CaseFiles<'_> {
+        CaseFiles { known: &self.known, out: &self.out, reactions: &self.reactions }
     }
 
     /// The same question for another program.
@@ -293,7 +373,11 @@ impl SolveCommand {
             solve,
             discretisation_estimate_rel: discretisation.rel,
             discretisation_why: discretisation.why,
-            out: self.out.display().to_string(),
+            out: self.out.first().map(|out| out.display().to_string()).unwrap_or_default(),
+            outs: match self.out.len() {
+                1 => Vec::new(),
+                _ => self.out.iter().map(|out| out.display().to_string()).collect(),
+            },
         }
     }
 }
@@ -321,6 +405,21 @@ fn ask(
     }
 }
 
+/// The answers to all cases.
+fn ask_several(
+    connection: &mut ServerConnection,
+    request: &SolveOnce,
+    cases: Vec<Vec<f64>>,
+    estimate: bool,
+) -> Result<(Box<Answer>, Vec<CaseAnswer>), LinkError> {
+    let SolveOnce { mesh, materials, element, question } = request.clone();
+    let several = SolveSeveral { mesh, materials, element, question, cases, estimate };
+    match connection.ask(&Request::SolveSeveral(Box::new(several)))? {
+        Reply::SeveralAnswers(answers) => Ok((Box::new(answers.answer), answers.cases)),
+        other => Err(unexpected("SolveSeveral", &other)),
+    }
+}
+
 fn describe_discretisation(estimate: &DiscretisationEstimate) -> String {
     match estimate.rel {
         Some(rel) => format!(
@@ -332,30 +431,10 @@ fn describe_discretisation(estimate: &DiscretisationEstimate) -> String {
     }
 }
 
-fn read_values(
-    path: &Path,
-    columns: [&'static str; 4],
-    node_count: usize,
-) -> anyhow::Result<Vec<DofValue>> {
-    let name = path.display().to_string();
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
-    Ok(read_table(&name, &bytes, columns, node_count)?)
-}
-
-fn encode(path: &Path, mesh: &TetMesh, displacements: &[[f64; 3]]) -> anyhow::Result<Vec<u8>> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("vtu") => {
-            let field = PointField { name: "displacement", values: displacements };
-            write_vtu(mesh, &[field]).context("cannot form the VTU file")
-        }
-        _ => Ok(write_displacements(displacements).into_bytes()),
-    }
-}
-
-fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
+fn describe(file: &MeshFile, summary: &SolveSummary, outs: &[PathBuf]) -> String {
     let mut text = format!(
         "{}: {} nodes, {} tetrahedra\n{} on {}: {} unknown and {} prescribed degrees of freedom, \
-         {:.1} ms, residual {:.1e}\nlargest element rotation {:.2} degrees, strain {:.2} %\n",
+         {:.1} ms, residual {:.1e}\n",
         file.format,
         file.mesh.node_count(),
         file.mesh.tets().len(),
@@ -365,9 +444,14 @@ fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
         summary.known_dofs,
         summary.round_trip_ms,
         summary.residual_rel,
-        summary.max_rotation_deg,
-        100.0 * summary.max_strain,
     );
+    if summary.max_rotation_deg.is_finite() {
+        text.push_str(&format!(
+            "largest element rotation {:.2} degrees, strain {:.2} %\n",
+            summary.max_rotation_deg,
+            100.0 * summary.max_strain,
+        ));
+    }
     text.push_str(&describe_large(summary));
     let findings = &file.findings;
     for (count, what) in [
@@ -380,7 +464,9 @@ fn describe(file: &MeshFile, summary: &SolveSummary, out: &Path) -> String {
             text.push_str(&format!("{count} {what}\n"));
         }
     }
-    text.push_str(&format!("displacements written to {}\n", out.display()));
+    for out in outs {
+        text.push_str(&format!("displacements written to {}\n", out.display()));
+    }
     text
 }
 

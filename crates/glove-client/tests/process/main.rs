@@ -8,6 +8,7 @@
 
 mod admission;
 mod agreement;
+mod cases;
 mod commands;
 mod devices;
 mod discretisation;

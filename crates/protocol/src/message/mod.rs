@@ -14,6 +14,7 @@ mod reply;
 mod report;
 mod request;
 mod session;
+mod several;
 
 pub use answer::{Answer, Displacements};
 pub use dof_value::DofValue;
@@ -31,3 +32,4 @@ pub use reply::Reply;
 pub use report::{SolveReport, StageMs, WarningLevel};
 pub use request::Request;
 pub use session::{Hello, Welcome};
+pub use several::{CaseAnswer, SeveralAnswers, SolveSeveral};

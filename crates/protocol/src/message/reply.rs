@@ -5,6 +5,7 @@ use super::large::LargeAnswer;
 use super::model::ModelReady;
 use super::reject::Rejected;
 use super::session::Welcome;
+use super::several::SeveralAnswers;
 use crate::payload::{PayloadReader, encode_frame};
 use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 
@@ -31,6 +32,8 @@ pub enum Reply {
     },
     /// Answer to `SolveLarge` and `LargeFrame`.
     LargeAnswer(Box<LargeAnswer>),
+    /// Answer to `SolveSeveral`.
+    SeveralAnswers(Box<SeveralAnswers>),
 }
 
 impl Reply {
@@ -44,6 +47,7 @@ impl Reply {
             Self::Rejected(_) => Kind::Rejected,
             Self::Pong { .. } => Kind::Pong,
             Self::LargeAnswer(_) => Kind::LargeAnswer,
+            Self::SeveralAnswers(_) => Kind::SeveralAnswers,
         }
     }
 
@@ -66,6 +70,7 @@ impl Reply {
             Self::Rejected(rejected) => writer.part(rejected),
             Self::Pong { nonce } => writer.part(nonce),
             Self::LargeAnswer(answer) => answer.write(writer),
+            Self::SeveralAnswers(answers) => answers.write(writer),
         })
     }
 
@@ -94,6 +99,9 @@ impl Reply {
             Kind::LargeAnswer => {
                 Self::LargeAnswer(Box::new(LargeAnswer::read(&mut reader, limits)?))
             }
+            Kind::SeveralAnswers => {
+                Self::SeveralAnswers(Box::new(SeveralAnswers::read(&mut reader, limits)?))
+            }
             Kind::Hello
             | Kind::SolveOnce
             | Kind::HaveModel
@@ -103,7 +111,8 @@ impl Reply {
             | Kind::Drop
             | Kind::Ping
             | Kind::SolveLarge
-            | Kind::LargeFrame => return Err(DecodeError::WrongDirection { kind }),
+            | Kind::LargeFrame
+            | Kind::SolveSeveral => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;
         Ok(reply)

@@ -4,6 +4,7 @@ use super::large::{LargeFrame, SolveLarge};
 use super::model::{FrameRequest, ModelHash, Prefetch, UploadModel};
 use super::question::SolveOnce;
 use super::session::Hello;
+use super::several::SolveSeveral;
 use crate::payload::{PayloadReader, encode_frame};
 use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 
@@ -33,6 +34,8 @@ pub enum Request {
     SolveLarge(Box<SolveLarge>),
     /// Large deformation of a kept model; answered by `LargeAnswer`.
     LargeFrame(Box<LargeFrame>),
+    /// One self-contained solve for several sets of displacements; answered by `SeveralAnswers`.
+    SolveSeveral(Box<SolveSeveral>),
 }
 
 impl Request {
@@ -49,6 +52,7 @@ impl Request {
             Self::Ping { .. } => Kind::Ping,
             Self::SolveLarge(_) => Kind::SolveLarge,
             Self::LargeFrame(_) => Kind::LargeFrame,
+            Self::SolveSeveral(_) => Kind::SolveSeveral,
         }
     }
 
@@ -75,6 +79,7 @@ impl Request {
             Self::Ping { nonce } => writer.part(nonce),
             Self::SolveLarge(solve) => solve.write(writer),
             Self::LargeFrame(frame) => frame.write(writer),
+            Self::SolveSeveral(solve) => solve.write(writer),
         })
     }
 
@@ -100,13 +105,17 @@ impl Request {
             Kind::Ping => Self::Ping { nonce: reader.part()? },
             Kind::SolveLarge => Self::SolveLarge(Box::new(SolveLarge::read(&mut reader, limits)?)),
             Kind::LargeFrame => Self::LargeFrame(Box::new(LargeFrame::read(&mut reader, limits)?)),
+            Kind::SolveSeveral => {
+                Self::SolveSeveral(Box::new(SolveSeveral::read(&mut reader, limits)?))
+            }
             Kind::Welcome
             | Kind::Answer
             | Kind::ModelState
             | Kind::ModelReady
             | Kind::Rejected
             | Kind::Pong
-            | Kind::LargeAnswer => return Err(DecodeError::WrongDirection { kind }),
+            | Kind::LargeAnswer
+            | Kind::SeveralAnswers => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;
         Ok(request)

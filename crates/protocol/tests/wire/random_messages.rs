@@ -41,6 +41,23 @@ fn any_request() -> impl Strategy<Value = Request> {
         (model(), question()).prop_map(|(model, question)| FrameRequest { model, question });
     let prefetch = (model(), vec(any::<u32>(), 0..9), masks())
         .prop_map(|(model, nodes, masks)| Request::Prefetch(Prefetch { model, nodes, masks }));
+    let solve_several = (mesh(), materials(), element_choice(), question(), 0..4_usize).prop_map(
+        |(mesh, materials, element, question, count)| {
+            let count = if question.known.is_empty() { 0 } else { count };
+            let cases = (0..count)
+                .map(|case| {
+                    question
+                        .known
+                        .iter()
+                        .map(|k| if case % 2 == 0 { k.value } else { -k.value })
+                        .collect()
+                })
+                .collect();
+            let estimate = count % 2 == 0;
+            let several = SolveSeveral { mesh, materials, element, question, cases, estimate };
+            Request::SolveSeveral(Box::new(several))
+        },
+    );
     prop_oneof![
         hello.prop_map(Request::Hello),
         solve.prop_map(Request::SolveOnce),
@@ -52,6 +69,7 @@ fn any_request() -> impl Strategy<Value = Request> {
         any::<u64>().prop_map(|nonce| Request::Ping { nonce }),
         solve_large.prop_map(Request::SolveLarge),
         large_frame,
+        solve_several,
     ]
 }
 
@@ -82,6 +100,16 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         (code, text(), text()).prop_map(|(code, text, detail)| Rejected { code, text, detail });
     let large_answer = (answer(), large_report())
         .prop_map(|(answer, large)| Reply::LargeAnswer(Box::new(LargeAnswer { answer, large })));
+    let several = (answer(), 0..4_usize).prop_map(|(answer, count)| {
+        let (nodes, reactions) = (answer.displacements.node_count(), answer.reactions.len());
+        let case = |k: usize| CaseAnswer {
+            displacements: vec![[k as f64, -0.5, 0.0]; nodes],
+            reactions: vec![0.25 * k as f64; reactions],
+        };
+        let count = if nodes + reactions == 0 { 0 } else { count };
+        let cases = (0..count).map(case).collect();
+        Reply::SeveralAnswers(Box::new(SeveralAnswers { answer, cases }))
+    });
     prop_oneof![
         welcome.prop_map(Reply::Welcome),
         answer().prop_map(|answer| Reply::Answer(Box::new(answer))),
@@ -90,6 +118,7 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         rejected.prop_map(Reply::Rejected),
         any::<u64>().prop_map(|nonce| Reply::Pong { nonce }),
         large_answer,
+        several,
     ]
 }
 

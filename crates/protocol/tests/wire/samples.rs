@@ -109,7 +109,7 @@ fn requests() -> Vec<Message> {
 }
 
 /// The same for large deformation, with forces and without masks.
-fn large_requests(mesh: &MeshData, materials: &[Material], question: &Question) -> [Request; 2] {
+fn large_requests(mesh: &MeshData, materials: &[Material], question: &Question) -> [Request; 3] {
     let question =
         Question { mask_displacements: vec![], masks: Masks::default(), ..question.clone() };
     let large = LargeAsk {
@@ -126,9 +126,20 @@ fn large_requests(mesh: &MeshData, materials: &[Material], question: &Question) 
         large: LargeAsk::default(),
         question: Question { want: Want::default(), ..question.clone() },
     };
+    let several = SolveSeveral {
+        mesh: mesh.clone(),
+        materials: materials.to_vec(),
+        element: ElementChoice::T4,
+        question: solve.question.clone(),
+        cases: [2.0, -1.0]
+            .map(|factor| question.known.iter().map(|known| factor * known.value).collect())
+            .to_vec(),
+        estimate: false,
+    };
     [
         Request::SolveLarge(Box::new(solve)),
         Request::LargeFrame(Box::new(LargeFrame { model: hash(), large, question })),
+        Request::SolveSeveral(Box::new(several)),
     ]
 }
 
@@ -163,6 +174,13 @@ fn replies() -> Vec<Message> {
         reactions: vec![DofValue { dof: 2, value: -1.25 }],
         mask_forces: vec![[0.0, -0.75, 0.125], [0.5, 0.0, 0.0]],
     };
+    let first = Answer {
+        displacements: Displacements::F64(vec![[0.5, 0.0, 0.0]; 3]),
+        mask_forces: vec![],
+        ..answer.clone()
+    };
+    let case = CaseAnswer { displacements: vec![[1.0, -2.0, 0.25]; 3], reactions: vec![4.5] };
+    let several = SeveralAnswers { answer: first, cases: vec![case] };
     let ready =
         ModelReady { model: hash(), unknown_dofs: 9, fixed_dofs: 3, reused: false, stage_ms };
     let welcome = Welcome {
@@ -184,6 +202,7 @@ fn replies() -> Vec<Message> {
         Message::Reply(5, Reply::Rejected(rejected)),
         Message::Reply(8, Reply::Pong { nonce: 0x0123_4567_89ab_cdef }),
         Message::Reply(10, Reply::LargeAnswer(Box::new(large_answer()))),
+        Message::Reply(11, Reply::SeveralAnswers(Box::new(several))),
     ]
 }
 

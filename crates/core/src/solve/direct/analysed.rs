@@ -37,10 +37,7 @@ impl Analysed {
 
     /// Bytes held at most while the factor of a method over fronts is made, the factor included.
     pub fn peak_bytes(&self, method: Method) -> u64 {
-        (match method.is_single() {
-            false => self.analysis.peak_bytes::<f64>(),
-            true => self.analysis.peak_bytes::<f32>(),
-        }) as u64
+        self.analysis.peak_bytes_of(method) as u64
     }
 
     /// The partition that was analysed.

@@ -46,7 +46,47 @@ impl Kernel {
                 factor.solve_in_place(&mut b, columns);
                 b
             }
+            Self::FrontSingle(factor) if n > 0 => {
+                let scales: Vec<f64> = b.chunks(n).map(|b| safe_scale(norm(b))).collect();
+                let scale = |b: &mut [f64], by: &dyn Fn(f64) -> f64| {
+                    for (b, s) in b.chunks_mut(n).zip(&scales) {
+                        b.iter_mut().for_each(|b| *b *= by(*s));
+                    }
+                };
+                scale(&mut b, &|s| 1.0 / s);
+                factor.solve_in_place(&mut b, columns);
+                scale(&mut b, &|s| s);
+                b
+            }
             _ => b.chunks(n.max(1)).flat_map(|b| self.apply(b.to_vec())).collect(),
+        }
+    }
+
+    /// Whether [`Kernel::apply_to_rows`] is there.
+    pub fn takes_rows(&self) -> bool {
+        matches!(self, Self::Front(_) | Self::FrontSingle(_))
+    }
+
+    /// `K11⁻¹ B` in place with the numbers of one row next to each other; B as it is for a kernel
+    /// that is no factor over fronts.
+    ///
+    /// Shapes: `b` n × `columns` row-major.
+    pub fn apply_to_rows(&self, b: &mut [f64], columns: usize) {
+        match self {
+            Self::Front(factor) => factor.solve_rows_in_place(b, columns),
+            Self::FrontSingle(factor) => {
+                // Scaled as in `apply`.
+                let scales: Vec<f64> = norms(b, columns).iter().map(|s| safe_scale(*s)).collect();
+                let scale = |b: &mut [f64], by: &dyn Fn(f64) -> f64| {
+                    for row in b.chunks_exact_mut(columns) {
+                        row.iter_mut().zip(&scales).for_each(|(b, s)| *b *= by(*s));
+                    }
+                };
+                scale(b, &|s| 1.0 / s);
+                factor.solve_rows_in_place(b, columns);
+                scale(b, &|s| s);
+            }
+            _ => {}
         }
     }
 
@@ -79,4 +119,16 @@ impl Kernel {
             }
         }
     }
+}
+
+/// A scale that can be divided by.
+fn safe_scale(norm: f64) -> f64 {
+    if norm > 0.0 && norm.is_finite() { norm } else { 1.0 }
+}
+
+/// Euclidean norms of the columns of numbers that stand row by row.
+pub(super) fn norms(rows: &[f64], columns: usize) -> Vec<f64> {
+    (0..columns)
+        .map(|j| norm(&rows.iter().skip(j).step_by(columns).copied().collect::<Vec<f64>>()))
+        .collect()
 }

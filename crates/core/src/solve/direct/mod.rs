@@ -6,6 +6,7 @@ mod factored;
 mod fallback;
 mod kernel;
 mod refinement;
+mod several;
 mod solution;
 #[cfg(test)]
 mod tests;

@@ -47,9 +47,9 @@ pub struct Solution {
 }
 
 /// Refinement and conjugate gradients stop at this relative residual.
-const RESIDUAL_GOOD: f64 = 1e-13;
+pub(super) const RESIDUAL_GOOD: f64 = 1e-13;
 /// Refinement stops at this backward error; one step more would only move the last bits.
-const BACKWARD_ERROR_GOOD: f64 = 1e-13;
+pub(super) const BACKWARD_ERROR_GOOD: f64 = 1e-13;
 /// Refinement stops a little short of its goal where rounding does; that far short is as good.
 const SHORT_OF_GOAL: f64 = 10.0;
 /// Conjugate gradients stop after this many steps in any case.
@@ -178,7 +178,7 @@ impl Factored {
 impl Solution {
     /// How certain an answer of a factor is; where the method stopped early, its own estimate counts
     /// beside rounding.
-    fn certainty(&self, factored: &Factored, stiffness: &Stiffness) -> Certainty {
+    pub(super) fn certainty(&self, factored: &Factored, stiffness: &Stiffness) -> Certainty {
         match self.error_estimate_rel {
             None => factored.certainty(stiffness, self.backward_error),
             Some(stopped_at) => {
@@ -193,7 +193,7 @@ impl Solution {
 }
 
 /// Whether loads fit a partition.
-fn check(partition: &Partition, loads: Loads<'_>) -> Result<(), SolveError> {
+pub(super) fn check(partition: &Partition, loads: Loads<'_>) -> Result<(), SolveError> {
     let expected = partition.known().len();
     if loads.q_known.len() != expected {
         let given = loads.q_known.len();

@@ -273,3 +273,67 @@ fn pivot_lost_in_rounding_is_not_called_a_free_motion() {
         assert!(text.contains(precision), "{text}");
     }
 }
+
+#[test]
+fn several_loads_together_equal_each_of_them_alone() {
+    let mesh = irregular_cube(6);
+    let stiffness = stiffness_of(&mesh, 0.4);
+    let known = five_contacts(&mesh);
+    let dofs: Vec<u32> = known.iter().map(|k| k.0).collect();
+    let displacements: Vec<Vec<f64>> = (0..27)
+        .map(|case| known.iter().map(|(_, u)| u * (1.0 + f64::from(case)).cos()).collect())
+        .collect();
+    let mut pushed = vec![0.0; 3 * mesh.node_count()];
+    pushed[3 * 100] = 5.0;
+    assert!(!dofs.contains(&300));
+    for method in [Method::Front, Method::FrontMixed, Method::SparseCholesky, Method::Pcg] {
+        let partition = Partition::try_new(&mesh.used_nodes(), &dofs).unwrap();
+        let factored = Factored::try_new(&stiffness, partition, method, &mut |_| {}).unwrap();
+        // One of them is zero and one is pushed besides.
+        let loads: Vec<Loads<'_>> = displacements
+            .iter()
+            .enumerate()
+            .map(|(case, q_known)| match case {
+                3 => Loads { q_known, forces: &pushed, residual_rel: 0.0 },
+                _ => Loads { q_known, ..Loads::default() },
+            })
+            .collect();
+        let together = factored.solve_several(&stiffness, &loads, &mut |_| {}).unwrap();
+        assert_eq!(together.len(), loads.len());
+        for (together, loads) in together.iter().zip(&loads) {
+            let alone = factored.solve(&stiffness, *loads, &mut |_| {}).unwrap();
+            let agree = |a: &[f64], b: &[f64]| {
+                let largest = b.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-12 * largest)
+            };
+            assert!(agree(&together.displacement, &alone.displacement), "{method:?}");
+            assert!(agree(&together.reaction, &alone.reaction), "{method:?}");
+            assert!(together.residual_rel < 1e-13 && together.backward_error < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn several_loads_say_what_is_wrong_with_one_of_them() {
+    let mesh = irregular_cube(4);
+    let stiffness = stiffness_of(&mesh, 0.3);
+    let known = five_contacts(&mesh);
+    let dofs: Vec<u32> = known.iter().map(|k| k.0).collect();
+    let partition = Partition::try_new(&mesh.used_nodes(), &dofs).unwrap();
+    let factored = Factored::try_new(&stiffness, partition, Method::Front, &mut |_| {}).unwrap();
+    let good: Vec<f64> = known.iter().map(|k| k.1).collect();
+    let mut bad = good.clone();
+    bad[2] = f64::NAN;
+    let solve = |some: &[&[f64]]| {
+        let loads: Vec<Loads<'_>> =
+            some.iter().map(|q_known| Loads { q_known, ..Loads::default() }).collect();
+        factored.solve_several(&stiffness, &loads, &mut |_| {})
+    };
+    assert!(matches!(solve(&[&good, &bad]), Err(SolveError::NotFinite { .. })));
+    assert!(matches!(solve(&[&good, &good[1..]]), Err(SolveError::LoadCount { .. })));
+    assert_eq!(solve(&[]).unwrap(), vec![]);
+    // Zeros are an answer.
+    let zeros = vec![0.0; good.len()];
+    let solutions = solve(&[&zeros, &good]).unwrap();
+    assert!(solutions[0].displacement.iter().all(|q| *q == 0.0));
+}

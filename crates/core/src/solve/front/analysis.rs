@@ -1,11 +1,14 @@
 //! Everything about a factor that depends on the pattern of `K11` only: fronts, where entries and
 //! contributions go, work and memory.
 
+use super::Real;
 use super::etree::{EliminationTree, NONE, inverse};
+use super::runs;
+use super::slabs::Slabs;
 use super::supernodes::{Supernodes, flops};
 use crate::fem::{AXES, Stiffness, dof};
-use crate::solve::Partition;
 use crate::solve::ordering::NodeGraph;
+use crate::solve::{Method, Partition};
 
 /// Marks a stiffness block whose entries go to no panel: known, or stored by symmetry.
 const NOWHERE: u32 = u32::MAX;
@@ -35,8 +38,8 @@ pub struct FrontAnalysis {
 
 /// One dense front: `pivots` rows eliminated here and the rows they couple to.
 ///
-/// Shapes: panel `size` × `pivots` column-major, lower triangle of its top; contribution block
-/// (`size` − `pivots`)², lower triangle, added to the parent's front.
+/// Shapes: panel `size` × `pivots`, lower triangle of its top; contribution block
+/// (`size` − `pivots`)², lower triangle, added to the parent's front; both in slabs ([`Slabs`]).
 #[derive(Default)]
 pub(super) struct Front {
     /// First eliminated row, in the elimination order.
@@ -52,12 +55,8 @@ pub(super) struct Front {
     pub subtree_first: u32,
     /// Work of the subtree.
     pub subtree_flops: f64,
-    /// Entries of the subtree's panels.
+    /// Entries of the subtree's panels, without the zeros that slabs are filled up with.
     pub subtree_entries: usize,
-    /// Where the contribution block lies in the arena of its serial subtree.
-    pub in_arena: usize,
-    /// At the root of a serial subtree: entries its arena must hold.
-    pub arena: usize,
     /// Vertices eliminated here, as a range of [`Entries`].
     pub vertices: std::ops::Range<u32>,
 }
@@ -108,9 +107,14 @@ impl Front {
         self.size - self.pivots
     }
 
-    /// Entries of the panel.
-    pub fn panel_len(&self) -> usize {
-        self.size * self.pivots
+    /// How it lies in memory.
+    pub fn slabs<T: Real>(&self) -> Slabs {
+        Slabs::new::<T>(self.pivots, self.rest())
+    }
+
+    /// Entries of the factor, explicit zeros of merged fronts included.
+    fn entries(&self) -> usize {
+        self.size * self.pivots - self.pivots * (self.pivots.max(1) - 1) / 2
     }
 
     /// Whether the subtree is one task.
@@ -137,7 +141,8 @@ impl FrontAnalysis {
         order: Vec<u32>,
     ) -> Self {
         let tree = EliminationTree::new(graph, order);
-        let supernodes = Supernodes::new(graph, &tree);
+        let mut supernodes = Supernodes::new(graph, &tree);
+        supernodes.permute(&runs::places(&supernodes));
         let mut axes = Vec::with_capacity(graph.len());
         let mut first_row = Vec::with_capacity(graph.len() + 1);
         let mut order = Vec::with_capacity(partition.unknown().len());
@@ -169,7 +174,6 @@ impl FrontAnalysis {
         };
         this.link(&supernodes);
         this.place_rows(stiffness, &supernodes, &first_row);
-        this.place_arenas();
         this
     }
 
@@ -180,7 +184,7 @@ impl FrontAnalysis {
             let front = &mut self.fronts[v];
             front.parent = parent;
             front.subtree_flops += flops(front.pivots as f64, front.size as f64);
-            front.subtree_entries += front.panel_len();
+            front.subtree_entries += front.entries();
             let (work, entries) = (front.subtree_flops, front.subtree_entries);
             let first = front.subtree_first;
             match self.fronts.get_mut(parent as usize) {
@@ -231,46 +235,6 @@ impl FrontAnalysis {
         }
     }
 
-    /// Lays the contribution blocks of each serial subtree out in one arena with two stacks: even
-    /// depths from the left, odd ones from the right. A front pushes on one stack while its
-    /// children's blocks lie on top of the other.
-    fn place_arenas(&mut self) {
-        let heads: Vec<usize> = (0..self.fronts.len())
-            .filter(|&v| {
-                let parent = self.fronts.get(self.fronts[v].parent as usize);
-                self.fronts[v].is_serial() && !parent.is_some_and(Front::is_serial)
-            })
-            .collect();
-        for head in heads {
-            let first = self.fronts[head].subtree_first as usize;
-            let mut odd = vec![false; head - first + 1];
-            for v in (first..head).rev() {
-                odd[v - first] = !odd[self.fronts[v].parent as usize - first];
-            }
-            let (mut tops, mut most) = ([0, 0], 0);
-            for v in first..=head {
-                let side = usize::from(odd[v - first]);
-                // The left stack grows from the start, the right one towards smaller offsets.
-                self.fronts[v].in_arena = tops[0];
-                tops[side] += self.fronts[v].rest().pow(2);
-                if side == 1 {
-                    self.fronts[v].in_arena = tops[1];
-                }
-                most = most.max(tops[0] + tops[1]);
-                let children = &self.fronts[v].children;
-                let popped: usize =
-                    children.iter().map(|&c| self.fronts[c as usize].rest().pow(2)).sum();
-                tops[1 - side] -= popped;
-            }
-            for v in first..=head {
-                if odd[v - first] {
-                    self.fronts[v].in_arena = most - self.fronts[v].in_arena;
-                }
-            }
-            self.fronts[head].arena = most;
-        }
-    }
-
     /// Number of rows of `K11`.
     pub fn row_count(&self) -> usize {
         self.order.len()
@@ -284,7 +248,7 @@ impl FrontAnalysis {
 
     /// Entries of the factor, explicit zeros of merged fronts included.
     pub fn fill(&self) -> usize {
-        self.fronts.iter().map(|f| f.panel_len() - f.pivots * (f.pivots.max(1) - 1) / 2).sum()
+        self.fronts.iter().map(Front::entries).sum()
     }
 
     /// Floating point operations of a factorisation.
@@ -297,34 +261,61 @@ impl FrontAnalysis {
         self.fronts.len()
     }
 
-    /// Numbers a factor stores: each panel is a full rectangle.
-    pub(super) fn stored(&self) -> usize {
-        self.fronts.iter().map(Front::panel_len).sum()
+    /// Bytes of a factor in this precision, with the zeros that fill up slabs.
+    pub fn factor_bytes<T: Real>(&self) -> usize {
+        self.fronts.iter().map(|f| f.slabs::<T>().panel_len()).sum::<usize>() * size_of::<T>()
     }
 
-    /// Bytes of a factor in numbers of `size_of::<T>()` bytes.
-    pub fn factor_bytes<T>(&self) -> usize {
-        self.stored() * size_of::<T>()
+    /// Numbers of the contribution blocks that can be there at once, on any number of threads.
+    pub(super) fn blocks_max<T: Real>(&self) -> usize {
+        self.most::<T>(|_| 0)
     }
 
-    /// Upper bound of the bytes held while factoring, on any number of threads: panels and
-    /// contribution blocks that can be there at once. Panels are allocated as their fronts are come
-    /// to, so what waits deep in the tree waits before the panels above are there.
-    pub fn peak_bytes<T>(&self) -> usize {
+    /// Numbers that can be there at once while a factor is made, on any number of threads: panels and
+    /// contribution blocks. Panels are allocated as their fronts are come to, so what waits deep in
+    /// the tree waits before the panels above are there.
+    pub(super) fn peak<T: Real>(&self) -> usize {
+        self.most::<T>(|front| front.slabs::<T>().panel_len())
+    }
+
+    /// Most numbers at once, where a front keeps some and its block goes with its parent.
+    fn most<T: Real>(&self, kept_by: impl Fn(&Front) -> usize) -> usize {
+        let block = |v: usize| self.fronts[v].slabs::<T>().block_len();
         let mut most = vec![0usize; self.fronts.len()];
+        let mut kept: Vec<usize> = self.fronts.iter().map(kept_by).collect();
         for (v, front) in self.fronts.iter().enumerate() {
-            most[v] = if front.is_serial() {
-                front.subtree_entries + front.arena
-            } else {
-                // All children at their most at once; or all done, and this front beside them.
-                let below: usize = front.children.iter().map(|&c| most[c as usize]).sum();
-                let blocks: usize =
-                    front.children.iter().map(|&c| self.fronts[c as usize].rest().pow(2)).sum();
-                below.max(front.subtree_entries + blocks + front.rest().pow(2))
+            let children = || front.children.iter().map(|&c| c as usize);
+            let below = match front.is_serial() {
+                // One after another: what those before keep and hand on waits.
+                true => {
+                    let mut waiting = 0;
+                    let mut below = 0;
+                    for c in children() {
+                        below = below.max(waiting + most[c]);
+                        waiting += kept[c] + block(c);
+                    }
+                    below
+                }
+                // All children at their most at once.
+                false => children().map(|c| most[c]).sum(),
             };
+            kept[v] += children().map(|c| kept[c]).sum::<usize>();
+            most[v] = below.max(kept[v] + children().map(block).sum::<usize>() + block(v));
         }
-        let most: usize = self.roots.iter().map(|&v| most[v as usize]).sum();
-        most * size_of::<T>()
+        self.roots.iter().map(|&v| most[v as usize]).sum()
+    }
+
+    /// Upper bound of the bytes held while factoring, on any number of threads.
+    pub fn peak_bytes<T: Real>(&self) -> usize {
+        self.peak::<T>() * size_of::<T>()
+    }
+
+    /// The same in the precision of a method.
+    pub fn peak_bytes_of(&self, method: Method) -> usize {
+        match method.is_single() {
+            false => self.peak_bytes::<f64>(),
+            true => self.peak_bytes::<f32>(),
+        }
     }
 }
 

@@ -1,92 +1,174 @@
-//! Filling a front: entries of the stiffness, then the children's contributions in their order.
+//! Filling a front: the children's contributions in their order, then entries of the stiffness.
 
 use std::ops::Range;
 
+use pulp::{Simd, WithSimd};
+
 use super::Real;
 use super::analysis::{Entries, Front, Run};
+use super::slabs::Slabs;
 use crate::fem::{AXES, Stiffness};
 
 /// A child's contribution block on its way into the parent's front.
-///
-/// Shapes: `values` rest × rest column-major, lower triangle.
 pub(super) struct Contribution<'a, T> {
-    pub runs: &'a [Run],
-    pub values: &'a [T],
-    pub rest: usize,
+    values: &'a [T],
+    pieces: Vec<Piece>,
+    /// Pieces whose rows are pivots of the parent come first; this many.
+    to_pivots: usize,
+}
+
+/// Rows that lie in one slab of the child and in one of the parent.
+struct Piece {
+    child: usize,
+    parent: usize,
+    len: usize,
+}
+
+impl<'a, T: Real> Contribution<'a, T> {
+    /// Shapes: `values` the child's block; `parent` the shape of the front it goes into.
+    pub fn new(values: &'a [T], runs: &[Run], parent: Slabs) -> Self {
+        let height = parent.height;
+        let mut pieces = Vec::with_capacity(2 * runs.len());
+        for run in runs {
+            let mut done = 0;
+            while done < run.len as usize {
+                let (child, row) = (run.child as usize + done, run.parent as usize + done);
+                let len = (run.len as usize - done)
+                    .min(height - child % height)
+                    .min(height - parent.padded(row) % height);
+                pieces.push(Piece { child, parent: row, len });
+                done += len;
+            }
+        }
+        let to_pivots = pieces.partition_point(|piece| piece.parent < parent.pivots);
+        Self { values, pieces, to_pivots }
+    }
+}
+
+/// Adds all children's contributions to some slabs of a panel, in the children's order.
+pub(super) struct AddToPanel<'a, 'b, T> {
+    pub panel: &'a mut [T],
+    pub range: Range<usize>,
+    pub slabs: Slabs,
+    pub children: &'a [Contribution<'b, T>],
+}
+
+impl<T: Real> WithSimd for AddToPanel<'_, '_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { panel, range, slabs, children } = self;
+        let (start, height) = (slabs.start(range.start), slabs.height);
+        for child in children {
+            let slab_of = |piece: &Piece| slabs.padded(piece.parent) / height;
+            let rows = child.pieces.partition_point(|piece| slab_of(piece) < range.start)
+                ..child.pieces.partition_point(|piece| slab_of(piece) < range.end);
+            for k in rows {
+                let row = &child.pieces[k];
+                let into = &mut panel[slabs.panel_row(row.parent) - start..];
+                let columns = &child.pieces[..child.to_pivots.min(k + 1)];
+                add_row(simd, into, child.values, row, columns, 0, height);
+            }
+        }
+    }
+}
+
+/// Adds all children's contributions to a square of the contribution block, in their order.
+///
+/// Shapes: `rows` the square's part of each slab, the first one slab `row`; its first column is that
+/// of slab `column`.
+#[inline(always)]
+pub(super) fn add_to_tile<S: Simd, T: Real>(
+    simd: S,
+    rows: &mut [&mut [T]],
+    (row, column): (usize, usize),
+    slabs: Slabs,
+    children: &[Contribution<'_, T>],
+) {
+    let height = slabs.height;
+    for child in children {
+        let pieces = &child.pieces[child.to_pivots..];
+        let slab_of = |piece: &Piece| (piece.parent - slabs.pivots) / height;
+        let before = |slab: usize| pieces.partition_point(|piece| slab_of(piece) < slab);
+        let columns = before(column)..before(column + TILE_SLABS);
+        for k in before(row)..before(row + rows.len()) {
+            let piece = &pieces[k];
+            let into = &mut rows[slab_of(piece) - row][(piece.parent - slabs.pivots) % height..];
+            let columns = &pieces[columns.start..columns.end.min(k + 1)];
+            let first = slabs.pivots + column * height;
+            add_row(simd, into, child.values, piece, columns, first, height);
+        }
+    }
+}
+
+/// Slabs of a square of the contribution block.
+pub(super) const TILE_SLABS: usize = 8;
+
+/// Adds the rows of one piece, the columns of those before it and its own lower triangle.
+///
+/// Shapes: `into` begins with the piece's first row, its columns follow every `height`; the first
+/// column there is the parent's row `first`.
+#[inline(always)]
+fn add_row<S: Simd, T: Real>(
+    simd: S,
+    into: &mut [T],
+    values: &[T],
+    row: &Piece,
+    columns: &[Piece],
+    first: usize,
+    height: usize,
+) {
+    let slab = row.child / height;
+    let values = &values[slab * (slab + 1) / 2 * height * height + row.child % height..];
+    for column in columns {
+        let is_own = column.child == row.child;
+        for j in 0..column.len {
+            let top = if is_own { j } else { 0 };
+            let from = &values[(column.child + j) * height..][top..row.len];
+            let into = &mut into[(column.parent - first + j) * height..][top..row.len];
+            T::add_onto(simd, into, from);
+        }
+    }
 }
 
 /// All axes of a node unknown.
 const ALL_AXES: u8 = 0b111;
 
-/// Writes the stiffness entries of a front's pivots into its zeroed panel.
+/// Adds the stiffness entries of a front's pivots to its panel.
 ///
 /// Source: thesis (3.41): `K11` is what is left of the stiffness.
 pub(super) fn add_entries<T: Real>(
     panel: &mut [T],
     front: &Front,
+    slabs: Slabs,
     entries: &Entries,
     stiffness: &Stiffness,
 ) {
+    let unknown = |mask: u8| (0..AXES).filter(move |&a| mask & (1 << a) != 0);
     let mut column = 0;
     for vertex in front.vertices.start as usize..front.vertices.end as usize {
         let axes = entries.axes[vertex];
         for (row, row_axes, block) in entries.of(vertex, stiffness) {
             // Block (vertex, other), row-major; the panel holds its transpose.
-            if axes == ALL_AXES && row_axes == ALL_AXES {
+            let at = slabs.panel_row(row);
+            let is_whole = axes == ALL_AXES && row_axes == ALL_AXES;
+            if is_whole && row > column && slabs.panel_row(row + AXES - 1) == at + AXES - 1 {
                 for c in 0..AXES {
-                    let at = (column + c) * front.size + row;
-                    for (a, slot) in panel[at..at + AXES].iter_mut().enumerate() {
-                        *slot = T::from_f64(block[AXES * c + a]);
+                    let into = &mut panel[at + (column + c) * slabs.height..][..AXES];
+                    for (a, slot) in into.iter_mut().enumerate() {
+                        *slot += T::from_f64(block[AXES * c + a]);
                     }
                 }
                 continue;
             }
-            let unknown = |mask: u8| (0..AXES).filter(move |&a| mask & (1 << a) != 0);
-            for (j, c) in unknown(axes).enumerate() {
-                for (i, a) in unknown(row_axes).enumerate() {
-                    panel[(column + j) * front.size + row + i] = T::from_f64(block[AXES * c + a]);
+            for (i, a) in unknown(row_axes).enumerate() {
+                let at = slabs.panel_row(row + i);
+                for (j, c) in unknown(axes).enumerate().filter(|&(j, _)| column + j <= row + i) {
+                    panel[at + (column + j) * slabs.height] += T::from_f64(block[AXES * c + a]);
                 }
             }
         }
         column += axes.count_ones() as usize;
-    }
-}
-
-/// Adds a child's contribution to some columns of the parent's front.
-///
-/// Shapes: `into` holds the parent's columns `columns`, each with its rows `first_row .. size`.
-pub(super) fn extend_add<T: Real>(
-    into: &mut [T],
-    columns: Range<usize>,
-    first_row: usize,
-    size: usize,
-    child: &Contribution<'_, T>,
-) {
-    let height = size - first_row;
-    for (position, run) in child.runs.iter().enumerate() {
-        let (parent, len) = (run.parent as usize, run.len as usize);
-        let from = columns.start.clamp(parent, parent + len) - parent;
-        let to = columns.end.clamp(parent, parent + len) - parent;
-        for j in from..to {
-            let source_column = run.child as usize + j;
-            let source = &child.values[source_column * child.rest..][..child.rest];
-            let into = &mut into[(parent + j - columns.start) * height..][..height];
-            add_slice(
-                &mut into[parent + j - first_row..parent + len - first_row],
-                &source[source_column..run.child as usize + len],
-            );
-            for below in &child.runs[position + 1..] {
-                let (row, len) = (below.parent as usize - first_row, below.len as usize);
-                let source = &source[below.child as usize..][..len];
-                add_slice(&mut into[row..][..len], source);
-            }
-        }
-    }
-}
-
-#[inline]
-fn add_slice<T: Real>(into: &mut [T], values: &[T]) {
-    for (slot, &value) in into.iter_mut().zip(values) {
-        *slot += value;
     }
 }

@@ -2,24 +2,25 @@
 
 use std::sync::Arc;
 
+use pulp::Arch;
 use rayon::prelude::*;
 
 use super::Real;
 use super::analysis::{Front, FrontAnalysis};
-use super::assembly::{Contribution, add_entries, extend_add};
-use super::dense::{Tasks, factor_panel, form_contribution};
+use super::assembly::{AddToPanel, Contribution, add_entries};
+use super::blocks::Blocks;
+use super::dense::{TASK_SLABS, Tasks, factor_panel, form_contribution};
+use super::lines::Lines;
+use super::slabs::Slabs;
 use crate::fem::Stiffness;
-
-/// Columns of a parallel front that one task fills.
-const FILLED_COLUMNS: usize = 64;
 
 /// Cholesky factor of `K11` as one dense panel per front.
 ///
 /// Source: thesis (3.43a) asks for `K11⁻¹`; this stands for it.
 pub struct FrontFactor<T> {
     pub(super) analysis: Arc<FrontAnalysis>,
-    /// Panel of each front, size × pivots column-major.
-    pub(super) panels: Vec<Vec<T>>,
+    /// Panel of each front, in slabs; empty before the first factor.
+    pub(super) panels: Vec<Lines<T>>,
 }
 
 /// Why there is no factor.
@@ -52,7 +53,7 @@ impl<T: Real> FrontFactor<T> {
         analysis: &Arc<FrontAnalysis>,
         stiffness: &Stiffness,
     ) -> Result<Self, FrontError> {
-        let panels = analysis.fronts.iter().map(|_| Vec::new()).collect();
+        let panels = analysis.fronts.iter().map(|_| Lines::default()).collect();
         let mut factor = Self { analysis: Arc::clone(analysis), panels };
         factor.refactor(stiffness)?;
         Ok(factor)
@@ -66,14 +67,20 @@ impl<T: Real> FrontFactor<T> {
         if !self.analysis.fits(stiffness) {
             return Err(FrontError::OtherPattern);
         }
-        probe_memory(self.analysis.peak_bytes::<T>())?;
-        let run = Run { analysis: &self.analysis, stiffness };
+        // Panels that are not there yet count as their fronts are come to.
+        let limit = match self.panels.iter().all(|panel| panel.is_empty()) {
+            true => self.analysis.peak::<T>(),
+            false => self.analysis.blocks_max::<T>(),
+        };
+        probe_memory(limit * size_of::<T>())?;
+        let blocks = Blocks::new(limit);
+        let run = Run { analysis: &self.analysis, stiffness, blocks };
         run.subtrees(&self.analysis.roots, 0, &mut self.panels).map(drop)
     }
 
     /// Bytes of the panels.
     pub fn bytes(&self) -> usize {
-        self.panels.iter().map(|panel| size_of_val(panel.as_slice())).sum()
+        self.panels.iter().map(|panel| size_of_val::<[T]>(panel)).sum()
     }
 
     /// The analysis this factor follows.
@@ -83,21 +90,22 @@ impl<T: Real> FrontFactor<T> {
 }
 
 /// One factorisation under way.
-struct Run<'a> {
+struct Run<'a, T> {
     analysis: &'a FrontAnalysis,
     stiffness: &'a Stiffness,
+    blocks: Blocks<T>,
 }
 
-impl Run<'_> {
+impl<T: Real> Run<'_, T> {
     /// Factors sibling subtrees as tasks; returns their contribution blocks.
     ///
     /// `panels` starts at front `first` and ends with the last of the subtrees.
-    fn subtrees<T: Real>(
+    fn subtrees(
         &self,
         heads: &[u32],
         first: usize,
-        panels: &mut [Vec<T>],
-    ) -> Result<Vec<Vec<T>>, FrontError> {
+        panels: &mut [Lines<T>],
+    ) -> Result<Vec<Lines<T>>, FrontError> {
         let mut rest = panels;
         let mut start = first;
         let mut tasks = Vec::with_capacity(heads.len());
@@ -108,13 +116,13 @@ impl Run<'_> {
             rest = tail;
         }
         // Every subtree is finished before an error is looked at, so that it is always the same.
-        let done: Vec<Result<Vec<T>, FrontError>> =
+        let done: Vec<Result<Lines<T>, FrontError>> =
             tasks.into_par_iter().map(|(head, panels)| self.subtree(head, panels)).collect();
         done.into_iter().collect()
     }
 
     /// Factors one subtree; returns the contribution block of its head.
-    fn subtree<T: Real>(&self, head: usize, panels: &mut [Vec<T>]) -> Result<Vec<T>, FrontError> {
+    fn subtree(&self, head: usize, panels: &mut [Lines<T>]) -> Result<Lines<T>, FrontError> {
         let fronts = &self.analysis.fronts;
         if fronts[head].is_serial() {
             return self.serial(head, panels);
@@ -128,79 +136,57 @@ impl Run<'_> {
         }
         let first = fronts[head].subtree_first as usize;
         let (below, chain) = panels.split_at_mut(bottom - first);
-        let mut blocks = self.subtrees(&fronts[bottom].children, first, below)?;
+        let mut children = self.subtrees(&fronts[bottom].children, first, below)?;
         for (v, panel) in (bottom..=head).zip(chain) {
-            let front = &fronts[v];
-            let children: Vec<Contribution<'_, T>> = front
-                .children
-                .iter()
-                .zip(&blocks)
-                .map(|(&c, values)| self.contribution(c, values))
-                .collect();
-            let mut block = vec![T::ZERO; front.rest() * front.rest()];
-            self.front(v, panel, &mut block, &children, Tasks::Parallel)?;
-            blocks = vec![block];
+            children = vec![self.front(v, panel, children, Tasks::Parallel)?];
         }
-        Ok(blocks.pop().unwrap_or_default())
+        Ok(children.pop().unwrap_or_default())
     }
 
-    /// Factors a subtree front by front, with the contribution blocks in one arena.
-    fn serial<T: Real>(&self, head: usize, panels: &mut [Vec<T>]) -> Result<Vec<T>, FrontError> {
+    /// Factors a subtree front by front.
+    fn serial(&self, head: usize, panels: &mut [Lines<T>]) -> Result<Lines<T>, FrontError> {
         let fronts = &self.analysis.fronts;
         let first = fronts[head].subtree_first as usize;
-        let mut arena = vec![T::ZERO; fronts[head].arena];
+        let mut waiting: Vec<Lines<T>> = Vec::new();
         for (v, panel) in (first..=head).zip(panels) {
-            let front = &fronts[v];
-            let block_len = front.rest() * front.rest();
-            // The children lie on the other of the arena's two stacks, all on one side.
-            let leftmost = front.children.iter().map(|&c| fronts[c as usize].in_arena).min();
-            let (block, others, others_at) = match leftmost {
-                Some(at) if at < front.in_arena => {
-                    let (others, own) = arena.split_at_mut(front.in_arena);
-                    (&mut own[..block_len], others, 0)
-                }
-                _ => {
-                    let end = front.in_arena + block_len;
-                    let (own, others) = arena.split_at_mut(end);
-                    (&mut own[front.in_arena..], others, end)
-                }
-            };
-            let children: Vec<Contribution<'_, T>> = front
-                .children
-                .iter()
-                .map(|&c| self.contribution(c, &others[fronts[c as usize].in_arena - others_at..]))
-                .collect();
-            self.front(v, panel, block, &children, Tasks::Serial)?;
+            let children = waiting.split_off(waiting.len() - fronts[v].children.len());
+            waiting.push(self.front(v, panel, children, Tasks::Serial)?);
         }
-        arena.truncate(fronts[head].rest() * fronts[head].rest());
-        arena.shrink_to_fit();
-        Ok(arena)
+        Ok(waiting.pop().unwrap_or_default())
     }
 
-    fn contribution<'b, T>(&'b self, child: u32, values: &'b [T]) -> Contribution<'b, T> {
-        let child = &self.analysis.fronts[child as usize];
-        Contribution { runs: &child.runs, values, rest: child.rest() }
-    }
-
-    /// Fills and factors one front and forms its contribution block.
-    fn front<T: Real>(
+    /// Fills and factors one front; returns its contribution block.
+    fn front(
         &self,
         v: usize,
-        panel: &mut Vec<T>,
-        block: &mut [T],
-        children: &[Contribution<'_, T>],
+        panel: &mut Lines<T>,
+        handed: Vec<Lines<T>>,
         tasks: Tasks,
-    ) -> Result<(), FrontError> {
+    ) -> Result<Lines<T>, FrontError> {
         let front = &self.analysis.fronts[v];
-        let (size, pivots) = (front.size, front.pivots);
-        reset(panel, front.panel_len());
-        add_entries(panel, front, &self.analysis.entries, self.stiffness);
-        add_children(panel, 0..pivots, 0, size, children, tasks);
-        factor_panel(panel, size, pivots, tasks)
-            .map_err(|pivot| self.not_positive(front, pivot))?;
-        form_contribution(block, panel, size, pivots, tasks);
-        add_children(block, pivots..size, pivots, size, children, tasks);
-        Ok(())
+        let slabs = front.slabs::<T>();
+        // What the system hands out is zero.
+        let is_clear = panel.is_empty();
+        if is_clear {
+            *panel = self.blocks.keep(slabs.panel_len());
+        }
+        let children: Vec<Contribution<'_, T>> = front
+            .children
+            .iter()
+            .zip(&handed)
+            .map(|(&child, values)| {
+                Contribution::new(values, &self.analysis.fronts[child as usize].runs, slabs)
+            })
+            .collect();
+        fill_panel((&mut *panel, is_clear), slabs, &children, tasks);
+        add_entries(panel, front, slabs, &self.analysis.entries, self.stiffness);
+        factor_panel(panel, slabs, tasks).map_err(|pivot| self.not_positive(front, pivot))?;
+        let mut own = self.blocks.take(slabs.block_len());
+        let block = &mut own[..slabs.block_len()];
+        form_contribution(block, panel, slabs, &children, tasks);
+        drop(children);
+        handed.into_iter().for_each(|block| self.blocks.give_back(block));
+        Ok(own)
     }
 
     fn not_positive(&self, front: &Front, pivot: usize) -> FrontError {
@@ -208,35 +194,27 @@ impl Run<'_> {
     }
 }
 
-/// Adds all children's contributions to the columns `columns` of a front, in the children's order.
-fn add_children<T: Real>(
-    into: &mut [T],
-    columns: std::ops::Range<usize>,
-    first_row: usize,
-    size: usize,
+/// Clears a panel that is not clear, and adds the children's contributions, some slabs a task.
+fn fill_panel<T: Real>(
+    (panel, is_clear): (&mut [T], bool),
+    slabs: Slabs,
     children: &[Contribution<'_, T>],
     tasks: Tasks,
 ) {
-    match tasks {
-        Tasks::Serial => {
-            for child in children {
-                extend_add(into, columns.clone(), first_row, size, child);
-            }
-        }
-        Tasks::Parallel => {
-            let height = size - first_row;
-            if height == 0 {
-                return;
-            }
-            into.par_chunks_mut(FILLED_COLUMNS * height).enumerate().for_each(|(k, into)| {
-                let from = columns.start + k * FILLED_COLUMNS;
-                let some = from..(from + FILLED_COLUMNS).min(columns.end);
-                for child in children {
-                    extend_add(into, some.clone(), first_row, size, child);
-                }
-            });
-        }
+    let mut parts = Vec::with_capacity(slabs.panel_slabs().div_ceil(TASK_SLABS));
+    let mut rest = panel;
+    for first in (0..slabs.panel_slabs()).step_by(TASK_SLABS) {
+        let range = first..slabs.panel_slabs().min(first + TASK_SLABS);
+        let (part, after) = rest.split_at_mut(slabs.start(range.end) - slabs.start(first));
+        parts.push((part, range));
+        rest = after;
     }
+    tasks.run(parts, |(panel, range)| {
+        if !is_clear {
+            panel.fill(T::ZERO);
+        }
+        Arch::new().dispatch(AddToPanel { panel, range, slabs, children });
+    });
 }
 
 /// Refuses a request the system would refuse, before it is made piece by piece.
@@ -245,12 +223,4 @@ fn add_children<T: Real>(
 /// works on them; only the infallible constructors offer that.
 fn probe_memory(bytes: usize) -> Result<(), FrontError> {
     Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| FrontError::OutOfMemory { bytes })
-}
-
-/// Makes `values` hold `len` zeros, in the memory it has if that fits.
-fn reset<T: Real>(values: &mut Vec<T>, len: usize) {
-    match values.len() == len {
-        true => values.fill(T::ZERO),
-        false => *values = vec![T::ZERO; len],
-    }
 }

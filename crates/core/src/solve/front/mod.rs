@@ -2,10 +2,15 @@
 
 mod analysis;
 mod assembly;
+mod blocks;
 mod dense;
 mod etree;
 mod factor;
+mod kernel;
+mod lines;
 mod real;
+mod runs;
+mod slabs;
 mod solve;
 mod substitute;
 mod supernodes;

@@ -1,10 +1,11 @@
 //! Solves with a factor, over the whole tree of fronts or along a few of its paths.
 
-use faer::Mat;
+use faer::{Mat, MatMut};
 use rayon::prelude::*;
 
 use super::analysis::{Front, FrontAnalysis};
-use super::substitute::Panel;
+use super::lines::Lines;
+use super::substitute::{Panel, width};
 use super::{FrontFactor, Real};
 
 /// Subtrees whose panels times right-hand sides are below this are not split into tasks.
@@ -34,19 +35,55 @@ impl<T: Real> FrontFactor<T> {
         if b.is_empty() {
             return;
         }
-        let mut x = vec![T::ZERO; b.len()];
-        self.each_row(columns, |row, at, stride| {
-            for (j, column) in b.chunks_exact(n).enumerate() {
-                x[at + j * stride] = T::from_f64(column[row]);
+        // As many at once as fit into the strips of the kernels.
+        for b in b.chunks_mut(n * T::SLAB) {
+            let columns = b.len() / n;
+            let mut x = self.strips(columns, |row, j| b[j * n + row]);
+            self.solve_ordered(&mut x, width::<T>(columns), &self.all_paths());
+            self.each_number(&x, columns, |row, j, x| b[j * n + row] = x);
+        }
+    }
+
+    /// The same with the numbers of one row next to each other.
+    ///
+    /// Shapes: `b` n × `columns` row-major.
+    ///
+    /// # Panics
+    /// If `b` does not hold n × `columns` numbers.
+    pub fn solve_rows_in_place(&self, b: &mut [f64], columns: usize) {
+        assert_eq!(b.len(), self.analysis.row_count() * columns, "the factor has other rows");
+        for first in (0..columns).step_by(T::SLAB) {
+            let some = T::SLAB.min(columns - first);
+            let mut x = self.strips(some, |row, j| b[row * columns + first + j]);
+            self.solve_ordered(&mut x, width::<T>(some), &self.all_paths());
+            self.each_number(&x, some, |row, j, x| b[row * columns + first + j] = x);
+        }
+    }
+
+    fn all_paths(&self) -> Paths {
+        let all = vec![true; self.analysis.fronts.len()];
+        Paths { up: all.clone(), down: all }
+    }
+
+    /// Right-hand sides in elimination order, `at(row of K11, column)`.
+    fn strips(&self, columns: usize, at: impl Fn(usize, usize) -> f64) -> Lines<T> {
+        let width = width::<T>(columns);
+        let mut x = Lines::zeros(self.analysis.row_count() * width);
+        for (x, &row) in x.chunks_exact_mut(width).zip(&self.analysis.order) {
+            for (j, x) in x[..columns].iter_mut().enumerate() {
+                *x = T::from_f64(at(row as usize, j));
             }
-        });
-        let all = vec![true; self.panels.len()];
-        self.solve_ordered(&mut x, columns, &Paths { up: all.clone(), down: all });
-        self.each_row(columns, |row, at, stride| {
-            for (j, column) in b.chunks_exact_mut(n).enumerate() {
-                column[row] = x[at + j * stride].to_f64();
+        }
+        x
+    }
+
+    /// Calls `visit(row of K11, column, number)` for what [`FrontFactor::strips`] has filled.
+    fn each_number(&self, x: &[T], columns: usize, mut visit: impl FnMut(usize, usize, f64)) {
+        for (x, &row) in x.chunks_exact(width::<T>(columns)).zip(&self.analysis.order) {
+            for (j, x) in x[..columns].iter().enumerate() {
+                visit(row as usize, j, x.to_f64());
             }
-        });
+        }
     }
 
     /// Some rows of `K11⁻¹ B` for right-hand sides that are zero nearly everywhere.
@@ -67,59 +104,56 @@ impl<T: Real> FrontFactor<T> {
         rows_wanted: &[usize],
     ) -> Mat<f64> {
         let columns = right_hand_sides.len();
+        let mut wanted = Mat::zeros(rows_wanted.len(), columns);
+        for (k, some) in right_hand_sides.chunks(T::SLAB).enumerate() {
+            let some_wanted = wanted.as_mut().get_mut(.., k * T::SLAB..k * T::SLAB + some.len());
+            self.solve_partial_some(some, rows_wanted, some_wanted);
+        }
+        wanted
+    }
+
+    /// The same for a few right-hand sides.
+    fn solve_partial_some(
+        &self,
+        right_hand_sides: &[Vec<(usize, f64)>],
+        rows_wanted: &[usize],
+        mut wanted: MatMut<'_, f64>,
+    ) {
+        let width = width::<T>(right_hand_sides.len());
         let analysis = &*self.analysis;
-        let place = |row: usize| {
-            let new = analysis.position[row] as usize;
-            // Fronts are sorted by their first row.
-            let front = analysis.fronts.partition_point(|f| f.first <= new) - 1;
-            (front, new - analysis.fronts[front].first)
-        };
-        let mut x = vec![T::ZERO; analysis.row_count() * columns];
+        let position = |row: usize| analysis.position[row] as usize;
+        // Fronts are sorted by their first row.
+        let front = |new: usize| analysis.fronts.partition_point(|f| f.first <= new) - 1;
+        let len = analysis.row_count() * width;
+        let mut x = Lines::zeros(len);
+        let x = &mut x[..len];
         let mut paths = Paths {
             up: vec![false; analysis.fronts.len()],
             down: vec![false; analysis.fronts.len()],
         };
         for (j, entries) in right_hand_sides.iter().enumerate() {
             for &(row, value) in entries {
-                let (front, within) = place(row);
-                let Front { first, pivots, .. } = analysis.fronts[front];
-                x[first * columns + j * pivots + within] += T::from_f64(value);
-                mark(&mut paths.up, analysis, front);
+                let new = position(row);
+                x[new * width + j] += T::from_f64(value);
+                mark(&mut paths.up, analysis, front(new));
             }
         }
         for &row in rows_wanted {
-            mark(&mut paths.down, analysis, place(row).0);
+            mark(&mut paths.down, analysis, front(position(row)));
         }
-        self.solve_ordered(&mut x, columns, &paths);
-        let mut wanted = Mat::zeros(rows_wanted.len(), columns);
+        self.solve_ordered(x, width, &paths);
         for (i, &row) in rows_wanted.iter().enumerate() {
-            let (front, within) = place(row);
-            let Front { first, pivots, .. } = analysis.fronts[front];
-            for j in 0..columns {
-                wanted[(i, j)] = x[first * columns + j * pivots + within].to_f64();
-            }
-        }
-        wanted
-    }
-
-    /// Calls `visit(row of K11, position, stride)` for every row, where `position` and `stride`
-    /// are those of its values for all columns in the solve's own layout.
-    fn each_row(&self, columns: usize, mut visit: impl FnMut(usize, usize, usize)) {
-        for front in &self.analysis.fronts {
-            for i in 0..front.pivots {
-                let row = self.analysis.order[front.first + i] as usize;
-                visit(row, front.first * columns + i, front.pivots);
+            for j in 0..right_hand_sides.len() {
+                wanted[(i, j)] = x[position(row) * width + j].to_f64();
             }
         }
     }
 
-    /// Solves in the layout of the fronts: the rows a front eliminates are one block, pivots ×
-    /// columns column-major, and blocks follow each other in elimination order.
-    fn solve_ordered(&self, x: &mut [T], columns: usize, paths: &Paths) {
-        if columns == 0 {
-            return;
-        }
-        let solve = Solve { factor: self, paths, columns };
+    /// Solves in elimination order, each row with `width` numbers, one for each right-hand side.
+    fn solve_ordered(&self, x: &mut [T], width: usize, paths: &Paths) {
+        // Lines end with a whole cache line.
+        let x = &mut x[..self.analysis.row_count() * width];
+        let solve = Solve { factor: self, paths, width };
         solve.up_siblings(&self.analysis.roots, 0, x);
         solve.down_siblings(&self.analysis.roots, 0, x, &[]);
     }
@@ -139,7 +173,8 @@ fn mark(marks: &mut [bool], analysis: &FrontAnalysis, front: usize) {
 struct Solve<'a, T> {
     factor: &'a FrontFactor<T>,
     paths: &'a Paths,
-    columns: usize,
+    /// Numbers of a row.
+    width: usize,
 }
 
 impl<T: Real> Solve<'_, T> {
@@ -148,7 +183,7 @@ impl<T: Real> Solve<'_, T> {
     }
 
     fn is_serial(&self, v: usize) -> bool {
-        self.front(v).subtree_entries * self.columns < SERIAL_PRODUCTS
+        self.front(v).subtree_entries * self.width < SERIAL_PRODUCTS
     }
 
     /// The subtrees of siblings with their parts of `x`, which starts at front `first`.
@@ -159,7 +194,7 @@ impl<T: Real> Solve<'_, T> {
         for &head in heads {
             let head = head as usize;
             let end = self.front(head).first + self.front(head).pivots;
-            let (own, tail) = rest.split_at_mut((end - start) * self.columns);
+            let (own, tail) = rest.split_at_mut((end - start) * self.width);
             parts.push((head, own));
             (rest, start) = (tail, end);
         }
@@ -183,13 +218,13 @@ impl<T: Real> Solve<'_, T> {
         let first = self.front(head).subtree_first as usize;
         let start = self.front(first).first;
         let bottom = self.bottom(head);
-        let (below, mut own) = x.split_at_mut((self.front(bottom).first - start) * self.columns);
+        let (below, mut own) = x.split_at_mut((self.front(bottom).first - start) * self.width);
         let mut handed = match self.is_serial(bottom) {
             true => self.up_serial(first, bottom, below),
             false => self.up_siblings(&self.front(bottom).children, first, below),
         };
         for v in bottom..=head {
-            let (pivots, rest) = own.split_at_mut(self.front(v).pivots * self.columns);
+            let (pivots, rest) = own.split_at_mut(self.front(v).pivots * self.width);
             handed = vec![self.up_front(v, pivots, &handed)];
             own = rest;
         }
@@ -212,7 +247,7 @@ impl<T: Real> Solve<'_, T> {
         let mut stack: Vec<Vec<T>> = Vec::new();
         let mut rest = x;
         for v in first..head {
-            let (pivots, tail) = rest.split_at_mut(self.front(v).pivots * self.columns);
+            let (pivots, tail) = rest.split_at_mut(self.front(v).pivots * self.width);
             rest = tail;
             let children = stack.split_off(stack.len() - self.front(v).children.len());
             stack.push(match self.paths.up[v] {
@@ -223,30 +258,24 @@ impl<T: Real> Solve<'_, T> {
         stack
     }
 
-    /// One front: adds what its children hand it and eliminates; the whole front, size × columns,
+    /// One front: adds what its children hand it and eliminates; the whole front with its zero rows,
     /// whose rest is for the parent.
     fn up_front(&self, v: usize, x1: &mut [T], handed: &[Vec<T>]) -> Vec<T> {
-        let front = self.front(v);
-        let (pivots, size) = (front.pivots, front.size);
-        let mut local = vec![T::ZERO; size * self.columns];
-        for (local, x1) in local.chunks_exact_mut(size).zip(x1.chunks_exact(pivots)) {
-            local[..pivots].copy_from_slice(x1);
-        }
+        let (front, width) = (self.front(v), self.width);
+        let slabs = front.slabs::<T>();
+        let mut local = vec![T::ZERO; slabs.padded_rows() * width];
+        local[..x1.len()].copy_from_slice(x1);
         for (&child, values) in front.children.iter().zip(handed).filter(|(_, h)| !h.is_empty()) {
             let child = self.front(child as usize);
-            for (local, values) in local.chunks_exact_mut(size).zip(values.chunks_exact(child.size))
-            {
-                for run in &child.runs {
-                    let from = &values[child.pivots + run.child as usize..][..run.len as usize];
-                    let into = &mut local[run.parent as usize..];
-                    into.iter_mut().zip(from).for_each(|(slot, &value)| *slot += value);
-                }
+            let rest = &values[child.slabs::<T>().padded(child.pivots) * width..];
+            for run in &child.runs {
+                let from = &rest[run.child as usize * width..][..run.len as usize * width];
+                let into = &mut local[slabs.padded(run.parent as usize) * width..];
+                into.iter_mut().zip(from).for_each(|(slot, &value)| *slot += value);
             }
         }
-        self.panel(v).forward(&mut local, self.columns);
-        for (local, x1) in local.chunks_exact(size).zip(x1.chunks_exact_mut(pivots)) {
-            x1.copy_from_slice(&local[..pivots]);
-        }
+        self.panel(v).forward(&mut local, width);
+        x1.copy_from_slice(&local[..x1.len()]);
         local
     }
 
@@ -267,10 +296,10 @@ impl<T: Real> Solve<'_, T> {
         let first = self.front(head).subtree_first as usize;
         let start = self.front(first).first;
         let bottom = self.bottom(head);
-        let (below, mut own) = x.split_at_mut((self.front(bottom).first - start) * self.columns);
+        let (below, mut own) = x.split_at_mut((self.front(bottom).first - start) * self.width);
         let mut local = Vec::new();
         for v in (bottom..=head).rev() {
-            let at = own.len() - self.front(v).pivots * self.columns;
+            let at = own.len() - self.front(v).pivots * self.width;
             let (rest, pivots) = own.split_at_mut(at);
             local = self.down_front(v, pivots, if v == head { above } else { &local });
             own = rest;
@@ -287,7 +316,7 @@ impl<T: Real> Solve<'_, T> {
         let mut open = vec![(head, local)];
         let mut rest = x;
         for v in (first..head).rev() {
-            let at = rest.len() - self.front(v).pivots * self.columns;
+            let at = rest.len() - self.front(v).pivots * self.width;
             let (head, pivots) = rest.split_at_mut(at);
             rest = head;
             if !self.paths.down[v] {
@@ -303,31 +332,27 @@ impl<T: Real> Solve<'_, T> {
         }
     }
 
-    /// One front: takes the rest from the parent's front `above` and substitutes; the whole front,
-    /// size × columns, for the children.
+    /// One front: takes the rest from the parent's front `above` and substitutes; the whole front
+    /// with its zero rows, for the children.
     fn down_front(&self, v: usize, x1: &mut [T], above: &[T]) -> Vec<T> {
-        let front = self.front(v);
-        let (pivots, size) = (front.pivots, front.size);
-        let above_size = above.len() / self.columns;
-        let mut local = vec![T::ZERO; size * self.columns];
-        for (j, (local, x1)) in
-            local.chunks_exact_mut(size).zip(x1.chunks_exact(pivots)).enumerate()
-        {
-            local[..pivots].copy_from_slice(x1);
-            for run in &front.runs {
-                let from = &above[j * above_size + run.parent as usize..][..run.len as usize];
-                local[pivots + run.child as usize..][..from.len()].copy_from_slice(from);
-            }
+        let (front, width) = (self.front(v), self.width);
+        let slabs = front.slabs::<T>();
+        let mut local = vec![T::ZERO; slabs.padded_rows() * width];
+        local[..x1.len()].copy_from_slice(x1);
+        let rest = &mut local[slabs.padded(front.pivots) * width..];
+        for run in &front.runs {
+            let parent = self.front(front.parent as usize).slabs::<T>();
+            let from = &above[parent.padded(run.parent as usize) * width..];
+            let into = &mut rest[run.child as usize * width..][..run.len as usize * width];
+            into.copy_from_slice(&from[..into.len()]);
         }
-        self.panel(v).backward(&mut local, self.columns);
-        for (local, x1) in local.chunks_exact(size).zip(x1.chunks_exact_mut(pivots)) {
-            x1.copy_from_slice(&local[..pivots]);
-        }
+        self.panel(v).backward(&mut local, width);
+        x1.copy_from_slice(&local[..x1.len()]);
         local
     }
 
     fn panel(&self, v: usize) -> Panel<'_, T> {
-        let Front { size, pivots, .. } = *self.front(v);
-        Panel { values: &self.factor.panels[v], size, pivots }
+        let slabs = self.front(v).slabs::<T>();
+        Panel { values: &self.factor.panels[v], slabs }
     }
 }

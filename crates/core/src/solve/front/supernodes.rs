@@ -72,6 +72,22 @@ impl Supernodes {
         this
     }
 
+    /// Gives columns other places inside their supernodes: `place[old] = new`.
+    pub fn permute(&mut self, place: &[u32]) {
+        let mut order = vec![0; self.order.len()];
+        for (&vertex, &new) in self.order.iter().zip(place) {
+            order[new as usize] = vertex;
+        }
+        self.position = inverse(&order);
+        self.order = order;
+        for row in &mut self.rows {
+            *row = place[*row as usize];
+        }
+        for v in 0..self.len() {
+            self.rows[self.rows_start[v]..self.rows_start[v + 1]].sort_unstable();
+        }
+    }
+
     /// Number of supernodes.
     pub fn len(&self) -> usize {
         self.parent.len()

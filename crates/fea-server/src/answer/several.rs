@@ -1,0 +1,85 @@
+//! Answers one request that holds mesh, partition and several sets of known displacements: one
+//! matrix, one factor (thesis 3.43).
+
+use softgrasp_core::model::{Known, Model};
+use softgrasp_core::solve::Method;
+use softgrasp_protocol::{SeveralAnswers, SolveSeveral};
+
+use super::direct;
+use super::once::Work;
+use super::warnings::add_plan_warnings;
+use crate::clock::StageClock;
+use crate::plan::{OnceRequest, Subject, plan_once};
+use crate::refusal::Refusal;
+use crate::request::{
+    check_node_count, checked_forces, element_given, model_of, pairs, poisson_max, question_of,
+};
+use crate::resources::Resources;
+
+/// Vectors of all degrees of freedom that one case holds while it is solved and afterwards: known
+/// and unknown displacements, forces, products, residual, correction, answer.
+const VECTORS_PER_CASE: usize = 12;
+
+/// Mesh, partition and several sets of known displacements in one request.
+///
+/// # Errors
+/// [`Refusal`].
+pub(crate) fn solve_several(
+    resources: &Resources,
+    several: SolveSeveral,
+    mut clock: StageClock,
+) -> Result<SeveralAnswers, Refusal> {
+    let SolveSeveral { mesh, materials, element, question: message, cases, estimate } = several;
+    let asked_element = element_given(element);
+    let poisson_max = poisson_max(&materials);
+    let question = question_of(&message, asked_element, poisson_max)?;
+    if !message.masks.is_empty() || question.method == Some(Method::Condensed) {
+        return Err(Refusal::SeveralCondensed);
+    }
+    check_node_count(&mesh, resources.config.max_nodes)?;
+    let request = OnceRequest {
+        question,
+        subject: Subject::once(&mesh, message.known.len()),
+        has_masks: false,
+        has_forces: !message.forces.is_empty(),
+    };
+    let reservation = resources.budget.reservation();
+    let models = &resources.models;
+    let plan = plan_once(&request, models, &reservation, &resources.rates, || clock.elapsed_ms())?;
+    if plan.method == Method::Condensed {
+        return Err(Refusal::SeveralCondensed);
+    }
+    let model = model_of(mesh, &materials, plan.element, Vec::new(), &mut clock)?;
+    let known = model.known(pairs(&message.known))?;
+    let further = further(&model, &message.known, &cases)?;
+    let forces = checked_forces(&model, &known, &message)?;
+    let work = Work { resources, reservation, request, message };
+    let (factored, plan, why) = work.factored(plan, &model, &known, &mut clock)?;
+    let bytes = cases_bytes(&model, cases.len());
+    let free = work.reservation.free().saturating_sub((factored.bytes() + model.bytes()) as u64);
+    if bytes > free {
+        return Err(Refusal::TooManyCases { cases: cases.len() + 1, bytes, free });
+    }
+    let posed = work.posed(&model, known, forces, why);
+    let mut answers = direct::answer_several(&model, &factored, posed, &further, estimate, clock)?;
+    add_plan_warnings(&plan, asked_element, poisson_max, &mut answers.answer.report);
+    Ok(answers)
+}
+
+/// The known displacements of the further cases.
+fn further(
+    model: &Model,
+    first: &[softgrasp_protocol::DofValue],
+    cases: &[Vec<f64>],
+) -> Result<Vec<Known>, Refusal> {
+    let known = |values: &Vec<f64>| {
+        let pairs = first.iter().zip(values).map(|(known, &value)| (known.dof, value)).collect();
+        Ok(model.known(pairs)?)
+    };
+    cases.iter().map(known).collect()
+}
+
+/// What solving and answering takes beside the factor.
+fn cases_bytes(model: &Model, cases: usize) -> u64 {
+    (VECTORS_PER_CASE * cases) as u64 * (3 * model.system_node_count() * size_of::<f64>()) as u64
+}

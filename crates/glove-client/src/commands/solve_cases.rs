@@ -1,0 +1,117 @@
+//! The files of `glove-client solve`: known displacements, displacements and reactions of each case.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use softgrasp_core::mesh::TetMesh;
+use softgrasp_core::mesh_io::{PointField, write_vtu};
+use softgrasp_protocol::DofValue;
+
+use crate::displacement_table::{
+    DISPLACEMENT_COLUMNS, read_table, write_displacements, write_reactions,
+};
+use crate::file_writing::write_file;
+
+/// Files of all cases, in the order of the command line.
+#[derive(Clone, Copy)]
+pub(super) struct CaseFiles<'a> {
+    pub known: &'a [PathBuf],
+    pub out: &'a [PathBuf],
+    pub reactions: &'a [PathBuf],
+}
+
+impl CaseFiles<'_> {
+    /// # Errors
+    /// One line where a file is missing or too many.
+    pub fn check(self) -> anyhow::Result<()> {
+        let cases = self.known.len();
+        if self.out.len() != cases {
+            bail!(
+                "{cases} --known and {} --out were given; give one --out for each",
+                self.out.len()
+            );
+        }
+        if !self.reactions.is_empty() && self.reactions.len() != cases {
+            let given = self.reactions.len();
+            bail!("{cases} --known and {given} --reactions were given; give one for each, or none");
+        }
+        Ok(())
+    }
+
+    /// Values of the further cases, in the order of the first one's known displacements.
+    pub fn further(self, mesh: &TetMesh, first: &[DofValue]) -> anyhow::Result<Vec<Vec<f64>>> {
+        let mut cases = Vec::new();
+        for path in self.known.iter().skip(1) {
+            let known = read_values(path, DISPLACEMENT_COLUMNS, mesh.node_count())?;
+            let by_dof: BTreeMap<u32, f64> = known.iter().map(|k| (k.dof, k.value)).collect();
+            let dofs: BTreeSet<u32> = first.iter().map(|k| k.dof).collect();
+            if let Some(dof) = dofs.iter().find(|dof| !by_dof.contains_key(dof)) {
+                bail!(other_directions(
+                    path,
+                    *dof,
+                    "leaves free what the first --known prescribes"
+                ));
+            }
+            if let Some(dof) = by_dof.keys().find(|dof| !dofs.contains(dof)) {
+                bail!(other_directions(
+                    path,
+                    *dof,
+                    "prescribes what the first --known leaves free"
+                ));
+            }
+            cases.push(first.iter().map(|k| by_dof[&k.dof]).collect());
+        }
+        Ok(cases)
+    }
+
+    /// Writes what was asked for of one case.
+    pub fn write(
+        self,
+        case: usize,
+        mesh: &TetMesh,
+        displacements: &[[f64; 3]],
+        reactions: &[DofValue],
+    ) -> anyhow::Result<()> {
+        if let Some(path) = self.out.get(case) {
+            write_file(path, &encode(path, mesh, displacements)?)?;
+        }
+        if let Some(path) = self.reactions.get(case) {
+            write_file(path, write_reactions(reactions).as_bytes())?;
+        }
+        Ok(())
+    }
+}
+
+fn other_directions(path: &Path, dof: u32, what: &str) -> String {
+    let axis = ["ux", "uy", "uz"][dof as usize % 3];
+    format!(
+        "{} {what}: {axis} of node {}; several --known prescribe the same directions",
+        path.display(),
+        dof / 3
+    )
+}
+
+/// Entries of a table of values by node.
+///
+/// # Errors
+/// One line with file and row.
+pub(super) fn read_values(
+    path: &Path,
+    columns: [&'static str; 4],
+    node_count: usize,
+) -> anyhow::Result<Vec<DofValue>> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
+    Ok(read_table(&name, &bytes, columns, node_count)?)
+}
+
+fn encode(path: &Path, mesh: &TetMesh, displacements: &[[f64; 3]]) -> anyhow::Result<Vec<u8>> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("vtu") => {
+            let field = PointField { name: "displacement", values: displacements };
+            write_vtu(mesh, &[field]).context("cannot form the VTU file")
+        }
+        _ => Ok(write_displacements(displacements).into_bytes()),
+    }
+}
