@@ -198,7 +198,6 @@ fn first_line_names_the_address_and_both_signals_end_with_exit_code_0() {
     }
 }
 
-/// METIS takes SIGTERM over while it orders: a server that was stopped then died of SIGSEGV.
 /// An order to end is kept within three seconds; the rest is for a busy machine.
 const STOP_MAX: Duration = Duration::from_millis(4500);
 
@@ -221,8 +220,10 @@ fn server_at_work_that_takes_minutes_ends_within_three_seconds() {
     }
 }
 
+/// METIS, once used here, took SIGTERM over while it ordered: a server that was stopped then died of
+/// SIGSEGV.
 #[test]
-fn a_stop_while_metis_orders_does_not_crash() {
+fn a_stop_while_equations_are_ordered_does_not_crash() {
     // Start-up measures this machine on cubes, which are ordered: the signals fall at other
     // moments of that each time.
     for turn in 0..12 {

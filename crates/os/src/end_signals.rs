@@ -1,9 +1,9 @@
 //! Waits, on a thread of its own, for the signals that ask a program to end.
 //!
-//! METIS takes SIGTERM and SIGABRT over while it orders (`gk_sigtrap`) and answers them by a
-//! `longjmp` on whichever thread the system gave the signal to. A program that was asked to end at
-//! such a moment crashed instead. A signal that every thread blocks waits for the one that asks for
-//! it, whatever handler stands there.
+//! A library in C may take signals over while it works: METIS, which once ordered the equations,
+//! answered SIGTERM by a `longjmp` on whichever thread the system gave the signal to, and a program
+//! that was asked to end at such a moment crashed. A signal that every thread blocks waits for the
+//! one that asks for it, whatever handler stands there.
 
 use std::io;
 

@@ -1,5 +1,6 @@
 //! The sparsity pattern of the global stiffness matrix (thesis 3.5.2).
 
+use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::elements_around::elements_around;
@@ -23,6 +24,8 @@ pub struct StiffnessPattern {
     /// For each entry of `around`, the positions in the row of the blocks of the element's nodes.
     slots: Vec<u32>,
     nodes_per_tet: usize,
+    /// Where the nodes are at rest: orders are found by planes between them.
+    places: Vec<Point3<f64>>,
 }
 
 /// One element seen from one of its nodes.
@@ -50,7 +53,7 @@ impl StiffnessPattern {
     ///
     /// Shapes: N nodes give N block rows.
     pub fn new(mesh: &TetMesh) -> Self {
-        Self::from_elements(mesh.node_count(), mesh.tets(), None)
+        Self::from_elements(mesh.vertices(), mesh.tets(), None)
     }
 
     /// Pattern of a linear mesh with averaged nodal pressure: nodes of one patch see each other, so a
@@ -58,22 +61,23 @@ impl StiffnessPattern {
     ///
     /// Shapes: N nodes give N block rows.
     pub fn nodal_pressure(mesh: &TetMesh, patches: &NodalPatches) -> Self {
-        Self::from_elements(mesh.node_count(), mesh.tets(), Some(patches))
+        Self::from_elements(mesh.vertices(), mesh.tets(), Some(patches))
     }
 
     /// Pattern of a ten-node mesh.
     ///
     /// Shapes: N + E nodes give as many block rows.
     pub fn quadratic(mesh: &QuadraticMesh) -> Self {
-        Self::from_elements(mesh.node_count(), mesh.tets(), None)
+        Self::from_elements(mesh.vertices(), mesh.tets(), None)
     }
 
-    /// Pattern of elements of K nodes each; every node index must be below `node_count`.
+    /// Pattern of elements of K nodes each; every node index must be one of `places`.
     fn from_elements<const K: usize>(
-        node_count: usize,
+        places: &[Point3<f64>],
         tets: &[[u32; K]],
         patches: Option<&NodalPatches>,
     ) -> Self {
+        let node_count = places.len();
         let (around_start, tets_around) = elements_around(node_count, tets);
         let rows: Vec<BlockRow> = (0..node_count)
             .into_par_iter()
@@ -96,7 +100,8 @@ impl StiffnessPattern {
             slots.extend_from_slice(&row.slots);
             row_start.push(columns.len());
         }
-        Self { row_start, columns, around_start, around, slots, nodes_per_tet: K }
+        let places = places.to_vec();
+        Self { row_start, columns, around_start, around, slots, nodes_per_tet: K, places }
     }
 
     /// Number of nodes, orphans included.
@@ -107,6 +112,11 @@ impl StiffnessPattern {
     /// Nodes of each element: 4 or 10.
     pub fn nodes_per_tet(&self) -> usize {
         self.nodes_per_tet
+    }
+
+    /// Where the nodes are at rest, m.
+    pub fn places(&self) -> &[Point3<f64>] {
+        &self.places
     }
 
     /// Number of stored 3 × 3 blocks.

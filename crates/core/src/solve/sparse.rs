@@ -1,4 +1,4 @@
-//! Sparse Cholesky factor of `K11` (faer) in the nested-dissection order of METIS.
+//! Sparse Cholesky factor of `K11` (faer) in the order of nested dissection.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::Perm;

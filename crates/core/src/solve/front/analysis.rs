@@ -126,9 +126,9 @@ impl Front {
 impl FrontAnalysis {
     /// Orders and analyses the `K11` of a partition.
     ///
-    /// Source: thesis (3.41); METIS nested dissection of the graph of nodes.
+    /// Source: thesis (3.41); nested dissection of the graph of nodes.
     pub fn new(stiffness: &Stiffness, partition: &Partition) -> Self {
-        let mut graph = NodeGraph::new(stiffness, partition);
+        let graph = NodeGraph::new(stiffness, partition);
         let order = graph.nested_dissection();
         Self::with_order(stiffness, partition, &graph, order)
     }

@@ -173,16 +173,17 @@ pub(super) mod tests {
     pub fn graph(count: usize, edges: &[(u32, u32)]) -> NodeGraph {
         let mut rows = vec![std::collections::BTreeSet::new(); count];
         for &(a, b) in edges.iter().filter(|(a, b)| a != b) {
-            rows[a as usize].insert(b as i32);
-            rows[b as usize].insert(a as i32);
+            rows[a as usize].insert(b);
+            rows[b as usize].insert(a);
         }
         let mut start = vec![0];
         let mut neighbours = Vec::new();
         for row in rows {
             neighbours.extend(row);
-            start.push(neighbours.len() as i32);
+            start.push(neighbours.len() as u32);
         }
-        NodeGraph { nodes: (0..count as u32).collect(), start, neighbours }
+        let places = vec![[0.0; 3]; count];
+        NodeGraph { nodes: (0..count as u32).collect(), places, start, neighbours }
     }
 
     /// Elimination on the filled graph, column by column.

@@ -128,8 +128,8 @@ fn fill_is_close_to_that_of_an_exact_symbolic_factorisation() {
     assert!(exact <= analysis.fill(), "some entry of the factor has no place");
     assert!(analysis.fill() < exact * 7 / 5, "{} against {exact}", analysis.fill());
     // faer merges too; the two must not be far apart.
-    let metis = ordering::nested_dissection(&stiffness, &partition);
-    let faer = Analysis::new(SparseK11::new(&stiffness, &partition), metis).ok().unwrap().fill();
+    let order = ordering::nested_dissection(&stiffness, &partition);
+    let faer = Analysis::new(SparseK11::new(&stiffness, &partition), order).ok().unwrap().fill();
     assert!(analysis.fill() < faer + faer / 4, "{} against faer {faer}", analysis.fill());
 }
 
