@@ -11,7 +11,6 @@ pub mod bound;
 pub mod collision;
 pub mod contact;
 pub mod echo;
-pub mod factor;
 pub mod fit;
 pub mod flicker;
 pub mod frame;
@@ -19,6 +18,7 @@ pub mod frontier;
 pub mod hard_cases;
 pub mod hold;
 pub mod large;
+pub mod limits;
 pub mod load;
 pub mod machine;
 pub mod methods;
@@ -57,8 +57,8 @@ pub enum ReportName {
     Frontier,
     /// The first frame of a new grip, with and without prefetch.
     Onset,
-    /// The factor over fronts against the machine's own matrix product.
-    Factor,
+    /// The factor over fronts against what the machine can do at most.
+    Limits,
     /// A request every millisecond for a minute.
     Hold,
     /// What a user of `run` gets in real time.
@@ -93,7 +93,7 @@ impl ReportName {
             Self::Frame => "frame",
             Self::Frontier => "frontier",
             Self::Onset => "onset",
-            Self::Factor => "factor",
+            Self::Limits => "limits",
             Self::Hold => "hold",
             Self::Session => "session",
             Self::Scaling => "scaling",
@@ -121,7 +121,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Frame => frame::measure(options)?,
         ReportName::Frontier => frontier::measure(options)?,
         ReportName::Onset => onset::measure(options)?,
-        ReportName::Factor => factor::measure(options)?,
+        ReportName::Limits => limits::measure(options)?,
         ReportName::Hold => hold::measure(options)?,
         ReportName::Session => session::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,

@@ -54,22 +54,58 @@ impl WithSimd for Rows<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self { stiffness, first, q, columns, forces, sizes } = self;
-        let of_node = AXES * columns;
-        let rows = forces.chunks_exact_mut(of_node).zip(sizes.chunks_exact_mut(of_node));
-        for (k, (forces, sizes)) in rows.enumerate() {
-            for (other, block) in stiffness.row(first + k) {
-                let q = &q[other * of_node..][..of_node];
-                let rows = forces.chunks_exact_mut(columns).zip(sizes.chunks_exact_mut(columns));
-                for ((forces, sizes), entries) in rows.zip(block.chunks_exact(AXES)) {
-                    for (&entry, q) in entries.iter().zip(q.chunks_exact(columns)) {
-                        for ((force, size), q) in forces.iter_mut().zip(&mut *sizes).zip(q) {
-                            *force += entry * q;
-                            *size += (entry * q).abs();
-                        }
+        let of_node = AXES * self.columns;
+        let nodes = self.forces.chunks_exact_mut(of_node).zip(self.sizes.chunks_exact_mut(of_node));
+        for (k, (forces, sizes)) in nodes.enumerate() {
+            let row = Row { stiffness: self.stiffness, node: self.first + k, q: self.q };
+            let mut from = 0;
+            while from < self.columns {
+                let at = (from, self.columns);
+                from += match self.columns - from {
+                    8.. => row.some_columns::<8>(at, forces, sizes),
+                    4.. => row.some_columns::<4>(at, forces, sizes),
+                    _ => row.some_columns::<1>(at, forces, sizes),
+                };
+            }
+        }
+    }
+}
+
+/// One block row of a product.
+struct Row<'a> {
+    stiffness: &'a Stiffness,
+    node: usize,
+    q: &'a [f64],
+}
+
+impl Row<'_> {
+    /// W columns, whose sums stay in registers; returns W.
+    #[inline(always)]
+    fn some_columns<const W: usize>(
+        &self,
+        (from, columns): (usize, usize),
+        forces: &mut [f64],
+        sizes: &mut [f64],
+    ) -> usize {
+        let (mut force, mut size) = ([[0.0; W]; AXES], [[0.0; W]; AXES]);
+        for (other, block) in self.stiffness.row(self.node) {
+            for c in 0..AXES {
+                let at = (AXES * other + c) * columns + from;
+                let q = &self.q[at..at + W];
+                for a in 0..AXES {
+                    let entry = block[AXES * a + c];
+                    for w in 0..W {
+                        force[a][w] += entry * q[w];
+                        size[a][w] += (entry * q[w]).abs();
                     }
                 }
             }
         }
+        for a in 0..AXES {
+            let at = a * columns + from;
+            forces[at..at + W].copy_from_slice(&force[a]);
+            sizes[at..at + W].copy_from_slice(&size[a]);
+        }
+        W
     }
 }

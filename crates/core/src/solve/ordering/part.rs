@@ -1,4 +1,4 @@
-//! A part of a graph with the places of its vertices.
+//! A part of a graph with the places of its vertices, and how a separator divides it.
 
 /// A graph in its own numbering.
 ///
@@ -19,6 +19,22 @@ pub(super) enum Side {
     Right,
     /// In the separator: its neighbours may be on both sides.
     Between,
+}
+
+/// A separator and the number of vertices on its sides.
+pub(super) struct Separated {
+    pub sides: Vec<Side>,
+    pub left: usize,
+    pub right: usize,
+}
+
+impl Separated {
+    /// Shapes: `sides` one for each vertex of a part.
+    pub fn count(sides: Vec<Side>) -> Self {
+        let count = |wanted: Side| sides.iter().filter(|&&side| side == wanted).count();
+        let (left, right) = (count(Side::Left), count(Side::Right));
+        Self { sides, left, right }
+    }
 }
 
 impl Part {

@@ -1,6 +1,6 @@
 //! Separators: the best of planes in a few directions, then the smallest nearby.
 
-use super::part::{Part, Side};
+use super::part::{Part, Separated, Side};
 use super::vertex_cut::smallest_near;
 
 /// Directions of planes: axes, and diagonals of faces and of the cube.
@@ -30,24 +30,10 @@ const SIDE_MAX: f64 = 0.9;
 /// How much a separator with sides of different size costs more.
 const IMBALANCE: f64 = 0.5;
 
-/// A separator and the number of vertices on its sides.
-pub(super) struct Separated {
-    pub sides: Vec<Side>,
-    pub left: usize,
-    pub right: usize,
-}
-
-impl Separated {
-    pub fn count(sides: Vec<Side>) -> Self {
-        let count = |wanted: Side| sides.iter().filter(|&&side| side == wanted).count();
-        let (left, right) = (count(Side::Left), count(Side::Right));
-        Self { sides, left, right }
-    }
-
-    /// What it costs; `None` where a side is empty or too large.
-    fn cost(&self) -> Option<f64> {
-        cost(self.left, self.right, self.sides.len() - self.left - self.right)
-    }
+/// What a separator costs; `None` where a side is empty or too large.
+fn cost_of(separated: &Separated) -> Option<f64> {
+    let Separated { left, right, sides } = separated;
+    cost(*left, *right, sides.len() - left - right)
 }
 
 /// Vertices between, and more of them the more the sides differ; `None` where a side is empty or
@@ -75,11 +61,11 @@ pub(super) fn separate(part: &Part) -> Option<Separated> {
     // Where most vertices lie in one layer, as many in each.
     let found = best_plane(part, by_places)
         .or_else(|| best_plane(part, (0..3).map(|axis| layers_by_rank(part, axis))))?;
-    let mut cost = found.cost()?;
+    let mut cost = cost_of(&found)?;
     let mut found = found;
     for _ in 0..SEARCHES {
         let Some(other) = smallest_near(part, &found) else { break };
-        match other.cost() {
+        match cost_of(&other) {
             Some(less) if less < cost => (found, cost) = (other, less),
             _ => break,
         }

@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::part::{Part, Side};
-use super::separator::Separated;
+use super::part::{Part, Separated, Side};
 
 /// No vertex of a band.
 const NONE: u32 = u32::MAX;

@@ -17,6 +17,8 @@ pub struct Problem {
     pub model: Model,
     pub partition: Partition,
     pub b: Vec<f64>,
+    /// Nodes whose displacements are known.
+    pub held: [usize; 5],
 }
 
 impl Problem {
@@ -37,7 +39,7 @@ impl Problem {
         let used: Vec<bool> = (0..model.system_node_count()).map(|n| model.is_used(n)).collect();
         let partition = Partition::try_new(&used, &known)?;
         let b = (0..partition.unknown().len()).map(|i| (0.37 * i as f64).sin()).collect();
-        Ok(Self { nodes, model, partition, b })
+        Ok(Self { nodes, model, partition, b, held })
     }
 
     fn stiffness(&self) -> &Stiffness {

@@ -1,0 +1,10 @@
+//! Report `limits`: the factor over fronts against what the machine can do at most.
+
+mod before;
+mod product;
+mod report;
+mod request;
+mod round;
+mod several;
+
+pub use report::measure;
