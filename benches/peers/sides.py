@@ -63,7 +63,7 @@ def target():
 def build():
     """Builds both Rust programs; nothing if they are up to date."""
     run = ["cargo", "build", "--release", "--quiet"]
-    subprocess.run([*run, "--workspace", "--example", "peer"], cwd=ROOT, check=True)
+    subprocess.run([*run, "-p", "softgrasp-bench", "--example", "peer"], cwd=ROOT, check=True)
     rapier = {**os.environ, "CARGO_TARGET_DIR": str(HERE / "rapier" / "target")}
     subprocess.run([*run, "--locked"], cwd=HERE / "rapier", env=rapier, check=True)
 
