@@ -67,20 +67,23 @@ CLAIMS = (
     ("front-mixed, over the wire", "MKL Pardiso, single, refined in double", "21 frames"),
 )
 
-# Measured from outside, on a machine that this report does not run on.
+# Measured on a machine that this report does not run on today.
 ELSEWHERE = """
-### The same on a processor by Intel, quoted
+### The same on a processor by AMD, quoted
 
-Measured from outside on an Intel Xeon with AVX-512 (MKL and the processor are by one maker), order +
-factor in ms, in double precision, with other versions of both codes than above; `over Pardiso` below
-1 is in favour of `front`.
+The run of this report on an AMD EPYC, two cores, 24 GiB, 2026-11-23, with the order of METIS that
+`front` had then. All its pairs are in [peers-amd.csv](peers-amd.csv).
 
-| problem | front | Pardiso | over Pardiso |
-| :-- | --: | --: | --: |
-| cube 10648 | 45 + 313 | 82 + 234 | 1.13 |
-| cube 21952 | 101 + 989 | 183 + 854 | 1.05 |
-
-[peers-intel.csv](peers-intel.csv)
+| problem | what | ours | ms | theirs | ms | ours over theirs |
+| :-- | :-- | :-- | --: | :-- | --: | --: |
+| cube 10648 | one | front | 294 | MKL Pardiso | 519 | 0.546 |
+| cube 10648 | one | front-mixed | 197 | MKL Pardiso, single, refined in double | 435 | 0.449 |
+| cube 10648 | 21 | front | 69.7 | MKL Pardiso | 192 | 0.361 |
+| cube 10648 | 21 | front-mixed | 213 | MKL Pardiso, single, refined in double | 1.39e+03 | 0.159 |
+| cube 21952 | one | front | 1.12e+03 | MKL Pardiso | 2.38e+03 | 0.482 |
+| cube 21952 | one | front-mixed | 718 | MKL Pardiso, single, refined in double | 1.69e+03 | 0.424 |
+| cube 21952 | 21 | front | 167 | MKL Pardiso | 536 | 0.301 |
+| cube 21952 | 21 | front-mixed | 611 | MKL Pardiso, single, refined in double | 3.47e+03 | 0.175 |
 """
 
 

@@ -16,7 +16,7 @@ const NOT_FREE: u32 = u32::MAX;
 /// Units: places in parts of the body's largest extent.
 ///
 /// Source: thesis (3.41).
-pub(in crate::solve) struct NodeGraph {
+pub(crate) struct NodeGraph {
     pub nodes: Vec<u32>,
     pub places: Vec<[f32; 3]>,
     pub start: Vec<u32>,
@@ -26,10 +26,7 @@ pub(in crate::solve) struct NodeGraph {
 /// Order in which the rows of `K11` are eliminated: `order[new] = old`.
 ///
 /// Shapes: n rows of `K11`, a permutation of `0..n`.
-pub(in crate::solve) fn nested_dissection(
-    stiffness: &Stiffness,
-    partition: &Partition,
-) -> Vec<usize> {
+pub(crate) fn nested_dissection(stiffness: &Stiffness, partition: &Partition) -> Vec<usize> {
     let graph = NodeGraph::new(stiffness, partition);
     let mut order = Vec::with_capacity(partition.unknown().len());
     for vertex in graph.nested_dissection() {
