@@ -79,11 +79,11 @@ The run of this report on an AMD EPYC, two cores, 24 GiB, 2026-11-23, with the o
 | cube 10648 | one | front | 294 | MKL Pardiso | 519 | 0.546 |
 | cube 10648 | one | front-mixed | 197 | MKL Pardiso, single, refined in double | 435 | 0.449 |
 | cube 10648 | 21 | front | 69.7 | MKL Pardiso | 192 | 0.361 |
-| cube 10648 | 21 | front-mixed | 213 | MKL Pardiso, single, refined in double | 1.39e+03 | 0.159 |
-| cube 21952 | one | front | 1.12e+03 | MKL Pardiso | 2.38e+03 | 0.482 |
-| cube 21952 | one | front-mixed | 718 | MKL Pardiso, single, refined in double | 1.69e+03 | 0.424 |
+| cube 10648 | 21 | front-mixed | 213 | MKL Pardiso, single, refined in double | 1385 | 0.159 |
+| cube 21952 | one | front | 1121 | MKL Pardiso | 2378 | 0.482 |
+| cube 21952 | one | front-mixed | 718 | MKL Pardiso, single, refined in double | 1687 | 0.424 |
 | cube 21952 | 21 | front | 167 | MKL Pardiso | 536 | 0.301 |
-| cube 21952 | 21 | front-mixed | 611 | MKL Pardiso, single, refined in double | 3.47e+03 | 0.175 |
+| cube 21952 | 21 | front-mixed | 611 | MKL Pardiso, single, refined in double | 3472 | 0.175 |
 """
 
 

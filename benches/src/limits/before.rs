@@ -17,7 +17,7 @@ pub struct Rounds<'a> {
     pub singles: [&'a [Round]; 2],
 }
 
-/// The table of the issue this page answers, with a column `after`.
+/// Each stage of this size, as it was and as it is.
 ///
 /// Units: ms, but for the rates.
 ///

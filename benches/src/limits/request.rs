@@ -18,7 +18,7 @@ pub struct Files {
     known: PathBuf,
 }
 
-/// Milliseconds by stage of one request, and of all of the process.
+/// Milliseconds by stage of one request.
 pub struct Stages {
     pub assemble: f64,
     pub order: f64,

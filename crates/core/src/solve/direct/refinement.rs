@@ -4,9 +4,22 @@ use super::kernel::Kernel;
 use crate::solve::vectors::{norm, subtract};
 
 /// Refinement stops after this many steps in any case.
-pub(super) const REFINEMENT_STEPS_MAX: u32 = 3;
+const REFINEMENT_STEPS_MAX: u32 = 3;
 /// The same with a single-precision factor, which gains four to seven digits a step.
-pub(super) const REFINEMENT_STEPS_SINGLE_MAX: u32 = 8;
+const REFINEMENT_STEPS_SINGLE_MAX: u32 = 8;
+/// Refinement and conjugate gradients stop at this relative residual.
+pub(super) const RESIDUAL_GOOD: f64 = 1e-13;
+/// Refinement stops at this backward error; one step more would only move the last bits.
+const BACKWARD_ERROR_GOOD: f64 = 1e-13;
+
+/// Corrections that a kernel's answers are worth.
+pub(super) fn steps_max(kernel: &Kernel) -> u32 {
+    match kernel.is_single() {
+        true => REFINEMENT_STEPS_SINGLE_MAX,
+        // The first answer of a factor in double precision is as good as corrections make it.
+        false => REFINEMENT_STEPS_MAX,
+    }
+}
 
 /// How good an answer is.
 pub(super) struct Judged {
@@ -16,11 +29,21 @@ pub(super) struct Judged {
     pub off: f64,
 }
 
+impl Judged {
+    /// Units: both norms those of the right-hand side.
+    pub(super) fn new(backward_error: f64, residual_norm: f64, b_norm: f64) -> Self {
+        let backward = backward_error / BACKWARD_ERROR_GOOD;
+        let residual = residual_norm / (RESIDUAL_GOOD * b_norm);
+        let off = if residual_norm > 0.0 { backward.max(residual) } else { 0.0 };
+        Self { backward_error, off }
+    }
+}
+
 /// How fast the corrections of an answer by a single-precision factor shrink: a residual can be
 /// small while a smooth error, which makes little force, is not.
 ///
 /// Units: relative to the answer.
-pub(super) struct Shrinking {
+struct Shrinking {
     /// Size of the last correction.
     last: f64,
     /// What the next one would be, if it shrank as the last one did.
@@ -34,9 +57,9 @@ const CORRECTION_GOOD: f64 = 1e-13;
 
 impl Shrinking {
     /// Nothing is seen yet: at least one correction is made.
-    pub(super) const UNSEEN: Self = Self { last: 1.0, next: f64::INFINITY };
+    const UNSEEN: Self = Self { last: 1.0, next: f64::INFINITY };
 
-    pub(super) fn see(&mut self, size: f64) {
+    fn see(&mut self, size: f64) {
         self.next = match size < 0.5 * self.last {
             true => size * size / self.last,
             // It shrinks no more, or is no number.
@@ -47,28 +70,57 @@ impl Shrinking {
 
     /// Whether corrections that are still large shrink no more: the factor is that of another
     /// matrix.
-    pub(super) fn has_stalled(&self) -> bool {
+    fn has_stalled(&self) -> bool {
         self.next == 0.0 && !matches!(self.last, 0.0..=CORRECTION_STALLED)
     }
 
-    pub(super) fn is_done(&self) -> bool {
+    fn is_done(&self) -> bool {
         self.next <= CORRECTION_GOOD
     }
 }
 
-/// What became of a refinement.
-pub(super) struct Refined {
-    pub steps: u32,
-    /// What was found of the last `x`.
+/// The refinement of one answer, be it alone or among several.
+pub(super) struct Course {
+    /// What was found of the answer as it is.
     pub judged: Judged,
-    /// Corrections by a single-precision factor stayed large.
-    pub has_stalled: bool,
+    /// Corrections taken.
+    pub steps: u32,
+    /// Of a single-precision factor's corrections only.
+    shrinking: Option<Shrinking>,
 }
 
-impl Refined {
-    fn of(steps: u32, judged: Judged, shrinking: Option<&Shrinking>) -> Self {
-        let has_stalled = shrinking.is_some_and(Shrinking::has_stalled);
-        Self { steps, judged, has_stalled }
+impl Course {
+    pub(super) fn new(kernel: &Kernel, first: Judged) -> Self {
+        let shrinking = kernel.is_single().then_some(Shrinking::UNSEEN);
+        Self { judged: first, steps: 0, shrinking }
+    }
+
+    /// Whether the answer is good, and no further correction would change it.
+    pub(super) fn is_good(&self) -> bool {
+        self.judged.off <= 1.0 && self.shrinking.as_ref().is_none_or(Shrinking::is_done)
+    }
+
+    /// Looks at a correction and the answer with it; whether that one is taken.
+    ///
+    /// Units: `size_rel` relative to the answer.
+    pub(super) fn takes(&mut self, after: Judged, size_rel: impl FnOnce() -> f64) -> bool {
+        // Of good answers a single-precision factor's later one is taken; a NaN is refused too.
+        let mut enough = self.judged.off;
+        if let Some(shrinking) = &mut self.shrinking {
+            enough = enough.max(1.0);
+            shrinking.see(size_rel());
+        }
+        if after.off >= enough || after.off.is_nan() {
+            return false;
+        }
+        self.judged = after;
+        self.steps += 1;
+        true
+    }
+
+    /// Whether corrections by a single-precision factor stayed large.
+    pub(super) fn has_stalled(&self) -> bool {
+        self.shrinking.as_ref().is_some_and(Shrinking::has_stalled)
     }
 }
 
@@ -80,32 +132,22 @@ pub(super) fn refine(
     b: &[f64],
     x: &mut Vec<f64>,
     residual: &mut Vec<f64>,
-) -> Refined {
-    // The first answer of a factor in double precision is as good as corrections make it.
-    let (steps_max, mut shrinking) = match kernel.is_single() {
-        true => (REFINEMENT_STEPS_SINGLE_MAX, Some(Shrinking::UNSEEN)),
-        false => (REFINEMENT_STEPS_MAX, None),
-    };
-    let mut before = judge(x, residual);
-    for step in 0..steps_max {
-        if before.off <= 1.0 && shrinking.as_ref().is_none_or(Shrinking::is_done) {
-            return Refined::of(step, before, shrinking.as_ref());
+) -> Course {
+    let mut course = Course::new(kernel, judge(x, residual));
+    for _ in 0..steps_max(kernel) {
+        if course.is_good() {
+            break;
         }
         let correction = kernel.apply(residual.clone());
         let refined: Vec<f64> = x.iter().zip(&correction).map(|(x, c)| x + c).collect();
         let refined_residual = subtract(b, &apply(&refined));
         let after = judge(&refined, &refined_residual);
-        // Of good answers a single-precision factor's later one is taken; a NaN ends the loop too.
-        let enough = if shrinking.is_some() { before.off.max(1.0) } else { before.off };
-        if let Some(shrinking) = &mut shrinking {
-            shrinking.see(norm(&correction) / norm(&refined));
+        if !course.takes(after, || norm(&correction) / norm(&refined)) {
+            break;
         }
-        if after.off >= enough || after.off.is_nan() {
-            return Refined::of(step, before, shrinking.as_ref());
-        }
-        (*x, *residual, before) = (refined, refined_residual, after);
+        (*x, *residual) = (refined, refined_residual);
     }
-    Refined::of(steps_max, before, shrinking.as_ref())
+    course
 }
 
 /// `K11⁻¹ B` to a digit at least: by a factor in single precision refined until corrections are

@@ -4,8 +4,8 @@
 use super::error::SolveError;
 use super::factored::Factored;
 use super::kernel::{Kernel, norms};
-use super::refinement::{Judged, REFINEMENT_STEPS_MAX, REFINEMENT_STEPS_SINGLE_MAX, Shrinking};
-use super::solution::{BACKWARD_ERROR_GOOD, Loads, RESIDUAL_GOOD, Solution, check};
+use super::refinement::{Course, Judged, steps_max};
+use super::solution::{Loads, Solution, check};
 use crate::fem::{Products, Stiffness};
 use crate::solve::{Certainty, Method, Partition, Stage};
 
@@ -48,9 +48,7 @@ impl Factored {
         }
         Ok(solutions)
     }
-}
 
-impl Factored {
     /// The same, and how certain the least certain answer is. Where no digit of one by single
     /// precision is certain, double precision answers, as far as memory goes.
     ///
@@ -66,7 +64,7 @@ impl Factored {
         let certainty = self.least_certain(stiffness, &solutions);
         let is_older = solutions.iter().any(|solution| solution.fallback != self.fallback());
         let is_none = certainty.as_ref().is_some_and(Certainty::is_none);
-        if !is_older && (!is_none || !self.take_double(stiffness)) {
+        if !self.is_to_solve_again(stiffness, is_older, is_none) {
             return Ok((solutions, certainty));
         }
         let solutions = self.solve_several(stiffness, loads, on_stage)?;
@@ -101,10 +99,8 @@ struct Block<'a> {
 
 /// How far one answer is.
 struct State {
-    judged: Judged,
+    course: Course,
     residual_norm: f64,
-    shrinking: Option<Shrinking>,
-    steps: u32,
     is_done: bool,
 }
 
@@ -150,10 +146,6 @@ impl<'a> Block<'a> {
 
     /// Solves, and improves every answer until it is judged good or gets no better.
     fn refine(&mut self, kernel: &Kernel) {
-        let steps_max = match kernel.is_single() {
-            true => REFINEMENT_STEPS_SINGLE_MAX,
-            false => REFINEMENT_STEPS_MAX,
-        };
         let mut residual = self.residual();
         kernel.apply_to_rows(&mut residual, self.columns);
         self.add(&residual, &vec![true; self.columns]);
@@ -163,14 +155,13 @@ impl<'a> Block<'a> {
             .judge(&residual)
             .into_iter()
             .map(|(judged, residual_norm)| {
-                let shrinking = kernel.is_single().then_some(Shrinking::UNSEEN);
-                State { judged, residual_norm, shrinking, steps: 0, is_done: false }
+                let course = Course::new(kernel, judged);
+                State { course, residual_norm, is_done: false }
             })
             .collect();
-        for _ in 0..steps_max {
+        for _ in 0..steps_max(kernel) {
             for state in &mut self.states {
-                let is_small = state.shrinking.as_ref().is_none_or(Shrinking::is_done);
-                state.is_done |= state.judged.off <= 1.0 && is_small;
+                state.is_done |= state.course.is_good();
             }
             if self.states.iter().all(|state| state.is_done) {
                 return;
@@ -199,19 +190,12 @@ impl<'a> Block<'a> {
             if state.is_done {
                 continue;
             }
-            // As with one answer alone.
-            let off = state.judged.off;
-            let enough = if state.shrinking.is_some() { off.max(1.0) } else { off };
-            if let Some(shrinking) = &mut state.shrinking {
-                shrinking.see(sizes[j] / whole[j]);
-            }
-            if judged.off >= enough || judged.off.is_nan() {
+            if state.course.takes(judged, || sizes[j] / whole[j]) {
+                state.residual_norm = residual_norm;
+            } else {
                 state.is_done = true;
                 worse.push(j);
-                continue;
             }
-            (state.judged, state.residual_norm) = (judged, residual_norm);
-            state.steps += 1;
         }
         for j in worse {
             for k in (j..self.q.len()).step_by(self.columns) {
@@ -259,12 +243,7 @@ impl<'a> Block<'a> {
         let sizes = norms(residual, self.columns);
         let judged = backward.iter().zip(sizes).zip(&self.b_norms);
         judged
-            .map(|((&backward_error, size), b_norm)| {
-                let backward = backward_error / BACKWARD_ERROR_GOOD;
-                let off =
-                    if size > 0.0 { backward.max(size / (RESIDUAL_GOOD * b_norm)) } else { 0.0 };
-                (Judged { backward_error, off }, size)
-            })
+            .map(|((&backward, size), &b_norm)| (Judged::new(backward, size, b_norm), size))
             .collect()
     }
 
@@ -277,8 +256,7 @@ impl<'a> Block<'a> {
             .map(|j| {
                 let state = &self.states[j];
                 let displacement = column(&self.q, j);
-                let has_stalled = state.shrinking.as_ref().is_some_and(Shrinking::has_stalled);
-                if has_stalled || !displacement.iter().all(|q| q.is_finite()) {
+                if state.course.has_stalled() || !displacement.iter().all(|q| q.is_finite()) {
                     return None;
                 }
                 let forces = &self.products.forces;
@@ -291,9 +269,9 @@ impl<'a> Block<'a> {
                         true => state.residual_norm / b_norm,
                         false => state.residual_norm,
                     },
-                    backward_error: state.judged.backward_error,
+                    backward_error: state.course.judged.backward_error,
                     error_estimate_rel: None,
-                    refinement_steps: state.steps,
+                    refinement_steps: state.course.steps,
                     fallback: factored.fallback(),
                 })
             })

@@ -4,7 +4,7 @@ use super::error::SolveError;
 use super::factored::Factored;
 use super::fallback::Fallback;
 use super::kernel::Kernel;
-use super::refinement::{Judged, refine};
+use super::refinement::{Judged, RESIDUAL_GOOD, refine};
 use crate::fem::Stiffness;
 use crate::solve::certainty::{Certainty, backward_error};
 use crate::solve::k11::right_hand_side;
@@ -46,10 +46,6 @@ pub struct Solution {
     pub fallback: Option<Fallback>,
 }
 
-/// Refinement and conjugate gradients stop at this relative residual.
-pub(super) const RESIDUAL_GOOD: f64 = 1e-13;
-/// Refinement stops at this backward error; one step more would only move the last bits.
-pub(super) const BACKWARD_ERROR_GOOD: f64 = 1e-13;
 /// Refinement stops a little short of its goal where rounding does; that far short is as good.
 const SHORT_OF_GOAL: f64 = 10.0;
 /// Conjugate gradients stop after this many steps in any case.
@@ -97,12 +93,23 @@ impl Factored {
         let certainty = solution.certainty(self, stiffness);
         // The certainty may itself have found out that single precision does not do.
         let is_older = self.fallback() != solution.fallback;
-        if !is_older && (!certainty.is_none() || !self.take_double(stiffness)) {
+        if !self.is_to_solve_again(stiffness, is_older, certainty.is_none()) {
             return Ok((solution, certainty));
         }
         let solution = self.solve(stiffness, loads, on_stage)?;
         let certainty = solution.certainty(self, stiffness);
         Ok((solution, certainty))
+    }
+
+    /// Whether there is a better factor than the one an answer is of: since the answer (`is_older`), or
+    /// now, because no digit of it is certain (`is_none`).
+    pub(super) fn is_to_solve_again(
+        &self,
+        stiffness: &Stiffness,
+        is_older: bool,
+        is_none: bool,
+    ) -> bool {
+        is_older || (is_none && self.take_double(stiffness))
     }
 
     /// An answer by one factor or inverse, and whether refinement came to its goal.
@@ -127,15 +134,13 @@ impl Factored {
         let mut judge = |x: &[f64], residual: &[f64]| {
             partition.scatter_unknown(x, &mut q);
             let backward_error = backward_error(stiffness, partition, &q, residual, loads.forces);
-            let (backward, size) = (backward_error / BACKWARD_ERROR_GOOD, norm(residual));
-            let off = if size > 0.0 { backward.max(size / (RESIDUAL_GOOD * b_norm)) } else { 0.0 };
-            Judged { backward_error, off }
+            Judged::new(backward_error, norm(residual), b_norm)
         };
         let (mut refinement_steps, mut judged, mut is_right) = (0, None, true);
         if !stops_early {
             let refined = refine(kernel, &apply, &mut judge, &b, &mut x, &mut residual);
+            is_right = !refined.has_stalled();
             (refinement_steps, judged) = (refined.steps, Some(refined.judged));
-            is_right = !refined.has_stalled;
         }
         // A single-precision factor that refinement cannot use any more still preconditions well.
         let goal = RESIDUAL_GOOD.max(loads.residual_rel);

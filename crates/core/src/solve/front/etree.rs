@@ -169,23 +169,6 @@ pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Graph from an edge list.
-    pub fn graph(count: usize, edges: &[(u32, u32)]) -> NodeGraph {
-        let mut rows = vec![std::collections::BTreeSet::new(); count];
-        for &(a, b) in edges.iter().filter(|(a, b)| a != b) {
-            rows[a as usize].insert(b);
-            rows[b as usize].insert(a);
-        }
-        let mut start = vec![0];
-        let mut neighbours = Vec::new();
-        for row in rows {
-            neighbours.extend(row);
-            start.push(neighbours.len() as u32);
-        }
-        let places = vec![[0.0; 3]; count];
-        NodeGraph { nodes: (0..count as u32).collect(), places, start, neighbours }
-    }
-
     /// Elimination on the filled graph, column by column.
     pub fn eliminate(graph: &NodeGraph, order: &[u32]) -> Vec<Vec<usize>> {
         let position = inverse(order);
@@ -216,7 +199,7 @@ pub(super) mod tests {
         ) {
             let edges: Vec<_> =
                 edges.into_iter().map(|(a, b)| (a % count as u32, b % count as u32)).collect();
-            let graph = graph(count, &edges);
+            let graph = NodeGraph::from_edges(count, &edges);
             let mut order: Vec<u32> = (0..count as u32).collect();
             order.sort_by_key(|&v| (u64::from(v) + 1).wrapping_mul(seed * 2 + 1) % 101);
             let tree = EliminationTree::new(&graph, order);

@@ -256,7 +256,7 @@ pub(super) fn flops(s: f64, m: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::etree::tests::{eliminate, graph};
+    use super::super::etree::tests::eliminate;
     use super::*;
     use proptest::prelude::*;
 
@@ -268,7 +268,7 @@ mod tests {
         ) {
             let count = count as u32;
             let edges: Vec<_> = edges.into_iter().map(|(a, b)| (a % count, b % count)).collect();
-            let graph = graph(count as usize, &edges);
+            let graph = NodeGraph::from_edges(count as usize, &edges);
             let tree = EliminationTree::new(&graph, (0..count).collect());
             let supernodes = Supernodes::new(&graph, &tree);
             prop_assert_eq!(*supernodes.start.last().unwrap(), count);

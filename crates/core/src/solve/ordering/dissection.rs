@@ -46,23 +46,13 @@ fn dissect_into(part: Part, order: &mut [u32]) {
 mod tests {
     use proptest::prelude::*;
 
-    use super::*;
+    use super::super::NodeGraph;
 
-    /// A graph from its edges; `place` of each vertex.
-    fn part(count: usize, edges: &[(u32, u32)], place: impl Fn(usize) -> [f32; 3]) -> Part {
-        let mut rows = vec![std::collections::BTreeSet::new(); count];
-        for &(a, b) in edges.iter().filter(|(a, b)| a != b) {
-            rows[a as usize].insert(b);
-            rows[b as usize].insert(a);
-        }
-        let mut start = vec![0];
-        let mut neighbours = Vec::new();
-        for row in rows {
-            neighbours.extend(row);
-            start.push(neighbours.len() as u32);
-        }
-        let places = (0..count).map(place).collect();
-        Part { vertices: (0..count as u32).collect(), start, neighbours, places }
+    /// Order of a graph of edges; `place` of each vertex.
+    fn order(count: usize, edges: &[(u32, u32)], place: impl Fn(usize) -> [f32; 3]) -> Vec<u32> {
+        let mut graph = NodeGraph::from_edges(count, edges);
+        graph.places = (0..count).map(place).collect();
+        graph.nested_dissection()
     }
 
     fn is_permutation(order: &[u32]) -> bool {
@@ -84,7 +74,7 @@ mod tests {
                 .collect();
             // With a coarse step many lie at the same place, with none all.
             let coarse = |x: f32| if step > 0.0 { (x / step).round() * step } else { 0.0 };
-            let order = dissect(part(count, &edges, |v| places[v].map(coarse)));
+            let order = order(count, &edges, |v| places[v].map(coarse));
             prop_assert!(is_permutation(&order));
         }
     }
@@ -104,7 +94,7 @@ mod tests {
             (&Vec::new(), &in_a_row),
             (&path, &|_| [0.0; 3]),
         ] {
-            assert!(is_permutation(&dissect(part(count, edges, place))));
+            assert!(is_permutation(&order(count, edges, place)));
         }
     }
 }

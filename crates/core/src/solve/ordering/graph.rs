@@ -64,6 +64,24 @@ impl NodeGraph {
         Self { nodes, places, start, neighbours }
     }
 
+    /// Graph from an edge list; each vertex is a node, all at one place.
+    #[cfg(test)]
+    pub fn from_edges(count: usize, edges: &[(u32, u32)]) -> Self {
+        let mut rows = vec![std::collections::BTreeSet::new(); count];
+        for &(a, b) in edges.iter().filter(|(a, b)| a != b) {
+            rows[a as usize].insert(b);
+            rows[b as usize].insert(a);
+        }
+        let mut start = vec![0];
+        let mut neighbours = Vec::new();
+        for row in rows {
+            neighbours.extend(row);
+            start.push(neighbours.len() as u32);
+        }
+        let places = vec![[0.0; 3]; count];
+        Self { nodes: (0..count as u32).collect(), places, start, neighbours }
+    }
+
     /// Number of vertices.
     pub fn len(&self) -> usize {
         self.nodes.len()
