@@ -4,7 +4,7 @@
 use super::Real;
 use super::etree::{EliminationTree, NONE, inverse};
 use super::runs;
-use super::slabs::Slabs;
+use super::slabs::{BlockSlabs, Slabs};
 use super::supernodes::{Supernodes, flops};
 use crate::fem::{AXES, Stiffness, dof};
 use crate::solve::ordering::NodeGraph;
@@ -51,6 +51,8 @@ pub(super) struct Front {
     pub children: Vec<u32>,
     /// Where the contribution rows lie in the parent.
     pub runs: Vec<Run>,
+    /// Contribution rows that the parent eliminates; they come first.
+    pub eliminated: usize,
     /// First front of the subtree.
     pub subtree_first: u32,
     /// Work of the subtree.
@@ -107,9 +109,14 @@ impl Front {
         self.size - self.pivots
     }
 
-    /// How it lies in memory.
+    /// How its panel lies in memory.
     pub fn slabs<T: Real>(&self) -> Slabs {
         Slabs::new::<T>(self.pivots, self.rest())
+    }
+
+    /// How its contribution block lies in memory.
+    pub fn block_slabs<T: Real>(&self) -> BlockSlabs {
+        BlockSlabs::new::<T>(self.rest(), self.eliminated)
     }
 
     /// Entries of the factor, explicit zeros of merged fronts included.
@@ -229,7 +236,10 @@ impl FrontAnalysis {
             for child in std::mem::take(&mut self.fronts[v].children) {
                 let rows = supernodes.rows(child as usize);
                 let placed = rows.iter().map(|&i| (local[i as usize], width(i)));
-                self.fronts[child as usize].runs = runs(placed, pivots);
+                let runs = runs(placed, pivots);
+                let eliminated = runs.iter().filter(|run| run.parent < pivots).map(|run| run.len);
+                let front = &mut self.fronts[child as usize];
+                (front.eliminated, front.runs) = (eliminated.sum::<u32>() as usize, runs);
                 self.fronts[v].children.push(child);
             }
         }
@@ -278,9 +288,10 @@ impl FrontAnalysis {
         self.most::<T>(|front| front.slabs::<T>().panel_len())
     }
 
-    /// Most numbers at once, where a front keeps some and its block goes with its parent.
+    /// Most numbers at once, where a front keeps some and its block goes with its parent: the columns
+    /// that the parent eliminates before its own block is there, the others after that.
     fn most<T: Real>(&self, kept_by: impl Fn(&Front) -> usize) -> usize {
-        let block = |v: usize| self.fronts[v].slabs::<T>().block_len();
+        let block = |v: usize| self.fronts[v].block_slabs::<T>();
         let mut most = vec![0usize; self.fronts.len()];
         let mut kept: Vec<usize> = self.fronts.iter().map(kept_by).collect();
         for (v, front) in self.fronts.iter().enumerate() {
@@ -292,7 +303,7 @@ impl FrontAnalysis {
                     let mut below = 0;
                     for c in children() {
                         below = below.max(waiting + most[c]);
-                        waiting += kept[c] + block(c);
+                        waiting += kept[c] + block(c).len();
                     }
                     below
                 }
@@ -300,7 +311,9 @@ impl FrontAnalysis {
                 false => children().map(|c| most[c]).sum(),
             };
             kept[v] += children().map(|c| kept[c]).sum::<usize>();
-            most[v] = below.max(kept[v] + children().map(block).sum::<usize>() + block(v));
+            let eliminated = children().map(|c| block(c).eliminated_len()).sum::<usize>();
+            let passed_on = children().map(|c| block(c).passed_on_len()).sum::<usize>();
+            most[v] = below.max(kept[v] + passed_on + eliminated.max(block(v).len()));
         }
         self.roots.iter().map(|&v| most[v as usize]).sum()
     }

@@ -6,12 +6,13 @@ use pulp::{Simd, WithSimd};
 
 use super::Real;
 use super::analysis::{Entries, Front, Run};
+use super::blocks::Block;
 use super::slabs::Slabs;
 use crate::fem::{AXES, Stiffness};
 
 /// A child's contribution block on its way into the parent's front.
-pub(super) struct Contribution<'a, T> {
-    values: &'a [T],
+pub(super) struct Contribution<T> {
+    pub block: Block<T>,
     pieces: Vec<Piece>,
     /// Pieces whose rows are pivots of the parent come first; this many.
     to_pivots: usize,
@@ -24,9 +25,9 @@ struct Piece {
     len: usize,
 }
 
-impl<'a, T: Real> Contribution<'a, T> {
-    /// Shapes: `values` the child's block; `parent` the shape of the front it goes into.
-    pub fn new(values: &'a [T], runs: &[Run], parent: Slabs) -> Self {
+impl<T: Real> Contribution<T> {
+    /// Shapes: `parent` the shape of the front it goes into.
+    pub fn new(block: Block<T>, runs: &[Run], parent: Slabs) -> Self {
         let height = parent.height;
         let mut pieces = Vec::with_capacity(2 * runs.len());
         for run in runs {
@@ -41,19 +42,19 @@ impl<'a, T: Real> Contribution<'a, T> {
             }
         }
         let to_pivots = pieces.partition_point(|piece| piece.parent < parent.pivots);
-        Self { values, pieces, to_pivots }
+        Self { block, pieces, to_pivots }
     }
 }
 
 /// Adds all children's contributions to some slabs of a panel, in the children's order.
-pub(super) struct AddToPanel<'a, 'b, T> {
+pub(super) struct AddToPanel<'a, T> {
     pub panel: &'a mut [T],
     pub range: Range<usize>,
     pub slabs: Slabs,
-    pub children: &'a [Contribution<'b, T>],
+    pub children: &'a [Contribution<T>],
 }
 
-impl<T: Real> WithSimd for AddToPanel<'_, '_, T> {
+impl<T: Real> WithSimd for AddToPanel<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -68,7 +69,7 @@ impl<T: Real> WithSimd for AddToPanel<'_, '_, T> {
                 let row = &child.pieces[k];
                 let into = &mut panel[slabs.panel_row(row.parent) - start..];
                 let columns = &child.pieces[..child.to_pivots.min(k + 1)];
-                add_row(simd, into, child.values, row, columns, 0, height);
+                add_row(simd, into, &child.block, row, columns, 0);
             }
         }
     }
@@ -76,34 +77,30 @@ impl<T: Real> WithSimd for AddToPanel<'_, '_, T> {
 
 /// Adds all children's contributions to a square of the contribution block, in their order.
 ///
-/// Shapes: `rows` the square's part of each slab, the first one slab `row`; its first column is that
-/// of slab `column`.
+/// Shapes: `rows` the square's part of each slab, the first one slab `row`; its columns are those of
+/// the slabs `columns`.
 #[inline(always)]
 pub(super) fn add_to_tile<S: Simd, T: Real>(
     simd: S,
     rows: &mut [&mut [T]],
-    (row, column): (usize, usize),
+    (row, columns): (usize, &Range<usize>),
     slabs: Slabs,
-    children: &[Contribution<'_, T>],
+    children: &[Contribution<T>],
 ) {
     let height = slabs.height;
     for child in children {
         let pieces = &child.pieces[child.to_pivots..];
         let slab_of = |piece: &Piece| (piece.parent - slabs.pivots) / height;
         let before = |slab: usize| pieces.partition_point(|piece| slab_of(piece) < slab);
-        let columns = before(column)..before(column + TILE_SLABS);
+        let tile = before(columns.start)..before(columns.end);
         for k in before(row)..before(row + rows.len()) {
             let piece = &pieces[k];
             let into = &mut rows[slab_of(piece) - row][(piece.parent - slabs.pivots) % height..];
-            let columns = &pieces[columns.start..columns.end.min(k + 1)];
-            let first = slabs.pivots + column * height;
-            add_row(simd, into, child.values, piece, columns, first, height);
+            let own = &pieces[tile.start..tile.end.min(k + 1)];
+            add_row(simd, into, &child.block, piece, own, slabs.pivots + columns.start * height);
         }
     }
 }
-
-/// Slabs of a square of the contribution block.
-pub(super) const TILE_SLABS: usize = 8;
 
 /// Adds the rows of one piece, the columns of those before it and its own lower triangle.
 ///
@@ -113,19 +110,18 @@ pub(super) const TILE_SLABS: usize = 8;
 fn add_row<S: Simd, T: Real>(
     simd: S,
     into: &mut [T],
-    values: &[T],
+    block: &Block<T>,
     row: &Piece,
     columns: &[Piece],
     first: usize,
-    height: usize,
 ) {
-    let slab = row.child / height;
-    let values = &values[slab * (slab + 1) / 2 * height * height + row.child % height..];
+    let height = block.shape.height;
     for column in columns {
         let is_own = column.child == row.child;
+        let values = &block.columns(row.child / height, column.child)[row.child % height..];
         for j in 0..column.len {
             let top = if is_own { j } else { 0 };
-            let from = &values[(column.child + j) * height..][top..row.len];
+            let from = &values[j * height..][top..row.len];
             let into = &mut into[(column.parent - first + j) * height..][top..row.len];
             T::add_onto(simd, into, from);
         }

@@ -4,6 +4,31 @@ use std::sync::{Mutex, PoisonError};
 
 use super::Real;
 use super::lines::Lines;
+use super::slabs::BlockSlabs;
+
+/// A front's contribution block on its way to the parent.
+///
+/// Shapes: as `shape` says.
+#[derive(Default)]
+pub(super) struct Block<T> {
+    pub shape: BlockSlabs,
+    /// Columns that the parent eliminates; empty as soon as its panel is filled.
+    pub eliminated: Lines<T>,
+    /// Columns that the parent passes on.
+    pub passed_on: Lines<T>,
+}
+
+impl<T: Real> Block<T> {
+    /// A column of a slab and those behind it that lie in the same piece of memory.
+    #[inline(always)]
+    pub fn columns(&self, slab: usize, column: usize) -> &[T] {
+        let (shape, height) = (self.shape, self.shape.height);
+        match column.checked_sub(shape.cut * height) {
+            None => &self.eliminated[shape.eliminated_start(slab) + column * height..],
+            Some(column) => &self.passed_on[shape.passed_on_start(slab) + column * height..],
+        }
+    }
+}
 
 /// Blocks that wait for the next front, within what a factor may hold.
 ///
@@ -27,8 +52,14 @@ impl<T: Real> Blocks<T> {
         Self { limit, state: Mutex::new(State { idle: Vec::new(), held: 0 }) }
     }
 
+    /// Memory for a contribution block, with anything in it.
+    pub fn block(&self, shape: BlockSlabs) -> Block<T> {
+        let eliminated = self.take(shape.eliminated_len());
+        Block { shape, eliminated, passed_on: self.take(shape.passed_on_len()) }
+    }
+
     /// Memory for at least `len` numbers, with anything in it.
-    pub fn take(&self, len: usize) -> Lines<T> {
+    fn take(&self, len: usize) -> Lines<T> {
         if len == 0 {
             return Lines::default();
         }
@@ -37,7 +68,14 @@ impl<T: Real> Blocks<T> {
             .filter(|&k| state.idle[k].len() >= len)
             .min_by_key(|&k| state.idle[k].len());
         if let Some(k) = fitting {
-            return state.idle.swap_remove(k);
+            let mut block = state.idle.swap_remove(k);
+            state.held -= block.len();
+            let given_up = state.make_room(len, self.limit);
+            drop(state);
+            drop(given_up);
+            // What is lent counts in full, and the limit counts only what is needed.
+            block.shorten(len);
+            return block;
         }
         let given_up = state.make_room(len, self.limit);
         // The system may take its time for both.
@@ -75,6 +113,7 @@ impl<T: Real> State<T> {
             given_up.push(idle);
         }
         self.held += len;
+        debug_assert!(self.held <= limit, "{} numbers where {limit} were planned", self.held);
         given_up
     }
 }
@@ -84,17 +123,25 @@ mod tests {
     use super::*;
 
     #[test]
+    #[should_panic(expected = "numbers where 48 were planned")]
+    #[cfg(debug_assertions)]
+    fn more_than_was_planned_is_noticed() {
+        let blocks = Blocks::<f64>::new(48);
+        let _lent = (blocks.take(8), blocks.take(48));
+    }
+
+    #[test]
     fn the_smallest_that_fits_is_lent_again_and_others_go_when_the_limit_is_reached() {
         let blocks = Blocks::<f64>::new(48);
+        let held = || blocks.state.lock().unwrap().held;
         let (small, large) = (blocks.take(8), blocks.take(32));
         blocks.give_back(large);
         blocks.give_back(small);
-        assert_eq!(blocks.take(5).len(), 8);
-        let large = blocks.take(16);
-        assert_eq!(large.len(), 32, "a larger one is better than a new one");
-        blocks.give_back(large);
-        assert_eq!(blocks.take(40).len(), 40);
-        assert_eq!(blocks.state.lock().unwrap().held, 48, "the one of 32 is gone");
+        assert_eq!((blocks.take(8).len(), held()), (8, 40));
+        let shorter = blocks.take(16);
+        assert_eq!((shorter.len(), held()), (16, 24), "what is lent and not needed is given up");
+        blocks.give_back(shorter);
+        assert_eq!((blocks.take(40).len(), held()), (40, 48), "the one of 16 is gone");
         assert!(blocks.take(0).is_empty());
     }
 }

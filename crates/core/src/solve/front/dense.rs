@@ -7,7 +7,8 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Real;
-use super::assembly::{Contribution, TILE_SLABS, add_to_tile};
+use super::assembly::{Contribution, add_to_tile};
+use super::blocks::Block;
 use super::kernel::{Factors, Onto, divide_by_square, factor_square, subtract_product};
 use super::slabs::Slabs;
 
@@ -15,6 +16,8 @@ use super::slabs::Slabs;
 const FACTORED_SLABS: usize = 4;
 /// Slabs of a task.
 pub(super) const TASK_SLABS: usize = 8;
+/// Slabs of a square of the contribution block.
+const TILE_SLABS: usize = 8;
 /// Products summed before the next slab is taken: what is used again stays in the nearest caches.
 const DEPTH: usize = 128;
 
@@ -172,45 +175,58 @@ impl<T: Real> WithSimd for FactorBelow<'_, '_, T> {
 /// `−L21 L21ᵀ` and the children's contributions into the contribution block; what was there is not
 /// read.
 ///
-/// Shapes: `contribution` and `panel` as `slabs` says.
+/// Shapes: `panel` as `slabs` says; the block is that of the panel's rest.
 pub(super) fn form_contribution<T: Real>(
-    contribution: &mut [T],
+    contribution: &mut Block<T>,
     panel: &[T],
     slabs: Slabs,
-    children: &[Contribution<'_, T>],
+    children: &[Contribution<T>],
     tasks: Tasks,
 ) {
     let arch = Arch::new();
-    let square = slabs.height * slabs.height;
     let l21 = &panel[slabs.start(slabs.pivot_slabs())..];
-    let count = slabs.rest_slabs();
-    let mut tiles: Vec<Tile<'_, '_, T>> = Vec::new();
-    let mut rest = contribution;
-    for i in 0..count {
-        let (row, after) = rest.split_at_mut((i + 1) * square);
-        rest = after;
-        let (group, is_first) = (i / TILE_SLABS, i % TILE_SLABS == 0);
-        let before = group * (group + 1) / 2;
-        for (j, part) in row.chunks_mut(TILE_SLABS * square).enumerate() {
-            if is_first {
-                let at = (group * TILE_SLABS, j * TILE_SLABS);
-                tiles.push(Tile { l21, slabs, at, children, rows: Vec::new() });
-            }
-            tiles[before + j].rows.push(part);
-        }
+    let mut tiles = Vec::new();
+    for (at, rows) in squares_of(contribution) {
+        tiles.push(Tile { l21, slabs, at, children, rows });
     }
     // The tiles on the diagonal are half the work and come last.
-    tiles.sort_by_key(|tile| tile.at.0 == tile.at.1);
+    tiles.sort_by_key(|tile| tile.at.0 == tile.at.1.start);
     tasks.run(tiles, |tile| arch.dispatch(tile));
+}
+
+/// A contribution block in squares of a few slabs, which do not cross the cut between its pieces:
+/// first slab of the rows, slabs of the columns, and their part of each row.
+fn squares_of<T: Real>(block: &mut Block<T>) -> Vec<((usize, Range<usize>), Vec<&mut [T]>)> {
+    let Block { shape, eliminated, passed_on } = block;
+    let square = shape.height * shape.height;
+    let cut =
+        (0..shape.cut).step_by(TILE_SLABS).chain((shape.cut..shape.slabs).step_by(TILE_SLABS));
+    let starts: Vec<usize> = cut.chain([shape.slabs]).collect();
+    let (mut eliminated, mut passed_on) = (&mut eliminated[..], &mut passed_on[..]);
+    let mut squares = Vec::new();
+    for (group, rows) in starts.windows(2).enumerate() {
+        let first = squares.len();
+        for columns in starts.windows(2).take(group + 1) {
+            squares.push(((rows[0], columns[0]..columns[1]), Vec::new()));
+        }
+        for row in rows[0]..rows[1] {
+            for (at, parts) in &mut squares[first..] {
+                let len = square * (at.1.end.min(row + 1) - at.1.start);
+                let piece = if at.1.start < shape.cut { &mut eliminated } else { &mut passed_on };
+                parts.push(piece.split_off_mut(..len).unwrap_or_default());
+            }
+        }
+    }
+    squares
 }
 
 /// A square of a contribution block.
 struct Tile<'a, 'b, T> {
     l21: &'a [T],
     slabs: Slabs,
-    /// First slab of its rows and of its columns.
-    at: (usize, usize),
-    children: &'a [Contribution<'a, T>],
+    /// First slab of its rows, and slabs of its columns.
+    at: (usize, Range<usize>),
+    children: &'a [Contribution<T>],
     rows: Vec<&'b mut [T]>,
 }
 
@@ -221,13 +237,14 @@ impl<T: Real> WithSimd for Tile<'_, '_, T> {
     fn with_simd<S: Simd>(mut self, simd: S) {
         let (height, square) = (T::SLAB, T::SLAB * T::SLAB);
         let whole = self.slabs.pivots * height;
+        let (first, columns) = &self.at;
         for from in (0..whole).step_by(DEPTH * height) {
             let to = whole.min(from + DEPTH * height);
             let onto = if from == 0 { Onto::Zero } else { Onto::There };
-            for j in 0..TILE_SLABS {
-                for (i, row) in self.rows.iter_mut().enumerate() {
-                    let Some(into) = row.chunks_exact_mut(square).nth(j) else { continue };
-                    let (i, j) = (self.at.0 + i, self.at.1 + j);
+            for j in columns.clone() {
+                for (i, row) in (*first..).zip(self.rows.iter_mut()) {
+                    let into = row.chunks_exact_mut(square).nth(j - columns.start);
+                    let Some(into) = into else { continue };
                     let a = &self.l21[i * whole + from..i * whole + to];
                     let b = &self.l21[j * whole + from..j * whole + to];
                     let b = Factors::Rows { strips: b, first: 0 };
@@ -236,12 +253,14 @@ impl<T: Real> WithSimd for Tile<'_, '_, T> {
             }
         }
         // The tile is in the nearest caches now.
-        add_to_tile(simd, &mut self.rows, self.at, self.slabs, self.children);
+        add_to_tile(simd, &mut self.rows, (*first, columns), self.slabs, self.children);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::blocks::Blocks;
+    use super::super::slabs::BlockSlabs;
     use super::*;
 
     /// A symmetric matrix, diagonally dominant, column-major.
@@ -278,7 +297,10 @@ mod tests {
         panel
     }
 
-    fn agrees_with_plain_elimination<T: Real>(size: usize, pivots: usize, good: f64) {
+    fn agrees_with_plain_elimination<T: Real>(
+        (size, pivots, eliminated): (usize, usize, usize),
+        good: f64,
+    ) {
         let slabs = Slabs::new::<T>(pivots, size - pivots);
         let height = slabs.height;
         let whole = symmetric(size);
@@ -288,7 +310,10 @@ mod tests {
         for tasks in [Tasks::Serial, Tasks::Parallel] {
             let mut panel = panel_of::<T>(&whole, slabs);
             factor_panel(&mut panel, slabs, tasks).unwrap();
-            let mut block = vec![T::from_f64(f64::NAN); slabs.block_len()];
+            let mut block =
+                Blocks::new(usize::MAX).block(BlockSlabs::new::<T>(slabs.rest, eliminated));
+            block.eliminated.fill(T::from_f64(f64::NAN));
+            block.passed_on.fill(T::from_f64(f64::NAN));
             form_contribution(&mut block, &panel, slabs, &[], tasks);
             for j in 0..pivots {
                 for i in j..size {
@@ -300,7 +325,7 @@ mod tests {
                 for i in j..slabs.rest {
                     let at = i + pivots + size * (j + pivots);
                     let expected = plain[at] - whole[at];
-                    let found = block[slabs.block_start(i / height) + j * height + i % height];
+                    let found = block.columns(i / height, j)[i % height];
                     assert!((found.to_f64() - expected).abs() < good, "({i}, {j}) of {size}");
                 }
             }
@@ -313,7 +338,8 @@ mod tests {
                     last.chunks(height).all(|strip| strip[rest..].iter().all(|x| *x == T::ZERO))
                 );
             }
-            let bits: Vec<u64> = panel.iter().chain(&block).map(|x| x.to_f64().to_bits()).collect();
+            let numbers = panel.iter().chain(&block.eliminated[..]).chain(&block.passed_on[..]);
+            let bits: Vec<u64> = numbers.map(|x| x.to_f64().to_bits()).collect();
             assert!(first.get_or_insert_with(|| bits.clone()) == &bits);
         }
     }
@@ -321,19 +347,20 @@ mod tests {
     #[test]
     fn panel_and_contribution_equal_plain_elimination_around_the_sizes_of_slabs() {
         let sizes = [
-            (1, 1),
-            (5, 2),
-            (24, 24),
-            (25, 24),
-            (97, 96),
-            (130, 128),
-            (129, 129),
-            (400, 150),
-            (460, 7),
+            (1, 1, 0),
+            (5, 2, 3),
+            (24, 24, 0),
+            (25, 24, 1),
+            (97, 96, 0),
+            (130, 128, 2),
+            (129, 129, 0),
+            (400, 150, 100),
+            (460, 7, 230),
+            (460, 7, 453),
         ];
-        for (size, pivots) in sizes {
-            agrees_with_plain_elimination::<f64>(size, pivots, 1e-10);
-            agrees_with_plain_elimination::<f32>(size, pivots, 1e-2);
+        for shape in sizes {
+            agrees_with_plain_elimination::<f64>(shape, 1e-10);
+            agrees_with_plain_elimination::<f32>(shape, 1e-2);
         }
     }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::Real;
 use super::analysis::{Front, FrontAnalysis};
 use super::assembly::{AddToPanel, Contribution, add_entries};
-use super::blocks::Blocks;
+use super::blocks::{Block, Blocks};
 use super::dense::{TASK_SLABS, Tasks, factor_panel, form_contribution};
 use super::lines::Lines;
 use super::slabs::Slabs;
@@ -105,7 +105,7 @@ impl<T: Real> Run<'_, T> {
         heads: &[u32],
         first: usize,
         panels: &mut [Lines<T>],
-    ) -> Result<Vec<Lines<T>>, FrontError> {
+    ) -> Result<Vec<Block<T>>, FrontError> {
         let mut rest = panels;
         let mut start = first;
         let mut tasks = Vec::with_capacity(heads.len());
@@ -116,13 +116,13 @@ impl<T: Real> Run<'_, T> {
             rest = tail;
         }
         // Every subtree is finished before an error is looked at, so that it is always the same.
-        let done: Vec<Result<Lines<T>, FrontError>> =
+        let done: Vec<Result<Block<T>, FrontError>> =
             tasks.into_par_iter().map(|(head, panels)| self.subtree(head, panels)).collect();
         done.into_iter().collect()
     }
 
     /// Factors one subtree; returns the contribution block of its head.
-    fn subtree(&self, head: usize, panels: &mut [Lines<T>]) -> Result<Lines<T>, FrontError> {
+    fn subtree(&self, head: usize, panels: &mut [Lines<T>]) -> Result<Block<T>, FrontError> {
         let fronts = &self.analysis.fronts;
         if fronts[head].is_serial() {
             return self.serial(head, panels);
@@ -144,10 +144,10 @@ impl<T: Real> Run<'_, T> {
     }
 
     /// Factors a subtree front by front.
-    fn serial(&self, head: usize, panels: &mut [Lines<T>]) -> Result<Lines<T>, FrontError> {
+    fn serial(&self, head: usize, panels: &mut [Lines<T>]) -> Result<Block<T>, FrontError> {
         let fronts = &self.analysis.fronts;
         let first = fronts[head].subtree_first as usize;
-        let mut waiting: Vec<Lines<T>> = Vec::new();
+        let mut waiting: Vec<Block<T>> = Vec::new();
         for (v, panel) in (first..=head).zip(panels) {
             let children = waiting.split_off(waiting.len() - fronts[v].children.len());
             waiting.push(self.front(v, panel, children, Tasks::Serial)?);
@@ -160,9 +160,9 @@ impl<T: Real> Run<'_, T> {
         &self,
         v: usize,
         panel: &mut Lines<T>,
-        handed: Vec<Lines<T>>,
+        handed: Vec<Block<T>>,
         tasks: Tasks,
-    ) -> Result<Lines<T>, FrontError> {
+    ) -> Result<Block<T>, FrontError> {
         let front = &self.analysis.fronts[v];
         let slabs = front.slabs::<T>();
         // What the system hands out is zero.
@@ -170,22 +170,19 @@ impl<T: Real> Run<'_, T> {
         if is_clear {
             *panel = self.blocks.keep(slabs.panel_len());
         }
-        let children: Vec<Contribution<'_, T>> = front
-            .children
-            .iter()
-            .zip(&handed)
-            .map(|(&child, values)| {
-                Contribution::new(values, &self.analysis.fronts[child as usize].runs, slabs)
-            })
-            .collect();
+        let runs = |child: u32| &self.analysis.fronts[child as usize].runs;
+        let handed = front.children.iter().zip(handed);
+        let mut children: Vec<Contribution<T>> =
+            handed.map(|(&child, block)| Contribution::new(block, runs(child), slabs)).collect();
         fill_panel((&mut *panel, is_clear), slabs, &children, tasks);
+        for child in &mut children {
+            self.blocks.give_back(std::mem::take(&mut child.block.eliminated));
+        }
         add_entries(panel, front, slabs, &self.analysis.entries, self.stiffness);
         factor_panel(panel, slabs, tasks).map_err(|pivot| self.not_positive(front, pivot))?;
-        let mut own = self.blocks.take(slabs.block_len());
-        let block = &mut own[..slabs.block_len()];
-        form_contribution(block, panel, slabs, &children, tasks);
-        drop(children);
-        handed.into_iter().for_each(|block| self.blocks.give_back(block));
+        let mut own = self.blocks.block(front.block_slabs::<T>());
+        form_contribution(&mut own, panel, slabs, &children, tasks);
+        children.into_iter().for_each(|child| self.blocks.give_back(child.block.passed_on));
         Ok(own)
     }
 
@@ -198,7 +195,7 @@ impl<T: Real> Run<'_, T> {
 fn fill_panel<T: Real>(
     (panel, is_clear): (&mut [T], bool),
     slabs: Slabs,
-    children: &[Contribution<'_, T>],
+    children: &[Contribution<T>],
     tasks: Tasks,
 ) {
     let mut parts = Vec::with_capacity(slabs.panel_slabs().div_ceil(TASK_SLABS));

@@ -31,6 +31,12 @@ impl<T: Real> Lines<T> {
     pub fn zeros(len: usize) -> Self {
         Self { lines: bytemuck::zeroed_vec(count::<T>(len)), numbers: PhantomData }
     }
+
+    /// Gives the memory behind so many numbers back to the system.
+    pub fn shorten(&mut self, len: usize) {
+        self.lines.truncate(count::<T>(len));
+        self.lines.shrink_to_fit();
+    }
 }
 
 /// Lines that so many numbers take.

@@ -2,17 +2,18 @@
 //!
 //! ```text
 //! panel                       contribution block
-//! slab 0   ┌─┐                ┌─┐
-//! slab 1   │ └─┐              │ └─┐
-//! slab 2   │   └┐ pivots      │   └─┐
-//!          ├────┤             └─────┘
-//! slab 3   │    │ rest
+//! slab 0   ┌─┐                ┌─┐             columns that the parent
+//! slab 1   │ └─┐              │ └─┐           ↙ eliminates
+//! slab 2   │   └┐ pivots      │   ├─┐           ↙ passes on
+//!          ├────┤             │   │ └─┐
+//! slab 3   │    │ rest        └───┴───┘
 //! slab 4   └────┘
 //! ```
 //!
 //! The kernels read a slab from its first column to its last without a step, for both sides of a
 //! product, so nothing is packed; and what lies above the diagonal is stored inside the squares on
-//! it only.
+//! it only. A contribution block is two pieces of memory: the columns that the parent eliminates are
+//! needed until its panel is filled, the others until its own contribution block is formed.
 
 use super::Real;
 
@@ -70,16 +71,6 @@ impl Slabs {
         self.start(self.panel_slabs())
     }
 
-    /// Where a slab of the contribution block begins.
-    pub fn block_start(self, slab: usize) -> usize {
-        slab * (slab + 1) / 2 * self.height.pow(2)
-    }
-
-    /// Numbers of the contribution block.
-    pub fn block_len(self) -> usize {
-        self.block_start(self.rest_slabs())
-    }
-
     /// Row of the front, counted with the zero rows between pivots and rest.
     pub fn padded(self, row: usize) -> usize {
         match row.checked_sub(self.pivots) {
@@ -100,6 +91,53 @@ impl Slabs {
     }
 }
 
+/// Shape of a front's contribution block.
+///
+/// Shapes: `slabs` slabs of rows, each with the columns up to its square on the diagonal; the
+/// columns of the first `cut` slabs are those that the parent eliminates.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BlockSlabs {
+    /// Rows of a slab.
+    pub height: usize,
+    pub slabs: usize,
+    pub cut: usize,
+}
+
+impl BlockSlabs {
+    /// Shapes: `rest` rows, of which the parent eliminates the first `eliminated`; those that fill
+    /// no slab of their own count as passed on.
+    pub fn new<T: Real>(rest: usize, eliminated: usize) -> Self {
+        Self { height: T::SLAB, slabs: rest.div_ceil(T::SLAB), cut: eliminated / T::SLAB }
+    }
+
+    /// Where a slab begins among the columns that the parent eliminates.
+    pub fn eliminated_start(self, slab: usize) -> usize {
+        let (triangle, below) = (slab.min(self.cut), slab.saturating_sub(self.cut));
+        (triangle * (triangle + 1) / 2 + below * self.cut) * self.height.pow(2)
+    }
+
+    /// Where a slab begins among the columns that the parent passes on.
+    pub fn passed_on_start(self, slab: usize) -> usize {
+        let slab = slab.saturating_sub(self.cut);
+        slab * (slab + 1) / 2 * self.height.pow(2)
+    }
+
+    /// Numbers of the columns that the parent eliminates.
+    pub fn eliminated_len(self) -> usize {
+        self.eliminated_start(self.slabs)
+    }
+
+    /// Numbers of the columns that the parent passes on.
+    pub fn passed_on_len(self) -> usize {
+        self.passed_on_start(self.slabs)
+    }
+
+    /// Numbers of both.
+    pub fn len(self) -> usize {
+        self.eliminated_len() + self.passed_on_len()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,13 +153,25 @@ mod tests {
                     assert!(!std::mem::replace(&mut seen[at], true), "({row}, {column})");
                 }
             }
-            let mut seen = vec![false; slabs.block_len()];
+        }
+    }
+
+    #[test]
+    fn every_entry_of_a_contribution_block_has_a_place_of_its_own() {
+        for (rest, eliminated) in [(1, 0), (1, 1), (24, 24), (25, 24), (97, 30), (97, 73), (97, 97)]
+        {
+            let block = BlockSlabs::new::<f64>(rest, eliminated);
+            let mut seen =
+                [vec![false; block.eliminated_len()], vec![false; block.passed_on_len()]];
             for row in 0..rest {
-                for column in 0..=row {
-                    let at = slabs.block_start(row / slabs.height)
-                        + column * slabs.height
-                        + row % slabs.height;
-                    assert!(!std::mem::replace(&mut seen[at], true), "({row}, {column})");
+                let (slab, row) = (row / block.height, row % block.height);
+                for column in 0..=slab * block.height + row {
+                    let at = match column.checked_sub(block.cut * block.height) {
+                        None => block.eliminated_start(slab) + column * block.height,
+                        Some(column) => block.passed_on_start(slab) + column * block.height,
+                    };
+                    let seen = &mut seen[usize::from(column >= block.cut * block.height)];
+                    assert!(!std::mem::replace(&mut seen[at + row], true), "({row}, {column})");
                 }
             }
         }
