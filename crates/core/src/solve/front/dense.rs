@@ -185,75 +185,81 @@ pub(super) fn form_contribution<T: Real>(
 ) {
     let arch = Arch::new();
     let l21 = &panel[slabs.start(slabs.pivot_slabs())..];
-    let mut tiles = Vec::new();
-    for (at, rows) in squares_of(contribution) {
-        tiles.push(Tile { l21, slabs, at, children, rows });
-    }
+    let mut tiles = tiles_of(contribution);
     // The tiles on the diagonal are half the work and come last.
-    tiles.sort_by_key(|tile| tile.at.0 == tile.at.1.start);
-    tasks.run(tiles, |tile| arch.dispatch(tile));
+    tiles.sort_by_key(|tile| tile.first == tile.columns.start);
+    tasks.run(tiles, |tile| arch.dispatch(FormTile { l21, slabs, children, tile }));
 }
 
-/// A contribution block in squares of a few slabs, which do not cross the cut between its pieces:
-/// first slab of the rows, slabs of the columns, and their part of each row.
-fn squares_of<T: Real>(block: &mut Block<T>) -> Vec<((usize, Range<usize>), Vec<&mut [T]>)> {
+/// A square of a contribution block.
+struct Tile<'a, T> {
+    /// First slab of its rows.
+    first: usize,
+    /// Slabs of its columns.
+    columns: Range<usize>,
+    /// Its part of each slab of rows.
+    rows: Vec<&'a mut [T]>,
+}
+
+/// A contribution block in squares of a few slabs, which do not cross the cut between its pieces.
+fn tiles_of<T: Real>(block: &mut Block<T>) -> Vec<Tile<'_, T>> {
     let Block { shape, eliminated, passed_on } = block;
     let square = shape.height * shape.height;
     let cut =
         (0..shape.cut).step_by(TILE_SLABS).chain((shape.cut..shape.slabs).step_by(TILE_SLABS));
     let starts: Vec<usize> = cut.chain([shape.slabs]).collect();
     let (mut eliminated, mut passed_on) = (&mut eliminated[..], &mut passed_on[..]);
-    let mut squares = Vec::new();
+    let mut tiles = Vec::new();
     for (group, rows) in starts.windows(2).enumerate() {
-        let first = squares.len();
+        let before = tiles.len();
         for columns in starts.windows(2).take(group + 1) {
-            squares.push(((rows[0], columns[0]..columns[1]), Vec::new()));
+            tiles.push(Tile { first: rows[0], columns: columns[0]..columns[1], rows: Vec::new() });
         }
         for row in rows[0]..rows[1] {
-            for (at, parts) in &mut squares[first..] {
-                let len = square * (at.1.end.min(row + 1) - at.1.start);
-                let piece = if at.1.start < shape.cut { &mut eliminated } else { &mut passed_on };
-                parts.push(piece.split_off_mut(..len).unwrap_or_default());
+            for Tile { columns, rows, .. } in &mut tiles[before..] {
+                let len = square * (columns.end.min(row + 1) - columns.start);
+                let is_eliminated = columns.start < shape.cut;
+                let piece = if is_eliminated { &mut eliminated } else { &mut passed_on };
+                rows.push(piece.split_off_mut(..len).unwrap_or_default());
             }
         }
     }
-    squares
+    tiles
 }
 
-/// A square of a contribution block.
-struct Tile<'a, 'b, T> {
+/// `−L21 L21ᵀ` and the children's contributions into one square.
+struct FormTile<'a, 'b, T> {
     l21: &'a [T],
     slabs: Slabs,
-    /// First slab of its rows, and slabs of its columns.
-    at: (usize, Range<usize>),
     children: &'a [Contribution<T>],
-    rows: Vec<&'b mut [T]>,
+    tile: Tile<'b, T>,
 }
 
-impl<T: Real> WithSimd for Tile<'_, '_, T> {
+impl<T: Real> WithSimd for FormTile<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { l21, slabs, children, tile } = self;
+        let Tile { first, columns, mut rows } = tile;
         let (height, square) = (T::SLAB, T::SLAB * T::SLAB);
-        let whole = self.slabs.pivots * height;
-        let (first, columns) = &self.at;
+        let whole = slabs.pivots * height;
         for from in (0..whole).step_by(DEPTH * height) {
             let to = whole.min(from + DEPTH * height);
             let onto = if from == 0 { Onto::Zero } else { Onto::There };
             for j in columns.clone() {
-                for (i, row) in (*first..).zip(self.rows.iter_mut()) {
+                for (i, row) in (first..).zip(rows.iter_mut()) {
                     let into = row.chunks_exact_mut(square).nth(j - columns.start);
                     let Some(into) = into else { continue };
-                    let a = &self.l21[i * whole + from..i * whole + to];
-                    let b = &self.l21[j * whole + from..j * whole + to];
+                    let a = &l21[i * whole + from..i * whole + to];
+                    let b = &l21[j * whole + from..j * whole + to];
                     let b = Factors::Rows { strips: b, first: 0 };
                     subtract_product(simd, (into, onto), a, b, height, height);
                 }
             }
         }
         // The tile is in the nearest caches now.
-        add_to_tile(simd, &mut self.rows, (*first, columns), self.slabs, self.children);
+        add_to_tile(simd, &mut rows, (first, &columns), slabs, children);
     }
 }
 
