@@ -23,19 +23,31 @@ impl Stiffness {
     ///
     /// Shapes: `q` 3N × `columns`, the numbers of one degree of freedom next to each other.
     pub(crate) fn mul_columns(&self, q: &[f64], columns: usize) -> Products {
-        assert_eq!(q.len(), AXES * self.node_count() * columns, "displacements do not fit");
         let (mut forces, mut sizes) = (vec![0.0; q.len()], vec![0.0; q.len()]);
-        if columns > 0 {
-            let arch = Arch::new();
-            let task = TASK_NODES * AXES * columns;
-            forces.par_chunks_mut(task).zip(sizes.par_chunks_mut(task)).enumerate().for_each(
-                |(k, (forces, sizes))| {
-                    let first = k * TASK_NODES;
-                    arch.dispatch(Rows { stiffness: self, first, q, columns, forces, sizes });
-                },
-            );
-        }
+        let task = self.task_len(q, columns);
+        let (arch, tasks) = (Arch::new(), sizes.par_chunks_mut(task));
+        forces.par_chunks_mut(task).zip(tasks).enumerate().for_each(|(k, (forces, sizes))| {
+            let first = k * TASK_NODES;
+            arch.dispatch(Rows { stiffness: self, first, q, columns, forces, sizes: Some(sizes) });
+        });
         Products { forces, sizes }
+    }
+
+    /// `K q` alone, with the same bits, in the place of what `forces` held.
+    ///
+    /// Shapes: as [`Stiffness::mul_columns`].
+    pub(crate) fn forces_of_columns(&self, q: &[f64], columns: usize, forces: &mut [f64]) {
+        assert_eq!(forces.len(), q.len(), "forces do not fit");
+        let (arch, task) = (Arch::new(), self.task_len(q, columns));
+        forces.par_chunks_mut(task).enumerate().for_each(|(k, forces)| {
+            let first = k * TASK_NODES;
+            arch.dispatch(Rows { stiffness: self, first, q, columns, forces, sizes: None });
+        });
+    }
+
+    fn task_len(&self, q: &[f64], columns: usize) -> usize {
+        assert_eq!(q.len(), AXES * self.node_count() * columns, "displacements do not fit");
+        TASK_NODES * AXES * columns.max(1)
     }
 }
 
@@ -46,7 +58,7 @@ struct Rows<'a> {
     q: &'a [f64],
     columns: usize,
     forces: &'a mut [f64],
-    sizes: &'a mut [f64],
+    sizes: Option<&'a mut [f64]>,
 }
 
 impl WithSimd for Rows<'_> {
@@ -54,18 +66,21 @@ impl WithSimd for Rows<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let of_node = AXES * self.columns;
-        let nodes = self.forces.chunks_exact_mut(of_node).zip(self.sizes.chunks_exact_mut(of_node));
-        for (k, (forces, sizes)) in nodes.enumerate() {
-            let row = Row { stiffness: self.stiffness, node: self.first + k, q: self.q };
-            let mut from = 0;
-            while from < self.columns {
-                let at = (from, self.columns);
-                from += match self.columns - from {
-                    8.. => row.some_columns::<8>(at, forces, sizes),
-                    4.. => row.some_columns::<4>(at, forces, sizes),
-                    _ => row.some_columns::<1>(at, forces, sizes),
-                };
+        let Self { stiffness, first, q, columns, forces, sizes } = self;
+        let of_node = AXES * columns;
+        let row = |k: usize| Row { stiffness, node: first + k, q, columns };
+        match sizes {
+            Some(sizes) => {
+                let sizes = sizes.chunks_exact_mut(of_node);
+                for (k, (forces, sizes)) in forces.chunks_exact_mut(of_node).zip(sizes).enumerate()
+                {
+                    row(k).all_columns::<true>(forces, sizes);
+                }
+            }
+            None => {
+                for (k, forces) in forces.chunks_exact_mut(of_node).enumerate() {
+                    row(k).all_columns::<false>(forces, &mut []);
+                }
             }
         }
     }
@@ -76,35 +91,54 @@ struct Row<'a> {
     stiffness: &'a Stiffness,
     node: usize,
     q: &'a [f64],
+    columns: usize,
 }
 
 impl Row<'_> {
+    #[inline(always)]
+    fn all_columns<const SIZES: bool>(&self, forces: &mut [f64], sizes: &mut [f64]) {
+        let mut from = 0;
+        while from < self.columns {
+            from += match self.columns - from {
+                24.. => self.some_columns::<24, SIZES>(from, forces, sizes),
+                16.. => self.some_columns::<16, SIZES>(from, forces, sizes),
+                8.. => self.some_columns::<8, SIZES>(from, forces, sizes),
+                _ => self.some_columns::<1, SIZES>(from, forces, sizes),
+            };
+        }
+    }
+
     /// W columns, whose sums stay in registers; returns W.
     #[inline(always)]
-    fn some_columns<const W: usize>(
+    fn some_columns<const W: usize, const SIZES: bool>(
         &self,
-        (from, columns): (usize, usize),
+        from: usize,
         forces: &mut [f64],
         sizes: &mut [f64],
     ) -> usize {
         let (mut force, mut size) = ([[0.0; W]; AXES], [[0.0; W]; AXES]);
         for (other, block) in self.stiffness.row(self.node) {
             for c in 0..AXES {
-                let at = (AXES * other + c) * columns + from;
+                let at = (AXES * other + c) * self.columns + from;
                 let q = &self.q[at..at + W];
                 for a in 0..AXES {
                     let entry = block[AXES * a + c];
                     for w in 0..W {
-                        force[a][w] += entry * q[w];
-                        size[a][w] += (entry * q[w]).abs();
+                        let product = entry * q[w];
+                        force[a][w] += product;
+                        if SIZES {
+                            size[a][w] += product.abs();
+                        }
                     }
                 }
             }
         }
         for a in 0..AXES {
-            let at = a * columns + from;
+            let at = a * self.columns + from;
             forces[at..at + W].copy_from_slice(&force[a]);
-            sizes[at..at + W].copy_from_slice(&size[a]);
+            if SIZES {
+                sizes[at..at + W].copy_from_slice(&size[a]);
+            }
         }
         W
     }

@@ -2,6 +2,7 @@
 
 mod certainty;
 pub mod choose;
+mod columns;
 pub mod condensed;
 mod definite;
 mod direct;

@@ -15,7 +15,7 @@ pub(super) fn norm(v: &[f64]) -> f64 {
 }
 
 /// Sums of squares in which nothing that matters was lost below or above the range of a double.
-const SAFE_SQUARES: std::ops::Range<f64> = 1e-200..1e200;
+pub(super) const SAFE_SQUARES: std::ops::Range<f64> = 1e-200..1e200;
 /// Sums that run beside each other: always as many, so that the bits are always the same.
 const SUMS: usize = 8;
 

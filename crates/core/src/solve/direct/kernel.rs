@@ -1,5 +1,7 @@
 //! What a direct method makes of `K11`: an explicit inverse or a factor, and products with it.
 
+use crate::solve::Partition;
+use crate::solve::columns::norms;
 use crate::solve::front::FrontFactor;
 use crate::solve::gauss_jordan;
 use crate::solve::sparse::SparseFactor;
@@ -67,24 +69,18 @@ impl Kernel {
         matches!(self, Self::Front(_) | Self::FrontSingle(_))
     }
 
-    /// `K11⁻¹ B` in place with the numbers of one row next to each other; B as it is for a kernel
-    /// that is no factor over fronts.
+    /// `K11⁻¹ B` with the numbers of one row next to each other, into `x`, whose known rows become
+    /// zero; `x` as it is for a kernel that is no factor over fronts.
     ///
-    /// Shapes: `b` n × `columns` row-major.
-    pub fn apply_to_rows(&self, b: &mut [f64], columns: usize) {
+    /// Shapes: `b` and `x` 3N × `columns` row-major; known rows of `b` are not read, but must be zero
+    /// or small beside the others.
+    pub fn apply_to_rows(&self, b: &[f64], x: &mut [f64], columns: usize, partition: &Partition) {
         match self {
-            Self::Front(factor) => factor.solve_rows_in_place(b, columns),
+            Self::Front(factor) => factor.solve_rows((b, x), &vec![1.0; columns], partition),
             Self::FrontSingle(factor) => {
                 // Scaled as in `apply`.
-                let scales: Vec<f64> = norms(b, columns).iter().map(|s| safe_scale(*s)).collect();
-                let scale = |b: &mut [f64], by: &dyn Fn(f64) -> f64| {
-                    for row in b.chunks_exact_mut(columns) {
-                        row.iter_mut().zip(&scales).for_each(|(b, s)| *b *= by(*s));
-                    }
-                };
-                scale(b, &|s| 1.0 / s);
-                factor.solve_rows_in_place(b, columns);
-                scale(b, &|s| s);
+                let scales: Vec<f64> = norms(b, columns).into_iter().map(safe_scale).collect();
+                factor.solve_rows((b, x), &scales, partition);
             }
             _ => {}
         }
@@ -124,11 +120,4 @@ impl Kernel {
 /// A scale that can be divided by.
 fn safe_scale(norm: f64) -> f64 {
     if norm > 0.0 && norm.is_finite() { norm } else { 1.0 }
-}
-
-/// Euclidean norms of the columns of numbers that stand row by row.
-pub(super) fn norms(rows: &[f64], columns: usize) -> Vec<f64> {
-    (0..columns)
-        .map(|j| norm(&rows.iter().skip(j).step_by(columns).copied().collect::<Vec<f64>>()))
-        .collect()
 }

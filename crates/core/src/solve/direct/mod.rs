@@ -1,6 +1,8 @@
 //! One interface to all direct methods: factor a partition once, then solve for many loads.
 
 mod analysed;
+mod block;
+mod direction;
 mod error;
 mod factored;
 mod fallback;

@@ -43,7 +43,7 @@ impl Judged {
 /// small while a smooth error, which makes little force, is not.
 ///
 /// Units: relative to the answer.
-struct Shrinking {
+pub(super) struct Shrinking {
     /// Size of the last correction.
     last: f64,
     /// What the next one would be, if it shrank as the last one did.
@@ -57,9 +57,9 @@ const CORRECTION_GOOD: f64 = 1e-13;
 
 impl Shrinking {
     /// Nothing is seen yet: at least one correction is made.
-    const UNSEEN: Self = Self { last: 1.0, next: f64::INFINITY };
+    pub(super) const UNSEEN: Self = Self { last: 1.0, next: f64::INFINITY };
 
-    fn see(&mut self, size: f64) {
+    pub(super) fn see(&mut self, size: f64) {
         self.next = match size < 0.5 * self.last {
             true => size * size / self.last,
             // It shrinks no more, or is no number.
@@ -70,16 +70,16 @@ impl Shrinking {
 
     /// Whether corrections that are still large shrink no more: the factor is that of another
     /// matrix.
-    fn has_stalled(&self) -> bool {
+    pub(super) fn has_stalled(&self) -> bool {
         self.next == 0.0 && !matches!(self.last, 0.0..=CORRECTION_STALLED)
     }
 
-    fn is_done(&self) -> bool {
+    pub(super) fn is_done(&self) -> bool {
         self.next <= CORRECTION_GOOD
     }
 }
 
-/// The refinement of one answer, be it alone or among several.
+/// The refinement of one answer.
 pub(super) struct Course {
     /// What was found of the answer as it is.
     pub judged: Judged,

@@ -1,5 +1,6 @@
 //! Loads, and the displacements and reactions that they cause.
 
+use super::block::Block;
 use super::error::SolveError;
 use super::factored::Factored;
 use super::fallback::Fallback;
@@ -120,14 +121,21 @@ impl Factored {
         loads: Loads<'_>,
     ) -> Result<(Solution, bool), SolveError> {
         let (partition, method) = (self.partition(), self.method());
+        let is_single = kernel.is_single();
+        let stops_early = is_single && method == Method::Pcg;
+        let goal = RESIDUAL_GOOD.max(loads.residual_rel);
+        if is_single && !stops_early {
+            let found = Block::solve(partition, stiffness, kernel, &[loads], self.fallback()).pop();
+            if let Some(solution) = found.flatten().filter(|found| found.residual_rel <= goal) {
+                return Ok((solution, true));
+            }
+        }
         let b = right_hand_side(stiffness, partition, loads.q_known, loads.forces);
         let b_norm = norm(&b);
         let mut q = vec![0.0; partition.dof_count()];
         for (&dof, &value) in partition.known().iter().zip(loads.q_known) {
             q[dof as usize] = value;
         }
-        let is_single = kernel.is_single();
-        let stops_early = is_single && method == Method::Pcg;
         let mut x = if stops_early { vec![0.0; b.len()] } else { kernel.apply(b.clone()) };
         let apply = |x: &[f64]| self.apply_k11(stiffness, x);
         let mut residual = subtract(&b, &apply(&x));
@@ -143,7 +151,6 @@ impl Factored {
             (refinement_steps, judged) = (refined.steps, Some(refined.judged));
         }
         // A single-precision factor that refinement cannot use any more still preconditions well.
-        let goal = RESIDUAL_GOOD.max(loads.residual_rel);
         let mut error_estimate_rel = None;
         if is_single && norm(&residual) > goal * b_norm {
             // Without an error to reach the residual decides alone.

@@ -7,9 +7,13 @@ use super::analysis::{Front, FrontAnalysis};
 use super::lines::Lines;
 use super::substitute::{Panel, width};
 use super::{FrontFactor, Real};
+use crate::solve::Partition;
 
 /// Subtrees whose panels times right-hand sides are below this are not split into tasks.
 const SERIAL_PRODUCTS: usize = 400_000;
+
+/// Rows that a task takes into the order of elimination or out of it.
+const TASK_ROWS: usize = 256;
 
 /// Which fronts a solve passes through; both sets are closed towards the roots.
 struct Paths {
@@ -44,19 +48,47 @@ impl<T: Real> FrontFactor<T> {
         }
     }
 
-    /// The same with the numbers of one row next to each other.
+    /// Solves `K11 X = B` for the unknown rows of B with the numbers of one row next to each other; X
+    /// is zero on the other rows.
     ///
-    /// Shapes: `b` n × `columns` row-major.
+    /// Shapes: `b` and `x` 3N × columns row-major; `scales` one number for each column, which it is
+    /// divided by on the way through the factor; `partition` the one that was analysed.
     ///
     /// # Panics
-    /// If `b` does not hold n × `columns` numbers.
-    pub fn solve_rows_in_place(&self, b: &mut [f64], columns: usize) {
-        assert_eq!(b.len(), self.analysis.row_count() * columns, "the factor has other rows");
+    /// If the partition has other rows than the factor, or `b` and `x` do not fit it.
+    pub fn solve_rows(&self, (b, x): (&[f64], &mut [f64]), scales: &[f64], partition: &Partition) {
+        let (analysis, columns) = (&*self.analysis, scales.len());
+        assert_eq!(analysis.row_count(), partition.unknown().len(), "the factor has other rows");
+        assert_eq!((b.len(), x.len()), (partition.dof_count() * columns, b.len()), "other rows");
         for first in (0..columns).step_by(T::SLAB) {
-            let some = T::SLAB.min(columns - first);
-            let mut x = self.strips(some, |row, j| b[row * columns + first + j]);
-            self.solve_ordered(&mut x, width::<T>(some), &self.all_paths());
-            self.each_number(&x, some, |row, j, x| b[row * columns + first + j] = x);
+            let some = first..columns.min(first + T::SLAB);
+            let width = width::<T>(some.len());
+            let by: Vec<f64> = scales[some.clone()].iter().map(|scale| scale.recip()).collect();
+            let mut strips = Lines::<T>::zeros(analysis.row_count() * width);
+            let rows = analysis.order.par_chunks(TASK_ROWS);
+            strips.par_chunks_mut(TASK_ROWS * width).zip(rows).for_each(|(strips, rows)| {
+                for (strip, &row) in strips.chunks_exact_mut(width).zip(rows) {
+                    let b =
+                        &b[partition.unknown()[row as usize] as usize * columns..][some.clone()];
+                    let scaled = b.iter().zip(&by).map(|(b, by)| T::from_f64(b * by));
+                    strip.iter_mut().zip(scaled).for_each(|(strip, b)| *strip = b);
+                }
+            });
+            self.solve_ordered(&mut strips, width, &self.all_paths());
+            x.par_chunks_mut(TASK_ROWS * columns).enumerate().for_each(|(k, rows)| {
+                for (i, x) in rows.chunks_exact_mut(columns).enumerate() {
+                    let Some(row) = partition.row_of(k * TASK_ROWS + i) else {
+                        x[some.clone()].fill(0.0);
+                        continue;
+                    };
+                    let strip = &strips[analysis.position[row] as usize * width..][..some.len()];
+                    for ((x, strip), scale) in
+                        x[some.clone()].iter_mut().zip(strip).zip(&scales[some.clone()])
+                    {
+                        *x = strip.to_f64() * scale;
+                    }
+                }
+            });
         }
     }
 
