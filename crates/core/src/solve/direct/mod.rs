@@ -1,5 +1,6 @@
 //! One interface to all direct methods: factor a partition once, then solve for many loads.
 
+mod alone;
 mod analysed;
 mod block;
 mod direction;

@@ -19,12 +19,15 @@ pub(super) struct Reader {
     pub(super) pieces: usize,
     /// Arrival of the last piece of each device.
     pub(super) last: [Option<Instant>; 2],
+    /// Longest time between two pieces of a device since its first record.
+    pub(super) longest_gap: Duration,
 }
 
 impl Reader {
     pub(super) fn of(devices: SerialDevices, glove: GloveParser, format: FastrakFormat) -> Self {
         let tracker = FastrakParser::new(format);
-        Self { devices, glove, tracker, numbers: Vec::new(), pieces: 0, last: [None; 2] }
+        let (numbers, longest_gap) = (Vec::new(), Duration::ZERO);
+        Self { devices, glove, tracker, numbers, pieces: 0, last: [None; 2], longest_gap }
     }
 
     pub(super) fn of_glove(devices: SerialDevices, count: SensorCount) -> Self {
@@ -41,6 +44,9 @@ impl Reader {
         for arrived in self.devices.take() {
             let last = &mut self.last[usize::from(arrived.device == Device::Tracker)];
             assert!(last.is_none_or(|last| last <= arrived.arrived));
+            if let (Some(last), false) = (*last, numbers.is_empty()) {
+                self.longest_gap = self.longest_gap.max(arrived.arrived - last);
+            }
             *last = Some(arrived.arrived);
             self.pieces += 1;
             match arrived.device {
@@ -59,6 +65,24 @@ impl Reader {
                 }),
                 Device::Joints => panic!("nobody sends joints over a serial line"),
             }
+        }
+    }
+
+    /// Reads until something holds, or nothing has come for so long; whether it holds.
+    pub(super) fn within(&mut self, quiet: Duration, holds: impl Fn(&Self) -> bool) -> bool {
+        let (mut pieces, mut since) = (self.pieces, Instant::now());
+        loop {
+            self.read();
+            if holds(self) {
+                return true;
+            }
+            if self.pieces > pieces {
+                (pieces, since) = (self.pieces, Instant::now());
+            }
+            if since.elapsed() > quiet {
+                return false;
+            }
+            std::thread::sleep(Duration::from_millis(5));
         }
     }
 
