@@ -157,8 +157,8 @@ const COLUMNS: [&str; 17] = [
 
 const INTRODUCTION: &str = "\
 `K11` of cubes of linear tetrahedra, five nodes known, factored over fronts. `product_gflops` is the \
-rate of faer's product of two matrices of 1500 rows on the same threads, measured in the same round \
-just before; `over_product` is the factor's rate over it. `first` is the first factor of a pattern, \
+best rate of five products of two matrices of 1500 rows by faer on the same threads, measured in the \
+same round just before; `over_product` is the factor's rate over it. `first` is the first factor of a pattern, \
 whose memory the system hands out page by page; `again` the same with other values in the memory that \
 is there, as in every step at large deformation; the rates are of that. `solve` is one right-hand side. \
 `peak` is the most that can be held while a factor is made, on any number of threads, the factor \
