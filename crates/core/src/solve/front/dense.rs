@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::Real;
 use super::assembly::{Contribution, add_to_tile};
 use super::blocks::Block;
-use super::kernel::{Factors, Onto, divide_by_square, factor_square, subtract_product};
+use super::kernel::{DEPTH, Factors, Onto, divide_by_square, factor_square, subtract_product};
 use super::slabs::Slabs;
 
 /// Slabs of pivots that are factored together.
@@ -18,8 +18,6 @@ const FACTORED_SLABS: usize = 4;
 pub(super) const TASK_SLABS: usize = 8;
 /// Slabs of a square of the contribution block.
 const TILE_SLABS: usize = 8;
-/// Products summed before the next slab is taken: what is used again stays in the nearest caches.
-const DEPTH: usize = 128;
 
 /// Whether the slabs of a front are tasks or one after another.
 #[derive(Clone, Copy, PartialEq)]

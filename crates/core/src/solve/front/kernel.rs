@@ -7,8 +7,20 @@ use pulp::Simd;
 
 use super::Real;
 
-/// Vectors of a strip that stay in registers together.
+/// Vectors of a strip that stay in registers together, where there are 32.
 const VECTORS_MAX: usize = 3;
+
+/// Strips of both factors that stay in the nearest cache together: 24 of 32 KiB.
+pub(super) const DEPTH: usize = 64;
+
+/// Columns that are computed at once.
+///
+/// 3 vectors × 8 columns fill 24 of 32 registers, 2 × 6 fill 12 of 16. Compilers move sums of 3 × 4
+/// through memory, because all 16 registers have a number in them then, which halves the rate.
+#[inline(always)]
+const fn columns_at_once<S: Simd>() -> usize {
+    if S::REGISTER_COUNT >= 32 { 8 } else { 6 }
+}
 
 /// The second factor of a product, B of `C − A B`.
 #[derive(Clone, Copy)]
@@ -45,11 +57,9 @@ pub(super) fn subtract_product<S: Simd, T: Real>(
     while from < columns {
         let part = &mut into[from * width..];
         let b = b.from(from);
-        // 3 vectors × 8 columns fill 24 of 32 registers, 3 × 4 fill 12 of 16.
-        from += match columns - from {
-            8.. if S::REGISTER_COUNT >= 32 => {
-                some_columns::<S, T, 8>(simd, (part, onto), a, b, width)
-            }
+        from += match columns_at_once::<S>().min(columns - from) {
+            8.. => some_columns::<S, T, 8>(simd, (part, onto), a, b, width),
+            6.. => some_columns::<S, T, 6>(simd, (part, onto), a, b, width),
             4.. => some_columns::<S, T, 4>(simd, (part, onto), a, b, width),
             2.. => some_columns::<S, T, 2>(simd, (part, onto), a, b, width),
             _ => some_columns::<S, T, 1>(simd, (part, onto), a, b, width),
@@ -85,8 +95,12 @@ fn some_columns<S: Simd, T: Real, const N: usize>(
     while from < strip {
         let into = (&mut *into, onto);
         from += match strip - from {
-            VECTORS_MAX.. => part::<S, T, N, VECTORS_MAX>(simd, into, a, b, (strip, from)),
-            2 => part::<S, T, N, 2>(simd, into, a, b, (strip, from)),
+            // One column reads A once: from first to last byte.
+            6.. if N == 1 => part::<S, T, N, 6>(simd, into, a, b, (strip, from)),
+            VECTORS_MAX.. if S::REGISTER_COUNT >= 32 => {
+                part::<S, T, N, VECTORS_MAX>(simd, into, a, b, (strip, from))
+            }
+            2.. => part::<S, T, N, 2>(simd, into, a, b, (strip, from)),
             _ => part::<S, T, N, 1>(simd, into, a, b, (strip, from)),
         };
     }
@@ -166,7 +180,7 @@ pub(super) fn divide_by_square<S: Simd, T: Real>(
 ) {
     let lanes = size_of::<T::Vector<S>>() / size_of::<T>();
     let strip = width / lanes;
-    let step = if S::REGISTER_COUNT >= 32 { 8 } else { 4 };
+    let step = columns_at_once::<S>();
     let mut from = 0;
     while from < columns {
         let to = columns.min(from + step);
@@ -205,7 +219,7 @@ pub(super) fn factor_square<S: Simd, T: Real>(
     inverses: &mut [T],
     columns: usize,
 ) -> Result<(), usize> {
-    let step = if S::REGISTER_COUNT >= 32 { 8 } else { 4 };
+    let step = columns_at_once::<S>();
     let mut from = 0;
     while from < columns {
         let to = columns.min(from + step);
