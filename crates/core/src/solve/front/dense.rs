@@ -9,7 +9,9 @@ use rayon::prelude::*;
 use super::Real;
 use super::assembly::{Contribution, add_to_tile};
 use super::blocks::Block;
-use super::kernel::{DEPTH, Factors, Onto, divide_by_square, factor_square, subtract_product};
+use super::kernel::{
+    DEPTH, Factors, Onto, divide_by_square, factor_square, subtract_deep, subtract_product,
+};
 use super::slabs::Slabs;
 
 /// Slabs of pivots that are factored together.
@@ -73,16 +75,6 @@ fn rows_of<T>(mut part: &mut [T], slabs: Slabs, range: Range<usize>) -> Vec<&mut
     rows
 }
 
-/// `C −= A Bᵀ` for a slab of rows each: few products in a row, so that they stay in the caches.
-#[inline(always)]
-fn subtract_deep<S: Simd, T: Real>(simd: S, into: &mut [T], a: &[T], b: &[T], columns: usize) {
-    let depth = DEPTH * T::SLAB;
-    for (a, b) in a.chunks(depth).zip(b.chunks(depth)) {
-        let b = Factors::Rows { strips: b, first: 0 };
-        subtract_product(simd, (&mut *into, Onto::There), a, b, T::SLAB, columns);
-    }
-}
-
 /// The slabs of pivots that are factored now, one after another.
 struct FactorTop<'a, T> {
     /// The panel up to the last of them.
@@ -108,16 +100,16 @@ impl<T: Real> WithSimd for FactorTop<'_, T> {
                 let into = &mut into[..columns * height];
                 let inverses = &mut inverses[(s - now.start) * height..][..columns];
                 if s == i {
-                    subtract_deep(simd, into, done, done, columns);
-                    subtract_deep(simd, into, before, before, columns);
+                    subtract_deep(simd, into, done, done, height, columns);
+                    subtract_deep(simd, into, before, before, height, columns);
                     factor_square(simd, into, inverses, columns)
                         .map_err(|pivot| s * height + pivot)?;
                     continue;
                 }
                 let other = &above[slabs.start(s)..slabs.start(s + 1)];
                 let (other_done, other) = other.split_at(now.start * square);
-                subtract_deep(simd, into, done, other_done, columns);
-                subtract_deep(simd, into, before, other, columns);
+                subtract_deep(simd, into, done, other_done, height, columns);
+                subtract_deep(simd, into, before, other, height, columns);
                 let square = &other[(s - now.start) * square..];
                 divide_by_square(simd, into, square, inverses, height, columns);
             }
@@ -162,7 +154,7 @@ impl<T: Real> WithSimd for FactorBelow<'_, '_, T> {
                 let other = &top[slabs.start(s) + done_len..slabs.start(s + 1)];
                 let at = (s - now.start) * square;
                 let (before, into) = row[done_len..].split_at_mut(at);
-                subtract_deep(simd, into, before, other, columns_of(s));
+                subtract_deep(simd, into, before, other, height, columns_of(s));
                 let inverses = &inverses[(s - now.start) * height..];
                 divide_by_square(simd, into, &other[at..], inverses, height, columns_of(s));
             }

@@ -67,6 +67,26 @@ pub(super) fn subtract_product<S: Simd, T: Real>(
     }
 }
 
+/// [`subtract_product`] with B in rows, [`DEPTH`] strips after another, so that what the next
+/// columns of C read again stays in the nearest cache.
+///
+/// Shapes: `a` k strips of `width` numbers, `b` k strips of [`Real::SLAB`] numbers, `into` `columns`
+/// strips of `width` numbers.
+#[inline(always)]
+pub(super) fn subtract_deep<S: Simd, T: Real>(
+    simd: S,
+    into: &mut [T],
+    a: &[T],
+    b: &[T],
+    width: usize,
+    columns: usize,
+) {
+    for (a, b) in a.chunks(DEPTH * width).zip(b.chunks(DEPTH * T::SLAB)) {
+        let b = Factors::Rows { strips: b, first: 0 };
+        subtract_product(simd, (&mut *into, Onto::There), a, b, width, columns);
+    }
+}
+
 impl<'a, T: Real> Factors<'a, T> {
     /// The same from a later column on.
     #[inline(always)]

@@ -7,7 +7,9 @@ use rayon::prelude::*;
 
 use super::Real;
 use super::dense::TASK_SLABS;
-use super::kernel::{DEPTH, Factors, Onto, divide_by_square, subtract_dots, subtract_product};
+use super::kernel::{
+    Factors, Onto, divide_by_square, subtract_deep, subtract_dots, subtract_product,
+};
 use super::slabs::Slabs;
 
 /// Panels times right-hand sides above this are split into tasks.
@@ -151,10 +153,7 @@ fn subtract_slab<S: Simd, T: Real>(
         let into = (&mut own[..T::SLAB], Onto::There);
         return subtract_product(simd, into, slab, Factors::One { values: x }, T::SLAB, 1);
     }
-    for (slab, x) in slab.chunks(DEPTH * T::SLAB).zip(x.chunks(DEPTH * width)) {
-        let b = Factors::Rows { strips: slab, first: 0 };
-        subtract_product(simd, (&mut *own, Onto::There), x, b, width, rows);
-    }
+    subtract_deep(simd, own, x, slab, width, rows);
 }
 
 /// `x2 ← x2 − L21 x1` for some slabs.
