@@ -33,6 +33,7 @@ mod requests;
 pub mod sample;
 pub mod scaling;
 pub mod scene;
+pub mod service;
 pub mod session;
 pub mod stages;
 pub mod table;
@@ -81,6 +82,8 @@ pub enum ReportName {
     Bound,
     /// How many clients at 60 Hz one server serves in time.
     Load,
+    /// A newcomer and a new contact beside others' long work; a crowd that sends large requests.
+    Service,
     /// Malformed frames, hostile connections, restarts and a long run.
     Trust,
 }
@@ -105,6 +108,7 @@ impl ReportName {
             Self::Flicker => "flicker",
             Self::Large => "large",
             Self::Load => "load",
+            Self::Service => "service",
             Self::Trust => "trust",
         }
     }
@@ -133,6 +137,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Flicker => flicker::measure(options)?,
         ReportName::Large => large::measure(options)?,
         ReportName::Load => load::measure(options)?,
+        ReportName::Service => service::measure(options)?,
         ReportName::Trust => trust::measure(options)?,
     };
     report.end();

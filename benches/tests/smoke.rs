@@ -307,6 +307,19 @@ fn clients_at_an_even_pace_get_right_answers() {
 }
 
 #[test]
+fn questions_beside_long_work_are_right_and_a_crowd_that_sends_is_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    // A wrong answer beside long work, or other bits of the long work, fail the report.
+    run_quick(ReportName::Service, folder.path());
+    assert!(numbers(folder.path(), "service.csv", "asked").iter().all(|&asked| asked > 0.0));
+    let solves = numbers(folder.path(), "service-pace.csv", "solves_beside");
+    assert!(solves.iter().all(|&solves| solves >= 2.0), "{solves:?}");
+    let refused = numbers(folder.path(), "service-receiving.csv", "refused");
+    let done = numbers(folder.path(), "service-receiving.csv", "done");
+    assert!(refused.iter().zip(&done).all(|(refused, done)| refused + done == 8.0));
+}
+
+#[test]
 fn hostile_connections_and_restarts_cost_no_right_answer() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Trust, folder.path());

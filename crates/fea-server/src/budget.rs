@@ -3,6 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
+use tokio::sync::Notify;
+use tokio::sync::futures::Notified;
+
 use crate::lock::Lock;
 
 /// Memory that the server may take, and what of it is reserved for requests under way.
@@ -11,13 +14,15 @@ use crate::lock::Lock;
 /// keeps its part by [`Budget::left_for_kept`].
 ///
 /// Units: bytes.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(crate) struct Budget {
     limit: u64,
     reserved: Arc<Lock<u64>>,
+    freed: Arc<Notify>,
 }
 
 /// What one request has reserved; given back when dropped.
+#[derive(Debug)]
 pub(crate) struct Reservation {
     budget: Budget,
     own: AtomicU64,
@@ -26,7 +31,7 @@ pub(crate) struct Reservation {
 impl Budget {
     /// Units: `limit` bytes.
     pub fn new(limit: u64) -> Self {
-        Self { limit, reserved: Arc::default() }
+        Self { limit, reserved: Arc::default(), freed: Arc::default() }
     }
 
     /// A reservation for one request, empty at first.
@@ -37,6 +42,11 @@ impl Budget {
     /// All of it, bytes.
     pub fn limit(&self) -> u64 {
         self.limit
+    }
+
+    /// Ends when something that was reserved is given back.
+    pub fn freed(&self) -> Notified<'_> {
+        self.freed.notified()
     }
 
     /// Bytes that the reservations leave for what is kept between requests.
@@ -83,6 +93,9 @@ impl Reservation {
     fn replace(&self, reserved: &mut u64, own: u64) {
         let before = self.own.swap(own, Relaxed);
         *reserved = reserved.saturating_sub(before).saturating_add(own);
+        if own < before {
+            self.budget.freed.notify_waiters();
+        }
     }
 }
 

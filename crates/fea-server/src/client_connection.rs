@@ -6,20 +6,32 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use softgrasp_protocol::asynchronous::Connection;
-use softgrasp_protocol::{ConnectionError, Frame, HEADER_LEN, Limits};
+use softgrasp_protocol::{ConnectionError, Frame, HEADER_LEN, Header, Limits};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, sleep, timeout, timeout_at};
 
+use crate::budget::Reservation;
 use crate::config::ServerConfig;
+use crate::room::{NoRoom, Room};
 
 /// Frames from and bytes to one client, each with a limit on how long the client may hold it up.
 pub(crate) struct ClientConnection<S> {
     connection: Connection<TimedStream<S>>,
+    room: Room,
     patience: Patience,
     /// When a client that has not introduced itself yet is given up.
     stranger_until: Option<Instant>,
     /// Whether it is known only after it has shown a token.
     wants_token: bool,
+}
+
+/// What comes from a client.
+#[derive(Debug)]
+pub(crate) enum Incoming {
+    /// A request, with the memory that it was received in.
+    Request { frame: Frame, received: Reservation },
+    /// A request for which there is no memory; the rest of its bytes is passed over as they come.
+    NoRoom { header: Header, why: NoRoom },
 }
 
 /// How long a client is waited for.
@@ -72,12 +84,18 @@ const READ_AHEAD_MAX: usize = 64 * 1024;
 impl<S> ClientConnection<S> {
     /// Wraps the stream of a client that is not known yet, until it has spoken or, if a token is
     /// wanted, has shown it; `limits` hold for what is read from it.
-    pub fn new(stream: S, limits: Limits, patience: Patience, wants_token: bool) -> Self {
+    pub fn new(
+        stream: S,
+        limits: Limits,
+        patience: Patience,
+        wants_token: bool,
+        room: Room,
+    ) -> Self {
         let now = Instant::now();
         let stream = TimedStream { stream, first_read: None, last_read: now, since_rest: 0 };
         let stranger_until = Some(now + patience.greeting);
         let connection = Connection::new(stream, limits);
-        Self { connection, patience, stranger_until, wants_token }
+        Self { connection, room, patience, stranger_until, wants_token }
     }
 
     /// The client has introduced itself: it may rest as long as it likes, and send what `limits` allow.
@@ -104,11 +122,19 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
     ///
     /// # Errors
     /// [`SessionError`]: how the client was too slow, or what is wrong with the stream.
-    pub async fn next_frame(&mut self) -> Result<Option<Frame>, SessionError> {
+    pub async fn next_frame(&mut self) -> Result<Option<Incoming>, SessionError> {
         let start = Instant::now();
         self.connection.stream_mut().first_read =
             self.connection.is_inside_frame().then_some(start);
         loop {
+            if let Some(frame) = self.connection.frame_received().map_err(ConnectionError::from)? {
+                return Ok(Some(Incoming::Request { frame, received: self.room.hand_over() }));
+            }
+            if let Err((header, why)) = self.make_room().await {
+                self.connection.pass_over();
+                self.room.give_up();
+                return Ok(Some(Incoming::NoRoom { header, why }));
+            }
             let (until, too_slow) = self.deadline(start);
             if until <= Instant::now() {
                 return match too_slow {
@@ -117,10 +143,31 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
                 };
             }
             // Bytes may come meanwhile: then the time begins anew from the last of them.
-            if let Ok(frame) = timeout_at(until, self.connection.read_frame()).await {
-                return Ok(frame?);
+            match timeout_at(until, self.connection.read_ahead()).await {
+                Ok(Ok(true)) | Err(_) => {}
+                Ok(Ok(false)) => {
+                    self.connection.finish().map_err(ConnectionError::from)?;
+                    return Ok(None);
+                }
+                Ok(Err(error)) => return Err(error.into()),
             }
         }
+    }
+
+    /// Reserves the memory that the next read takes; what must wait for it is not held against the
+    /// client.
+    async fn make_room(&mut self) -> Result<(), (Header, NoRoom)> {
+        let Some(header) = self.connection.header() else { return Ok(()) };
+        let whole = header.frame_len();
+        let begin = Instant::now();
+        let made = match self.room.check(whole) {
+            Ok(()) => self.room.grow(self.connection.len_wanted(), whole).await,
+            never => never,
+        };
+        if begin < Instant::now() {
+            self.connection.stream_mut().last_read = Instant::now();
+        }
+        made.map_err(|why| (header, why))
     }
 
     /// Ends when the client has gone, while its request is worked on: its connection is broken, or it has
@@ -148,16 +195,18 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         let Patience { stall, greeting, idle, .. } = self.patience;
         let stream = self.connection.stream();
         let received = self.connection.received();
-        let has_header = received >= HEADER_LEN;
-        let stalled = (received > 0)
-            .then(|| (stream.last_read.max(start) + stall, SessionError::Stalled(stall)));
+        let is_inside = self.connection.is_inside_frame();
+        // What is passed over has had its header.
+        let has_header = received >= HEADER_LEN || (is_inside && received == 0);
+        let stalled =
+            is_inside.then(|| (stream.last_read.max(start) + stall, SessionError::Stalled(stall)));
         let first_read = stream.first_read.unwrap_or(start);
         let no_header = (received > 0 && !has_header)
             .then(|| (first_read + greeting, SessionError::NoHeader(greeting)));
         // Without a token a first request may be a large one: its header is waited for so long.
         let stranger_until = self.stranger_until.filter(|_| self.wants_token || !has_header);
         let stranger = stranger_until.map(|until| (until, SessionError::Stranger(greeting)));
-        let idle = idle.filter(|_| received == 0);
+        let idle = idle.filter(|_| !is_inside);
         let idle = idle.map(|limit| (start + limit, SessionError::Idle(limit)));
         let ends = [stalled, no_header, stranger, idle];
         match ends.into_iter().flatten().min_by_key(|(until, _)| *until) {
@@ -237,229 +286,4 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for TimedStream<S> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use softgrasp_protocol::Request;
-    use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
-
-    const PATIENCE: Patience = Patience {
-        stall: Duration::from_secs(30),
-        greeting: Duration::from_secs(10),
-        idle: None,
-        reply: Duration::from_secs(60),
-    };
-    const MOMENT: Duration = Duration::from_millis(2);
-
-    /// A connection, the client's end of it, and the bytes of a request. The clock of these tests
-    /// stands still, and goes to the next thing that is waited for when all else rests.
-    fn connected() -> (ClientConnection<DuplexStream>, DuplexStream, Vec<u8>) {
-        let (client, server) = duplex(1 << 10);
-        let mut bytes = Vec::new();
-        Request::Ping { nonce: 7 }.encode_into(1, &Limits::default(), &mut bytes).unwrap();
-        let mut connection = ClientConnection::new(server, Limits::default(), PATIENCE, true);
-        connection.make_known(Limits::default());
-        (connection, client, bytes)
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn client_that_stops_inside_a_frame_is_not_waited_for_twice_as_long_as_said() {
-        for idle in [0, 1, 29, 31, 3600].map(Duration::from_secs) {
-            let (mut connection, mut client, bytes) = connected();
-            let sender = async {
-                sleep(idle).await;
-                client.write_all(&bytes[..bytes.len() - 1]).await.unwrap();
-                Instant::now()
-            };
-            let (ended, last_byte) = tokio::join!(connection.next_frame(), sender);
-            assert!(matches!(ended, Err(SessionError::Stalled(_))), "{ended:?}");
-            // The runtime's timer counts milliseconds.
-            let over = last_byte.elapsed().checked_sub(PATIENCE.stall).expect("not too soon");
-            assert!(over <= MOMENT, "{over:?} late after {idle:?} between frames");
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn client_whose_bytes_come_slowly_is_waited_for() {
-        let (mut connection, mut client, bytes) = connected();
-        let sender = async {
-            let (header, payload) = bytes.split_at(HEADER_LEN);
-            client.write_all(header).await.unwrap();
-            for byte in payload {
-                sleep(PATIENCE.stall - Duration::from_millis(10)).await;
-                client.write_all(&[*byte]).await.unwrap();
-            }
-        };
-        let (frame, ()) = tokio::join!(connection.next_frame(), sender);
-        assert_eq!(frame.unwrap().unwrap().request_id(), 1);
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn header_that_comes_byte_by_byte_is_there_in_time_or_given_up() {
-        for (pause_ms, is_in_time) in [(300, true), (350, false)] {
-            for idle in [0, 7, 3600].map(Duration::from_secs) {
-                let (mut connection, mut client, bytes) = connected();
-                let sender = async {
-                    sleep(idle).await;
-                    let start = Instant::now();
-                    for byte in &bytes {
-                        if client.write_all(&[*byte]).await.is_err() {
-                            break;
-                        }
-                        sleep(Duration::from_millis(pause_ms)).await;
-                    }
-                    start
-                };
-                let ended = async {
-                    let ended = connection.next_frame().await;
-                    (ended, Instant::now())
-                };
-                let ((ended, at), start) = tokio::join!(ended, sender);
-                match is_in_time {
-                    true => assert!(ended.unwrap().is_some()),
-                    false => {
-                        assert!(matches!(ended, Err(SessionError::NoHeader(_))), "{ended:?}");
-                        let took = at.duration_since(start);
-                        assert!(took >= PATIENCE.greeting && took <= PATIENCE.greeting + MOMENT);
-                    }
-                }
-            }
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn stranger_that_does_not_speak_is_given_up_and_a_known_client_is_not() {
-        for wants_token in [false, true] {
-            let (client, server) = duplex(1 << 10);
-            let mut connection =
-                ClientConnection::new(server, Limits::default(), PATIENCE, wants_token);
-            let start = Instant::now();
-            let ended = connection.next_frame().await;
-            assert!(matches!(ended, Err(SessionError::Stranger(_))), "{ended:?}");
-            let over = start.elapsed().checked_sub(PATIENCE.greeting).expect("not too soon");
-            assert!(over <= MOMENT);
-            drop(client);
-        }
-        let (mut connection, mut client, bytes) = connected();
-        let sender = async {
-            sleep(Duration::from_secs(24 * 3600)).await;
-            client.write_all(&bytes).await.unwrap();
-        };
-        let (frame, ()) = tokio::join!(connection.next_frame(), sender);
-        assert!(frame.unwrap().is_some());
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn first_request_may_be_long_only_where_no_token_is_wanted() {
-        for wants_token in [false, true] {
-            let (mut client, server) = duplex(1 << 10);
-            let (_, _, bytes) = connected();
-            let mut connection =
-                ClientConnection::new(server, Limits::default(), PATIENCE, wants_token);
-            let sender = async {
-                let (first, last) = bytes.split_at(HEADER_LEN);
-                client.write_all(first).await.unwrap();
-                sleep(2 * PATIENCE.greeting).await;
-                let _ = client.write_all(last).await;
-            };
-            let (frame, ()) = tokio::join!(connection.next_frame(), sender);
-            assert_eq!(frame.is_ok(), !wants_token, "{frame:?}");
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn time_in_which_the_server_does_not_read_is_not_held_against_the_client() {
-        for left in [1, HEADER_LEN] {
-            let (mut connection, mut client, bytes) = connected();
-            let (first, last) = bytes.split_at(bytes.len() - left);
-            client.write_all(&[&bytes, first].concat()).await.unwrap();
-            assert!(connection.next_frame().await.unwrap().is_some());
-            sleep(10 * PATIENCE.stall).await;
-            let sender = async {
-                sleep(PATIENCE.greeting / 2).await;
-                client.write_all(last).await.unwrap();
-            };
-            let (frame, ()) = tokio::join!(connection.next_frame(), sender);
-            assert!(frame.unwrap().is_some());
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn client_that_rests_is_given_up_when_its_time_is_over_and_not_before() {
-        let limit = Duration::from_secs(50);
-        for (rests, is_in_time) in [(49, true), (51, false)] {
-            let (mut connection, mut client, bytes) = connected();
-            connection.patience.idle = Some(limit);
-            let start = Instant::now();
-            let sender = async {
-                sleep(Duration::from_secs(rests)).await;
-                let _ = client.write_all(&bytes).await;
-            };
-            let ended = async { (connection.next_frame().await, start.elapsed()) };
-            let ((ended, took), ()) = tokio::join!(ended, sender);
-            match is_in_time {
-                true => assert!(ended.unwrap().is_some()),
-                false => {
-                    assert!(matches!(ended, Err(SessionError::Idle(_))), "{ended:?}");
-                    assert!((limit..limit + MOMENT).contains(&took), "{took:?}");
-                }
-            }
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn reply_that_is_not_taken_is_given_up_after_the_time_for_its_size() {
-        // 3 s for its size; the pipe holds the first KiB.
-        let reply = vec![0; 3 * REPLY_BYTES_PER_S as usize];
-        let limit = PATIENCE.reply + Duration::from_secs(3);
-        for (pause, is_taken) in [(limit - MOMENT, true), (limit + MOMENT, false)] {
-            let (mut connection, mut client, _) = connected();
-            let start = Instant::now();
-            let writer = async { (connection.write_bytes(&reply).await, start.elapsed()) };
-            let reader = async {
-                sleep(pause).await;
-                let mut taken = vec![0; reply.len()];
-                client.read_exact(&mut taken).await
-            };
-            let (written, took) = match is_taken {
-                true => tokio::join!(writer, reader).0,
-                false => writer.await,
-            };
-            assert_eq!(written.is_ok(), is_taken, "{written:?} after {took:?}");
-            assert!(is_taken || (limit..limit + MOMENT).contains(&took), "{took:?}");
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn client_that_goes_during_its_request_is_noticed_and_one_that_waits_is_not() {
-        // It is gone without a word.
-        let (mut connection, client, _) = connected();
-        let start = Instant::now();
-        let goes = async {
-            sleep(Duration::from_secs(3)).await;
-            drop(client);
-        };
-        let (gone, ()) = tokio::join!(connection.gone(), goes);
-        assert!(matches!(gone, SessionError::Gone));
-        assert!(start.elapsed() >= Duration::from_secs(3) + HALF_CLOSED_MAX);
-        // It waits, and has sent its next request meanwhile.
-        let (mut connection, mut client, bytes) = connected();
-        client.write_all(&bytes).await.unwrap();
-        let waits = timeout(Duration::from_secs(3600), connection.gone()).await;
-        assert!(waits.is_err(), "{:?}", waits.map(|gone| gone.to_string()));
-        assert!(connection.next_frame().await.unwrap().is_some(), "nothing is lost");
-        // It sends without end: only a little is taken.
-        let (mut connection, mut client, _) = connected();
-        let sends = async {
-            let mut sent = 0;
-            while let Ok(Ok(())) =
-                timeout(Duration::from_secs(1), client.write_all(&[0; 256])).await
-            {
-                sent += 256;
-            }
-            sent
-        };
-        let gone = timeout(Duration::from_secs(60), connection.gone());
-        let (gone, sent) = tokio::join!(gone, sends);
-        assert!(gone.is_err() && sent <= 4 * READ_AHEAD_MAX, "{sent}");
-    }
-}
+mod tests;

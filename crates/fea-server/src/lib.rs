@@ -28,6 +28,7 @@ mod refusal;
 mod request;
 mod request_handler;
 mod resources;
+mod room;
 mod server;
 mod server_handle;
 mod session;

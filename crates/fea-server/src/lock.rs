@@ -14,10 +14,15 @@ thread_local! {
 }
 
 /// A mutex whose content is seen by closures only.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Lock<T>(Mutex<T>);
 
 impl<T> Lock<T> {
+    /// Guards a value.
+    pub fn new(value: T) -> Self {
+        Self(Mutex::new(value))
+    }
+
     /// Calls `look` with the value; `look` must not start parallel work.
     ///
     /// A panic elsewhere does not close the lock: what it guards is replaced whole, never half.

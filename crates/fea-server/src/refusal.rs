@@ -9,6 +9,7 @@ use softgrasp_core::solve::{Method, SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
 
 use crate::plan::PlanError;
+use crate::room::NoRoom;
 use crate::workers::EndedAbnormally;
 
 /// Why a request is refused, before it becomes a message.
@@ -89,6 +90,13 @@ pub(crate) enum Refusal {
         "too many wrong tokens from this address; try again {seconds} s after the last of them"
     )]
     Barred { seconds: u64 },
+    #[error(transparent)]
+    NoRoom(#[from] NoRoom),
+    #[error(
+        "the answer has no finite numbers: displacements, forces or sizes of this request are out of \
+         the range of double precision; scale them, for example to metres and pascals"
+    )]
+    NotFinite,
     #[error("the server is at fault: the work on this request ended abnormally")]
     Internal,
 }
@@ -117,8 +125,10 @@ impl Refusal {
             Self::Plan(error) => code_of_plan(error),
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
-            Self::TooManyCases { .. } => RejectCode::MemoryLimit,
-            Self::Uncertain { .. } | Self::NoEquilibrium(_) => RejectCode::Uncertain,
+            Self::TooManyCases { .. } | Self::NoRoom(_) => RejectCode::MemoryLimit,
+            Self::Uncertain { .. } | Self::NoEquilibrium(_) | Self::NotFinite => {
+                RejectCode::Uncertain
+            }
             Self::Token | Self::Barred { .. } => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,
             Self::Limit(_) => RejectCode::TooLarge,

@@ -10,21 +10,26 @@ use softgrasp_protocol::{
 };
 
 use crate::answer::{
-    PosedFrame, Readiness, answer_large_frame, prefetch, prove, readiness, solve_large, solve_once,
-    solve_several, upload,
+    PosedFrame, Readiness, answer_large_frame, is_finite, prefetch, prove, readiness, solve_large,
+    solve_once, solve_several, upload,
 };
 use crate::awaited::Waiting;
+use crate::budget::Reservation;
 use crate::clock::{StageClock, ms_since};
 use crate::held_models::HeldModels;
 use crate::paths::Paths;
+use crate::plan::{large_frame_ms, request_ms};
 use crate::refusal::Refusal;
+use crate::room::{OWN_BYTES, reserve_for_reading};
 use crate::server_handle::{Grasping, ServerHandle};
-use crate::workers::Workers;
+use crate::workers::{Asker, Turn, Workers};
 
 /// What one session holds, and the server that works for it.
 pub(crate) struct RequestHandler {
     server: ServerHandle,
     peer: SocketAddr,
+    /// Whose turn its work takes.
+    asker: Asker,
     limits: Limits,
     is_authorised: bool,
     held: HeldModels,
@@ -34,12 +39,19 @@ pub(crate) struct RequestHandler {
     grasping: Option<Grasping>,
 }
 
+/// Predicted cost above which a frame at large deformation is not one among the frames: others would
+/// wait for it.
+const FRAME_MS_MAX: f64 = 50.0;
+/// Reading a request out of its bytes, ms per byte: a tenth of what memory does.
+const READ_BYTE_MS: f64 = 1e-6;
+
 impl RequestHandler {
     /// For a session that has not said anything yet.
     pub fn new(server: ServerHandle, peer: SocketAddr) -> Self {
         let resources = &server.resources;
         Self {
             peer,
+            asker: Asker::new(),
             limits: resources.config.limits(),
             is_authorised: !resources.access.wants_token(),
             held: HeldModels::new(Arc::clone(resources)),
@@ -60,14 +72,17 @@ impl RequestHandler {
     }
 
     /// The reply to one request; `None` to a hint. May be dropped at any await: the work then ends when
-    /// its stage does.
+    /// its stage does. `received` is the memory that the request was received in.
     ///
     /// # Errors
     /// [`Refusal`]; the session lives on.
-    pub async fn reply_to(&mut self, frame: Frame) -> Result<Option<Reply>, Refusal> {
+    pub async fn reply_to(
+        &mut self,
+        frame: Frame,
+        received: Reservation,
+    ) -> Result<Option<Reply>, Refusal> {
         let start = Instant::now();
-        let request = Request::decode(&frame, &self.limits)?;
-        drop(frame);
+        let request = self.read(frame, &received).await?;
         let decode_ms = ms_since(start);
         if !self.is_authorised && !matches!(request, Request::Hello(_)) {
             return Err(Refusal::Token);
@@ -78,7 +93,8 @@ impl RequestHandler {
         let clock = move || StageClock::new(decode_ms, queued, watch, awaited);
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
-        Ok(Some(match request {
+        let turn = self.turn(request_ms(&request, &resources.rates.known()));
+        let reply = match request {
             Request::Hello(hello) => self.welcome(&hello)?,
             Request::Ping { nonce } => Reply::Pong { nonce },
             Request::HaveModel(hash) => Reply::ModelState { known: self.held.hold(hash) },
@@ -92,37 +108,76 @@ impl RequestHandler {
                 return Ok(None);
             }
             Request::SolveOnce(once) => {
-                let work = move || solve_once(&resources, *once, clock());
-                Reply::Answer(Box::new(workers.run(work).await??))
+                let work = move || solve_once(&resources, *once, received, clock());
+                Reply::Answer(Box::new(workers.run(turn, work).await??))
             }
             Request::SolveLarge(once) => {
-                let work = move || solve_large(&resources, *once, clock());
-                Reply::LargeAnswer(Box::new(workers.run(work).await??))
+                let work = move || solve_large(&resources, *once, received, clock());
+                Reply::LargeAnswer(Box::new(workers.run(turn, work).await??))
             }
             Request::SolveSeveral(several) => {
-                let work = move || solve_several(&resources, *several, clock());
-                Reply::SeveralAnswers(Box::new(workers.run(work).await??))
+                let work = move || solve_several(&resources, *several, received, clock());
+                Reply::SeveralAnswers(Box::new(workers.run(turn, work).await??))
             }
-            Request::UploadModel(model) => Reply::ModelReady(self.upload(model, clock).await?),
+            Request::UploadModel(model) => {
+                Reply::ModelReady(self.upload(turn, model, received, clock).await?)
+            }
             Request::Frame(request) => Reply::Answer(Box::new(self.frame(request, clock).await?)),
             Request::LargeFrame(request) => {
                 Reply::LargeAnswer(Box::new(self.large_frame(*request, clock).await?))
             }
-        }))
+        };
+        match is_finite(&reply) {
+            true => Ok(Some(reply)),
+            false => Err(Refusal::NotFinite),
+        }
+    }
+
+    /// The turn of work that is predicted to cost so much.
+    fn turn(&self, cost_ms: f64) -> Turn {
+        Turn { asker: self.asker, cost_ms }
+    }
+
+    /// Reads a request out of its bytes; a large one on a solving thread, for all sessions share that of
+    /// the sockets.
+    async fn read(&self, frame: Frame, received: &Reservation) -> Result<Request, Refusal> {
+        let bytes = frame.payload.len();
+        if bytes <= OWN_BYTES {
+            return Ok(Request::decode(&frame, &self.limits)?);
+        }
+        reserve_for_reading(received, bytes)?;
+        self.server.resources.models.make_room(None);
+        let limits = self.limits;
+        let turn = self.turn(bytes as f64 * READ_BYTE_MS);
+        let workers = &self.server.resources.workers;
+        let reading = move || {
+            let request = Request::decode(&frame, &limits);
+            drop(frame);
+            softgrasp_os::give_back_freed_memory();
+            request
+        };
+        let request = workers.run(turn, reading).await??;
+        // What was received has gone; what was made of it has about its size.
+        received.settle(bytes as u64);
+        Ok(request)
     }
 
     async fn upload(
         &mut self,
+        turn: Turn,
         model: UploadModel,
+        received: Reservation,
         clock: impl FnOnce() -> StageClock + Send + 'static,
     ) -> Result<ModelReady, Refusal> {
         let ServerHandle { resources, uploads, .. } = &self.server;
         let workers = &resources.workers;
-        let (hash, model) = workers.run(move || (ModelHash::of(&model), model)).await?;
-        let turn = uploads.turn(hash).await;
+        let named = move || (ModelHash::of(&model), model);
+        let (hash, model) = workers.run(turn, named).await?;
+        let right = uploads.turn(hash).await;
         let (shared, later) = (Arc::clone(resources), Arc::clone(resources));
-        let ready = workers.run(move || upload(&shared, hash, model, clock())).await??;
-        drop(turn);
+        let work = move || upload(&shared, hash, model, received, clock());
+        let ready = workers.run(turn, work).await??;
+        drop(right);
         self.held.hold(hash);
         workers.in_background(move || prove(&later, hash));
         Ok(ready)
@@ -156,7 +211,10 @@ impl RequestHandler {
         };
         match workers.run_frame(among_frames).await? {
             Ok(answered) => answered,
-            Err((frame, clock)) => workers.run(move || frame.answer(&resources, clock())).await?,
+            Err((frame, clock)) => {
+                let turn = self.turn(frame.predicted_ms(&resources));
+                workers.run(turn, move || frame.answer(&resources, clock())).await?
+            }
         }
     }
 
@@ -170,10 +228,13 @@ impl RequestHandler {
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
         let goes_on = seat.with(|kept| kept.is_some());
+        let stored = resources.models.find(request.model);
+        let cost_ms = stored
+            .map_or(0.0, |stored| large_frame_ms(&stored.model, goes_on, &resources.rates.known()));
         let work = move || answer_large_frame(&resources, &seat, request, clock());
-        match goes_on {
+        match goes_on && cost_ms <= FRAME_MS_MAX {
             true => workers.run_frame(work).await?,
-            false => workers.run(work).await?,
+            false => workers.run(self.turn(cost_ms), work).await?,
         }
     }
 

@@ -1,17 +1,21 @@
 //! A session: reads one client's requests and writes the replies, in order.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_protocol::{
-    ConnectionError, Frame, FrameError, HEADER_LEN, Kind, Limits, RejectCode, Rejected, Reply,
+    ConnectionError, Frame, FrameError, HEADER_LEN, Header, Kind, Limits, RejectCode, Rejected,
+    Reply,
 };
 use tokio::io::{AsyncRead, AsyncWrite};
 
-use crate::client_connection::{ClientConnection, Patience, SessionError};
+use crate::budget::Reservation;
+use crate::client_connection::{ClientConnection, Incoming, Patience, SessionError};
 use crate::manners::Manners;
 use crate::refusal::Refusal;
 use crate::request_handler::RequestHandler;
+use crate::room::Room;
 use crate::server_handle::{ServerHandle, stopped};
 
 /// Serves one connection until the client goes, sends bytes that are no frames, or the server
@@ -24,7 +28,13 @@ where
     let wants_token = server.resources.access.wants_token();
     let limits = if wants_token { config.limits_of_strangers() } else { config.limits() };
     let mut session = Session {
-        connection: ClientConnection::new(stream, limits, Patience::of(config), wants_token),
+        connection: ClientConnection::new(
+            stream,
+            limits,
+            Patience::of(config),
+            wants_token,
+            Room::new(Arc::clone(&server.resources)),
+        ),
         handler: RequestHandler::new(server.clone(), peer),
         server,
         out: Vec::new(),
@@ -73,8 +83,15 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
                 }
             };
             match frame {
-                Ok(Some(frame)) => {
-                    self.handle(frame).await?;
+                Ok(Some(incoming)) => {
+                    match incoming {
+                        Incoming::Request { frame, received } => {
+                            self.handle(frame, received).await?;
+                        }
+                        Incoming::NoRoom { header, why } => {
+                            self.refuse(&Refusal::NoRoom(why), &header).await?;
+                        }
+                    }
                     self.give_way().await;
                 }
                 Ok(None) => return Ok(()),
@@ -117,6 +134,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
                 return Ok(());
             }
         }
+        // A reply that its client does not take counts as long as it is held.
+        let held = self.server.resources.budget.reservation();
+        if self.out.len() > OUT_KEPT {
+            held.settle(self.out.capacity() as u64);
+            self.server.resources.models.make_room(None);
+        }
         let written = self.connection.write_bytes(&self.out).await;
         self.server.resources.metrics.sent(self.out.len());
         if self.out.capacity() > OUT_KEPT {
@@ -148,15 +171,14 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
 
     /// One request: decoded, worked on, answered. A bad request is answered and the session lives; a
     /// client that goes is not worked for any longer.
-    async fn handle(&mut self, frame: Frame) -> Result<(), SessionError> {
-        let (request_id, kind) = (frame.request_id(), frame.kind());
-        let has_reply = !matches!(kind, Some(Kind::Prefetch | Kind::Drop));
+    async fn handle(&mut self, frame: Frame, received: Reservation) -> Result<(), SessionError> {
+        let (header, kind) = (frame.header, frame.kind());
         let start = Instant::now();
         let metrics = &self.server.resources.metrics;
         metrics.received(HEADER_LEN + frame.payload.len());
         let replied = tokio::select! {
             biased;
-            replied = self.handler.reply_to(frame) => replied,
+            replied = self.handler.reply_to(frame, received) => replied,
             gone = self.connection.gone() => {
                 metrics.abandoned();
                 return Err(gone);
@@ -168,14 +190,20 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
             self.connection.make_known(self.handler.limits());
         }
         match replied {
-            Ok(Some(reply)) => self.write(request_id, &reply).await,
+            Ok(Some(reply)) => self.write(header.request_id, &reply).await,
             Ok(None) => Ok(()),
-            Err(refusal) => {
-                self.log(&refusal);
-                match has_reply {
-                    true => self.write(request_id, &Reply::Rejected(refusal.to_message())).await,
-                    false => Ok(()),
-                }
+            Err(refusal) => self.refuse(&refusal, &header).await,
+        }
+    }
+
+    /// Tells a client why its request is refused; hints have no reply.
+    async fn refuse(&mut self, refusal: &Refusal, header: &Header) -> Result<(), SessionError> {
+        self.log(refusal);
+        match Kind::from_number(header.kind) {
+            Some(Kind::Prefetch | Kind::Drop) => Ok(()),
+            _ => {
+                let reply = Reply::Rejected(refusal.to_message());
+                self.write(header.request_id, &reply).await
             }
         }
     }

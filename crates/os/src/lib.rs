@@ -1,11 +1,13 @@
 //! What the programs share beside the mathematics and the wire: signals that are waited for,
-//! threads that are woken in time, the time a thread computed, errors as one line, the file
+//! threads that are woken in time or stand back, the time a thread computed, errors as one line, the file
 //! of a token.
 
 mod cpu_time;
 mod end;
 mod end_signals;
 mod error_line;
+mod freed_memory;
+mod niceness;
 mod token_file;
 mod urgency;
 
@@ -13,5 +15,7 @@ pub use cpu_time::thread_cpu_time;
 pub use end::end_within;
 pub use end_signals::{EndSignal, on_end_signal};
 pub use error_line::one_line;
+pub use freed_memory::{give_back_freed_memory, give_back_large_pieces_at_once};
+pub use niceness::stand_back;
 pub use token_file::{TokenFileError, read_token};
 pub use urgency::{NotUrgent, be_ordinary, be_urgent};

@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
-use crate::{ConnectionError, Frame, FrameBuffer, Limits};
+use crate::{ConnectionError, Frame, FrameBuffer, FrameError, Header, Limits};
 
 /// A stream, or one half of it, that frames are read from and written to.
 ///
@@ -40,7 +40,39 @@ impl<S> Connection<S> {
     /// Whether a frame has begun to come and has not ended; an idle peer may be waited for longer
     /// than one that stops inside a frame.
     pub fn is_inside_frame(&self) -> bool {
-        self.buffer.received() > 0
+        !self.buffer.is_at_border()
+    }
+
+    /// Bytes of memory that the next read brings the buffer to.
+    pub fn len_wanted(&self) -> usize {
+        self.buffer.len_wanted()
+    }
+
+    /// Header of the unfinished frame at the front, once it is there.
+    pub fn header(&self) -> Option<Header> {
+        self.buffer.header()
+    }
+
+    /// Gives up the unfinished frame at the front, see [`FrameBuffer::pass_over`].
+    pub fn pass_over(&mut self) {
+        self.buffer.pass_over();
+    }
+
+    /// The next frame if all of it has come; `None` means "not yet".
+    ///
+    /// # Errors
+    /// [`FrameError`] for bad bytes: give the stream up.
+    pub fn frame_received(&mut self) -> Result<Option<Frame>, FrameError> {
+        self.buffer.next_frame()
+    }
+
+    /// What the end of the stream means, once [`frame_received`](Self::frame_received) has said
+    /// `Ok(None)`.
+    ///
+    /// # Errors
+    /// [`FrameError::Truncated`] inside a frame.
+    pub fn finish(&self) -> Result<(), FrameError> {
+        self.buffer.finish()
     }
 
     /// Bytes of an unfinished frame that have come; tells a slow peer from one that has stopped.

@@ -43,6 +43,8 @@ pub struct FrameBuffer {
     received: usize,
     /// Header of the frame at the front and the checksum over its first `summed` bytes.
     front: Option<Front>,
+    /// Bytes still to come of a frame that is passed over.
+    passed_over: usize,
     /// After an error the border of the next frame is unknown, so the error stays.
     failed: Option<FrameError>,
 }
@@ -57,7 +59,14 @@ struct Front {
 impl FrameBuffer {
     /// Empty buffer; takes memory when bytes come.
     pub fn new(limits: Limits) -> Self {
-        Self { limits, storage: BytesMut::new(), received: 0, front: None, failed: None }
+        Self {
+            limits,
+            storage: BytesMut::new(),
+            received: 0,
+            front: None,
+            passed_over: 0,
+            failed: None,
+        }
     }
 
     /// Other limits from the next header on.
@@ -79,16 +88,23 @@ impl FrameBuffer {
 
     /// Room to read into, never empty; between 4 KiB and the order of what has come so far.
     pub fn spare_mut(&mut self) -> &mut [u8] {
-        if self.storage.len() - self.received < SPARE_LEN_MIN {
-            let missing = match self.front {
-                Some(front) => front.header.frame_len().saturating_sub(self.received),
-                None => 0,
-            };
-            // At most doubling: the peer has to send a byte for each byte of room it gets.
-            let step = missing.clamp(STEP_LEN_MIN, self.received.max(STEP_LEN_MIN));
-            self.storage.resize(self.received + step, 0);
-        }
+        self.storage.resize(self.len_wanted(), 0);
         &mut self.storage[self.received..]
+    }
+
+    /// Bytes of memory that the next [`spare_mut`](Self::spare_mut) brings the buffer to, so that
+    /// whoever counts memory can do so before it is taken.
+    pub fn len_wanted(&self) -> usize {
+        let len = self.storage.len();
+        if len - self.received >= SPARE_LEN_MIN {
+            return len;
+        }
+        let missing = match self.front {
+            Some(front) => front.header.frame_len().saturating_sub(self.received),
+            None => 0,
+        };
+        // At most doubling: the peer has to send a byte for each byte of room it gets.
+        self.received + missing.clamp(STEP_LEN_MIN, self.received.max(STEP_LEN_MIN))
     }
 
     /// Says that the first `count` bytes of [`spare_mut`](Self::spare_mut) have been filled.
@@ -98,7 +114,30 @@ impl FrameBuffer {
     pub fn advance(&mut self, count: usize) {
         let room = self.storage.len() - self.received;
         assert!(count <= room, "{count} bytes came, but there was room for {room}");
-        self.received += count;
+        // While a frame is passed over nothing else is here.
+        let dropped = self.passed_over.min(count);
+        if dropped > 0 {
+            self.passed_over -= dropped;
+            self.storage.copy_within(dropped..count, 0);
+        }
+        self.received += count - dropped;
+    }
+
+    /// Header of the frame at the front, once it is there and only a part of the frame.
+    pub fn header(&self) -> Option<Header> {
+        self.front.map(|front| front.header)
+    }
+
+    /// Gives up the frame whose header is at the front: its memory goes at once, and what is still to
+    /// come of it is passed over unseen. The next frame is whole again.
+    pub fn pass_over(&mut self) {
+        let Some(front) = self.front.take() else { return };
+        let frame_len = front.header.frame_len();
+        let there = frame_len.min(self.received);
+        let rest = self.storage.get(there..self.received).unwrap_or_default();
+        self.storage = BytesMut::from(rest);
+        self.received -= there;
+        self.passed_over = frame_len - there;
     }
 
     /// Next frame; `Ok(None)` means "not yet".
@@ -128,16 +167,21 @@ impl FrameBuffer {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        if self.received == 0 {
+        if self.is_at_border() {
             return Ok(());
         }
         let frame_len = self.front.map(|front| front.header.frame_len());
         Err(FrameError::Truncated { received: self.received, frame_len })
     }
 
-    /// Bytes that have come of frames not taken yet; 0 means the stream stands at a border.
+    /// Bytes that have come of frames not taken yet.
     pub fn received(&self) -> usize {
         self.received
+    }
+
+    /// Whether the stream stands between two frames.
+    pub fn is_at_border(&self) -> bool {
+        self.received == 0 && self.passed_over == 0
     }
 
     /// Bytes of memory held.
@@ -272,6 +316,41 @@ mod tests {
         assert_eq!(taken.payload, bytes[HEADER_LEN..]);
         drop(taken);
         assert!(buffer.capacity() <= KEPT_LEN_MAX, "{} bytes kept", buffer.capacity());
+    }
+
+    #[test]
+    fn frame_that_is_passed_over_takes_no_memory_and_the_next_one_is_whole() {
+        let (large, next) = (frame(4, 1, &vec![7; 1 << 20]), frame(8, 2, b"next"));
+        for (piece, before) in [(1000, 5000), (9999, 40_000), (1 << 20, HEADER_LEN)] {
+            let mut buffer = FrameBuffer::new(Limits::default());
+            buffer.feed(&large[..before]);
+            assert_eq!(buffer.next_frame(), Ok(None));
+            assert_eq!(buffer.header().map(|header| header.request_id), Some(1));
+            buffer.pass_over();
+            assert!(!buffer.is_at_border() && buffer.header().is_none());
+            assert!(matches!(buffer.finish(), Err(FrameError::Truncated { .. })));
+            let rest = [&large[before..], &next, &next[..9]].concat();
+            for piece in rest.chunks(piece) {
+                buffer.feed(piece);
+                assert!(buffer.capacity() <= 2 * STEP_LEN_MIN + piece.len());
+                while let Some(frame) = buffer.next_frame().unwrap() {
+                    assert_eq!((frame.request_id(), &frame.payload[..]), (2, &b"next"[..]));
+                }
+            }
+            assert_eq!(buffer.received(), 9, "what came after it stays");
+        }
+    }
+
+    #[test]
+    fn memory_is_no_more_than_was_said_before() {
+        let bytes = frame(4, 1, &vec![3; 3 << 20]);
+        let mut buffer = FrameBuffer::new(Limits::default());
+        for piece in bytes.chunks(5000) {
+            let wanted = buffer.len_wanted();
+            assert_eq!(buffer.spare_mut().len() + buffer.received(), wanted);
+            buffer.feed(piece);
+            let _ = buffer.next_frame().unwrap();
+        }
     }
 
     #[test]

@@ -83,7 +83,7 @@ impl Header {
     }
 
     /// Bytes of the whole frame.
-    pub(crate) fn frame_len(&self) -> usize {
+    pub fn frame_len(&self) -> usize {
         HEADER_LEN + self.payload_len as usize
     }
 }

@@ -10,6 +10,9 @@ use crate::plan::{PlanError, Subject, admit, counted, shortage};
 use crate::refusal::Refusal;
 use crate::store::ModelStore;
 
+/// A factor takes so long from this size on that looking for freed memory before it costs nothing.
+const LARGE_BYTES: u64 = 16 << 20;
+
 /// What a factor is made for, and the memory it may take.
 #[derive(Clone, Copy)]
 pub(super) struct FactorRequest<'a> {
@@ -64,6 +67,10 @@ impl FactorRequest<'_> {
         let needs: Vec<Need> = fronts.map(|method| self.need(&analysed, method)).collect();
         let admitted = self.admit(&needs)?;
         let limit = self.limit_with_fallback(&analysed, &admitted);
+        if admitted.factor_bytes > LARGE_BYTES {
+            // What assembly and order have freed lies in holes that the factor does not fit into.
+            softgrasp_os::give_back_freed_memory();
+        }
         let (stiffness, method) = (self.model.stiffness(), admitted.method);
         match analysed.factor_within(stiffness, method, limit, &mut |stage| clock.begin(stage)) {
             // Too hard for single precision, which was taken for its size: what is short is memory.

@@ -14,7 +14,7 @@ use super::condensed::{Contacts, PreparedSet, StrainOf};
 use super::direct::{self, Posed};
 use super::factor::{FactorRequest, because_of_memory};
 use crate::clock::StageClock;
-use crate::plan::{Subject, plan_frame};
+use crate::plan::{Subject, columns_ms, factor_ms, plan_frame};
 use crate::refusal::Refusal;
 use crate::request::{checked_forces, name_of, pairs, question_of};
 use crate::resources::Resources;
@@ -131,6 +131,23 @@ impl PosedFrame {
                     .is_ok_and(|contacts| contacts.kept_set().is_some())
             }
             _ => self.kept_factor().is_some(),
+        }
+    }
+
+    /// What making is predicted to take.
+    ///
+    /// Units: ms.
+    pub fn predicted_ms(&self, resources: &Resources) -> f64 {
+        let Self { stored, message, known, plan, .. } = self;
+        let rates = resources.rates.known();
+        match (plan.method, stored.base()) {
+            (Method::Condensed, Ok(base)) => {
+                let fixed = stored.model.fixed().len().min(known.dofs.len());
+                let nodes = (known.dofs.len() - fixed).div_ceil(3);
+                let entries = base.bytes() as f64 / size_of::<f64>() as f64;
+                columns_ms(entries, nodes + message.masks.len(), &rates)
+            }
+            (method, _) => factor_ms(&stored.model, method, &rates),
         }
     }
 

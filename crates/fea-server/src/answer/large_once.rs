@@ -29,6 +29,7 @@ use crate::resources::Resources;
 pub(crate) fn solve_large(
     resources: &Resources,
     once: SolveLarge,
+    reservation: Reservation,
     mut clock: StageClock,
 ) -> Result<LargeAnswer, Refusal> {
     let why = match once.large.deformation {
@@ -44,7 +45,6 @@ pub(crate) fn solve_large(
     let element = element_given(element).unwrap_or_else(|| cheapest(poisson_max(&materials)));
     check_node_count(&mesh, resources.config.max_nodes)?;
     let subject = Subject::once(&mesh, message.known.len());
-    let reservation = resources.budget.reservation();
     let needs = subject.predict(element, &[Method::FrontMixed]);
     admit(&resources.models, &reservation, &needs, &subject).map_err(PlanError::Memory)?;
     let model = model_of(mesh, &materials, element, Vec::new(), &mut clock)?;
@@ -97,7 +97,7 @@ fn linear_within(
     }
     let allowed = question.max_error.unwrap_or(LINEAR_ERROR_REL);
     let linear = SolveOnce { mesh, materials, element, question };
-    let answer = solve_once(resources, linear, clock)?;
+    let answer = solve_once(resources, linear, resources.budget.reservation(), clock)?;
     let report = &answer.report;
     let promised = promised_error(report.max_rotation_deg.to_radians(), report.max_strain);
     if promised > allowed {

@@ -3,6 +3,7 @@
 mod condensed;
 mod direct;
 mod factor;
+mod finite;
 mod frame;
 mod large;
 mod large_frame;
@@ -12,6 +13,7 @@ mod several;
 mod upload;
 mod warnings;
 
+pub(crate) use finite::is_finite;
 pub(crate) use frame::{PosedFrame, Readiness, readiness};
 pub(crate) use large_frame::answer_large_frame;
 pub(crate) use large_once::solve_large;

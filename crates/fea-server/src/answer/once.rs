@@ -37,6 +37,7 @@ pub(super) struct Work<'a> {
 pub(crate) fn solve_once(
     resources: &Resources,
     once: SolveOnce,
+    reservation: Reservation,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
     let SolveOnce { mesh, materials, element, question: message } = once;
@@ -50,7 +51,6 @@ pub(crate) fn solve_once(
         has_masks: !message.masks.is_empty(),
         has_forces: !message.forces.is_empty(),
     };
-    let reservation = resources.budget.reservation();
     let models = &resources.models;
     let plan = plan_once(&request, models, &reservation, &resources.rates, || clock.elapsed_ms())?;
     let model = model_of(mesh, &materials, plan.element, Vec::new(), &mut clock)?;

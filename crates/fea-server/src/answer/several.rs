@@ -8,6 +8,7 @@ use softgrasp_protocol::{SeveralAnswers, SolveSeveral};
 use super::direct;
 use super::once::Work;
 use super::warnings::add_plan_warnings;
+use crate::budget::Reservation;
 use crate::clock::StageClock;
 use crate::plan::{OnceRequest, Subject, plan_once};
 use crate::refusal::Refusal;
@@ -27,6 +28,7 @@ const VECTORS_PER_CASE: usize = 12;
 pub(crate) fn solve_several(
     resources: &Resources,
     several: SolveSeveral,
+    reservation: Reservation,
     mut clock: StageClock,
 ) -> Result<SeveralAnswers, Refusal> {
     let SolveSeveral { mesh, materials, element, question: message, cases, estimate } = several;
@@ -43,7 +45,6 @@ pub(crate) fn solve_several(
         has_masks: false,
         has_forces: !message.forces.is_empty(),
     };
-    let reservation = resources.budget.reservation();
     let models = &resources.models;
     let plan = plan_once(&request, models, &reservation, &resources.rates, || clock.elapsed_ms())?;
     if plan.method == Method::Condensed {

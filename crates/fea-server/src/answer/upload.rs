@@ -27,6 +27,7 @@ pub(crate) fn upload(
     resources: &Resources,
     hash: ModelHash,
     upload: UploadModel,
+    reservation: Reservation,
     mut clock: StageClock,
 ) -> Result<ModelReady, Refusal> {
     let found = resources.models.find(hash);
@@ -38,7 +39,6 @@ pub(crate) fn upload(
             check_node_count(&mesh, resources.config.max_nodes)?;
             let element = element_of(element);
             let subject = Subject::once(&mesh, fixed.len());
-            let reservation = resources.budget.reservation();
             let needs = subject.predict(element, &SENSIBLE);
             admit(&resources.models, &reservation, &needs, &subject).map_err(PlanError::Memory)?;
             let model = model_of(mesh, &materials, element, fixed, &mut clock)?;

@@ -57,6 +57,14 @@ impl MeasuredRates {
         self.state.with(|state| *state = State::Known(rates));
         rates
     }
+
+    /// The rates as far as they are known, without measuring: for predictions that need not be right.
+    pub fn known(&self) -> Rates {
+        match self.state.with(|state| *state) {
+            State::Known(rates) => rates,
+            State::Running | State::Unknown => Rates::ASSUMED,
+        }
+    }
 }
 
 /// The speed of this machine with so many threads, for predictions without a server; takes some

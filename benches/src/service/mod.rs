@@ -1,0 +1,9 @@
+//! Report `service`: what one client's long work costs the others, and what a crowd's bytes cost the
+//! server.
+
+mod beside;
+mod page;
+mod probe;
+mod receiving;
+
+pub use page::measure;

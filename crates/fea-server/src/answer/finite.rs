@@ -1,0 +1,79 @@
+//! Looks whether all that a reply says of displacements, forces and errors are finite numbers.
+
+use softgrasp_protocol::{Answer, Displacements, Reply, SolveReport};
+
+/// Whether every displacement, every force and every error of a reply is a finite number. What a report
+/// leaves open on purpose (rotation, strain) may be none.
+pub(crate) fn is_finite(reply: &Reply) -> bool {
+    match reply {
+        Reply::Answer(answer) => answer_is_finite(answer),
+        Reply::LargeAnswer(large) => answer_is_finite(&large.answer),
+        Reply::SeveralAnswers(several) => {
+            let is_case_finite = |case: &softgrasp_protocol::CaseAnswer| {
+                all(case.displacements.iter().flatten()) && all(&case.reactions)
+            };
+            answer_is_finite(&several.answer) && several.cases.iter().all(is_case_finite)
+        }
+        _ => true,
+    }
+}
+
+fn answer_is_finite(answer: &Answer) -> bool {
+    let Answer { report, displacements, reactions, mask_forces, .. } = answer;
+    let are_displacements = match displacements {
+        Displacements::F64(values) => all(values.iter().flatten()),
+        Displacements::F32Quantised { scale, values } => {
+            scale.is_finite() && values.iter().flatten().all(|value| value.is_finite())
+        }
+    };
+    let SolveReport { residual_rel, error_bound_rel, error_estimate_rel, .. } = report;
+    let errors = [*error_bound_rel, *error_estimate_rel, Some(*residual_rel)];
+    are_displacements
+        && all(reactions.iter().map(|reaction| &reaction.value))
+        && all(mask_forces.iter().flatten())
+        && all(errors.iter().flatten())
+}
+
+fn all<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
+    // A sum of zeros times them is zero exactly where all are finite, and vectorises.
+    values.into_iter().map(|value| 0.0 * value).sum::<f64>() == 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_number_that_is_none_is_found_wherever_it_stands() {
+        let sound = Answer {
+            report: SolveReport { max_strain: f64::NAN, ..SolveReport::default() },
+            nodes: softgrasp_protocol::NodeChoice::All,
+            displacements: Displacements::F64(vec![[1.0; 3]; 40]),
+            reactions: vec![softgrasp_protocol::DofValue { dof: 0, value: -1e308 }; 3],
+            mask_forces: vec![[0.0; 3]; 2],
+        };
+        let is_sound = |answer: &Answer| is_finite(&Reply::Answer(Box::new(answer.clone())));
+        assert!(is_sound(&sound));
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let damages: [fn(&mut Answer, f64); 7] = [
+                |answer, value| {
+                    answer.displacements = Displacements::F64(vec![[0.0, 0.0, value]]);
+                },
+                |answer, value| {
+                    let values = vec![[0.0; 3]];
+                    answer.displacements = Displacements::F32Quantised { scale: value, values };
+                },
+                |answer, value| answer.reactions[2].value = value,
+                |answer, value| answer.mask_forces[1][1] = value,
+                |answer, value| answer.report.residual_rel = value,
+                |answer, value| answer.report.error_bound_rel = Some(value),
+                |answer, value| answer.report.error_estimate_rel = Some(value),
+            ];
+            for (i, damage) in damages.iter().enumerate() {
+                let mut damaged = sound.clone();
+                damage(&mut damaged, value);
+                assert!(!is_sound(&damaged), "damage {i} with {value}");
+            }
+        }
+    }
+}

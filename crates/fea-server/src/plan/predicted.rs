@@ -1,0 +1,108 @@
+//! Predicts what a request costs before it is begun, so that it waits for its like only.
+//!
+//! The prediction chooses a lane and a turn, and nothing that an answer depends on.
+
+use softgrasp_core::fem::Element;
+use softgrasp_core::model::Model;
+use softgrasp_core::solve::Method;
+use softgrasp_core::solve::choose::cheapest_element;
+use softgrasp_core::solve::rates::Rates;
+use softgrasp_core::solve::work::{MeshSize, Work};
+use softgrasp_protocol::{
+    ElementChoice, MeshData, Request, SolveLarge, SolveOnce, SolveSeveral, UploadModel,
+};
+
+use crate::request::{element_given, element_of, poisson_max};
+
+/// Tangents that a request at large deformation is taken to factor.
+const TANGENTS_OF_A_MOTION: f64 = 6.0;
+/// Solves of a frame that goes on from the one before.
+const SOLVES_OF_A_FRAME: f64 = 5.0;
+/// Right-hand sides that are solved together in the time of about three single ones.
+const TOGETHER: f64 = 15.0;
+const SOLVES_TOGETHER: f64 = 3.0;
+/// Sums over all right-hand sides in refinement, for one case of several.
+const SOLVES_PER_CASE: f64 = 1.0;
+
+/// Time that a request with its own mesh is predicted to take on all threads; 0 for those that ask
+/// about a model.
+///
+/// Units: ms.
+pub(crate) fn request_ms(request: &Request, rates: &Rates) -> f64 {
+    match request {
+        Request::SolveOnce(once) => {
+            let SolveOnce { mesh, materials, element, question } = &**once;
+            let element = element_chosen(*element, poisson_max(materials));
+            made_ms(rates, &work_of(mesh, element), method_of(question.method.as_str()))
+        }
+        Request::SolveSeveral(several) => {
+            let SolveSeveral { mesh, materials, element, question, cases, .. } = &**several;
+            let work = work_of(mesh, element_chosen(*element, poisson_max(materials)));
+            let solve_ms = 1e3 * rates.double.solve_entry_s * work.factor_entries;
+            let method = method_of(question.method.as_str());
+            made_ms(rates, &work, method) + SOLVES_PER_CASE * cases.len() as f64 * solve_ms
+        }
+        Request::SolveLarge(large) => {
+            let SolveLarge { mesh, materials, element, .. } = &**large;
+            let work = work_of(mesh, element_chosen(*element, poisson_max(materials)));
+            TANGENTS_OF_A_MOTION * made_ms(rates, &work, Method::FrontMixed)
+        }
+        Request::UploadModel(UploadModel { mesh, element, .. }) => {
+            made_ms(rates, &work_of(mesh, element_of(*element)), Method::Condensed)
+        }
+        _ => 0.0,
+    }
+}
+
+/// Time until a factor of a kept model is there and has answered.
+///
+/// Units: ms.
+pub(crate) fn factor_ms(model: &Model, method: Method, rates: &Rates) -> f64 {
+    made_ms(rates, &work_of_model(model), method)
+}
+
+/// Time of a frame at large deformation: one that goes on takes some solves with an older factor, the
+/// first one on a model makes the factor.
+///
+/// Units: ms.
+pub(crate) fn large_frame_ms(model: &Model, goes_on: bool, rates: &Rates) -> f64 {
+    if !goes_on {
+        return factor_ms(model, Method::FrontMixed, rates);
+    }
+    let work = work_of_model(model);
+    let solve_s = rates.single.solve_entry_s * work.factor_entries;
+    // Evaluating the elements takes about as long as assembling them.
+    let evaluation_s = rates.assemble_pair_s * work.element_pairs;
+    1e3 * SOLVES_OF_A_FRAME * (solve_s + evaluation_s)
+}
+
+/// Time to compute the columns of so many contacts by a factor of so many numbers.
+///
+/// Units: ms.
+pub(crate) fn columns_ms(factor_entries: f64, contacts: usize, rates: &Rates) -> f64 {
+    let together = (3.0 * contacts as f64 / TOGETHER).ceil();
+    1e3 * together * SOLVES_TOGETHER * rates.double.solve_entry_s * factor_entries
+}
+
+fn work_of_model(model: &Model) -> Work {
+    let mesh = model.mesh();
+    let size = MeshSize { nodes: mesh.node_count(), tets: mesh.tets().len() };
+    Work::estimate(size, model.element())
+}
+
+fn made_ms(rates: &Rates, work: &Work, method: Method) -> f64 {
+    rates.preparation_ms(work, method) + rates.factor_and_solve_ms(work, method, 0.0)
+}
+
+fn work_of(mesh: &MeshData, element: Element) -> Work {
+    Work::estimate(MeshSize { nodes: mesh.vertices.len(), tets: mesh.tets.len() }, element)
+}
+
+/// A name that no method has is refused when its turn comes.
+fn method_of(name: &str) -> Method {
+    Method::named_or_auto(name).ok().flatten().unwrap_or(Method::Front)
+}
+
+fn element_chosen(element: ElementChoice, poisson_max: f64) -> Element {
+    element_given(element).unwrap_or_else(|| cheapest_element(poisson_max))
+}

@@ -1,0 +1,160 @@
+//! Memory for requests that are being received: taken from the limit as their bytes come.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::time::{Instant, timeout_at};
+
+use crate::budget::Reservation;
+use crate::resources::Resources;
+
+/// The memory that one session takes for the request that it receives.
+pub(crate) struct Room {
+    resources: Arc<Resources>,
+    /// For what has come of the next request.
+    reserved: Reservation,
+}
+
+/// There is no memory for a request.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum NoRoom {
+    #[error(
+        "the request has {bytes} bytes; to receive and read it takes twice as much, and this server \
+         has {limit} in all (--memory-limit)"
+    )]
+    Never { bytes: u64, limit: u64 },
+    #[error(
+        "the request has {bytes} bytes, and of the {limit} bytes of this server {taken} are taken \
+         (--memory-limit); send it again later"
+    )]
+    Now { bytes: u64, limit: u64, taken: u64 },
+}
+
+/// Memory for which a session reserves nothing: every session may hold so much.
+pub(crate) const OWN_BYTES: usize = 256 * 1024;
+/// How long a request waits for memory, with its client's bytes left in the network meanwhile.
+const WAIT_MAX: Duration = Duration::from_secs(5);
+
+impl Room {
+    /// Nothing at first.
+    pub fn new(resources: Arc<Resources>) -> Self {
+        let reserved = resources.budget.reservation();
+        Self { resources, reserved }
+    }
+
+    /// Whether a request of so many bytes can be received and read at all.
+    ///
+    /// # Errors
+    /// [`NoRoom::Never`].
+    pub fn check(&self, bytes: usize) -> Result<(), NoRoom> {
+        let (bytes, limit) = (bytes as u64, self.reserved.limit());
+        match bytes > OWN_BYTES as u64 && bytes.saturating_mul(2) > limit {
+            true => Err(NoRoom::Never { bytes, limit }),
+            false => Ok(()),
+        }
+    }
+
+    /// Makes the reserved memory `bytes`, of a request that will have `whole` at last. Waits a while
+    /// where others hold too much.
+    ///
+    /// May be dropped at any await.
+    ///
+    /// # Errors
+    /// [`NoRoom::Now`].
+    pub async fn grow(&self, bytes: usize, whole: usize) -> Result<(), NoRoom> {
+        if bytes <= OWN_BYTES {
+            return Ok(());
+        }
+        let until = Instant::now() + WAIT_MAX;
+        loop {
+            let freed = self.resources.budget.freed();
+            // What is given back from here on is heard of.
+            tokio::pin!(freed);
+            freed.as_mut().enable();
+            match self.try_grow(bytes, whole) {
+                Ok(()) => return Ok(()),
+                Err(no_room) => {
+                    timeout_at(until, freed).await.map_err(|_| no_room)?;
+                }
+            }
+        }
+    }
+
+    fn try_grow(&self, bytes: usize, whole: usize) -> Result<(), NoRoom> {
+        if self.reserved.reserve(bytes as u64, 0) {
+            self.resources.models.make_room(None);
+            return Ok(());
+        }
+        let (limit, taken) = (self.reserved.limit(), self.reserved.of_others());
+        Err(NoRoom::Now { bytes: whole as u64, limit, taken })
+    }
+
+    /// The memory of a request that is whole, to go along with it.
+    pub fn hand_over(&mut self) -> Reservation {
+        std::mem::replace(&mut self.reserved, self.resources.budget.reservation())
+    }
+
+    /// Gives back what was reserved for a request that is not received any further.
+    pub fn give_up(&self) {
+        self.reserved.settle(0);
+    }
+}
+
+/// Reserves what reading a request of so many bytes takes for the moment: the bytes and what is made
+/// of them.
+///
+/// # Errors
+/// [`NoRoom::Now`].
+pub(crate) fn reserve_for_reading(received: &Reservation, bytes: usize) -> Result<(), NoRoom> {
+    let bytes = bytes as u64;
+    match bytes <= OWN_BYTES as u64 || received.reserve(2 * bytes, 0) {
+        true => Ok(()),
+        false => {
+            let (limit, taken) = (received.limit(), received.of_others());
+            Err(NoRoom::Now { bytes, limit, taken })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::ServerConfig;
+    use crate::workers::Workers;
+
+    fn resources(memory_limit: u64) -> Arc<Resources> {
+        let config = ServerConfig { memory_limit, ..ServerConfig::default() };
+        Arc::new(Resources::new(config, Workers::new(1, 1).unwrap()))
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn bytes_that_are_received_count_and_wait_for_those_of_others() {
+        let resources = resources(10 << 20);
+        let [mut first, second] = [(); 2].map(|()| Room::new(Arc::clone(&resources)));
+        first.grow(8 << 20, 8 << 20).await.unwrap();
+        assert_eq!(resources.budget.left_for_kept(), 2 << 20);
+        second.grow(OWN_BYTES, 8 << 20).await.expect("every session may hold so much");
+        let refused = second.grow(4 << 20, 5 << 20).await;
+        let taken = 8 << 20;
+        assert_eq!(refused, Err(NoRoom::Now { bytes: 5 << 20, limit: 10 << 20, taken }));
+        // It goes on as soon as the other's request has been read.
+        let held = first.hand_over();
+        let (grown, ()) = tokio::join!(second.grow(4 << 20, 5 << 20), async {
+            tokio::time::sleep(WAIT_MAX / 2).await;
+            drop(held);
+        });
+        assert_eq!(grown, Ok(()));
+        second.give_up();
+        assert_eq!(resources.budget.left_for_kept(), 10 << 20);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn request_that_can_never_be_read_is_refused_before_it_comes() {
+        let room = Room::new(resources(10 << 20));
+        assert_eq!(room.check(5 << 20), Ok(()));
+        let (bytes, limit) = ((5 << 20) + 1, 10 << 20);
+        assert_eq!(room.check(bytes), Err(NoRoom::Never { bytes: bytes as u64, limit }));
+        let small = Room::new(resources(1));
+        assert_eq!(small.check(OWN_BYTES), Ok(()), "a small one is told more by its own refusal");
+    }
+}
