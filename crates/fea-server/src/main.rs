@@ -19,6 +19,8 @@ const WRONG_USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    // What `--memory-limit` counts is what the system sees.
+    softgrasp_os::give_back_large_pieces_at_once();
     start_log(arguments.log);
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,

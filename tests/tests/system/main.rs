@@ -21,6 +21,7 @@ mod many_clients;
 mod masks;
 mod memory;
 mod mouse;
+mod not_finite;
 mod real_time;
 mod same_bits;
 mod settings;

@@ -12,6 +12,7 @@ mod fifty;
 mod fuzzed;
 mod killed;
 mod limits;
+mod received;
 mod seeds;
 #[path = "../system/start.rs"]
 mod start;
