@@ -193,6 +193,15 @@ end_run() {
         "$work/$name.mcap" --at-least "$questions")" || fail "run $name"
 }
 
+strangers() { python3 "$here/metrics.py" "${metrics[$1]}" value softgrasp_strangers; }
+has_strangers() { [ "$(strangers "$1")" = "$2" ]; }
+
+# introduce DESCRIPTOR: sends the example Ping of docs/wire.md, which makes a connection a session.
+introduce() {
+    printf 'SGRP\3\0\x08\0\0\0\0\0\x08\0\0\0\x08\0\0\0\0\0\0\0\x61\x05\x02\xd7\xf4\xdf\xf8\xc2' >&"$1"
+    printf '\xef\xcd\xab\x89\x67\x45\x23\x01' >&"$1"
+}
+
 status_of() { python3 "$here/metrics.py" "${metrics[$1]}" status "$2"; }
 ready_says() { [[ "$(status_of "$1" /ready)" == "$2"* ]]; }
 
@@ -276,15 +285,20 @@ full_server_keeps_its_sessions() {
     local holder taken=()
     start_run full squeeze 240
     holder="$(in_grasp full)" || exit 1
-    # Connections that say nothing take places until the server loses patience with them.
+    # Connections that say nothing take no place: only those that have introduced themselves do.
     local n
-    for n in 1 2 3; do
+    for n in 1 2 3 4 5 6; do
         exec {taken[$n]}<>"/dev/tcp/${address[$holder]%:*}/${address[$holder]##*:}"
+    done
+    wait_until 2 has_strangers "$holder" 6 || fail "strangers: $(strangers "$holder"), not 6"
+    ready_says "$holder" '200 ready' || fail "/ready: $(status_of "$holder" /ready) beside strangers"
+    for n in 1 2 3; do
+        introduce "${taken[$n]}"
     done
     wait_until 2 ready_says "$holder" '503 all sessions' || fail "/ready: $(status_of "$holder" /ready)"
     await_seen_as "$holder" NOLB
     client beside --server "${address[proxy]}" || fail "a new client while a server is full"
-    for n in 1 2 3; do
+    for n in 1 2 3 4 5 6; do
         exec {taken[$n]}>&-
     done
     await_seen_as "$holder" UP
@@ -329,6 +343,7 @@ one_address_gets_so_many_places() {
     local n places=() more
     for n in 1 2 3 4 5 6; do
         exec {places[$n]}<>"/dev/tcp/${address[proxy]%:*}/${address[proxy]##*:}"
+        introduce "${places[$n]}"
     done
     wait_until 5 has_sessions 3 3 || fail "sessions: $(sessions a) and $(sessions b)"
     exec {more}<>"/dev/tcp/${address[proxy]%:*}/${address[proxy]##*:}"

@@ -1,19 +1,21 @@
-//! Who may use the server: those who show its token, and nobody who guesses.
+//! Who may use the server: those who show one of its tokens, and nobody who guesses.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::time::{Duration, Instant};
 
 use crate::lock::Lock;
+use crate::origin::Origin;
 use crate::refusal::Refusal;
+use crate::tokens::{Bearer, TokenNumbers, Tokens};
 
-/// The token of a server, as a digest, and the addresses that showed wrong ones.
+/// The tokens of a server, and the owners of addresses that showed wrong ones.
 pub(crate) struct Access {
-    token: Option<blake3::Hash>,
-    wrong: Lock<BTreeMap<IpAddr, Wrong>>,
+    tokens: Option<Tokens>,
+    wrong: Lock<BTreeMap<Origin, Wrong>>,
 }
 
-/// Wrong tokens of one address.
+/// Wrong tokens of one owner.
 #[derive(Clone, Copy)]
 struct Wrong {
     count: u32,
@@ -28,43 +30,50 @@ const BARRED_FOR: Duration = Duration::from_secs(30);
 const ADDRESSES_MAX: usize = 4096;
 
 impl Access {
-    /// Access for all (`None`) or for those who show the token.
-    pub fn new(token: Option<&str>) -> Self {
-        let token = token.map(|token| blake3::hash(token.as_bytes()));
-        Self { token, wrong: Lock::default() }
+    /// Access for all (`None`) or for those who show one of the tokens.
+    pub fn new(tokens: Option<Tokens>) -> Self {
+        Self { tokens, wrong: Lock::default() }
     }
 
     /// Whether a token is wanted.
     pub fn wants_token(&self) -> bool {
-        self.token.is_some()
+        self.tokens.is_some()
     }
 
-    /// Lets in who shows the right token. The time it takes tells nothing of the token: digests are
-    /// compared, all of their bytes.
+    /// What has been counted of each token that has a name.
+    pub fn numbers(&self) -> Vec<TokenNumbers> {
+        self.tokens.as_ref().map(Tokens::numbers).unwrap_or_default()
+    }
+
+    /// Lets in who shows a right token, and tells whose it is; `None` where none is wanted.
     ///
     /// # Errors
     /// [`Refusal::Token`] for a wrong or missing token, [`Refusal::Barred`] for an address that showed
     /// too many of them, whatever it shows now.
-    pub fn check(&self, address: IpAddr, shown: Option<&str>, now: Instant) -> Result<(), Refusal> {
-        let Some(token) = self.token else { return Ok(()) };
-        // An address of either family counts as the same one.
-        let address = address.to_canonical();
-        let is_right = blake3::hash(shown.unwrap_or("").as_bytes()) == token && shown.is_some();
+    pub fn check(
+        &self,
+        address: IpAddr,
+        shown: Option<&str>,
+        now: Instant,
+    ) -> Result<Option<Bearer>, Refusal> {
+        let Some(tokens) = &self.tokens else { return Ok(None) };
+        let origin = Origin::of(address);
+        let bearer = shown.and_then(|shown| tokens.bearer(shown));
         self.wrong.with(|wrong| {
             wrong.retain(|_, wrong| now.duration_since(wrong.newest) < BARRED_FOR);
-            let count = wrong.get(&address).map_or(0, |wrong| wrong.count);
+            let count = wrong.get(&origin).map_or(0, |wrong| wrong.count);
             if count >= WRONG_MAX {
                 return Err(Refusal::Barred { seconds: BARRED_FOR.as_secs() });
             }
-            if is_right {
-                wrong.remove(&address);
-                return Ok(());
+            if bearer.is_some() {
+                wrong.remove(&origin);
+                return Ok(bearer);
             }
-            if wrong.len() >= ADDRESSES_MAX && !wrong.contains_key(&address) {
+            if wrong.len() >= ADDRESSES_MAX && !wrong.contains_key(&origin) {
                 let oldest = wrong.iter().min_by_key(|(_, wrong)| wrong.newest).map(|(a, _)| *a);
                 oldest.map(|oldest| wrong.remove(&oldest));
             }
-            wrong.insert(address, Wrong { count: count + 1, newest: now });
+            wrong.insert(origin, Wrong { count: count + 1, newest: now });
             Err(Refusal::Token)
         })
     }
@@ -87,7 +96,7 @@ mod tests {
 
     #[test]
     fn only_the_right_token_is_let_in() {
-        let access = Access::new(Some("open sesame"));
+        let access = Access::new(Some(Tokens::of("open sesame")));
         let now = Instant::now();
         for (at, shown) in
             [None, Some(""), Some("open sesam"), Some("open sesame ")].iter().enumerate()
@@ -100,7 +109,7 @@ mod tests {
 
     #[test]
     fn an_address_that_guesses_is_barred_for_a_while_and_others_are_not() {
-        let access = Access::new(Some("right"));
+        let access = Access::new(Some(Tokens::of("right")));
         let start = Instant::now();
         for _ in 0..WRONG_MAX {
             assert!(matches!(access.check(address(1), Some("guess"), start), Err(Refusal::Token)));
@@ -118,7 +127,7 @@ mod tests {
 
     #[test]
     fn one_wrong_token_less_than_the_limit_does_not_bar() {
-        let access = Access::new(Some("right"));
+        let access = Access::new(Some(Tokens::of("right")));
         let now = Instant::now();
         for _ in 1..WRONG_MAX {
             assert!(access.check(address(1), Some("guess"), now).is_err());
@@ -128,7 +137,7 @@ mod tests {
 
     #[test]
     fn addresses_that_are_remembered_are_bounded() {
-        let access = Access::new(Some("right"));
+        let access = Access::new(Some(Tokens::of("right")));
         let start = Instant::now();
         for at in 0..2 * ADDRESSES_MAX as u32 {
             let now = start + Duration::from_micros(u64::from(at));
@@ -136,6 +145,6 @@ mod tests {
         }
         assert_eq!(access.wrong.with(|wrong| wrong.len()), ADDRESSES_MAX);
         let newest = address(2 * ADDRESSES_MAX as u32 - 1);
-        assert!(access.wrong.with(|wrong| wrong.contains_key(&newest)));
+        assert!(access.wrong.with(|wrong| wrong.contains_key(&Origin::of(newest))));
     }
 }

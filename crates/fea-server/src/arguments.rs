@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
-use fea_server::{Encryption, ServerConfig};
+use fea_server::{Encryption, ServerConfig, Tokens};
 use softgrasp_core::solve::memory::Bytes;
 
 /// Finite element server of Softgrasp: solves deformations over TCP, once per frame.
@@ -87,13 +87,14 @@ struct LimitArguments {
 }
 
 /// Who may come, and what others can read.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 #[command(next_help_heading = "Access")]
 pub struct AccessArguments {
-    /// File whose first line is the token a client must show.
+    /// File whose first line is the token a client must show; or of lines with several tokens, each
+    /// name=NAME token=TOKEN [sessions=N]. SIGHUP reads it again.
     #[arg(long, value_name = "F")]
-    token_file: Option<PathBuf>,
-    /// Encrypt with this certificate (chain), PEM.
+    pub token_file: Option<PathBuf>,
+    /// Encrypt with this certificate (chain), PEM. SIGHUP reads it and its key again.
     #[arg(long, value_name = "F", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
     /// Key of the certificate, PEM.
@@ -103,6 +104,10 @@ pub struct AccessArguments {
     /// of --tls-cert and --tls-key, and end; clients trust the same file (--tls-ca).
     #[arg(long, value_name = "HOST,...", value_delimiter = ',', requires = "tls_cert")]
     pub make_certificate: Vec<String>,
+    /// Days for which that certificate is valid.
+    #[arg(long, value_name = "N", default_value = "730", requires = "make_certificate",
+        value_parser = clap::value_parser!(u32).range(1..=36_500))]
+    pub certificate_days: u32,
     /// Listen on an address that other machines can reach without token and encryption: whoever reaches
     /// it can use this server and read what others send.
     #[arg(long)]
@@ -128,18 +133,17 @@ fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 impl Arguments {
-    /// The settings.
+    /// The settings, with what the files of [`AccessArguments`] held.
     ///
     /// # Errors
-    /// What cannot be read: an address, the token, certificate and key.
-    pub fn config(&self) -> anyhow::Result<ServerConfig> {
+    /// An address that is none.
+    pub fn config(
+        &self,
+        tokens: Option<Tokens>,
+        encryption: Option<Encryption>,
+    ) -> anyhow::Result<ServerConfig> {
         let usual = ServerConfig::default();
         let Self { limits, access, .. } = self;
-        let token = access.token_file.as_deref().map(softgrasp_os::read_token).transpose()?;
-        let encryption = match (&access.tls_cert, &access.tls_key) {
-            (Some(certificate), Some(key)) => Some(Encryption::read(certificate, key)?),
-            _ => None,
-        };
         let metrics = self.metrics.as_deref().map(|text| address("--metrics", text)).transpose()?;
         Ok(ServerConfig {
             listen: address("--listen", &self.listen)?,
@@ -159,7 +163,7 @@ impl Arguments {
             reply_limit: limits.reply_limit,
             drain: self.drain,
             metrics,
-            token,
+            tokens,
             encryption,
             is_insecure: access.insecure,
             measure_at_start: true,
@@ -182,7 +186,7 @@ mod tests {
 
     #[test]
     fn options_left_out_are_the_settings_of_the_library() {
-        let made = Arguments::parse_from(["fea-server"]).config().unwrap();
+        let made = Arguments::parse_from(["fea-server"]).config(None, None).unwrap();
         let usual = ServerConfig { measure_at_start: true, ..ServerConfig::default() };
         assert_eq!(format!("{made:?}"), format!("{usual:?}"));
     }

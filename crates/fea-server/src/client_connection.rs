@@ -12,6 +12,7 @@ use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 use crate::budget::Reservation;
 use crate::config::ServerConfig;
+use crate::places::NoPlace;
 use crate::room::{NoRoom, Room};
 
 /// Frames from and bytes to one client, each with a limit on how long the client may hold it up.
@@ -32,6 +33,10 @@ pub(crate) enum Incoming {
     Request { frame: Frame, received: Reservation },
     /// A request for which there is no memory; the rest of its bytes is passed over as they come.
     NoRoom { header: Header, why: NoRoom },
+    /// A frame longer than it may be has begun; it is read on when it may.
+    Longer,
+    /// The client has closed between two frames.
+    End,
 }
 
 /// How long a client is waited for.
@@ -66,6 +71,10 @@ pub(crate) enum SessionError {
     NoHeader(Duration),
     #[error("the client did not introduce itself within {} s", .0.as_secs_f64())]
     Stranger(Duration),
+    #[error("others came while the client had not introduced itself")]
+    SentAway,
+    #[error(transparent)]
+    NoPlace(#[from] NoPlace),
     #[error("the client sent nothing for {} s", .0.as_secs_f64())]
     Idle(Duration),
     #[error("the client did not take its reply within {} s", .0.as_secs_f64())]
@@ -122,18 +131,30 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
     ///
     /// # Errors
     /// [`SessionError`]: how the client was too slow, or what is wrong with the stream.
-    pub async fn next_frame(&mut self) -> Result<Option<Incoming>, SessionError> {
+    pub async fn next_frame(&mut self) -> Result<Incoming, SessionError> {
+        self.next_frame_up_to(usize::MAX).await
+    }
+
+    /// The same for frames of at most `len_max` bytes, header included; a longer one is told when its
+    /// header is there.
+    ///
+    /// # Errors
+    /// As [`Self::next_frame`].
+    pub async fn next_frame_up_to(&mut self, len_max: usize) -> Result<Incoming, SessionError> {
         let start = Instant::now();
         self.connection.stream_mut().first_read =
             self.connection.is_inside_frame().then_some(start);
         loop {
             if let Some(frame) = self.connection.frame_received().map_err(ConnectionError::from)? {
-                return Ok(Some(Incoming::Request { frame, received: self.room.hand_over() }));
+                return Ok(Incoming::Request { frame, received: self.room.hand_over() });
+            }
+            if self.connection.header().is_some_and(|header| header.frame_len() > len_max) {
+                return Ok(Incoming::Longer);
             }
             if let Err((header, why)) = self.make_room().await {
                 self.connection.pass_over();
                 self.room.give_up();
-                return Ok(Some(Incoming::NoRoom { header, why }));
+                return Ok(Incoming::NoRoom { header, why });
             }
             let (until, too_slow) = self.deadline(start);
             if until <= Instant::now() {
@@ -147,7 +168,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
                 Ok(Ok(true)) | Err(_) => {}
                 Ok(Ok(false)) => {
                     self.connection.finish().map_err(ConnectionError::from)?;
-                    return Ok(None);
+                    return Ok(Incoming::End);
                 }
                 Ok(Err(error)) => return Err(error.into()),
             }

@@ -7,6 +7,7 @@ use softgrasp_protocol::Limits;
 
 use crate::clock::StageWatch;
 use crate::encryption::Encryption;
+use crate::tokens::Tokens;
 
 /// Settings of one server.
 #[derive(Clone, Debug)]
@@ -33,8 +34,8 @@ pub struct ServerConfig {
     pub model_idle_limit: Duration,
     /// Bytes of compliance columns kept per model.
     pub column_cache: u64,
-    /// Shared secret a client must show, if any.
-    pub token: Option<String>,
+    /// Tokens of which a client must show one, if any.
+    pub tokens: Option<Tokens>,
     /// What sessions are encrypted with, if at all.
     pub encryption: Option<Encryption>,
     /// Whether the server may be reached from other machines without token and encryption.
@@ -103,8 +104,9 @@ pub enum ConfigError {
 }
 
 const THREADS_MAX: usize = 1024;
-/// Bytes that a client may send in one frame before it has shown the token.
-const STRANGER_PAYLOAD_MAX: u32 = 64 * 1024;
+/// Bytes that a client may send in one frame before it has shown the token; without a token a longer
+/// frame takes the place of a session when its header is there.
+pub(crate) const STRANGER_PAYLOAD_MAX: u32 = 64 * 1024;
 
 impl Default for ServerConfig {
     fn default() -> Self {
@@ -120,7 +122,7 @@ impl Default for ServerConfig {
             memory_limit: 8 << 30,
             model_idle_limit: Duration::from_secs(600),
             column_cache: 1 << 30,
-            token: None,
+            tokens: None,
             encryption: None,
             is_insecure: false,
             measure_at_start: false,
@@ -167,7 +169,7 @@ impl ServerConfig {
                 return Err(ConfigError::Zero { option });
             }
         }
-        let is_guarded = self.token.is_some() && self.encryption.is_some();
+        let is_guarded = self.tokens.is_some() && self.encryption.is_some();
         if !self.listen.ip().is_loopback() && !is_guarded && !self.is_insecure {
             return Err(ConfigError::Open { address: self.listen });
         }
@@ -208,19 +210,19 @@ mod tests {
     fn an_address_that_others_can_reach_wants_token_and_encryption_or_a_word() {
         let folder = tempfile::tempdir().unwrap();
         let (certificate, key) = (folder.path().join("certificate"), folder.path().join("key"));
-        crate::make_certificate(&["lab".to_owned()], &certificate, &key).unwrap();
+        crate::make_certificate(&["lab".to_owned()], 1, &certificate, &key).unwrap();
         let encryption = Some(Encryption::read(&certificate, &key).unwrap());
-        let token = Some("secret".to_owned());
+        let tokens = Some(Tokens::of("secret"));
         let open: SocketAddr = ([0, 0, 0, 0], 7878).into();
         let config = ServerConfig { listen: open, ..ServerConfig::default() };
         let refused = Err(ConfigError::Open { address: open });
         assert_eq!(config.check(), refused);
-        assert_eq!(ServerConfig { token: token.clone(), ..config.clone() }.check(), refused);
+        assert_eq!(ServerConfig { tokens: tokens.clone(), ..config.clone() }.check(), refused);
         assert_eq!(
             ServerConfig { encryption: encryption.clone(), ..config.clone() }.check(),
             refused
         );
-        assert_eq!(ServerConfig { token, encryption, ..config.clone() }.check(), Ok(()));
+        assert_eq!(ServerConfig { tokens, encryption, ..config.clone() }.check(), Ok(()));
         assert_eq!(ServerConfig { is_insecure: true, ..config }.check(), Ok(()));
         assert_eq!(ServerConfig::default().check(), Ok(()));
         let pages = ServerConfig { metrics: Some(open), ..ServerConfig::default() };

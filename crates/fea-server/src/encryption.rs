@@ -1,17 +1,29 @@
-//! TLS: the certificate and key of a server, and a pair for a lab that has no authority.
+//! TLS: the certificate and key of a server.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::{self, crypto, version};
 
-/// What a server encrypts with: TLS 1.3, its certificate and key.
+use crate::certificate::{Validity, ValidityError};
+use crate::lock::Lock;
+
+/// What a server encrypts with: TLS 1.3, its certificate and key. Clones are the same: those of a running
+/// server can be replaced.
 #[derive(Clone)]
-pub struct Encryption(Arc<rustls::ServerConfig>);
+pub struct Encryption(Arc<Lock<Pair>>);
+
+/// A certificate with its key, and how long it is valid.
+#[derive(Clone)]
+struct Pair {
+    config: Arc<rustls::ServerConfig>,
+    validity: Validity,
+}
 
 /// Why there is no encryption.
 #[derive(Debug, thiserror::Error)]
@@ -38,23 +50,13 @@ pub enum EncryptionError {
         /// What the library says.
         reason: String,
     },
-    /// Names for which no certificate can be made.
-    #[error(
-        "no certificate can be made for {names}: {reason}; name hosts or addresses, as in lab.example,192.168.1.5"
-    )]
-    Names {
-        /// As given.
-        names: String,
-        /// What the library says.
-        reason: String,
-    },
-    /// A file that cannot be written.
-    #[error("cannot write {path}: {source}")]
-    Write {
-        /// The file.
+    /// A certificate that no client trusts at this time.
+    #[error("certificate {path} cannot be used: {source}")]
+    Validity {
+        /// The certificate's file.
         path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
+        /// Why.
+        source: ValidityError,
     },
 }
 
@@ -62,7 +64,7 @@ impl Encryption {
     /// Reads a chain of certificates and the key of the first, both PEM.
     ///
     /// # Errors
-    /// [`EncryptionError`].
+    /// [`EncryptionError`]; also for a certificate that has expired or is not valid yet.
     pub fn read(certificate: &Path, key: &Path) -> Result<Self, EncryptionError> {
         let wrong = |what, path: &Path, reason: String| EncryptionError::File {
             what,
@@ -72,9 +74,12 @@ impl Encryption {
         let chain = CertificateDer::pem_file_iter(certificate)
             .and_then(|chain| chain.collect::<Result<Vec<_>, _>>())
             .map_err(|e| wrong("certificate", certificate, e.to_string()))?;
-        if chain.is_empty() {
+        let Some(first) = chain.first() else {
             return Err(wrong("certificate", certificate, "it holds none".to_owned()));
-        }
+        };
+        let outdated = |source| EncryptionError::Validity { path: certificate.to_owned(), source };
+        let validity = Validity::of(first).map_err(outdated)?;
+        validity.check(SystemTime::now()).map_err(outdated)?;
         let private =
             PrivateKeyDer::from_pem_file(key).map_err(|e| wrong("key", key, e.to_string()))?;
         let provider = Arc::new(crypto::ring::default_provider());
@@ -82,7 +87,7 @@ impl Encryption {
             .with_protocol_versions(&[&version::TLS13])
             .map(|builder| builder.with_no_client_auth())
             .and_then(|builder| builder.with_single_cert(chain, private))
-            .map(|config| Self(Arc::new(config)))
+            .map(|config| Self(Arc::new(Lock::new(Pair { config: Arc::new(config), validity }))))
             .map_err(|e| EncryptionError::Pair {
                 certificate: certificate.to_owned(),
                 key: key.to_owned(),
@@ -90,8 +95,19 @@ impl Encryption {
             })
     }
 
+    /// Whoever connects from now on is shown this certificate; those who are connected stay.
+    pub fn renew(&self, by: &Self) {
+        let new = by.0.with(|pair| pair.clone());
+        self.0.with(|pair| *pair = new);
+    }
+
+    /// For how long the certificate is valid.
+    pub fn validity(&self) -> Validity {
+        self.0.with(|pair| pair.validity)
+    }
+
     pub(crate) fn acceptor(&self) -> TlsAcceptor {
-        TlsAcceptor::from(Arc::clone(&self.0))
+        TlsAcceptor::from(self.0.with(|pair| Arc::clone(&pair.config)))
     }
 }
 
@@ -102,68 +118,22 @@ impl fmt::Debug for Encryption {
     }
 }
 
-/// Makes a self-signed certificate for hosts and addresses and writes it with its key; the
-/// certificate is also what clients trust (`--tls-ca`). The key can be read by its owner only.
-///
-/// # Errors
-/// [`EncryptionError`]; a file that is there already is not overwritten.
-pub fn make_certificate(
-    names: &[String],
-    certificate: &Path,
-    key: &Path,
-) -> Result<(), EncryptionError> {
-    let made = rcgen::generate_simple_self_signed(names.to_vec())
-        .map_err(|e| EncryptionError::Names { names: names.join(","), reason: e.to_string() })?;
-    write_new(key, &made.signing_key.serialize_pem(), 0o600)?;
-    write_new(certificate, &made.cert.pem(), 0o644)
-}
-
-fn write_new(path: &Path, text: &str, mode: u32) -> Result<(), EncryptionError> {
-    use std::io::Write;
-    let mut options = std::fs::OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
-    #[cfg(not(unix))]
-    let _ = mode;
-    options
-        .open(path)
-        .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
-        .map_err(|source| EncryptionError::Write { path: path.to_owned(), source })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::certificate::make_certificate;
 
     fn pair(folder: &Path) -> (PathBuf, PathBuf) {
         (folder.join("certificate.pem"), folder.join("key.pem"))
     }
 
     #[test]
-    fn a_pair_that_was_made_can_be_served_and_is_not_overwritten() {
-        let folder = tempfile::tempdir().unwrap();
-        let (certificate, key) = pair(folder.path());
-        let names = ["lab.example".to_owned(), "192.168.1.5".to_owned()];
-        make_certificate(&names, &certificate, &key).unwrap();
-        Encryption::read(&certificate, &key).unwrap();
-        let again = make_certificate(&names, &certificate, &key);
-        assert!(matches!(again, Err(EncryptionError::Write { .. })), "{again:?}");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            let mode = std::fs::metadata(&key).unwrap().permissions().mode();
-            assert_eq!(mode & 0o777, 0o600);
-        }
-    }
-
-    #[test]
     fn files_that_are_no_pair_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let (certificate, key) = pair(folder.path());
-        make_certificate(&["a".to_owned()], &certificate, &key).unwrap();
+        make_certificate(&["a".to_owned()], 1, &certificate, &key).unwrap();
         let (other, other_key) = (folder.path().join("other"), folder.path().join("other-key"));
-        make_certificate(&["a".to_owned()], &other, &other_key).unwrap();
+        make_certificate(&["a".to_owned()], 1, &other, &other_key).unwrap();
         let mixed = Encryption::read(&certificate, &other_key);
         assert!(matches!(mixed, Err(EncryptionError::Pair { .. })), "{mixed:?}");
         let swapped = Encryption::read(&key, &certificate);

@@ -7,11 +7,13 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use tokio::io::{DuplexStream, duplex};
 use tokio::sync::watch;
+use tracing::Instrument;
 
 use crate::config::ServerConfig;
 use crate::server::StartError;
 use crate::server_handle::ServerHandle;
 use crate::session;
+use crate::standing::Standing;
 use crate::status_pages::gauges;
 use crate::workers::Workers;
 
@@ -47,16 +49,18 @@ impl LocalServer {
         let place = self.server.places.take(PEER.ip()).ok()?;
         let (client, stream) = duplex(PIPE_BYTES);
         let server = self.server.clone();
-        let serves = async move {
-            session::serve(stream, PEER, server).await;
-            drop(place);
-        };
-        Some((client, serves))
+        let span = session::span(&server, PEER);
+        let serves = session::serve(
+            stream,
+            PEER,
+            server,
+            Standing::Known { _place: place, _of_token: None },
+        );
+        Some((client, serves.instrument(span)))
     }
 
     /// What the page `/metrics` of a server tells.
     pub fn metrics(&self) -> String {
-        let ServerHandle { resources, places, .. } = &self.server;
-        resources.metrics.text(&gauges(resources, places, true))
+        self.server.resources.metrics.text(&gauges(&self.server, true))
     }
 }

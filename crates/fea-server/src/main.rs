@@ -1,6 +1,7 @@
 //! The `fea-server` program: log, signals, exit code.
 
 mod arguments;
+mod credentials;
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
@@ -9,6 +10,7 @@ use std::time::Duration;
 use anyhow::Context;
 use arguments::{Arguments, LogForm};
 use clap::Parser;
+use credentials::{Credentials, Renewal};
 use fea_server::{Listening, StartError, make_certificate};
 use tokio::sync::watch;
 
@@ -44,7 +46,8 @@ fn start_log(form: LogForm) {
         .with_writer(std::io::stderr);
     match form {
         LogForm::Text => log.init(),
-        LogForm::Json => log.json().init(),
+        // Of the session around a line once is enough.
+        LogForm::Json => log.json().with_span_list(false).init(),
     }
 }
 
@@ -53,13 +56,19 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
     if let (false, Some(certificate), Some(key)) =
         (access.make_certificate.is_empty(), &access.tls_cert, &access.tls_key)
     {
-        return Ok(make_certificate(&access.make_certificate, certificate, key)?);
+        let (names, days) = (&access.make_certificate, access.certificate_days);
+        return Ok(make_certificate(names, days, certificate, key)?);
     }
-    let config = arguments.config()?;
+    let Credentials { tokens, encryption } = access.read()?;
+    let config = arguments.config(tokens, encryption)?;
     let (stop, stopped) = watch::channel(false);
     let mut ends_in = arguments.drain + END_MAX;
+    let renewal = Renewal::of(access, &config);
     // Before the first thread: all of them leave these signals to the one that waits.
-    softgrasp_os::on_end_signal(false, move |signal| {
+    softgrasp_os::on_end_signal(true, move |signal| {
+        if let (true, Some(renewal)) = (signal.is_hang_up, &renewal) {
+            return renewal.read_again();
+        }
         tracing::info!(signal = signal.name, "asked to end");
         let _ = stop.send(true);
         softgrasp_os::end_within(ends_in);

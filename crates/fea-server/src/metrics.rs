@@ -8,11 +8,14 @@ use std::time::Duration;
 
 use softgrasp_protocol::{Kind, RejectCode};
 
+use crate::tokens::TokenNumbers;
+
 /// Counters of one server; they only grow.
 #[derive(Default)]
 pub(crate) struct Metrics {
     sessions: AtomicU64,
     turned_away: AtomicU64,
+    not_introduced: AtomicU64,
     given_up: AtomicU64,
     abandoned: AtomicU64,
     bytes_received: AtomicU64,
@@ -39,6 +42,8 @@ const BOUNDS_S: [f64; 12] =
 pub(crate) struct Gauges {
     /// Sessions that are there.
     pub sessions: usize,
+    /// Connections that have not introduced themselves.
+    pub strangers: usize,
     /// Requests that wait or are worked on.
     pub queued: usize,
     /// Models that are kept.
@@ -53,6 +58,10 @@ pub(crate) struct Gauges {
     pub resident_bytes: Option<u64>,
     /// Whether new sessions are taken.
     pub is_ready: bool,
+    /// The last second of the certificate's life, as Unix time; `None` without encryption.
+    pub certificate_expires_s: Option<i64>,
+    /// What has been counted of each token that has a name.
+    pub tokens: Vec<TokenNumbers>,
 }
 
 impl Metrics {
@@ -61,7 +70,12 @@ impl Metrics {
         self.sessions.fetch_add(1, Relaxed);
     }
 
-    /// A connection was turned away: no place, or no agreement on encryption.
+    /// A connection ended before it had introduced itself.
+    pub fn not_introduced(&self) {
+        self.not_introduced.fetch_add(1, Relaxed);
+    }
+
+    /// A client was turned away: all places were taken.
     pub fn turned_away(&self) {
         self.turned_away.fetch_add(1, Relaxed);
     }
@@ -110,7 +124,12 @@ impl Metrics {
     fn write_counters(&self, page: &mut Page) {
         let counters = [
             ("sessions_total", "Sessions that have begun.", &self.sessions),
-            ("turned_away_total", "Connections that got no session.", &self.turned_away),
+            ("turned_away_total", "Clients for which there was no place.", &self.turned_away),
+            (
+                "not_introduced_total",
+                "Connections that ended before they had introduced themselves.",
+                &self.not_introduced,
+            ),
             ("given_up_total", "Sessions that were given up.", &self.given_up),
             ("abandoned_total", "Requests whose client has gone.", &self.abandoned),
             ("received_bytes_total", "Bytes of whole requests.", &self.bytes_received),
@@ -167,6 +186,11 @@ impl Gauges {
     fn write(&self, page: &mut Page) {
         let gauges = [
             ("sessions", "Sessions that are there.", self.sessions as u64),
+            (
+                "strangers",
+                "Connections that have not introduced themselves.",
+                self.strangers as u64,
+            ),
             ("queued_requests", "Requests that wait or are worked on.", self.queued as u64),
             ("models", "Models that are kept.", self.models as u64),
             ("models_bytes", "Memory of the models and what is made for them.", self.models_bytes),
@@ -178,11 +202,48 @@ impl Gauges {
             page.begin(name, "gauge", help);
             page.line(name, "", value);
         }
+        if let Some(seconds) = self.certificate_expires_s {
+            let name = "certificate_expires_seconds";
+            page.begin(name, "gauge", "End of the certificate's life, as Unix time.");
+            page.line(name, "", seconds);
+        }
+        self.write_tokens(page);
         if let Some(bytes) = self.resident_bytes {
             // The name that all programs use for it.
             let _ = writeln!(page.0, "# HELP process_resident_memory_bytes Resident memory.");
             let _ = writeln!(page.0, "# TYPE process_resident_memory_bytes gauge");
             let _ = writeln!(page.0, "process_resident_memory_bytes {bytes}");
+        }
+    }
+}
+
+impl Gauges {
+    fn write_tokens(&self, page: &mut Page) {
+        type Number = fn(&TokenNumbers) -> u64;
+        let numbers: [(&str, &str, &str, Number); 4] = [
+            ("sessions", "gauge", "Sessions that are there, by token.", |token| token.sessions),
+            ("sessions_total", "counter", "Sessions that have begun, by token.", |token| {
+                token.sessions_total
+            }),
+            (
+                "requests_total",
+                "counter",
+                "Requests with an answer or a refusal, by token.",
+                |token| token.requests,
+            ),
+            ("refused_total", "counter", "Requests that were refused, by token.", |token| {
+                token.refused
+            }),
+        ];
+        for (name, kind, help, number) in numbers {
+            if self.tokens.is_empty() {
+                continue;
+            }
+            let name = format!("token_{name}");
+            page.begin(&name, kind, help);
+            for token in &self.tokens {
+                page.line(&name, &format!("{{token=\"{}\"}}", token.name), number(token));
+            }
         }
     }
 }
@@ -207,6 +268,7 @@ mod tests {
 
     const GAUGES: Gauges = Gauges {
         sessions: 3,
+        strangers: 4,
         queued: 1,
         models: 2,
         models_bytes: 10,
@@ -214,6 +276,8 @@ mod tests {
         limit_bytes: 100,
         resident_bytes: Some(7),
         is_ready: true,
+        certificate_expires_s: Some(2_000_000_000),
+        tokens: Vec::new(),
     };
 
     fn value(text: &str, name: &str) -> f64 {

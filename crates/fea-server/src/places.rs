@@ -1,29 +1,30 @@
-//! Places for sessions: so many at the same time, and so many of them for one address.
+//! Places for sessions: so many at the same time, and so many of them for one owner.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::Arc;
 
 use crate::lock::Lock;
+use crate::origin::Origin;
 
 /// Places for sessions that are taken and given back.
 #[derive(Clone)]
 pub(crate) struct Places {
     taken: Arc<Lock<Taken>>,
     max: usize,
-    of_address_max: usize,
+    of_origin_max: usize,
 }
 
 #[derive(Default)]
 struct Taken {
     all: usize,
-    by_address: BTreeMap<IpAddr, usize>,
+    by_origin: BTreeMap<Origin, usize>,
 }
 
 /// A place that is taken until it is dropped.
 pub(crate) struct Place {
     places: Places,
-    address: IpAddr,
+    origin: Origin,
 }
 
 /// Why there is no place.
@@ -35,31 +36,35 @@ pub(crate) enum NoPlace {
         "all sessions for your address are taken (--max-sessions-per-address); end one of them first"
     )]
     Address,
+    #[error(
+        "all sessions of your token are taken (sessions=N in the token file); end one of them first"
+    )]
+    Token,
 }
 
 impl Places {
-    /// `max` places, of which one address may take `of_address_max`.
-    pub fn new(max: usize, of_address_max: usize) -> Self {
-        Self { taken: Arc::default(), max, of_address_max }
+    /// `max` places, of which one address or IPv6 network may take `of_origin_max`.
+    pub fn new(max: usize, of_origin_max: usize) -> Self {
+        Self { taken: Arc::default(), max, of_origin_max }
     }
 
-    /// Takes a place. Programs on the server's own machine share all places: they are one address.
+    /// Takes a place. Programs on the server's own machine share all places.
     ///
     /// # Errors
     /// [`NoPlace`].
     pub fn take(&self, address: IpAddr) -> Result<Place, NoPlace> {
-        let address = address.to_canonical();
+        let origin = Origin::of(address);
         self.taken.with(|taken| {
             if taken.all >= self.max {
                 return Err(NoPlace::Server);
             }
-            let of_address = taken.by_address.get(&address).copied().unwrap_or(0);
-            if of_address >= self.of_address_max && !address.is_loopback() {
+            let of_origin = taken.by_origin.get(&origin).copied().unwrap_or(0);
+            if of_origin >= self.of_origin_max && origin != Origin::ThisMachine {
                 return Err(NoPlace::Address);
             }
             taken.all += 1;
-            taken.by_address.insert(address, of_address + 1);
-            Ok(Place { places: self.clone(), address })
+            taken.by_origin.insert(origin, of_origin + 1);
+            Ok(Place { places: self.clone(), origin })
         })
     }
 
@@ -73,10 +78,10 @@ impl Drop for Place {
     fn drop(&mut self) {
         self.places.taken.with(|taken| {
             taken.all -= 1;
-            if let Some(of_address) = taken.by_address.get_mut(&self.address) {
-                *of_address -= 1;
-                if *of_address == 0 {
-                    taken.by_address.remove(&self.address);
+            if let Some(of_origin) = taken.by_origin.get_mut(&self.origin) {
+                *of_origin -= 1;
+                if *of_origin == 0 {
+                    taken.by_origin.remove(&self.origin);
                 }
             }
         });
@@ -100,7 +105,20 @@ mod tests {
         drop(first);
         assert!(places.take(a).is_ok());
         assert_eq!(places.taken(), 2);
-        assert_eq!(places.taken.with(|taken| taken.by_address.len()), 2);
+        assert_eq!(places.taken.with(|taken| taken.by_origin.len()), 2);
+    }
+
+    #[test]
+    fn addresses_of_one_ipv6_network_share_its_places() {
+        let places = Places::new(5, 2);
+        let [a, b, c, other] = ["2001:db8::1", "2001:db8::2", "2001:db8::3:3", "2001:db8:0:1::1"]
+            .map(|text| {
+                let address: IpAddr = text.parse().unwrap();
+                address
+            });
+        let _taken = [places.take(a).unwrap(), places.take(b).unwrap()];
+        assert_eq!(places.take(c).err(), Some(NoPlace::Address));
+        assert!(places.take(other).is_ok());
     }
 
     #[test]

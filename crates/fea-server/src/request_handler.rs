@@ -17,11 +17,13 @@ use crate::awaited::Waiting;
 use crate::budget::Reservation;
 use crate::clock::{StageClock, ms_since};
 use crate::held_models::HeldModels;
+use crate::log_line::foreign_name;
 use crate::paths::Paths;
 use crate::plan::{large_frame_ms, request_ms};
 use crate::refusal::Refusal;
 use crate::room::{OWN_BYTES, reserve_for_reading};
 use crate::server_handle::{Grasping, ServerHandle};
+use crate::tokens::Bearer;
 use crate::workers::{Asker, Turn, Workers};
 
 /// What one session holds, and the server that works for it.
@@ -32,6 +34,10 @@ pub(crate) struct RequestHandler {
     asker: Asker,
     limits: Limits,
     is_authorised: bool,
+    /// Whose token it has shown, if one is wanted.
+    bearer: Option<Bearer>,
+    /// Whether it has said what it is.
+    is_introduced: bool,
     held: HeldModels,
     /// The equilibria that this session follows.
     paths: Paths,
@@ -54,6 +60,8 @@ impl RequestHandler {
             asker: Asker::new(),
             limits: resources.config.limits(),
             is_authorised: !resources.access.wants_token(),
+            bearer: None,
+            is_introduced: false,
             held: HeldModels::new(Arc::clone(resources)),
             paths: Paths::default(),
             grasping: None,
@@ -69,6 +77,11 @@ impl RequestHandler {
     /// Whether the client has shown the token, or none is wanted.
     pub fn is_authorised(&self) -> bool {
         self.is_authorised
+    }
+
+    /// Whose token the client has shown.
+    pub fn bearer(&self) -> Option<&Bearer> {
+        self.bearer.as_ref()
     }
 
     /// The reply to one request; `None` to a hint. May be dropped at any await: the work then ends when
@@ -238,20 +251,42 @@ impl RequestHandler {
         }
     }
 
-    fn welcome(&mut self, hello: &Hello) -> Result<Reply, Refusal> {
-        let resources = &self.server.resources;
-        let shown = hello.token.as_deref();
-        if let Err(refusal) = resources.access.check(self.peer.ip(), shown, Instant::now()) {
-            tracing::warn!(peer = %self.peer, %refusal, "a token was refused");
-            return Err(refusal);
+    /// The first time; whoever says it again and again is not worth a line.
+    fn log_introduction(&mut self, client: &str) {
+        let is_first = !std::mem::replace(&mut self.is_introduced, true);
+        if is_first && self.server.resources.log_lines.has_room(self.peer.ip()) {
+            let token = self.bearer.as_ref().and_then(|bearer| bearer.name.as_deref());
+            tracing::info!(client = foreign_name(client), token, "client introduced itself");
         }
-        self.is_authorised = true;
-        tracing::info!(client = hello.client, "client introduced itself");
+    }
+
+    fn welcome(&mut self, hello: &Hello) -> Result<Reply, Refusal> {
+        self.check_token(hello)?;
+        self.log_introduction(&hello.client);
         Ok(Reply::Welcome(Welcome {
             server: "fea-server".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            threads: resources.workers.threads() as u32,
+            threads: self.server.resources.workers.threads() as u32,
             limits: self.limits,
         }))
+    }
+
+    fn check_token(&mut self, hello: &Hello) -> Result<(), Refusal> {
+        let resources = &self.server.resources;
+        let shown = hello.token.as_deref();
+        match resources.access.check(self.peer.ip(), shown, Instant::now()) {
+            Ok(bearer) => {
+                // A session stays that of the token it began with.
+                self.bearer = self.bearer.take().or(bearer);
+                self.is_authorised = true;
+                Ok(())
+            }
+            Err(refusal) => {
+                if resources.log_lines.has_room(self.peer.ip()) {
+                    tracing::warn!(%refusal, "a token was refused");
+                }
+                Err(refusal)
+            }
+        }
     }
 }

@@ -3,12 +3,13 @@
 use crate::access::Access;
 use crate::budget::Budget;
 use crate::config::ServerConfig;
+use crate::log_line::LogLines;
 use crate::metrics::Metrics;
 use crate::plan::MeasuredRates;
 use crate::store::ModelStore;
 use crate::workers::Workers;
 
-/// Settings, kept models, memory, solving threads and their speed, and what is counted.
+/// Settings, kept models, memory, solving threads and their speed, what is counted and logged.
 pub(crate) struct Resources {
     pub config: ServerConfig,
     pub access: Access,
@@ -17,6 +18,7 @@ pub(crate) struct Resources {
     pub workers: Workers,
     pub rates: MeasuredRates,
     pub metrics: Metrics,
+    pub log_lines: LogLines,
 }
 
 impl Resources {
@@ -24,8 +26,9 @@ impl Resources {
     pub fn new(config: ServerConfig, workers: Workers) -> Self {
         let budget = Budget::new(config.memory_limit);
         let models = ModelStore::new(budget.clone());
-        let access = Access::new(config.token.as_deref());
+        let access = Access::new(config.tokens.clone());
         let (rates, metrics) = (MeasuredRates::default(), Metrics::default());
-        Self { config, access, models, budget, workers, rates, metrics }
+        let log_lines = LogLines::default();
+        Self { config, access, models, budget, workers, rates, metrics, log_lines }
     }
 }

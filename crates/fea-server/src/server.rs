@@ -5,17 +5,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
-use softgrasp_protocol::asynchronous::Connection;
-use softgrasp_protocol::{Limits, RejectCode, Rejected, Reply};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::TcpListener;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 
+use crate::attendance::{attend, make_ready};
 use crate::config::{ConfigError, ServerConfig};
-use crate::places::NoPlace;
+use crate::pace::Pace;
 use crate::resources::Resources;
 use crate::server_handle::{ServerHandle, stopped};
-use crate::session;
 use crate::status_pages::StatusPages;
 use crate::workers::Workers;
 
@@ -58,10 +56,6 @@ pub enum StartError {
 
 /// Sessions that are still at work this long after a stop are cut off.
 const STOP_GRACE: Duration = Duration::from_secs(2);
-/// A silent peer is asked whether it is there after this long, and again so often; the system gives it
-/// up after some questions without an answer.
-const ALIVE_AFTER: Duration = Duration::from_secs(30);
-const ALIVE_EVERY: Duration = Duration::from_secs(10);
 /// Unused models are looked for this often: a quarter of their time, within these bounds.
 const FORGET_EVERY_MIN: Duration = Duration::from_millis(100);
 const FORGET_EVERY_MAX: Duration = Duration::from_secs(60);
@@ -97,11 +91,10 @@ pub async fn serve(
     let is_stopping = Arc::new(AtomicBool::new(false));
     // Ends with this function.
     let mut beside = JoinSet::new();
-    let (resources, places) = (Arc::clone(&server.resources), server.places.clone());
-    beside.spawn(forget_unused_models(Arc::clone(&resources)));
+    beside.spawn(forget_unused_models(Arc::clone(&server.resources)));
     if let Some(listener) = pages {
-        let is_stopping = Arc::clone(&is_stopping);
-        beside.spawn(StatusPages { resources, places, is_stopping }.serve(listener));
+        let pages = StatusPages::new(server.clone(), Arc::clone(&is_stopping));
+        beside.spawn(pages.serve(listener));
     }
     on_ready(listening);
     if server.resources.config.measure_at_start {
@@ -175,7 +168,7 @@ async fn accept_until_stopped(
     mut stop: watch::Receiver<bool>,
     sessions: &mut JoinSet<()>,
 ) {
-    let mut pace = AcceptPace::new(Instant::now());
+    let mut pace = Pace::of_connections(Instant::now());
     loop {
         let next = async {
             tokio::time::sleep_until(pace.next().into()).await;
@@ -188,103 +181,19 @@ async fn accept_until_stopped(
         };
         match accepted {
             Ok((stream, peer)) => {
-                pace.accepted(Instant::now());
+                pace.came(Instant::now());
                 if let Err(error) = make_ready(&stream) {
                     tracing::warn!(%peer, %error, "a connection could not be set up");
                 }
                 sessions.spawn(attend(stream, peer, server.clone()));
             }
             Err(error) => {
-                tracing::error!(%error, "a connection could not be accepted");
+                // For want of descriptors, most likely: a stranger's comes free.
+                let sent_away = server.strangers.send_one_away();
+                tracing::error!(%error, sent_away, "a connection could not be accepted");
                 tokio::time::sleep(ACCEPT_PAUSE).await;
             }
         }
-    }
-}
-
-/// How fast connections are accepted: a crowd that comes and goes without end must not take the sockets'
-/// thread from those who are there.
-struct AcceptPace {
-    /// The next connection is accepted then, or [`ACCEPTS_AT_ONCE`] earlier ones' worth before.
-    due: Instant,
-}
-
-/// Connections that are accepted at once after a pause.
-const ACCEPTS_AT_ONCE: u32 = 64;
-/// Time between two connections after those.
-const ACCEPT_EVERY: Duration = Duration::from_millis(1);
-
-impl AcceptPace {
-    fn new(now: Instant) -> Self {
-        Self { due: now }
-    }
-
-    /// When the next one may be accepted.
-    fn next(&self) -> Instant {
-        self.due.checked_sub(ACCEPTS_AT_ONCE * ACCEPT_EVERY).unwrap_or(self.due)
-    }
-
-    fn accepted(&mut self, now: Instant) {
-        self.due = self.due.max(now) + ACCEPT_EVERY;
-    }
-}
-
-/// A frame is sent at once, and a peer that is gone without a word is noticed.
-fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
-    stream.set_nodelay(true)?;
-    let alive = socket2::TcpKeepalive::new().with_time(ALIVE_AFTER).with_interval(ALIVE_EVERY);
-    socket2::SockRef::from(stream).set_tcp_keepalive(&alive)
-}
-
-/// Serves a connection if there is a place for it, encrypted if the server is; else says why not.
-async fn attend(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
-    let place = server.places.take(peer.ip());
-    let config = &server.resources.config;
-    let Some(encryption) = &config.encryption else {
-        return match place {
-            Ok(_place) => session::serve(stream, peer, server).await,
-            Err(why) => {
-                server.resources.metrics.turned_away();
-                turn_away(stream, peer, why).await;
-            }
-        };
-    };
-    // A handshake costs: whoever has no place does not get one.
-    let _place = match place {
-        Ok(place) => place,
-        Err(why) => {
-            server.resources.metrics.turned_away();
-            return tracing::warn!(%peer, %why, "turned away");
-        }
-    };
-    let handshake = encryption.acceptor().accept(stream);
-    let mut stop = server.stop.clone();
-    let shaken = tokio::select! {
-        shaken = tokio::time::timeout(config.greeting_limit, handshake) => shaken,
-        () = stopped(&mut stop) => return,
-    };
-    match shaken {
-        Ok(Ok(stream)) => session::serve(stream, peer, server).await,
-        Ok(Err(error)) => {
-            server.resources.metrics.turned_away();
-            tracing::warn!(%peer, %error, "TLS could not be agreed on");
-        }
-        Err(_) => {
-            server.resources.metrics.turned_away();
-            tracing::warn!(%peer, "TLS was not agreed on in time");
-        }
-    }
-}
-
-/// Tells a client that there is no place, and closes.
-async fn turn_away(stream: TcpStream, peer: SocketAddr, why: NoPlace) {
-    tracing::warn!(%peer, %why, "turned away");
-    let text = why.to_string();
-    let reply = Reply::Rejected(Rejected { code: RejectCode::Busy, text, detail: String::new() });
-    let mut bytes = Vec::new();
-    if reply.encode_into(0, &Limits::default(), &mut bytes).is_ok() {
-        let mut connection = Connection::new(stream, Limits::default());
-        let _ = tokio::time::timeout(STOP_GRACE, connection.write_bytes(&bytes)).await;
     }
 }
 
@@ -372,28 +281,5 @@ impl RunningServer {
 impl Drop for RunningServer {
     fn drop(&mut self) {
         self.stop_and_join();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_burst_is_accepted_at_once_and_an_endless_crowd_at_its_pace() {
-        let start = Instant::now();
-        let mut pace = AcceptPace::new(start);
-        for _ in 0..ACCEPTS_AT_ONCE {
-            assert!(pace.next() <= start);
-            pace.accepted(start);
-        }
-        for more in 0..100 {
-            assert_eq!(pace.next(), start + more * ACCEPT_EVERY);
-            pace.accepted(pace.next());
-        }
-        // After a pause there is room for a burst again.
-        let later = start + Duration::from_secs(10);
-        pace.accepted(later);
-        assert!(pace.next() <= later);
     }
 }

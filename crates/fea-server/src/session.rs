@@ -1,5 +1,6 @@
 //! A session: reads one client's requests and writes the replies, in order.
 
+use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,15 +13,25 @@ use tokio::io::{AsyncRead, AsyncWrite};
 
 use crate::budget::Reservation;
 use crate::client_connection::{ClientConnection, Incoming, Patience, SessionError};
+use crate::config::STRANGER_PAYLOAD_MAX;
+use crate::log_line::foreign_sentence;
 use crate::manners::Manners;
 use crate::refusal::Refusal;
 use crate::request_handler::RequestHandler;
 use crate::room::Room;
 use crate::server_handle::{ServerHandle, stopped};
+use crate::standing::Standing;
+use crate::tokens::Bearer;
+
+/// What every line of the log about a connection bears: its number and its peer.
+pub(crate) fn span(server: &ServerHandle, peer: SocketAddr) -> tracing::Span {
+    // Of the highest level, so that no filter takes it from a line that passes.
+    tracing::error_span!("session", id = server.next_connection(), %peer)
+}
 
 /// Serves one connection until the client goes, sends bytes that are no frames, or the server
-/// stops.
-pub(crate) async fn serve<S>(stream: S, peer: SocketAddr, server: ServerHandle)
+/// stops; a stranger until it is to go, too.
+pub(crate) async fn serve<S>(stream: S, peer: SocketAddr, server: ServerHandle, standing: Standing)
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
@@ -37,25 +48,25 @@ where
         ),
         handler: RequestHandler::new(server.clone(), peer),
         server,
+        peer,
+        standing,
         out: Vec::new(),
         refused: 0,
         manners: Manners::default(),
     };
-    tracing::info!(%peer, "session begins");
-    session.server.resources.metrics.session_began();
-    match session.run().await {
-        Ok(()) => tracing::info!(%peer, "session ends"),
-        Err(error) => {
-            session.server.resources.metrics.given_up();
-            tracing::warn!(%peer, %error, "session is given up");
-        }
+    if !session.standing.is_stranger() {
+        session.begin();
     }
+    let ended = session.run().await;
+    session.end(ended);
 }
 
 struct Session<S> {
     connection: ClientConnection<S>,
     handler: RequestHandler,
     server: ServerHandle,
+    peer: SocketAddr,
+    standing: Standing,
     /// Encoded reply, kept so that its memory is reused.
     out: Vec<u8>,
     /// Requests that were refused.
@@ -74,34 +85,95 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     async fn run(&mut self) -> Result<(), SessionError> {
         loop {
             let mut stop = self.server.stop.clone();
-            let frame = tokio::select! {
-                frame = self.connection.next_frame() => frame,
+            let next = tokio::select! {
+                next = next(&mut self.connection, &self.standing) => next,
                 () = stopped(&mut stop) => {
                     let text = "the server is stopping; connect again later".to_owned();
                     self.reject(0, RejectCode::ShuttingDown, text).await?;
                     return Ok(());
                 }
             };
-            match frame {
-                Ok(Some(incoming)) => {
-                    match incoming {
-                        Incoming::Request { frame, received } => {
-                            self.handle(frame, received).await?;
-                        }
-                        Incoming::NoRoom { header, why } => {
-                            self.refuse(&Refusal::NoRoom(why), &header).await?;
-                        }
-                    }
+            match next {
+                Ok(Incoming::Request { frame, received }) => {
+                    self.handle(frame, received).await?;
                     self.give_way().await;
                 }
-                Ok(None) => return Ok(()),
+                Ok(Incoming::NoRoom { header, why }) => {
+                    self.refuse(&Refusal::NoRoom(why), &header).await?;
+                    self.give_way().await;
+                }
+                // It takes its time to come, which a stranger has not.
+                Ok(Incoming::Longer) => self.introduced().await?,
+                Ok(Incoming::End) => return Ok(()),
                 Err(SessionError::Connection(ConnectionError::Frame(error))) => {
                     self.answer_bad_stream(&error).await;
                     return Err(ConnectionError::Frame(error).into());
                 }
+                // TLS tells an end without a farewell; between two frames it is one all the same.
+                Err(SessionError::Connection(ConnectionError::Io(error)))
+                    if error.kind() == ErrorKind::UnexpectedEof
+                        && !self.connection.is_inside_frame() =>
+                {
+                    return Ok(());
+                }
                 Err(error) => return Err(error),
             }
         }
+    }
+
+    /// The client has introduced itself: it gets a session's place, or is told that there is none.
+    async fn introduced(&mut self) -> Result<(), SessionError> {
+        if !self.standing.is_stranger() {
+            return Ok(());
+        }
+        let place = self.server.places.take(self.peer.ip()).and_then(|place| {
+            let of_token = self.handler.bearer().map(Bearer::take_place).transpose()?;
+            Ok(Standing::Known { _place: place, _of_token: of_token })
+        });
+        match place {
+            Ok(known) => {
+                self.standing = known;
+                self.begin();
+                Ok(())
+            }
+            Err(why) => {
+                self.reject(0, RejectCode::Busy, why.to_string()).await?;
+                Err(why.into())
+            }
+        }
+    }
+
+    fn begin(&self) {
+        self.server.resources.metrics.session_began();
+        if self.may_log() {
+            tracing::info!("session begins");
+        }
+    }
+
+    fn end(&self, ended: Result<(), SessionError>) {
+        let metrics = &self.server.resources.metrics;
+        let is_stranger = self.standing.is_stranger();
+        match &ended {
+            Err(SessionError::NoPlace(_)) => metrics.turned_away(),
+            _ if is_stranger => metrics.not_introduced(),
+            Err(_) => metrics.given_up(),
+            Ok(()) => {}
+        }
+        if !self.may_log() {
+            return;
+        }
+        let text = ended.as_ref().err().map(foreign_sentence);
+        match (ended, text) {
+            (Err(SessionError::NoPlace(_)), why) => tracing::warn!(why, "turned away"),
+            (_, error) if is_stranger => tracing::info!(error, "connection ends before a session"),
+            (Err(_), error) => tracing::warn!(error, "session is given up"),
+            (Ok(()), _) => tracing::info!("session ends"),
+        }
+    }
+
+    /// Whether a line about this client may be logged.
+    fn may_log(&self) -> bool {
+        self.server.resources.log_lines.has_room(self.peer.ip())
     }
 
     /// Last words to a client whose bytes make no sense; whether they arrive is of no matter.
@@ -160,12 +232,18 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     fn log(&mut self, refusal: &Refusal) {
         self.refused += 1;
         self.manners.refused(refusal.code());
+        if self.refused > REFUSALS_LOGGED {
+            return tracing::debug!(refusal = foreign_sentence(refusal), "request refused");
+        }
+        if !self.may_log() {
+            return;
+        }
+        let (refusal, code) = (foreign_sentence(refusal), refusal.code());
         match self.refused {
-            ..REFUSALS_LOGGED => tracing::info!(%refusal, "request refused"),
-            REFUSALS_LOGGED => {
-                tracing::info!(%refusal, "request refused; further ones of this session are not logged");
-            }
-            _ => tracing::debug!(%refusal, "request refused"),
+            ..REFUSALS_LOGGED => tracing::info!(%code, refusal, "request refused"),
+            _ => tracing::info!(
+                %code, refusal, "request refused; further ones of this session are not logged"
+            ),
         }
     }
 
@@ -173,7 +251,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     /// client that goes is not worked for any longer.
     async fn handle(&mut self, frame: Frame, received: Reservation) -> Result<(), SessionError> {
         let (header, kind) = (frame.header, frame.kind());
+        let is_request = kind.is_some_and(|kind| !kind.is_reply());
         let start = Instant::now();
+        // Without a token any request introduces a client, before it is worked for.
+        if self.handler.is_authorised() && is_request {
+            self.introduced().await?;
+        }
         let metrics = &self.server.resources.metrics;
         metrics.received(HEADER_LEN + frame.payload.len());
         let replied = tokio::select! {
@@ -186,8 +269,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         };
         let refused = replied.as_ref().err().map(Refusal::code);
         metrics.answered(kind, start.elapsed(), refused);
-        if self.handler.is_authorised() {
+        if self.handler.is_authorised() && is_request {
+            self.introduced().await?;
             self.connection.make_known(self.handler.limits());
+        }
+        if let Some(bearer) = self.handler.bearer() {
+            bearer.count(refused.is_some());
         }
         match replied {
             Ok(Some(reply)) => self.write(header.request_id, &reply).await,
@@ -206,5 +293,19 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
                 self.write(header.request_id, &reply).await
             }
         }
+    }
+}
+
+/// What comes next from a client; of a stranger's longer frames the header is enough.
+async fn next<S: AsyncRead + Unpin>(
+    connection: &mut ClientConnection<S>,
+    standing: &Standing,
+) -> Result<Incoming, SessionError> {
+    match standing {
+        Standing::Known { .. } => connection.next_frame().await,
+        Standing::Stranger(greeting) => tokio::select! {
+            next = connection.next_frame_up_to(HEADER_LEN + STRANGER_PAYLOAD_MAX as usize) => next,
+            too_late = greeting.ends() => Err(too_late),
+        },
     }
 }

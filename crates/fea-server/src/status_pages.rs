@@ -5,33 +5,35 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
 use crate::machine_memory::resident_bytes;
 use crate::metrics::Gauges;
-use crate::places::Places;
+use crate::pace::Pace;
 use crate::resources::Resources;
+use crate::server_handle::ServerHandle;
+use crate::strangers::Strangers;
 
 /// What the pages are about.
 #[derive(Clone)]
 pub(crate) struct StatusPages {
-    pub resources: Arc<Resources>,
-    pub places: Places,
+    server: ServerHandle,
     /// Whether the server is to stop, and takes no more sessions.
-    pub is_stopping: Arc<AtomicBool>,
+    is_stopping: Arc<AtomicBool>,
+    /// Those who have not asked, or not taken their page yet.
+    readers: Strangers,
 }
 
 /// A request's head has at most so many bytes.
 const HEAD_MAX: usize = 8 * 1024;
 /// A request has come and its page is taken within this time.
 const PAGE_MAX: Duration = Duration::from_secs(5);
-/// Requests at the same time; others wait.
-const READERS_MAX: usize = 16;
+/// Connections at the same time; one more takes the place of the oldest.
+const READERS_MAX: usize = 64;
 /// Pause after a failed accept.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
@@ -43,20 +45,30 @@ struct Page {
 }
 
 impl StatusPages {
-    /// Answers until it is dropped.
+    /// Those of a server.
+    pub fn new(server: ServerHandle, is_stopping: Arc<AtomicBool>) -> Self {
+        Self { server, is_stopping, readers: Strangers::new(READERS_MAX) }
+    }
+
+    /// Answers until it is dropped. Nobody waits for somebody else: a connection that says nothing, or
+    /// takes nothing, is closed when others need its room.
     pub async fn serve(self, listener: TcpListener) {
-        let readers = Arc::new(Semaphore::new(READERS_MAX));
+        let mut pace = Pace::of_connections(Instant::now());
         loop {
-            let Ok(place) = Arc::clone(&readers).acquire_owned().await else { return };
-            let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep_until(pace.next().into()).await;
+            let Ok((stream, peer)) = listener.accept().await else {
+                self.readers.send_one_away();
                 tokio::time::sleep(ACCEPT_PAUSE).await;
                 continue;
             };
-            let pages = self.clone();
+            pace.came(Instant::now());
+            let (pages, guest) = (self.clone(), self.readers.let_in(peer.ip()));
             tokio::spawn(async move {
-                // Whoever asks too slowly, or goes, has no page.
-                let _ = timeout(PAGE_MAX, pages.answer(stream)).await;
-                drop(place);
+                tokio::select! {
+                    // Whoever asks too slowly, or goes, has no page.
+                    _ = timeout(PAGE_MAX, pages.answer(stream)) => {}
+                    () = guest.is_to_go() => {}
+                }
             });
         }
     }
@@ -89,8 +101,8 @@ impl StatusPages {
             },
             (b"GET" | b"HEAD", b"/metrics") => {
                 let is_ready = self.not_ready().is_none();
-                let gauges = gauges(&self.resources, &self.places, is_ready);
-                page("200 OK", self.resources.metrics.text(&gauges))
+                let gauges = gauges(&self.server, is_ready);
+                page("200 OK", self.server.resources.metrics.text(&gauges))
             }
             (b"GET" | b"HEAD", _) => {
                 page("404 Not Found", "there are /metrics, /health and /ready\n".to_owned())
@@ -101,20 +113,22 @@ impl StatusPages {
 
     /// Why no new session would be taken; `None` where one would.
     fn not_ready(&self) -> Option<&'static str> {
-        let max = self.resources.config.max_sessions;
+        let max = self.server.resources.config.max_sessions;
         match self.is_stopping.load(Ordering::Relaxed) {
             true => Some("stopping"),
-            false => (self.places.taken() >= max).then_some("all sessions are taken"),
+            false => (self.server.places.taken() >= max).then_some("all sessions are taken"),
         }
     }
 }
 
 /// What is read of a server when somebody asks.
-pub(crate) fn gauges(resources: &Resources, places: &Places, is_ready: bool) -> Gauges {
-    let Resources { models, budget, workers, .. } = resources;
+pub(crate) fn gauges(server: &ServerHandle, is_ready: bool) -> Gauges {
+    let ServerHandle { resources, places, strangers, .. } = server;
+    let Resources { models, budget, workers, .. } = &**resources;
     let (count, bytes) = models.count_and_bytes();
     Gauges {
         sessions: places.taken(),
+        strangers: strangers.count(),
         queued: workers.queued(),
         models: count,
         models_bytes: bytes,
@@ -122,6 +136,12 @@ pub(crate) fn gauges(resources: &Resources, places: &Places, is_ready: bool) -> 
         limit_bytes: budget.limit(),
         resident_bytes: resident_bytes(),
         is_ready,
+        certificate_expires_s: resources
+            .config
+            .encryption
+            .as_ref()
+            .map(|e| e.validity().expires_s()),
+        tokens: resources.access.numbers(),
     }
 }
 
@@ -148,11 +168,8 @@ mod tests {
     fn pages() -> StatusPages {
         let config = ServerConfig { threads: 1, max_sessions: 1, ..ServerConfig::default() };
         let workers = Workers::new(1, 1).unwrap();
-        StatusPages {
-            resources: Arc::new(Resources::new(config, workers)),
-            places: Places::new(1, 1),
-            is_stopping: Arc::default(),
-        }
+        let (_, stop) = tokio::sync::watch::channel(false);
+        StatusPages::new(ServerHandle::new(config, workers, stop), Arc::default())
     }
 
     #[test]
@@ -161,7 +178,7 @@ mod tests {
         let status =
             |target: &str| pages.page(format!("GET {target} HTTP/1.1\r\n").as_bytes()).status;
         assert_eq!(status("/ready"), "200 OK");
-        let place = pages.places.take([127, 0, 0, 1].into()).unwrap();
+        let place = pages.server.places.take([127, 0, 0, 1].into()).unwrap();
         assert_eq!(status("/ready?x=1"), "503 Service Unavailable");
         assert_eq!(status("/health"), "200 OK");
         drop(place);

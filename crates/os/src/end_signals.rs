@@ -14,6 +14,8 @@ pub struct EndSignal {
     pub name: &'static str,
     /// Exit code by which a shell knows a program that this signal ended: 128 and its number.
     pub exit_code: u8,
+    /// Whether it is that of a closed terminal, by which one also asks a server to read its files again.
+    pub is_hang_up: bool,
 }
 
 /// Calls `react`, on a thread of its own, for every signal that asks the program to end: Ctrl-C,
@@ -40,7 +42,8 @@ pub fn on_end_signal(
         // It fails for a set that holds no signal only.
         while let Ok(signal) = awaited.wait() {
             let exit_code = 128 + signal as i32 as u8;
-            react(EndSignal { name: signal.as_str(), exit_code });
+            let is_hang_up = signal == Signal::SIGHUP;
+            react(EndSignal { name: signal.as_str(), exit_code, is_hang_up });
         }
     };
     let waits = std::thread::Builder::new().name("signals".to_owned()).spawn(wait);
@@ -60,6 +63,6 @@ pub fn on_end_signal(
     _hang_up: bool,
     mut react: impl FnMut(EndSignal) + Send + 'static,
 ) -> io::Result<()> {
-    ctrlc::set_handler(move || react(EndSignal { name: "Ctrl-C", exit_code: 130 }))
-        .map_err(io::Error::other)
+    let ctrl_c = EndSignal { name: "Ctrl-C", exit_code: 130, is_hang_up: false };
+    ctrlc::set_handler(move || react(ctrl_c)).map_err(io::Error::other)
 }

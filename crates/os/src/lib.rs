@@ -1,6 +1,6 @@
 //! What the programs share beside the mathematics and the wire: signals that are waited for,
-//! threads that are woken in time or stand back, the time a thread computed, errors as one line, the file
-//! of a token.
+//! threads that are woken in time or stand back, memory that is given back, the time a thread computed,
+//! errors as one line, the file of a token, and who can read a file.
 
 mod cpu_time;
 mod end;
@@ -8,6 +8,7 @@ mod end_signals;
 mod error_line;
 mod freed_memory;
 mod niceness;
+mod private_file;
 mod token_file;
 mod urgency;
 
@@ -17,5 +18,6 @@ pub use end_signals::{EndSignal, on_end_signal};
 pub use error_line::one_line;
 pub use freed_memory::{give_back_freed_memory, give_back_large_pieces_at_once};
 pub use niceness::stand_back;
+pub use private_file::others_can_read;
 pub use token_file::{TokenFileError, read_token};
 pub use urgency::{NotUrgent, be_ordinary, be_urgent};

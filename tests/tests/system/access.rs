@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use fea_server::{
-    ConfigError, Encryption, RunningServer, ServerConfig, StartError, make_certificate,
+    ConfigError, Encryption, RunningServer, ServerConfig, StartError, Tokens, make_certificate,
 };
 use glove_client::connection::{LinkError, ServerConnection};
 use glove_client::endpoint::{Endpoint, Trust};
@@ -31,14 +31,14 @@ impl Pair {
         let folder = tempfile::tempdir().unwrap();
         let (certificate, key) = (folder.path().join("certificate"), folder.path().join("key"));
         let names = ["localhost", "127.0.0.1"].map(str::to_owned);
-        make_certificate(&names, &certificate, &key).unwrap();
+        make_certificate(&names, 1, &certificate, &key).unwrap();
         Self { certificate, key, _folder: folder }
     }
 
     fn server(&self) -> RunningServer {
         let encryption = Some(Encryption::read(&self.certificate, &self.key).unwrap());
-        let token = Some("open sesame".to_owned());
-        fea_server::start(ServerConfig { encryption, token, ..config(2) }).unwrap()
+        let tokens = Some(Tokens::of("open sesame"));
+        fea_server::start(ServerConfig { encryption, tokens, ..config(2) }).unwrap()
     }
 
     fn endpoint(&self, server: &RunningServer) -> Endpoint {
@@ -58,8 +58,8 @@ fn rejection(to: impl Into<Endpoint>) -> (RejectCode, String) {
 #[test]
 fn address_that_guesses_tokens_is_barred_even_with_the_right_one() {
     within(LIMIT, "guesses", || {
-        let token = Some("open sesame".to_owned());
-        let server = fea_server::start(ServerConfig { token, ..config(1) }).unwrap();
+        let tokens = Some(Tokens::of("open sesame"));
+        let server = fea_server::start(ServerConfig { tokens, ..config(1) }).unwrap();
         let endpoint = Endpoint::from(server.address().to_string());
         let right = || endpoint.clone().with_token(Some("open sesame"));
         assert!(ServerConnection::connect(right()).is_ok());
@@ -157,9 +157,9 @@ fn address_that_others_reach_is_not_listened_on_without_token_and_encryption() {
 #[test]
 fn before_the_token_is_shown_frames_are_short_and_time_is_too() {
     within(LIMIT, "strangers", || {
-        let token = Some("open sesame".to_owned());
+        let tokens = Some(Tokens::of("open sesame"));
         let greeting_limit = Duration::from_millis(300);
-        let settings = ServerConfig { token, greeting_limit, ..config(1) };
+        let settings = ServerConfig { tokens, greeting_limit, ..config(1) };
         let server = fea_server::start(settings).unwrap();
         let header = |payload_len| raw_header(VERSION, 1, 1, payload_len, &[]);
         let mut over = RawSession::open(server.address());

@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use fea_server::ServerConfig;
+use fea_server::{ServerConfig, Tokens};
 use glove_client::connection::{LinkError, ServerConnection};
 use glove_client::endpoint::Endpoint;
 use softgrasp_protocol::{Kind, Masks, Prefetch, RejectCode, Reply, Request, VERSION};
@@ -242,8 +242,8 @@ fn broken_hints_are_not_answered_because_hints_have_no_reply() {
 
 #[test]
 fn requests_before_the_right_token_are_refused_and_the_token_opens_the_session() {
-    let token = Some("open sesame".to_owned());
-    let server = fea_server::start(ServerConfig { token, ..config(1) }).unwrap();
+    let tokens = Some(Tokens::of("open sesame"));
+    let server = fea_server::start(ServerConfig { tokens, ..config(1) }).unwrap();
     let mut session = RawSession::open(server.address());
     let refuse = |session: &mut RawSession, id, request: &Request| {
         let (code, text) = rejected(session.ask(id, request));

@@ -24,10 +24,8 @@ fn number(metrics: &str, name: &str) -> f64 {
 /// A request of so many bytes that is refused for its nodes once it was received and read.
 fn request_of(bytes: usize) -> Vec<u8> {
     let vertices = vec![[0.0; 3]; bytes / 24];
-    let model = UploadModel {
-        mesh: MeshData { vertices, ..MeshData::default() },
-        ..upload(&cube(27))
-    };
+    let model =
+        UploadModel { mesh: MeshData { vertices, ..MeshData::default() }, ..upload(&cube(27)) };
     request_frame(1, &Request::UploadModel(model))
 }
 

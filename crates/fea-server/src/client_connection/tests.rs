@@ -25,9 +25,9 @@ fn room_within(memory_limit: u64) -> Room {
     Room::new(Arc::new(Resources::new(config, Workers::new(1, 1).unwrap())))
 }
 
-fn request_id(incoming: Result<Option<Incoming>, SessionError>) -> u64 {
+fn request_id(incoming: Result<Incoming, SessionError>) -> u64 {
     match incoming {
-        Ok(Some(Incoming::Request { frame, .. })) => frame.request_id(),
+        Ok(Incoming::Request { frame, .. }) => frame.request_id(),
         other => panic!("{other:?}"),
     }
 }
@@ -97,7 +97,7 @@ async fn header_that_comes_byte_by_byte_is_there_in_time_or_given_up() {
             };
             let ((ended, at), start) = tokio::join!(ended, sender);
             match is_in_time {
-                true => assert!(ended.unwrap().is_some()),
+                true => assert!(matches!(ended.unwrap(), Incoming::Request { .. })),
                 false => {
                     assert!(matches!(ended, Err(SessionError::NoHeader(_))), "{ended:?}");
                     let took = at.duration_since(start);
@@ -127,7 +127,7 @@ async fn stranger_that_does_not_speak_is_given_up_and_a_known_client_is_not() {
         client.write_all(&bytes).await.unwrap();
     };
     let (frame, ()) = tokio::join!(connection.next_frame(), sender);
-    assert!(frame.unwrap().is_some());
+    assert!(matches!(frame.unwrap(), Incoming::Request { .. }));
 }
 
 #[tokio::test(start_paused = true)]
@@ -154,14 +154,14 @@ async fn time_in_which_the_server_does_not_read_is_not_held_against_the_client()
         let (mut connection, mut client, bytes) = connected();
         let (first, last) = bytes.split_at(bytes.len() - left);
         client.write_all(&[&bytes, first].concat()).await.unwrap();
-        assert!(connection.next_frame().await.unwrap().is_some());
+        assert!(matches!(connection.next_frame().await.unwrap(), Incoming::Request { .. }));
         sleep(10 * PATIENCE.stall).await;
         let sender = async {
             sleep(PATIENCE.greeting / 2).await;
             client.write_all(last).await.unwrap();
         };
         let (frame, ()) = tokio::join!(connection.next_frame(), sender);
-        assert!(frame.unwrap().is_some());
+        assert!(matches!(frame.unwrap(), Incoming::Request { .. }));
     }
 }
 
@@ -179,7 +179,7 @@ async fn client_that_rests_is_given_up_when_its_time_is_over_and_not_before() {
         let ended = async { (connection.next_frame().await, start.elapsed()) };
         let ((ended, took), ()) = tokio::join!(ended, sender);
         match is_in_time {
-            true => assert!(ended.unwrap().is_some()),
+            true => assert!(matches!(ended.unwrap(), Incoming::Request { .. })),
             false => {
                 assert!(matches!(ended, Err(SessionError::Idle(_))), "{ended:?}");
                 assert!((limit..limit + MOMENT).contains(&took), "{took:?}");
@@ -228,7 +228,10 @@ async fn client_that_goes_during_its_request_is_noticed_and_one_that_waits_is_no
     client.write_all(&bytes).await.unwrap();
     let waits = timeout(Duration::from_secs(3600), connection.gone()).await;
     assert!(waits.is_err(), "{:?}", waits.map(|gone| gone.to_string()));
-    assert!(connection.next_frame().await.unwrap().is_some(), "nothing is lost");
+    assert!(
+        matches!(connection.next_frame().await.unwrap(), Incoming::Request { .. }),
+        "nothing is lost"
+    );
     // It sends without end: only a little is taken.
     let (mut connection, mut client, _) = connected();
     let sends = async {
@@ -259,7 +262,7 @@ async fn request_without_room_is_passed_over_and_the_session_lives() {
     };
     let receiver = async {
         match connection.next_frame().await {
-            Ok(Some(Incoming::NoRoom { header, why: NoRoom::Never { .. } })) => {
+            Ok(Incoming::NoRoom { header, why: NoRoom::Never { .. } }) => {
                 assert_eq!(header.request_id, 5);
             }
             other => panic!("{other:?}"),

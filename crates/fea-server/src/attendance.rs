@@ -1,0 +1,58 @@
+//! A connection that has just been accepted, until it is a session: encrypted if the server is, within
+//! the time for a greeting, and sent away when others need its room.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use tokio::net::TcpStream;
+use tokio::time::Instant;
+use tracing::Instrument;
+
+use crate::log_line::foreign_sentence;
+use crate::server_handle::{ServerHandle, stopped};
+use crate::session;
+use crate::standing::{Greeting, Standing};
+
+/// A silent peer is asked whether it is there after this long, and again so often; the system gives it
+/// up after some questions without an answer.
+const ALIVE_AFTER: Duration = Duration::from_secs(30);
+const ALIVE_EVERY: Duration = Duration::from_secs(10);
+
+/// A frame is sent at once, and a peer that is gone without a word is noticed.
+pub(crate) fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
+    stream.set_nodelay(true)?;
+    let alive = socket2::TcpKeepalive::new().with_time(ALIVE_AFTER).with_interval(ALIVE_EVERY);
+    socket2::SockRef::from(stream).set_tcp_keepalive(&alive)
+}
+
+/// Serves a connection, encrypted if the server is.
+pub(crate) async fn attend(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
+    let span = session::span(&server, peer);
+    agree_and_serve(stream, peer, server).instrument(span).await;
+}
+
+async fn agree_and_serve(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
+    let resources = &server.resources;
+    let limit = resources.config.greeting_limit;
+    let guest = server.strangers.let_in(peer.ip());
+    let greeting = Greeting { guest, until: Instant::now() + limit, limit };
+    let Some(encryption) = &resources.config.encryption else {
+        return session::serve(stream, peer, server, Standing::Stranger(greeting)).await;
+    };
+    let mut stop = server.stop.clone();
+    let shaken = tokio::select! {
+        shaken = encryption.acceptor().accept(stream) => shaken.map_err(|error| error.to_string()),
+        too_late = greeting.ends() => Err(too_late.to_string()),
+        () = stopped(&mut stop) => return,
+    };
+    match shaken {
+        Ok(stream) => session::serve(stream, peer, server, Standing::Stranger(greeting)).await,
+        Err(error) => {
+            resources.metrics.not_introduced();
+            if resources.log_lines.has_room(peer.ip()) {
+                let error = foreign_sentence(error);
+                tracing::info!(error, "connection ends before a session: TLS was not agreed on");
+            }
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The files that let clients in and hide what they say: read at the start, and again when asked to.
+
+use std::path::Path;
+use std::time::SystemTime;
+
+use fea_server::{Encryption, ServerConfig, Tokens};
+
+use crate::arguments::AccessArguments;
+
+/// Tokens, and certificate with key, as far as they are wanted.
+pub struct Credentials {
+    pub tokens: Option<Tokens>,
+    pub encryption: Option<Encryption>,
+}
+
+/// The credentials of a running server, and where they came from.
+pub struct Renewal {
+    access: AccessArguments,
+    in_use: Credentials,
+}
+
+/// A certificate with fewer days left is warned of.
+const DAYS_LEFT_MIN: u64 = 30;
+
+impl AccessArguments {
+    /// Reads the files, and warns of what is weak in them.
+    ///
+    /// # Errors
+    /// What cannot be read or used, with the file.
+    pub fn read(&self) -> anyhow::Result<Credentials> {
+        let tokens = self.token_file.as_deref().map(Tokens::read).transpose()?;
+        let encryption = match (&self.tls_cert, &self.tls_key) {
+            (Some(certificate), Some(key)) => Some(Encryption::read(certificate, key)?),
+            _ => None,
+        };
+        for (what, file) in [("token", &self.token_file), ("key", &self.tls_key)] {
+            if let Some(file) = file {
+                warn_if_others_read(what, file);
+            }
+        }
+        let short = tokens.as_ref().map_or(0, Tokens::count_short);
+        if short > 0 {
+            tracing::warn!(
+                short,
+                "a token has fewer than 16 letters and may be guessed; make one with \
+                 head -c 24 /dev/urandom | base64"
+            );
+        }
+        if let Some(validity) = encryption.as_ref().map(Encryption::validity) {
+            let (on, days_left) = (validity.expires_on(), validity.days_left(SystemTime::now()));
+            match days_left {
+                ..DAYS_LEFT_MIN => tracing::warn!(
+                    on,
+                    days_left,
+                    "the certificate expires soon; put a new one in its place and send SIGHUP"
+                ),
+                _ => tracing::info!(on, days_left, "the certificate expires"),
+            }
+        }
+        Ok(Credentials { tokens, encryption })
+    }
+}
+
+fn warn_if_others_read(what: &str, file: &Path) {
+    if softgrasp_os::others_can_read(file) {
+        let (file, name) = (file.display(), file.display());
+        tracing::warn!(
+            %file, "others on this machine can read the {what} file; say chmod 600 {name}"
+        );
+    }
+}
+
+impl Renewal {
+    /// Of a server with these settings; `None` where it uses no files that could be read again.
+    pub fn of(access: &AccessArguments, config: &ServerConfig) -> Option<Self> {
+        let in_use =
+            Credentials { tokens: config.tokens.clone(), encryption: config.encryption.clone() };
+        let is_any = in_use.tokens.is_some() || in_use.encryption.is_some();
+        is_any.then(|| Self { access: access.clone(), in_use })
+    }
+
+    /// Reads all files again. New clients need what is in them; sessions live on. Of files that cannot be
+    /// used none is.
+    pub fn read_again(&self) {
+        let read = match self.access.read() {
+            Ok(read) => read,
+            Err(error) => {
+                let error = softgrasp_os::one_line(error.as_ref());
+                return tracing::error!(error, "what was read before stays in use");
+            }
+        };
+        if let (Some(old), Some(new)) = (&self.in_use.tokens, &read.tokens) {
+            old.renew(new);
+        }
+        if let (Some(old), Some(new)) = (&self.in_use.encryption, &read.encryption) {
+            old.renew(new);
+        }
+        tracing::info!("tokens and certificate were read again");
+    }
+}
