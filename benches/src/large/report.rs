@@ -5,6 +5,7 @@ use softgrasp_core::mesh::BuiltIn;
 use super::frames::{Linear, Measured, Truth, linear, play};
 use super::rates::hold_rate;
 use super::squeeze::Squeeze;
+use super::trust;
 use super::walk::Walk;
 use crate::plot::{Mark, Plot, PlotPoint, Scale, Series};
 use crate::report::{Options, Report, ReportError, progress};
@@ -78,6 +79,10 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     }
     report.text(OBJECTS_TEXT);
     report.table(objects);
+    let (estimates, left_out) = pool.install(|| trust::table(options))?;
+    report.text(ESTIMATES_TEXT);
+    report.table(estimates);
+    left_out.into_iter().for_each(|line| report.text(line));
     report.text(RATES_TEXT);
     let held = rates(options, threads, &mut report)?;
     report.table(held);
@@ -310,6 +315,12 @@ the goal to the shape, factors that are made beside the frames excluded (`factor
 solve of `front` in single precision of the same object, in turn with the frames.";
 const OBJECTS_TEXT: &str = "\
 The same for five objects and three speeds of the hand: 20, 60 and 200 frames for the same squeeze. `depth` is how deep the tips press, as a share of the size; where that has no equilibrium, because a thin part would turn inside out, the squeeze is halved until it has one.";
+const ESTIMATES_TEXT: &str = "\
+Three to five round patches of an object, drawn at random with material, law, depth (up to half of the \
+smallest extent), turn, slide and speed, are pressed in; files of others and generated objects, the \
+seeds are those of the program. Every frame is set beside the equilibrium that it settles to by \
+itself. `judged` are the frames outside of a snap; `above` of them have a true error above the \
+estimate, `over_twice` above twice the estimate.";
 const RATES_TEXT: &str = "\
 A hand squeezes in for two seconds and out for two seconds, again and again, at a rate, over a \
 loopback socket, budget 2e-3, factors made beside the frames on a thread of their own. `first_frame_ms` \

@@ -1,6 +1,7 @@
 //! Report `session`: what a user of `run` gets in real time, from runs of the real programs.
 
 mod large;
+mod live;
 mod record;
 mod report;
 mod way;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::large;
+use super::{large, live};
 
 use super::record::Record;
 use super::way::{Arrangement, Object, RATE_HZ, play};
@@ -68,6 +68,9 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     report.table(why);
     let nodes = if options.is_quick { 1000 } else { LARGE };
     let large = large::measure(&programs, nodes, folder.path())?;
+    let live = live::measure(&programs, (runs, threads), folder.path(), options)?;
+    report.text(LIVE);
+    report.table(live);
     report.text(LARGE_OBJECT);
     report.table(large);
     Ok(report)
@@ -78,8 +81,13 @@ fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
     let named = |name: &str, path: &Path| Object {
         name: name.to_owned(),
         arguments: vec!["--object".into(), path.as_os_str().to_owned()],
+        deformation: "linear",
     };
-    let mut objects = vec![Object { name: "strawberry".to_owned(), arguments: Vec::new() }];
+    let mut objects = vec![Object {
+        name: "strawberry".to_owned(),
+        arguments: Vec::new(),
+        deformation: "linear",
+    }];
     let mut left_out = Vec::new();
     let files = if options.is_quick { &FILES[..0] } else { &FILES[..] };
     for file in files {
@@ -219,6 +227,11 @@ session had brought it). Both are seen by ticks, so they come in steps of one.
 Every answer carries its residual, and a proven bound of its error where it has one; the largest of \
 all are in the tables, and a residual above 1e-9 ends the report. The displacements of the same \
 server are compared with direct solves in the reports `frame`, `onset`, `hold` and `contact`.";
+
+const LIVE: &str = "\
+The same runs with the equations that `run` takes by itself (`--deformation auto`): a live frame asks \
+for its answer within the time of a tick, and a jump of the hand is followed over several frames. \
+Ages are in ticks.";
 
 const LARGE_OBJECT: &str = "\
 A sphere made by `glove-client mesh`, five of its surface nodes known, is solved by one process \

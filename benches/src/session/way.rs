@@ -39,6 +39,8 @@ pub(super) struct Object {
     pub name: String,
     /// Arguments of `run` that name it.
     pub arguments: Vec<OsString>,
+    /// Equations that `run` is asked for.
+    pub deformation: &'static str,
 }
 
 /// Ticks a second.
@@ -68,10 +70,17 @@ pub(super) fn play(
         for name in &names {
             let report = folder.join(format!("{name}.json"));
             let rate = RATE_HZ.to_string();
-            let mut arguments: Vec<&OsStr> =
-                ["run", "--headless", "--deformation", "linear", "--rate", &rate, "--server"]
-                    .map(OsStr::new)
-                    .to_vec();
+            let mut arguments: Vec<&OsStr> = [
+                "run",
+                "--headless",
+                "--deformation",
+                object.deformation,
+                "--rate",
+                &rate,
+                "--server",
+            ]
+            .map(OsStr::new)
+            .to_vec();
             arguments.extend([OsStr::new(address), OsStr::new("--report"), report.as_os_str()]);
             let threads = threads.to_string();
             if server.is_none() {

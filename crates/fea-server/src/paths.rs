@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use softgrasp_core::fem::hyperelastic::{LargeSummary, Law};
+use softgrasp_core::fem::hyperelastic::Law;
 use softgrasp_core::solve::equilibrium::{FactorError, Path, Renewed};
 use softgrasp_protocol::ModelHash;
 
@@ -22,17 +22,22 @@ pub(crate) struct ModelPath {
     pub reservation: Reservation,
     /// A factor that is being made beside the frames.
     pub under_way: Option<UnderWay>,
-    /// Rotation and stretches of the newest frame they are known for.
-    pub summary: Arc<Lock<LargeSummary>>,
+    /// How long the last factor made beside the frames took, ms.
+    pub factor_ms: Option<f64>,
+    /// How long rotation and stretches took to work out last, ms.
+    pub summary_ms: Option<f64>,
 }
 
 /// A factor that is being made beside the frames.
 pub(crate) struct UnderWay {
-    /// Where it will lie.
-    pub made: Arc<Lock<Option<Result<Renewed, FactorError>>>>,
+    /// Where it will lie, with how long it took, ms.
+    pub made: Arc<Lock<Option<MadeFactor>>>,
     /// Frames since it was begun.
     pub frames: u32,
 }
+
+/// A factor that was made beside the frames, and how long it took, ms.
+pub(crate) type MadeFactor = (Result<Renewed, FactorError>, f64);
 
 /// The paths of one session.
 #[derive(Default)]

@@ -201,6 +201,17 @@ impl Stiffness {
         Self { pattern: Arc::clone(pattern), blocks }
     }
 
+    /// Goes a share of the way to another stiffness.
+    ///
+    /// # Panics
+    /// If it is of another pattern.
+    pub fn blend(&mut self, other: &Self, share: f64) {
+        assert_eq!(self.blocks.len(), other.blocks.len(), "blocks of one pattern");
+        for (block, other) in self.blocks.iter_mut().zip(&other.blocks) {
+            block.iter_mut().zip(other).for_each(|(a, b)| *a += share * (b - *a));
+        }
+    }
+
     /// Adds springs to the ground: `(degree of freedom, N/m)`.
     ///
     /// # Panics

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Known, ModelError};
 use softgrasp_core::solve::condensed::{
     Base, Certificate, ContactAnswer, ContactSet, Delivery, Touched,
@@ -35,8 +36,8 @@ pub(super) enum StrainOf<'a> {
         /// Whether there is memory for the proof.
         may_prove: bool,
     },
-    /// Worked out beside the frames; no frame waits.
-    NewestFrame(&'a Resources),
+    /// Worked out beside the frames; no frame waits, and only a frame that asks the same again has it.
+    Beside(&'a Resources),
 }
 
 /// What one question touches on a model with a base.
@@ -160,10 +161,13 @@ impl Contacts {
         }
         let displacements = Displacements::of(displacement, question.want.precision);
         stage_ms.encode = ms_since(start);
-        if let StrainOf::ThisAnswer { .. } = strain {
-            stored.keep_strain(stored.model.strain(&set.full_displacement(base, &solved)));
-        }
-        let mut report = self.report(set, &certificate, why);
+        let its_strain = match strain {
+            StrainOf::ThisAnswer { .. } => {
+                Some(stored.model.strain(&set.full_displacement(base, &solved)))
+            }
+            StrainOf::Beside(_) => stored.strain_of(&self.touched, q),
+        };
+        let mut report = self.report(set, &certificate, (why, its_strain));
         report.stage_ms = stage_ms;
         report.factor_reused = *is_kept;
         report.peak_rss_bytes = match is_kept {
@@ -174,20 +178,25 @@ impl Contacts {
             add_certainty(certainty, question, &mut report)?;
         }
         add_unmet_wishes(question, &mut report);
-        if let StrainOf::NewestFrame(resources) = strain {
+        if let StrainOf::Beside(resources) = strain {
             if *is_kept {
                 self.sharpen(resources, set);
             }
-            self.watch_strain(&resources.workers, Arc::clone(set), solved);
+            if its_strain.is_none() {
+                self.watch_strain(&resources.workers, Arc::clone(set), solved);
+            }
         }
         let nodes = question.want.nodes.clone();
         Ok(Answer { report, nodes, displacements, reactions, mask_forces })
     }
 
-    fn report(&self, set: &ContactSet, certificate: &Certificate, why: &str) -> SolveReport {
-        // Worked out beside the frames: it belongs to the newest frame it is known for.
-        let strain = self.stored.strain();
-        let mut warnings = strain_warnings(strain);
+    fn report(
+        &self,
+        set: &ContactSet,
+        certificate: &Certificate,
+        (why, strain): (&str, Option<StrainSummary>),
+    ) -> SolveReport {
+        let mut warnings = strain.map(strain_warnings).unwrap_or_default();
         if set.condition() > CONDITION_WARNING {
             warnings.push(format!(
                 "the touched nodes hold the body weakly (condition {:.0e}); spread them",
@@ -205,8 +214,8 @@ impl Contacts {
             residual_rel: certificate.residual_rel,
             error_bound_rel: certificate.error_bound_rel.ok(),
             error_bound_why: certificate.error_bound_rel.err().unwrap_or_default().to_owned(),
-            max_rotation_deg: strain.rotation_max.to_degrees(),
-            max_strain: strain.strain_max,
+            max_rotation_deg: strain.map_or(f64::NAN, |strain| strain.rotation_max.to_degrees()),
+            max_strain: strain.map_or(f64::NAN, |strain| strain.strain_max),
             precision: "f64".to_owned(),
             condition_estimate: Some(set.condition()),
             warnings,
@@ -238,11 +247,12 @@ impl Contacts {
     fn watch_strain(&self, workers: &Workers, set: Arc<ContactSet>, solved: ContactAnswer) {
         let Some(claimed) = self.stored.strain_under_way.take() else { return };
         let (stored, base) = (Arc::clone(&self.stored), Arc::clone(&self.base));
+        let (touched, q) = (self.touched.clone(), self.q.clone());
         workers.beside(move || {
             let mut rest = Rest::new();
             let displacement = set.full_displacement(&base, &solved);
-            let newest = stored.model.strain_with_pauses(&displacement, &mut || rest.rest());
-            stored.keep_strain(newest);
+            let strain = stored.model.strain_with_pauses(&displacement, &mut || rest.rest());
+            stored.keep_strain(touched, q, strain);
             drop(claimed);
         });
     }

@@ -87,7 +87,7 @@ impl KeptFrame {
     /// [`Refusal`].
     pub fn answer(&self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {
         let Self { frame, contacts, prepared } = self;
-        let strain = StrainOf::NewestFrame(resources);
+        let strain = StrainOf::Beside(resources);
         contacts.answer_with(prepared, &frame.message, &frame.plan.why, strain, clock)
     }
 }
@@ -177,7 +177,7 @@ impl PosedFrame {
     fn by_columns(&self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {
         let stored = Arc::clone(&self.stored);
         let contacts = Contacts::new(stored, &self.message, self.known.clone())?;
-        let strain = StrainOf::NewestFrame(resources);
+        let strain = StrainOf::Beside(resources);
         contacts.answer(&self.message, &self.plan.why, strain, clock)
     }
 

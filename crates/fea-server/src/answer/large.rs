@@ -70,13 +70,45 @@ impl LargeQuestion {
         path: &mut Path,
         clock: &StageClock,
     ) -> Result<Equilibrium, NoEquilibrium> {
+        self.advance_in_time(path, clock, FramePace::default())
+    }
+
+    /// The same for a frame of a moving hand.
+    ///
+    /// # Errors
+    /// As [`LargeQuestion::advance`].
+    pub fn advance_in_time(
+        &self,
+        path: &mut Path,
+        clock: &StageClock,
+        pace: FramePace,
+    ) -> Result<Equilibrium, NoEquilibrium> {
         let Self { known, mask_q, forces, .. } = self;
         let goal = Goal { q_known: &known.q_known, mask_q, forces };
         let deadline_ms = self.deadline_ms.unwrap_or(f64::INFINITY);
         let is_late = || clock.elapsed_ms() > deadline_ms;
-        path.advance(&goal, &Wish { error_rel: self.max_error, is_late: &is_late })
+        let may_factor = || {
+            // Without a measured one it is taken not to fit.
+            let factor_ms = pace.factor_ms.unwrap_or(f64::INFINITY);
+            !pace.part_will_do || clock.elapsed_ms() + FACTOR_MARGIN * factor_ms <= deadline_ms
+        };
+        let (error_rel, part_will_do) = (self.max_error, pace.part_will_do);
+        let wish = Wish { error_rel, is_late: &is_late, may_factor: &may_factor, part_will_do };
+        path.advance(&goal, &wish)
     }
 }
+
+/// What a frame may take of its time, and whether it must come to its end.
+#[derive(Clone, Copy, Default)]
+pub(super) struct FramePace {
+    /// How long the last factor took, ms.
+    pub factor_ms: Option<f64>,
+    /// Whether the last balanced shape on the way will do.
+    pub part_will_do: bool,
+}
+
+/// Time that must be left for a factor, over what the last one took.
+const FACTOR_MARGIN: f64 = 1.5;
 
 /// The law behind a name on the wire.
 pub(super) fn law_of(name: LawName) -> Law {

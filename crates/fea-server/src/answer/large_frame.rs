@@ -1,7 +1,9 @@
 //! Answers one frame at large deformation: the session's path on a kept model goes on.
 
 use std::sync::Arc;
+use std::time::Instant;
 
+use softgrasp_core::fem::hyperelastic::LargeSummary;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::equilibrium::{Hold, Path};
 use softgrasp_protocol::{
@@ -10,16 +12,15 @@ use softgrasp_protocol::{
 };
 
 use super::frame::answer_frame;
-use super::large::{Found, LINEAR_ERROR_REL, LargeQuestion, law_of};
+use super::large::{Found, FramePace, LINEAR_ERROR_REL, LargeQuestion, law_of};
 use super::large_once::{admit_path, linear_answer, promised_error};
-use crate::clock::StageClock;
+use crate::clock::{StageClock, ms_since};
 use crate::lock::Lock;
 use crate::paths::{ModelPath, Seat, UnderWay};
 use crate::plan::Subject;
 use crate::refusal::Refusal;
 use crate::resources::Resources;
 use crate::store::StoredModel;
-use crate::workers::Rest;
 
 /// One frame on a kept model, from the shape of the session's last one.
 ///
@@ -136,7 +137,8 @@ impl Frame<'_> {
             path,
             reservation,
             under_way: None,
-            summary: Arc::default(),
+            summary_ms: None,
+            factor_ms: None,
         }))
     }
 
@@ -144,22 +146,30 @@ impl Frame<'_> {
     fn advance(&self, kept: &mut ModelPath, mut clock: StageClock) -> Result<LargeAnswer, Refusal> {
         let Self { question, message, stored, .. } = self;
         if !kept.path.hold().is_by(&question.known.dofs, &question.masks) {
+            let LargeQuestion { known, masks, .. } = question;
+            let is_new_grip = !kept.path.hold().shares_a_node(&known.dofs, masks);
             let hold = self.hold(Some(kept.path.hold()), &mut clock)?;
             kept.path.hold_by(hold);
+            // Between two grips nothing held the body.
+            if is_new_grip && kept.yield_stress.is_none() {
+                kept.path.spring_back();
+            }
         }
         self.take_factor(kept, &mut clock);
         clock.begin(Stage::Solve);
-        let equilibrium = question.advance(&mut kept.path, &clock)?;
+        let part_will_do = self.ask.pace == Pace::Timely && question.deadline_ms.is_some();
+        let pace = FramePace { factor_ms: kept.factor_ms, part_will_do };
+        let equilibrium = question.advance_in_time(&mut kept.path, &clock, pace)?;
         clock.end();
         self.begin_factor(kept);
-        self.watch_strain(kept);
+        let summary = self.summary(kept, &clock);
         kept.reservation.settle((kept.path.bytes() + kept.path.elements().bytes()) as u64);
         let found = Found {
             model: &stored.model,
             path: &kept.path,
             factor_reused: equilibrium.factors == 0,
             equilibrium,
-            summary: kept.summary.with(|summary| *summary),
+            summary,
             is_single: question.is_single,
             chosen_because: match self.ask.deformation {
                 DeformationChoice::Large => "asked for".to_owned(),
@@ -183,7 +193,10 @@ impl Frame<'_> {
         let Some(mut under_way) = kept.under_way.take() else { return };
         under_way.frames += 1;
         match under_way.made.with(Option::take) {
-            Some(made) => kept.path.install(made, under_way.frames),
+            Some((made, took_ms)) => {
+                kept.factor_ms = Some(took_ms);
+                kept.path.install(made, under_way.frames);
+            }
             None => kept.under_way = Some(under_way),
         }
     }
@@ -197,22 +210,26 @@ impl Frame<'_> {
         let made = Arc::new(Lock::default());
         kept.under_way = Some(UnderWay { made: Arc::clone(&made), frames: 0 });
         self.resources.workers.factor_beside(move || {
+            let start = Instant::now();
             let renewed = renewal.make();
-            made.with(|made| *made = Some(renewed));
+            made.with(|made| *made = Some((renewed, ms_since(start))));
         });
     }
 
-    /// Works out rotation and stretches beside the frames, one at a time.
-    fn watch_strain(&self, kept: &ModelPath) {
-        let Some(claimed) = self.stored.strain_under_way.take() else { return };
-        let elements = Arc::clone(kept.path.elements());
-        let displacement = kept.path.displacement().to_vec();
-        let summary = Arc::clone(&kept.summary);
-        self.resources.workers.beside(move || {
-            let mut rest = Rest::new();
-            let newest = elements.summary_with_pauses(&displacement, &mut || rest.rest());
-            summary.with(|summary| *summary = newest);
-            drop(claimed);
-        });
+    /// Rotation and stretches of this shape, or no numbers where the deadline leaves no time for them.
+    fn summary(&self, kept: &mut ModelPath, clock: &StageClock) -> LargeSummary {
+        let deadline_ms = self.question.deadline_ms.filter(|_| self.ask.pace == Pace::Timely);
+        let left_ms = deadline_ms.map_or(f64::INFINITY, |deadline| deadline - clock.elapsed_ms());
+        // What the last one took is known; the first one is taken to fit.
+        if SUMMARY_MARGIN * kept.summary_ms.unwrap_or(0.0) > left_ms {
+            return LargeSummary::UNKNOWN;
+        }
+        let start = Instant::now();
+        let summary = kept.path.elements().summary(kept.path.displacement());
+        kept.summary_ms = Some(ms_since(start));
+        summary
     }
 }
+
+/// Time that must be left for rotation and stretches, over what they took last.
+const SUMMARY_MARGIN: f64 = 2.0;

@@ -100,7 +100,8 @@ fn linear_within(
     let answer = solve_once(resources, linear, resources.budget.reservation(), clock)?;
     let report = &answer.report;
     let promised = promised_error(report.max_rotation_deg.to_radians(), report.max_strain);
-    if promised > allowed {
+    // Without a number nothing is promised.
+    if promised.is_nan() || promised > allowed {
         return Ok(Linear::TooFar { promised });
     }
     Ok(Linear::Within(Box::new(linear_answer(answer, promised))))

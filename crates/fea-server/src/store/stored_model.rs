@@ -20,7 +20,7 @@ pub(crate) struct StoredModel {
     /// Whether a factor in double precision was larger than allowed.
     pub single_only: AtomicBool,
     sets: Lock<Recent<KeptSet>>,
-    strain: Lock<StrainSummary>,
+    strain: Lock<Option<KeptStrain>>,
     /// Whether somebody works out the strain of a frame.
     pub strain_under_way: Claim,
     /// Whether somebody proves the bound of the smallest eigenvalue.
@@ -66,6 +66,13 @@ struct KeptFactor {
 struct KeptSet {
     nodes: Vec<u32>,
     set: Arc<ContactSet>,
+}
+
+/// The strain of one frame and what was known in it.
+struct KeptStrain {
+    touched: Touched,
+    q: Vec<f64>,
+    strain: StrainSummary,
 }
 
 /// Factors kept per model; a grasp needs one, a change of grip a second.
@@ -115,14 +122,15 @@ impl StoredModel {
         });
     }
 
-    /// Strain of the newest frame it is known for; zero before the first.
-    pub fn strain(&self) -> StrainSummary {
-        self.strain.with(|strain| *strain)
+    /// Strain of the frame with these contacts and displacements, where it is known.
+    pub fn strain_of(&self, touched: &Touched, q: &[f64]) -> Option<StrainSummary> {
+        let is_it = |kept: &&KeptStrain| kept.q == q && kept.touched == *touched;
+        self.strain.with(|kept| kept.as_ref().filter(is_it).map(|kept| kept.strain))
     }
 
-    /// Keeps the strain of the newest frame.
-    pub fn keep_strain(&self, newest: StrainSummary) {
-        self.strain.with(|strain| *strain = newest);
+    /// Keeps the strain of a frame.
+    pub fn keep_strain(&self, touched: Touched, q: Vec<f64>, strain: StrainSummary) {
+        self.strain.with(|kept| *kept = Some(KeptStrain { touched, q, strain }));
     }
 
     /// Factor for a set of known degrees of freedom by a method, if it is kept.

@@ -33,6 +33,15 @@ impl Default for LargeSummary {
 }
 
 impl LargeSummary {
+    /// What was not worked out: no numbers.
+    pub const UNKNOWN: Self = Self {
+        rotation_max: f64::NAN,
+        strain_max: f64::NAN,
+        stretch_max: f64::NAN,
+        stretch_min: f64::NAN,
+        jacobian_min: f64::NAN,
+    };
+
     fn joined(self, other: &Self) -> Self {
         Self {
             rotation_max: self.rotation_max.max(other.rotation_max),
@@ -89,16 +98,5 @@ impl Elements {
     pub fn summary(&self, u: &[f64]) -> LargeSummary {
         let pieces = self.by_pieces(u, |_, _, h, piece: &mut LargeSummary| piece.see(h));
         pieces.iter().fold(LargeSummary::default(), LargeSummary::joined)
-    }
-
-    /// The same on the calling thread alone, with a call of `pause` every 200 µs or so.
-    pub fn summary_with_pauses(&self, u: &[f64], pause: &mut dyn FnMut()) -> LargeSummary {
-        let mut summary = LargeSummary::default();
-        for piece in 0..self.piece_count() {
-            let see = &|_: usize, _: usize, h: &Matrix3<f64>, all: &mut LargeSummary| all.see(h);
-            summary = summary.joined(&self.piece(u, piece, see));
-            pause();
-        }
-        summary
     }
 }

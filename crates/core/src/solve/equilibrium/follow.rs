@@ -45,10 +45,12 @@ impl Path {
         wish: &Wish<'_>,
     ) -> Result<Equilibrium, NoEquilibrium> {
         let motion = Motion::begin(self, goal);
-        let (mut done, mut piece) = (0.0, 1.0);
+        let length = largest(&self.missing(goal));
+        let (mut done, mut piece) = (0.0, self.first_piece(length, wish));
         // Whether the factor is that of the shape that was reached.
-        let (mut jumped, mut is_fresh, mut failed_pieces) = (false, false, 0);
-        let mut is_settled = false;
+        let (mut jumped, mut try_again) = (false, Retries::default());
+        // Of the last balanced shape.
+        let mut errors = self.errors;
         loop {
             let to = if done + piece > 1.0 - 1e-12 { 1.0 } else { done + piece };
             let is_last = to == 1.0;
@@ -61,13 +63,15 @@ impl Path {
                     self.counts.substeps += 1;
                     self.forces = part.forces;
                     jumped |= jump;
+                    self.piece_length = 1.5 * piece * length;
                     if is_last || (wish.is_late)() {
-                        let missing = (1.0 - to) * largest(&self.missing(goal));
+                        let missing = largest(&self.missing(goal));
                         return Ok(self.equilibrium(settled, jumped, missing));
                     }
+                    errors = self.errors;
                     self.q_before = before.0;
                     done = to;
-                    is_fresh = false;
+                    try_again.is_fresh = false;
                     piece *= 1.5;
                 }
                 Err(failed) => {
@@ -76,34 +80,95 @@ impl Path {
                     if let Failed::Factor(error) = failed {
                         return Err(error.into());
                     }
-                    // What was let go of goes its way first, before the rest is moved.
-                    if self.was_held_otherwise {
-                        self.was_held_otherwise = false;
-                        self.let_go_in_place(&motion.at(0.0).goal(), &way)?;
-                        continue;
+                    self.piece_length = 0.5 * piece * length;
+                    if (wish.is_late)()
+                        && let Some(part) = self.part_of_the_way(goal, errors, wish)
+                    {
+                        return Ok(part);
                     }
-                    // A step of an older tangent may have led astray: one of this shape first.
-                    if !is_fresh {
-                        self.factor_here()?;
-                        is_fresh = true;
-                        continue;
-                    }
-                    // So may a shape that is only nearly in balance: near the end of a branch there is
-                    // nothing beside it to follow.
-                    if !is_settled {
-                        is_settled = true;
-                        self.settle_in_place(&motion.at(done).goal(), wish);
+                    let here = motion.at(if self.was_held_otherwise { 0.0 } else { done });
+                    if self.mend(&mut try_again, &here.goal(), (wish, &way))? {
+                        errors = self.errors;
                         continue;
                     }
                     piece *= 0.5;
-                    failed_pieces += 1;
-                    if piece < PIECE_MIN || failed_pieces > FAILED_PIECES_MAX {
+                    try_again.failed_pieces += 1;
+                    if piece < PIECE_MIN || try_again.failed_pieces > FAILED_PIECES_MAX {
+                        if let Some(part) = self.part_of_the_way(goal, errors, wish) {
+                            return Ok(part);
+                        }
                         let solves = self.counts.linear_solves;
                         return Err(failed.after(done, solves));
                     }
                 }
             }
         }
+    }
+
+    /// The share of a motion that is tried first: where time is short, what was too far in the last
+    /// frame is not tried again.
+    fn first_piece(&self, length: f64, wish: &Wish<'_>) -> f64 {
+        if wish.part_will_do && self.piece_length < length {
+            return (self.piece_length / length).max(PIECE_MIN);
+        }
+        1.0
+    }
+
+    /// Does what may make the same piece succeed when it is tried again; says whether anything was
+    /// left to do.
+    fn mend(
+        &mut self,
+        try_again: &mut Retries,
+        here: &Goal<'_>,
+        (wish, way): (&Wish<'_>, &Wish<'_>),
+    ) -> Result<bool, NoEquilibrium> {
+        // What was let go of goes its way first, before the rest is moved.
+        if self.was_held_otherwise {
+            self.was_held_otherwise = false;
+            self.let_go_in_place(here, way)?;
+            return Ok(true);
+        }
+        // A step of an older tangent may have led astray: one of this shape first.
+        if !try_again.is_fresh && self.may_factor(wish) {
+            self.factor_here()?;
+            try_again.is_fresh = true;
+            return Ok(true);
+        }
+        // So may a shape that is only nearly in balance: near the end of a branch there is nothing
+        // beside it to follow.
+        if try_again.is_fresh && !try_again.is_settled {
+            try_again.is_settled = true;
+            self.settle_in_place(here, wish);
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    /// The shape that was reached last, if part of the way will do and it is known how good it is.
+    fn part_of_the_way(
+        &mut self,
+        goal: &Goal<'_>,
+        errors: (f64, f64),
+        wish: &Wish<'_>,
+    ) -> Option<Equilibrium> {
+        if !wish.part_will_do || !errors.0.is_finite() {
+            return None;
+        }
+        self.errors = errors;
+        let missing = largest(&self.missing(goal));
+        let evaluated = self.elements.evaluate(&self.q);
+        let forces = self.forces.clone();
+        let balance = self.balance(&evaluated, &Goal { forces: &forces, ..*goal });
+        let (error, energy_error) = errors;
+        let settled = Settled {
+            evaluated,
+            balance,
+            error,
+            energy_error,
+            is_balanced: true,
+            is_converged: false,
+        };
+        Some(self.equilibrium(settled, false, missing))
     }
 
     /// Finds the equilibrium of a new hold where it took hold.
@@ -310,6 +375,15 @@ impl Path {
             mask_forces: balance.mask_forces,
         }
     }
+}
+
+/// What was done already where pieces of a motion failed.
+#[derive(Default)]
+struct Retries {
+    /// Whether the factor is that of the shape that was reached.
+    is_fresh: bool,
+    is_settled: bool,
+    failed_pieces: u32,
 }
 
 /// Why a piece of a motion did not come to an equilibrium.

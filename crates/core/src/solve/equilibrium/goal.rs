@@ -22,9 +22,16 @@ pub struct Wish<'a> {
     pub error_rel: Option<f64>,
     /// Says that time is up: the best that is there is answered.
     pub is_late: &'a (dyn Fn() -> bool + Sync),
+    /// Says whether there is time to wait for a factor; where not, [`super::Path::renewal`] asks for
+    /// one to be made beside the frames. The first factor is waited for in any case.
+    pub may_factor: &'a (dyn Fn() -> bool + Sync),
+    /// Whether the last balanced shape on the way will do, where time is up or the way ends; what is
+    /// missing is in the estimate then.
+    pub part_will_do: bool,
 }
 
 impl Wish<'_> {
     /// Until the residual is rounding, whatever it takes.
-    pub const EXACT: Self = Self { error_rel: None, is_late: &|| false };
+    pub const EXACT: Self =
+        Self { error_rel: None, is_late: &|| false, may_factor: &|| true, part_will_do: false };
 }

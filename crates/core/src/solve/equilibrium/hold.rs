@@ -1,5 +1,6 @@
 //! What holds a body: known degrees of freedom, masks, and springs where these leave it free.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -113,6 +114,15 @@ impl Hold {
     /// Whether this is the hold by these degrees of freedom and masks.
     pub fn is_by(&self, dofs: &[u32], masks: &[Mask]) -> bool {
         self.partition.known() == dofs && self.masks == masks
+    }
+
+    /// Whether a hold by these degrees of freedom and masks has a node in common with this one.
+    pub fn shares_a_node(&self, dofs: &[u32], masks: &[Mask]) -> bool {
+        let nodes = |dofs: &[u32], masks: &[Mask]| -> BTreeSet<u32> {
+            let of_masks = masks.iter().flat_map(|mask| mask.entries().iter().map(|entry| entry.0));
+            dofs.iter().map(|dof| dof / 3).chain(of_masks).collect()
+        };
+        !nodes(self.dofs(), &self.masks).is_disjoint(&nodes(dofs, masks))
     }
 
     /// Known degrees of freedom, ascending.

@@ -5,6 +5,8 @@ mod follow;
 mod goal;
 mod hold;
 mod inverse;
+#[cfg(test)]
+mod live_tests;
 mod motion;
 mod outcome;
 mod path;
@@ -15,8 +17,10 @@ mod secants;
 mod settle;
 #[cfg(test)]
 mod snap_tests;
+mod soft;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 pub use goal::{Goal, Wish};
 pub use hold::{Dependent, Hold, HoldOf};

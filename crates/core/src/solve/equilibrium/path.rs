@@ -8,6 +8,7 @@ use super::inverse::{FactorError, Inverse};
 use super::outcome::{Equilibrium, NoEquilibrium};
 use super::renewal::{Renewal, Renewed};
 use super::secants::Secants;
+use super::soft::Soft;
 use crate::fem::hyperelastic::Elements;
 use crate::fem::{Stiffness, StiffnessPattern};
 use crate::solve::vectors::{largest, node_max};
@@ -40,6 +41,14 @@ pub struct Path {
     pub(super) errors: (f64, f64),
     pub(super) counts: Counts,
     pub(super) factor_age: u32,
+    /// The softest motion that was met.
+    pub(super) soft: Option<Soft>,
+    /// Whether it was watched in this frame.
+    pub(super) is_soft_watched: bool,
+    /// Length of a motion that may be followed in one piece, m; shorter after one that was not.
+    pub(super) piece_length: f64,
+    /// Whether a frame had no time to wait for a factor that it needed.
+    wants_factor: bool,
     renewal_under_way: bool,
     /// Whether no equilibrium was found since the body was held in another way.
     pub(super) was_held_otherwise: bool,
@@ -55,11 +64,11 @@ pub(super) struct Counts {
 }
 
 /// Solves in a frame above which its factor counts as old.
-const SOLVES_OF_AN_OLD_FACTOR: u32 = 4;
+const SOLVES_OF_AN_OLD_FACTOR: u32 = 5;
 /// Share of the path's largest displacement that counts as one.
 const REACH_SHARE: f64 = 1e-3;
 /// Ratio of corrections above which it counts as old, so that a hand that rests gets a new one too.
-const THETA_OLD: f64 = 0.6;
+const THETA_OLD: f64 = 0.87;
 /// Expected ratio of corrections with a new factor.
 const THETA_NEW: f64 = 0.2;
 
@@ -91,6 +100,10 @@ impl Path {
             errors: (0.0, 0.0),
             counts: Counts::default(),
             factor_age: 0,
+            soft: None,
+            is_soft_watched: false,
+            piece_length: f64::INFINITY,
+            wants_factor: false,
             renewal_under_way: false,
             was_held_otherwise: false,
         }
@@ -120,7 +133,8 @@ impl Path {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let inverse = self.inverse.as_ref().map_or(0, |inverse| inverse.bytes());
-        inverse + self.secants.bytes() + 2 * size_of_val(self.q.as_slice())
+        // The softest motion and its force are as long as the unknown.
+        inverse + self.secants.bytes() + 4 * size_of_val(self.q.as_slice())
     }
 
     /// Holds the body in another way from the same shape on. A factor stays if only masks change.
@@ -129,6 +143,7 @@ impl Path {
             return;
         }
         self.secants.clear();
+        self.soft = None;
         self.q_before.clone_from(&self.q);
         let is_same_order = Arc::ptr_eq(&self.hold.analysis, &hold.analysis);
         let kept = self.inverse.take().filter(|_| is_same_order);
@@ -139,9 +154,22 @@ impl Path {
         });
         self.hold = hold;
         self.renewal_under_way = false;
+        self.wants_factor = false;
         self.was_held_otherwise = true;
         // Where the new hold leads is not known yet.
         self.errors = (f64::INFINITY, 0.0);
+    }
+
+    /// Goes back to rest, where the body is in balance by itself: for an elastic body that was let go
+    /// of.
+    pub fn spring_back(&mut self) {
+        self.q.fill(0.0);
+        self.q_before.fill(0.0);
+        self.forces.clear();
+        self.secants.clear();
+        self.soft = None;
+        self.errors = (0.0, 0.0);
+        self.was_held_otherwise = false;
     }
 
     /// Moves known displacements and masks to what is asked for and finds the equilibrium there,
@@ -162,6 +190,7 @@ impl Path {
         let before = self.snapshot();
         self.reference = node_max(&self.q).max(REACH_SHARE * self.reach);
         self.counts = Counts::default();
+        self.is_soft_watched = false;
         self.factor_age += 1;
         match self.follow(goal, wish) {
             Ok(found) => {
@@ -186,6 +215,7 @@ impl Path {
             forces: self.forces.clone(),
             inverse: self.inverse.clone(),
             secants: self.secants.clone(),
+            soft: self.soft.clone(),
             theta: self.theta,
             errors: self.errors,
             counts: self.counts,
@@ -201,6 +231,7 @@ impl Path {
             forces,
             inverse,
             secants,
+            soft,
             theta,
             errors,
             counts,
@@ -209,6 +240,7 @@ impl Path {
         self.elements = elements;
         (self.q, self.q_before, self.forces) = (q, q_before, forces);
         (self.inverse, self.secants, self.theta) = (inverse, secants, theta);
+        self.soft = soft;
         (self.errors, self.counts, self.factor_age) = (errors, counts, factor_age);
     }
 
@@ -217,11 +249,20 @@ impl Path {
         let took_long =
             self.counts.linear_solves + 10 * self.counts.factors > SOLVES_OF_AN_OLD_FACTOR;
         let is_old = took_long || (self.theta > THETA_OLD && self.counts.linear_solves > 0);
-        if !is_old || self.factor_age == 0 || self.renewal_under_way {
+        let is_wanted = (is_old && self.factor_age > 0) || self.wants_factor;
+        if !is_wanted || self.renewal_under_way {
             return None;
         }
+        self.wants_factor = false;
         self.renewal_under_way = true;
         Some(self.renewal_here())
+    }
+
+    /// Whether there is time for a factor now; where not, one is wanted beside the frames.
+    pub(super) fn may_factor(&mut self, wish: &Wish<'_>) -> bool {
+        let may = (wish.may_factor)();
+        self.wants_factor |= !may;
+        may
     }
 
     /// A factor of the shape as it is now, to be made.
@@ -272,6 +313,7 @@ struct Snapshot {
     forces: Vec<f64>,
     inverse: Option<Arc<Inverse>>,
     secants: Secants,
+    soft: Option<Soft>,
     theta: f64,
     errors: (f64, f64),
     counts: Counts,

@@ -22,6 +22,11 @@ pub struct Renewed {
     pub(super) inverse: Inverse,
 }
 
+/// How far from the tangent to its positive part a factor is looked for. Masks hold a body in ways
+/// that a factor does not know of, so the tangent of a pressed body often has none; the less is added
+/// to it, the better is its inverse.
+const POSITIVE_SHARES: [f64; 4] = [0.0, 0.1, 0.35, 1.0];
+
 impl Renewal {
     /// Makes the factor: of the tangent as it is, or of its positive part where that has none.
     ///
@@ -30,15 +35,24 @@ impl Renewal {
     pub fn make(self) -> Result<Renewed, FactorError> {
         let Self { elements, pattern, hold, q, is_single } = self;
         let mut refused = FactorError::NotPositive;
-        for curvature in [Curvature::AsItIs, Curvature::PositivePart] {
-            let mut tangent = elements.tangent(&pattern, &q, curvature);
+        let mut positive = None;
+        for share in POSITIVE_SHARES {
+            let mut tangent = elements.tangent(&pattern, &q, Curvature::AsItIs);
+            if share > 0.0 {
+                let part = || elements.tangent(&pattern, &q, Curvature::PositivePart);
+                tangent.blend(positive.get_or_insert_with(part), share);
+            }
             let springs = hold.add_springs(&mut tangent);
             match Factor::try_new(&hold, &tangent, is_single) {
                 Ok(factor) => {
                     let inverse = Inverse::new(&hold, factor, springs);
                     return Ok(Renewed { hold, inverse });
                 }
-                Err(error) => refused = error,
+                Err(FactorError::NotPositive) => {}
+                Err(error) => {
+                    refused = error;
+                    break;
+                }
             }
         }
         Err(refused)

@@ -12,6 +12,8 @@ use crate::solve::vectors::{add_scaled, dot};
 /// first inverse as in Liu, Bouaziz and Kavan (2017).
 #[derive(Clone, Default)]
 pub(super) struct Secants {
+    /// Older than all pairs, and there as long as no other takes its place.
+    pinned: Option<Arc<Pair>>,
     pairs: VecDeque<Arc<Pair>>,
 }
 
@@ -29,6 +31,7 @@ impl Secants {
     /// Forgets all.
     pub fn clear(&mut self) {
         self.pairs.clear();
+        self.pinned = None;
     }
 
     /// Keeps a pair if it has positive curvature, so that corrections go on going downhill.
@@ -44,16 +47,23 @@ impl Secants {
         self.pairs.push_back(Arc::new(Pair { step, change, rho: 1.0 / curvature }));
     }
 
+    /// Keeps a pair of the present shape beside the others.
+    pub fn pin(&mut self, step: Vec<f64>, change: Vec<f64>) {
+        let curvature = dot(&step, &change);
+        let is_usable = curvature > 0.0 && curvature.is_finite();
+        self.pinned = is_usable.then(|| Arc::new(Pair { step, change, rho: 1.0 / curvature }));
+    }
+
     /// The inverse times forces, `inverse` being that of an older tangent.
     pub fn apply(&self, mut r: Vec<f64>, inverse: impl FnOnce(Vec<f64>) -> Vec<f64>) -> Vec<f64> {
         let mut alphas = Vec::with_capacity(self.pairs.len());
-        for pair in self.pairs.iter().rev() {
+        for pair in self.pairs.iter().rev().chain(&self.pinned) {
             let alpha = pair.rho * dot(&pair.step, &r);
             add_scaled(&mut r, -alpha, &pair.change);
             alphas.push(alpha);
         }
         let mut z = inverse(r);
-        for (pair, alpha) in self.pairs.iter().zip(alphas.iter().rev()) {
+        for (pair, alpha) in self.pinned.iter().chain(&self.pairs).zip(alphas.iter().rev()) {
             let beta = pair.rho * dot(&pair.change, &z);
             add_scaled(&mut z, alpha - beta, &pair.step);
         }

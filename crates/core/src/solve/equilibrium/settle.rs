@@ -26,11 +26,11 @@ pub(super) struct Contraction {
 }
 
 /// A ratio of corrections that is taken to be at least so much: slow motions hide behind quick ones.
-const THETA_MIN: f64 = 0.55;
+const THETA_MIN: f64 = 0.8;
 /// The same before two corrections of a frame were seen.
-const THETA_UNSEEN: f64 = 0.6;
+const THETA_UNSEEN: f64 = 0.8;
 /// A ratio above which nothing is promised.
-const THETA_MAX: f64 = 0.9;
+const THETA_MAX: f64 = 0.93;
 
 impl Contraction {
     /// With what is expected before two corrections were seen.
@@ -139,9 +139,12 @@ impl Path {
         let mut contraction = Contraction::expecting(self.theta);
         let mut best = Best::default();
         let (mut with_this_factor, mut stalled_before) = (0, false);
-        let solves_before = self.counts.linear_solves;
         // What does not move and is settled is left alone.
         let is_done = error.is_finite() && balance.residual_rel <= RESIDUAL_SETTLED;
+        if !(is_done && wish.error_rel.is_some()) {
+            self.watch_soft(&balance.residual);
+        }
+        let solves_before = self.counts.linear_solves;
         while !(is_done && wish.error_rel.is_some()) {
             let is_rounding = best.see(balance.residual_rel);
             let is_late = (wish.is_late)() && error.is_finite();
@@ -156,7 +159,9 @@ impl Path {
                 break;
             }
             if with_this_factor >= SOLVES_WITH_OLD_FACTOR {
-                contraction = self.begin_anew()?;
+                if self.may_factor(wish) {
+                    contraction = self.begin_anew()?;
+                }
                 with_this_factor = 0;
             }
             let off = self.means_off(goal);
@@ -174,7 +179,7 @@ impl Path {
             contraction.see([size, largest]);
             let next = self.searched(goal, &evaluated, &balance, (&step, slope));
             let Some((moved, after, after_balance)) = next else {
-                if with_this_factor > 1 {
+                if with_this_factor > 1 && self.may_factor(wish) {
                     contraction = self.begin_anew()?;
                     with_this_factor = 0;
                     continue;
@@ -191,6 +196,7 @@ impl Path {
             self.q = moved.q;
             (evaluated, balance) = (after, after_balance);
             error = if share == 1.0 { contraction.left_after(largest) } else { largest };
+            error += self.left_along_soft(&balance.residual);
             energy_error = contraction.left_after(size);
             let is_good = |tolerance: f64| error <= tolerance * self.size();
             if wish.error_rel.is_some_and(is_good) {

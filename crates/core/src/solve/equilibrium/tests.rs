@@ -77,7 +77,7 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
     amax(&difference) / amax(b)
 }
 
-const LOOSE: Wish<'_> = Wish { error_rel: Some(2e-3), is_late: &|| false };
+const LOOSE: Wish<'_> = Wish { error_rel: Some(2e-3), ..Wish::EXACT };
 
 #[test]
 fn body_held_by_masks_alone_is_in_balance_and_follows_a_translation_without_force() {
@@ -386,7 +386,7 @@ fn late_answers_say_how_far_they_are_from_what_was_asked() {
     let model = model(BuiltIn::Strawberry, 300, 0.4, Element::Tet4);
     let grip = Grip::of(&model);
     let mut late = path(&model, model.hold(&[], grip.masks.clone(), None).unwrap(), true);
-    let wish = Wish { error_rel: Some(1e-6), is_late: &|| true };
+    let wish = Wish { error_rel: Some(1e-6), is_late: &|| true, ..Wish::EXACT };
     let pressed = grip.pressed(0.15);
     let found = late.advance(&goal(&[], &pressed), &wish).unwrap();
     let mut exact = path(&model, model.hold(&[], grip.masks.clone(), None).unwrap(), true);
