@@ -46,7 +46,7 @@ impl AnswerBits {
     /// Takes the bits of an answer.
     pub fn of(answer: &Answer) -> Self {
         let SolveReport { method, unknown_dofs, known_dofs, .. } = &answer.report;
-        // With `condensed` both are found beside the frames, and belong to an earlier one.
+        // With `condensed` both are found beside the frames, and are told where they are there.
         let of_this = |value: f64| if method == "condensed" { 0 } else { value.to_bits() };
         Self {
             method: method.clone(),

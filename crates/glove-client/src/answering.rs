@@ -35,7 +35,11 @@ impl GraspLoop {
                 question.method = method;
             }
         }
-        self.link.ask(tick, grip, question, self.large_ask());
+        let large = self.large_ask();
+        if large.is_some_and(|large| large.pace == FramePace::Timely) {
+            question.deadline_ms = self.answer_within_ms;
+        }
+        self.link.ask(tick, grip, question, large);
         self.wait_in_lockstep(outcome)
     }
 

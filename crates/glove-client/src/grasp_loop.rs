@@ -38,6 +38,8 @@ pub struct GraspLoop {
     pub(crate) settings: SolveSettings,
     pub(crate) wishes: AnswerWishes,
     pub(crate) pace: Pace,
+    /// Time that a live frame at large deformation may take, ms.
+    pub(crate) answer_within_ms: Option<f64>,
     /// Tick in which the grip began, to tell answers of an earlier grip from those of this one.
     pub(crate) deforming_since: Option<u64>,
     /// Tick whose answer the object shows.
@@ -71,6 +73,9 @@ pub struct GraspLoop {
 pub const MODEL_READY: &str = "model ready";
 /// Longest wait of a lockstep tick; a server that takes longer is overtaken.
 pub(crate) const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
+/// Share of the time from tick to tick in which a live frame at large deformation is to be answered;
+/// the rest is for what a solve takes longer, for the wire and for the shape.
+const SHARE_FOR_ANSWERS: f64 = 0.6;
 
 impl GraspLoop {
     /// A loop around an object at the origin; its model is sent to the server at once. To be made
@@ -113,7 +118,13 @@ impl GraspLoop {
             digests: false,
             recorded: None,
             held_back: Vec::new(),
+            answer_within_ms: None,
         })
+    }
+
+    /// Tells how long it is from tick to tick: a live frame asks for its answer within that time.
+    pub fn tick_every(&mut self, period: Duration) {
+        self.answer_within_ms = Some(SHARE_FOR_ANSWERS * 1e3 * period.as_secs_f64());
     }
 
     /// Whether ticks wait for answers.

@@ -161,10 +161,10 @@ pub struct RunSummary {
     pub bytes_sent: u64,
     /// Bytes on the wire of their answers.
     pub bytes_received: u64,
-    /// Largest rotation of an element, degrees.
-    pub max_rotation_deg: f64,
-    /// Largest strain of an element.
-    pub max_strain: f64,
+    /// Largest rotation of an element, degrees, of the answers that tell it; null where none does.
+    pub max_rotation_deg: Option<f64>,
+    /// Largest strain of an element, of the same answers.
+    pub max_strain: Option<f64>,
     /// Answers that were solved with the equations of large deformation; the others were linear.
     pub large_solves: usize,
     /// Largest estimated error of an answer over its largest displacement; null where none was
@@ -326,6 +326,10 @@ impl RunReport {
         let round_trips = Sorted::new(solves.iter().map(|s| s.round_trip_ms));
         let ages = Sorted::new(self.shown_ages_ms());
         let most = |of: fn(&SolveSummary) -> f64| solves.iter().map(|s| of(s)).fold(0.0, f64::max);
+        // An answer that has no time to work a number out has none.
+        let told = |of: fn(&SolveSummary) -> f64| {
+            solves.iter().map(|s| of(s)).filter(|x| x.is_finite()).max_by(f64::total_cmp)
+        };
         let is_large = |s: &&&SolveSummary| s.deformation == "large";
         let large = || solves.iter().filter(is_large).filter_map(|s| s.large.as_ref());
         let deforming = self.played.iter().filter(|record| record.deforms()).count() as u64;
@@ -352,8 +356,8 @@ impl RunReport {
             shown_age_ms_max: ages.quantile(1.0),
             bytes_sent: solves.iter().map(|s| s.request_bytes).sum(),
             bytes_received: solves.iter().map(|s| s.answer_bytes).sum(),
-            max_rotation_deg: most(|s| s.max_rotation_deg),
-            max_strain: most(|s| s.max_strain),
+            max_rotation_deg: told(|s| s.max_rotation_deg),
+            max_strain: told(|s| s.max_strain),
             large_solves: large().count(),
             error_estimate_rel_max: solves
                 .iter()

@@ -74,8 +74,7 @@ impl RunReport {
             text.push_str(&format!(
                 "  equations           {} unknown, {} prescribed, by {}\n  \
                  answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
-                 residual            {:.1e} at most\n  \
-                 shape               turned by {:.1} degrees, strained by {:.0} % at most\n",
+                 residual            {:.1e} at most\n",
                 solve.unknown_dofs,
                 solve.known_dofs,
                 solve.method,
@@ -83,9 +82,13 @@ impl RunReport {
                 ms(s.round_trip_ms_p99),
                 ms(s.round_trip_ms_max),
                 s.residual_rel_max,
-                s.max_rotation_deg,
-                100.0 * s.max_strain,
             ));
+            if let (Some(turned), Some(strain)) = (s.max_rotation_deg, s.max_strain) {
+                text.push_str(&format!(
+                    "  shape               turned by {turned:.1} degrees, strained by {:.0} % at most\n",
+                    100.0 * strain,
+                ));
+            }
         }
         text.push_str(&self.words_of_age());
         text.push_str(&self.words_of_large());

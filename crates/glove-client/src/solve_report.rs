@@ -39,9 +39,9 @@ pub struct SolveSummary {
     pub why: Option<String>,
     /// Refinement steps taken.
     pub refinement_steps: u32,
-    /// Largest rotation of an element, degrees.
+    /// Largest rotation of an element, degrees; null where there was no time to work it out.
     pub max_rotation_deg: f64,
-    /// Largest principal strain of an element.
+    /// Largest principal strain of an element, or null.
     pub max_strain: f64,
     /// Precision of the factor.
     pub precision: String,
@@ -76,7 +76,7 @@ pub struct LargeSummary {
     pub min_jacobian: f64,
     /// Estimated error in the energy norm, or null.
     pub energy_error_rel: Option<f64>,
-    /// Largest principal stretch of an element.
+    /// Largest principal stretch of an element, or null.
     pub max_stretch: f64,
     /// The equilibrium jumped.
     pub jumped: bool,

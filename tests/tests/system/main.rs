@@ -22,6 +22,7 @@ mod masks;
 mod memory;
 mod mouse;
 mod not_finite;
+mod own_strain;
 mod real_time;
 mod same_bits;
 mod settings;

@@ -115,8 +115,11 @@ pub(super) fn make_ready(
         false => HandReader::new(hand_setup),
     };
     let settings = plan.settings.clone();
-    let grasp_loop = GraspLoop::try_new(reader, object, grasp, link, settings, plan.pace)
+    let mut grasp_loop = GraspLoop::try_new(reader, object, grasp, link, settings, plan.pace)
         .context("cannot start a thread beside the ticks")?;
+    if let Some(period) = plan.period {
+        grasp_loop.tick_every(period);
+    }
     let mut session = Session::new(grasp_loop, hand, report, priority, setup.ends_with_script);
     if let Some(recorder) = recorder {
         session.record_to(recorder);

@@ -81,7 +81,8 @@ pub struct LargeReport {
     pub min_jacobian: f64,
     /// Estimated error in the energy norm over the energy norm of the displacement.
     pub energy_error_rel: Option<f64>,
-    /// Largest principal stretch of an element; 1 at rest.
+    /// Largest principal stretch of an element, 1 at rest; NaN where it was not worked out for this
+    /// answer.
     pub max_stretch: f64,
     /// Whether the equilibrium jumped (snap-through).
     pub jumped: bool,

@@ -70,9 +70,10 @@ pub struct SolveReport {
     pub error_bound_why: String,
     /// Steps of iterative refinement.
     pub refinement_steps: u32,
-    /// Largest rotation of an element; linear elasticity is wrong where this is large.
+    /// Largest rotation of an element; linear elasticity is wrong where this is large. NaN where it
+    /// was not worked out for this answer.
     pub max_rotation_deg: f64,
-    /// Largest principal strain.
+    /// Largest principal strain, NaN likewise.
     pub max_strain: f64,
     /// Arithmetic that was used.
     pub precision: String,

@@ -69,6 +69,9 @@ fn of_frame(ui: &mut Ui, frame: &ViewFrame) {
     let equations = format!("{} unknown, {} prescribed", solve.unknown_dofs, solve.known_dofs);
     row(ui, "equations", equations);
     row(ui, "precision", solve.precision.clone());
-    let turned = format!("{:.1}°, {:.0} %", solve.max_rotation_deg, 100.0 * solve.max_strain);
+    let turned = match solve.max_rotation_deg.is_finite() {
+        true => format!("{:.1}°, {:.0} %", solve.max_rotation_deg, 100.0 * solve.max_strain),
+        false => "–".to_owned(),
+    };
     row(ui, "largest turn, strain", turned);
 }
