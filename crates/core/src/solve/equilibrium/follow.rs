@@ -354,7 +354,8 @@ impl Path {
     fn equilibrium(&self, settled: Settled, jumped: bool, missing: f64) -> Equilibrium {
         let Settled { evaluated, balance, error, energy_error, .. } = settled;
         let error = error + missing;
-        let largest = self.size();
+        // A shape that has hardly set out is measured by the way that it has to go.
+        let largest = self.size().max(missing);
         let reactions = self.hold.dofs().iter().map(|&dof| evaluated.forces[dof as usize]);
         let stored = (2.0 * evaluated.energy).max(0.0).sqrt();
         Equilibrium {
