@@ -1,6 +1,7 @@
 //! Tests of frames that must be answered in time: bounded work, balanced shapes, honest estimates.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use nalgebra::Vector3;
 
@@ -11,6 +12,11 @@ use crate::fem::{Element, Material};
 use crate::mesh::{BuiltIn, generate};
 use crate::model::Model;
 use crate::solve::vectors::node_max;
+
+/// Looks at the clock after which a frame is late.
+const LOOKS: u32 = 6;
+/// Solves after which a frame that is late must have been answered.
+const SOLVES_MAX: u32 = 40;
 
 /// A flat body under two tips that press it together and far to one side, at once.
 struct Jump {
@@ -59,6 +65,53 @@ impl Jump {
     fn goal(&self) -> Goal<'_> {
         Goal { q_known: &[], mask_q: &self.mask_q, forces: &[] }
     }
+}
+
+fn off(a: &[f64], b: &[f64]) -> f64 {
+    let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    node_max(&difference)
+}
+
+#[test]
+fn a_jump_of_the_hand_is_followed_over_several_frames_and_none_keeps_the_hand_waiting() {
+    let jump = Jump::new();
+    let goal = jump.goal();
+    let mut exact = jump.path();
+    exact.advance(&goal, &Wish::EXACT).unwrap();
+    let right = exact.displacement().to_vec();
+    let mut path = jump.path();
+    let (mut frames, mut arrived) = (0, false);
+    while !arrived && frames < 60 {
+        let looks = AtomicU32::new(0);
+        let is_late = || looks.fetch_add(1, Ordering::Relaxed) >= LOOKS;
+        let wish = Wish {
+            error_rel: Some(2e-3),
+            is_late: &is_late,
+            may_factor: &|| false,
+            part_will_do: true,
+        };
+        let found = path.advance(&goal, &wish).expect("a part of the way will do");
+        frames += 1;
+        assert!(
+            found.linear_solves <= SOLVES_MAX,
+            "frame {frames}: {} solves",
+            found.linear_solves
+        );
+        assert!(found.factors <= u32::from(frames == 1), "frame {frames} waited for a factor");
+        assert!(found.jacobian_min > 0.0 && found.residual_rel.is_finite());
+        let size = node_max(path.displacement()).max(1e-12);
+        let error = off(path.displacement(), &right) / size;
+        let said = found.error_estimate_rel;
+        // What is missing is told of the masks; the body between them may have more to go.
+        assert!(error <= 4.0 * said + 1e-9, "frame {frames}: off by {error:.1e}, said {said:.1e}");
+        arrived = said <= 2e-3;
+        if let Some(renewal) = path.renewal() {
+            path.install(renewal.make(), 1);
+        }
+    }
+    assert!(arrived, "still on the way after {frames} frames");
+    assert!(frames > 1, "one frame was enough: that is no jump");
+    assert!(off(path.displacement(), &right) <= 4e-3 * node_max(&right));
 }
 
 #[test]
