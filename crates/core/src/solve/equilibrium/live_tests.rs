@@ -99,7 +99,10 @@ fn a_jump_of_the_hand_is_followed_over_several_frames_and_none_keeps_the_hand_wa
         );
         assert!(found.factors <= u32::from(frames == 1), "frame {frames} waited for a factor");
         assert!(found.jacobian_min > 0.0 && found.residual_rel.is_finite());
-        let size = node_max(path.displacement()).max(1e-12);
+        // A shape that has hardly set out is measured by the way that the masks have to go.
+        let means = path.hold().means(path.displacement());
+        let missing = jump.mask_q.iter().zip(means).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let size = node_max(path.displacement()).max(missing);
         let error = off(path.displacement(), &right) / size;
         let said = found.error_estimate_rel;
         // What is missing is told of the masks; the body between them may have more to go.
