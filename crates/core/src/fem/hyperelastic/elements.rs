@@ -177,6 +177,11 @@ impl Elements {
         self.node_count
     }
 
+    /// Largest Poisson's ratio of the moduli.
+    pub fn poisson_max(&self) -> f64 {
+        self.moduli.by_region.iter().map(Moduli::poisson).fold(-1.0, f64::max)
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let per_tet = match self.shape {

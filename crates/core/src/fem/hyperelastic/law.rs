@@ -113,6 +113,15 @@ impl Moduli {
         Self { law, mu: material.shear_modulus(), volumetric }
     }
 
+    /// Poisson's ratio at small strains.
+    pub(super) fn poisson(&self) -> f64 {
+        let kappa = match self.law {
+            Law::NeoHookean => self.volumetric,
+            Law::NeoHookeanLog => self.volumetric + 2.0 / 3.0 * self.mu,
+        };
+        (3.0 * kappa - 2.0 * self.mu) / (6.0 * kappa + 2.0 * self.mu)
+    }
+
     /// The part that belongs to an element when the volume ratio is averaged around nodes; the rest
     /// is [`Moduli::pressure_of_volume`].
     pub(super) fn without_volume(self) -> Self {

@@ -7,7 +7,7 @@ use super::goal::{Goal, Wish};
 use super::inverse::FactorError;
 use super::motion::Motion;
 use super::outcome::{Equilibrium, NoEquilibrium};
-use super::path::Path;
+use super::path::{Path, Patience};
 use super::settle::{GRADIENT_CHANGE_SMALL, RESIDUAL_SETTLED, Settled};
 use crate::fem::hyperelastic::Evaluated;
 use crate::solve::vectors::{largest, node_max};
@@ -29,9 +29,6 @@ const SETTLED_ERROR_REL: f64 = 1e-8;
 const SOLVES_AT_REST: u32 = 5;
 /// Solves after which a piece of a motion has no equilibrium.
 const SOLVES_OF_A_PIECE_MAX: u32 = 200;
-/// Pieces of a motion that may fail before it is given up: a branch that ends is crept towards in ever
-/// smaller pieces, and whoever waits for the refusal must not wait long.
-const FAILED_PIECES_MAX: u32 = 40;
 /// Smallest piece of a motion.
 const PIECE_MIN: f64 = 1.0 / 4096.0;
 /// Estimated error of a piece that is not the last one.
@@ -43,6 +40,7 @@ impl Path {
         &mut self,
         goal: &Goal<'_>,
         wish: &Wish<'_>,
+        patience: Patience,
     ) -> Result<Equilibrium, NoEquilibrium> {
         let motion = Motion::begin(self, goal);
         let length = largest(&self.missing(goal));
@@ -93,7 +91,9 @@ impl Path {
                     }
                     piece *= 0.5;
                     try_again.failed_pieces += 1;
-                    if piece < PIECE_MIN || try_again.failed_pieces > FAILED_PIECES_MAX {
+                    let is_over = self.counts.linear_solves > patience.solves
+                        || try_again.failed_pieces > patience.failed_pieces;
+                    if piece < PIECE_MIN || is_over {
                         if let Some(part) = self.part_of_the_way(goal, errors, wish) {
                             return Ok(part);
                         }
@@ -277,7 +277,7 @@ impl Path {
     }
 
     /// What the known displacements, the masks and the forces still have to go, m and N.
-    fn missing(&self, goal: &Goal<'_>) -> Vec<f64> {
+    pub(super) fn missing(&self, goal: &Goal<'_>) -> Vec<f64> {
         let known = self.hold.dofs().iter().map(|&dof| self.q[dof as usize]);
         let known = goal.q_known.iter().zip(known).map(|(wanted, q)| wanted - q);
         let means = self.hold.means(&self.q);
@@ -351,7 +351,7 @@ impl Path {
     }
 
     /// `missing` is how far the known displacements are from those asked for, m.
-    fn equilibrium(&self, settled: Settled, jumped: bool, missing: f64) -> Equilibrium {
+    pub(super) fn equilibrium(&self, settled: Settled, jumped: bool, missing: f64) -> Equilibrium {
         let Settled { evaluated, balance, error, energy_error, .. } = settled;
         let error = error + missing;
         // A shape that has hardly set out is measured by the way that it has to go.

@@ -1,6 +1,11 @@
 //! Equilibrium at large deformation: found by corrections with an older factor, followed from frame
 //! to frame, and judged by its own residual.
 
+mod cause;
+mod descent;
+mod find;
+#[cfg(test)]
+mod find_tests;
 mod follow;
 mod goal;
 mod hold;
@@ -13,6 +18,7 @@ mod path;
 #[cfg(test)]
 mod plastic_tests;
 mod renewal;
+mod rigid_part;
 mod secants;
 mod settle;
 #[cfg(test)]

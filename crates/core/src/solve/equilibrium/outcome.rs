@@ -50,6 +50,69 @@ pub enum NoEquilibrium {
         /// Share of the motion that was followed.
         share: f64,
     },
+    /// The branch of equilibria that the motion leads along ends, and no other was found.
+    #[error(
+        "no equilibrium found: after {:.0} % of the motion the branch of equilibria ends, and no other \
+         stable shape was found downhill of it (forces out of balance by {residual_rel:.1e} of those \
+         that hold the body); move or load it less, or by another way", 100.0 * share
+    )]
+    BranchEnded {
+        /// Share of the motion that was followed.
+        share: f64,
+        /// Residual that was left.
+        residual_rel: f64,
+    },
+    /// The surface creases: an element is pressed further than any smooth surface can be.
+    #[error(
+        "no equilibrium found: after {:.0} % of the motion an element is pressed to {:.0} % of its \
+         length; surfaces crease from about 60 % on, and no mesh follows them there; press less deep, \
+         or over a larger patch", 100.0 * share, 100.0 * stretch
+    )]
+    Creased {
+        /// Share of the motion that was followed.
+        share: f64,
+        /// Smallest principal stretch.
+        stretch: f64,
+    },
+    /// The material can hardly change its volume, and the elements cannot follow without.
+    #[error(
+        "no equilibrium found: after {:.0} % of the motion the elements cannot go on without a change \
+         of volume, which a Poisson's ratio of {poisson} hardly allows; ask for elements that do not \
+         lock (t4-anp), lower Poisson's ratio, or move less", 100.0 * share
+    )]
+    Incompressible {
+        /// Share of the motion that was followed.
+        share: f64,
+        /// Largest Poisson's ratio.
+        poisson: f64,
+    },
+    /// Forces pull the body out without end.
+    #[error(
+        "no equilibrium found: at {:.0} % of the motion the forces draw the body to {stretch:.1} times \
+         its length and still are not held; use smaller forces, or a stiffer material", 100.0 * share
+    )]
+    Overloaded {
+        /// Share of the motion that was followed.
+        share: f64,
+        /// Largest principal stretch.
+        stretch: f64,
+    },
+    /// Neither the tangent nor its positive part has a factor.
+    #[error(
+        "no equilibrium found: the tangent stiffness is singular, something can move without any \
+         force; hold more nodes, or nodes further apart"
+    )]
+    Singular,
+    /// Young's modulus or size beyond what energies can be worked out for.
+    #[error(
+        "no equilibrium found: the stiffness of an element is {stiffness:.0e} N/m, and energies at \
+         large deformation are numbers from 1e-100 to 1e100 N/m only; use other units for Young's \
+         modulus or the size"
+    )]
+    OutOfRange {
+        /// Largest entry of the stiffness' diagonal at rest, N/m.
+        stiffness: f64,
+    },
     /// Forces did not come into balance.
     #[error(
         "no equilibrium found: after {:.0} % of the motion and {solves} solves the forces are out of \

@@ -18,7 +18,7 @@ use crate::solve::vectors::{largest, node_max};
 /// Shapes: 3N displacements of the system from rest. Units: m, N.
 pub struct Path {
     pub(super) elements: Arc<Elements>,
-    pattern: Arc<StiffnessPattern>,
+    pub(super) pattern: Arc<StiffnessPattern>,
     pub(super) hold: Arc<Hold>,
     /// The shape that was reached.
     pub(super) q: Vec<f64>,
@@ -27,7 +27,7 @@ pub struct Path {
     /// Forces that act at the shape that was reached, 3N or empty, N.
     pub(super) forces: Vec<f64>,
     pub(super) inverse: Option<Arc<Inverse>>,
-    is_single: bool,
+    pub(super) is_single: bool,
     /// Largest entry of the stiffness' diagonal at rest, N/m: what rounding of forces is measured by.
     pub(super) stiffest: f64,
     /// Largest displacement of the path so far, m.
@@ -65,6 +65,22 @@ pub(super) struct Counts {
 
 /// Solves in a frame above which its factor counts as old.
 const SOLVES_OF_AN_OLD_FACTOR: u32 = 5;
+
+/// How long a motion is followed that fails again and again: a branch that ends is crept towards in
+/// ever smaller pieces, and whoever waits for the refusal must not wait long.
+#[derive(Clone, Copy)]
+pub(super) struct Patience {
+    /// Pieces that may fail.
+    pub failed_pieces: u32,
+    /// Solves of the whole attempt after which no piece may fail.
+    pub solves: u32,
+}
+
+impl Patience {
+    /// Of frames.
+    pub const OF_FRAMES: Self = Self { failed_pieces: 40, solves: u32::MAX };
+}
+
 /// Share of the path's largest displacement that counts as one.
 const REACH_SHARE: f64 = 1e-3;
 /// Ratio of corrections above which it counts as old, so that a hand that rests gets a new one too.
@@ -185,6 +201,15 @@ impl Path {
         goal: &Goal<'_>,
         wish: &Wish<'_>,
     ) -> Result<Equilibrium, NoEquilibrium> {
+        self.attempt(goal, |path| path.follow(goal, wish, Patience::OF_FRAMES))
+    }
+
+    /// Tries to reach a goal; where that fails the shape is the one before.
+    pub(super) fn attempt(
+        &mut self,
+        goal: &Goal<'_>,
+        reach: impl FnOnce(&mut Self) -> Result<Equilibrium, NoEquilibrium>,
+    ) -> Result<Equilibrium, NoEquilibrium> {
         assert_eq!(goal.q_known.len(), self.hold.dofs().len(), "known displacements");
         assert_eq!(goal.mask_q.len(), self.hold.constraint_count(), "displacements of masks");
         let before = self.snapshot();
@@ -192,7 +217,7 @@ impl Path {
         self.counts = Counts::default();
         self.is_soft_watched = false;
         self.factor_age += 1;
-        match self.follow(goal, wish) {
+        match reach(self) {
             Ok(found) => {
                 self.q_before = before.q;
                 self.reach = self.reach.max(node_max(&self.q));
@@ -207,7 +232,7 @@ impl Path {
     }
 
     /// All that an attempt that fails must leave as it was.
-    fn snapshot(&self) -> Snapshot {
+    pub(super) fn snapshot(&self) -> Snapshot {
         Snapshot {
             elements: Arc::clone(&self.elements),
             q: self.q.clone(),
@@ -223,7 +248,7 @@ impl Path {
         }
     }
 
-    fn restore(&mut self, before: Snapshot) {
+    pub(super) fn restore(&mut self, before: Snapshot) {
         let Snapshot {
             elements,
             q,
@@ -297,16 +322,22 @@ impl Path {
         self.inverse = None;
         let Renewed { inverse, .. } = self.renewal_here().make()?;
         self.inverse = Some(Arc::new(inverse));
+        self.has_new_factor();
+        Ok(())
+    }
+
+    /// What follows from a factor of the shape as it is now.
+    pub(super) fn has_new_factor(&mut self) {
         self.secants.clear();
         self.theta = THETA_NEW;
         self.factor_age = 0;
         self.counts.factors += 1;
-        Ok(())
     }
 }
 
 /// What a path is before an attempt.
-struct Snapshot {
+#[derive(Clone)]
+pub(super) struct Snapshot {
     elements: Arc<Elements>,
     q: Vec<f64>,
     q_before: Vec<f64>,

@@ -224,7 +224,7 @@ impl Path {
     }
 
     /// Goes along a step as far as the energy falls.
-    fn searched(
+    pub(super) fn searched(
         &self,
         goal: &Goal<'_>,
         evaluated: &Evaluated,
@@ -275,10 +275,10 @@ impl Path {
 }
 
 /// A shape that was gone to.
-struct Moved {
-    q: Vec<f64>,
+pub(super) struct Moved {
+    pub q: Vec<f64>,
     /// Of the step.
-    share: f64,
+    pub share: f64,
 }
 
 /// The best residual so far, and how long ago it was.
