@@ -2,6 +2,7 @@
 
 mod bodies;
 mod faces;
+mod folds;
 mod generate;
 mod inversion;
 mod quality;
@@ -9,6 +10,7 @@ mod surface;
 mod tet_mesh;
 
 pub use bodies::Bodies;
+pub use folds::Folds;
 pub use generate::{BuiltIn, GenerateError, NODES_MAX, NODES_MIN, UnknownShape, generate};
 pub use inversion::Inversion;
 pub use quality::{Quality, TetQuality, tet_quality};
