@@ -6,7 +6,8 @@ use glove_client::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_protocol::RejectCode::BadRequest;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementChoice, ElementName, Material, Request, SolveOnce, UploadModel,
+    Answer, DofValue, ElementChoice, ElementName, LargeAsk, Material, Reply, Request, SolveLarge,
+    SolveOnce, UploadModel,
 };
 use softgrasp_tests::questions::{METHODS, cube, frame, object, once, upload};
 
@@ -190,6 +191,26 @@ fn linear_elements_that_lock_are_warned_of() {
         &mesh,
     );
     assert!(warned(&asked_for, "linear elements lock at a Poisson's ratio of 0.49"));
+}
+
+#[test]
+fn linear_elements_that_lock_are_warned_of_at_large_deformation_too() {
+    let server = server(1);
+    let mut connection = client(&server);
+    for (element, poisson, is_warned) in [
+        (ElementChoice::T4, 0.46, true),
+        (ElementChoice::T4, 0.4, false),
+        (ElementChoice::T4Anp, 0.46, false),
+    ] {
+        let SolveOnce { mesh, question, .. } = once(&cube(27), "auto");
+        let materials = vec![Material { young: 1.0e5, poisson }];
+        let large = LargeAsk::default();
+        let request = SolveLarge { mesh, materials, element, large, question };
+        let reply = connection.ask(&Request::SolveLarge(Box::new(request))).unwrap();
+        let Reply::LargeAnswer(large) = reply else { panic!("an answer") };
+        let locks = warned(&large.answer, "linear elements lock at a Poisson's ratio of 0.46");
+        assert_eq!(locks, is_warned, "{element:?} {poisson}: {:?}", large.answer.report.warnings);
+    }
 }
 
 #[test]

@@ -96,6 +96,18 @@ impl LargeQuestion {
         let wish = Wish { error_rel, is_late: &is_late, may_factor: &may_factor, part_will_do };
         path.advance(&goal, &wish)
     }
+
+    /// Goes from rest to what is asked for in one request, by all means there are.
+    ///
+    /// # Errors
+    /// [`NoEquilibrium`] with the cause.
+    pub fn find(&self, path: &mut Path, clock: &StageClock) -> Result<Equilibrium, NoEquilibrium> {
+        let Self { known, mask_q, forces, .. } = self;
+        let goal = Goal { q_known: &known.q_known, mask_q, forces };
+        let deadline_ms = self.deadline_ms.unwrap_or(f64::INFINITY);
+        let is_late = || clock.elapsed_ms() > deadline_ms;
+        path.find(&goal, &Wish { error_rel: self.max_error, is_late: &is_late })
+    }
 }
 
 /// What a frame may take of its time, and whether it must come to its end.

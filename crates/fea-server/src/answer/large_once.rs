@@ -14,6 +14,7 @@ use softgrasp_protocol::{
 
 use super::large::{Found, LINEAR_ERROR_REL, LargeQuestion, law_of};
 use super::once::solve_once;
+use super::warnings::locking_warning;
 use crate::budget::Reservation;
 use crate::clock::StageClock;
 use crate::plan::{PlanError, Subject, admit};
@@ -56,7 +57,7 @@ pub(crate) fn solve_large(
     clock.begin(Stage::Solve);
     let rest = vec![0.0; 3 * model.system_node_count()];
     let mut path = Path::new(elements, model.stiffness(), hold, rest, question.is_single);
-    let equilibrium = question.advance(&mut path, &clock)?;
+    let equilibrium = question.find(&mut path, &clock)?;
     clock.end();
     let summary = path.elements().summary(path.displacement());
     let found = Found {
@@ -68,7 +69,10 @@ pub(crate) fn solve_large(
         factor_reused: false,
         chosen_because: why,
     };
-    Ok(found.answer(&question, &message, clock))
+    let mut answered = found.answer(&question, &message, clock);
+    let locks = locking_warning(model.element(), model.poisson_max());
+    answered.answer.report.warnings.extend(locks);
+    Ok(answered)
 }
 
 /// At large strain ten-node elements do not follow as far: linear ones, which do not lock.

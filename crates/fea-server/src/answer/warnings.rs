@@ -94,10 +94,18 @@ pub(super) fn add_plan_warnings(
 ) {
     report.warnings.extend(plan.gave_up.map(|gave_up| gave_up.to_string()));
     report.warnings.extend(plan.locks.map(|locks| locks.to_string()));
-    if asked == Some(Element::Tet4) && poisson_max >= LOCKING_POISSON {
-        report.warnings.push(format!(
+    if asked == Some(Element::Tet4) {
+        report.warnings.extend(locking_warning(Element::Tet4, poisson_max));
+    }
+}
+
+/// A sentence for elements that lock on a material.
+pub(super) fn locking_warning(element: Element, poisson_max: f64) -> Option<String> {
+    let locks = element == Element::Tet4 && poisson_max >= LOCKING_POISSON;
+    locks.then(|| {
+        format!(
             "linear elements lock at a Poisson's ratio of {poisson_max}: the object seems stiffer \
              than it is; ask for elements that do not (t4-anp, t10, auto)"
-        ));
-    }
+        )
+    })
 }
