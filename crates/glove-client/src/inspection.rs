@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 use softgrasp_core::fem::StiffnessPattern;
-use softgrasp_core::mesh::{Bodies, Quality, Surface};
+use softgrasp_core::mesh::{Bodies, Folds, Quality, Surface};
 use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::memory::{BYTES_PER_BLOCK, Bytes, Problem};
@@ -41,6 +41,8 @@ pub struct Inspection {
     orphans: usize,
     /// Bad elements and what mending them changes; null if there is nothing to mend.
     mending: Option<MendingSummary>,
+    /// Why no answer is right: elements that overlap; null where there are none.
+    folded: Option<String>,
     surface_triangles: usize,
     surface_nodes: usize,
     non_manifold_edges: usize,
@@ -122,6 +124,7 @@ impl Inspection {
             repeated_dropped: findings.repeated.len(),
             orphans: findings.orphans,
             mending: findings.mending.as_ref().map(MendingSummary::new),
+            folded: Folds::from_mesh(mesh).map(|folds| folds.to_string()),
             surface_triangles: surface.triangles.len(),
             surface_nodes: surface.nodes.len(),
             non_manifold_edges: surface.non_manifold_edges(),
@@ -218,6 +221,9 @@ impl fmt::Display for Inspection {
             self.repeated_dropped,
             self.higher_order_tets
         )?;
+        if let Some(folded) = &self.folded {
+            writeln!(f, "  WARNING       {folded}")?;
+        }
         if let Some(mending) = &self.mending {
             write!(f, "{mending}")?;
         }
@@ -274,7 +280,11 @@ mod tests {
                          elements 4\n0 1 2 3\n2 1 4 3\n0 1 4 5\n1 2 0 3\n";
 
     fn inspect(limit: Option<u64>) -> Inspection {
-        let read = parse("f.txt", LISTS.as_bytes(), &mut |_| None).unwrap();
+        inspect_lists(LISTS, limit)
+    }
+
+    fn inspect_lists(lists: &str, limit: Option<u64>) -> Inspection {
+        let read = parse("f.txt", lists.as_bytes(), &mut |_| None).unwrap();
         let machine = OwnMachine {
             rates: None,
             threads: 1,
@@ -304,6 +314,17 @@ mod tests {
         assert_eq!(json["mending"]["lost_nodes"][0], 5);
         assert!(json["forecast"]["ways"].as_array().unwrap().len() >= 4);
         assert_eq!(json["usable"], true);
+    }
+
+    /// The second element lies inside the first: both stand on the same side of their common face.
+    #[test]
+    fn a_mesh_folded_over_itself_is_warned_of_with_how_much_overlaps() {
+        let folded = "softgrasp-lists 1\nvertices 5\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.1 0.1 0.25\n\
+                      elements 2\n0 1 2 3\n0 1 2 4\n";
+        let text = inspect_lists(folded, None).to_string();
+        assert!(text.contains("WARNING       the mesh is folded over itself"), "{text}");
+        assert!(text.contains("up to 20.0 % of the volume counts twice"), "{text}");
+        assert!(!inspect(None).to_string().contains("folded"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The part of every JSON report about one solve: method, times, residual, error bound.
 
 use serde::Serialize;
+use softgrasp_core::mesh::Folds;
 use softgrasp_protocol::{DeformationName, LargeReport, SolveReport, StageMs};
 
 /// Version of the JSON reports; changes when a field changes its meaning or goes.
@@ -123,6 +124,15 @@ pub struct StageSummary {
 }
 
 impl SolveSummary {
+    /// With a warning, the first of all, where the mesh is folded over itself.
+    #[must_use]
+    pub fn with_folds(mut self, folds: Option<Folds>) -> Self {
+        if let Some(folds) = folds {
+            self.warnings.insert(0, folds.to_string());
+        }
+        self
+    }
+
     /// From the wire's report and the time the client waited.
     pub fn new(report: &SolveReport, round_trip_ms: f64) -> Self {
         let StageMs { decode, assemble, order, factor, solve, encode, queue } = report.stage_ms;

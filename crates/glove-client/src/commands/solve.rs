@@ -7,7 +7,7 @@ use anyhow::bail;
 use clap::Args;
 use serde::Serialize;
 use softgrasp_core::fem::Element;
-use softgrasp_core::mesh::TetMesh;
+use softgrasp_core::mesh::{Folds, TetMesh};
 use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::{
@@ -190,6 +190,7 @@ impl SolveCommand {
         progress.now("writing");
         let summary = SolveSummary::new(&answer.report, round_trip_ms)
             .with_large(large.as_ref())
+            .with_folds(Folds::from_mesh(&file.mesh))
             .with_bytes(connection.bytes_of_exchange());
         let displacements =
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
