@@ -23,7 +23,6 @@ const DRAWS: usize = 20;
 /// An object, where tips hold it, and how they move.
 pub(super) struct Trial {
     pub model: Model,
-    pub poisson: f64,
     pub frames: usize,
     law: Law,
     masks: Vec<Mask>,
@@ -61,7 +60,7 @@ impl Trial {
             drawn = patches(&model, depth, &mut random)?;
         }
         let (masks, ways) = drawn;
-        Ok(Self { model, poisson, frames, law, masks, ways, axis, turn, slide })
+        Ok(Self { model, frames, law, masks, ways, axis, turn, slide })
     }
 
     /// Means of the masks at a share of the whole squeeze, m.

@@ -55,14 +55,8 @@ const QUICK: Amounts = Amounts {
 pub(super) fn measure(programs: &Programs, bars: &mut Bars<'_>) -> Result<(), ReportError> {
     let amounts = if bars.is_quick() { QUICK } else { FULL };
     let threads = processors().to_string();
-    let server = programs.serve_as(&[
-        "--listen",
-        "127.0.0.1:0",
-        "--threads",
-        &threads,
-        "--max-queue",
-        "64",
-    ])?;
+    let arguments = ["--listen", "127.0.0.1:0", "--threads", &threads, "--max-queue", "64"];
+    let server = programs.serve_as(&arguments)?;
     bars.report().text(
         "A newcomer connects and uploads a cube of 1000 nodes that the server has never seen, and waits \
          until it is ready. A client with a kept cube of 10 648 nodes then presses five surface nodes \
@@ -73,10 +67,32 @@ pub(super) fn measure(programs: &Programs, bars: &mut Bars<'_>) -> Result<(), Re
          every long solve must give the displacements of the first one, bit by bit. *Pace* is solves a \
          second, alone and beside the questions.",
     );
-    let mut table = Table::new(
-        "service",
-        "Questions beside long work",
-        &[
+    let mut tables = Tables::new();
+    let mut probes = Probes::new(&server.address, amounts.newcomer_nodes, amounts.contact_nodes)?;
+    let mut quiet = Times::default();
+    progress("service", "quiet");
+    for _ in 0..amounts.quiet_questions {
+        probes.ask(&mut quiet)?;
+    }
+    rows(&mut tables.questions, "nobody", &quiet, &quiet);
+    for long in amounts.long {
+        beside(&server.address, long, (&mut probes, &quiet), &mut tables, bars)?;
+    }
+    let checked = probes.check()?;
+    bars.report().table(tables.questions);
+    bars.report().table(tables.pace);
+    bars.report().text(format!("{checked} answers to new contacts were checked and are right."));
+    Ok(())
+}
+
+struct Tables {
+    questions: Table,
+    pace: Table,
+}
+
+impl Tables {
+    fn new() -> Self {
+        let questions = [
             "beside",
             "question",
             "asked",
@@ -86,56 +102,51 @@ pub(super) fn measure(programs: &Programs, bars: &mut Bars<'_>) -> Result<(), Re
             "quiet_p50_ms",
             "ratio_p50",
             "ratio_max",
-        ],
-    );
-    let mut pace = Table::new(
-        "service-pace",
-        "What the long work loses",
-        &["work", "alone_per_s", "beside_per_s", "loss", "solves_beside"],
-    );
-    let mut probes = Probes::new(&server.address, amounts.newcomer_nodes, amounts.contact_nodes)?;
-    let mut quiet = Times::default();
-    progress("service", "quiet");
-    for _ in 0..amounts.quiet_questions {
-        probes.ask(&mut quiet)?;
+        ];
+        let pace = ["work", "alone_per_s", "beside_per_s", "loss", "solves_beside"];
+        Self {
+            questions: Table::new("service", "Questions beside long work", &questions),
+            pace: Table::new("service-pace", "What the long work loses", &pace),
+        }
     }
-    rows(&mut table, "nobody", &quiet, &quiet);
-    for (sessions, nodes, solves_min) in amounts.long {
-        let scene = Pressed::try_new(BuiltIn::Cube, nodes)?;
-        let nodes = scene.mesh.node_count();
-        let what = format!("{sessions} × {nodes} nodes");
-        progress("service", &what);
-        let mut request = scene.solve_once(Method::Front);
-        let few: Vec<u32> = scene.surface.nodes.iter().copied().take(100).collect();
-        request.question = scene.question("auto", 1.0, NodeChoice::Nodes(few));
-        let work = LongWork { address: &server.address, request: &request, sessions, solves_min };
-        let alone = work.run(|_| Ok(()))?;
-        let mut times = Times::default();
-        let beside = work.run(|is_over| {
-            while !is_over() {
-                probes.ask(&mut times)?;
-                std::thread::sleep(PAUSE);
-            }
-            Ok(())
-        })?;
-        let ratios = rows(&mut table, &what, &times, &quiet);
-        let loss = 1.0 - beside.per_s / alone.per_s;
-        pace.push([
-            Cell::Text(what.clone()),
-            Cell::Number(alone.per_s),
-            Cell::Number(beside.per_s),
-            Cell::Number(loss),
-            Cell::Count(beside.solves as u64),
-        ]);
-        let [newcomer, contact] = ratios;
-        bars.row(&format!("newcomer beside {what}, slowest"), newcomer, NEWCOMER_MAX, "× quiet");
-        bars.row(&format!("new contact beside {what}, slowest"), contact, CONTACT_MAX, "× quiet");
-        bars.row(&format!("loss of {what}"), loss, LOSS_MAX, "of the pace");
-    }
-    let checked = probes.check()?;
-    bars.report().table(table);
-    bars.report().table(pace);
-    bars.report().text(format!("{checked} answers to new contacts were checked and are right."));
+}
+
+/// Questions beside so many sessions that solve so many nodes, until so many solves are done.
+fn beside(
+    address: &str,
+    (sessions, nodes, solves_min): (usize, usize, usize),
+    (probes, quiet): (&mut Probes, &Times),
+    tables: &mut Tables,
+    bars: &mut Bars<'_>,
+) -> Result<(), ReportError> {
+    let scene = Pressed::try_new(BuiltIn::Cube, nodes)?;
+    let what = format!("{sessions} × {} nodes", scene.mesh.node_count());
+    progress("service", &what);
+    let mut request = scene.solve_once(Method::Front);
+    let few: Vec<u32> = scene.surface.nodes.iter().copied().take(100).collect();
+    request.question = scene.question("auto", 1.0, NodeChoice::Nodes(few));
+    let work = LongWork { address, request: &request, sessions, solves_min };
+    let alone = work.run(|_| Ok(()))?;
+    let mut times = Times::default();
+    let beside = work.run(|is_over| {
+        while !is_over() {
+            probes.ask(&mut times)?;
+            std::thread::sleep(PAUSE);
+        }
+        Ok(())
+    })?;
+    let [newcomer, contact] = rows(&mut tables.questions, &what, &times, quiet);
+    let loss = 1.0 - beside.per_s / alone.per_s;
+    tables.pace.push([
+        Cell::Text(what.clone()),
+        Cell::Number(alone.per_s),
+        Cell::Number(beside.per_s),
+        Cell::Number(loss),
+        Cell::Count(beside.solves as u64),
+    ]);
+    bars.row(&format!("newcomer beside {what}, slowest"), newcomer, NEWCOMER_MAX, "× quiet");
+    bars.row(&format!("new contact beside {what}, slowest"), contact, CONTACT_MAX, "× quiet");
+    bars.row(&format!("loss of {what}"), loss, LOSS_MAX, "of the pace");
     Ok(())
 }
 

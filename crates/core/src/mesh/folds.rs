@@ -104,7 +104,7 @@ mod tests {
             Point3::new(0.0, 0.0, 1.0),
             Point3::new(0.1, 0.1, 0.25),
         ];
-        let mesh = TetMesh::try_new(vertices, vec![[0, 1, 2, 3], [0, 1, 2, 4]], vec![]).unwrap();
+        let mesh = TetMesh::try_new(vertices, vec![[1, 0, 2, 3], [1, 0, 2, 4]], vec![]).unwrap();
         let folds = Folds::from_mesh(&mesh).unwrap();
         assert_eq!((folds.faces, folds.first.as_slice()), (1, &[0, 1][..]));
         assert!((folds.volume_rel - 0.2).abs() < 1e-12, "{folds:?}");

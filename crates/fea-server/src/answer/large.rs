@@ -61,23 +61,12 @@ impl LargeQuestion {
         Ok(Self { known, masks, mask_q, forces, is_single, max_error, deadline_ms })
     }
 
-    /// Moves a path to what is asked for, until it is right enough or the deadline has passed.
+    /// Moves the path of a moving hand to what is asked for, until it is right enough or the deadline
+    /// has passed.
     ///
     /// # Errors
     /// [`NoEquilibrium`]; the path is where it was, then.
     pub fn advance(
-        &self,
-        path: &mut Path,
-        clock: &StageClock,
-    ) -> Result<Equilibrium, NoEquilibrium> {
-        self.advance_in_time(path, clock, FramePace::default())
-    }
-
-    /// The same for a frame of a moving hand.
-    ///
-    /// # Errors
-    /// As [`LargeQuestion::advance`].
-    pub fn advance_in_time(
         &self,
         path: &mut Path,
         clock: &StageClock,
@@ -106,7 +95,7 @@ impl LargeQuestion {
         let goal = Goal { q_known: &known.q_known, mask_q, forces };
         let deadline_ms = self.deadline_ms.unwrap_or(f64::INFINITY);
         let is_late = || clock.elapsed_ms() > deadline_ms;
-        path.find(&goal, &Wish { error_rel: self.max_error, is_late: &is_late })
+        path.find(&goal, &Wish { error_rel: self.max_error, is_late: &is_late, ..Wish::EXACT })
     }
 }
 

@@ -159,7 +159,7 @@ impl Frame<'_> {
         clock.begin(Stage::Solve);
         let part_will_do = self.ask.pace == Pace::Timely && question.deadline_ms.is_some();
         let pace = FramePace { factor_ms: kept.factor_ms, part_will_do };
-        let equilibrium = question.advance_in_time(&mut kept.path, &clock, pace)?;
+        let equilibrium = question.advance(&mut kept.path, &clock, pace)?;
         clock.end();
         self.begin_factor(kept);
         let summary = self.summary(kept, &clock);

@@ -165,15 +165,8 @@ impl Path {
                 with_this_factor = 0;
             }
             let off = self.means_off(goal);
-            let mut step = self.correction(&balance.residual, &off);
+            let (step, slope) = self.downhill(&balance.residual, &off);
             with_this_factor += 1;
-            let mut slope = dot(&balance.residual, &step);
-            if (slope >= 0.0 || slope.is_nan()) && self.secants.bytes() > 0 {
-                // What was learnt leads uphill: rounding, or the shape has changed too much.
-                self.secants.clear();
-                step = self.correction(&balance.residual, &off);
-                slope = dot(&balance.residual, &step);
-            }
             let size = (-slope).max(0.0).sqrt();
             let largest = node_max(&step);
             contraction.see([size, largest]);
@@ -215,6 +208,21 @@ impl Path {
             };
         let is_balanced = is_converged || (wish.is_late)();
         Ok(Settled { evaluated, balance, error, energy_error, is_balanced, is_converged })
+    }
+
+    /// A correction and the slope of the energy along it; without what was learnt where that leads
+    /// uphill.
+    fn downhill(&mut self, residual: &[f64], off: &[f64]) -> (Vec<f64>, f64) {
+        let step = self.correction(residual, off);
+        let slope = dot(residual, &step);
+        if !(slope >= 0.0 || slope.is_nan()) || self.secants.bytes() == 0 {
+            return (step, slope);
+        }
+        // Rounding, or the shape has changed too much.
+        self.secants.clear();
+        let step = self.correction(residual, off);
+        let slope = dot(residual, &step);
+        (step, slope)
     }
 
     /// A factor of the shape as it is now, and what is expected of it.
