@@ -128,7 +128,7 @@ mod tests {
         for seed in [1006, 1007, 2006, 2009] {
             let (name, mesh) = drawn_object(seed, 200).unwrap();
             let trial = Trial::draw(mesh, seed).unwrap();
-            println!("{name}, seed {seed}, Poisson's ratio {}", trial.poisson);
+            println!("{name}, seed {seed}, {} frames", trial.frames);
             let reference = Reference::follow(&trial).unwrap();
             for budget in [1e-2, 2e-3, 1e-6] {
                 judged.append(judge(&trial, &reference, budget).unwrap());

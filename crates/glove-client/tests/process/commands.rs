@@ -147,9 +147,9 @@ fn server_that_is_not_there_or_wants_a_token_is_told_in_one_line() {
     fails(&solve(&folder, &["--server", &address]), &["no server answers at", &address]);
     fails(&solve(&folder, &["--server", "nonsense"]), &["nonsense", "HOST:PORT"]);
     let listen = SocketAddr::from(([127, 0, 0, 1], 0));
-    let token = Some("hush".to_owned());
+    let tokens = Some(fea_server::Tokens::of("hush"));
     let config = ServerConfig { listen, threads: 1, ..ServerConfig::default() };
-    let closed = fea_server::start(ServerConfig { token, ..config.clone() }).unwrap();
+    let closed = fea_server::start(ServerConfig { tokens, ..config.clone() }).unwrap();
     let address = closed.address().to_string();
     fails(&solve(&folder, &["--server", &address]), &["NotAuthorised", "token"]);
     let open = fea_server::start(config).unwrap();
