@@ -26,6 +26,8 @@ const BESIDE: f64 = (128 << 20) as f64;
 const CROWD: usize = 8;
 /// Bytes that each of them sends in one request.
 const REQUEST_BYTES: [usize; 2] = [200_000_000, 100_000_000];
+/// Nodes that the server takes, so that requests of the crowd are refused once they were read.
+const NODES_MAX: &str = "20000";
 /// How often memory is looked at.
 const LOOK: Duration = Duration::from_millis(5);
 /// A client that is not read from gives up after so long.
@@ -55,8 +57,16 @@ pub(super) fn measure(programs: &Programs, bars: &mut Bars<'_>) -> Result<(), Re
         progress("service", &format!("{CROWD} × {bytes} bytes"));
         let threads = processors().to_string();
         let limit = LIMIT.to_string();
-        let arguments =
-            ["--listen", "127.0.0.1:0", "--threads", &threads, "--memory-limit", &limit];
+        let arguments = [
+            "--listen",
+            "127.0.0.1:0",
+            "--threads",
+            &threads,
+            "--memory-limit",
+            &limit,
+            "--max-nodes",
+            NODES_MAX,
+        ];
         let server = programs.serve_as(&arguments)?;
         let outcome = crowd(&server, bytes)?;
         let mib = |bytes: f64| Cell::Number(bytes / f64::from(1 << 20));
@@ -127,7 +137,7 @@ fn ended_abnormally() -> ReportError {
     ReportError::Ended { what: "a client of the crowd".to_owned(), said: "it panicked".to_owned() }
 }
 
-/// A model with more nodes than any server takes, so that all that happens to it is to be received and
+/// A model with more nodes than the server takes, so that all that happens to it is to be received and
 /// read.
 fn large_request(bytes: usize) -> Result<Vec<u8>, ReportError> {
     let mut model = Pressed::try_new(BuiltIn::Cube, 64)?.upload();

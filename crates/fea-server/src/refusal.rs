@@ -93,7 +93,7 @@ pub(crate) enum Refusal {
     #[error(transparent)]
     NoRoom(#[from] NoRoom),
     #[error(
-        "the answer has no finite numbers: displacements, forces or sizes of this request are out of \
+        "the answer is not finite: displacements, forces or sizes of this request are out of \
          the range of double precision; scale them, for example to metres and pascals"
     )]
     NotFinite,
@@ -126,9 +126,7 @@ impl Refusal {
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
             Self::TooManyCases { .. } | Self::NoRoom(_) => RejectCode::MemoryLimit,
-            Self::Uncertain { .. } | Self::NoEquilibrium(_) | Self::NotFinite => {
-                RejectCode::Uncertain
-            }
+            Self::Uncertain { .. } | Self::NoEquilibrium(_) => RejectCode::Uncertain,
             Self::Token | Self::Barred { .. } => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,
             Self::Limit(_) => RejectCode::TooLarge,

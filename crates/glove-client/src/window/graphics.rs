@@ -46,7 +46,17 @@ impl Graphics {
         });
         let adapter = instance.request_adapter(&wgpu::RequestAdapterOptions::default());
         let adapter = pollster::block_on(adapter).map_err(|_| NoGraphics::NoDriver)?;
-        Ok(Self::of(&adapter.get_info()))
+        Self::usable(&adapter.get_info())
+    }
+
+    /// Mesa's OpenGL on the processor takes every order and leaves the picture black: several samples a
+    /// pixel are not what it can draw into. Its Vulkan can.
+    fn usable(info: &wgpu::AdapterInfo) -> Result<Self, NoGraphics> {
+        let found = Self::of(info);
+        match info.backend == wgpu::Backend::Gl && found.is_software {
+            true => Err(NoGraphics::NoDriver),
+            false => Ok(found),
+        }
     }
 
     /// What draws in the window or picture that is open.
@@ -128,5 +138,14 @@ mod tests {
         let NoGraphics::Window { reason } = &failed else { panic!("{failed}") };
         assert_eq!(reason, "Failed to create window");
         assert_eq!(without_panic(|| 3), Ok(3));
+    }
+
+    #[test]
+    fn opengl_on_the_processor_is_no_driver_instead_of_a_black_picture() {
+        use wgpu::{AdapterInfo, Backend, DeviceType};
+        let usable = |kind, backend| Graphics::usable(&AdapterInfo::new(kind, backend));
+        assert_eq!(usable(DeviceType::Cpu, Backend::Gl), Err(NoGraphics::NoDriver));
+        assert!(usable(DeviceType::Cpu, Backend::Vulkan).is_ok_and(|found| found.is_software));
+        assert!(usable(DeviceType::DiscreteGpu, Backend::Gl).is_ok());
     }
 }
