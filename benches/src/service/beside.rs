@@ -8,7 +8,7 @@ use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::Method;
 use softgrasp_protocol::{NodeChoice, Request, SolveOnce};
 
-use super::page::Bars;
+use super::bars::Bars;
 use super::probe::{Probes, Times};
 use crate::programs::Programs;
 use crate::report::{ReportError, progress};

@@ -1,6 +1,7 @@
 //! Report `service`: what one client's long work costs the others, and what a crowd's bytes cost the
 //! server.
 
+mod bars;
 mod beside;
 mod page;
 mod probe;

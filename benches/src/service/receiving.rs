@@ -10,7 +10,7 @@ use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{Limits, MeshData, RejectCode, Rejected, Reply, Request};
 
-use super::page::Bars;
+use super::bars::Bars;
 use crate::programs::{Programs, Server};
 use crate::report::{ReportError, progress};
 use crate::requests::upload;

@@ -12,8 +12,9 @@ use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 use crate::budget::Reservation;
 use crate::config::ServerConfig;
+use crate::no_room::NoRoom;
 use crate::places::NoPlace;
-use crate::room::{NoRoom, Room};
+use crate::room::Room;
 
 /// Frames from and bytes to one client, each with a limit on how long the client may hold it up.
 pub(crate) struct ClientConnection<S> {

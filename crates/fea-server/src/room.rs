@@ -6,6 +6,7 @@ use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
 use crate::budget::Reservation;
+use crate::no_room::NoRoom;
 use crate::resources::Resources;
 
 /// The memory that one session takes for the request that it receives.
@@ -13,21 +14,6 @@ pub(crate) struct Room {
     resources: Arc<Resources>,
     /// For what has come of the next request.
     reserved: Reservation,
-}
-
-/// There is no memory for a request.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum NoRoom {
-    #[error(
-        "the request has {bytes} bytes; to receive and read it takes twice as much, and this server \
-         has {limit} in all (--memory-limit)"
-    )]
-    Never { bytes: u64, limit: u64 },
-    #[error(
-        "the request has {bytes} bytes, and of the {limit} bytes of this server {taken} are taken \
-         (--memory-limit); send it again later"
-    )]
-    Now { bytes: u64, limit: u64, taken: u64 },
 }
 
 /// Memory for which a session reserves nothing: every session may hold so much.

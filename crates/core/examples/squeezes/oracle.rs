@@ -58,9 +58,12 @@ pub fn solve(squeeze: &Squeeze) -> Option<Vec<f64>> {
 
 type Factored = (FrontFactor<f64>, softgrasp_core::fem::Stiffness);
 
+/// The factor of a tangent at a shape, if it has one.
+type FactorOf<'a> = dyn Fn(&[f64], Curvature) -> Option<Factored> + 'a;
+
 fn newton(
     squeeze: &Squeeze,
-    (partition, factor_of): (&Partition, &dyn Fn(&[f64], Curvature) -> Option<Factored>),
+    (partition, factor_of): (&Partition, &FactorOf<'_>),
     loads: &[f64],
     q: &mut Vec<f64>,
 ) -> Option<()> {

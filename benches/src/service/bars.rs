@@ -1,0 +1,48 @@
+//! What was promised of the service, beside what was measured.
+
+use crate::report::Report;
+use crate::table::{Cell, Table};
+
+/// The table of bars, and where a broken one is told.
+pub(super) struct Bars<'a> {
+    table: Table,
+    report: &'a mut Report,
+    is_quick: bool,
+}
+
+impl<'a> Bars<'a> {
+    /// An empty table.
+    pub fn new(report: &'a mut Report, is_quick: bool) -> Self {
+        let columns = ["what", "measured", "bar", "unit", "kept"];
+        let table = Table::new("service-bars", "Bars", &columns);
+        Self { table, report, is_quick }
+    }
+
+    /// Adds the table to the report.
+    pub fn write(self) {
+        self.report.table(self.table);
+    }
+
+    /// A row; a bar that is not kept is a fault, but not in the quick form, whose figures mean little.
+    pub fn row(&mut self, what: &str, measured: f64, bar: f64, unit: &str) {
+        // A figure that could not be had does not keep its bar.
+        let is_kept = measured <= bar;
+        if !is_kept && !self.is_quick {
+            self.report.fault(format!("{what}: {measured:.3} {unit}, the bar is {bar}"));
+        }
+        let text = |text: &str| Cell::Text(text.to_owned());
+        let kept = text(if is_kept { "yes" } else { "no" });
+        let cells = [text(what), Cell::Number(measured), Cell::Number(bar), text(unit), kept];
+        self.table.push(cells);
+    }
+
+    /// The report, for tables of its own.
+    pub fn report(&mut self) -> &mut Report {
+        self.report
+    }
+
+    /// Whether small sizes and few rounds are asked for.
+    pub fn is_quick(&self) -> bool {
+        self.is_quick
+    }
+}
