@@ -18,7 +18,8 @@ pub(crate) fn is_finite(reply: &Reply) -> bool {
     }
 }
 
-fn answer_is_finite(answer: &Answer) -> bool {
+/// The same for one answer.
+pub(super) fn answer_is_finite(answer: &Answer) -> bool {
     let Answer { report, displacements, reactions, mask_forces, .. } = answer;
     let are_displacements = match displacements {
         Displacements::F64(values) => all(values.iter().flatten()),

@@ -13,6 +13,7 @@ use softgrasp_protocol::{
 use super::condensed::{Contacts, PreparedSet, StrainOf};
 use super::direct::{self, Posed};
 use super::factor::{FactorRequest, because_of_memory};
+use super::finite::answer_is_finite;
 use crate::clock::StageClock;
 use crate::plan::{Subject, columns_ms, factor_ms, plan_frame};
 use crate::refusal::Refusal;
@@ -165,6 +166,16 @@ impl PosedFrame {
                     if self.question.method.is_none() && self.message.masks.is_empty() =>
                 {
                     let why = format!("not condensed: {error}");
+                    let plan = self.question.plan(self.plan.element, Method::Front, why);
+                    self.plan = Plan { instead: Some(Method::FrontMixed), ..plan };
+                }
+                // A factor of its own works with smaller numbers than columns of the inverse.
+                Ok(answer)
+                    if self.question.method.is_none()
+                        && self.message.masks.is_empty()
+                        && !answer_is_finite(&answer) =>
+                {
+                    let why = "not condensed: its answer is not finite";
                     let plan = self.question.plan(self.plan.element, Method::Front, why);
                     self.plan = Plan { instead: Some(Method::FrontMixed), ..plan };
                 }
