@@ -1,5 +1,6 @@
-//! Contacts of fingertips as masks: the surface around a touched node, weighted by pressure.
+//! Contact mechanics: masks of fingertips on a surface, and points with Coulomb friction.
 
+pub mod coulomb;
 mod mask;
 mod pressure;
 

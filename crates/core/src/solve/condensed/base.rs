@@ -127,6 +127,15 @@ pub enum CondensedError {
         /// Nodes of the mesh.
         node_count: usize,
     },
+    /// A body that cannot fly: it is held, or it has parts that move on their own.
+    #[error(
+        "condensed: contact with friction takes one body that nothing holds, which has 6 motions \
+         without energy; this one has {motions}"
+    )]
+    NotFree {
+        /// Motions without energy.
+        motions: usize,
+    },
     /// The answer is not finite.
     #[error("condensed: the answer is not finite; the known displacements are too large")]
     NotFinite,

@@ -27,6 +27,8 @@ mod contact_set;
 mod correction;
 mod eigenvalue;
 mod exact;
+mod free_body;
+mod free_response;
 mod load_size;
 #[cfg(test)]
 mod mask_tests;
@@ -42,4 +44,6 @@ pub use base::{Base, CondensedError};
 pub use certificate::{Certificate, Delivery};
 pub use columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
 pub use contact_set::{ContactAnswer, ContactSet};
+pub use free_body::{FreeBody, Relief};
+pub use free_response::{Elasticity, NodeForce, Response};
 pub use touched::{Contact, Touched};

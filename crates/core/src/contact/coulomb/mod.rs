@@ -1,0 +1,15 @@
+//! Contact with Coulomb friction between points: the cone, the problem, its solution, its residual.
+
+mod cone;
+mod local;
+mod newton;
+mod problem;
+mod solution;
+mod sweeps;
+
+pub use cone::{FrictionCone, PointForce};
+pub use problem::{ContactProblem, ProblemError};
+pub use solution::{PointState, Solution, SolveBudget, state_of};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,125 @@
+//! The linear contact problem: gaps and slips of points as a function of their forces.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::cone::{FrictionCone, PointForce};
+
+/// Points in contact, or nearly so: `u = W λ + b`, and a cone for each.
+///
+/// Shapes: n points; `w` 3n × 3n, symmetric, positive semidefinite (the Delassus operator); `b` 3n;
+/// each point has three rows: normal, and two tangents.
+/// Units: `w` m/N, `b` m (gap and slip without contact forces), λ N.
+///
+/// Source: Moreau's implicit contact at position level; Alart and Curnier (1991).
+#[derive(Clone, Debug)]
+pub struct ContactProblem {
+    pub(super) w: DMatrix<f64>,
+    pub(super) b: Vec<f64>,
+    pub(super) cones: Vec<FrictionCone>,
+    /// A stiffness for each point, N/m: it turns metres into newtons in the residual.
+    pub(super) rho: Vec<f64>,
+}
+
+/// Why numbers make no contact problem.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProblemError {
+    /// Sizes that do not fit each other.
+    #[error("{points} points need {expected} rows, but the operator has {rows} and the motion {motion}")]
+    Sizes {
+        /// Number of points.
+        points: usize,
+        /// Rows they need.
+        expected: usize,
+        /// Rows of the operator.
+        rows: usize,
+        /// Entries of the motion.
+        motion: usize,
+    },
+    /// A point that no force moves along its own normal.
+    #[error("contact point {point} has the compliance {compliance:e} m/N along its normal; it must be positive")]
+    Rigid {
+        /// The point.
+        point: usize,
+        /// Its compliance.
+        compliance: f64,
+    },
+    /// A number that is not finite.
+    #[error("a number of the contact problem is not finite")]
+    NotFinite,
+}
+
+impl ContactProblem {
+    /// Shapes and units as in [`ContactProblem`].
+    ///
+    /// # Errors
+    /// [`ProblemError`].
+    pub fn try_new(
+        w: DMatrix<f64>,
+        b: Vec<f64>,
+        cones: Vec<FrictionCone>,
+    ) -> Result<Self, ProblemError> {
+        let points = cones.len();
+        let expected = 3 * points;
+        if w.nrows() != expected || w.ncols() != expected || b.len() != expected {
+            let (rows, motion) = (w.nrows(), b.len());
+            return Err(ProblemError::Sizes { points, expected, rows, motion });
+        }
+        if !w.iter().chain(&b).all(|x| x.is_finite()) {
+            return Err(ProblemError::NotFinite);
+        }
+        let mut rho = Vec::with_capacity(points);
+        for point in 0..points {
+            let compliance = w[(3 * point, 3 * point)];
+            // Written so that a NaN is refused too.
+            let is_soft = compliance > 0.0;
+            if !is_soft {
+                return Err(ProblemError::Rigid { point, compliance });
+            }
+            rho.push(1.0 / compliance);
+        }
+        Ok(Self { w, b, cones, rho })
+    }
+
+    pub fn dump(&self, dir: &str, warm: &[f64]) { use std::io::Write; static N: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0); let k=N.fetch_add(1,std::sync::atomic::Ordering::Relaxed); let mut f=std::fs::File::create(format!("{dir}/{k:04}.bin")).unwrap(); let n=self.cones.len(); f.write_all(&(n as u64).to_le_bytes()).unwrap(); for x in self.w.iter().chain(&self.b).chain(warm) { f.write_all(&x.to_le_bytes()).unwrap(); } for c in &self.cones { f.write_all(&c.friction.to_le_bytes()).unwrap(); } }
+    /// Number of points.
+    pub fn point_count(&self) -> usize {
+        self.cones.len()
+    }
+
+    /// Gap and slip `W λ + b` of every point, m.
+    ///
+    /// Shapes: `lambda` and result 3n.
+    pub fn motion(&self, lambda: &[f64]) -> Vec<f64> {
+        let mut motion = self.b.clone();
+        for (column, &force) in lambda.iter().enumerate() {
+            // Open points have no force, and most of a margin is open.
+            if force != 0.0 {
+                let w = self.w.column(column);
+                motion.iter_mut().zip(w.iter()).for_each(|(u, w)| *u += w * force);
+            }
+        }
+        motion
+    }
+
+    /// Largest residual of the natural map over all points, N.
+    ///
+    /// Shapes: `lambda` and `motion` 3n.
+    pub fn residual_of(&self, lambda: &[f64], motion: &[f64]) -> f64 {
+        let points = 0..self.point_count();
+        let residuals = points.map(|i| {
+            let (force, motion) = (at(lambda, i), at(motion, i));
+            self.cones[i].residual(force, motion, self.rho[i])
+        });
+        residuals.fold(0.0, f64::max)
+    }
+
+    /// The block of a point with itself.
+    pub(super) fn own(&self, point: usize) -> Matrix3<f64> {
+        self.w.fixed_view::<3, 3>(3 * point, 3 * point).into_owned()
+    }
+}
+
+/// The three numbers of a point.
+pub(super) fn at(numbers: &[f64], point: usize) -> PointForce {
+    Vector3::new(numbers[3 * point], numbers[3 * point + 1], numbers[3 * point + 2])
+}

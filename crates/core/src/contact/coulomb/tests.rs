@@ -1,0 +1,155 @@
+//! Contact problems with known answers, and random ones against sweeps alone.
+
+use nalgebra::{DMatrix, Vector3};
+use proptest::prelude::*;
+
+use super::local::PointProblem;
+use super::problem::at;
+use super::sweeps::Sweeps;
+use super::*;
+
+/// A rigid block of four corners on a plane: forces act on mass and inertia.
+///
+/// Units: kg, m, s.
+struct Block {
+    mass: f64,
+    inertia: Vector3<f64>,
+    /// Corners from the centre of mass; the normal is z, written first in the rows.
+    corners: [Vector3<f64>; 4],
+}
+
+impl Block {
+    fn new() -> Self {
+        let (mass, half) = (0.3, Vector3::new(0.03, 0.02, 0.01));
+        let square = half.component_mul(&half) * (mass / 3.0);
+        let inertia = Vector3::new(square.y + square.z, square.x + square.z, square.x + square.y);
+        let corner = |x: f64, y: f64| Vector3::new(x * half.x, y * half.y, -half.z);
+        let corners =
+            [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
+        Self { mass, inertia, corners }
+    }
+
+    /// One step of the block with a velocity, under gravity, on a plane of some friction.
+    fn problem(&self, gravity: Vector3<f64>, h: f64, friction: f64) -> ContactProblem {
+        let normal_first = |v: Vector3<f64>| [v.z, v.x, v.y];
+        let w = DMatrix::from_fn(12, 12, |r, c| {
+            let axis = |k: usize| [Vector3::z(), Vector3::x(), Vector3::y()][k % 3];
+            let (i, j) = (self.corners[r / 3], self.corners[c / 3]);
+            let turned = j.cross(&axis(c)).component_div(&self.inertia).cross(&i);
+            h * h * axis(r).dot(&(axis(c) / self.mass + turned))
+        });
+        let fall = normal_first(h * h * gravity);
+        let b = (0..12).map(|row| fall[row % 3]).collect();
+        // A body that is rigid has no compliance of its own; what is shared is not touched by this.
+        let soft = DMatrix::identity(12, 12) * (1e-6 * w.trace() / 12.0);
+        ContactProblem::try_new(w + soft, b, vec![FrictionCone { friction }; 4]).unwrap()
+    }
+}
+
+fn tilted(degrees: f64) -> Vector3<f64> {
+    let angle = degrees.to_radians();
+    9.81 * Vector3::new(angle.sin(), 0.0, -angle.cos())
+}
+
+#[test]
+fn block_on_a_tilted_plane_sticks_below_the_angle_of_friction_and_slides_above() {
+    let (block, h) = (Block::new(), 0.01);
+    let friction: f64 = 0.4;
+    let angle = friction.atan().to_degrees();
+    for (degrees, slides) in [(angle - 0.01, false), (angle + 0.01, true), (angle + 5.0, true)] {
+        let problem = block.problem(tilted(degrees), h, friction);
+        let found = problem.solve(&[], SolveBudget::default());
+        assert!(found.is_converged, "{degrees} degrees: residual {:e} N", found.residual);
+        let weight = block.mass * 9.81;
+        let (normal, along) = (0..4).fold((0.0, 0.0), |(n, t), i| {
+            (n + found.force(i).x, t - found.force(i).y)
+        });
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        assert!((normal - weight * cos).abs() < 1e-6 * weight, "{normal}");
+        let expected = if slides { friction * weight * cos } else { weight * sin };
+        assert!((along - expected).abs() < 1e-5 * weight, "{degrees} degrees: {along}, {expected}");
+        let slip = (0..4).map(|i| at(&found.motion, i).yz().norm()).fold(0.0, f64::max);
+        let free = h * h * 9.81 * (sin - friction * cos);
+        match slides {
+            true => assert!((slip - free).abs() < 1e-3 * free, "{slip:e} instead of {free:e}"),
+            false => assert!(slip < 1e-11, "{slip:e}"),
+        }
+    }
+}
+
+#[test]
+fn points_that_are_nowhere_near_get_no_force_at_all() {
+    let problem = ContactProblem::try_new(
+        DMatrix::identity(6, 6),
+        vec![0.1, 3.0, -4.0, 1e-9, 0.0, 1.0],
+        vec![FrictionCone { friction: 1.0 }; 2],
+    )
+    .unwrap();
+    let found = problem.solve(&[], SolveBudget::default());
+    assert_eq!(found.lambda, [0.0; 6]);
+    assert!(found.is_converged && found.sweeps == 0);
+}
+
+#[test]
+fn what_makes_no_problem_is_refused_by_name() {
+    let cones = vec![FrictionCone { friction: 0.5 }];
+    let new = |w: DMatrix<f64>, b: Vec<f64>| ContactProblem::try_new(w, b, cones.clone()).err();
+    assert!(matches!(new(DMatrix::identity(2, 2), vec![0.0; 3]), Some(ProblemError::Sizes { .. })));
+    assert!(matches!(new(DMatrix::zeros(3, 3), vec![0.0; 3]), Some(ProblemError::Rigid { .. })));
+    let nan = new(DMatrix::identity(3, 3), vec![f64::NAN; 3]);
+    assert!(matches!(nan, Some(ProblemError::NotFinite)));
+}
+
+/// A random compliance as bodies have it: everything is coupled, near things more.
+fn compliance(n: usize, seed: &[f64]) -> DMatrix<f64> {
+    let place = |i: usize| {
+        Vector3::new(seed[3 * i], seed[3 * i + 1], 0.3 * seed[3 * i + 2]) + Vector3::repeat(1e-3)
+    };
+    DMatrix::from_fn(3 * n, 3 * n, |r, c| {
+        let apart = place(r / 3) - place(c / 3);
+        let distance = (apart.norm_squared() + 0.01).sqrt();
+        let direction = apart / distance;
+        let same = if r % 3 == c % 3 { 1.4 } else { 0.0 };
+        // Kelvin's solution for a point force, smoothed.
+        (same + 0.6 * direction[r % 3] * direction[c % 3]) / distance
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn random_problems_are_solved_and_sweeps_alone_find_the_same_motion(
+        n in 1usize..16,
+        seed in prop::collection::vec(-1.0..1.0f64, 72),
+        pushed in prop::collection::vec(-1.0..0.5f64, 72),
+        friction in 0.0..0.9f64,
+    ) {
+        let w = compliance(n, &seed);
+        let cones = vec![FrictionCone { friction }; n];
+        let problem = ContactProblem::try_new(w, pushed[..3 * n].to_vec(), cones).unwrap();
+        let found = problem.solve(&[], SolveBudget::default());
+        prop_assert!(found.is_converged, "residual {:e} of {:e} N", found.residual, found.force_max());
+        prop_assert!((0..n).all(|i| found.motion[3 * i] > -1e-9));
+        // The oracle: sweeps and nothing else.
+        let sweeps = Sweeps::new(&problem);
+        let (mut lambda, mut motion) = (vec![0.0; 3 * n], problem.motion(&[]));
+        for _ in 0..2_000 {
+            sweeps.sweep(&mut lambda, &mut motion);
+        }
+        motion = problem.motion(&lambda);
+        let residual = problem.residual_of(&lambda, &motion);
+        prop_assume!(residual < 1e-9 * found.force_max().max(1e-3));
+        let off = motion.iter().zip(&found.motion).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        prop_assert!(off < 1e-5, "{off:e}");
+    }
+}
+
+#[test]
+fn a_point_without_friction_presses_only() {
+    let mut w = nalgebra::Matrix3::identity();
+    w[(0, 1)] = 0.3;
+    w[(1, 0)] = 0.3;
+    let force = PointProblem::new(w, 0.0).solve(Vector3::new(-0.5, 0.2, 0.0));
+    assert_eq!(force, Vector3::new(0.5, 0.0, 0.0));
+}

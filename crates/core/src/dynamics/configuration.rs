@@ -1,0 +1,169 @@
+//! Where object and bodies are at the end of a step, for one guess of the contact forces.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::bodies::MovingBody;
+use super::features::{Candidate, Gap, MaterialPoint, deepest};
+use super::rigid_motion::{RigidMotion, RigidStep, Wrench};
+use super::state::{HeldContact, at_nodes, mix, summed};
+use crate::solve::condensed::{NodeForce, Response};
+
+/// What does not change while a step is solved.
+pub(super) struct Scene<'a> {
+    pub vertices: &'a [Point3<f64>],
+    pub triangles: &'a [[u32; 3]],
+    pub bodies: &'a [MovingBody],
+    pub candidates: &'a [Candidate],
+    pub rigid: RigidStep<'a>,
+    /// Seconds in which the shape forgets a force, Kelvin and Voigt.
+    pub viscosity: f64,
+    /// Displacement of the response's rows when the step begins.
+    pub begun: Vec<Vector3<f64>>,
+}
+
+/// One guess: contact forces, and what they do to pose and shape.
+pub(super) struct Configuration {
+    pub contacts: Vec<HeldContact>,
+    pub motion: RigidMotion,
+    /// Forces whose elastic response is the shape.
+    pub forces: Vec<NodeForce>,
+    /// Displacement of the response's rows.
+    pub displacement: Vec<Vector3<f64>>,
+}
+
+impl Scene<'_> {
+    /// Share of a force that the shape has answered at the end of the step.
+    pub fn answered(&self) -> f64 {
+        self.rigid.seconds / (self.rigid.seconds + self.viscosity)
+    }
+
+    /// Forces whose elastic response is the shape at the end, under some contact forces.
+    pub fn elastic_forces(&self, contacts: &[NodeForce]) -> Vec<NodeForce> {
+        let answered = self.answered();
+        let new = contacts.iter().map(|(node, force)| (*node, answered * force));
+        let left = 1.0 - answered;
+        // What is left of a force after it has been forgotten to rounding is dropped.
+        let largest = self.rigid.state.forces.iter().map(|(_, f)| f.norm()).fold(0.0, f64::max);
+        let remembered = self.rigid.state.forces.iter().filter(|(_, f)| f.norm() > 1e-14 * largest);
+        let old = remembered.map(|(node, force)| (*node, left * force));
+        match self.viscosity > 0.0 {
+            true => summed(new.chain(old).collect()),
+            false => contacts.to_vec(),
+        }
+    }
+
+    /// The configuration that contact forces in the frame of a turned object lead to.
+    ///
+    /// The columns of all nodes with a force have been asked for.
+    pub fn configuration(
+        &self,
+        response: &Response<'_>,
+        contacts: Vec<HeldContact>,
+        at: &Configured<'_>,
+    ) -> Configuration {
+        let mut wrench = Wrench::default();
+        for contact in &contacts {
+            let place = self.place(response, at.displacement, &contact.nodes, &contact.weights);
+            wrench.force += contact.force;
+            wrench.torque += (place - self.rigid.mass.centre).cross(&contact.force);
+        }
+        let motion = self.rigid.motion(&wrench, &at.world_from_object.rotation);
+        let forces = self.elastic_forces(&at_nodes(&contacts));
+        let displacement = response.displacement(&forces);
+        Configuration { contacts, motion, forces, displacement }
+    }
+
+    /// Where a point of the surface is in the object's frame.
+    pub fn place(
+        &self,
+        response: &Response<'_>,
+        displacement: &[Vector3<f64>],
+        nodes: &[u32; 3],
+        weights: &[f64; 3],
+    ) -> Point3<f64> {
+        mix(&self.corners(response, displacement, nodes), weights)
+    }
+
+    fn corners(
+        &self,
+        response: &Response<'_>,
+        displacement: &[Vector3<f64>],
+        nodes: &[u32; 3],
+    ) -> [Vector3<f64>; 3] {
+        nodes.map(|node| {
+            let moved = response.row_of(node).map_or(Vector3::zeros(), |row| displacement[row]);
+            self.vertices[node as usize].coords + moved
+        })
+    }
+
+    /// The bodies at the end of the step, in the object's frame.
+    pub fn object_from_bodies(&self, at: &Configured<'_>) -> Vec<Isometry3<f64>> {
+        let object_from_world = at.world_from_object.inverse();
+        self.bodies.iter().map(|body| object_from_world * body.world_from_body_end).collect()
+    }
+
+    /// Where a body is from a point of the surface.
+    pub fn gap(
+        &self,
+        response: &Response<'_>,
+        at: &Configured<'_>,
+        object_from_bodies: &[Isometry3<f64>],
+        point: &MaterialPoint,
+    ) -> Gap {
+        let place = self.place(response, at.displacement, &point.nodes, &point.weights);
+        let body = usize::from(point.body);
+        let object_from_body = &object_from_bodies[body];
+        let in_body = object_from_body.inverse_transform_point(&place);
+        let signed = self.bodies[body].shape.distance(&in_body);
+        let normal = object_from_body.rotation * signed.normal;
+        Gap { place, distance: signed.distance, normal }
+    }
+
+    /// The deepest point of each candidate that is on the outer side of its triangle, and how far from
+    /// the body it is.
+    pub fn deepest_points(
+        &self,
+        response: &Response<'_>,
+        at: &Configured<'_>,
+        object_from_bodies: &[Isometry3<f64>],
+    ) -> Vec<(MaterialPoint, f64)> {
+        let of_candidate = |candidate: &Candidate| {
+            let nodes = self.triangles[candidate.triangle as usize];
+            let body = usize::from(candidate.body);
+            let corners = self.corners(response, at.displacement, &nodes);
+            let found = deepest(&corners, &self.bodies[body].shape, &object_from_bodies[body])?;
+            let point = MaterialPoint::new(candidate.body, nodes, found.weights);
+            Some((point, found.distance.distance))
+        };
+        self.candidates.iter().filter_map(of_candidate).collect()
+    }
+
+    /// Where the material point of a contact would be at the end if it stuck to the body, in the
+    /// object's frame at the end.
+    pub fn stuck(
+        &self,
+        response: &Response<'_>,
+        at: &Configured<'_>,
+        point: &MaterialPoint,
+    ) -> Point3<f64> {
+        let begun = self.place(response, &self.begun, &point.nodes, &point.weights);
+        let in_world = self.rigid.state.world_from_object * begun;
+        let carried = self.bodies[usize::from(point.body)].carried(&in_world);
+        at.world_from_object.inverse_transform_point(&carried)
+    }
+}
+
+/// Pose and shape of a configuration, which the next one is linearised about.
+pub(super) struct Configured<'a> {
+    pub world_from_object: Isometry3<f64>,
+    pub displacement: &'a [Vector3<f64>],
+}
+
+impl Configuration {
+    pub fn configured(&self) -> Configured<'_> {
+        Configured {
+            world_from_object: self.motion.world_from_object,
+            displacement: &self.displacement,
+        }
+    }
+}

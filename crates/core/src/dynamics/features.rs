@@ -1,0 +1,147 @@
+//! Points of the surface at which the object touches bodies: fixed in the material, found as needed.
+//!
+//! A contact is a point that stays where it is in its triangle while a step is solved. Where a triangle
+//! goes deeper into a body between the points that it has, its deepest point becomes one more. So the
+//! force on a triangle can move from point to point, the problem with given points is solved exactly,
+//! and after a few rounds no part of any triangle is inside a body.
+
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+use super::state::HeldContact;
+use crate::rigid_body::{Barycentric, Deepest, RigidShape};
+
+/// A triangle of the boundary surface that is near a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Candidate {
+    /// Position in the surface's triangles.
+    pub triangle: u32,
+    /// Position in the list of bodies.
+    pub body: u16,
+}
+
+/// A point of the surface that a body can touch, by the nodes of its triangle and their weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MaterialPoint {
+    pub body: u16,
+    pub nodes: [u32; 3],
+    pub weights: Barycentric,
+}
+
+/// Where a body is from a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gap {
+    /// Where the point is, in the object's frame.
+    pub place: Point3<f64>,
+    /// Signed distance from the body, m.
+    pub distance: f64,
+    /// Out of the body, in the object's frame.
+    pub normal: Unit<Vector3<f64>>,
+}
+
+/// Weights below this count as zero: the point is on an edge or at a corner.
+const ON_EDGE: f64 = 1e-9;
+/// Points of one triangle whose weights differ by less are one point.
+const SAME: f64 = 1e-7;
+/// Cosine between the way out of a body and the way out of the object above which the body is on the
+/// other side of the triangle.
+const FACING: f64 = 0.3;
+
+impl MaterialPoint {
+    /// A corner of the surface.
+    pub fn corner(body: u16, node: u32) -> Self {
+        Self { body, nodes: [node; 3], weights: [1.0, 0.0, 0.0] }
+    }
+
+    /// A point of a triangle; one at a corner is the corner of all triangles there, one on an edge
+    /// that of both.
+    pub fn new(body: u16, nodes: [u32; 3], weights: Barycentric) -> Self {
+        let mut within: Vec<(u32, f64)> =
+            nodes.into_iter().zip(weights).filter(|(_, weight)| *weight > ON_EDGE).collect();
+        within.sort_unstable_by_key(|(node, _)| *node);
+        match within[..] {
+            [(node, _)] => Self::corner(body, node),
+            [(a, weight), (b, other)] => {
+                let share = weight / (weight + other);
+                Self { body, nodes: [a, b, b], weights: [share, 1.0 - share, 0.0] }
+            }
+            _ => Self { body, nodes, weights },
+        }
+    }
+
+    /// Nodes with a weight.
+    pub fn weighted(&self) -> impl Iterator<Item = (u32, f64)> + use<> {
+        self.nodes.into_iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0)
+    }
+
+    /// Whether two points are one, or too near to tell apart.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() < SAME;
+        self.body == other.body
+            && self.nodes == other.nodes
+            && self.weights.iter().zip(&other.weights).all(near)
+    }
+}
+
+impl From<&HeldContact> for MaterialPoint {
+    fn from(held: &HeldContact) -> Self {
+        Self { body: held.body, nodes: held.nodes, weights: held.weights }
+    }
+}
+
+/// The deepest point of a triangle in a body, where the body is on the triangle's outer side; a half
+/// space is met by corners alone.
+///
+/// Shapes: `corners` in the object's frame.
+pub(super) fn deepest(
+    corners: &[Vector3<f64>; 3],
+    shape: &RigidShape,
+    object_from_body: &Isometry3<f64>,
+) -> Option<Deepest> {
+    if matches!(shape, RigidShape::Plane { .. }) {
+        return None;
+    }
+    let in_body = corners.map(|c| object_from_body.inverse_transform_point(&Point3::from(c)));
+    let deepest = shape.deepest(&in_body);
+    let out_of_body = object_from_body.rotation * deepest.distance.normal;
+    let [a, b, c] = corners;
+    let outward = (b - a).cross(&(c - a));
+    (out_of_body.dot(&outward) < FACING * outward.norm()).then_some(deepest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle() -> [Vector3<f64>; 3] {
+        [Vector3::zeros(), Vector3::new(0.01, 0.0, 0.0), Vector3::new(0.0, 0.01, 0.0)]
+    }
+
+    fn found(shape: &RigidShape, place: Vector3<f64>) -> Option<Deepest> {
+        let pose = Isometry3::from_parts(place.into(), Default::default());
+        deepest(&triangle(), shape, &pose)
+    }
+
+    #[test]
+    fn a_ball_touches_a_large_triangle_inside_it() {
+        let ball = RigidShape::sphere(0.001).unwrap();
+        let point = found(&ball, Vector3::new(0.003, 0.003, 0.0008)).unwrap();
+        assert!((point.distance.distance + 0.0002).abs() < 1e-15);
+        assert!((point.distance.normal.z + 1.0).abs() < 1e-12);
+        assert!(point.weights.iter().all(|w| *w > 0.2));
+    }
+
+    #[test]
+    fn a_ball_behind_the_triangle_does_not_touch_it() {
+        let ball = RigidShape::sphere(0.001).unwrap();
+        assert_eq!(found(&ball, Vector3::new(0.003, 0.003, -0.0008)), None);
+    }
+
+    #[test]
+    fn a_point_on_an_edge_is_the_same_from_both_triangles() {
+        let ours = MaterialPoint::new(3, [7, 4, 9], [0.25, 0.75, 0.0]);
+        let theirs = MaterialPoint::new(3, [4, 7, 11], [0.75, 0.25, 1e-12]);
+        assert!(ours.is_same(&theirs), "{ours:?} {theirs:?}");
+        let corner = MaterialPoint::new(3, [4, 7, 11], [1.0, 0.0, 0.0]);
+        assert_eq!(corner, MaterialPoint::corner(3, 4));
+    }
+}

@@ -1,0 +1,37 @@
+//! Motion of a soft object among rigid bodies: weight, contact, Coulomb friction, one step at a time.
+//!
+//! The elastic part has no inertia and the rigid motion has: a fruit rings at tens of hertz and is damped
+//! within a few periods, so a scene of grasping needs the inertia of the whole object, and not that of
+//! its vibrations. A step of h seconds solves, for the contact forces λ,
+//!
+//! ```text
+//! M (v⁺ − v) / h = w + Gᵀ λ            rigid part, implicit Euler; w the weight
+//! u⁺ = (h K⁻ P Bᵀ λ + τ u) / (h + τ)   elastic part (inertia relief), viscosity τ
+//! gap ≥ 0, λ_n ≥ 0, λ_n gap = 0        at the end of the step
+//! ‖λ_t‖ ≤ μ λ_n, against the slip of the step
+//! ```
+//!
+//! so that gaps and slips are `W λ + b` with `W = h/(h+τ) B C Bᵀ + h² G M⁻¹ Gᵀ`. Distances are those of
+//! the true bodies: the step is repeated from where it ended until they are met.
+//!
+//! Source: Moreau–Jean time stepping; Kelvin and Voigt; De Saxcé and Feng (1998).
+
+mod assemble;
+mod bodies;
+mod configuration;
+mod features;
+mod near;
+mod outcome;
+mod rigid_motion;
+mod state;
+mod step;
+#[cfg(test)]
+mod tests;
+
+pub use bodies::MovingBody;
+pub use features::Candidate;
+pub use near::near_triangles;
+pub use outcome::{BodyLoad, PointContact, StepOutcome};
+pub use rigid_motion::MassProperties;
+pub use state::{HeldContact, ObjectState};
+pub use step::{ContactStep, StepError, StepSettings};

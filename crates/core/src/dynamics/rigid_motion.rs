@@ -1,0 +1,106 @@
+//! The rigid part of an object's motion: mass, inertia, and where forces of one step take it.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use super::state::ObjectState;
+use crate::solve::condensed::FreeBody;
+
+/// Mass, centre and moments of inertia.
+///
+/// Units: kg, m, kg m². Frame: the object's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassProperties {
+    /// Mass.
+    pub mass: f64,
+    /// Centre of mass at rest.
+    pub centre: Point3<f64>,
+    /// Moments of inertia about the centre.
+    pub inertia: Matrix3<f64>,
+    /// Inverse of the moments of inertia.
+    pub inverse_inertia: Matrix3<f64>,
+}
+
+impl MassProperties {
+    /// Those of a body of one density, kg/m³; `None` where they are no positive numbers.
+    pub fn of(body: &FreeBody, density: f64) -> Option<Self> {
+        let (mass, inertia) = (density * body.volume(), density * body.inertia());
+        let inverse_inertia = inertia.try_inverse()?;
+        let is_sound = mass > 0.0 && mass.is_finite() && inverse_inertia.iter().all(|x| x.is_finite());
+        is_sound.then_some(Self { mass, centre: body.centre(), inertia, inverse_inertia })
+    }
+}
+
+/// Force and torque about the centre of mass, in the object's frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Wrench {
+    /// N.
+    pub force: Vector3<f64>,
+    /// N m.
+    pub torque: Vector3<f64>,
+}
+
+/// The rigid motion of one step under given forces.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RigidMotion {
+    /// Pose at the end.
+    pub world_from_object: Isometry3<f64>,
+    /// Velocity of the centre of mass at the end, world.
+    pub velocity: Vector3<f64>,
+    /// Angular velocity of the step, world.
+    pub angular_velocity: Vector3<f64>,
+    /// Angular momentum at the end, world.
+    pub angular_momentum: Vector3<f64>,
+}
+
+/// The rigid part of a step: state at its beginning, mass, weight, time.
+pub(super) struct RigidStep<'a> {
+    pub state: &'a ObjectState,
+    pub mass: MassProperties,
+    /// m/s², world.
+    pub gravity: Vector3<f64>,
+    pub seconds: f64,
+}
+
+impl RigidStep<'_> {
+    /// Motion under a wrench that acts in the frame of the object as it is turned by `turned`.
+    pub fn motion(&self, wrench: &Wrench, turned: &UnitQuaternion<f64>) -> RigidMotion {
+        let (h, mass) = (self.seconds, &self.mass);
+        let start = &self.state.world_from_object;
+        let velocity =
+            self.state.velocity + h * (self.gravity + turned * wrench.force / mass.mass);
+        let inertia = |turn: &UnitQuaternion<f64>, v: Vector3<f64>| {
+            turn * (mass.inertia * (turn.inverse() * v))
+        };
+        let begun = inertia(&start.rotation, self.state.angular_velocity);
+        let angular_momentum = begun + h * (turned * wrench.torque);
+        let angular_velocity =
+            turned * (mass.inverse_inertia * (turned.inverse() * angular_momentum));
+        let rotation = UnitQuaternion::from_scaled_axis(h * angular_velocity) * start.rotation;
+        let centre = start * mass.centre + h * velocity;
+        let place = centre - rotation * mass.centre.coords;
+        RigidMotion {
+            world_from_object: Isometry3::from_parts(Translation3::from(place.coords), rotation),
+            velocity,
+            angular_velocity,
+            angular_momentum,
+        }
+    }
+
+    /// What a change of the wrench changes in the place of a point, in the object's frame.
+    ///
+    /// Units: `arm` from the centre of mass, m; result m/N.
+    pub fn compliance(&self, arm_of_point: &Vector3<f64>, arm_of_force: &Vector3<f64>) -> Matrix3<f64> {
+        let turning = arm_of_point.cross_matrix()
+            * self.mass.inverse_inertia
+            * arm_of_force.cross_matrix().transpose();
+        self.seconds.powi(2) * (Matrix3::identity() / self.mass.mass + turning)
+    }
+}
+
+impl RigidMotion {
+    /// Angular velocity of the object in its end pose with the same angular momentum.
+    pub fn settled_angular_velocity(&self, mass: &MassProperties) -> Vector3<f64> {
+        let turn = self.world_from_object.rotation;
+        turn * (mass.inverse_inertia * (turn.inverse() * self.angular_momentum))
+    }
+}

@@ -1,0 +1,223 @@
+//! The shape of a rigid body and the signed distance of points from it.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use super::triangles::RigidMesh;
+
+/// A rigid body in a frame of its own.
+///
+/// Units: m. Frame: the body's.
+#[derive(Clone, Debug)]
+pub enum RigidShape {
+    /// A ball around the origin.
+    Sphere {
+        /// Its radius.
+        radius: f64,
+    },
+    /// All points within a radius of a segment along z, centred at the origin.
+    Capsule {
+        /// The radius.
+        radius: f64,
+        /// Length of the segment, between the centres of the two half balls.
+        length: f64,
+    },
+    /// The half space below a plane through the origin.
+    Plane {
+        /// Out of the half space.
+        normal: Unit<Vector3<f64>>,
+    },
+    /// A box around the origin.
+    Cuboid {
+        /// Half its edges along x, y and z.
+        half: Vector3<f64>,
+    },
+    /// The inside of a closed surface.
+    Mesh(Arc<RigidMesh>),
+}
+
+/// A size that makes no body.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    /// A size that is no positive number.
+    #[error("{what} is {value}; it must be a positive number of metres")]
+    Size {
+        /// Which size.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// A normal without a direction.
+    #[error("the normal of a plane must have a direction")]
+    Normal,
+}
+
+/// Distance of a point from a body's surface, and the way out of the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SignedDistance {
+    /// Positive outside, negative inside, m.
+    pub distance: f64,
+    /// The direction in which the distance grows: out of the body.
+    pub normal: Unit<Vector3<f64>>,
+}
+
+impl RigidShape {
+    /// A sphere.
+    ///
+    /// # Errors
+    /// [`ShapeError::Size`].
+    pub fn sphere(radius: f64) -> Result<Self, ShapeError> {
+        Ok(Self::Sphere { radius: positive("radius", radius)? })
+    }
+
+    /// A capsule along z.
+    ///
+    /// # Errors
+    /// [`ShapeError::Size`].
+    pub fn capsule(radius: f64, length: f64) -> Result<Self, ShapeError> {
+        let (radius, length) = (positive("radius", radius)?, positive("length", length)?);
+        Ok(Self::Capsule { radius, length })
+    }
+
+    /// A half space.
+    ///
+    /// # Errors
+    /// [`ShapeError::Normal`].
+    pub fn plane(normal: Vector3<f64>) -> Result<Self, ShapeError> {
+        let is_finite = normal.iter().all(|x| x.is_finite());
+        let unit = Unit::try_new(normal, f64::MIN_POSITIVE).filter(|_| is_finite);
+        Ok(Self::Plane { normal: unit.ok_or(ShapeError::Normal)? })
+    }
+
+    /// A box.
+    ///
+    /// # Errors
+    /// [`ShapeError::Size`].
+    pub fn cuboid(half: Vector3<f64>) -> Result<Self, ShapeError> {
+        for value in half.iter() {
+            positive("half an edge", *value)?;
+        }
+        Ok(Self::Cuboid { half })
+    }
+
+    /// Signed distance of a point and the way out.
+    ///
+    /// Units: m. Frame: the body's.
+    pub fn distance(&self, point: &Point3<f64>) -> SignedDistance {
+        match self {
+            Self::Sphere { radius } => of_axis(point.coords, *radius),
+            Self::Capsule { radius, length } => {
+                let along = point.z.clamp(-0.5 * length, 0.5 * length);
+                of_axis(point.coords - Vector3::new(0.0, 0.0, along), *radius)
+            }
+            Self::Plane { normal } => {
+                SignedDistance { distance: point.coords.dot(normal), normal: *normal }
+            }
+            Self::Cuboid { half } => of_cuboid(point, half),
+            Self::Mesh(mesh) => mesh.distance(point),
+        }
+    }
+
+    /// Whether every triangle has one deepest point in it that moves smoothly with the triangle: a
+    /// round body.
+    pub fn is_round(&self) -> bool {
+        matches!(self, Self::Sphere { .. } | Self::Capsule { .. })
+    }
+
+    /// Half of the smallest width of the body: a surface that moves by less in one step cannot be
+    /// found on the far side. Infinite for a half space.
+    ///
+    /// Units: m.
+    pub fn thickness(&self) -> f64 {
+        match self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => *radius,
+            Self::Plane { .. } => f64::INFINITY,
+            Self::Cuboid { half } => half.min(),
+            Self::Mesh(mesh) => mesh.thickness(),
+        }
+    }
+
+    /// Radius of a ball around the origin that holds the body; infinite for a half space.
+    ///
+    /// Units: m.
+    pub fn reach(&self) -> f64 {
+        match self {
+            Self::Sphere { radius } => *radius,
+            Self::Capsule { radius, length } => radius + 0.5 * length,
+            Self::Plane { .. } => f64::INFINITY,
+            Self::Cuboid { half } => half.norm(),
+            Self::Mesh(mesh) => mesh.reach(),
+        }
+    }
+}
+
+fn positive(what: &'static str, value: f64) -> Result<f64, ShapeError> {
+    match value > 0.0 && value.is_finite() {
+        true => Ok(value),
+        false => Err(ShapeError::Size { what, value }),
+    }
+}
+
+/// Distance from a round body, by the way from its axis.
+fn of_axis(from_axis: Vector3<f64>, radius: f64) -> SignedDistance {
+    let distance = from_axis.norm() - radius;
+    // On the axis every way out is equally long.
+    let normal = Unit::try_new(from_axis, f64::MIN_POSITIVE).unwrap_or(Vector3::x_axis());
+    SignedDistance { distance, normal }
+}
+
+fn of_cuboid(point: &Point3<f64>, half: &Vector3<f64>) -> SignedDistance {
+    let outside = point.coords.zip_map(half, |x, h| x - x.clamp(-h, h));
+    if let Some((normal, distance)) = Unit::try_new_and_get(outside, 0.0) {
+        return SignedDistance { distance, normal };
+    }
+    let depth = point.coords.zip_map(half, |x, h| x.abs() - h);
+    let axis = depth.imax();
+    let sign = if point.coords[axis] < 0.0 { -1.0 } else { 1.0 };
+    let mut normal = Vector3::zeros();
+    normal[axis] = sign;
+    SignedDistance { distance: depth[axis], normal: Unit::new_unchecked(normal) }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn shapes() -> Vec<RigidShape> {
+        vec![
+            RigidShape::sphere(0.3).unwrap(),
+            RigidShape::capsule(0.2, 0.5).unwrap(),
+            RigidShape::plane(Vector3::new(0.3, -0.2, 0.9)).unwrap(),
+            RigidShape::cuboid(Vector3::new(0.2, 0.4, 0.1)).unwrap(),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn normal_is_where_the_distance_grows_at_rate_one(
+            p in prop::array::uniform3(-1.0..1.0f64),
+        ) {
+            for shape in shapes() {
+                let p = Point3::from(p);
+                let here = shape.distance(&p);
+                let h = 1e-7;
+                let there = shape.distance(&(p + h * here.normal.into_inner()));
+                // Across the middle of a box the nearest face changes.
+                prop_assume!(here.distance > -0.05);
+                prop_assert!(((there.distance - here.distance) / h - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_that_make_no_body_are_refused() {
+        assert!(RigidShape::sphere(0.0).is_err());
+        assert!(RigidShape::capsule(0.1, f64::NAN).is_err());
+        assert!(RigidShape::plane(Vector3::zeros()).is_err());
+        assert!(RigidShape::plane(Vector3::new(f64::INFINITY, 0.0, 0.0)).is_err());
+        assert!(RigidShape::cuboid(Vector3::new(0.1, -0.1, 0.1)).is_err());
+    }
+}

@@ -1,0 +1,145 @@
+//! Displacements of a few nodes of a free body under forces at a few nodes: what contact asks for.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use super::base::{Base, CondensedError};
+use super::columns::{Columns, ContactColumns};
+use super::free_body::FreeBody;
+use super::touched::Contact;
+
+/// A force at a node, N, in the object's frame.
+pub type NodeForce = (u32, Vector3<f64>);
+
+/// The elastic part of a free body: factor, rigid motions, and the cache of columns.
+#[derive(Clone, Copy)]
+pub struct Elasticity<'a> {
+    /// The held base and its factor.
+    pub base: &'a Base,
+    /// What nothing holds.
+    pub body: &'a FreeBody,
+    /// Columns of the compliance.
+    pub columns: &'a Columns,
+}
+
+/// The response of some nodes (rows) to forces at nodes that are added as they are needed.
+///
+/// Shapes: one 3 × 3 block for each row and each node with a force.
+pub struct Response<'a> {
+    elasticity: Elasticity<'a>,
+    rows: Vec<u32>,
+    /// Held compliance of the rows, by node of the force.
+    held: BTreeMap<u32, Vec<Matrix3<f64>>>,
+    kept: BTreeMap<u32, Arc<ContactColumns>>,
+}
+
+/// Rows of a displacement that one task sums.
+const TASK_ROWS: usize = 512;
+
+impl<'a> Response<'a> {
+    /// Shapes: `rows` ascending nodes.
+    pub fn new(elasticity: Elasticity<'a>, rows: Vec<u32>) -> Self {
+        Self { elasticity, rows, held: BTreeMap::new(), kept: BTreeMap::new() }
+    }
+
+    /// The nodes whose displacement can be asked for, ascending.
+    pub fn rows(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// Position of a node among the rows.
+    pub fn row_of(&self, node: u32) -> Option<usize> {
+        self.rows.binary_search(&node).ok()
+    }
+
+    /// Gets the columns of nodes at which forces act, from the cache or by solves.
+    ///
+    /// # Errors
+    /// [`CondensedError::CacheTooSmall`].
+    pub fn need(&mut self, nodes: impl IntoIterator<Item = u32>) -> Result<(), CondensedError> {
+        let mut missing: Vec<u32> =
+            nodes.into_iter().filter(|node| !self.kept.contains_key(node)).collect();
+        missing.sort_unstable();
+        missing.dedup();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let contacts: Vec<Contact> = missing.iter().map(|&node| Contact::Node(node)).collect();
+        let Elasticity { base, columns, .. } = self.elasticity;
+        for (node, columns) in missing.into_iter().zip(columns.of_contacts(base, &contacts)?) {
+            let block = |&row: &u32| {
+                Matrix3::from_fn(|r, c| columns.fields[c][3 * row as usize + r])
+            };
+            self.held.insert(node, self.rows.iter().map(block).collect());
+            self.kept.insert(node, columns);
+        }
+        Ok(())
+    }
+
+    /// Held compliance of all rows under forces at a node.
+    ///
+    /// # Panics
+    /// If the node was not named to [`Response::need`].
+    pub fn held(&self, node: u32) -> &[Matrix3<f64>] {
+        &self.held[&node]
+    }
+
+    /// The free body.
+    pub fn body(&self) -> &FreeBody {
+        self.elasticity.body
+    }
+
+    /// Displacement of the rows under forces at needed nodes, in balance with inertia.
+    ///
+    /// Units: N, m. Frame: the object's.
+    pub fn displacement(&self, forces: &[NodeForce]) -> Vec<Vector3<f64>> {
+        let mut u = vec![[0.0; 3]; self.rows.len()];
+        for (node, force) in forces {
+            for (u, block) in u.iter_mut().zip(self.held(*node)) {
+                let moved = block * force;
+                (0..3).for_each(|axis| u[axis] += moved[axis]);
+            }
+        }
+        self.body().relieve(forces, &self.rows, &mut u);
+        u.into_iter().map(Vector3::from).collect()
+    }
+
+    /// Displacement of any nodes under forces at needed nodes, on the current rayon pool.
+    ///
+    /// Units: N, m. Frame: the object's.
+    pub fn displacement_of(&self, nodes: &[u32], forces: &[NodeForce]) -> Vec<[f64; 3]> {
+        let mut u = vec![[0.0; 3]; nodes.len()];
+        let columns: Vec<(&ContactColumns, &Vector3<f64>)> =
+            forces.iter().map(|(node, force)| (&*self.kept[node], force)).collect();
+        u.par_chunks_mut(TASK_ROWS).zip(nodes.par_chunks(TASK_ROWS)).for_each(|(u, nodes)| {
+            for (columns, force) in &columns {
+                let [x, y, z] = &columns.fields;
+                for (u, &node) in u.iter_mut().zip(nodes) {
+                    let at = 3 * node as usize;
+                    for axis in 0..3 {
+                        u[axis] += force.x * x[at + axis]
+                            + force.y * y[at + axis]
+                            + force.z * z[at + axis];
+                    }
+                }
+            }
+        });
+        self.body().relieve(forces, nodes, &mut u);
+        u
+    }
+
+    /// `‖K u − P f‖ / ‖f‖` at most, by the residuals of the columns as computed.
+    pub fn residual_rel(&self, forces: &[NodeForce]) -> f64 {
+        let (mut residual, mut square) = (0.0, 0.0);
+        for (node, force) in forces {
+            let columns = &self.kept[node];
+            residual += (0..3).map(|c| force[c].abs() * columns.residuals[c]).sum::<f64>();
+            square += force.norm_squared();
+        }
+        residual += self.body().residual(forces);
+        if square > 0.0 { residual / square.sqrt() } else { 0.0 }
+    }
+}
