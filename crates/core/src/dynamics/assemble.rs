@@ -20,12 +20,7 @@ pub(super) struct ProblemPoint {
 }
 
 impl ProblemPoint {
-    pub fn new(
-        scene: &Scene<'_>,
-        response: &Response<'_>,
-        point: MaterialPoint,
-        gap: Gap,
-    ) -> Self {
+    pub fn new(scene: &Scene<'_>, response: &Response<'_>, point: MaterialPoint, gap: Gap) -> Self {
         let normal = gap.normal.into_inner();
         let tangent = tangent_of(&normal);
         Self {

@@ -28,7 +28,8 @@ impl MovingBody {
     ///
     /// Frame: world.
     pub fn carried(&self, point_in_world: &Point3<f64>) -> Point3<f64> {
-        self.world_from_body_end * self.world_from_body_start.inverse_transform_point(point_in_world)
+        self.world_from_body_end
+            * self.world_from_body_start.inverse_transform_point(point_in_world)
     }
 
     /// The part of the way between two shares of it, turned and moved evenly.

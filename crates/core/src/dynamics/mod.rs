@@ -22,6 +22,7 @@ mod configuration;
 mod features;
 mod near;
 mod outcome;
+mod pool;
 mod rigid_motion;
 mod state;
 mod step;

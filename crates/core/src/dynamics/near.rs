@@ -19,7 +19,8 @@ pub fn near_triangles(
     let mut near = Vec::new();
     for (triangle, nodes) in (0u32..).zip(triangles) {
         let corners = nodes.map(|node| places[node as usize]);
-        let middle = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
+        let middle =
+            Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
         let reach = corners.iter().map(|c| (c - middle).norm()).fold(0.0, f64::max);
         for (position, body) in (0u16..).zip(bodies) {
             let in_body =

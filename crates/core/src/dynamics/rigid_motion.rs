@@ -25,7 +25,8 @@ impl MassProperties {
     pub fn of(body: &FreeBody, density: f64) -> Option<Self> {
         let (mass, inertia) = (density * body.volume(), density * body.inertia());
         let inverse_inertia = inertia.try_inverse()?;
-        let is_sound = mass > 0.0 && mass.is_finite() && inverse_inertia.iter().all(|x| x.is_finite());
+        let is_sound =
+            mass > 0.0 && mass.is_finite() && inverse_inertia.iter().all(|x| x.is_finite());
         is_sound.then_some(Self { mass, centre: body.centre(), inertia, inverse_inertia })
     }
 }
@@ -66,8 +67,7 @@ impl RigidStep<'_> {
     pub fn motion(&self, wrench: &Wrench, turned: &UnitQuaternion<f64>) -> RigidMotion {
         let (h, mass) = (self.seconds, &self.mass);
         let start = &self.state.world_from_object;
-        let velocity =
-            self.state.velocity + h * (self.gravity + turned * wrench.force / mass.mass);
+        let velocity = self.state.velocity + h * (self.gravity + turned * wrench.force / mass.mass);
         let inertia = |turn: &UnitQuaternion<f64>, v: Vector3<f64>| {
             turn * (mass.inertia * (turn.inverse() * v))
         };
@@ -89,7 +89,11 @@ impl RigidStep<'_> {
     /// What a change of the wrench changes in the place of a point, in the object's frame.
     ///
     /// Units: `arm` from the centre of mass, m; result m/N.
-    pub fn compliance(&self, arm_of_point: &Vector3<f64>, arm_of_force: &Vector3<f64>) -> Matrix3<f64> {
+    pub fn compliance(
+        &self,
+        arm_of_point: &Vector3<f64>,
+        arm_of_force: &Vector3<f64>,
+    ) -> Matrix3<f64> {
         let turning = arm_of_point.cross_matrix()
             * self.mass.inverse_inertia
             * arm_of_force.cross_matrix().transpose();

@@ -74,9 +74,7 @@ pub(super) fn summed(mut forces: Vec<NodeForce>) -> Vec<NodeForce> {
 }
 
 /// The forces of some contacts at their nodes.
-pub(super) fn at_nodes<'a>(
-    contacts: impl IntoIterator<Item = &'a HeldContact>,
-) -> Vec<NodeForce> {
+pub(super) fn at_nodes<'a>(contacts: impl IntoIterator<Item = &'a HeldContact>) -> Vec<NodeForce> {
     let of_contact = |c: &HeldContact| {
         let (weights, force) = (c.weights, c.force);
         c.nodes.into_iter().zip(weights).map(move |(node, weight)| (node, weight * force))

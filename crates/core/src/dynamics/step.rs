@@ -9,6 +9,7 @@ use super::bodies::MovingBody;
 use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint};
 use super::outcome::{BodyLoad, PointContact, StepOutcome};
+use super::pool::{Pool, force_at, merged};
 use super::rigid_motion::{MassProperties, RigidStep};
 use super::state::{HeldContact, ObjectState, at_nodes};
 use crate::contact::coulomb::{ContactProblem, ProblemError, SolveBudget};
@@ -31,6 +32,8 @@ pub struct StepSettings {
     pub residual_rel: f64,
     /// Most times that the contact problem is made anew.
     pub rounds_max: usize,
+    /// Steps of Newton's method after which no further round is begun.
+    pub newton_max: usize,
 }
 
 impl Default for StepSettings {
@@ -40,9 +43,10 @@ impl Default for StepSettings {
             gravity: Vector3::new(0.0, 0.0, -9.81),
             density: 1000.0,
             viscosity: 0.0,
-            penetration_rel: 1e-7,
+            penetration_rel: 1e-6,
             residual_rel: 1e-9,
             rounds_max: 16,
+            newton_max: 400,
         }
     }
 }
@@ -77,7 +81,9 @@ pub enum StepError {
         expected: &'static str,
     },
     /// A candidate that names what is not there.
-    #[error("candidate {candidate} names triangle {triangle} of {triangles} and body {body} of {bodies}")]
+    #[error(
+        "candidate {candidate} names triangle {triangle} of {triangles} and body {body} of {bodies}"
+    )]
     Candidate {
         /// Position in the list.
         candidate: usize,
@@ -111,6 +117,10 @@ pub enum StepError {
 
 /// Points nearer to a body than this share of the object's size are in the problem from the start.
 const MARGIN: f64 = 2e-3;
+/// Share of a round's residual that its solution may leave.
+const INEXACT: f64 = 1e-3;
+/// Attempts of Newton's method in a round.
+const ATTEMPTS: usize = 8;
 
 impl ContactStep<'_> {
     /// Makes the step.
@@ -119,11 +129,7 @@ impl ContactStep<'_> {
     ///
     /// # Errors
     /// [`StepError`]; a step that does not meet the law of contact is no error, it says so.
-    pub fn advance(
-        &self,
-        state: &ObjectState,
-        wanted: &[u32],
-    ) -> Result<StepOutcome, StepError> {
+    pub fn advance(&self, state: &ObjectState, wanted: &[u32]) -> Result<StepOutcome, StepError> {
         let mass = self.check(state)?;
         let mut response = self.response(state);
         response.need(state.forces.iter().map(|(node, _)| *node))?;
@@ -146,7 +152,8 @@ impl ContactStep<'_> {
 
     /// Size of the object: the diagonal of its bounding box, m.
     fn size(&self) -> f64 {
-        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        let (mut low, mut high) =
+            (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for vertex in self.vertices {
             (low, high) = (low.inf(&vertex.coords), high.sup(&vertex.coords));
         }
@@ -157,7 +164,11 @@ impl ContactStep<'_> {
         let settings = &self.settings;
         let setting = |what, value, expected| Err(StepError::Setting { what, value, expected });
         if !(settings.seconds > 0.0 && settings.seconds.is_finite()) {
-            return setting("the length of the step", settings.seconds, "a positive number of seconds");
+            return setting(
+                "the length of the step",
+                settings.seconds,
+                "a positive number of seconds",
+            );
         }
         if !(settings.viscosity >= 0.0 && settings.viscosity.is_finite()) {
             return setting("the viscosity", settings.viscosity, "a number of seconds, at least 0");
@@ -167,11 +178,15 @@ impl ContactStep<'_> {
                 return setting("the friction of a body", body.friction, "a number, at least 0");
             }
         }
-        let poses = self.bodies.iter().flat_map(|b| [b.world_from_body_start, b.world_from_body_end]);
+        let poses =
+            self.bodies.iter().flat_map(|b| [b.world_from_body_start, b.world_from_body_end]);
         let poses_are_finite = poses.into_iter().all(|pose| {
             pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
         });
-        if !state.is_finite() || !poses_are_finite || !settings.gravity.iter().all(|x| x.is_finite()) {
+        if !state.is_finite()
+            || !poses_are_finite
+            || !settings.gravity.iter().all(|x| x.is_finite())
+        {
             return Err(StepError::NotFinite);
         }
         for (candidate, named) in self.candidates.iter().enumerate() {
@@ -253,7 +268,7 @@ impl ContactStep<'_> {
                 velocity: end.motion.velocity,
                 angular_velocity: end.motion.settled_angular_velocity(&scene.rigid.mass),
                 forces: end.forces.clone(),
-                contacts: end.contacts.clone(),
+                contacts: merged(&end.contacts),
             },
             displacements: response.displacement_of(wanted, &end.forces),
             slip_max: contacts.iter().map(|c| c.slip.norm()).fold(0.0, f64::max),
@@ -313,20 +328,33 @@ impl Rounds<'_, '_, '_> {
         let is_known = |c: &&HeldContact| usize::from(c.body) < self.step.bodies.len();
         let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();
         let mut pool = self.corners();
-        held.iter().for_each(|contact| add(&mut pool, contact.into()));
+        held.iter().for_each(|contact| pool.add(contact.into(), &[]));
         let mut about = self.scene.configuration(self.response, held, &start);
         let (mut rounds, mut sweeps, mut newton_steps) = (0, 0, 0);
+        let mut best: Option<(f64, Configuration, Round)> = None;
         loop {
             let round = self.round(&about, &mut pool, (MARGIN * size, allowed))?;
             let force_max =
                 about.contacts.iter().map(|contact| contact.force.norm()).fold(0.0, f64::max);
-            let is_converged = round.penetration <= allowed
-                && round.residual <= settings.residual_rel * force_max;
-            if is_converged || rounds == settings.rounds_max {
+            // How far the round is from what is asked for: at most 1 where it is met.
+            let allowed_residual = settings.residual_rel * force_max;
+            let far = (round.penetration / allowed).max(match allowed_residual > 0.0 {
+                true => round.residual / allowed_residual,
+                false if round.residual == 0.0 => 0.0,
+                false => f64::INFINITY,
+            });
+            let is_converged = far <= 1.0;
+            let is_last = rounds >= settings.rounds_max || newton_steps >= settings.newton_max;
+            if is_converged || is_last {
+                let is_best = best.as_ref().is_none_or(|(best_far, ..)| far <= *best_far);
+                let (end, round) = match (is_best, best) {
+                    (false, Some((_, end, round))) => (end, round),
+                    _ => (about, round),
+                };
                 let (penetration, residual) = (round.penetration, round.residual);
                 let pressing = round.into_pressing();
                 return Ok(Found {
-                    end: about,
+                    end,
                     pressing,
                     penetration,
                     residual,
@@ -336,29 +364,32 @@ impl Rounds<'_, '_, '_> {
                     newton_steps,
                 });
             }
+            // A problem that will be made anew is solved no better than that is worth.
             let budget = SolveBudget {
                 residual_rel: 0.1 * settings.residual_rel,
-                ..SolveBudget::default()
+                residual: INEXACT * round.residual,
+                attempts_max: ATTEMPTS,
             };
             let solution = round.problem.solve(&round.lambda, budget);
-            if let Ok(dir)=std::env::var("DUMP") && !solution.is_converged { round.problem.dump(&dir,&round.lambda); }
             rounds += 1;
-            if std::env::var("ROUNDS").is_ok() { eprintln!("   round {rounds}: points {} pool {} pen {:.2e} res {:.2e} fmax {force_max:.3} | solved res {:.1e} conv {} sweeps {} newton {} fmax {:.3} pressing {}", round.points.len(), pool.len(), round.penetration, round.residual, solution.residual, solution.is_converged, solution.sweeps, solution.newton_steps, solution.force_max(), solution.lambda.chunks(3).filter(|l| l[0]>0.0).count()); }
             sweeps += solution.sweeps;
             newton_steps += solution.newton_steps;
             let contacts = pressing(&round.points, &solution.lambda);
-            about = self.scene.configuration(self.response, contacts, &about.configured());
+            let next = self.scene.configuration(self.response, contacts, &about.configured());
+            let about_now = std::mem::replace(&mut about, next);
+            if best.as_ref().is_none_or(|(best_far, ..)| far < *best_far) {
+                best = Some((far, about_now, round));
+            }
         }
     }
 
     /// The corners of all candidates.
-    fn corners(&self) -> Vec<MaterialPoint> {
-        let corner = |c: &Candidate| {
-            self.step.triangles[c.triangle as usize].map(|node| (c.body, node))
-        };
-        let corners: BTreeSet<(u16, u32)> =
-            self.step.candidates.iter().flat_map(corner).collect();
-        corners.into_iter().map(|(body, node)| MaterialPoint::corner(body, node)).collect()
+    fn corners(&self) -> Pool {
+        let corner =
+            |c: &Candidate| self.step.triangles[c.triangle as usize].map(|node| (c.body, node));
+        let corners: BTreeSet<(u16, u32)> = self.step.candidates.iter().flat_map(corner).collect();
+        let corner = |(body, node)| MaterialPoint::corner(body, node);
+        Pool { corners: corners.into_iter().map(corner).collect(), inside: Vec::new() }
     }
 
     /// The contact problem about a configuration, and how well the configuration answers it. Points
@@ -366,7 +397,7 @@ impl Rounds<'_, '_, '_> {
     fn round(
         &mut self,
         about: &Configuration,
-        pool: &mut Vec<MaterialPoint>,
+        pool: &mut Pool,
         (margin, allowed): (f64, f64),
     ) -> Result<Round, StepError> {
         let (scene, at) = (self.scene, about.configured());
@@ -375,13 +406,10 @@ impl Rounds<'_, '_, '_> {
         for (point, distance) in scene.deepest_points(self.response, &at, &bodies) {
             penetration = penetration.max(-distance);
             if distance < -0.5 * allowed {
-                add(pool, point);
+                pool.add(point, &about.contacts);
             }
         }
-        let force_of = |point: &MaterialPoint| {
-            let held = about.contacts.iter().find(|held| point.is_same(&(*held).into()));
-            held.map(|held| held.force)
-        };
+        let force_of = |point: &MaterialPoint| force_at(&about.contacts, point);
         let mut chosen = Vec::new();
         for point in pool.iter() {
             let gap = scene.gap(self.response, &at, &bodies, point);
@@ -416,13 +444,6 @@ impl Round {
                 (point, force)
             })
             .collect()
-    }
-}
-
-/// Adds a point that is not there yet.
-fn add(pool: &mut Vec<MaterialPoint>, point: MaterialPoint) {
-    if !pool.iter().any(|other| other.is_same(&point)) {
-        pool.push(point);
     }
 }
 

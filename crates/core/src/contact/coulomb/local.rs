@@ -61,8 +61,10 @@ impl PointProblem {
         };
         for k in 0..=DIRECTIONS / 2 {
             for side in [1.0, -1.0] {
-                let (near, far) = (angle + side * step * k as f64, angle + side * step * (k + 1) as f64);
-                let (Some(a), Some(c)) = (consider(near, &mut best), consider(far, &mut best)) else {
+                let (near, far) =
+                    (angle + side * step * k as f64, angle + side * step * (k + 1) as f64);
+                let (Some(a), Some(c)) = (consider(near, &mut best), consider(far, &mut best))
+                else {
                     continue;
                 };
                 if a.0 * c.0 > 0.0 || (a.1 > 0.0 && c.1 > 0.0) {
@@ -94,12 +96,7 @@ impl PointProblem {
     }
 
     /// The root between two angles by false position (Illinois), with a bisection now and then.
-    fn root(
-        &self,
-        mut low: (f64, f64),
-        mut high: (f64, f64),
-        b: PointForce,
-    ) -> Option<PointForce> {
+    fn root(&self, mut low: (f64, f64), mut high: (f64, f64), b: PointForce) -> Option<PointForce> {
         let mut found = None;
         for step in 0..STEPS {
             let chord = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);

@@ -1,116 +1,173 @@
-//! Newton's method for the forces of all points together, once sweeps have told who sticks and slips.
+//! Newton's method for the forces of all points together.
+//!
+//! More points than a patch of surface has motions leave their forces undetermined, and Newton's matrix
+//! has no inverse. So a step is made on a problem with a little compliance at each point, counted from
+//! the forces it begins with (proximal point method): its matrix has an inverse, and forces that it does
+//! not change any more are those of the problem itself.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
+use super::cone::PointForce;
 use super::problem::{ContactProblem, at};
 
-/// Share of the mean compliance added to the diagonal, so that forces which the body does not tell
-/// apart (more points than it has motions) get one answer.
-const SHIFT: f64 = 1e-13;
+/// A problem with a little compliance at every point, counted from given forces.
+pub(super) struct Proximal<'a> {
+    problem: &'a ContactProblem,
+    /// Compliance added to each point, m/N.
+    added: Vec<f64>,
+    /// Forces it is counted from.
+    from: &'a [f64],
+}
 
-/// The forces after one step of the semismooth Newton method; `None` where the step has none.
-///
-/// Shapes: `lambda` and `motion` 3n. Units: N, m.
-///
-/// Source: Alart and Curnier (1991).
-pub(super) fn step(problem: &ContactProblem, lambda: &[f64], motion: &[f64]) -> Option<Vec<f64>> {
-    let pressed: Vec<usize> = (0..problem.point_count())
-        .filter(|&i| lambda[3 * i] - problem.rho[i] * motion[3 * i] > 0.0)
-        .collect();
-    let mut next = vec![0.0; lambda.len()];
-    if pressed.is_empty() {
-        return Some(next);
+/// Forces that Newton's method has found, and how well they solve the proximal problem.
+pub(super) struct Step {
+    pub lambda: Vec<f64>,
+    /// Residual of the proximal problem, N.
+    pub residual: f64,
+    pub steps: usize,
+}
+
+/// Steps without a better residual after which no better one is expected.
+const STRAYING: usize = 4;
+
+impl<'a> Proximal<'a> {
+    /// `share` of every point's own compliance is added to it.
+    pub fn new(problem: &'a ContactProblem, from: &'a [f64], share: f64) -> Self {
+        let added = problem.rho.iter().map(|rho| share / rho).collect();
+        Self { problem, added, from }
     }
-    let rows = 3 * pressed.len();
-    let row_of = |k: usize| 3 * pressed[k / 3] + k % 3;
-    let mut w = DMatrix::from_fn(rows, rows, |r, c| problem.w[(row_of(r), row_of(c))]);
-    let shift = SHIFT * w.trace() / rows as f64;
-    (0..rows).for_each(|r| w[(r, r)] += shift);
-    // What points that open now have pressed with is taken away.
-    let free = motion_without_opening(problem, lambda, motion, &pressed);
-    let now = DVector::from_fn(rows, |r, _| lambda[row_of(r)]);
-    // Unknown is the change of the forces; sticking points and gaps: W δ = −u.
-    let mut jacobian = w.clone();
-    let mut right = DVector::from_fn(rows, |r, _| -free[row_of(r)]);
-    for (k, &point) in pressed.iter().enumerate() {
-        let (force, slip) = (at(lambda, point), at(&free, point));
-        let (mu, rho) = (problem.cones[point].friction, problem.rho[point]);
-        let trial: Vector2<f64> = force.yz() - rho * slip.yz();
-        let size = trial.norm();
-        let radius = mu * (force.x - rho * slip.x).max(0.0);
-        if size <= radius {
-            continue;
+
+    /// Takes steps of the semismooth Newton method until the residual is small enough.
+    ///
+    /// Units: `tolerance` N.
+    ///
+    /// Source: Alart and Curnier (1991); Rockafellar (1976) for the proximal point.
+    pub fn solve(&self, steps_max: usize, tolerance: f64) -> Step {
+        let mut lambda = self.from.to_vec();
+        let mut best_at = 0;
+        let mut best = Step { lambda: self.from.to_vec(), residual: f64::INFINITY, steps: 0 };
+        for steps in 0..=steps_max {
+            let inside = self.problem.projected(&lambda);
+            let residual = self.problem.residual_of(&inside, &self.motion(&inside));
+            best.steps = steps;
+            if residual < best.residual {
+                (best.lambda, best.residual, best_at) = (inside, residual, steps);
+            }
+            let strays = steps >= best_at + STRAYING;
+            if best.residual <= tolerance || steps == steps_max || strays {
+                break;
+            }
+            match self.step(&lambda) {
+                Some(next) => lambda = next,
+                None => break,
+            }
         }
-        let slip = Slip { force: force.yz(), normal: force.x, trial, radius, mu, rho };
-        slip_rows(&mut jacobian, &mut right, &w, k, &slip);
+        best
     }
-    let change = jacobian.lu().solve(&right)?;
-    for r in 0..rows {
-        next[row_of(r)] = now[r] + change[r];
+
+    fn motion(&self, lambda: &[f64]) -> Vec<f64> {
+        let mut motion = self.problem.motion(lambda);
+        for (k, u) in motion.iter_mut().enumerate() {
+            *u += self.added[k / 3] * (lambda[k] - self.from[k]);
+        }
+        motion
     }
-    next.iter().all(|x| x.is_finite()).then_some(next)
+
+    /// One step; `None` where it has none.
+    fn step(&self, lambda: &[f64]) -> Option<Vec<f64>> {
+        let problem = self.problem;
+        let motion = self.motion(lambda);
+        let pressed: Vec<usize> = (0..problem.point_count())
+            .filter(|&i| lambda[3 * i] - problem.rho[i] * motion[3 * i] > 0.0)
+            .collect();
+        let mut next = vec![0.0; lambda.len()];
+        if pressed.is_empty() {
+            return Some(next);
+        }
+        // Points that are not pressed give up their forces.
+        let mut kept = vec![0.0; lambda.len()];
+        for &point in &pressed {
+            kept[3 * point..3 * point + 3].copy_from_slice(&lambda[3 * point..3 * point + 3]);
+        }
+        let free = self.motion(&kept);
+        let rows = 3 * pressed.len();
+        let row_of = |k: usize| 3 * pressed[k / 3] + k % 3;
+        let mut w = DMatrix::from_fn(rows, rows, |r, c| problem.w[(row_of(r), row_of(c))]);
+        (0..rows).for_each(|r| w[(r, r)] += self.added[pressed[r / 3]]);
+        let mut jacobian = w.clone();
+        let mut right = DVector::from_fn(rows, |r, _| -free[row_of(r)]);
+        for (k, &point) in pressed.iter().enumerate() {
+            let rho = problem.rho[point];
+            let slip = Slip::new(
+                problem.cones[point].friction,
+                rho,
+                &at(lambda, point),
+                &at(&motion, point),
+            );
+            match slip {
+                Some(slip) => slip.fill(&mut jacobian, &mut right, &w, k),
+                None => continue,
+            }
+        }
+        let change = jacobian.lu().solve(&right)?;
+        for r in 0..rows {
+            next[row_of(r)] = kept[row_of(r)] + change[r];
+        }
+        next.iter().all(|x| x.is_finite()).then_some(next)
+    }
 }
 
 /// A slipping point: what its two tangential rows are made of.
 struct Slip {
-    force: Vector2<f64>,
-    normal: f64,
-    trial: Vector2<f64>,
-    radius: f64,
-    mu: f64,
+    force: PointForce,
+    /// Direction of the trial force `λ_t − ρ u_t`.
+    direction: Vector2<f64>,
+    /// Radius of the cone over the size of the trial force.
+    share: f64,
+    friction: f64,
     rho: f64,
 }
 
-/// Rows `δ_t − μ d δ_n − r (I − d dᵀ)/‖a‖ (δ_t − ρ W_t δ) = μ λ_n d − λ_t` of a slip in the direction
-/// d = a/‖a‖ of its trial force a, whose cone has the radius r there.
-fn slip_rows(
-    jacobian: &mut DMatrix<f64>,
-    right: &mut DVector<f64>,
-    w: &DMatrix<f64>,
-    k: usize,
-    slip: &Slip,
-) {
-    let size = slip.trial.norm();
-    let direction = slip.trial / size;
-    let turned = (Matrix2::identity() - direction * direction.transpose()) * (slip.radius / size);
-    // With the normal force itself instead of its trial value the row stays regular far from the
-    // solution; both agree where the gap is closed.
-    let radius = slip.mu * slip.normal.max(0.0);
-    for c in 0..jacobian.ncols() {
-        let tangential = Vector2::new(w[(3 * k + 1, c)], w[(3 * k + 2, c)]);
-        let row = slip.rho * (turned * tangential);
-        jacobian[(3 * k + 1, c)] = row.x;
-        jacobian[(3 * k + 2, c)] = row.y;
+impl Slip {
+    /// `None` where the trial force lies in the cone: the point sticks.
+    fn new(friction: f64, rho: f64, force: &PointForce, motion: &PointForce) -> Option<Self> {
+        let trial: Vector2<f64> = force.yz() - rho * motion.yz();
+        let (size, radius) = (trial.norm(), friction * force.x.max(0.0));
+        let slips = size > radius;
+        slips.then(|| Self {
+            force: *force,
+            direction: trial / size,
+            share: radius / size,
+            friction,
+            rho,
+        })
     }
-    for axis in 0..2 {
-        let row = 3 * k + 1 + axis;
-        jacobian[(row, row)] += 1.0;
-        for other in 0..2 {
-            jacobian[(row, 3 * k + 1 + other)] -= turned[(axis, other)];
-        }
-        jacobian[(row, 3 * k)] -= slip.mu * direction[axis];
-        right[row] = radius * direction[axis] - slip.force[axis];
-    }
-}
 
-/// Gaps and slips once the points that are not pressed have given up their forces, m.
-fn motion_without_opening(
-    problem: &ContactProblem,
-    lambda: &[f64],
-    motion: &[f64],
-    pressed: &[usize],
-) -> Vec<f64> {
-    let mut free = motion.to_vec();
-    let mut is_pressed = vec![false; problem.point_count()];
-    pressed.iter().for_each(|&point| is_pressed[point] = true);
-    for point in (0..problem.point_count()).filter(|&point| !is_pressed[point]) {
-        for axis in 0..3 {
-            let force = lambda[3 * point + axis];
-            if force != 0.0 {
-                let w = problem.w.column(3 * point + axis);
-                free.iter_mut().zip(w.iter()).for_each(|(u, w)| *u -= w * force);
+    /// Rows `δ_t − μ d δ_n − r/‖a‖ (I − d dᵀ) (δ_t − ρ W_t δ) = μ λ_n d − λ_t`.
+    fn fill(
+        &self,
+        jacobian: &mut DMatrix<f64>,
+        right: &mut DVector<f64>,
+        w: &DMatrix<f64>,
+        k: usize,
+    ) {
+        let d = self.direction;
+        let turned = (Matrix2::identity() - d * d.transpose()) * self.share;
+        for c in 0..jacobian.ncols() {
+            let tangential = Vector2::new(w[(3 * k + 1, c)], w[(3 * k + 2, c)]);
+            let row = self.rho * (turned * tangential);
+            jacobian[(3 * k + 1, c)] = row.x;
+            jacobian[(3 * k + 2, c)] = row.y;
+        }
+        let missing = self.friction * self.force.x.max(0.0) * d - self.force.yz();
+        for axis in 0..2 {
+            let row = 3 * k + 1 + axis;
+            jacobian[(row, row)] += 1.0;
+            for other in 0..2 {
+                jacobian[(row, 3 * k + 1 + other)] -= turned[(axis, other)];
             }
+            jacobian[(row, 3 * k)] -= self.friction * d[axis];
+            right[row] = missing[axis];
         }
     }
-    free
 }

@@ -24,7 +24,9 @@ pub struct ContactProblem {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProblemError {
     /// Sizes that do not fit each other.
-    #[error("{points} points need {expected} rows, but the operator has {rows} and the motion {motion}")]
+    #[error(
+        "{points} points need {expected} rows, but the operator has {rows} and the motion {motion}"
+    )]
     Sizes {
         /// Number of points.
         points: usize,
@@ -36,7 +38,9 @@ pub enum ProblemError {
         motion: usize,
     },
     /// A point that no force moves along its own normal.
-    #[error("contact point {point} has the compliance {compliance:e} m/N along its normal; it must be positive")]
+    #[error(
+        "contact point {point} has the compliance {compliance:e} m/N along its normal; it must be positive"
+    )]
     Rigid {
         /// The point.
         point: usize,
@@ -80,7 +84,6 @@ impl ContactProblem {
         Ok(Self { w, b, cones, rho })
     }
 
-    pub fn dump(&self, dir: &str, warm: &[f64]) { use std::io::Write; static N: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0); let k=N.fetch_add(1,std::sync::atomic::Ordering::Relaxed); let mut f=std::fs::File::create(format!("{dir}/{k:04}.bin")).unwrap(); let n=self.cones.len(); f.write_all(&(n as u64).to_le_bytes()).unwrap(); for x in self.w.iter().chain(&self.b).chain(warm) { f.write_all(&x.to_le_bytes()).unwrap(); } for c in &self.cones { f.write_all(&c.friction.to_le_bytes()).unwrap(); } }
     /// Number of points.
     pub fn point_count(&self) -> usize {
         self.cones.len()

@@ -1,7 +1,7 @@
-//! The solution of a contact problem: sweeps until it is clear who sticks, then Newton's method.
+//! The solution of a contact problem: Newton's method, with sweeps over the points where it strays.
 
 use super::cone::PointForce;
-use super::newton;
+use super::newton::Proximal;
 use super::problem::{ContactProblem, at};
 use super::sweeps::Sweeps;
 
@@ -12,13 +12,13 @@ pub struct SolveBudget {
     pub residual_rel: f64,
     /// Residual that is small enough in any case, N.
     pub residual: f64,
-    /// Most sweeps over all points.
-    pub sweeps_max: usize,
+    /// Most attempts of Newton's method.
+    pub attempts_max: usize,
 }
 
 impl Default for SolveBudget {
     fn default() -> Self {
-        Self { residual_rel: 1e-10, residual: 0.0, sweeps_max: 2000 }
+        Self { residual_rel: 1e-10, residual: 0.0, attempts_max: 40 }
     }
 }
 
@@ -44,16 +44,27 @@ pub struct Solution {
     pub residual: f64,
     /// Sweeps that were made.
     pub sweeps: usize,
-    /// Steps of Newton's method that were kept.
+    /// Steps of Newton's method.
     pub newton_steps: usize,
     /// Whether the residual is within what was asked for.
     pub is_converged: bool,
 }
 
-/// Sweeps before the first step of Newton's method, and between two attempts.
-const SWEEPS_BETWEEN: usize = 6;
 /// Steps of Newton's method in one attempt.
-const NEWTON_STEPS: usize = 6;
+const NEWTON_STEPS: usize = 8;
+/// Sweeps after an attempt that failed.
+const SWEEPS: usize = 3;
+/// Share of its own compliance that is added to a point in the first attempt, and its limits.
+const SHARE_FIRST: f64 = 1e-8;
+const SHARE_MIN: f64 = 1e-9;
+const SHARE_MAX: f64 = 0.1;
+/// The share shrinks after an attempt that succeeded, and grows after one that failed.
+const SHRINK: f64 = 0.03;
+const GROW: f64 = 30.0;
+/// An attempt has succeeded if it leaves so little of the residual …
+const SUCCESS: f64 = 0.3;
+/// … or if it solves its own problem so much better than that.
+const OWN_SUCCESS: f64 = 1e-3;
 
 impl ContactProblem {
     /// The forces that obey the law of Signorini and Coulomb: exactly that law, no relaxation of it.
@@ -61,61 +72,55 @@ impl ContactProblem {
     /// Shapes: `warm` 3n forces to begin with, those of the last tick, N.
     pub fn solve(&self, warm: &[f64], budget: SolveBudget) -> Solution {
         let n = self.point_count();
-        let mut lambda: Vec<f64> = Vec::with_capacity(3 * n);
-        for point in 0..n {
-            let force = if warm.len() == 3 * n { at(warm, point) } else { PointForce::zeros() };
-            lambda.extend(self.cones[point].project(force).iter());
-        }
-        let motion = self.motion(&lambda);
-        let residual = self.residual_of(&lambda, &motion);
-        let mut found = Solution {
-            lambda,
-            motion,
-            residual,
-            sweeps: 0,
-            newton_steps: 0,
-            is_converged: false,
+        let mut lambda = match warm.len() == 3 * n {
+            true => self.projected(warm),
+            false => vec![0.0; 3 * n],
         };
-        let sweeps = Sweeps::new(self);
-        while !found.is_small_enough(budget) && found.sweeps < budget.sweeps_max {
-            for _ in 0..SWEEPS_BETWEEN {
-                sweeps.sweep(&mut found.lambda, &mut found.motion);
-                found.sweeps += 1;
+        let mut residual = self.residual_of(&lambda, &self.motion(&lambda));
+        let mut best = (residual, lambda.clone());
+        let (mut sweeps, mut newton_steps) = (0, 0);
+        let mut sweeper = None;
+        let mut share = SHARE_FIRST;
+        let is_small = |residual: f64, lambda: &[f64]| {
+            residual <= budget.residual.max(budget.residual_rel * force_max(lambda))
+        };
+        for _ in 0..budget.attempts_max {
+            if is_small(residual, &lambda) {
+                break;
             }
-            // Summed anew, so that no rounding of the sweeps stays.
-            found.motion = self.motion(&found.lambda);
-            found.residual = self.residual_of(&found.lambda, &found.motion);
-            for _ in 0..NEWTON_STEPS {
-                if found.is_small_enough(budget) || !self.take_newton_step(&mut found) {
-                    break;
+            let allowed = budget.residual.max(budget.residual_rel * force_max(&lambda));
+            let found = Proximal::new(self, &lambda, share).solve(NEWTON_STEPS, 0.1 * allowed);
+            newton_steps += found.steps;
+            let now = self.residual_of(&found.lambda, &self.motion(&found.lambda));
+            let own_limit = (0.1 * allowed).max(OWN_SUCCESS * residual);
+            if found.residual <= own_limit || now < SUCCESS * residual {
+                (lambda, residual) = (found.lambda, now);
+                share = (SHRINK * share).max(SHARE_MIN);
+            } else {
+                share = (GROW * share).min(SHARE_MAX);
+                if now < residual {
+                    lambda = found.lambda;
                 }
+                let mut motion = self.motion(&lambda);
+                let sweeper = sweeper.get_or_insert_with(|| Sweeps::new(self));
+                (0..SWEEPS).for_each(|_| sweeper.sweep(&mut lambda, &mut motion));
+                sweeps += SWEEPS;
+                residual = self.residual_of(&lambda, &self.motion(&lambda));
+            }
+            if residual < best.0 {
+                best = (residual, lambda.clone());
             }
         }
-        found.is_converged = found.is_small_enough(budget);
-        found
+        let (residual, lambda) = best;
+        let motion = self.motion(&lambda);
+        let is_converged = is_small(residual, &lambda);
+        Solution { lambda, motion, residual, sweeps, newton_steps, is_converged }
     }
 
-    /// Takes a step of Newton's method, or a part of it, if that brings the forces nearer to the law.
-    fn take_newton_step(&self, found: &mut Solution) -> bool {
-        let Some(full) = newton::step(self, &found.lambda, &found.motion) else { return false };
-        for share in [1.0, 0.5, 0.25] {
-            let part = found.lambda.iter().zip(&full).map(|(old, new)| old + share * (new - old));
-            let mut next: Vec<f64> = part.collect();
-            for (point, cone) in self.cones.iter().enumerate() {
-                let force = cone.project(at(&next, point));
-                next[3 * point..3 * point + 3].copy_from_slice(force.as_slice());
-            }
-            let motion = self.motion(&next);
-            let residual = self.residual_of(&next, &motion);
-            // Written so that a NaN is refused too.
-            let is_better = residual < found.residual;
-            if is_better {
-                (found.lambda, found.motion, found.residual) = (next, motion, residual);
-                found.newton_steps += 1;
-                return true;
-            }
-        }
-        false
+    /// Every force moved into its cone.
+    pub(super) fn projected(&self, lambda: &[f64]) -> Vec<f64> {
+        let points = self.cones.iter().enumerate();
+        points.flat_map(|(point, cone)| <[f64; 3]>::from(cone.project(at(lambda, point)))).collect()
     }
 }
 
@@ -131,16 +136,15 @@ pub fn state_of(force: &PointForce, friction: f64) -> PointState {
 impl Solution {
     /// Largest force of a point, N.
     pub fn force_max(&self) -> f64 {
-        let points = 0..self.lambda.len() / 3;
-        points.map(|point| at(&self.lambda, point).norm()).fold(0.0, f64::max)
+        force_max(&self.lambda)
     }
 
     /// Force of a point along its normal and its tangents, N.
     pub fn force(&self, point: usize) -> PointForce {
         at(&self.lambda, point)
     }
+}
 
-    fn is_small_enough(&self, budget: SolveBudget) -> bool {
-        self.residual <= budget.residual.max(budget.residual_rel * self.force_max())
-    }
+fn force_max(lambda: &[f64]) -> f64 {
+    lambda.chunks_exact(3).map(|f| f[0].hypot(f[1]).hypot(f[2])).fold(0.0, f64::max)
 }

@@ -24,8 +24,7 @@ impl Block {
         let square = half.component_mul(&half) * (mass / 3.0);
         let inertia = Vector3::new(square.y + square.z, square.x + square.z, square.x + square.y);
         let corner = |x: f64, y: f64| Vector3::new(x * half.x, y * half.y, -half.z);
-        let corners =
-            [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
+        let corners = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
         Self { mass, inertia, corners }
     }
 
@@ -61,9 +60,8 @@ fn block_on_a_tilted_plane_sticks_below_the_angle_of_friction_and_slides_above()
         let found = problem.solve(&[], SolveBudget::default());
         assert!(found.is_converged, "{degrees} degrees: residual {:e} N", found.residual);
         let weight = block.mass * 9.81;
-        let (normal, along) = (0..4).fold((0.0, 0.0), |(n, t), i| {
-            (n + found.force(i).x, t - found.force(i).y)
-        });
+        let (normal, along) =
+            (0..4).fold((0.0, 0.0), |(n, t), i| (n + found.force(i).x, t - found.force(i).y));
         let (sin, cos) = degrees.to_radians().sin_cos();
         assert!((normal - weight * cos).abs() < 1e-6 * weight, "{normal}");
         let expected = if slides { friction * weight * cos } else { weight * sin };
@@ -72,7 +70,7 @@ fn block_on_a_tilted_plane_sticks_below_the_angle_of_friction_and_slides_above()
         let free = h * h * 9.81 * (sin - friction * cos);
         match slides {
             true => assert!((slip - free).abs() < 1e-3 * free, "{slip:e} instead of {free:e}"),
-            false => assert!(slip < 1e-11, "{slip:e}"),
+            false => assert!(slip < 1e-9, "{slip:e}"),
         }
     }
 }
@@ -87,7 +85,7 @@ fn points_that_are_nowhere_near_get_no_force_at_all() {
     .unwrap();
     let found = problem.solve(&[], SolveBudget::default());
     assert_eq!(found.lambda, [0.0; 6]);
-    assert!(found.is_converged && found.sweeps == 0);
+    assert!(found.is_converged && found.newton_steps == 0);
 }
 
 #[test]

@@ -106,7 +106,8 @@ impl FreeBody {
             }
             let forces = base.stiffness.mul(&field);
             let left = unknown.iter().zip(&asked[of_motion]);
-            *residual = left.map(|(&dof, load)| (load - forces[dof as usize]).powi(2)).sum::<f64>().sqrt();
+            *residual =
+                left.map(|(&dof, load)| (load - forces[dof as usize]).powi(2)).sum::<f64>().sqrt();
         }
         let mut response = vec![Matrix3x6::zeros(); n];
         for (motion, solved) in loads.chunks_exact(unknown.len()).enumerate() {
@@ -268,7 +269,8 @@ mod tests {
         for (columns, (_, force)) in columns.iter().zip(forces) {
             for (node, u) in u.iter_mut().enumerate() {
                 for axis in 0..3 {
-                    u[axis] += (0..3).map(|c| force[c] * columns.fields[c][3 * node + axis]).sum::<f64>();
+                    u[axis] +=
+                        (0..3).map(|c| force[c] * columns.fields[c][3 * node + axis]).sum::<f64>();
                 }
             }
         }

@@ -70,9 +70,8 @@ impl<'a> Response<'a> {
         let contacts: Vec<Contact> = missing.iter().map(|&node| Contact::Node(node)).collect();
         let Elasticity { base, columns, .. } = self.elasticity;
         for (node, columns) in missing.into_iter().zip(columns.of_contacts(base, &contacts)?) {
-            let block = |&row: &u32| {
-                Matrix3::from_fn(|r, c| columns.fields[c][3 * row as usize + r])
-            };
+            let block =
+                |&row: &u32| Matrix3::from_fn(|r, c| columns.fields[c][3 * row as usize + r]);
             self.held.insert(node, self.rows.iter().map(block).collect());
             self.kept.insert(node, columns);
         }

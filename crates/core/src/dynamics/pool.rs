@@ -1,0 +1,77 @@
+//! The points at which contact is looked for in a step: all corners near bodies, few in each triangle.
+
+use nalgebra::Vector3;
+
+use super::features::MaterialPoint;
+use super::state::HeldContact;
+
+/// Points of contact.
+pub(super) struct Pool {
+    /// Corners, each once.
+    pub corners: Vec<MaterialPoint>,
+    /// Points on edges and inside triangles, in the order in which they were found.
+    pub inside: Vec<MaterialPoint>,
+}
+
+/// Points on one edge or inside one triangle: three say all about a flat triangle.
+const POINTS_OF_TRIANGLE: usize = 3;
+
+impl Pool {
+    /// All points.
+    pub fn iter(&self) -> impl Iterator<Item = &MaterialPoint> {
+        self.corners.iter().chain(&self.inside)
+    }
+
+    /// Adds a point that is not there yet. Where its triangle has enough of them, one without a
+    /// force makes room.
+    pub fn add(&mut self, point: MaterialPoint, forces: &[HeldContact]) {
+        if self.iter().any(|other| other.is_same(&point)) {
+            return;
+        }
+        if point.nodes[0] == point.nodes[1] {
+            self.corners.push(point);
+            return;
+        }
+        let is_beside =
+            |other: &MaterialPoint| other.body == point.body && other.nodes == point.nodes;
+        let beside: Vec<usize> =
+            (0..self.inside.len()).filter(|&at| is_beside(&self.inside[at])).collect();
+        let is_open = |at: &usize| force_at(forces, &self.inside[*at]).is_none();
+        if beside.len() >= POINTS_OF_TRIANGLE
+            && let Some(open) = beside.into_iter().find(is_open)
+        {
+            self.inside.remove(open);
+        }
+        self.inside.push(point);
+    }
+}
+
+/// Force at a point.
+pub(super) fn force_at(forces: &[HeldContact], point: &MaterialPoint) -> Option<Vector3<f64>> {
+    forces.iter().find(|held| point.is_same(&(*held).into())).map(|held| held.force)
+}
+
+/// One contact for each triangle and body: where its forces act on average, with their sum.
+///
+/// The next step begins with these; those that it needs besides it finds again.
+pub(super) fn merged(contacts: &[HeldContact]) -> Vec<HeldContact> {
+    let mut merged: Vec<(HeldContact, f64)> = Vec::with_capacity(contacts.len());
+    for contact in contacts {
+        let size = contact.force.norm();
+        let beside = merged
+            .iter_mut()
+            .find(|(other, _)| other.body == contact.body && other.nodes == contact.nodes);
+        match beside {
+            Some((other, sum)) => {
+                let share = size / (size + *sum);
+                for (weight, new) in other.weights.iter_mut().zip(&contact.weights) {
+                    *weight += share * (new - *weight);
+                }
+                other.force += contact.force;
+                *sum += size;
+            }
+            None => merged.push((*contact, size)),
+        }
+    }
+    merged.into_iter().map(|(contact, _)| contact).collect()
+}
