@@ -82,7 +82,9 @@ pub enum RigidMeshError {
 /// Triangles of a leaf.
 const LEAF: usize = 4;
 /// Pieces into which a triangle is cut at most while its deepest point is looked for.
-const PIECES_MAX: usize = 96;
+const PIECES_MAX: usize = 64;
+/// A piece is given up where it can be deeper by this share of its size only.
+const NEAR_ENOUGH: f64 = 1e-3;
 /// Halvings of the step of the last search around the deepest point found, and ways tried with each.
 const HALVINGS: u32 = 34;
 const WAYS: u32 = 9;
@@ -175,16 +177,21 @@ impl RigidMesh {
         };
         consider(whole[1], &mut best);
         consider(whole[2], &mut best);
-        let mut pieces = std::collections::VecDeque::from([(whole, size)]);
-        let mut seen = 0;
-        while let Some((piece, size)) = pieces.pop_front()
-            && seen < PIECES_MAX
-        {
-            seen += 1;
-            let middle = [0, 1, 2].map(|k| (piece[0][k] + piece[1][k] + piece[2][k]) / 3.0);
-            // The distance changes by no more than the way gone.
-            if consider(middle, &mut best) - size < best.distance.distance {
-                pieces.extend(quarters(&piece).map(|quarter| (quarter, 0.5 * size)));
+        // Each piece with the smallest distance that can be in it; the most promising comes next.
+        let mut pieces = vec![(f64::NEG_INFINITY, whole, size)];
+        for _ in 0..PIECES_MAX {
+            let next = (0..pieces.len()).min_by(|&a, &b| pieces[a].0.total_cmp(&pieces[b].0));
+            let Some((least, piece, size)) = next.map(|at| pieces.swap_remove(at)) else { break };
+            if least >= best.distance.distance - NEAR_ENOUGH * size {
+                break;
+            }
+            for quarter in quarters(&piece) {
+                let middle =
+                    [0, 1, 2].map(|k| (quarter[0][k] + quarter[1][k] + quarter[2][k]) / 3.0);
+                // The distance changes by no more than the way gone: two thirds of the longest
+                // median, which is below the longest edge.
+                let reach = 0.5 * size;
+                pieces.push((consider(middle, &mut best) - 0.6 * reach, quarter, reach));
             }
         }
         let mut best = self.descend(best, at);
