@@ -64,6 +64,12 @@ pub enum FrameError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeError {
+    /// A rigid body of a shape that this version does not know.
+    #[error("a rigid body has the shape number {kind}; there are 0 to 4")]
+    UnknownShape {
+        /// Its number.
+        kind: u32,
+    },
     /// No message has this number.
     #[error("unknown message kind {kind:#06x}")]
     UnknownKind {

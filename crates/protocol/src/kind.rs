@@ -28,6 +28,8 @@ pub enum Kind {
     LargeFrame = 0x000a,
     /// As `SolveOnce`, for several sets of displacements of one partition.
     SolveSeveral = 0x000b,
+    /// One step of a free object among rigid bodies, with contact and friction.
+    ContactFrame = 0x000c,
     /// Server introduces itself.
     Welcome = 0x8001,
     /// Displacements and what they cost.
@@ -44,11 +46,13 @@ pub enum Kind {
     LargeAnswer = 0x8009,
     /// As `Answer`, for several sets of displacements.
     SeveralAnswers = 0x800b,
+    /// State, contacts and displacements at the end of a step.
+    ContactAnswer = 0x800c,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 21] = [
         Self::Hello,
         Self::SolveOnce,
         Self::HaveModel,
@@ -60,6 +64,7 @@ impl Kind {
         Self::SolveLarge,
         Self::LargeFrame,
         Self::SolveSeveral,
+        Self::ContactFrame,
         Self::Welcome,
         Self::Answer,
         Self::ModelState,
@@ -68,6 +73,7 @@ impl Kind {
         Self::Pong,
         Self::LargeAnswer,
         Self::SeveralAnswers,
+        Self::ContactAnswer,
     ];
 
     /// Number in the header.

@@ -1,6 +1,7 @@
 //! All messages of a server as one type.
 
 use super::answer::Answer;
+use super::contact::ContactAnswer;
 use super::large::LargeAnswer;
 use super::model::ModelReady;
 use super::reject::Rejected;
@@ -34,6 +35,8 @@ pub enum Reply {
     LargeAnswer(Box<LargeAnswer>),
     /// Answer to `SolveSeveral`.
     SeveralAnswers(Box<SeveralAnswers>),
+    /// Answer to `ContactFrame`.
+    ContactAnswer(Box<ContactAnswer>),
 }
 
 impl Reply {
@@ -48,6 +51,7 @@ impl Reply {
             Self::Pong { .. } => Kind::Pong,
             Self::LargeAnswer(_) => Kind::LargeAnswer,
             Self::SeveralAnswers(_) => Kind::SeveralAnswers,
+            Self::ContactAnswer(_) => Kind::ContactAnswer,
         }
     }
 
@@ -71,6 +75,7 @@ impl Reply {
             Self::Pong { nonce } => writer.part(nonce),
             Self::LargeAnswer(answer) => answer.write(writer),
             Self::SeveralAnswers(answers) => answers.write(writer),
+            Self::ContactAnswer(answer) => answer.write(writer),
         })
     }
 
@@ -102,6 +107,9 @@ impl Reply {
             Kind::SeveralAnswers => {
                 Self::SeveralAnswers(Box::new(SeveralAnswers::read(&mut reader, limits)?))
             }
+            Kind::ContactAnswer => {
+                Self::ContactAnswer(Box::new(ContactAnswer::read(&mut reader, limits)?))
+            }
             Kind::Hello
             | Kind::SolveOnce
             | Kind::HaveModel
@@ -112,7 +120,8 @@ impl Reply {
             | Kind::Ping
             | Kind::SolveLarge
             | Kind::LargeFrame
-            | Kind::SolveSeveral => return Err(DecodeError::WrongDirection { kind }),
+            | Kind::SolveSeveral
+            | Kind::ContactFrame => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;
         Ok(reply)

@@ -1,5 +1,6 @@
 //! All messages of a client as one type.
 
+use super::contact::ContactFrame;
 use super::large::{LargeFrame, SolveLarge};
 use super::model::{FrameRequest, ModelHash, Prefetch, UploadModel};
 use super::question::SolveOnce;
@@ -36,6 +37,8 @@ pub enum Request {
     LargeFrame(Box<LargeFrame>),
     /// One self-contained solve for several sets of displacements; answered by `SeveralAnswers`.
     SolveSeveral(Box<SolveSeveral>),
+    /// One step of a free object among rigid bodies; answered by `ContactAnswer`.
+    ContactFrame(Box<ContactFrame>),
 }
 
 impl Request {
@@ -53,6 +56,7 @@ impl Request {
             Self::SolveLarge(_) => Kind::SolveLarge,
             Self::LargeFrame(_) => Kind::LargeFrame,
             Self::SolveSeveral(_) => Kind::SolveSeveral,
+            Self::ContactFrame(_) => Kind::ContactFrame,
         }
     }
 
@@ -80,6 +84,7 @@ impl Request {
             Self::SolveLarge(solve) => solve.write(writer),
             Self::LargeFrame(frame) => frame.write(writer),
             Self::SolveSeveral(solve) => solve.write(writer),
+            Self::ContactFrame(frame) => frame.write(writer),
         })
     }
 
@@ -108,6 +113,9 @@ impl Request {
             Kind::SolveSeveral => {
                 Self::SolveSeveral(Box::new(SolveSeveral::read(&mut reader, limits)?))
             }
+            Kind::ContactFrame => {
+                Self::ContactFrame(Box::new(ContactFrame::read(&mut reader, limits)?))
+            }
             Kind::Welcome
             | Kind::Answer
             | Kind::ModelState
@@ -115,7 +123,8 @@ impl Request {
             | Kind::Rejected
             | Kind::Pong
             | Kind::LargeAnswer
-            | Kind::SeveralAnswers => return Err(DecodeError::WrongDirection { kind }),
+            | Kind::SeveralAnswers
+            | Kind::ContactAnswer => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;
         Ok(request)

@@ -1,0 +1,280 @@
+//! The messages for contact with friction: one step of a free object among rigid bodies.
+
+use wincode::{SchemaRead, SchemaWrite};
+
+use super::answer::{Answer, AnswerPart};
+use super::model::ModelHash;
+use super::object_state::{ObjectState, ObjectStatePart};
+use super::question::{NodeChoice, Precision};
+use super::rigid_body::{BodyMotion, check_bodies, count_of_bodies, read_bodies, write_bodies};
+use crate::limits::check_count;
+use crate::payload::{PayloadReader, PayloadWriter, count_of};
+use crate::{DecodeError, EncodeError, Limits};
+
+/// One step of a kept model that nothing holds, among rigid bodies. Nothing of it is kept by the
+/// server: the state comes with the request and goes back with the answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactFrame {
+    /// Which model.
+    pub model: ModelHash,
+    /// How the step is made.
+    pub ask: ContactAsk,
+    /// The object when the step begins.
+    pub state: ObjectState,
+    /// The bodies.
+    pub bodies: Vec<BodyMotion>,
+    /// Surface triangles that can touch a body in this step: nodes in the model's order …
+    pub triangles: Vec<[u32; 3]>,
+    /// … and for each of them the position of its body in `bodies`.
+    pub triangle_bodies: Vec<u32>,
+    /// Nodes whose displacements are wanted.
+    pub nodes: NodeChoice,
+    /// How displacements are to travel.
+    pub precision: Precision,
+}
+
+/// How a step is made.
+///
+/// Units: s, m/s², kg/m³, s; `…_rel` relative.
+#[derive(Clone, Copy, Debug, PartialEq, SchemaRead, SchemaWrite)]
+pub struct ContactAsk {
+    /// Length of the step.
+    pub seconds: f64,
+    /// Acceleration of free fall, world.
+    pub gravity: [f64; 3],
+    /// Density of the object.
+    pub density: f64,
+    /// Time in which the shape forgets a force (Kelvin and Voigt).
+    pub viscosity: f64,
+    /// Penetration that is small enough, as a share of the object's size.
+    pub penetration_rel: f64,
+    /// Residual of the law of contact that is small enough, as a share of the largest force.
+    pub residual_rel: f64,
+    /// Most times that the contact problem is made anew about where it ended.
+    pub rounds_max: u32,
+    /// Steps of Newton's method after which no further round is begun.
+    pub newton_max: u32,
+}
+
+/// Answer to `ContactFrame`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactAnswer {
+    /// Displacements and the report of every answer.
+    pub answer: Answer,
+    /// How well the law of contact is met.
+    pub contact: ContactReport,
+    /// The object when the step has ended.
+    pub state: ObjectState,
+    /// Points that press.
+    pub points: Vec<ContactPoint>,
+    /// What each body does to the object, in the order of the bodies.
+    pub loads: Vec<BodyLoad>,
+}
+
+/// How well a step meets the law of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
+pub struct ContactReport {
+    /// Deepest point of the surface in a body, m.
+    pub penetration_max: f64,
+    /// Longest slip of a pressing point in this step, m.
+    pub slip_max: f64,
+    /// Largest residual of the natural map of Signorini's and Coulomb's law, N.
+    pub residual: f64,
+    /// The same over the largest force of a point.
+    pub residual_rel: f64,
+    /// Largest part of a force outside its cone of friction, N.
+    pub cone_violation: f64,
+    /// Whether penetration and residual are within what was asked for.
+    pub is_converged: bool,
+    /// Times the contact problem was made.
+    pub rounds: u32,
+    /// Sweeps over all points.
+    pub sweeps: u32,
+    /// Steps of Newton's method.
+    pub newton_steps: u32,
+    /// Nodes whose columns of the compliance were computed for this step.
+    pub columns_computed: u32,
+}
+
+/// A point of the object's surface that presses on a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPoint {
+    /// Position of the body.
+    pub body: u32,
+    /// Whether it slips.
+    pub slips: bool,
+    /// Where it is, m, world.
+    pub place: [f64; 3],
+    /// Out of the body, world.
+    pub normal: [f64; 3],
+    /// Force on the object, N, world.
+    pub force: [f64; 3],
+    /// Slip along the body in this step, m, world.
+    pub slip: [f64; 3],
+}
+
+/// The sum of a body's forces on the object.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyLoad {
+    /// Force, N, world.
+    pub force: [f64; 3],
+    /// Torque about the place of the body's pose at the end, N m, world.
+    pub torque: [f64; 3],
+    /// Sum of the normal parts, N.
+    pub normal_force: f64,
+    /// Points that press.
+    pub contacts: u32,
+}
+
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct ContactFramePart {
+    model: ModelHash,
+    ask: ContactAsk,
+    state: ObjectStatePart,
+    body_count: u32,
+    triangle_count: u32,
+    /// Whether nodes are listed.
+    listed: bool,
+    node_count: u32,
+    precision: Precision,
+}
+
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct ContactAnswerPart {
+    answer: AnswerPart,
+    contact: ContactReport,
+    state: ObjectStatePart,
+    point_count: u32,
+    load_count: u32,
+}
+
+const TRIANGLES: &str = "candidate triangles";
+const NODES: &str = "wanted nodes";
+const POINTS: &str = "contact points";
+const LOADS: &str = "loads of bodies";
+/// Numbers of a contact point and of a load.
+const POINT_NUMBERS: usize = 12;
+const LOAD_NUMBERS: usize = 7;
+
+impl ContactFrame {
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        let (count, expected) = (self.triangle_bodies.len(), self.triangles.len());
+        if count != expected {
+            let what = "bodies of candidate triangles";
+            return Err(EncodeError::CountMismatch { what, count, expected });
+        }
+        let nodes: &[u32] = match &self.nodes {
+            NodeChoice::All => &[],
+            NodeChoice::Nodes(nodes) => nodes,
+        };
+        writer.part(&ContactFramePart {
+            model: self.model,
+            ask: self.ask,
+            state: self.state.part()?,
+            body_count: count_of_bodies(&self.bodies)?,
+            triangle_count: count_of(TRIANGLES, expected)?,
+            listed: matches!(self.nodes, NodeChoice::Nodes(_)),
+            node_count: count_of(NODES, nodes.len())?,
+            precision: self.precision,
+        })?;
+        self.state.write_arrays(writer);
+        write_bodies(writer, &self.bodies)?;
+        writer.array(self.triangles.as_flattened());
+        writer.array(&self.triangle_bodies);
+        writer.array(nodes);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: ContactFramePart = reader.part()?;
+        part.state.check(limits)?;
+        check_bodies(part.body_count, limits)?;
+        let triangle_count = check_count(TRIANGLES, part.triangle_count, limits.dof_count_max)?;
+        let node_count = check_count(NODES, part.node_count, limits.node_count_max)?;
+        let state = ObjectState::read_arrays(reader, part.state)?;
+        let bodies = read_bodies(reader, part.body_count as usize, limits)?;
+        let corners: Vec<u32> = reader.array(TRIANGLES, 3 * triangle_count)?;
+        let triangle_bodies = reader.array("bodies of candidate triangles", triangle_count)?;
+        let nodes = reader.array(NODES, node_count)?;
+        Ok(Self {
+            model: part.model,
+            ask: part.ask,
+            state,
+            bodies,
+            triangles: corners.as_chunks::<3>().0.to_vec(),
+            triangle_bodies,
+            nodes: if part.listed { NodeChoice::Nodes(nodes) } else { NodeChoice::All },
+            precision: part.precision,
+        })
+    }
+}
+
+impl ContactAnswer {
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        writer.part(&ContactAnswerPart {
+            answer: self.answer.part()?,
+            contact: self.contact,
+            state: self.state.part()?,
+            point_count: count_of(POINTS, self.points.len())?,
+            load_count: count_of(LOADS, self.loads.len())?,
+        })?;
+        self.answer.write_arrays(writer);
+        self.state.write_arrays(writer);
+        let names: Vec<[u32; 2]> =
+            self.points.iter().map(|point| [point.body, u32::from(point.slips)]).collect();
+        writer.array(names.as_flattened());
+        let numbers: Vec<[[f64; 3]; 4]> =
+            self.points.iter().map(|p| [p.place, p.normal, p.force, p.slip]).collect();
+        writer.array(numbers.as_flattened());
+        let contacts: Vec<u32> = self.loads.iter().map(|load| load.contacts).collect();
+        writer.array(&contacts);
+        let numbers: Vec<f64> = self
+            .loads
+            .iter()
+            .flat_map(|l| l.force.into_iter().chain(l.torque).chain([l.normal_force]))
+            .collect();
+        writer.array(&numbers);
+        Ok(())
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let part: ContactAnswerPart = reader.part()?;
+        part.answer.check(limits)?;
+        part.state.check(limits)?;
+        let point_count = check_count(POINTS, part.point_count, limits.dof_count_max)?;
+        let load_count = check_count(LOADS, part.load_count, limits.node_count_max)?;
+        let answer = Answer::read_arrays(reader, part.answer)?;
+        let state = ObjectState::read_arrays(reader, part.state)?;
+        let names: Vec<u32> = reader.array(POINTS, 2 * point_count)?;
+        let numbers: Vec<f64> = reader.array(POINTS, POINT_NUMBERS * point_count)?;
+        let contacts: Vec<u32> = reader.array(LOADS, load_count)?;
+        let of_loads: Vec<f64> = reader.array(LOADS, LOAD_NUMBERS * load_count)?;
+        let three = |numbers: &[f64], first: usize| -> [f64; 3] {
+            std::array::from_fn(|k| numbers[first + k])
+        };
+        let points = names.as_chunks::<2>().0.iter().zip(numbers.chunks_exact(POINT_NUMBERS));
+        let points = points.map(|(&[body, slips], n)| ContactPoint {
+            body,
+            slips: slips != 0,
+            place: three(n, 0),
+            normal: three(n, 3),
+            force: three(n, 6),
+            slip: three(n, 9),
+        });
+        let loads = contacts.iter().zip(of_loads.chunks_exact(LOAD_NUMBERS));
+        let loads = loads.map(|(&contacts, n)| BodyLoad {
+            force: three(n, 0),
+            torque: three(n, 3),
+            normal_force: n[6],
+            contacts,
+        });
+        let (points, loads) = (points.collect(), loads.collect());
+        Ok(Self { answer, contact: part.contact, state, points, loads })
+    }
+}

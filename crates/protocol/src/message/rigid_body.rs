@@ -1,0 +1,174 @@
+//! Rigid bodies on the wire: shapes, sizes, friction, and where they are at two moments.
+
+use crate::limits::check_count;
+use crate::payload::{PayloadReader, PayloadWriter, count_of};
+use crate::{DecodeError, EncodeError, Limits};
+
+/// A pose: place x, y, z in m, then the unit quaternion w, x, y, z of its turn.
+pub type Pose = [f64; 7];
+
+/// Shape of a rigid body in a frame of its own, m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BodyShape {
+    /// A ball around the origin.
+    Sphere {
+        /// Its radius.
+        radius: f64,
+    },
+    /// All within a radius of a segment along z, centred at the origin.
+    Capsule {
+        /// The radius.
+        radius: f64,
+        /// Length of the segment.
+        length: f64,
+    },
+    /// The half space below a plane through the origin.
+    Plane {
+        /// Out of the half space.
+        normal: [f64; 3],
+    },
+    /// A box around the origin.
+    Box {
+        /// Half its edges.
+        half: [f64; 3],
+    },
+    /// The inside of a closed surface.
+    Mesh {
+        /// Corners.
+        vertices: Vec<[f64; 3]>,
+        /// Triangles, counter-clockwise seen from outside.
+        triangles: Vec<[u32; 3]>,
+    },
+}
+
+/// A rigid body that moves while the object answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyMotion {
+    /// Its shape.
+    pub shape: BodyShape,
+    /// Pose in the world when the step begins.
+    pub start: Pose,
+    /// Pose in the world when it ends.
+    pub end: Pose,
+    /// Coefficient of friction.
+    pub friction: f64,
+    /// How far the body gives way to a force, m/N; 0 for one that keeps to its poses.
+    pub compliance: f64,
+}
+
+/// Numbers of a body besides its mesh: three sizes, two poses, friction, compliance.
+const NUMBERS: usize = 19;
+const BODIES: &str = "rigid bodies";
+const SIZES: &str = "sizes of meshes of bodies";
+const VERTICES: &str = "vertices of bodies";
+const TRIANGLES: &str = "triangles of bodies";
+
+impl BodyShape {
+    fn kind(&self) -> u32 {
+        match self {
+            Self::Sphere { .. } => 0,
+            Self::Capsule { .. } => 1,
+            Self::Plane { .. } => 2,
+            Self::Box { .. } => 3,
+            Self::Mesh { .. } => 4,
+        }
+    }
+
+    fn sizes(&self) -> [f64; 3] {
+        match self {
+            Self::Sphere { radius } => [*radius, 0.0, 0.0],
+            Self::Capsule { radius, length } => [*radius, *length, 0.0],
+            Self::Plane { normal: sizes } | Self::Box { half: sizes } => *sizes,
+            Self::Mesh { .. } => [0.0; 3],
+        }
+    }
+}
+
+/// Announces `bodies`.
+pub(super) fn count_of_bodies(bodies: &[BodyMotion]) -> Result<u32, EncodeError> {
+    count_of(BODIES, bodies.len())
+}
+
+/// Compares the announced count with the limits.
+pub(super) fn check_bodies(count: u32, limits: &Limits) -> Result<(), DecodeError> {
+    check_count(BODIES, count, limits.node_count_max.min(u32::from(u16::MAX)))?;
+    Ok(())
+}
+
+/// Arrays: kinds, numbers, and of the meshes sizes, vertices and triangles.
+pub(super) fn write_bodies(
+    writer: &mut PayloadWriter<'_>,
+    bodies: &[BodyMotion],
+) -> Result<(), EncodeError> {
+    let kinds: Vec<u32> = bodies.iter().map(|body| body.shape.kind()).collect();
+    writer.array(&kinds);
+    let mut numbers = Vec::with_capacity(NUMBERS * bodies.len());
+    let (mut sizes, mut vertices, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    for body in bodies {
+        numbers.extend(body.shape.sizes());
+        numbers.extend(body.start);
+        numbers.extend(body.end);
+        numbers.extend([body.friction, body.compliance]);
+        if let BodyShape::Mesh { vertices: of_body, triangles: faces } = &body.shape {
+            sizes.extend([count_of(VERTICES, of_body.len())?, count_of(TRIANGLES, faces.len())?]);
+            vertices.extend_from_slice(of_body);
+            triangles.extend_from_slice(faces);
+        }
+    }
+    writer.array(&numbers);
+    writer.array(&sizes);
+    writer.array(&vertices);
+    writer.array(triangles.as_flattened());
+    Ok(())
+}
+
+/// Reads what [`write_bodies`] wrote; the count has been checked.
+pub(super) fn read_bodies(
+    reader: &mut PayloadReader<'_>,
+    count: usize,
+    limits: &Limits,
+) -> Result<Vec<BodyMotion>, DecodeError> {
+    let kinds: Vec<u32> = reader.array(BODIES, count)?;
+    let numbers: Vec<f64> = reader.array("numbers of bodies", NUMBERS * count)?;
+    let meshes = kinds.iter().filter(|kind| **kind == 4).count();
+    let sizes: Vec<u32> = reader.array(SIZES, 2 * meshes)?;
+    let total = |which: usize| sizes.iter().skip(which).step_by(2).map(|&n| u64::from(n)).sum();
+    let vertex_count = checked_sum(VERTICES, total(0), limits.node_count_max)?;
+    let triangle_count = checked_sum(TRIANGLES, total(1), limits.tet_count_max)?;
+    let vertices: Vec<[f64; 3]> = reader.array(VERTICES, vertex_count)?;
+    let corners: Vec<u32> = reader.array(TRIANGLES, 3 * triangle_count)?;
+    let (triangles, _) = corners.as_chunks::<3>();
+    let (mut vertices, mut triangles, mut sizes) = (&vertices[..], triangles, &sizes[..]);
+    let mut bodies = Vec::with_capacity(count);
+    for (kind, numbers) in kinds.iter().zip(numbers.chunks_exact(NUMBERS)) {
+        let at = |first: usize| [numbers[first], numbers[first + 1], numbers[first + 2]];
+        let pose = |first: usize| std::array::from_fn(|k| numbers[first + k]);
+        let shape = match kind {
+            0 => BodyShape::Sphere { radius: numbers[0] },
+            1 => BodyShape::Capsule { radius: numbers[0], length: numbers[1] },
+            2 => BodyShape::Plane { normal: at(0) },
+            3 => BodyShape::Box { half: at(0) },
+            4 => {
+                let (mine, rest) = sizes.split_at(2);
+                let (of_body, vertices_left) = vertices.split_at(mine[0] as usize);
+                let (faces, triangles_left) = triangles.split_at(mine[1] as usize);
+                (vertices, triangles, sizes) = (vertices_left, triangles_left, rest);
+                BodyShape::Mesh { vertices: of_body.to_vec(), triangles: faces.to_vec() }
+            }
+            &kind => return Err(DecodeError::UnknownShape { kind }),
+        };
+        bodies.push(BodyMotion {
+            shape,
+            start: pose(3),
+            end: pose(10),
+            friction: numbers[17],
+            compliance: numbers[18],
+        });
+    }
+    Ok(bodies)
+}
+
+/// A sum of announced counts as a length, if it is within the limit.
+fn checked_sum(what: &'static str, sum: u64, count_max: u32) -> Result<usize, DecodeError> {
+    check_count(what, u32::try_from(sum).unwrap_or(u32::MAX), count_max)
+}
