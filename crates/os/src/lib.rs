@@ -2,6 +2,7 @@
 //! threads that are woken in time or stand back, memory that is given back, the time a thread computed,
 //! errors as one line, the file of a token, and who can read a file.
 
+mod beside;
 mod cpu_time;
 mod end;
 mod end_signals;
@@ -12,6 +13,7 @@ mod private_file;
 mod token_file;
 mod urgency;
 
+pub use beside::Beside;
 pub use cpu_time::thread_cpu_time;
 pub use end::end_within;
 pub use end_signals::{EndSignal, on_end_signal};

@@ -22,6 +22,7 @@ mod kind;
 mod limits;
 mod message;
 mod payload;
+pub mod solve_report;
 
 pub use error::{ConnectionError, DecodeError, EncodeError, FrameError};
 pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION};
