@@ -68,9 +68,9 @@ pub(super) fn show(
 
 /// Loads other objects of the same size.
 fn load_beside(request: ObjectRequest) -> LoadObject {
-    Arc::new(move |choice, mut goes_on| {
+    Arc::new(move |choice, goes_on| {
         let request = ObjectRequest { choice, ..request.clone() };
-        load(&request, &mut goes_on).map_err(|error| error.to_string()).transpose()
+        load(&request, goes_on).map_err(|error| error.to_string()).transpose()
     })
 }
 
