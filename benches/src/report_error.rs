@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use glove_client::connection::LinkError;
+use glove_client::ask::connection::LinkError;
 use softgrasp_core::contact::MaskError;
 use softgrasp_core::fem::MaterialError;
 use softgrasp_core::mesh::{GenerateError, MeshError};
@@ -10,7 +10,7 @@ use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::equilibrium::NoEquilibrium;
 use softgrasp_core::solve::{FrontError, PartitionError, SolveError};
-use softgrasp_core::sphere_tree::TreeError;
+use softgrasp_grasp::sphere_tree::TreeError;
 
 use crate::plot::PlotError;
 

@@ -1,6 +1,6 @@
 //! The requests of all reports to a server: to keep a model and to answer frames.
 
-use glove_client::connection::{LinkError, ServerConnection, unexpected};
+use glove_client::ask::connection::{LinkError, ServerConnection, unexpected};
 use softgrasp_protocol::{
     Answer, FrameRequest, Limits, ModelHash, Question, Reply, Request, UploadModel,
 };

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_protocol::{
     DeformationChoice, FrameRequest, LargeAsk, LargeFrame, LawName, ModelHash, NodeChoice, Pace,
     PathChoice, Reply, Request,
@@ -112,7 +112,7 @@ impl Subject {
                 let error = answered.answer.report.error_estimate_rel;
                 Ok(error.is_some_and(|error| error <= 2e-3))
             }
-            other => Err(glove_client::connection::unexpected("Frame", &other).into()),
+            other => Err(glove_client::ask::connection::unexpected("Frame", &other).into()),
         }
     }
 }

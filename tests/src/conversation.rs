@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_protocol::asynchronous::Connection;
 use softgrasp_protocol::{
     ConnectionError, Hello, Limits, ModelHash, NodeChoice, Precision, Reply, Request,

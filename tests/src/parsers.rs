@@ -3,16 +3,16 @@
 //! Bytes may be refused, but they never panic, hang, or take memory that they only announce; and what is
 //! accepted stays the same when it is written and read again.
 
-use glove_client::devices::calibration::Calibration;
-use glove_client::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
-use glove_client::devices::fastrak::{
+use glove_client::object::scene::SceneFile;
+use softgrasp_core::mesh_io::{parse, write_msh41};
+use softgrasp_hand::devices::calibration::Calibration;
+use softgrasp_hand::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
+use softgrasp_hand::devices::fastrak::{
     Encoding, FastrakEvent, FastrakFormat, FastrakParser, LengthUnit, OutputList,
 };
-use glove_client::devices::recordings::{LeapRecording, Trajectory};
-use glove_client::hand_setup::HandConfiguration;
-use glove_client::joints::JointsParser;
-use glove_client::scene::SceneFile;
-use softgrasp_core::mesh_io::{parse, write_msh41};
+use softgrasp_hand::devices::recordings::{LeapRecording, Trajectory};
+use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::joints::JointsParser;
 use softgrasp_protocol::{Frame, FrameBuffer, Kind, Limits, Reply, Request};
 
 use crate::raw_session::raw_frame;

@@ -10,22 +10,21 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use fea_server::ServerConfig;
+use glove_client::ask::deformation::Elasticity;
+use glove_client::ask::link::Link;
+use glove_client::ask::solve_settings::{SolveSettings, Subscription};
 use glove_client::commands::run::RunCommand;
-use glove_client::contact_model::ContactModel;
-use glove_client::deformation::Elasticity;
-use glove_client::grasp_loop::GraspLoop;
-use glove_client::hand_reader::{HandReader, HandSetup};
-use glove_client::link::Link;
 use glove_client::pace::Pace;
-use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
-use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::{SolveSettings, Subscription};
-use glove_client::tick_budget::Priority;
-use glove_client::tick_outcome::{LoopEvent, TickOutcome};
+use glove_client::pace::tick_budget::Priority;
+use glove_client::run::grasp_loop::GraspLoop;
+use glove_client::run::tick_outcome::{LoopEvent, TickOutcome};
 use nalgebra::Isometry3;
 use serde_json::Value;
-use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_core::mesh::{BuiltIn, generate};
+use softgrasp_grasp::grasp::{Grasp, StateName};
+use softgrasp_grasp::object::{ContactModel, SoftObject};
+use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_protocol::{ElementName, Material, MethodName};
 
 #[derive(Parser)]

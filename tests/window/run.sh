@@ -129,7 +129,7 @@ begin() {
     local name="$1"
     shift
     log="$work/$name.log" out="$work/$name.out" told=0
-    RUST_LOG=warn,glove_client=info,glove_client::places=debug NO_COLOR=1 \
+    RUST_LOG=warn,glove_client=info,softgrasp_hand=info,softgrasp_window=info,softgrasp_window::places=debug NO_COLOR=1 \
         "$client" "$@" >"$out" 2>"$log" &
     client_pid=$!
     local end=$((SECONDS + patience))

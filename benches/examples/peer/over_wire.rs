@@ -1,7 +1,7 @@
 //! Our answers as a client gets them: a model uploaded to a server, then one frame per right-hand
 //! side over a loopback socket.
 
-use glove_client::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
+use glove_client::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
 use softgrasp_bench::sample::timed_ms;
 use softgrasp_protocol::{
     Answer, DofValue, ElementName, FrameRequest, Material, MeshData, MethodName, ModelHash,

@@ -40,7 +40,7 @@ impl Problem {
 
     /// A mesh file of any known format; its regions count as one material.
     pub fn of_file(mesh: &Path, folder: &Path) -> anyhow::Result<Self> {
-        let mesh = glove_client::mesh_file::read_mesh_file(mesh)?.mesh;
+        let mesh = glove_client::object::mesh_file::read_mesh_file(mesh)?.mesh;
         let one_region = TetMesh::try_new(mesh.vertices().to_vec(), mesh.tets().to_vec(), vec![])?;
         Self::of_mesh(one_region, folder)
     }

@@ -1,8 +1,8 @@
 //! Brute force: every vertex against every collider. What it finds must not be missed.
 
 use nalgebra::{Point3, Vector3};
-use softgrasp_core::hand::{FingerColliders, HandColliders};
-use softgrasp_core::shape::{Cylinder, Sphere};
+use softgrasp_grasp::hand::{FingerColliders, HandColliders};
+use softgrasp_grasp::shape::{Cylinder, Sphere};
 
 /// What really is inside a hand.
 #[derive(Clone, Debug, PartialEq)]

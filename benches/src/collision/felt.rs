@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::bounding_volume::Aabb;
-use softgrasp_core::grasp::{Grasp, sense};
-use softgrasp_core::hand::{FingerColliders, HandColliders};
-use softgrasp_core::shape::{Cylinder, Sphere};
-use softgrasp_core::sphere_tree::{
+use softgrasp_grasp::grasp::{Grasp, sense};
+use softgrasp_grasp::hand::{FingerColliders, HandColliders};
+use softgrasp_grasp::shape::{Cylinder, Sphere};
+use softgrasp_grasp::sphere_tree::{
     Closeness, SphereTree, cylinder_meets_sphere, sphere_meets_sphere, tip_hits,
 };
 

@@ -1,7 +1,7 @@
 //! The poses of hands that close around the object until their fingertips are inside it.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use softgrasp_core::hand::{HandColliders, HandDimensions, JointAngles, pose};
+use softgrasp_grasp::hand::{HandColliders, HandDimensions, JointAngles, pose};
 
 use super::brute::contact;
 
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use crate::collision::skin::Skin;
     use softgrasp_core::mesh::BuiltIn;
-    use softgrasp_core::sphere_tree::vertex_normals;
+    use softgrasp_grasp::sphere_tree::vertex_normals;
 
     #[test]
     fn fingertips_touch_every_object_that_is_measured() {

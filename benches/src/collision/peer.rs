@@ -4,8 +4,8 @@ use nalgebra::Point3;
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
-use softgrasp_core::hand::HandColliders;
-use softgrasp_core::shape::{Cylinder, Sphere};
+use softgrasp_grasp::hand::HandColliders;
+use softgrasp_grasp::shape::{Cylinder, Sphere};
 
 /// What the peer's leaves are boxes of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

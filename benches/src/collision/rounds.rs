@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 use parry3d::bounding_volume::Aabb;
-use softgrasp_core::hand::HandColliders;
 use softgrasp_core::mesh::BuiltIn;
-use softgrasp_core::sphere_tree::{SphereTree, vertex_normals};
+use softgrasp_grasp::hand::HandColliders;
+use softgrasp_grasp::sphere_tree::{SphereTree, vertex_normals};
 
 use super::brute::Inside;
 use super::felt::{self, SurfaceOf};

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use glove_client::connection::{Host, ServerChoice, ServerConnection};
-use glove_client::contact_model::ContactModel;
+use glove_client::ask::connection::{Host, ServerChoice, ServerConnection};
+use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{Answer, FrameRequest, ModelHash, Question, Request, SolveReport};
 
 use super::half_space;

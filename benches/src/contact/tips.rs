@@ -1,11 +1,11 @@
 //! Tips that touch an object, and what each contact model asks for them.
 
-use glove_client::contact_model::ContactModel;
 use nalgebra::Point3;
 use softgrasp_core::contact::SurfaceStars;
 use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_core::model::{Element, Model};
+use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{
     DofValue, ElementName, Masks, MeshData, MethodName, NodeChoice, Precision, Question,
     UploadModel, Want,

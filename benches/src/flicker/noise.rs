@@ -1,8 +1,9 @@
 //! Noise of a glove and a tracker, put on the bytes that they send.
 
-use crate::random::Random;
-use glove_client::arrival::{Arrival, Device};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use softgrasp_hand::arrival::{Arrival, Device};
+
+use crate::random::Random;
 
 /// Standard deviation of the tracker's position along each axis, cm (0.8 mm).
 const POSITION_CM: f64 = 0.08;

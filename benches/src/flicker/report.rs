@@ -1,6 +1,6 @@
 //! The table of report `flicker`.
 
-use softgrasp_core::grasp::{Grasp, StateName};
+use softgrasp_grasp::grasp::{Grasp, StateName};
 
 use super::trial::{RATE_HZ, Stage};
 use crate::report::{Options, Report, ReportError, progress};

@@ -1,16 +1,17 @@
 //! One hand with noise: how often a grasp that is held changes, and how late it lets go.
 
 use anyhow::Context;
-use glove_client::arrival::Arrival;
-use glove_client::contact_model::ContactModel;
-use glove_client::hand_reader::{HandReader, HandSetup};
-use glove_client::loading::{LoadedObject, ObjectRequest, load};
-use glove_client::scene::{ObjectChoice, size_to_hold};
-use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
+use glove_client::object::loading::{ObjectRequest, load};
+use glove_client::object::scene::size_to_hold;
 use nalgebra::Isometry3;
-use softgrasp_core::grasp::{Grasp, StateName, StepInput, sense};
-use softgrasp_core::hand::HandColliders;
 use softgrasp_core::mesh::BuiltIn;
+use softgrasp_grasp::grasp::{Grasp, StateName, StepInput, sense};
+use softgrasp_grasp::hand::HandColliders;
+use softgrasp_grasp::object::{ContactModel, ObjectChoice};
+use softgrasp_hand::arrival::Arrival;
+use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::loaded_object::LoadedObject;
+use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 
 use super::noise::Noise;
 

@@ -1,7 +1,7 @@
 //! A client that asks for frames of one object and compares every answer with the right one.
 
-use glove_client::connection::{Host, ServerConnection};
-use glove_client::contact_model::ContactModel;
+use glove_client::ask::connection::{Host, ServerConnection};
+use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{
     Answer, FrameRequest, MethodName, ModelHash, NodeChoice, Question, Request, StageMs,
     UploadModel,

@@ -1,6 +1,6 @@
 //! Writes the page: frames of the default contact, of single nodes, then of every method.
 
-use glove_client::connection::{Host, ServerChoice};
+use glove_client::ask::connection::{Host, ServerChoice};
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::Method;
 use softgrasp_protocol::StageMs;

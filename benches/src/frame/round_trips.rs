@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use glove_client::connection::Host;
+use glove_client::ask::connection::Host;
 
 use super::asker::{Asked, Asker, Trip};
 use crate::echo::{Echo, Ends, Waiting};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glove_client::mesh_file::read_mesh_file;
+use glove_client::object::mesh_file::read_mesh_file;
 use softgrasp_core::mesh::{BuiltIn, generate};
 use softgrasp_core::model::Element;
 

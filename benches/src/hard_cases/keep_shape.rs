@@ -1,9 +1,8 @@
 //! Cases in which a shape is kept again and again: each answer is the next rest shape.
 
+use glove_client::ask::connection::Host;
 use nalgebra::Vector3;
 use softgrasp_core::mesh::Inversion;
-
-use glove_client::connection::Host;
 
 use super::answer::Answer;
 use super::case::{Allowed, Case, Family, Form, Question, Reach, Repeats, THREADS, plain};

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use glove_client::connection::{Host, LinkError, ServerConnection};
+use glove_client::ask::connection::{Host, LinkError, ServerConnection};
 use softgrasp_core::model::Element;
 use softgrasp_protocol::{
     DofValue, ElementChoice, ElementName, FrameRequest, Masks, Material, MeshData, MethodName,

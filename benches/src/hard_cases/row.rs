@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use glove_client::connection::{Host, ServerChoice};
+use glove_client::ask::connection::{Host, ServerChoice};
 
 use super::answer::Answer;
 use super::case::{Allowed, Case, Family, Reach, Repeats, THREADS};

@@ -1,6 +1,6 @@
 //! Lists what is asked: every method with every element, `condensed`, masks, and the server.
 
-use glove_client::connection::Host;
+use glove_client::ask::connection::Host;
 use softgrasp_core::model::Element;
 use softgrasp_core::solve::Method;
 

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use fea_server::{RunningServer, ServerConfig};
-use glove_client::connection::{Host, LinkError, ServerChoice, ServerConnection};
+use glove_client::ask::connection::{Host, LinkError, ServerChoice, ServerConnection};
 use softgrasp_protocol::{Answer, FrameRequest, ModelHash, NodeChoice, Request};
 
 use super::kept::{Kept, Solved, keep};

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use glove_client::connection::{Host, ServerChoice, ServerConnection, unexpected};
+use glove_client::ask::connection::{Host, ServerChoice, ServerConnection, unexpected};
 use softgrasp_core::mesh::{BuiltIn, Surface};
 use softgrasp_protocol::{
     ElementName, LargeAnswer, LargeAsk, LargeFrame, Masks, Material, MeshData, ModelHash,

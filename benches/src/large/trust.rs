@@ -1,6 +1,6 @@
 //! How far estimates can be trusted: random squeezes of real and generated objects, every budget.
 
-use glove_client::mesh_file::read_mesh_file;
+use glove_client::object::mesh_file::read_mesh_file;
 use softgrasp_core::mesh::TetMesh;
 
 use super::estimates::{Judged, Reference, judge};

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use glove_client::connection::{Host, ServerChoice};
+use glove_client::ask::connection::{Host, ServerChoice};
 use softgrasp_core::mesh::BuiltIn;
 
 use super::grips::{Grip, Grips, TOUCHED};

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use glove_client::connection::{Host, ServerConnection};
+use glove_client::ask::connection::{Host, ServerConnection};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{FrontAnalysis, FrontFactor, Loads, Method};
 use softgrasp_protocol::{

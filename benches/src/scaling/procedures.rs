@@ -3,12 +3,12 @@
 
 use std::time::Duration;
 
-use glove_client::connection::{Host, ServerChoice, unexpected};
+use glove_client::ask::connection::{Host, ServerChoice, unexpected};
 use nalgebra::{Isometry3, Point3, Vector3};
-use softgrasp_core::hand::{HandColliders, HandDimensions, JointAngles, pose};
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::Method;
-use softgrasp_core::sphere_tree::{SphereTree, tip_hits, vertex_normals};
+use softgrasp_grasp::hand::{HandColliders, HandDimensions, JointAngles, pose};
+use softgrasp_grasp::sphere_tree::{SphereTree, tip_hits, vertex_normals};
 use softgrasp_protocol::{Reply, Request};
 
 use crate::reference::{Reference, error_rel};

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::Method;
 use softgrasp_protocol::{NodeChoice, Request, SolveOnce};

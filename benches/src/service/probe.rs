@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::{
     DofValue, FrameRequest, MethodName, ModelHash, NodeChoice, Reply, Request, UploadModel,

@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use glove_client::connection::{LinkError, ServerConnection, unexpected};
+use glove_client::ask::connection::{LinkError, ServerConnection, unexpected};
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{Limits, MeshData, RejectCode, Rejected, Reply, Request};

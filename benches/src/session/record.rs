@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use glove_client::grasp_loop::MODEL_READY;
+use glove_client::run::grasp_loop::MODEL_READY;
 use serde_json::Value;
-use softgrasp_core::grasp::{GraspEvent, StateName};
+use softgrasp_grasp::grasp::{GraspEvent, StateName};
 
 use crate::report_error::ReportError;
 

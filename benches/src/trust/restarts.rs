@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use glove_client::link::Link;
-use glove_client::model_upload::ModelUpload;
-use glove_client::tick_budget::Priority;
+use glove_client::ask::link::Link;
+use glove_client::ask::model_upload::ModelUpload;
+use glove_client::pace::tick_budget::Priority;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::{ModelHash, NodeChoice};
 

@@ -7,6 +7,18 @@
 //! decides by which method it is answered and reserves the memory, [`answer`] finds the model (in the
 //! [`store`] or in the request) and solves, and the session writes the reply. [`resources`] are what all
 //! requests share; [`status_pages`] tell of them.
+//!
+//! ```
+//! use std::net::SocketAddr;
+//!
+//! // In this process, on a free port of the loopback; `glove-client --server embedded` does the same.
+//! let listen = SocketAddr::from(([127, 0, 0, 1], 0));
+//! let config = fea_server::ServerConfig { listen, threads: 1, ..Default::default() };
+//! let server = fea_server::start(config)?;
+//! assert_ne!(server.address().port(), 0);
+//! server.stop();
+//! # Ok::<(), fea_server::StartError>(())
+//! ```
 
 mod access;
 mod answer;

@@ -9,12 +9,12 @@ use glove_client::commands::calibrate::CalibrateCommand;
 use glove_client::commands::devices::DevicesCommand;
 use glove_client::commands::emulate::EmulateCommand;
 use glove_client::commands::inspect::InspectCommand;
+use glove_client::commands::interruption;
 use glove_client::commands::mesh::MeshCommand;
 use glove_client::commands::record::RecordCommand;
 use glove_client::commands::replay::ReplayCommand;
 use glove_client::commands::run::RunCommand;
 use glove_client::commands::solve::SolveCommand;
-use glove_client::interruption;
 use softgrasp_os::one_line;
 
 /// Grasp and squeeze a soft object with an instrumented glove.

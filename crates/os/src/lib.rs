@@ -1,7 +1,18 @@
-//! What the programs share beside the mathematics and the wire: signals that are waited for,
-//! threads that are woken in time or stand back, memory that is given back, the time a thread computed,
+//! What the programs ask of the operating system: signals that are waited for, threads that are woken
+//! in time, stand back or work beside others, memory that is given back, the time a thread computed,
 //! errors as one line, the file of a token, and who can read a file.
+//!
+//! ```
+//! use softgrasp_os::Beside;
+//!
+//! // Long work on a thread of its own, while its owner goes on.
+//! let mut squares = Beside::start("squares", |n: u32| n * n)?;
+//! squares.begin(3);
+//! assert_eq!(squares.wait(), Some(9));
+//! # Ok::<(), std::io::Error>(())
+//! ```
 
+mod beside;
 mod cpu_time;
 mod end;
 mod end_signals;
@@ -12,6 +23,7 @@ mod private_file;
 mod token_file;
 mod urgency;
 
+pub use beside::Beside;
 pub use cpu_time::thread_cpu_time;
 pub use end::end_within;
 pub use end_signals::{EndSignal, on_end_signal};

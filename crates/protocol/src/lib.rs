@@ -11,6 +11,24 @@
 //!
 //! It does not interpret a message: whether a degree of freedom exists, a coordinate is finite or
 //! a method is known is the server's business.
+//!
+//! ```
+//! use softgrasp_protocol::{FrameBuffer, Limits, Request};
+//!
+//! let limits = Limits::default();
+//! let mut bytes = Vec::new();
+//! Request::Ping { nonce: 7 }.encode_into(1, &limits, &mut bytes)?;
+//!
+//! // The stream brings them in any pieces: "not yet" is `None`, "wrong" is an error.
+//! let mut buffer = FrameBuffer::new(limits);
+//! buffer.feed(&bytes[..10]);
+//! assert!(buffer.next_frame()?.is_none());
+//! buffer.feed(&bytes[10..]);
+//! let frame = buffer.next_frame()?.expect("all bytes have come");
+//! assert_eq!(frame.request_id(), 1);
+//! assert!(matches!(Request::decode(&frame, &limits)?, Request::Ping { nonce: 7 }));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod asynchronous;
 pub mod blocking;
@@ -22,6 +40,7 @@ mod kind;
 mod limits;
 mod message;
 mod payload;
+pub mod solve_report;
 
 pub use error::{ConnectionError, DecodeError, EncodeError, FrameError};
 pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION};

@@ -1,6 +1,6 @@
 //! The system that CalculiX solves for one question, and its input.
 
-use glove_client::calculix_deck::CalculixDeck;
+use glove_client::ask::calculix_deck::CalculixDeck;
 use nalgebra::Point3;
 use softgrasp_core::fem::{Element, QuadraticMesh};
 use softgrasp_core::mesh::TetMesh;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use glove_client::commands::mesh::MeshCommand;
-use glove_client::mesh_file::read_mesh_file;
+use glove_client::object::mesh_file::read_mesh_file;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 
 /// A mesh and the file it was read from.

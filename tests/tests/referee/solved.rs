@@ -5,8 +5,8 @@ use std::path::Path;
 
 use clap::Parser;
 use fea_server::{RunningServer, ServerConfig};
+use glove_client::ask::connection::ServerConnection;
 use glove_client::commands::solve::SolveCommand;
-use glove_client::connection::ServerConnection;
 use softgrasp_core::fem::{Element, Material};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{Loads, Method};

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use fea_server::{
     ConfigError, Encryption, RunningServer, ServerConfig, StartError, Tokens, make_certificate,
 };
-use glove_client::connection::{LinkError, ServerConnection};
-use glove_client::endpoint::{Endpoint, Trust};
+use glove_client::ask::connection::{LinkError, ServerConnection};
+use glove_client::ask::endpoint::{Endpoint, Trust};
 use softgrasp_protocol::{RejectCode, Reply, Request, VERSION};
 use softgrasp_tests::heard::Heard;
 use softgrasp_tests::questions::{cube, frame, once, upload};

@@ -2,7 +2,7 @@
 //! the session goes on.
 
 use fea_server::{RunningServer, ServerConfig};
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_protocol::RejectCode::{
     BadRequest, MemoryLimit, RigidMotionFree, TooLarge, UnknownMethod, UnknownModel,
 };

@@ -4,8 +4,8 @@ use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use fea_server::{ServerConfig, Tokens};
-use glove_client::connection::{LinkError, ServerConnection};
-use glove_client::endpoint::Endpoint;
+use glove_client::ask::connection::{LinkError, ServerConnection};
+use glove_client::ask::endpoint::Endpoint;
 use softgrasp_protocol::{Kind, Masks, Prefetch, RejectCode, Reply, Request, VERSION};
 use softgrasp_tests::heard::{AnswerBits, Heard};
 use softgrasp_tests::questions::{cube, frame, once, upload};

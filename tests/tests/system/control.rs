@@ -4,23 +4,22 @@ use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use glove_client::contact_model::ContactModel;
-use glove_client::control::Control;
-use glove_client::hand_reader::HandSetup;
-use glove_client::loading::LoadedObject;
-use glove_client::mesh_file::read_mesh_file;
-use glove_client::model_upload::ModelUpload;
-use glove_client::mouse::MouseInput;
-use glove_client::notice::NoticeKind;
-use glove_client::scripted::{PlanRequest, ScriptName};
-use glove_client::soft_object::SoftObject;
-use glove_client::tick_loop::Timing;
-use glove_client::tick_thread::TickThread;
+use glove_client::ask::model_upload::ModelUpload;
+use glove_client::object::mesh_file::read_mesh_file;
+use glove_client::run::tick_loop::Timing;
+use glove_client::run::tick_thread::TickThread;
 use nalgebra::Vector3;
-use softgrasp_core::grasp::StateName;
 use softgrasp_core::mesh::TetMesh;
+use softgrasp_grasp::grasp::StateName;
+use softgrasp_grasp::object::{ContactModel, SoftObject};
+use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::loaded_object::LoadedObject;
+use softgrasp_hand::mouse::MouseInput;
+use softgrasp_hand::notice::NoticeKind;
+use softgrasp_hand::scripted::{PlanRequest, ScriptName};
 use softgrasp_protocol::{ElementName, ModelHash};
 use softgrasp_tests::questions::cube;
+use softgrasp_window::view::control::Control;
 
 use crate::controlled::{Controlled, MATERIAL, summary};
 

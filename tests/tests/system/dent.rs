@@ -1,17 +1,17 @@
 //! What an object that has flowed looks like when the hand lets go.
 
-use glove_client::deformation::{Deformation, Elasticity};
-use glove_client::grasp_loop::GraspLoop;
-use glove_client::hand_reader::{HandReader, HandSetup};
-use glove_client::link::Link;
+use glove_client::ask::deformation::{Deformation, Elasticity};
+use glove_client::ask::link::Link;
+use glove_client::ask::solve_settings::SolveSettings;
 use glove_client::pace::Pace;
-use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
-use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::SolveSettings;
-use glove_client::tick_budget::Priority;
+use glove_client::pace::tick_budget::Priority;
+use glove_client::run::grasp_loop::GraspLoop;
 use nalgebra::Isometry3;
-use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
+use softgrasp_grasp::grasp::{Grasp, StateName};
+use softgrasp_grasp::object::SoftObject;
+use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_protocol::LawName;
 
 use crate::settings::linear_settings;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use fea_server::{RunningServer, ServerConfig};
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{
     Answer, DofValue, ElementName, FrameRequest, Masks, ModelHash, NodeChoice, Precision, Prefetch,

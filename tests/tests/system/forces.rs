@@ -1,18 +1,17 @@
 //! Forces of the fingertips while a strawberry is squeezed: they balance, they do work on the
 //! object, and they are there as long as the hand deforms it.
 
-use glove_client::contact_model::ContactModel;
-use glove_client::grasp_loop::GraspLoop;
-use glove_client::hand_reader::{HandReader, HandSetup};
-use glove_client::link::Link;
+use glove_client::ask::link::Link;
+use glove_client::ask::solve_settings::SolveSettings;
 use glove_client::pace::Pace;
-use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
-use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::SolveSettings;
-use glove_client::tick_budget::Priority;
+use glove_client::pace::tick_budget::Priority;
+use glove_client::run::grasp_loop::GraspLoop;
 use nalgebra::{Isometry3, Vector3};
-use softgrasp_core::grasp::{Grasp, StateName};
 use softgrasp_core::mesh::{BuiltIn, generate};
+use softgrasp_grasp::grasp::{Grasp, StateName};
+use softgrasp_grasp::object::{ContactModel, SoftObject};
+use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_protocol::ElementName;
 
 use crate::settings::linear_settings;

@@ -1,19 +1,18 @@
 //! Keep shape: the old model answers while the new one is made, and a shape with elements turned
 //! inside out is not kept.
 
-use glove_client::contact_model::ContactModel;
-use glove_client::grasp_loop::GraspLoop;
-use glove_client::hand_reader::{HandReader, HandSetup};
-use glove_client::link::Link;
+use glove_client::ask::link::Link;
+use glove_client::ask::solve_settings::SolveSettings;
 use glove_client::pace::Pace;
-use glove_client::scripted::{ScriptName, ScriptedHand, Seen};
-use glove_client::soft_object::SoftObject;
-use glove_client::solve_settings::SolveSettings;
-use glove_client::tick_budget::Priority;
-use glove_client::tick_outcome::LoopEvent;
+use glove_client::pace::tick_budget::Priority;
+use glove_client::run::grasp_loop::GraspLoop;
+use glove_client::run::tick_outcome::LoopEvent;
 use nalgebra::Isometry3;
-use softgrasp_core::grasp::{Command, Grasp, StateName};
 use softgrasp_core::mesh::TetMesh;
+use softgrasp_grasp::grasp::{Command, Grasp, StateName};
+use softgrasp_grasp::object::{ContactModel, SoftObject};
+use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_protocol::{ModelHash, Reply, Request};
 use softgrasp_tests::fake_server::start_fake_server;
 use softgrasp_tests::questions::{cube, frame, upload};

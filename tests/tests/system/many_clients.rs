@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use fea_server::ServerConfig;
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_protocol::{ModelHash, RejectCode, Reply, Request};
 use softgrasp_tests::heard::Heard;

@@ -1,7 +1,7 @@
 //! Contacts held by a weighted mean of nodes: right answers, kept sets, clear refusals.
 
 use fea_server::RunningServer;
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_protocol::RejectCode::{BadRequest, MemoryLimit, RigidMotionFree, UnknownMethod};
 use softgrasp_protocol::{
     Answer, DofValue, ElementChoice, ElementName, FrameRequest, Masks, ModelHash, Prefetch,

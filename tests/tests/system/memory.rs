@@ -1,7 +1,7 @@
 //! Memory: predicted and counted before it is taken, refused with numbers; the session lives on.
 
 use fea_server::ServerConfig;
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_core::model::{Element, Model};
 use softgrasp_core::solve::memory::Need;

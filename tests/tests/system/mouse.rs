@@ -1,12 +1,12 @@
 //! The mouse hand grasps, lets go, and grasps again from another side, by a few wishes.
 
-use glove_client::control::Control;
-use glove_client::hand_source::HandSource;
-use glove_client::mouse::{Digits, MouseInput, SPEED_MAX_M_S};
-use glove_client::notice::NoticeKind;
 use nalgebra::{UnitQuaternion, Vector3};
-use softgrasp_core::grasp::StateName;
 use softgrasp_core::mesh::{BuiltIn, generate};
+use softgrasp_grasp::grasp::StateName;
+use softgrasp_hand::hand_source::HandSource;
+use softgrasp_hand::mouse::{Digits, MouseInput, SPEED_MAX_M_S};
+use softgrasp_hand::notice::NoticeKind;
+use softgrasp_window::view::control::Control;
 
 use crate::controlled::Controlled;
 

@@ -1,7 +1,7 @@
 //! Numbers at the border of double precision: whatever is asked, by any method, an answer has finite
 //! numbers or there is none.
 
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{
     Answer, DeformationChoice, DofValue, FrameRequest, LargeAsk, LargeFrame, LawName, Material,

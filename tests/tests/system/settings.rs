@@ -1,8 +1,8 @@
 //! How the objects of these tests are solved.
 
-use glove_client::contact_model::ContactModel;
-use glove_client::deformation::Elasticity;
-use glove_client::solve_settings::{SolveSettings, Subscription};
+use glove_client::ask::deformation::Elasticity;
+use glove_client::ask::solve_settings::{SolveSettings, Subscription};
+use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{ElementName, Material, MethodName};
 
 /// A soft fruit of linear elasticity, held by masks; only its surface is asked for.

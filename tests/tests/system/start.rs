@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 
 use fea_server::{RunningServer, ServerConfig};
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_protocol::{Answer, Reply, Request};
 
 /// Settings for a server on a free loopback port with `threads` threads.

@@ -3,7 +3,7 @@
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_protocol::{RejectCode, Reply, Request};
 use softgrasp_tests::heard::AnswerBits;
 use softgrasp_tests::questions::{cube, frame, once, upload};

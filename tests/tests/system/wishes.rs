@@ -2,7 +2,7 @@
 //! report says when they cannot be kept.
 
 use fea_server::ServerConfig;
-use glove_client::connection::ServerConnection;
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_protocol::RejectCode::BadRequest;
 use softgrasp_protocol::{

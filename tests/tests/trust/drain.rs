@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 use fea_server::ServerConfig;
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_protocol::{RejectCode, Reply, Request};
 use softgrasp_tests::questions::{cube, frame, upload};
 use softgrasp_tests::watchdog::{until, within};

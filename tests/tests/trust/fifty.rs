@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use fea_server::{RunningServer, ServerConfig};
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{ModelHash, RejectCode, Reply, Request, SolveOnce, UploadModel};
 use softgrasp_tests::heard::displacement_hash;

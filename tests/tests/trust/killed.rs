@@ -4,9 +4,9 @@
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use glove_client::link::{Link, Reached, RequestEnd};
-use glove_client::model_upload::ModelUpload;
-use glove_client::tick_budget::Priority;
+use glove_client::ask::link::{Link, Reached, RequestEnd};
+use glove_client::ask::model_upload::ModelUpload;
+use glove_client::pace::tick_budget::Priority;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{Question, UploadModel};
 use softgrasp_tests::faulty_proxy::FaultyProxy;

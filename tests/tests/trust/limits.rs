@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use fea_server::{RunningServer, ServerConfig};
-use glove_client::connection::{LinkError, ServerConnection};
+use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{HEADER_LEN, ModelHash, RejectCode, Reply, Request};
 use softgrasp_tests::questions::{cube, once, upload};

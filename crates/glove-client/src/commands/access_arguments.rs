@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use clap::Args;
 
-use crate::connection::ServerChoice;
-use crate::endpoint::{Endpoint, Trust};
+use crate::ask::connection::ServerChoice;
+use crate::ask::endpoint::{Endpoint, Trust};
 
 /// What a server elsewhere wants.
 #[derive(Args, Clone, Default)]

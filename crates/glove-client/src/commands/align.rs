@@ -4,6 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use nalgebra::{Isometry3, Point3};
+use softgrasp_hand::devices::ReceiverMount;
+use softgrasp_hand::devices::alignment::{
+    AlignmentError, AveragedPose, FlatHand, MountPart, Pivot, StandTilt, aligned_mount,
+    aligned_stand, average_pose, find_pivot,
+};
+use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::serial::SerialSource;
 
 use super::arm_recording::{ArmRecording, ArmSource, Held, record_arm};
 use super::collecting::Patience;
@@ -11,13 +18,6 @@ use super::hand_files::{read_configuration, write_configuration};
 use super::live_samples::live_arm;
 use super::numbers::place;
 use super::output::print;
-use crate::devices::ReceiverMount;
-use crate::devices::alignment::{
-    AlignmentError, AveragedPose, FlatHand, MountPart, Pivot, StandTilt, aligned_mount,
-    aligned_stand, average_pose, find_pivot,
-};
-use crate::hand_setup::HandConfiguration;
-use crate::serial::SerialSource;
 
 /// Align the tracker: receiver to wrist, transmitter to world.
 #[derive(Args)]
@@ -184,11 +184,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::devices::alignment::flat_hand_at;
-    use crate::devices::fastrak::{FastrakRecord, encode_record};
     use clap::Parser;
     use nalgebra::{UnitQuaternion, Vector3};
-    use softgrasp_core::hand::{Handedness, JointAngles};
+    use softgrasp_grasp::hand::{Handedness, JointAngles};
+    use softgrasp_hand::devices::alignment::flat_hand_at;
+    use softgrasp_hand::devices::fastrak::{FastrakRecord, encode_record};
 
     #[derive(Parser)]
     struct Line {

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use nalgebra::Isometry3;
-use softgrasp_core::hand::JointAngles;
+use softgrasp_grasp::hand::JointAngles;
+use softgrasp_hand::devices::cyberglove::{RawSensors, SensorSet};
+use softgrasp_hand::hand_setup::HandConfiguration;
 
 use super::collecting::{Patience, Phase, collect};
 use super::live_samples::{ArmSample, NextArmSample};
 use super::recorded_samples::{recorded_poses, recorded_readings};
-use crate::devices::cyberglove::{RawSensors, SensorSet};
-use crate::hand_setup::HandConfiguration;
 
 /// Where the samples of the arm come from.
 pub(super) enum ArmSource {

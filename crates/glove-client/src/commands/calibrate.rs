@@ -4,7 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
 use clap::Args;
-use softgrasp_core::hand::{HandDimensions, Handedness};
+use softgrasp_grasp::hand::{HandDimensions, Handedness};
+use softgrasp_hand::devices::calibration::{
+    Calibration, CalibrationHeader, FitReport, SensorFit, ThumbFit, sensor_name,
+};
+use softgrasp_hand::devices::cyberglove::{SensorCount, SensorSet};
+use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::serial::SerialSource;
 
 use super::collecting::Patience;
 use super::gestures::{GloveSource, Plan, take_gestures};
@@ -13,13 +19,7 @@ use super::live_samples::live_glove;
 use super::numbers::positive;
 use super::output::print;
 use super::sensor_bars::SensorBars;
-use crate::devices::calibration::{
-    Calibration, CalibrationHeader, FitReport, SensorFit, ThumbFit, sensor_name,
-};
-use crate::devices::cyberglove::{SensorCount, SensorSet};
-use crate::file_writing::write_file;
-use crate::hand_setup::HandConfiguration;
-use crate::serial::SerialSource;
+use crate::object::file_writing::write_file;
 
 /// Calibrate a glove: flat hand, fist, and if wanted the thumb.
 #[derive(Args)]
@@ -171,10 +171,10 @@ impl CalibrateCommand {
 mod tests {
     use super::super::hand_files::read_configuration;
     use super::*;
-    use crate::devices::calibration::thumb_across;
-    use crate::devices::cyberglove::{GloveRecord, RecordKind, encode_record};
     use clap::Parser;
-    use softgrasp_core::hand::JointAngles;
+    use softgrasp_grasp::hand::JointAngles;
+    use softgrasp_hand::devices::calibration::thumb_across;
+    use softgrasp_hand::devices::cyberglove::{GloveRecord, RecordKind, encode_record};
 
     #[derive(Parser)]
     struct Line {

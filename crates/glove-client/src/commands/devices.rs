@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
+use softgrasp_hand::serial::probe::{BAUDS, Found, probe, serial_ports, why_unusable};
 
 use super::output::print;
-use crate::serial::probe::{BAUDS, Found, probe, serial_ports, why_unusable};
 
 /// List the serial ports of this machine, and whether each can be opened.
 #[derive(Args)]

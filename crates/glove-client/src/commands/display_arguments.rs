@@ -6,10 +6,10 @@ use std::str::FromStr;
 use clap::Args;
 
 #[cfg(feature = "window")]
-use crate::view::camera::ViewCamera;
-use crate::view::display::{Display, Level, Spheres};
-use crate::view::moment::Moment;
-use crate::view::shading::Shading;
+use softgrasp_window::view::camera::ViewCamera;
+use softgrasp_window::view::display::{Display, Level, Spheres};
+use softgrasp_window::view::moment::Moment;
+use softgrasp_window::view::shading::Shading;
 
 /// What is seen of a run.
 #[derive(Args, Clone, Default)]

@@ -5,8 +5,8 @@ use clap::Args;
 use softgrasp_protocol::{LawName, MethodName};
 
 use super::numbers::positive;
-use crate::deformation::{Deformation, Elasticity};
-use crate::scene::SceneFile;
+use crate::ask::deformation::{Deformation, Elasticity};
+use crate::object::scene::SceneFile;
 
 /// How the object deforms.
 #[derive(Args, Clone, Copy, Default)]

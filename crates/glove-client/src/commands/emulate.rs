@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use softgrasp_emulator::FaultSetting;
+use softgrasp_grasp::object::ObjectChoice;
+use softgrasp_hand::scripted::ScriptName;
 
 use super::numbers::{count, positive};
-use crate::devices::emulator::FaultSetting;
-use crate::scene::ObjectChoice;
-use crate::scripted::ScriptName;
 
 /// Emulate a glove and a tracker: prints the path of each, which can be opened as a serial port, and
 /// serves until it is stopped.
@@ -66,27 +66,28 @@ mod serving {
     use std::time::Duration;
 
     use anyhow::{Context, bail};
-    use softgrasp_core::hand::Handedness;
     use softgrasp_core::mesh::BuiltIn;
+    use softgrasp_grasp::hand::Handedness;
 
     use super::EmulateCommand;
+    use crate::commands::interruption;
     use crate::commands::output::print;
+    use crate::commands::progress::Progress;
     use crate::commands::recorded_settings::recorded_hand;
-    use crate::contact_model::ContactModel;
-    use crate::devices::cyberglove::SensorCount;
-    use crate::devices::emulator::{
+    use crate::object::loading::{ObjectRequest, load};
+    use crate::object::scene::{NODES_DEFAULT, size_to_hold};
+    use softgrasp_emulator::emulation::{Emulation, GloveLine, PseudoTerminal, TrackerLine};
+    use softgrasp_emulator::{
         EmulatedGlove, EmulatedGloveKind, EmulatedTracker, EmulatedTrackerKind,
     };
-    use crate::devices::recordings::Trajectory;
-    use crate::hand_reader::HandSetup;
-    use crate::interruption;
-    use crate::loading::{ObjectRequest, load};
-    use crate::progress::Progress;
-    use crate::recording::read_recording;
-    use crate::scene::{NODES_DEFAULT, ObjectChoice, size_to_hold};
-    use crate::scripted::Rehearsal;
-    use crate::serial::emulate::{Emulation, GloveLine, PseudoTerminal, TrackerLine};
-    use crate::serial::motion::Motion;
+    use softgrasp_grasp::object::ContactModel;
+    use softgrasp_grasp::object::ObjectChoice;
+    use softgrasp_hand::devices::cyberglove::SensorCount;
+    use softgrasp_hand::devices::recordings::Trajectory;
+    use softgrasp_hand::hand_reader::HandSetup;
+    use softgrasp_hand::recording::read_recording;
+    use softgrasp_hand::scripted::Rehearsal;
+    use softgrasp_hand::serial::motion::Motion;
 
     impl EmulateCommand {
         /// Prints the paths and serves until it is stopped.

@@ -3,14 +3,16 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use softgrasp_core::hand::JointAngles;
+use softgrasp_grasp::hand::JointAngles;
+use softgrasp_hand::devices::calibration::{
+    Calibration, FitReport, Gesture, fit_gestures, thumb_across,
+};
+use softgrasp_hand::devices::cyberglove::{RawSensors, SensorCount};
 
 use super::collecting::{Patience, Phase, collect};
 use super::live_samples::NextReading;
 use super::recorded_samples::recorded_readings;
 use super::sensor_bars::SensorBars;
-use crate::devices::calibration::{Calibration, FitReport, Gesture, fit_gestures, thumb_across};
-use crate::devices::cyberglove::{RawSensors, SensorCount};
 
 /// Where the readings of a gesture come from.
 pub(super) enum GloveSource {
@@ -174,8 +176,8 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::devices::calibration::{SensorFit, ThumbFit};
-    use crate::devices::cyberglove::Sensor;
+    use softgrasp_hand::devices::calibration::{SensorFit, ThumbFit};
+    use softgrasp_hand::devices::cyberglove::Sensor;
 
     const AT_ONCE: Patience =
         Patience { get_ready: Duration::ZERO, silence: Duration::from_secs(30) };

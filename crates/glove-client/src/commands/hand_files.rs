@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
+use softgrasp_hand::hand_setup::HandConfiguration;
 
-use crate::file_writing::write_file;
-use crate::hand_setup::HandConfiguration;
+use crate::object::file_writing::write_file;
 
 /// Reads a configuration and, where it names one, its calibration.
 ///

@@ -9,12 +9,12 @@ use softgrasp_core::mesh_io::{self, MeshFile, keeps_labels};
 use softgrasp_core::solve::memory::Bytes;
 
 use super::output::print;
-use crate::connection::OwnMachine;
-use crate::file_writing::write_file;
-use crate::inspection::Inspection;
-use crate::mesh_file::read_mesh_file;
-use crate::mesh_writing::encode_mesh;
-use crate::progress::Progress;
+use crate::ask::connection::OwnMachine;
+use crate::commands::progress::Progress;
+use crate::inspect::inspection::Inspection;
+use crate::object::file_writing::write_file;
+use crate::object::mesh_file::read_mesh_file;
+use crate::object::mesh_writing::encode_mesh;
 
 /// Tell what is in a mesh file, whether it can be used, and what an answer would cost.
 #[derive(Args)]

@@ -4,14 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use softgrasp_core::grasp::{GraspEvent, StateName};
 use softgrasp_core::mesh_io::{PointField, write_vtu};
+use softgrasp_grasp::grasp::{GraspEvent, StateName};
+use softgrasp_grasp::object::{RestShape, SoftObject};
+use softgrasp_os::Beside;
 
-use crate::beside::Beside;
-use crate::file_writing::write_file;
-use crate::rest_shape::RestShape;
-use crate::soft_object::SoftObject;
-use crate::tick_outcome::{LoopEvent, TickOutcome};
+use crate::object::file_writing::write_file;
+use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
 /// Writes the object when it starts to deform, just before its shape is kept or let go, and after.
 pub struct KeyFrames {

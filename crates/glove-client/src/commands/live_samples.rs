@@ -4,13 +4,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use nalgebra::Isometry3;
-
-use crate::arrival::Arrival;
-use crate::devices::HandSample;
-use crate::devices::cyberglove::RawSensors;
-use crate::hand_reader::HandReader;
-use crate::hand_setup::HandConfiguration;
-use crate::serial::{SerialDevices, SerialSettings, SerialSource};
+use softgrasp_hand::arrival::Arrival;
+use softgrasp_hand::devices::HandSample;
+use softgrasp_hand::devices::cyberglove::RawSensors;
+use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::serial::{SerialDevices, SerialSettings, SerialSource};
 
 /// Gives the next reading of the glove; waits for it a short while, `None` if none came.
 pub(super) type NextReading = Box<dyn FnMut() -> Option<RawSensors>>;

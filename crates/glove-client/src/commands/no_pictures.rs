@@ -3,9 +3,9 @@
 use anyhow::bail;
 
 use super::run_arguments::{RunArguments, RunPlan};
-use crate::grasp_loop::GraspLoop;
 use crate::pace::Due;
-use crate::tick_outcome::TickOutcome;
+use crate::run::grasp_loop::GraspLoop;
+use crate::run::tick_outcome::TickOutcome;
 
 /// Never made.
 pub(super) enum RunPictures {}

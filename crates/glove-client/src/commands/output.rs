@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context;
 
-use crate::file_writing::write_file;
+use crate::object::file_writing::write_file;
 
 /// Writes a value as indented JSON with a final newline.
 ///

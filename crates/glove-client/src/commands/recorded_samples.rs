@@ -4,10 +4,11 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use nalgebra::Isometry3;
-
-use crate::devices::cyberglove::{GloveEvent, GloveParser, RawSensors, RecordOptions, SensorCount};
-use crate::devices::fastrak::{FastrakEvent, FastrakParser};
-use crate::hand_setup::HandConfiguration;
+use softgrasp_hand::devices::cyberglove::{
+    GloveEvent, GloveParser, RawSensors, RecordOptions, SensorCount,
+};
+use softgrasp_hand::devices::fastrak::{FastrakEvent, FastrakParser};
+use softgrasp_hand::hand_setup::HandConfiguration;
 
 /// A gesture's recording is no longer than this: 20 minutes of a glove.
 const MAX_BYTES: u64 = 4 << 20;

@@ -2,13 +2,13 @@
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use softgrasp_hand::devices::calibration::Calibration;
+use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::recording::RecordedSetup;
 use softgrasp_protocol::{ElementName, LawName, Material};
 
-use crate::deformation::Elasticity;
-use crate::devices::calibration::Calibration;
-use crate::hand_setup::HandConfiguration;
-use crate::recording::RecordedSetup;
-use crate::solve_settings::{SolveSettings, Subscription};
+use crate::ask::deformation::Elasticity;
+use crate::ask::solve_settings::{SolveSettings, Subscription};
 
 /// The settings of a recorded run.
 ///

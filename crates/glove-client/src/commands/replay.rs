@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
+use softgrasp_hand::hand_request::HandRequest;
 
 use super::access_arguments::AccessArguments;
 use super::numbers::{count, speed};
 use super::run::RunCommand;
 use super::run_arguments::RunArguments;
 use super::tell_report::tell;
-use crate::connection::ServerChoice;
-use crate::hand_request::HandRequest;
+use crate::ask::connection::ServerChoice;
 
 /// Play a recording again without a window, and hold what comes out against it.
 #[derive(Args)]

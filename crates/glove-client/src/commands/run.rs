@@ -13,14 +13,14 @@ use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 #[cfg(feature = "window")]
 use super::run_window;
 use super::tell_report::tell;
-use crate::control::Control;
-use crate::hand_request::HandRequest;
-use crate::interruption;
+use crate::commands::interruption;
+use crate::commands::progress::Progress;
 use crate::pace::Pace;
-use crate::progress::Progress;
-use crate::run_report::RunReport;
-use crate::status_line::StatusLine;
-use crate::tick_loop::{TickLoop, Timing};
+use crate::run::run_report::RunReport;
+use crate::run::status_line::StatusLine;
+use crate::run::tick_loop::{TickLoop, Timing};
+use softgrasp_hand::hand_request::HandRequest;
+use softgrasp_window::view::control::Control;
 
 /// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
 #[derive(Args, Default)]

@@ -9,8 +9,15 @@ use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::{Isometry3, Point3, Translation3};
 use softgrasp_core::fem::{Element, Material as ElasticMaterial};
-use softgrasp_core::hand::HandDimensions;
 use softgrasp_core::solve::choose::cheapest_element;
+use softgrasp_grasp::hand::HandDimensions;
+use softgrasp_grasp::object::{ContactModel, ObjectChoice};
+use softgrasp_hand::foreign_recording::is_foreign;
+use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::hand_request::HandRequest;
+use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::recording::{Recording, read_recording};
+use softgrasp_hand::scripted::ScriptName;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
 use super::access_arguments::AccessArguments;
@@ -19,19 +26,12 @@ use super::elasticity_arguments::ElasticityArguments;
 use super::hand_files::read_configuration;
 use super::numbers::{count, place, poisson, positive, speed, ticks};
 use super::recorded_settings::{recorded_hand, recorded_place, recorded_settings};
-use crate::connection::ServerChoice;
-use crate::contact_model::ContactModel;
-use crate::endpoint::Endpoint;
-use crate::foreign_recording::is_foreign;
-use crate::hand_reader::HandSetup;
-use crate::hand_request::HandRequest;
-use crate::hand_setup::HandConfiguration;
-use crate::loading::ObjectRequest;
+use crate::ask::connection::ServerChoice;
+use crate::ask::endpoint::Endpoint;
+use crate::ask::solve_settings::{SolveSettings, Subscription};
+use crate::object::loading::ObjectRequest;
+use crate::object::scene::{NODES_DEFAULT, SceneFile, size_to_hold};
 use crate::pace::Pace;
-use crate::recording::{Recording, read_recording};
-use crate::scene::{NODES_DEFAULT, ObjectChoice, SceneFile, size_to_hold};
-use crate::scripted::ScriptName;
-use crate::solve_settings::{SolveSettings, Subscription};
 
 /// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
 #[derive(Args, Clone, Default)]

@@ -3,20 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use softgrasp_window::view::camera::ViewCamera;
+use softgrasp_window::view::display::{Display, Level};
+use softgrasp_window::view::frame::ViewFrame;
+use softgrasp_window::view::moment::{Moment, Watch};
+use softgrasp_window::view::object_skin::Look;
+use softgrasp_window::window::{Animation, Pictures, RgbImage, png};
 
 use super::display_arguments::DisplayArguments;
 use super::run_arguments::{RunArguments, RunPlan};
-use crate::file_writing::write_file;
-use crate::grasp_loop::GraspLoop;
+use crate::object::file_writing::write_file;
 use crate::pace::Due;
-use crate::tick_outcome::TickOutcome;
-use crate::view::camera::ViewCamera;
-use crate::view::display::{Display, Level};
-use crate::view::frame::ViewFrame;
-use crate::view::moment::{Moment, Watch};
-use crate::view::object_skin::Look;
-use crate::view::observer::Observer;
-use crate::window::{Animation, Pictures, RgbImage, png};
+use crate::run::grasp_loop::GraspLoop;
+use crate::run::observer::Observer;
+use crate::run::tick_outcome::TickOutcome;
 
 /// Draws what was asked for, tick by tick.
 pub(super) struct RunPictures {

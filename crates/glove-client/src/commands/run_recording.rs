@@ -4,12 +4,12 @@ use std::path::Path;
 
 use anyhow::ensure;
 use softgrasp_core::mesh::TetMesh;
+use softgrasp_hand::loaded_object::LoadedObject;
+use softgrasp_hand::recording::{RecordedSetup, Recorder, VERSION};
 
 use super::run_arguments::RunPlan;
-use crate::digest::Digest;
-use crate::loading::LoadedObject;
-use crate::recording::{RecordedSetup, Recorder, VERSION};
-use crate::solve_settings::{SolveSettings, Subscription};
+use crate::ask::digest::Digest;
+use crate::ask::solve_settings::{SolveSettings, Subscription};
 
 /// Begins the recording of a run.
 ///

@@ -5,30 +5,31 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use nalgebra::Isometry3;
-use softgrasp_core::grasp::Grasp;
+use softgrasp_grasp::grasp::Grasp;
+use softgrasp_grasp::object::SoftObject;
+use softgrasp_hand::foreign_recording::{ForeignHand, is_foreign};
+use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::hand_request::HandRequest;
+use softgrasp_hand::hand_source::HandSource;
+use softgrasp_hand::joints::JointsListener;
+use softgrasp_hand::live_hand::LiveHand;
+use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
+use softgrasp_hand::mouse::MouseHand;
+use softgrasp_hand::recording::ReplayHand;
+use softgrasp_hand::scripted::{GraspPlan, NoGrasp, Planner, ScriptedHand};
+use softgrasp_hand::serial::{SerialDevices, SerialSettings};
 
 use super::run_arguments::RunPlan;
 use super::run_recording::{check_object, start_recorder};
-use crate::connection::Host;
-use crate::foreign_recording::{ForeignHand, is_foreign};
-use crate::grasp_loop::GraspLoop;
-use crate::hand_reader::HandReader;
-use crate::hand_request::HandRequest;
-use crate::hand_source::HandSource;
-use crate::interruption;
-use crate::joints::JointsListener;
-use crate::link::Link;
-use crate::live_hand::LiveHand;
-use crate::loading::{LoadStage, LoadedObject, load};
-use crate::mouse::MouseHand;
+use crate::ask::connection::Host;
+use crate::ask::link::Link;
+use crate::commands::interruption;
+use crate::object::loading::load;
 use crate::pace::Pace;
-use crate::recording::ReplayHand;
-use crate::run_report::RunReport;
-use crate::scripted::{GraspPlan, NoGrasp, Planner, ScriptedHand};
-use crate::serial::{SerialDevices, SerialSettings};
-use crate::session::{Session, priority_for};
-use crate::soft_object::SoftObject;
-use crate::tick_budget::Priority;
+use crate::pace::tick_budget::Priority;
+use crate::run::grasp_loop::GraspLoop;
+use crate::run::run_report::RunReport;
+use crate::run::session::{Session, priority_for};
 
 /// A run that can be played.
 pub(super) struct ReadyRun {

@@ -2,27 +2,34 @@
 
 use std::path::PathBuf;
 use std::process::exit;
+use std::sync::Arc;
+use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
 use anyhow::Context;
+use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::loaded_object::LoadStage;
 use softgrasp_os::one_line;
+use softgrasp_window::view::control::Control;
+use softgrasp_window::view::loading::LoadObject;
+use softgrasp_window::view::outlet::outlet;
+use softgrasp_window::window::{About, App, Opening, Start, Started, Ticks, WhenLost};
 
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 use super::tell_report::tell;
-use crate::connection::{Host, ServerChoice};
-use crate::hand_reader::HandSetup;
-use crate::interruption;
-use crate::loading::LoadStage;
-use crate::run_report::RunReport;
-use crate::tick_loop::Timing;
-use crate::tick_thread::TickThread;
-use crate::view::observer::Observer;
-use crate::view::outlet::outlet;
-use crate::window::{About, App, Opening, Start, Started, WhenLost};
+use crate::ask::connection::{Host, ServerChoice};
+use crate::commands::interruption;
+use crate::object::loading::{ObjectRequest, load};
+use crate::run::observer::Observer;
+use crate::run::run_report::RunReport;
+use crate::run::tick_loop::Timing;
+use crate::run::tick_thread::TickThread;
 
 /// Frames are offered to the window so often.
 const FRAMES_EVERY: Duration = Duration::from_millis(7);
+/// A run without its window is looked at so often.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Shows a run until the window is closed: its report, if it began; `None` where no window can be
 /// opened, which is said in a sentence.
@@ -38,9 +45,10 @@ pub(super) fn show(
         camera: arguments.shown.camera(),
         eye_is_chosen: arguments.shown.eye.is_some(),
         level_is_chosen: arguments.shown.light.is_some(),
-        object: plan.object_request(&HandSetup::default()),
+        object: plan.object.clone(),
+        contact: plan.settings.contact,
+        load: load_beside(plan.object_request(&HandSetup::default())),
         material: plan.elastic_material()?,
-        when_lost: when_lost(arguments.report.clone()),
     };
     let app = match App::open(opening) {
         Ok(app) => app,
@@ -50,14 +58,50 @@ pub(super) fn show(
         }
     };
     interruption::hear();
-    let start = start(arguments, plan).context("cannot start the thread that begins the run")?;
-    Ok(Some(app.show(start, interruption::asked)?))
+    let (begun, threads) = channel();
+    let start = start(arguments, plan, begun);
+    let start = start.context("cannot start the thread that begins the run")?;
+    app.show(start, interruption::asked)?;
+    // It is there if the run began.
+    Ok(Some(threads.try_recv().ok().map(TickThread::join).transpose()?))
 }
 
-/// Tells how a run ended whose display was lost, and ends the process with its exit code.
-fn when_lost(report: Option<PathBuf>) -> WhenLost {
-    Box::new(move |ended| {
-        let told = ended.map_err(anyhow::Error::from).and_then(|ran| tell(report.as_deref(), &ran));
+/// Loads other objects of the same size.
+fn load_beside(request: ObjectRequest) -> LoadObject {
+    Arc::new(move |choice, goes_on| {
+        let request = ObjectRequest { choice, ..request.clone() };
+        load(&request, goes_on).map_err(|error| error.to_string()).transpose()
+    })
+}
+
+/// What the window holds of the ticks.
+fn in_window(thread: &mut TickThread, report: Option<PathBuf>) -> Ticks {
+    let end = thread.run_end();
+    // Nobody has taken the sentences before.
+    let notices = thread.take_notices().unwrap_or_else(|| channel().1);
+    Ticks {
+        controls: thread.controls(),
+        notices,
+        is_over: Box::new(move || end.is_there()),
+        when_lost: Some(when_lost(thread, report)),
+    }
+}
+
+/// Lets a run whose display was lost go on to the end of its script, tells how it ended, and ends the
+/// process with its exit code.
+fn when_lost(thread: &TickThread, report: Option<PathBuf>) -> WhenLost {
+    let (controls, end) = (thread.controls(), thread.run_end());
+    Box::new(move || {
+        // A run that is over does not hear it.
+        let _ = controls.send(Control::EndWithScript);
+        while !end.is_there() {
+            if interruption::asked() {
+                let _ = controls.send(Control::Stop);
+            }
+            std::thread::sleep(LOOK_EVERY);
+        }
+        let ended = end.wait().map_err(anyhow::Error::from);
+        let told = ended.and_then(|ran| tell(report.as_deref(), &ran));
         if let Err(error) = &told {
             eprintln!("glove-client: {}", one_line(error.as_ref()));
         }
@@ -65,9 +109,14 @@ fn when_lost(report: Option<PathBuf>) -> WhenLost {
     })
 }
 
-/// Begins the run beside the window.
-fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
+/// Begins the run beside the window; `begun` hears of its thread.
+fn start(
+    arguments: &RunArguments,
+    plan: &RunPlan,
+    begun: Sender<TickThread>,
+) -> std::io::Result<Start> {
     let plan = plan.for_window();
+    let report = arguments.report.clone();
     let record = arguments.record.clone();
     let setup = Setup { record, threads: arguments.threads, ends_with_script: false };
     let timing = Timing { period: plan.period, ticks_max: arguments.frames };
@@ -87,7 +136,7 @@ fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
         };
         let (mut out, inlet) = outlet(FRAMES_EVERY);
         let mut observer = Observer::default();
-        let sink = move |session: &crate::session::Session, outcome: &_, due, now_s| {
+        let sink = move |session: &crate::run::session::Session, outcome: &_, due, now_s| {
             // The server lives as long as the ticks.
             let _ = &host;
             observer.note(due, outcome);
@@ -96,7 +145,13 @@ fn start(arguments: &RunArguments, plan: &RunPlan) -> std::io::Result<Start> {
                 out.publish(Box::new(frame));
             }
         };
-        let play = move || TickThread::start(session, timing, || false, sink);
+        let play = move || {
+            let mut thread = TickThread::start(session, timing, || false, sink)?;
+            let ticks = in_window(&mut thread, report);
+            // Whoever shows the window waits for it.
+            let _ = begun.send(thread);
+            Ok(ticks)
+        };
         Ok(Started { play: Box::new(play), inlet, about })
     })
 }

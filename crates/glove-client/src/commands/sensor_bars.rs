@@ -3,8 +3,8 @@
 use std::io::{IsTerminal as _, Write};
 use std::time::{Duration, Instant};
 
-use crate::devices::calibration::sensor_name;
-use crate::devices::cyberglove::{RawSensors, Sensor};
+use softgrasp_hand::devices::calibration::sensor_name;
+use softgrasp_hand::devices::cyberglove::{RawSensors, Sensor};
 
 /// Length of a full bar.
 const BAR: usize = 32;
@@ -106,7 +106,7 @@ fn log_line(title: &str, raw: &RawSensors) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::devices::cyberglove::SensorCount;
+    use softgrasp_hand::devices::cyberglove::SensorCount;
 
     fn reading(value: u8) -> RawSensors {
         RawSensors::from_fn(SensorCount::Eighteen, |_| value)

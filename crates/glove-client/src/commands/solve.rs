@@ -10,6 +10,7 @@ use softgrasp_core::fem::Element;
 use softgrasp_core::mesh::{Folds, TetMesh};
 use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_core::solve::memory::Bytes;
+use softgrasp_protocol::solve_report::{SCHEMA, SolveSummary};
 use softgrasp_protocol::{
     Answer, CaseAnswer, Displacements, DofValue, ElementChoice, LargeAnswer, LargeAsk, LargeReport,
     Material, MethodName, NodeChoice, Pace, PathChoice, Precision, Question, Reply, Request,
@@ -21,16 +22,15 @@ use super::elasticity_arguments::ElasticityArguments;
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
 use super::solve_cases::{CaseFiles, read_values};
-use crate::calculix_deck::CalculixDeck;
-use crate::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
-use crate::deformation::{Deformation, Elasticity};
-use crate::discretisation::DiscretisationEstimate;
-use crate::displacement_table::{DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError};
-use crate::file_writing::write_file;
-use crate::mesh_file::read_mesh_file;
-use crate::model_upload::mesh_data;
-use crate::progress::Progress;
-use crate::solve_report::{SCHEMA, SolveSummary};
+use crate::ask::calculix_deck::CalculixDeck;
+use crate::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
+use crate::ask::deformation::{Deformation, Elasticity};
+use crate::ask::discretisation::DiscretisationEstimate;
+use crate::ask::displacement_table::{DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError};
+use crate::ask::model_upload::mesh_data;
+use crate::commands::progress::Progress;
+use crate::object::file_writing::write_file;
+use crate::object::mesh_file::read_mesh_file;
 
 /// Solve one request on a mesh file: prescribed displacements in, all displacements out.
 #[derive(Args)]
@@ -190,7 +190,7 @@ impl SolveCommand {
         progress.now("writing");
         let summary = SolveSummary::new(&answer.report, round_trip_ms)
             .with_large(large.as_ref())
-            .with_folds(Folds::from_mesh(&file.mesh))
+            .with_first_warning(Folds::from_mesh(&file.mesh).map(|folds| folds.to_string()))
             .with_bytes(connection.bytes_of_exchange());
         let displacements =
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));

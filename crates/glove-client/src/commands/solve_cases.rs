@@ -8,10 +8,10 @@ use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::mesh_io::{PointField, write_vtu};
 use softgrasp_protocol::DofValue;
 
-use crate::displacement_table::{
+use crate::ask::displacement_table::{
     DISPLACEMENT_COLUMNS, read_table, write_displacements, write_reactions,
 };
-use crate::file_writing::write_file;
+use crate::object::file_writing::write_file;
 
 /// Files of all cases, in the order of the command line.
 #[derive(Clone, Copy)]

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::bail;
 
 use super::output::{print, write_json};
-use crate::run_report::RunReport;
+use crate::run::run_report::RunReport;
 
 /// Writes and prints the report.
 ///

@@ -4,10 +4,11 @@
 
 use std::time::{Duration, Instant};
 
-use glove_client::arrival::Device;
-use glove_client::devices::cyberglove::Sensor;
-use glove_client::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
-use glove_client::serial::{SerialDevices, SerialSettings};
+use softgrasp_hand::arrival::Device;
+use softgrasp_hand::devices::cyberglove::{
+    GloveEvent, GloveParser, RecordOptions, Sensor, SensorCount,
+};
+use softgrasp_hand::serial::{SerialDevices, SerialSettings};
 
 use crate::emulator::Emulator;
 use crate::start::{Folder, fail, succeed};

@@ -5,7 +5,7 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use glove_client::serial::SerialSource;
+use softgrasp_hand::serial::SerialSource;
 
 use crate::start::command;
 

@@ -52,7 +52,7 @@ fn recording_of_a_replay_is_the_recording() {
     let third = folder.path("third.mcap");
     succeed(&["record", &third, "--headless", "--hand", &hand]);
     let [first, second, third] = [&path, &again, &third]
-        .map(|path| glove_client::recording::read_recording(path.as_ref()).unwrap());
+        .map(|path| softgrasp_hand::recording::read_recording(path.as_ref()).unwrap());
     assert!(!first.ticks.is_empty());
     assert!(first.ticks == second.ticks && first.ticks == third.ticks);
 }

@@ -5,8 +5,8 @@
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use glove_client::serial::emulate::PseudoTerminal;
 use serde_json::Value;
+use softgrasp_emulator::emulation::PseudoTerminal;
 
 use crate::emulator::Emulator;
 use crate::start::{Folder, command, succeed};

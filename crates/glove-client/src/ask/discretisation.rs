@@ -1,0 +1,110 @@
+//! Estimates the error that the mesh brings, by solving once more with the other element.
+
+use softgrasp_protocol::{
+    Answer, ElementChoice, ElementName, MethodName, NodeChoice, Precision, Reply, Request,
+    SolveOnce, Want,
+};
+
+use crate::ask::connection::{LinkError, ServerConnection, unexpected};
+
+/// Estimate of the error that the mesh brings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiscretisationEstimate {
+    /// `‖u_t4 − u_t10‖ / ‖u_t10‖` over the nodes of the mesh, for the same prescribed displacements and
+    /// forces; `None` where there is none.
+    pub rel: Option<f64>,
+    /// What it is, or why there is none.
+    pub why: String,
+}
+
+/// The estimate needs a few digits only, so the second answer may stop early.
+const SECOND_ERROR_MAX: f64 = 1e-6;
+
+impl DiscretisationEstimate {
+    /// The estimate that nobody asked for.
+    pub fn not_asked() -> Self {
+        Self { rel: None, why: "not asked for (--estimate-discretisation)".to_owned() }
+    }
+
+    /// Asks once more with the other element and compares.
+    ///
+    /// Shapes: `displacements` one per node of the request's mesh. Units: m.
+    ///
+    /// A server that refuses or goes leaves no estimate, and the reason is told; the first answer
+    /// stays what it is.
+    pub fn of(
+        connection: &mut ServerConnection,
+        request: &SolveOnce,
+        answer: &Answer,
+        displacements: &[[f64; 3]],
+    ) -> Self {
+        let first = answer.report.element;
+        let other = match first {
+            ElementName::T4 | ElementName::T4Anp => ElementChoice::T10,
+            ElementName::T10 => ElementChoice::T4,
+        };
+        let mut second = request.clone();
+        second.element = other;
+        second.question.method = MethodName::auto();
+        second.question.max_error = Some(SECOND_ERROR_MAX);
+        second.question.deadline_ms = None;
+        second.question.want =
+            Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 };
+        let second = match ask(connection, second) {
+            Ok(second) => second,
+            Err(error) => {
+                let why = format!("the second solve, by the other element, failed: {error}");
+                return Self { rel: None, why };
+            }
+        };
+        let (linear, quadratic) = match first {
+            ElementName::T4 | ElementName::T4Anp => (displacements, second.as_slice()),
+            ElementName::T10 => (second.as_slice(), displacements),
+        };
+        match difference_rel(linear, quadratic) {
+            Some(rel) => Self {
+                rel: Some(rel),
+                why: "an estimate, not a bound: the difference between linear and ten-node \
+                      elements on this mesh"
+                    .to_owned(),
+            },
+            None => Self { rel: None, why: "nothing moves".to_owned() },
+        }
+    }
+}
+
+fn ask(connection: &mut ServerConnection, request: SolveOnce) -> Result<Vec<[f64; 3]>, LinkError> {
+    match connection.ask(&Request::SolveOnce(Box::new(request)))? {
+        Reply::Answer(answer) => Ok(answer.displacements.into_f64()),
+        other => Err(unexpected("SolveOnce", &other)),
+    }
+}
+
+/// `‖a − b‖ / ‖b‖`; `None` where `b` is zero or one of them is too large to tell.
+fn difference_rel(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<f64> {
+    let pairs = a.iter().flatten().zip(b.iter().flatten());
+    let difference: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+    let size: f64 = b.iter().flatten().map(|b| b * b).sum();
+    let rel = (difference / size).sqrt();
+    (a.len() == b.len() && rel.is_finite()).then_some(rel)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn difference_is_relative_to_the_second_field() {
+        let a = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
+        let b = [[1.0, 0.0, 0.0], [0.0, 2.0, 1.0]];
+        assert_eq!(difference_rel(&a, &b), Some((1.0f64 / 6.0).sqrt()));
+        assert_eq!(difference_rel(&a, &a), Some(0.0));
+    }
+
+    #[test]
+    fn fields_that_cannot_be_compared_have_no_difference() {
+        assert_eq!(difference_rel(&[[0.0; 3]], &[[0.0; 3]]), None);
+        assert_eq!(difference_rel(&[[1.0; 3]], &[[1.0; 3]; 2]), None);
+        assert_eq!(difference_rel(&[[f64::NAN; 3]], &[[1.0; 3]]), None);
+    }
+}

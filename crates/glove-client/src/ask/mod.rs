@@ -1,0 +1,16 @@
+//! What the server is asked, and the connection over which it is asked.
+
+pub mod calculix_deck;
+pub mod connection;
+pub mod deformation;
+pub mod digest;
+pub mod discretisation;
+pub mod displacement_table;
+pub mod endpoint;
+pub mod held_nodes;
+pub mod link;
+pub mod model_upload;
+pub mod prefetch;
+pub mod server_stream;
+pub mod solve_settings;
+pub mod unanswered;

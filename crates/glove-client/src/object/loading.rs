@@ -1,0 +1,139 @@
+//! Makes an object ready for the hand: mesh, sphere tree, and a plan to grasp it; beside everything
+//! else where that is wanted, with its progress to be seen.
+
+use std::sync::Arc;
+
+use softgrasp_grasp::object::{ContactModel, ObjectChoice, ObjectError, SoftObject};
+use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::loaded_object::{LoadStage, LoadedObject, ObjectSummary};
+use softgrasp_hand::scripted::{NoGrasp, PlanRequest};
+
+use crate::object::scene::{SceneError, SceneObject, load_object};
+
+/// Which object is wanted, and the hand that is to grasp it.
+#[derive(Clone)]
+pub struct ObjectRequest {
+    /// The object.
+    pub choice: ObjectChoice,
+    /// Nodes of a built-in object.
+    pub nodes: usize,
+    /// Longest extent, m; `None` where the hand may choose it.
+    pub size_m: Option<f64>,
+    /// The hand.
+    pub setup: HandSetup,
+    /// What its fingertips hold.
+    pub contact: ContactModel,
+}
+
+/// Why there is no object.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// No mesh.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A mesh that cannot be touched.
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+}
+
+/// Factor by which an imported object grows while the hand finds no grip, and where it ends, m.
+const ENLARGE: f64 = 1.25;
+const ENLARGED_MAX_M: f64 = 0.2;
+
+/// Makes an object ready; says at which stage it is, and asks whether to go on: a caller who does
+/// not want it any more gets `None` soon.
+///
+/// An imported object whose size was not asked for is enlarged until the hand finds a grip.
+///
+/// # Errors
+/// [`LoadError`].
+pub fn load(
+    request: &ObjectRequest,
+    mut goes_on: impl FnMut(LoadStage) -> bool,
+) -> Result<Option<LoadedObject>, LoadError> {
+    let ObjectRequest { choice, nodes, size_m, setup, contact } = request;
+    let mut size = *size_m;
+    loop {
+        if !goes_on(LoadStage::Mesh) {
+            return Ok(None);
+        }
+        let SceneObject { mesh, notes } = load_object(choice, *nodes, size)?;
+        let summary = ObjectSummary {
+            name: choice.to_string(),
+            nodes: mesh.node_count(),
+            tets: mesh.tets().len(),
+            size_m: mesh.size(),
+            notes,
+        };
+        if !goes_on(LoadStage::Tree) {
+            return Ok(None);
+        }
+        let object = SoftObject::try_new(mesh)?;
+        if !goes_on(LoadStage::Plan) {
+            return Ok(None);
+        }
+        let rest = Arc::clone(object.rest_shape());
+        let plan =
+            PlanRequest { object: rest, setup: setup.clone(), contact: *contact, avoid_gaze: None };
+        let plan = plan.grip();
+        match plan {
+            Err(NoGrasp::OutOfReach { extent_m })
+                if size_m.is_none()
+                    && matches!(choice, ObjectChoice::File(_))
+                    && extent_m < ENLARGED_MAX_M =>
+            {
+                size = Some(ENLARGE * extent_m);
+            }
+            plan => {
+                let wanted = goes_on(LoadStage::Ready);
+                return Ok(wanted.then_some(LoadedObject {
+                    summary,
+                    brought_to_m: size,
+                    object,
+                    plan,
+                }));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(object: &str) -> ObjectRequest {
+        ObjectRequest {
+            choice: object.parse().unwrap(),
+            nodes: 64,
+            size_m: None,
+            setup: HandSetup::default(),
+            contact: ContactModel::default(),
+        }
+    }
+
+    #[test]
+    fn object_comes_with_its_tree_and_a_plan_after_every_stage() {
+        let mut stages = Vec::new();
+        let loaded = load(&request("cube"), |stage| {
+            stages.push(stage);
+            true
+        });
+        let loaded = loaded.unwrap().unwrap();
+        assert_eq!(stages, LoadStage::ALL);
+        assert_eq!((loaded.summary.nodes, loaded.object.shape().len()), (64, 64));
+        assert!(loaded.plan.is_ok());
+    }
+
+    #[test]
+    fn object_that_nobody_wants_any_more_is_not_made() {
+        for last in LoadStage::ALL {
+            assert!(load(&request("cube"), |stage| stage < last).unwrap().is_none());
+        }
+    }
+
+    #[test]
+    fn file_that_is_not_there_is_told_in_a_sentence() {
+        let Err(error) = load(&request("no-such-file.msh"), |_| true) else { panic!("loaded") };
+        assert!(error.to_string().starts_with("cannot read no-such-file.msh"), "{error}");
+    }
+}

@@ -1,0 +1,11 @@
+//! The object in the scene: read, made ready, changed, kept, written.
+
+pub mod file_writing;
+pub mod loading;
+pub mod mesh_file;
+pub mod mesh_writing;
+pub mod object_changes;
+pub mod object_work;
+pub mod saving;
+pub mod scene;
+pub mod shape_history;

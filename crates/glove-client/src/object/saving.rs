@@ -1,0 +1,72 @@
+//! Writes the object as it is, deformed or not, to a file of any format that can be written.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use softgrasp_core::mesh::{Inversion, MeshError};
+use softgrasp_core::mesh_io::PointField;
+use softgrasp_grasp::object::RestShape;
+
+use crate::object::file_writing::{FileWriteError, write_file};
+use crate::object::mesh_writing::{EncodeMeshError, encode_mesh};
+
+/// A shape that is to be saved.
+///
+/// Shapes: `vertices` and `displacement` one per node. Units: m. Frame: the object's own.
+pub struct ShapeToSave {
+    /// The file; its extension names the format.
+    pub path: PathBuf,
+    /// The shape that the displacement counts from.
+    pub rest: Arc<RestShape>,
+    /// Every vertex as it is now.
+    pub vertices: Vec<Point3<f64>>,
+    /// How each came there; a VTU file holds it as `displacement`.
+    pub displacement: Vec<[f64; 3]>,
+}
+
+/// A shape that is not saved.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// Elements are turned inside out; no program could use such a mesh.
+    #[error("cannot save {path}: {inversion}; open the hand a little and save it then")]
+    Inverted {
+        /// As given.
+        path: PathBuf,
+        /// How far.
+        inversion: Inversion,
+    },
+    /// The vertices make no mesh.
+    #[error("cannot save {path}: {source}")]
+    Shape {
+        /// As given.
+        path: PathBuf,
+        /// Why not.
+        source: MeshError,
+    },
+    /// The format.
+    #[error("cannot save {0}")]
+    Encode(#[from] EncodeMeshError),
+    /// The file.
+    #[error(transparent)]
+    Write(#[from] FileWriteError),
+}
+
+impl ShapeToSave {
+    /// Writes the file; returns what there is to tell.
+    ///
+    /// # Errors
+    /// [`SaveError`]; an older file stays as it was.
+    pub fn save(&self) -> Result<String, SaveError> {
+        let path = &self.path;
+        if let Some(inversion) = Inversion::of(self.rest.mesh(), &self.vertices) {
+            return Err(SaveError::Inverted { path: path.clone(), inversion });
+        }
+        let shape = |source| SaveError::Shape { path: path.clone(), source };
+        let mesh = self.rest.mesh().with_vertices(self.vertices.clone()).map_err(shape)?;
+        let field = PointField { name: "displacement", values: &self.displacement };
+        let bytes = encode_mesh(path, &mesh, &[], self.rest.surface(), &[field])?;
+        write_file(path, &bytes)?;
+        Ok(format!("saved {}: {} nodes", path.display(), mesh.node_count()))
+    }
+}

@@ -1,0 +1,229 @@
+//! Reads a scene (object, size, material, method) from a TOML file, and loads its object.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Point3;
+use serde::Deserialize;
+use softgrasp_core::mesh::{Bodies, BuiltIn, GenerateError, MeshError, TetMesh, generate};
+use softgrasp_grasp::object::ObjectChoice;
+
+use crate::object::mesh_file::{MeshFileReadError, read_mesh_file};
+
+/// A scene; every field can also be set by a flag, which wins.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct SceneFile {
+    /// cube, sphere, strawberry, toothpaste, or a mesh file (relative to the scene file).
+    pub object: Option<String>,
+    /// Nodes of a built-in object.
+    pub nodes: Option<usize>,
+    /// Longest extent, m; a mesh file is scaled to it.
+    pub object_size_m: Option<f64>,
+    /// Young's modulus, Pa.
+    pub young_pa: Option<f64>,
+    /// Poisson's ratio.
+    pub poisson: Option<f64>,
+    /// Method's name, or auto.
+    pub method: Option<String>,
+    /// t4, t4-anp or auto.
+    pub element: Option<String>,
+    /// vertex, patch or mask.
+    pub contact: Option<String>,
+    /// linear, large or auto.
+    pub deformation: Option<String>,
+    /// Law of large deformation: neo-hookean or neo-hookean-log.
+    pub material: Option<String>,
+    /// Yield stress, Pa.
+    pub yield_pa: Option<f64>,
+}
+
+/// Why there is no scene.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The scene file cannot be read.
+    #[error("cannot read the scene {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The scene file makes no sense.
+    #[error("{path}: {source}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// With line and column.
+        source: Box<toml::de::Error>,
+    },
+    /// The object's file.
+    #[error(transparent)]
+    Mesh(#[from] MeshFileReadError),
+    /// The object cannot be generated.
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    /// The object cannot be scaled.
+    #[error("the object cannot be scaled to {size_m} m: {source}")]
+    Scale {
+        /// Size asked for.
+        size_m: f64,
+        /// What broke.
+        source: MeshError,
+    },
+    /// A size that is no length.
+    #[error("--object-size is {size_m} m; it must be a finite number above 0")]
+    Size {
+        /// Size asked for.
+        size_m: f64,
+    },
+}
+
+/// Extent of an imported object that fits the hand, m.
+pub const IMPORTED_SIZE_M: f64 = 0.08;
+/// Nodes of a built-in object unless told otherwise.
+pub const NODES_DEFAULT: usize = 1000;
+
+impl SceneFile {
+    /// Reads the text of a scene; a mesh file in it is as it is written there.
+    ///
+    /// # Errors
+    /// The fault with line and column.
+    pub fn of_text(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
+    }
+
+    /// Reads a scene; a mesh file in it is taken relative to the scene's folder.
+    ///
+    /// # Errors
+    /// [`SceneError`] with the path and, for a fault inside, line and column.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let read_error = |source| SceneError::Read { path: path.to_owned(), source };
+        let text = std::fs::read_to_string(path).map_err(read_error)?;
+        let mut scene = Self::of_text(&text)
+            .map_err(|e| SceneError::Parse { path: path.to_owned(), source: Box::new(e) })?;
+        if let Some(object) = &mut scene.object
+            && let Ok(ObjectChoice::File(file)) = object.parse()
+        {
+            let beside = path.parent().unwrap_or(Path::new("")).join(file);
+            *object = beside.to_string_lossy().into_owned();
+        }
+        Ok(scene)
+    }
+}
+
+/// Longest extent of a built-in object that the hand grips best, m, where that is not its own: round
+/// a small strawberry the thumb comes to lie beside the fingers and not before them.
+pub fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
+    match object {
+        ObjectChoice::BuiltIn(BuiltIn::Strawberry) => Some(0.08),
+        ObjectChoice::BuiltIn(_) | ObjectChoice::File(_) => None,
+    }
+}
+
+/// An object ready for the hand, and what was done to make it so.
+#[derive(Debug)]
+pub struct SceneObject {
+    /// In m, centred at the origin.
+    pub mesh: TetMesh,
+    /// Sentences for the user.
+    pub notes: Vec<String>,
+}
+
+/// Makes or reads the object and brings it to the hand's size.
+///
+/// # Errors
+/// [`SceneError`].
+pub fn load_object(
+    choice: &ObjectChoice,
+    nodes: usize,
+    size_m: Option<f64>,
+) -> Result<SceneObject, SceneError> {
+    if let Some(size_m) = size_m.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        return Err(SceneError::Size { size_m });
+    }
+    let mut notes = Vec::new();
+    let mesh = match choice {
+        ObjectChoice::BuiltIn(shape) => generate(*shape, nodes)?,
+        ObjectChoice::File(path) => {
+            let file = read_mesh_file(path)?;
+            let findings = &file.findings;
+            notes.push(format!(
+                "{}: {}, {} nodes, {} tetrahedra",
+                path.display(),
+                file.format,
+                file.mesh.node_count(),
+                file.mesh.tets().len()
+            ));
+            if !findings.flipped.is_empty() {
+                notes.push(format!("{} inverted tetrahedra were turned", findings.flipped.len()));
+            }
+            let dropped = findings.degenerate.len() + findings.repeated.len();
+            if dropped > 0 {
+                notes.push(format!(
+                    "{dropped} tetrahedra without volume, or repeated, were dropped; `glove-client \
+                     inspect` lists them"
+                ));
+            }
+            largest_piece(&file.mesh, &mut notes)
+        }
+    };
+    let size_m = match choice {
+        ObjectChoice::BuiltIn(_) => size_m,
+        ObjectChoice::File(_) => Some(size_m.unwrap_or(IMPORTED_SIZE_M)),
+    };
+    let Some(size_m) = size_m else { return Ok(SceneObject { mesh, notes }) };
+    let factor = size_m / mesh.size();
+    notes.push(format!("scaled by {factor:.3} to {size_m} m and centred (--object-size)"));
+    let mesh =
+        scaled_and_centred(&mesh, factor).map_err(|source| SceneError::Scale { size_m, source })?;
+    Ok(SceneObject { mesh, notes })
+}
+
+fn scaled_and_centred(mesh: &TetMesh, factor: f64) -> Result<TetMesh, MeshError> {
+    let (low, high) = mesh.bounds();
+    let centre = nalgebra::center(&low, &high);
+    let moved = |p: &Point3<f64>| Point3::from((p - centre) * factor);
+    mesh.with_vertices(mesh.vertices().iter().map(moved).collect())
+}
+
+/// A hand holds one body; of several, and of pieces that hang together by an edge or a node only,
+/// the largest is taken. Nodes without elements go too: nothing could be grasped at them.
+fn largest_piece(mesh: &TetMesh, notes: &mut Vec<String>) -> TetMesh {
+    let bodies = Bodies::from_mesh(mesh);
+    let largest = bodies
+        .piece_tet_counts
+        .iter()
+        .enumerate()
+        .max_by_key(|&(piece, count)| (count, std::cmp::Reverse(piece)))
+        .map_or(0, |(piece, _)| piece as u32);
+    let kept = |tet: &usize| bodies.piece_of_tet[*tet] == largest;
+    let tets: Vec<usize> = (0..mesh.tets().len()).filter(kept).collect();
+    let mut new_index = vec![None; mesh.node_count()];
+    let mut vertices: Vec<Point3<f64>> = Vec::new();
+    for &n in tets.iter().flat_map(|&t| &mesh.tets()[t]) {
+        new_index[n as usize].get_or_insert_with(|| {
+            vertices.push(mesh.vertices()[n as usize]);
+            vertices.len() as u32 - 1
+        });
+    }
+    let renumbered = |t: &usize| mesh.tets()[*t].map(|n| new_index[n as usize].unwrap_or(0));
+    let regions = match mesh.regions() {
+        [] => Vec::new(),
+        regions => tets.iter().map(|&t| regions[t]).collect(),
+    };
+    match TetMesh::try_new(vertices, tets.iter().map(renumbered).collect(), regions) {
+        Ok(piece) => {
+            if bodies.piece_count() > 1 {
+                notes.push(format!(
+                    "the largest of {} pieces is grasped: {} of {} tetrahedra",
+                    bodies.piece_count(),
+                    piece.tets().len(),
+                    mesh.tets().len()
+                ));
+            }
+            piece
+        }
+        // The same elements were good before, so this is not reached; the whole mesh is as good.
+        Err(_) => mesh.clone(),
+    }
+}

@@ -1,0 +1,18 @@
+//! A run: ticks from the hand to the deformed object, and the report of them.
+
+mod answering;
+pub mod grasp_loop;
+mod keep;
+mod keeping;
+pub mod latency;
+mod object_control;
+pub mod observer;
+mod recorded_tick;
+pub mod run_report;
+mod run_words;
+pub mod session;
+mod springback;
+pub mod status_line;
+pub mod tick_loop;
+pub mod tick_outcome;
+pub mod tick_thread;

@@ -1,0 +1,467 @@
+//! The report of a run: JSON for programs, and a summary of one screen for people.
+
+use std::time::Duration;
+
+use serde::Serialize;
+use softgrasp_grasp::grasp::{GraspEvent, StateName};
+use softgrasp_grasp::object::ContactModel;
+use softgrasp_hand::hand_reader::DeviceFaults;
+use softgrasp_hand::joints_reader::FitErrors;
+use softgrasp_hand::loaded_object::ObjectSummary;
+use softgrasp_hand::recording::{Difference, ReplayCheck, ReplayHand};
+use softgrasp_protocol::solve_report::{SCHEMA, SolveSummary};
+
+use crate::ask::unanswered::{Unanswered, UnansweredCounts};
+use crate::pace::tick_budget::TickBudget;
+use crate::pace::{Due, Pace};
+use crate::run::latency::LatencySummary;
+use crate::run::tick_outcome::{LoopEvent, TickOutcome};
+
+/// JSON report of `glove-client run`.
+#[derive(Debug, Serialize)]
+pub struct RunReport {
+    schema: u32,
+    command: &'static str,
+    /// What was grasped.
+    pub object: ObjectSummary,
+    /// Which hand.
+    pub hand: String,
+    /// Where it was solved.
+    pub server: String,
+    /// `lockstep` or `free`.
+    pub pace: &'static str,
+    /// What a fingertip holds: `vertex`, `patch` or `mask`.
+    pub contact: String,
+    /// Ticks of the run, played and skipped.
+    pub ticks: u64,
+    /// Whether the user ended it.
+    pub interrupted: bool,
+    /// Grasp states in the order they were first reached.
+    pub states_reached: Vec<String>,
+    /// Everything that happened.
+    pub events: Vec<EventRecord>,
+    /// One entry per tick that was played.
+    #[serde(rename = "frames")]
+    pub played: Vec<TickRecord>,
+    /// The run in a few numbers.
+    pub summary: RunSummary,
+    /// How a replay agrees with its recording; null for other hands.
+    pub replay: Option<ReplaySummary>,
+    /// Why the recording of this run is not complete; null where it is, or none was made.
+    pub recording_failed: Option<String>,
+}
+
+/// How a replay agrees with its recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReplaySummary {
+    /// Ticks that were compared.
+    pub ticks: u64,
+    /// Ticks with known displacements among them.
+    pub requests: u64,
+    /// Tick and stage of the first difference; null when there is none.
+    pub difference: Option<Difference>,
+    /// Why the recording ends before its file does; null for one that is whole.
+    pub cut: Option<String>,
+}
+
+impl ReplaySummary {
+    /// What a hand that was played again has found.
+    pub fn of(hand: &ReplayHand) -> Self {
+        let ReplayCheck { ticks, requests, difference } = hand.check.clone();
+        Self { ticks, requests, difference, cut: hand.recording().cut.clone() }
+    }
+}
+
+/// One event.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EventRecord {
+    /// When.
+    pub tick: u64,
+    /// When, ms since the first tick was due.
+    pub at_ms: f64,
+    /// `grasp`, `shape` or `server`.
+    pub kind: &'static str,
+    /// What, in words.
+    pub what: String,
+}
+
+/// One tick that was played.
+#[derive(Clone, Debug, Serialize)]
+pub struct TickRecord {
+    /// Number, from 0.
+    pub tick: u64,
+    /// When it began, ms since the first tick was due.
+    pub at_ms: f64,
+    /// Grasp state after it.
+    pub state: String,
+    /// Which tips touch: thumb, index, middle, ring, little.
+    pub tips: [bool; 5],
+    /// Segments shown at their last free pose, by finger.
+    pub recalled: [u8; 5],
+    /// The answer to what was asked in this tick; null when nothing was asked or no answer came.
+    pub solve: Option<SolveSummary>,
+    /// Why a deforming tick has no answer; null for all others.
+    pub unanswered: Option<&'static str>,
+    /// Tick whose answer the object shows after this one; null while it shows none of this grip.
+    pub shown_tick: Option<u64>,
+    /// Time for which the tick computed, ms.
+    pub compute_ms: f64,
+}
+
+/// A run in a few numbers.
+///
+/// Invariant: `deforming_ticks` = `solves` + the sum of `unanswered`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RunSummary {
+    /// Deforming ticks that were answered.
+    pub solves: usize,
+    /// Ticks in which the fingers deformed the object, skipped ones included.
+    pub deforming_ticks: u64,
+    /// Deforming ticks without an answer, by reason.
+    pub unanswered: UnansweredCounts,
+    /// Ticks that were not played because their time was over.
+    pub ticks_skipped: u64,
+    /// Ticks that computed for longer than a millisecond.
+    pub ticks_over_1_ms: u64,
+    /// Longest time for which a tick computed, ms.
+    pub compute_ms_max: f64,
+    /// From the first byte of a sample to the displacement that it causes, by stage; null for a run
+    /// whose ticks wait for their answers, or in which nothing was deformed.
+    pub latency: Option<LatencySummary>,
+    /// Largest relative residual.
+    pub residual_rel_max: f64,
+    /// Median round trip, ms.
+    pub round_trip_ms_p50: Option<f64>,
+    /// 99 % of the round trips took no longer, ms.
+    pub round_trip_ms_p99: Option<f64>,
+    /// Longest round trip, ms: the first of a grasp, which computes what the grip needs.
+    pub round_trip_ms_max: Option<f64>,
+    /// How old the shape was that a deforming tick showed: time since the tick that had asked for it, ms,
+    /// median; null where none was shown.
+    pub shown_age_ms_p50: Option<f64>,
+    /// 99 % of the shapes were not older, ms.
+    pub shown_age_ms_p99: Option<f64>,
+    /// The oldest shape, ms.
+    pub shown_age_ms_max: Option<f64>,
+    /// Bytes on the wire of all requests that were answered.
+    pub bytes_sent: u64,
+    /// Bytes on the wire of their answers.
+    pub bytes_received: u64,
+    /// Largest rotation of an element, degrees, of the answers that tell it; null where none does.
+    pub max_rotation_deg: Option<f64>,
+    /// Largest strain of an element, of the same answers.
+    pub max_strain: Option<f64>,
+    /// Answers that were solved with the equations of large deformation; the others were linear.
+    pub large_solves: usize,
+    /// Largest estimated error of an answer over its largest displacement; null where none was
+    /// estimated.
+    pub error_estimate_rel_max: Option<f64>,
+    /// Smallest ratio of an element's volume to that at rest; null without large deformation.
+    pub min_jacobian: Option<f64>,
+    /// Equilibria that jumped.
+    pub jumps: usize,
+    /// Largest resident memory of the server, bytes.
+    pub peak_rss_bytes: u64,
+    /// Times a shape was kept.
+    pub shapes_kept: usize,
+    /// Ticks in which a device was silent and the hand was held where it was.
+    pub ticks_held: u64,
+    /// Jumps of the tracker to the opposite side of its field.
+    pub hemisphere_flips: u64,
+    /// Bad lines of joints, and lines that no hand fits.
+    pub joint_faults: u64,
+    /// How well the hand fits a sender's joints; null where none came.
+    pub joint_fit: Option<FitErrors>,
+    /// Pieces of device bytes that were dropped because no tick took them in time.
+    pub pieces_dropped: u64,
+    /// Bad records of the glove.
+    pub glove_faults: u64,
+    /// Bad records of the tracker.
+    pub tracker_faults: u64,
+}
+
+impl RunReport {
+    /// An empty report.
+    pub fn new(
+        object: ObjectSummary,
+        hand: String,
+        server: String,
+        pace: Pace,
+        contact: ContactModel,
+    ) -> Self {
+        Self {
+            schema: SCHEMA,
+            command: "run",
+            object,
+            hand,
+            server,
+            pace: pace.name(),
+            contact: contact.to_string(),
+            ticks: 0,
+            interrupted: false,
+            states_reached: Vec::new(),
+            events: Vec::new(),
+            played: Vec::new(),
+            summary: RunSummary::default(),
+            replay: None,
+            recording_failed: None,
+        }
+    }
+
+    /// Adds a tick, and those that were skipped before it.
+    ///
+    /// Units: `now_s` s since the first tick was due.
+    pub fn add(&mut self, due: Due, now_s: f64, outcome: &TickOutcome) {
+        self.add_skipped(due.skipped);
+        self.ticks = due.tick + 1;
+        let state = outcome.state.map_or("no hand yet".to_owned(), |s| s.to_string());
+        if outcome.state.is_some() && !self.states_reached.contains(&state) {
+            self.states_reached.push(state.clone());
+        }
+        let at_ms = 1e3 * now_s;
+        self.played.push(TickRecord {
+            tick: due.tick,
+            at_ms,
+            state,
+            tips: outcome.tips,
+            recalled: outcome.recalled,
+            solve: None,
+            unanswered: None,
+            shown_tick: outcome.shown_tick,
+            compute_ms: 0.0,
+        });
+        self.summary.ticks_held += u64::from(!outcome.silent.is_empty());
+        self.add_outcome(due.tick, at_ms, outcome);
+    }
+
+    /// Adds what came after the last tick.
+    pub fn add_last(&mut self, outcome: &TickOutcome) {
+        let at_ms = self.played.last().map_or(0.0, |record| record.at_ms);
+        self.add_outcome(self.ticks.saturating_sub(1), at_ms, outcome);
+    }
+
+    fn add_outcome(&mut self, tick: u64, at_ms: f64, outcome: &TickOutcome) {
+        self.add_events(tick, at_ms, &outcome.events);
+        for (tick, solve) in &outcome.answers {
+            if let Some(record) = self.record(*tick) {
+                record.solve = Some(solve.clone());
+            }
+        }
+        for (tick, why) in &outcome.unanswered {
+            self.add_unanswered(*tick, *why);
+        }
+    }
+
+    /// Adds ticks that were not played. They are deforming ticks if the one before them was.
+    pub fn add_skipped(&mut self, ticks: u64) {
+        self.ticks += ticks;
+        self.summary.ticks_skipped += ticks;
+        if self.played.last().is_some_and(TickRecord::deforms) {
+            self.summary.deforming_ticks += ticks;
+            self.summary.unanswered.add(Unanswered::TickSkipped, ticks);
+        }
+    }
+
+    /// Adds how long the last tick computed.
+    pub fn add_computed(&mut self, computed: Duration) {
+        if let Some(record) = self.played.last_mut() {
+            record.compute_ms = computed.as_secs_f64() * 1e3;
+        }
+    }
+
+    fn add_unanswered(&mut self, tick: u64, why: Unanswered) {
+        if let Some(record) = self.record(tick)
+            && record.unanswered.is_none()
+        {
+            record.unanswered = Some(why.key());
+            self.summary.unanswered.add(why, 1);
+        }
+    }
+
+    /// The record of a tick that was played.
+    fn record(&mut self, tick: u64) -> Option<&mut TickRecord> {
+        let at = self.played.binary_search_by_key(&tick, |record| record.tick).ok()?;
+        self.played.get_mut(at)
+    }
+
+    fn add_events(&mut self, tick: u64, at_ms: f64, events: &[LoopEvent]) {
+        self.events.extend(events.iter().map(|event| {
+            let (kind, what) = event.kind_and_words();
+            EventRecord { tick, at_ms, kind, what }
+        }));
+    }
+
+    /// Ages of the shapes that deforming ticks showed, ms.
+    fn shown_ages_ms(&self) -> impl Iterator<Item = f64> {
+        self.played.iter().filter(|record| record.deforms()).filter_map(|record| {
+            let asked = record.shown_tick?;
+            let at = self.played.binary_search_by_key(&asked, |record| record.tick).ok()?;
+            Some(record.at_ms - self.played.get(at)?.at_ms)
+        })
+    }
+
+    /// Fills the summary. What is not answered by now never is.
+    pub fn finish(&mut self, faults: DeviceFaults, budget: &TickBudget) {
+        let open = |record: &&TickRecord| {
+            record.deforms() && record.solve.is_none() && record.unanswered.is_none()
+        };
+        let open: Vec<u64> = self.played.iter().filter(open).map(|record| record.tick).collect();
+        open.into_iter().for_each(|tick| self.add_unanswered(tick, Unanswered::RunEnded));
+        let solves: Vec<&SolveSummary> =
+            self.played.iter().filter_map(|record| record.solve.as_ref()).collect();
+        let round_trips = Sorted::new(solves.iter().map(|s| s.round_trip_ms));
+        let ages = Sorted::new(self.shown_ages_ms());
+        let most = |of: fn(&SolveSummary) -> f64| solves.iter().map(|s| of(s)).fold(0.0, f64::max);
+        // An answer that has no time to work a number out has none.
+        let told = |of: fn(&SolveSummary) -> f64| {
+            solves.iter().map(|s| of(s)).filter(|x| x.is_finite()).max_by(f64::total_cmp)
+        };
+        let is_large = |s: &&&SolveSummary| s.deformation == "large";
+        let large = || solves.iter().filter(is_large).filter_map(|s| s.large.as_ref());
+        let deforming = self.played.iter().filter(|record| record.deforms()).count() as u64;
+        let kept = GraspEvent::ShapeKept.to_string();
+        let counted = &self.summary;
+        self.summary = RunSummary {
+            solves: solves.len(),
+            // Those that were skipped are there already.
+            deforming_ticks: counted.deforming_ticks + deforming,
+            unanswered: counted.unanswered.clone(),
+            ticks_skipped: counted.ticks_skipped,
+            ticks_over_1_ms: budget.over(),
+            compute_ms_max: budget.longest().as_secs_f64() * 1e3,
+            // Booked by whoever plays the ticks.
+            latency: None,
+            joint_fit: None,
+            pieces_dropped: 0,
+            residual_rel_max: most(|s| s.residual_rel),
+            round_trip_ms_p50: round_trips.quantile(0.5),
+            round_trip_ms_p99: round_trips.quantile(0.99),
+            round_trip_ms_max: round_trips.quantile(1.0),
+            shown_age_ms_p50: ages.quantile(0.5),
+            shown_age_ms_p99: ages.quantile(0.99),
+            shown_age_ms_max: ages.quantile(1.0),
+            bytes_sent: solves.iter().map(|s| s.request_bytes).sum(),
+            bytes_received: solves.iter().map(|s| s.answer_bytes).sum(),
+            max_rotation_deg: told(|s| s.max_rotation_deg),
+            max_strain: told(|s| s.max_strain),
+            large_solves: large().count(),
+            error_estimate_rel_max: solves
+                .iter()
+                .filter_map(|s| s.error_estimate_rel)
+                .max_by(f64::total_cmp),
+            min_jacobian: large().map(|large| large.min_jacobian).min_by(f64::total_cmp),
+            jumps: large().filter(|large| large.jumped).count(),
+            peak_rss_bytes: solves.iter().map(|s| s.peak_rss_bytes).max().unwrap_or(0),
+            shapes_kept: self.events.iter().filter(|e| e.what == kept).count(),
+            ticks_held: counted.ticks_held,
+            hemisphere_flips: faults.hemisphere_flips,
+            joint_faults: faults.joints,
+            glove_faults: faults.glove,
+            tracker_faults: faults.tracker,
+        };
+    }
+}
+
+/// Numbers in ascending order.
+struct Sorted(Vec<f64>);
+
+impl Sorted {
+    fn new(numbers: impl Iterator<Item = f64>) -> Self {
+        let mut numbers: Vec<f64> = numbers.collect();
+        numbers.sort_by(f64::total_cmp);
+        Self(numbers)
+    }
+
+    /// The number that a part `q` of them does not exceed; `None` where there are none.
+    fn quantile(&self, q: f64) -> Option<f64> {
+        let last = self.0.len().checked_sub(1)?;
+        self.0.get((q * last as f64).round() as usize).copied()
+    }
+}
+
+impl TickRecord {
+    /// Whether the fingers deformed the object.
+    fn deforms(&self) -> bool {
+        self.state == StateName::Deforming.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pace::tick_budget::Priority;
+
+    fn report() -> RunReport {
+        let object = ObjectSummary {
+            name: "cube".to_owned(),
+            nodes: 8,
+            tets: 6,
+            size_m: 0.1,
+            notes: vec![],
+        };
+        let contact = ContactModel::default();
+        RunReport::new(object, "none".to_owned(), "none".to_owned(), Pace::Free, contact)
+    }
+
+    fn tick(report: &mut RunReport, tick: u64, skipped: u64, outcome: TickOutcome) {
+        report.add(Due { tick, skipped }, 0.01 * tick as f64, &outcome);
+    }
+
+    fn deforming() -> TickOutcome {
+        TickOutcome { state: Some(StateName::Deforming), ..TickOutcome::default() }
+    }
+
+    #[test]
+    fn every_deforming_tick_is_answered_or_has_one_reason() {
+        let mut report = report();
+        let free = TickOutcome { state: Some(StateName::Free), ..TickOutcome::default() };
+        tick(&mut report, 0, 0, free.clone());
+        // Missed while nothing is deformed: no answer is missing.
+        tick(&mut report, 4, 3, deforming());
+        // Missed while something is.
+        let solve = SolveSummary::new(&softgrasp_protocol::SolveReport::default(), 0.5);
+        let answered = TickOutcome { answers: vec![(4, solve)], ..deforming() };
+        tick(&mut report, 7, 2, answered);
+        let late = (7, Unanswered::AnswerLate);
+        tick(&mut report, 8, 0, TickOutcome { unanswered: vec![late, late], ..deforming() });
+        tick(&mut report, 9, 0, free);
+        report.add_skipped(2);
+        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
+        let s = &report.summary;
+        assert_eq!((report.ticks, s.ticks_skipped), (12, 7));
+        let mut counts = UnansweredCounts::default();
+        counts.add(Unanswered::TickSkipped, 2);
+        counts.add(Unanswered::AnswerLate, 1);
+        counts.add(Unanswered::RunEnded, 1);
+        assert_eq!(s.unanswered, counts);
+        assert_eq!(s.deforming_ticks, s.solves as u64 + s.unanswered.total());
+        assert_eq!(report.failure(), None);
+    }
+
+    #[test]
+    fn age_of_a_shape_is_the_time_since_the_tick_that_asked_for_it() {
+        let mut report = report();
+        for (number, shown_tick) in [(0, None), (1, Some(0)), (2, Some(0)), (3, Some(3))] {
+            tick(&mut report, number, 0, TickOutcome { shown_tick, ..deforming() });
+        }
+        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
+        let RunSummary { shown_age_ms_p50, shown_age_ms_max, .. } = report.summary;
+        assert!((shown_age_ms_p50.unwrap() - 10.0).abs() < 1e-9);
+        assert!((shown_age_ms_max.unwrap() - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn run_without_any_answer_says_what_the_server_refused() {
+        let mut report = report();
+        let refused = LoopEvent::Server("refused the model (BadRequest): too soft".to_owned());
+        let unanswered = vec![(0, Unanswered::Refused)];
+        tick(&mut report, 0, 0, TickOutcome { events: vec![refused], unanswered, ..deforming() });
+        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
+        let why = report.failure().unwrap();
+        assert_eq!(
+            why,
+            "none of 1 deforming ticks was answered: the server refused the model (BadRequest): \
+             too soft"
+        );
+    }
+}

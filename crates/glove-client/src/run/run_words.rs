@@ -1,0 +1,176 @@
+//! The report of a run in words, for a person who has never seen the program.
+
+use crate::pace::Pace;
+use crate::run::run_report::{EventRecord, ReplaySummary, RunReport};
+
+impl RunReport {
+    /// Why the run is a failure: answers were asked for and none came. `None` if it is none.
+    pub fn failure(&self) -> Option<String> {
+        if let Some(why) = &self.recording_failed {
+            return Some(why.clone());
+        }
+        let s = &self.summary;
+        if s.solves > 0 || s.deforming_ticks == 0 || self.interrupted {
+            return None;
+        }
+        let said = |event: &&EventRecord| {
+            event.kind == "server"
+                && ["refused ", "lost: "].iter().any(|w| event.what.starts_with(w))
+        };
+        let why = match self.events.iter().rfind(said) {
+            Some(event) => format!("the server {}", event.what.replacen("lost", "was lost", 1)),
+            None => {
+                s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
+            }
+        };
+        Some(format!("none of {} deforming ticks was answered: {why}", s.deforming_ticks))
+    }
+
+    /// One screen for a person who has never seen the program.
+    pub fn describe(&self) -> String {
+        let s = &self.summary;
+        let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
+        let solve = self.played.iter().rev().find_map(|record| record.solve.as_ref());
+        let mut text = format!(
+            "\n{} ({} nodes, {} tetrahedra, {:.0} mm) in the {} hand, held by {}, solved by {}\n",
+            self.object.name,
+            self.object.nodes,
+            self.object.tets,
+            1e3 * self.object.size_m,
+            self.hand,
+            self.contact,
+            self.server
+        );
+        for note in &self.object.notes {
+            text.push_str(&format!("  {note}\n"));
+        }
+        text.push_str("\nWhat happened:\n");
+        for event in &self.events {
+            text.push_str(&format!("  tick {:>5}  {}\n", event.tick, event.what));
+        }
+        text.push_str(&format!("\n  ticks               {}", self.ticks));
+        if s.ticks_skipped > 0 {
+            text.push_str(&format!(
+                ", of which {} came too late and were skipped",
+                s.ticks_skipped
+            ));
+        }
+        text.push_str(&format!("\n  grasp states        {}\n", self.states_reached.join(", ")));
+        text.push_str(&format!(
+            "  deforming ticks     {} of {} answered\n",
+            s.solves, s.deforming_ticks
+        ));
+        for (why, count) in s.unanswered.by_count() {
+            text.push_str(&format!("    not answered      {count}: {why}\n"));
+        }
+        // A tick that waits for plans and kept shapes may compute for as long as they take.
+        if s.ticks_over_1_ms > 0 && self.pace == Pace::Free.name() {
+            text.push_str(&format!(
+                "  long ticks          {} computed for more than 1 ms ({:.1} ms at most)\n",
+                s.ticks_over_1_ms, s.compute_ms_max
+            ));
+        }
+        if let Some(solve) = solve {
+            text.push_str(&format!(
+                "  equations           {} unknown, {} prescribed, by {}\n  \
+                 answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
+                 residual            {:.1e} at most\n",
+                solve.unknown_dofs,
+                solve.known_dofs,
+                solve.method,
+                ms(s.round_trip_ms_p50),
+                ms(s.round_trip_ms_p99),
+                ms(s.round_trip_ms_max),
+                s.residual_rel_max,
+            ));
+            if let (Some(turned), Some(strain)) = (s.max_rotation_deg, s.max_strain) {
+                text.push_str(&format!(
+                    "  shape               turned by {turned:.1} degrees, strained by {:.0} % at most\n",
+                    100.0 * strain,
+                ));
+            }
+        }
+        text.push_str(&self.words_of_age());
+        text.push_str(&self.words_of_large());
+        text.push_str(&self.words_of_devices());
+        if self.interrupted {
+            text.push_str("  ended by the user\n");
+        }
+        text
+    }
+
+    /// How old the shape was that was shown, in real time.
+    fn words_of_age(&self) -> String {
+        match (self.summary.shown_age_ms_p50, self.summary.shown_age_ms_max) {
+            (Some(median), Some(most)) if self.pace == Pace::Free.name() => {
+                format!("  shape shown         {median:.0} ms old (median), {most:.0} ms at most\n")
+            }
+            _ => String::new(),
+        }
+    }
+
+    /// What is to be said of large deformation.
+    fn words_of_large(&self) -> String {
+        let s = &self.summary;
+        let Some(min_jacobian) = s.min_jacobian else { return String::new() };
+        let error = s.error_estimate_rel_max.unwrap_or(0.0);
+        let mut text = format!(
+            "  large deformation   {} of {} answers; off by {error:.1e} at most (estimated), volumes \
+             down to {min_jacobian:.2} of those at rest\n",
+            s.large_solves, s.solves
+        );
+        if s.jumps > 0 {
+            text.push_str(&format!("                      the shape jumped {} times\n", s.jumps));
+        }
+        text
+    }
+
+    /// What is to be said of silent devices, of the way of a sample, and of a replay.
+    fn words_of_devices(&self) -> String {
+        let (s, mut text) = (&self.summary, String::new());
+        if s.ticks_held > 0 {
+            text.push_str(&format!(
+                "  hand held           {} ticks, while a device was silent\n",
+                s.ticks_held
+            ));
+        }
+        if let Some(fit) = &s.joint_fit {
+            text.push_str(&format!(
+                "  hand fits joints    to {:.1} mm (root mean square), {:.1} mm at most\n",
+                1e3 * fit.rms_m,
+                1e3 * fit.most_m
+            ));
+        }
+        if let Some(latency) = &s.latency {
+            text.push_str(&format!(
+                "  sample to shape     {:.1} ms (median), {:.1} ms (99 %)\n",
+                latency.whole.p50_ms, latency.whole.p99_ms
+            ));
+        }
+        if let Some(replay) = &self.replay {
+            text.push_str(&replay.words());
+        }
+        text
+    }
+}
+
+impl ReplaySummary {
+    /// A line or two.
+    fn words(&self) -> String {
+        let Self { ticks, requests, difference, cut } = self;
+        let found = match difference {
+            None => {
+                "poses, contacts, requests and displacements are the same bit by bit".to_owned()
+            }
+            Some(difference) => format!("it differs from {difference}"),
+        };
+        let mut text =
+            format!("  replay              {ticks} ticks, {requests} with requests: {found}\n");
+        if let Some(why) = cut {
+            text.push_str(&format!(
+                "                      the recording was cut off there: {why}\n"
+            ));
+        }
+        text
+    }
+}

@@ -1,0 +1,452 @@
+//! A run from its first tick to its report: hand, grasp loop and report, one tick at a time, and
+//! what a person asks of it between the ticks.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use nalgebra::{Quaternion, UnitQuaternion};
+use softgrasp_grasp::grasp::{Command, GraspEvent, StateName};
+use softgrasp_grasp::object::{ObjectError, SoftObject};
+use softgrasp_hand::hand_source::HandSource;
+use softgrasp_hand::loaded_object::LoadedObject;
+use softgrasp_hand::notice::Notice;
+use softgrasp_hand::recording::{Intervention, Recorder, Replayed};
+use softgrasp_hand::scripted::Seen;
+use softgrasp_hand::sent::Sent;
+use softgrasp_window::view::control::Control;
+
+use crate::ask::solve_settings::Subscription;
+use crate::pace::tick_budget::{LIMIT, Priority, TickBudget};
+use crate::pace::{Due, Pace};
+use crate::run::grasp_loop::GraspLoop;
+use crate::run::latency::LatencyLedger;
+use crate::run::recorded_tick::{news, pose, stage_digests, tick_seen};
+use crate::run::run_report::{ReplaySummary, RunReport};
+use crate::run::tick_outcome::{LoopEvent, TickOutcome};
+
+/// A run. It has no clock: whoever plays it says which tick is due.
+pub struct Session {
+    grasp_loop: GraspLoop,
+    hand: HandSource,
+    seen: Seen,
+    report: RunReport,
+    budget: TickBudget,
+    ends_with_script: bool,
+    /// Commands of the menu; one a tick.
+    commands: VecDeque<Command>,
+    notices: Vec<Notice>,
+    /// State, tips and segments after the last tick, without its news.
+    last: TickOutcome,
+    recorder: Option<Recorder>,
+    latency: LatencyLedger,
+    /// What was wrong with devices when they were looked at last.
+    complaints: Vec<String>,
+}
+
+/// Devices are looked at every so many ticks.
+const COMPLAIN_EVERY: u64 = 30;
+
+impl Session {
+    /// A run that has not begun. The thread that plays it gets the priority with the first tick.
+    /// It ends with the script, or goes on with a hand that rests.
+    pub fn new(
+        grasp_loop: GraspLoop,
+        hand: impl Into<HandSource>,
+        report: RunReport,
+        priority: Priority,
+        ends_with_script: bool,
+    ) -> Self {
+        let (mut grasp_loop, hand) = (grasp_loop, hand.into());
+        if matches!(hand, HandSource::Replay(_)) {
+            grasp_loop.want_digests();
+        }
+        Self {
+            grasp_loop,
+            hand,
+            seen: Seen::default(),
+            report,
+            budget: TickBudget::new(priority),
+            ends_with_script,
+            commands: VecDeque::new(),
+            notices: Vec::new(),
+            last: TickOutcome::default(),
+            recorder: None,
+            latency: LatencyLedger::default(),
+            complaints: Vec::new(),
+        }
+    }
+
+    /// Plays the tick that is due; `None` when the script is over. Ticks that were missed are
+    /// counted; the hand is where it is now.
+    ///
+    /// Units: `now_s` s on the client's clock.
+    ///
+    /// # Errors
+    /// [`ObjectError`] when the object cannot be shown any more.
+    pub fn play(&mut self, due: Due, now_s: f64) -> Result<Option<TickOutcome>, ObjectError> {
+        self.budget.begin();
+        let began = Instant::now();
+        // Between the ticks the object may have been turned or replaced.
+        self.seen.world_from_object = *self.grasp_loop.world_from_object();
+        let (due, now_s, mut sent) = self.next(due, now_s);
+        if sent.over && self.ends_with_script {
+            self.report.add_skipped(due.skipped);
+            return Ok(None);
+        }
+        if sent.command.is_none() {
+            sent.command = self.commands.pop_front();
+        }
+        let mut outcome = self.grasp_loop.tick(due.tick, now_s, &sent)?;
+        self.complain(due.tick, &mut outcome);
+        self.record(due, now_s, &sent, &outcome);
+        self.seen = outcome.seen;
+        self.hear(&outcome);
+        self.report.add(due, now_s, &outcome);
+        let computed = self.budget.end();
+        self.note_latency(due.tick, now_s, began.elapsed(), &outcome);
+        self.report.add_computed(computed);
+        Ok(Some(outcome))
+    }
+
+    /// What comes into a tick; one that is played again has the number and the time it had before.
+    fn next(&mut self, due: Due, now_s: f64) -> (Due, f64, Sent) {
+        if let HandSource::Replay(hand) = &mut self.hand {
+            let Some(replayed) = hand.next_tick() else {
+                return (due, now_s, Sent { over: true, ..Sent::default() });
+            };
+            let Replayed { tick, skipped, now_s, interventions, sent } = replayed;
+            interventions.into_iter().for_each(|done| self.repeat(done));
+            return (Due { tick, skipped }, now_s, sent);
+        }
+        let object = self.grasp_loop.object();
+        let sent = self.hand.next_after(due.skipped + 1, now_s, &self.seen, object);
+        (due, now_s, sent)
+    }
+
+    /// Does again what a person did to the object between two ticks.
+    fn repeat(&mut self, done: Intervention) {
+        let repeated = match done {
+            Intervention::Turn([x, y, z, w]) => {
+                let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+                self.grasp_loop.turn_object(rotation).map_err(|error| error.to_string())
+            }
+            Intervention::UndoKeepShape => {
+                self.grasp_loop.undo_keep_shape().map_err(|notice| notice.text)
+            }
+            Intervention::NotReplayed(what) => Err(format!("a replay cannot repeat this: {what}")),
+        };
+        self.notices.extend(repeated.err().map(Notice::refused));
+    }
+
+    /// Tells what is wrong with devices that were open before, or never were.
+    fn complain(&mut self, tick: u64, outcome: &mut TickOutcome) {
+        let HandSource::Live(hand) = &self.hand else { return };
+        if tick % COMPLAIN_EVERY != COMPLAIN_EVERY - 1 {
+            return;
+        }
+        let complaints = hand.complaints();
+        let new = complaints.iter().filter(|text| !self.complaints.contains(text));
+        outcome.events.extend(new.cloned().map(LoopEvent::Device));
+        self.complaints = complaints;
+    }
+
+    /// Writes down what a tick did, and holds it against what was written down.
+    fn record(&mut self, due: Due, now_s: f64, sent: &Sent, outcome: &TickOutcome) {
+        if let HandSource::Replay(hand) = &mut self.hand {
+            hand.compare(&stage_digests(&self.grasp_loop, outcome));
+        }
+        if let Some(recorder) = &mut self.recorder {
+            let grasp_loop = &self.grasp_loop;
+            let stages = stage_digests(grasp_loop, outcome);
+            let made = tick_seen(due, now_s, grasp_loop, outcome, stages);
+            recorder.tick(sent, news(outcome), pose(due.tick, grasp_loop), made);
+        }
+    }
+
+    /// Books when the samples came, the question was asked and the answers were shown.
+    fn note_latency(&mut self, tick: u64, now_s: f64, computed: Duration, outcome: &TickOutcome) {
+        // Ticks that wait for their answers have no time of their own.
+        if self.grasp_loop.pace() == Pace::Lockstep {
+            return;
+        }
+        let end_s = now_s + computed.as_secs_f64();
+        for (asked, solve) in &outcome.answers {
+            self.latency.shown(*asked, solve.round_trip_ms, end_s);
+        }
+        let sample_s = self.grasp_loop.reader().sample_time_s(now_s);
+        if let (Some(StateName::Deforming), Some(sample_s)) = (outcome.state, sample_s) {
+            self.latency.asked(tick, sample_s, now_s, end_s);
+        }
+    }
+
+    /// From now on every tick is recorded.
+    pub fn record_to(&mut self, recorder: Recorder) {
+        self.grasp_loop.want_digests();
+        self.recorder = Some(recorder);
+    }
+
+    fn intervened(&mut self, intervention: Intervention) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.intervene(intervention);
+        }
+    }
+
+    /// Goes on with what is under way while no tick is played. The outcome repeats what the last
+    /// tick showed.
+    ///
+    /// # Errors
+    /// As [`Session::play`].
+    pub fn idle(&mut self) -> Result<TickOutcome, ObjectError> {
+        let outcome = self.grasp_loop.idle()?;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.idle(news(&outcome));
+        }
+        self.report.add_last(&outcome);
+        self.hear(&outcome);
+        let TickOutcome { events, answers, unanswered, notices, .. } = outcome;
+        let state = self.last.state.map(|_| self.grasp_loop.state());
+        Ok(TickOutcome { events, answers, unanswered, notices, state, ..self.last.clone() })
+    }
+
+    /// Does what a person asks, or takes it in hand; [`Session::take_notices`] tells what has become
+    /// of it. When ticks are played is the concern of whoever plays them: pause, step and stop
+    /// change nothing here.
+    pub fn apply(&mut self, control: Control) {
+        let refused = match control {
+            Control::KeepShape => self.command(Command::KeepShape),
+            Control::Detach => self.command(Command::Release),
+            Control::ReturnHome => self.command(Command::ReturnHome),
+            Control::UndoKeepShape => {
+                let begun = self.grasp_loop.undo_keep_shape();
+                if begun.is_ok() {
+                    self.intervened(Intervention::UndoKeepShape);
+                }
+                begun
+            }
+            Control::Save(path) => self.save(path),
+            Control::ReplaceObject(loaded) => self.replace_object(&loaded),
+            Control::ReplaceHand(hand) => self.replace_hand(*hand),
+            Control::TurnObject(rotation) => self.turn_object(rotation),
+            Control::Restart => self.restart(),
+            Control::Mouse(input) => {
+                if let HandSource::Mouse(hand) = &mut self.hand {
+                    hand.take(input);
+                }
+                Ok(())
+            }
+            Control::SetMethod(method) => {
+                self.notices.push(Notice::done(format!("solved by {method} from now on")));
+                self.grasp_loop.set_method(method);
+                Ok(())
+            }
+            Control::SetMaxError(max_error) => self.set_max_error(max_error),
+            Control::SetForces(forces) => {
+                self.grasp_loop.wishes_mut().forces = forces;
+                Ok(())
+            }
+            Control::SetWhole(whole) => {
+                let subscription = if whole { Subscription::Whole } else { Subscription::Surface };
+                self.grasp_loop.set_subscription(subscription);
+                Ok(())
+            }
+            Control::EndWithScript => {
+                self.ends_with_script = true;
+                Ok(())
+            }
+            Control::Pause | Control::Resume | Control::Step | Control::Stop => Ok(()),
+        };
+        self.notices.extend(refused.err());
+    }
+
+    /// Counts ticks that were missed at the end, after which none is played.
+    pub fn skip(&mut self, ticks: u64) {
+        self.report.add_skipped(ticks);
+    }
+
+    /// The grasp loop.
+    pub fn grasp_loop(&self) -> &GraspLoop {
+        &self.grasp_loop
+    }
+
+    /// The hand.
+    pub fn hand(&self) -> &HandSource {
+        &self.hand
+    }
+
+    /// Whether commands wait for the next tick.
+    pub fn has_commands(&self) -> bool {
+        !self.commands.is_empty()
+    }
+
+    /// Sentences for the person since the last call.
+    pub fn take_notices(&mut self) -> Vec<Notice> {
+        if let HandSource::Mouse(hand) = &mut self.hand {
+            self.notices.extend(hand.take_notices());
+        }
+        std::mem::take(&mut self.notices)
+    }
+
+    /// Waits until the server has answered all, at most so long.
+    pub fn wait_idle(&self, at_most: Duration) -> bool {
+        self.grasp_loop.wait_idle(at_most)
+    }
+
+    /// Waits until nothing is under way but the planning of the hand; see [`GraspLoop::settle`].
+    pub fn settle(&mut self, at_most: Duration) {
+        self.grasp_loop.settle(at_most);
+    }
+
+    /// Ends the run; `interrupted` if the user did.
+    ///
+    /// # Errors
+    /// As [`Session::play`].
+    pub fn finish(mut self, interrupted: bool) -> Result<RunReport, ObjectError> {
+        self.report.add_last(&self.grasp_loop.take_last()?);
+        self.report.interrupted = interrupted;
+        self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
+        self.report.summary.latency = self.latency.summary();
+        let fit = self.grasp_loop.reader().fit_errors();
+        self.report.summary.joint_fit = (fit.records > 0).then_some(fit);
+        if let HandSource::Live(hand) = &self.hand {
+            self.report.summary.pieces_dropped = hand.dropped();
+        }
+        if let HandSource::Replay(hand) = self.hand {
+            self.report.replay = Some(ReplaySummary::of(&hand));
+        }
+        if let Some(Err(error)) = self.recorder.map(Recorder::finish) {
+            self.report.recording_failed = Some(softgrasp_os::one_line(&error));
+        }
+        Ok(self.report)
+    }
+
+    /// Takes the news of a tick for the person.
+    fn hear(&mut self, outcome: &TickOutcome) {
+        self.notices.extend(outcome.events.iter().filter_map(notice_of));
+        self.notices.extend(outcome.notices.iter().cloned());
+        if let Some(state) = outcome.state {
+            let &TickOutcome { tips, recalled, shown_tick, seen, .. } = outcome;
+            let state = Some(state);
+            self.last =
+                TickOutcome { state, tips, recalled, shown_tick, seen, ..TickOutcome::default() };
+        }
+    }
+
+    fn command(&mut self, command: Command) -> Result<(), Notice> {
+        self.commands.push_back(command);
+        Ok(())
+    }
+
+    fn save(&mut self, path: PathBuf) -> Result<(), Notice> {
+        self.notices.extend(self.grasp_loop.save(path)?);
+        Ok(())
+    }
+
+    fn replace_object(&mut self, loaded: &LoadedObject) -> Result<(), Notice> {
+        if matches!(self.hand, HandSource::Replay(_)) {
+            return Err(Notice::refused("a recording is of the object that it was made with"));
+        }
+        let LoadedObject { summary, object, plan, .. } = loaded;
+        let plan = match (plan, self.hand.is_played()) {
+            (Err(error), true) => return Err(Notice::refused(error.to_string())),
+            (plan, _) => plan.as_ref().ok(),
+        };
+        self.grasp_loop.replace_object(Arc::clone(object.rest_shape()), &summary.name)?;
+        self.grasp_loop.let_object_go();
+        match &mut self.hand {
+            HandSource::Scripted(hand) => hand.restart(plan.copied()),
+            HandSource::Mouse(hand) => hand.meet_new_object(),
+            HandSource::Foreign(hand) => hand.restart(),
+            HandSource::Live(_) | HandSource::Replay(_) => {}
+        }
+        self.intervened(Intervention::NotReplayed(format!("the object became {}", summary.name)));
+        Ok(())
+    }
+
+    fn replace_hand(&mut self, mut hand: HandSource) -> Result<(), Notice> {
+        self.grasp_loop.let_object_go();
+        if let HandSource::Scripted(hand) = &mut hand {
+            // Scripts are made for an object at home, as it is now.
+            self.grasp_loop.put_object_home();
+            hand.restart(None);
+        }
+        let what = format!("the hand became {}", hand.name());
+        self.intervened(Intervention::NotReplayed(what));
+        let text = format!("the hand is now {}", hand.name());
+        self.hand = hand;
+        self.notices.push(Notice::done(text));
+        Ok(())
+    }
+
+    fn restart(&mut self) -> Result<(), Notice> {
+        let HandSource::Scripted(hand) = &mut self.hand else {
+            let text = "only a script can be played again from its beginning";
+            return Err(Notice::refused(text));
+        };
+        hand.restart(None);
+        self.grasp_loop.put_object_home();
+        self.intervened(Intervention::NotReplayed("the script began again".to_owned()));
+        Ok(())
+    }
+
+    fn turn_object(&mut self, rotation: UnitQuaternion<f64>) -> Result<(), Notice> {
+        if self.hand.is_played() {
+            let text = "a script grasps the object as it stands; take the mouse hand to turn it";
+            return Err(Notice::refused(text));
+        }
+        let turned = self.grasp_loop.turn_object(rotation);
+        if turned.is_ok() {
+            self.intervened(Intervention::Turn(rotation.coords.into()));
+        }
+        turned.map_err(|error| Notice::refused(format!("the object is not turned: {error}")))
+    }
+
+    fn set_max_error(&mut self, max_error: Option<f64>) -> Result<(), Notice> {
+        if max_error.is_some_and(|error| !(error.is_finite() && error > 0.0)) {
+            let text = "the largest error is not taken: it must be a number above 0";
+            return Err(Notice::refused(text));
+        }
+        self.grasp_loop.wishes_mut().max_error = max_error;
+        Ok(())
+    }
+}
+
+/// What a person wants to be told of an event.
+fn notice_of(event: &LoopEvent) -> Option<Notice> {
+    Some(match event {
+        LoopEvent::Grasp(GraspEvent::ShapeKept) => Notice::done("shape kept"),
+        LoopEvent::Grasp(GraspEvent::Released) => Notice::done("the object is let go"),
+        LoopEvent::Grasp(GraspEvent::ReturnedHome) => Notice::done("the object is back home"),
+        LoopEvent::Grasp(GraspEvent::Ignored(Command::KeepShape)) => {
+            Notice::refused("no shape to keep: close all five fingers on the object first")
+        }
+        LoopEvent::Grasp(GraspEvent::Ignored(command)) => {
+            Notice::refused(format!("{command}: the hand holds nothing"))
+        }
+        LoopEvent::KeepRefused(text) => Notice::refused(text.clone()),
+        LoopEvent::Device(text) => Notice::refused(text.clone()),
+        LoopEvent::Grasp(_) | LoopEvent::Shape(_) | LoopEvent::Server(_) => return None,
+    })
+}
+
+/// Real-time priority for the ticks of an object that follows its answers within half of what such
+/// a thread may compute at a time; the other half is for all else that a tick does.
+///
+/// # Errors
+/// [`ObjectError`] when the object cannot be shown.
+pub fn priority_for(object: &mut SoftObject) -> Result<Priority, ObjectError> {
+    let mut trial = TickBudget::new(Priority::Ordinary);
+    let still = vec![[0.0; 3]; object.surface().nodes.len()];
+    // The second time the memory is there.
+    for _ in 0..2 {
+        trial.begin();
+        object.apply_to_surface(&still)?;
+        let computed = trial.end();
+        object.relax()?;
+        if computed <= LIMIT / 2 {
+            return Ok(Priority::RealTime);
+        }
+    }
+    Ok(Priority::Ordinary)
+}

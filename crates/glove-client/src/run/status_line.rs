@@ -1,0 +1,54 @@
+//! Shows tick, grasp state and the last solve on one line of the terminal during a run.
+
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use softgrasp_protocol::solve_report::SolveSummary;
+
+use crate::run::tick_outcome::TickOutcome;
+
+/// The status line; silent when standard error is not a terminal.
+pub struct StatusLine {
+    bar: ProgressBar,
+    drawn: Option<Instant>,
+    last_solve: Option<SolveSummary>,
+}
+
+/// More often than this nobody can read it.
+const DRAW_EVERY: Duration = Duration::from_millis(50);
+
+impl StatusLine {
+    /// An empty line.
+    pub fn start() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        if let Ok(style) = ProgressStyle::with_template("{msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, drawn: None, last_solve: None }
+    }
+
+    /// Shows a tick.
+    pub fn show(&mut self, tick: u64, outcome: &TickOutcome) {
+        if let Some((_, solve)) = outcome.answers.last() {
+            self.last_solve = Some(solve.clone());
+        }
+        if self.bar.is_hidden() || self.drawn.is_some_and(|drawn| drawn.elapsed() < DRAW_EVERY) {
+            return;
+        }
+        self.drawn = Some(Instant::now());
+        let state = outcome.state.map_or("waiting for the hand".to_owned(), |s| s.to_string());
+        // One letter a finger that touches, a dot for one that does not.
+        let tips: String =
+            "TIMRL".chars().zip(outcome.tips).map(|(c, on)| if on { c } else { '.' }).collect();
+        let solver = self.last_solve.as_ref().map_or("no solve yet".to_owned(), |s| {
+            format!("{}  {:.2} ms  residual {:.1e}", s.method, s.round_trip_ms, s.residual_rel)
+        });
+        self.bar.set_message(format!("tick {tick:>5}  {state:<10} tips {tips}  {solver}"));
+    }
+}
+
+impl Drop for StatusLine {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

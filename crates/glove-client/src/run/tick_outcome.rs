@@ -1,0 +1,71 @@
+//! The outcome of one tick: events, the state of the grasp, answers, and ticks without one.
+
+use softgrasp_grasp::grasp::{GraspEvent, StateName};
+use softgrasp_hand::arrival::Device;
+use softgrasp_hand::notice::Notice;
+use softgrasp_hand::scripted::Seen;
+use softgrasp_protocol::solve_report::SolveSummary;
+
+use crate::ask::unanswered::Unanswered;
+
+/// What happened, for the report; in the order it happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoopEvent {
+    /// The grasp changed.
+    Grasp(GraspEvent),
+    /// A shape was to be kept, but cannot be.
+    KeepRefused(String),
+    /// The object was changed, replaced or saved.
+    Shape(String),
+    /// The server came, went, or refused.
+    Server(String),
+    /// A device fell silent, or speaks again.
+    Device(String),
+}
+
+impl LoopEvent {
+    /// `grasp`, `shape` or `server`, and what happened in words.
+    pub fn kind_and_words(&self) -> (&'static str, String) {
+        match self {
+            Self::Grasp(GraspEvent::TipTouched(finger, node)) => {
+                ("grasp", format!("{finger} touched node {node}"))
+            }
+            Self::Grasp(event) => ("grasp", event.to_string()),
+            Self::KeepRefused(text) => ("shape", format!("keep shape refused: {text}")),
+            Self::Shape(text) => ("shape", text.clone()),
+            Self::Server(text) => ("server", text.clone()),
+            Self::Device(text) => ("device", text.clone()),
+        }
+    }
+}
+
+/// One tick, for the status line and the report.
+#[derive(Clone, Debug, Default)]
+pub struct TickOutcome {
+    /// Events of this tick.
+    pub events: Vec<LoopEvent>,
+    /// State after it; `None` until both devices have spoken.
+    pub state: Option<StateName>,
+    /// Which tips hold or touch, thumb first.
+    pub tips: [bool; 5],
+    /// Segments shown at their last free pose, by finger.
+    pub recalled: [u8; 5],
+    /// Answers that came, with the tick they were asked for in.
+    pub answers: Vec<(u64, SolveSummary)>,
+    /// Deforming ticks of which it is now certain that no answer comes, and why.
+    pub unanswered: Vec<(u64, Unanswered)>,
+    /// Tick whose answer the object shows now; `None` while it shows none of this grip.
+    pub shown_tick: Option<u64>,
+    /// Devices that are silent: the hand is held where it was.
+    pub silent: Vec<Device>,
+    /// Whether the answer to what the object springs back to was taken.
+    pub sprung_back: bool,
+    /// Whether a rest shape that was made beside the ticks was taken.
+    pub took_work: bool,
+    /// Digest of what the server is asked, where that is recorded or held against a recording.
+    pub request_digest: Option<String>,
+    /// What the person sees next.
+    pub seen: Seen,
+    /// Sentences for the person.
+    pub notices: Vec<Notice>,
+}

@@ -1,7 +1,0 @@
-//! The drivers against the emulators over pseudo-terminals, at real rates.
-
-mod completeness;
-mod probing;
-mod reader;
-mod recovery;
-mod served;

@@ -1,0 +1,46 @@
+//! Which nodes follow a fingertip: the one it touched, all that it covers, or the average of those.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// What a fingertip holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ContactModel {
+    /// The single node it touched, as in the thesis. Its force goes to zero as the mesh is refined.
+    Vertex,
+    /// Every surface node within the fingertip's radius of the one it touched.
+    Patch,
+    /// The mean of the surface under the fingertip, weighted by its pressure, with one force. Its
+    /// force converges as the mesh is refined, and its frames cost what those of a vertex do
+    /// (`reports/contact.md`).
+    #[default]
+    Mask,
+}
+
+/// A name that is no contact model's.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no contact model is called '{0}'; there are vertex, patch and mask")]
+pub struct UnknownContact(String);
+
+impl FromStr for ContactModel {
+    type Err = UnknownContact;
+
+    fn from_str(name: &str) -> Result<Self, UnknownContact> {
+        match name {
+            "vertex" => Ok(Self::Vertex),
+            "patch" => Ok(Self::Patch),
+            "mask" => Ok(Self::Mask),
+            _ => Err(UnknownContact(name.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for ContactModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Vertex => "vertex",
+            Self::Patch => "patch",
+            Self::Mask => "mask",
+        })
+    }
+}

@@ -1,0 +1,11 @@
+//! The object in the hand: which one it is, its shape at rest, and its shape as it is now.
+
+mod choice;
+mod contact_model;
+mod rest_shape;
+mod soft_object;
+
+pub use choice::ObjectChoice;
+pub use contact_model::{ContactModel, UnknownContact};
+pub use rest_shape::{ObjectError, RestShape};
+pub use soft_object::SoftObject;

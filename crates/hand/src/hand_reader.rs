@@ -1,0 +1,320 @@
+//! Turns the bytes of glove and tracker into the pose of the hand.
+
+use nalgebra::{Isometry3, Translation3};
+use softgrasp_grasp::hand::{HandDimensions, HandPose, JointAngles, pose};
+
+use crate::arrival::{Arrival, Device};
+use crate::devices::calibration::Calibration;
+use crate::devices::cyberglove::{
+    self, GloveEvent, GloveParser, GloveRecord, RecordKind, RecordOptions, SensorCount,
+    SensorHealth, SensorSet,
+};
+use crate::devices::fastrak::{
+    self, Encoding, FastrakEvent, FastrakFormat, FastrakParser, FastrakRecord, LengthUnit,
+    OutputList, Station,
+};
+use crate::devices::{Detected, Freshness, HandSample, ReceiverMount, SampleHold};
+use crate::joints_reader::{FitErrors, JointsReader};
+
+/// Everything that says how a hand, its glove and its tracker are set up.
+#[derive(Clone, Debug)]
+pub struct HandSetup {
+    /// Sizes of the hand.
+    pub dimensions: HandDimensions,
+    /// From raw sensor values to angles.
+    pub calibration: Calibration,
+    /// How many sensors the glove has.
+    pub sensors: SensorCount,
+    /// What the glove's records hold besides.
+    pub glove_options: RecordOptions,
+    /// Format of the tracker's records.
+    pub tracker: FastrakFormat,
+    /// Where the receiver sits on the arm.
+    pub mount: ReceiverMount,
+    /// Where the transmitter stands: its Y-up frame (`docs/frames.md`) in the scene's world, m.
+    pub world_from_stand: Isometry3<f64>,
+}
+
+impl Default for HandSetup {
+    /// The scripted set-up: 22 sensors, binary quaternion records in centimetres, transmitter 60 cm
+    /// behind the object so that the hand never crosses the tracker's hemisphere.
+    fn default() -> Self {
+        Self {
+            dimensions: HandDimensions::default(),
+            calibration: Calibration::default(),
+            sensors: SensorCount::TwentyTwo,
+            glove_options: RecordOptions::default(),
+            tracker: FastrakFormat {
+                encoding: Encoding::Binary,
+                output: OutputList::PositionQuaternion,
+                units: LengthUnit::Centimetres,
+            },
+            mount: ReceiverMount::default(),
+            world_from_stand: Translation3::new(0.0, 0.0, 0.6).into(),
+        }
+    }
+}
+
+impl HandSetup {
+    /// The angles that the client reads when the glove's sensors measure these.
+    pub fn felt(&self, angles: &JointAngles) -> JointAngles {
+        let raw = self.calibration.raw_from_angles(angles, self.sensors);
+        self.calibration.angles(&raw, SensorSet::EMPTY)
+    }
+
+    /// What glove and tracker send for a hand in this pose.
+    pub fn arrivals_of(
+        &self,
+        angles: &JointAngles,
+        world_from_palm: &Isometry3<f64>,
+    ) -> Vec<Arrival> {
+        let glove = cyberglove::encode_record(&GloveRecord {
+            kind: RecordKind::Polled,
+            sensors: self.calibration.raw_from_angles(angles, self.sensors),
+            timestamp: None,
+            status: None,
+        });
+        let hand = self.dimensions.handedness;
+        let world_from_receiver = self.mount.world_from_receiver(world_from_palm, angles, hand);
+        let stand_from_receiver = self.world_from_stand.inverse() * world_from_receiver;
+        let FastrakFormat { encoding, output, units } = self.tracker;
+        let record = FastrakRecord::from_world(Station::FIRST, &stand_from_receiver, output, units);
+        // A pose too far for the record's columns is a record that does not come.
+        let tracker = fastrak::encode_record(&record, encoding).unwrap_or_default();
+        vec![Arrival::with_tick(Device::Glove, glove), Arrival::with_tick(Device::Tracker, tracker)]
+    }
+}
+
+/// Reads a hand from its devices' bytes.
+pub struct HandReader {
+    setup: HandSetup,
+    glove: Detected<GloveParser>,
+    tracker: Detected<FastrakParser>,
+    joints: JointsReader,
+    hold: SampleHold,
+    health: SensorHealth,
+    faults: DeviceFaults,
+    /// The tracker takes the receiver for its mirror image through the transmitter.
+    is_flipped: bool,
+}
+
+/// How often the devices' bytes were not good records.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DeviceFaults {
+    /// Faults of the glove's line.
+    pub glove: u64,
+    /// Faults of the tracker's line.
+    pub tracker: u64,
+    /// Jumps of the tracker to the opposite side of its field.
+    pub hemisphere_flips: u64,
+    /// Bad lines of joints, and lines that no hand fits.
+    pub joints: u64,
+}
+
+/// A sample that is older than this is stale: the hand is held where it was, s.
+pub const SAMPLE_AGE_MAX_S: f64 = 0.25;
+
+impl HandReader {
+    /// A reader that has heard nothing yet, for devices that send what the set-up says.
+    pub fn new(setup: HandSetup) -> Self {
+        let glove = Detected::known(GloveParser::new(setup.sensors, RecordOptions::default()));
+        let tracker = Detected::known(FastrakParser::new(setup.tracker));
+        Self::with(setup, glove, tracker, None)
+    }
+
+    /// A reader for devices that may not send what they were told to: the number of the glove's
+    /// sensors, bytes or text, angles or quaternion are taken from what comes.
+    ///
+    /// Frame: `world_from_sender` places a sender of joints; `None` places its first hand before the
+    /// object.
+    pub fn of_devices(setup: HandSetup, world_from_sender: Option<Isometry3<f64>>) -> Self {
+        let other = match setup.sensors {
+            SensorCount::Eighteen => SensorCount::TwentyTwo,
+            SensorCount::TwentyTwo => SensorCount::Eighteen,
+        };
+        let counts = [setup.sensors, other];
+        let in_bytes = counts.map(|count| GloveParser::new(count, setup.glove_options));
+        let in_lines = counts.map(GloveParser::of_lines);
+        let glove = Detected::one_of(in_bytes.into_iter().chain(in_lines));
+        let told = setup.tracker;
+        let encodings = [Encoding::Binary, Encoding::Ascii].into_iter();
+        let lists = [OutputList::PositionQuaternion, OutputList::PositionEuler];
+        let others = encodings.flat_map(|encoding| lists.map(|output| (encoding, output)));
+        let others = others.map(|(encoding, output)| FastrakFormat { encoding, output, ..told });
+        let formats = std::iter::once(told).chain(others.filter(|format| *format != told));
+        let tracker = Detected::one_of(formats.map(FastrakParser::new));
+        Self::with(setup, glove, tracker, world_from_sender)
+    }
+
+    fn with(
+        setup: HandSetup,
+        glove: Detected<GloveParser>,
+        tracker: Detected<FastrakParser>,
+        world_from_sender: Option<Isometry3<f64>>,
+    ) -> Self {
+        let joints = JointsReader::new(setup.dimensions, world_from_sender);
+        Self {
+            setup,
+            glove,
+            tracker,
+            joints,
+            hold: SampleHold::default(),
+            health: SensorHealth::default(),
+            faults: DeviceFaults::default(),
+            is_flipped: false,
+        }
+    }
+
+    /// The set-up.
+    pub fn setup(&self) -> &HandSetup {
+        &self.setup
+    }
+
+    /// Faults so far.
+    pub fn faults(&self) -> DeviceFaults {
+        DeviceFaults { joints: self.joints.faults(), ..self.faults }
+    }
+
+    /// How well the hand fits a sender's joints.
+    pub fn fit_errors(&self) -> FitErrors {
+        self.joints.fit_errors()
+    }
+
+    /// Takes bytes of the devices, in the order in which they came.
+    ///
+    /// Units: `now_s` s on the client's clock, the time of bytes that come with the tick.
+    pub fn feed(&mut self, arrivals: &[Arrival], now_s: f64) {
+        for Arrival { device, at_s, is_datagram, bytes } in arrivals {
+            let time_s = at_s.unwrap_or(now_s);
+            match device {
+                Device::Glove => self.feed_glove(bytes, time_s),
+                Device::Tracker => self.feed_tracker(bytes, time_s),
+                Device::Joints => {
+                    self.joints.feed(bytes, *is_datagram, time_s);
+                    self.setup.dimensions = *self.joints.dimensions();
+                }
+            }
+        }
+    }
+
+    fn feed_glove(&mut self, bytes: &[u8], time_s: f64) {
+        let read = |parser: &mut GloveParser| {
+            let mut events = Vec::new();
+            parser.feed_all(bytes, |event| events.push(event));
+            events
+        };
+        for event in self.glove.feed(read, |event| matches!(event, GloveEvent::Record(_))) {
+            match event {
+                GloveEvent::Record(record) => {
+                    self.health.observe(&record.sensors);
+                    self.hold.on_glove(&record, time_s);
+                }
+                GloveEvent::Fault(fault) => {
+                    tracing::debug!(?fault, "glove");
+                    self.faults.glove += 1;
+                }
+            }
+        }
+    }
+
+    fn feed_tracker(&mut self, bytes: &[u8], time_s: f64) {
+        let read = |parser: &mut FastrakParser| {
+            let mut events = Vec::new();
+            parser.feed_all(bytes, |event| events.push(event));
+            events
+        };
+        for event in self.tracker.feed(read, |event| matches!(event, FastrakEvent::Record(_))) {
+            match event {
+                FastrakEvent::Record(record) => {
+                    let record = if self.is_flipped { record.mirrored() } else { record };
+                    self.hold.on_tracker(&record, time_s);
+                }
+                FastrakEvent::HemisphereFlip(flip) => {
+                    tracing::warn!(?flip, "the tracker jumped to the opposite side of its field");
+                    self.faults.hemisphere_flips += 1;
+                    // The field is the same at p and −p, and so is the attitude: the hand goes on
+                    // where it was.
+                    self.is_flipped = !self.is_flipped;
+                }
+                FastrakEvent::Reply(text) => tracing::debug!(text, "tracker"),
+                FastrakEvent::Fault(fault) => {
+                    tracing::debug!(?fault, "tracker");
+                    self.faults.tracker += 1;
+                }
+            }
+        }
+    }
+
+    /// When the first byte came of the older of the samples that are used now, s; `None` until all
+    /// devices have spoken.
+    pub fn sample_time_s(&self, now_s: f64) -> Option<f64> {
+        if let Some(time_s) = self.joints.time_s() {
+            return Some(time_s);
+        }
+        let sample = self.hold.sample(now_s);
+        Some(sample.glove?.time_s.min(sample.tracker?.time_s))
+    }
+
+    /// The newest samples of glove and tracker.
+    pub fn sample(&self, now_s: f64) -> HandSample {
+        self.hold.sample(now_s)
+    }
+
+    /// The devices from which nothing good has come for too long, the glove first; those that have
+    /// not spoken yet included, once another one has.
+    pub fn silent(&self, now_s: f64) -> Vec<Device> {
+        if let Some(time_s) = self.joints.time_s() {
+            let is_stale = now_s - time_s > SAMPLE_AGE_MAX_S;
+            return is_stale.then_some(Device::Joints).into_iter().collect();
+        }
+        let sample = self.hold.sample(now_s);
+        let ages = [
+            (Device::Glove, sample.glove_freshness(SAMPLE_AGE_MAX_S)),
+            (Device::Tracker, sample.tracker_freshness(SAMPLE_AGE_MAX_S)),
+        ];
+        if ages.iter().all(|(_, freshness)| *freshness == Freshness::Missing) {
+            return Vec::new();
+        }
+        let silent = ages.iter().filter(|(_, freshness)| *freshness != Freshness::Fresh);
+        silent.map(|(device, _)| *device).collect()
+    }
+
+    /// Pose of the hand by the newest samples, however old; `None` until all devices have spoken.
+    pub fn hand(&self, now_s: f64) -> Option<HandPose> {
+        if let Some(hand) = self.joints.hand() {
+            return Some(hand);
+        }
+        let sample = self.hold.sample(now_s);
+        let angles = self.setup.calibration.angles(&sample.glove?.sensors, self.health.dead());
+        let world_from_receiver = self.setup.world_from_stand * sample.tracker?.world_from_receiver;
+        let hand = self.setup.dimensions.handedness;
+        let world_from_palm = self.setup.mount.world_from_palm(&world_from_receiver, &angles, hand);
+        Some(pose(&self.setup.dimensions, &angles, world_from_palm))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn scripted_pose_comes_back_through_the_device_bytes() {
+        let setup = HandSetup::default();
+        let mut reader = HandReader::new(setup.clone());
+        let palm = Isometry3::new(Vector3::new(0.1, 0.05, -0.2), Vector3::new(0.4, -0.3, 1.2));
+        let mut angles = JointAngles::flat();
+        angles.index.mcp_flexion = 0.7;
+        let arrivals = setup.arrivals_of(&angles, &palm);
+        assert!(reader.hand(0.0).is_none());
+        reader.feed(&arrivals, 0.0);
+        let hand = reader.hand(0.0).unwrap();
+        let expected = pose(&setup.dimensions, &angles, palm);
+        for (got, sent) in hand.fingers.iter().zip(&expected.fingers) {
+            // One sensor count is about a degree, 1.5 mm at a fingertip.
+            assert!((got.tip() - sent.tip()).norm() < 4e-3);
+        }
+        assert!((hand.world_from_palm.translation.vector - palm.translation.vector).norm() < 1e-3);
+        assert_eq!(reader.faults(), DeviceFaults::default());
+    }
+}

@@ -1,0 +1,207 @@
+//! Writes a recording beside the ticks, which never wait for the disk.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mcap::{McapError, McapResult};
+use serde_json::json;
+
+use super::channels::Channel;
+use super::file::{DeviceBytes, RecordingFile, hex_of};
+use super::tick::{AnswerSeen, EventSeen, Intervention, PoseSeen, RecordedSetup, TickSeen};
+use crate::arrival::Arrival;
+use crate::sent::Sent;
+
+/// A recording that is being written.
+pub struct Recorder {
+    path: PathBuf,
+    messages: Option<Sender<Message>>,
+    thread: Option<JoinHandle<McapResult<()>>>,
+    /// What was taken between the ticks, and belongs to the next one.
+    between: Between,
+}
+
+/// Why a recording is not complete.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be written.
+    #[error("cannot record to {path}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: McapError,
+    },
+    /// The thread that writes cannot be started, or ended abnormally.
+    #[error("cannot record to {path}: the thread that writes is not there")]
+    Thread {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// What happened while no tick was played.
+#[derive(Default)]
+struct Between {
+    interventions: Vec<Intervention>,
+    news: TickNews,
+}
+
+/// What a tick took and told, or the time between two.
+#[derive(Clone, Debug, Default)]
+pub struct TickNews {
+    /// What happened.
+    pub events: Vec<EventSeen>,
+    /// Answers that were taken, in that order.
+    pub answers: Vec<AnswerSeen>,
+    /// Whether a rest shape was taken that was made beside the ticks.
+    pub took_work: bool,
+}
+
+/// What is written at once.
+enum Message {
+    Setup(Box<RecordedSetup>),
+    Tick(Box<TickMessage>),
+}
+
+/// A tick with all that belongs to it.
+struct TickMessage {
+    arrivals: Vec<Arrival>,
+    pose: Option<PoseSeen>,
+    events: Vec<EventSeen>,
+    answers: Vec<AnswerSeen>,
+    seen: TickSeen,
+}
+
+/// The file is made readable so often: that much a crash loses.
+const FLUSH_EVERY: Duration = Duration::from_millis(250);
+
+impl Recorder {
+    /// Begins a recording; the file is there when this returns.
+    ///
+    /// # Errors
+    /// [`RecordError`].
+    pub fn start(path: &Path, setup: RecordedSetup) -> Result<Self, RecordError> {
+        let path = path.to_owned();
+        let file = RecordingFile::create(&path);
+        let file = file.map_err(|source| RecordError::Write { path: path.clone(), source })?;
+        let (messages, to_write) = channel();
+        // Nobody hears it yet.
+        let _ = messages.send(Message::Setup(Box::new(setup)));
+        let thread = std::thread::Builder::new().name("recorder".to_owned());
+        let thread = thread.spawn(move || write_all(file, &to_write));
+        let thread = thread.map_err(|_| RecordError::Thread { path: path.clone() })?;
+        let (messages, thread) = (Some(messages), Some(thread));
+        Ok(Self { path, messages, thread, between: Between::default() })
+    }
+
+    /// Something was done to the object.
+    pub fn intervene(&mut self, intervention: Intervention) {
+        self.between.interventions.push(intervention);
+    }
+
+    /// Something was taken while no tick was played.
+    pub fn idle(&mut self, news: TickNews) {
+        self.between.news.add(news);
+    }
+
+    /// A tick is over. `made` is what it made, but for what [`Recorder`] knows itself: the command,
+    /// and what was done and taken since the tick before.
+    pub fn tick(&mut self, sent: &Sent, news: TickNews, pose: Option<PoseSeen>, made: TickSeen) {
+        let Between { interventions, news: mut all } = std::mem::take(&mut self.between);
+        all.add(news);
+        let TickNews { events, answers, took_work } = all;
+        let seen = TickSeen {
+            command: sent.command.map(|command| command.to_string()),
+            interventions,
+            answers: answers.iter().map(|answer| answer.tick).collect(),
+            took_work,
+            ..made
+        };
+        let message = TickMessage { arrivals: sent.arrivals.clone(), pose, events, answers, seen };
+        if let Some(messages) = &self.messages {
+            // A thread that could not write says so at the end.
+            let _ = messages.send(Message::Tick(Box::new(message)));
+        }
+    }
+
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// [`RecordError`]: what is missing in the file.
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        self.end().unwrap_or(Ok(()))
+    }
+
+    fn end(&mut self) -> Option<Result<(), RecordError>> {
+        drop(self.messages.take());
+        let thread = self.thread.take()?;
+        let path = self.path.clone();
+        Some(match thread.join() {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(source)) => Err(RecordError::Write { path, source }),
+            Err(_) => Err(RecordError::Thread { path }),
+        })
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if let Some(Err(error)) = self.end() {
+            tracing::error!(%error, "recording");
+        }
+    }
+}
+
+fn write_all(mut file: RecordingFile, messages: &Receiver<Message>) -> McapResult<()> {
+    let mut flushed = Instant::now();
+    loop {
+        match messages.recv_timeout(FLUSH_EVERY) {
+            Ok(Message::Setup(setup)) => {
+                file.write(Channel::Setup, 0.0, &setup)?;
+                file.flush()?;
+            }
+            Ok(Message::Tick(tick)) => write_tick(&mut file, &tick)?,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return file.finish(),
+        }
+        if flushed.elapsed() >= FLUSH_EVERY {
+            file.flush()?;
+            flushed = Instant::now();
+        }
+    }
+}
+
+fn write_tick(file: &mut RecordingFile, message: &TickMessage) -> McapResult<()> {
+    let TickMessage { arrivals, pose, events, answers, seen } = message;
+    let now_s = seen.now_s;
+    for Arrival { device, at_s, is_datagram, bytes } in arrivals {
+        let data = DeviceBytes { at_s: *at_s, datagram: *is_datagram, hex: hex_of(bytes) };
+        file.write(Channel::Device(*device), at_s.unwrap_or(now_s), &data)?;
+    }
+    if let Some(pose) = pose {
+        file.write(Channel::Pose, now_s, pose)?;
+    }
+    for EventSeen { kind, what } in events {
+        let event = json!({"tick": seen.tick, "kind": kind, "what": what});
+        file.write(Channel::Event, now_s, &event)?;
+    }
+    if !seen.stages.request.is_empty() {
+        let request = json!({"tick": seen.tick, "digest": seen.stages.request});
+        file.write(Channel::Request, now_s, &request)?;
+    }
+    for answer in answers {
+        file.write(Channel::Answer, now_s, answer)?;
+    }
+    file.write(Channel::Tick, now_s, seen)
+}
+
+impl TickNews {
+    fn add(&mut self, later: Self) {
+        self.events.extend(later.events);
+        self.answers.extend(later.answers);
+        self.took_work |= later.took_work;
+    }
+}

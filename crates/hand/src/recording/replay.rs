@@ -1,0 +1,90 @@
+//! A hand that repeats a recording.
+
+use std::sync::Arc;
+
+use softgrasp_grasp::grasp::Command;
+
+use super::read::Recording;
+use super::replay_check::ReplayCheck;
+use super::stages::StageDigests;
+use super::tick::{Intervention, RecordedTick};
+use crate::sent::{RecordedAnswers, Sent};
+
+/// Plays the ticks of a recording one after another, however fast it is asked.
+pub struct ReplayHand {
+    recording: Arc<Recording>,
+    name: String,
+    next: usize,
+    /// What came out, held against the recording.
+    pub check: ReplayCheck,
+}
+
+/// A tick that is played again.
+pub struct Replayed {
+    /// Its number.
+    pub tick: u64,
+    /// Ticks before it that were not played.
+    pub skipped: u64,
+    /// Time of the client's clock then, s.
+    pub now_s: f64,
+    /// What was done to the object before it.
+    pub interventions: Vec<Intervention>,
+    /// What the devices sent.
+    pub sent: Sent,
+}
+
+impl ReplayHand {
+    /// A hand that repeats a recording from its beginning; `name` is its file.
+    pub fn new(recording: Arc<Recording>, name: String) -> Self {
+        Self { recording, name, next: 0, check: ReplayCheck::default() }
+    }
+
+    /// Its file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The recording.
+    pub fn recording(&self) -> &Recording {
+        &self.recording
+    }
+
+    /// The next tick; `None` when the recording is over.
+    pub fn next_tick(&mut self) -> Option<Replayed> {
+        let RecordedTick { seen, arrivals, answered_by } = self.recording.ticks.get(self.next)?;
+        self.next += 1;
+        let recorded = RecordedAnswers {
+            answered_by: answered_by.clone(),
+            taken: seen.answers.clone(),
+            took_work: seen.took_work,
+        };
+        let sent = Sent {
+            arrivals: arrivals.clone(),
+            command: seen.command.as_deref().and_then(command),
+            over: false,
+            recorded: Some(recorded),
+        };
+        Some(Replayed {
+            tick: seen.tick,
+            skipped: seen.skipped,
+            now_s: seen.now_s,
+            interventions: seen.interventions.clone(),
+            sent,
+        })
+    }
+
+    /// Holds what the tick made that was played last against the recording.
+    pub fn compare(&mut self, made: &StageDigests) {
+        let last = self.next.checked_sub(1).and_then(|at| self.recording.ticks.get(at));
+        if let Some(recorded) = last {
+            self.check.add(&recorded.seen, made);
+        }
+    }
+}
+
+/// The command of this name.
+fn command(name: &str) -> Option<Command> {
+    [Command::KeepShape, Command::Release, Command::ReturnHome]
+        .into_iter()
+        .find(|command| command.to_string() == name)
+}

@@ -1,0 +1,393 @@
+//! Plays a script step by step, and sends what glove and tracker would send meanwhile.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use softgrasp_grasp::grasp::{Command, StateName};
+use softgrasp_grasp::hand::{Finger, JointAngles};
+use softgrasp_grasp::object::{ContactModel, SoftObject};
+
+use super::approach::PalmPath;
+use super::plan::{GraspPlan, Posture, angles};
+use super::planner::{NoGrasp, PlanRequest, Planner};
+use super::script::{ScriptName, Step};
+use crate::hand_reader::HandSetup;
+use crate::sent::Sent;
+
+/// What the person behind the hand sees before moving on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Whether each tip is inside the object, thumb first.
+    pub inside: [bool; 5],
+    /// Where the object is.
+    pub world_from_object: Isometry3<f64>,
+    /// State of the grasp, once there is one.
+    pub state: Option<StateName>,
+    /// The shape is being kept beside the ticks; the hand holds still until it is.
+    pub keeping: bool,
+}
+
+/// How the hand stands at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moment {
+    /// How far each finger is closed, 0 to 1, thumb first.
+    pub(super) closure: [f64; 5],
+    /// How the hand is set.
+    pub(super) posture: Posture,
+    /// The palm.
+    pub(super) world_from_palm: Isometry3<f64>,
+}
+
+impl Moment {
+    /// The joint angles.
+    pub(super) fn angles(&self) -> JointAngles {
+        angles(&self.closure, self.posture)
+    }
+}
+
+/// What has been played of a script.
+pub(super) struct Played {
+    /// How the hand stands now.
+    pub(super) moment: Moment,
+    /// Menu command.
+    pub(super) command: Option<Command>,
+    /// The script is over.
+    pub(super) over: bool,
+}
+
+/// The scripted hand.
+pub struct ScriptedHand {
+    setup: HandSetup,
+    contact: ContactModel,
+    planner: Planner,
+    /// A plan has been asked for and is not there yet.
+    planning: bool,
+    /// The script begins with a plan for the object as it is then.
+    plans_first: bool,
+    name: ScriptName,
+    steps: Vec<Step>,
+    at: usize,
+    step_tick: u32,
+    /// Share of the step that is over, from 0 to 1, gently at both ends.
+    progress: f64,
+    /// Ticks for which the hand has held still because the shape is being kept.
+    rested: u32,
+    plan: GraspPlan,
+    /// Where the palm came from when the hand turns to the other side.
+    turned_from: PalmPath,
+    closure: [f64; 5],
+    closure_before: [f64; 5],
+    lift: f64,
+}
+
+/// The hand holds still for so many ticks at most while the shape is being kept; by then the server
+/// is lost, or has refused.
+const REST_MAX: u32 = 200;
+/// How far the hand keeps away while it is not grasping, m.
+const BACK_OFF: f64 = 0.22;
+/// How far the hand lifts the object while it squeezes, m.
+const LIFT: f64 = 0.03;
+/// Closure per tick far from and near the expected touch.
+const CLOSE_FAST: f64 = 0.03;
+const CLOSE_SLOW: f64 = 0.008;
+/// How much further than expected a finger closes while it looks for the touch.
+const CLOSE_BEYOND: f64 = 0.15;
+impl ScriptedHand {
+    /// A hand that has looked at the object and knows how to grasp it. It plans its later
+    /// approaches while the tick waits, unless it is given another planner.
+    ///
+    /// # Errors
+    /// [`NoGrasp`] if it cannot be grasped by this hand.
+    pub fn try_new(
+        name: ScriptName,
+        setup: HandSetup,
+        object: &SoftObject,
+    ) -> Result<Self, NoGrasp> {
+        let object = Arc::clone(object.rest_shape());
+        let contact = ContactModel::default();
+        let request = PlanRequest { object, setup, contact, avoid_gaze: None };
+        let plan = request.grip()?;
+        Ok(Self::following(name, request.setup, plan))
+    }
+
+    /// A hand that follows a plan which was made elsewhere.
+    pub fn following(name: ScriptName, setup: HandSetup, plan: GraspPlan) -> Self {
+        Self {
+            setup,
+            contact: ContactModel::default(),
+            planner: Planner::waited(),
+            planning: false,
+            plans_first: false,
+            name,
+            steps: name.steps(),
+            at: 0,
+            step_tick: 0,
+            progress: 0.0,
+            rested: 0,
+            plan,
+            turned_from: plan.path,
+            closure: [0.0; 5],
+            closure_before: [0.0; 5],
+            lift: 0.0,
+        }
+    }
+
+    /// Plays the script again from its beginning, by this plan; `None` lets the hand plan for the
+    /// object as it is then.
+    pub fn restart(&mut self, plan: Option<GraspPlan>) {
+        self.planner.abandon();
+        self.planning = false;
+        self.plans_first = plan.is_none();
+        self.plan = plan.unwrap_or(self.plan);
+        (self.at, self.step_tick, self.progress, self.rested) = (0, 0, 0.0, 0);
+        (self.closure, self.closure_before, self.lift) = ([0.0; 5], [0.0; 5], 0.0);
+    }
+
+    /// Which script it plays.
+    pub fn script(&self) -> ScriptName {
+        self.name
+    }
+
+    /// The same hand with another place to plan its later approaches.
+    #[must_use]
+    pub fn with_planner(self, planner: Planner) -> Self {
+        Self { planner, ..self }
+    }
+
+    /// The same hand, whose later approaches are planned for fingertips that hold this.
+    #[must_use]
+    pub fn holding(self, contact: ContactModel) -> Self {
+        Self { contact, ..self }
+    }
+
+    /// The plan being followed.
+    pub fn plan(&self) -> &GraspPlan {
+        &self.plan
+    }
+
+    /// Whether the hand rests because its next approach is being planned.
+    pub fn is_planning(&self) -> bool {
+        self.planning
+    }
+
+    /// Moves on by one tick and says what the devices send.
+    pub fn next(&mut self, seen: &Seen, object: &SoftObject) -> Sent {
+        self.next_after(1, seen, object)
+    }
+
+    /// Moves on by the time of so many ticks, of which only the last is played, and says what the
+    /// devices send then.
+    pub fn next_after(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Sent {
+        let Played { moment, command, over } = self.play(ticks, seen, object);
+        let arrivals = self.setup.arrivals_of(&moment.angles(), &moment.world_from_palm);
+        Sent { arrivals, command, over, recorded: None }
+    }
+
+    /// The same before anything is sent.
+    pub(super) fn play(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Played {
+        let mut command = None;
+        let mut step = None;
+        for _ in 0..ticks {
+            step = self.steps.get(self.at).copied();
+            let Some(step) = step else { break };
+            if self.step_tick == 0 {
+                self.progress = 0.0;
+            }
+            // A person who waits to see something goes on after it, however long it took.
+            if self.rests(seen) || !self.is_ready_for(step, object) {
+                break;
+            }
+            if self.advance(step, seen) {
+                command = Some(Command::KeepShape);
+                break;
+            }
+        }
+        let moment = Moment {
+            closure: self.closure,
+            posture: self.posture(step),
+            world_from_palm: self.world_from_palm(step, object.rest_shape().centre()),
+        };
+        Played { moment, command, over: step.is_none() }
+    }
+
+    /// Whether the hand holds still because the shape is being kept.
+    fn rests(&mut self, seen: &Seen) -> bool {
+        self.rested = if seen.keeping { self.rested + 1 } else { 0 };
+        (1..=REST_MAX).contains(&self.rested)
+    }
+
+    /// One tick of a step; whether the shape is to be kept.
+    fn advance(&mut self, step: Step, seen: &Seen) -> bool {
+        if self.step_tick == 0 {
+            self.closure_before = self.closure;
+        }
+        self.step_tick += 1;
+        let t = (f64::from(self.step_tick) / f64::from(step.ticks_max())).min(1.0);
+        self.progress = t * t * (3.0 - 2.0 * t);
+        self.close(step, seen);
+        if self.step_tick >= step.ticks_max() || is_done(step, seen) {
+            self.at += 1;
+            self.step_tick = 0;
+        }
+        step == Step::Keep
+    }
+
+    /// Whether the step can go on: turning to the other side needs a plan of what follows, and so
+    /// does the beginning where the object may have changed.
+    fn is_ready_for(&mut self, step: Step, object: &SoftObject) -> bool {
+        let begins = self.plans_first && self.at == 0;
+        if self.step_tick > 0 || !(begins || step == Step::TurnToOtherSide) {
+            return true;
+        }
+        if !self.planning {
+            self.planning = true;
+            self.turned_from = self.plan.path;
+            self.planner.ask(PlanRequest {
+                object: Arc::clone(object.rest_shape()),
+                setup: self.setup.clone(),
+                contact: self.contact,
+                avoid_gaze: (!begins).then(|| self.plan.path.gaze()),
+            });
+        }
+        let Some(planned) = self.planner.take() else { return false };
+        (self.planning, self.plans_first) = (false, false);
+        // A shape that cannot be grasped any more is reached for as before.
+        self.plan = planned.unwrap_or(self.plan);
+        true
+    }
+
+    fn close(&mut self, step: Step, seen: &Seen) {
+        let progress = self.progress;
+        let plan = self.plan;
+        match step {
+            Step::CloseThree => self.close_until_touch(seen, |finger| finger.attaches()),
+            Step::CloseOthers => self.close_until_touch(seen, |finger| !finger.attaches()),
+            Step::Press => {
+                for digit in 0..5 {
+                    let more = plan.press[digit] - plan.touch[digit];
+                    self.closure[digit] = self.closure_before[digit] + progress * more;
+                }
+                self.lift = LIFT * progress;
+            }
+            Step::Open => {
+                for digit in 0..5 {
+                    self.closure[digit] = self.closure_before[digit] * (1.0 - progress);
+                }
+            }
+            Step::TurnToOtherSide => self.lift = self.lift.min(LIFT * (1.0 - progress)),
+            Step::Reach | Step::Hold | Step::Keep | Step::Retreat => {}
+        }
+    }
+
+    fn close_until_touch(&mut self, seen: &Seen, moves: impl Fn(Finger) -> bool) {
+        for finger in Finger::ALL.into_iter().filter(|f| moves(*f)) {
+            let digit = finger.index();
+            let touch = self.plan.touch[digit];
+            if seen.inside[digit] {
+                continue;
+            }
+            let speed = if self.closure[digit] < touch - 0.06 { CLOSE_FAST } else { CLOSE_SLOW };
+            self.closure[digit] =
+                (self.closure[digit] + speed).min((touch + CLOSE_BEYOND).min(1.0));
+        }
+    }
+
+    fn posture(&self, step: Option<Step>) -> Posture {
+        // The hand is set for the grasp while it is still away, and opened after it.
+        let set = match step {
+            Some(Step::Reach) => self.progress,
+            Some(Step::Retreat) => 1.0 - self.progress,
+            Some(Step::TurnToOtherSide) => 0.0,
+            None if self.steps.last() == Some(&Step::Retreat) => 0.0,
+            // A script that does not end with letting go holds on.
+            Some(_) | None => 1.0,
+        };
+        Posture::OPEN.toward(&self.plan.posture, set)
+    }
+
+    fn world_from_palm(&self, step: Option<Step>, centre: Point3<f64>) -> Isometry3<f64> {
+        let path = match step {
+            Some(Step::Reach) => self.plan.path.backed_off(BACK_OFF * (1.0 - self.progress)),
+            Some(Step::Retreat) => self.plan.path.backed_off(BACK_OFF * self.progress),
+            Some(Step::TurnToOtherSide) => {
+                let share = self.progress;
+                self.turned_from
+                    .backed_off(BACK_OFF)
+                    .toward(&self.plan.path.backed_off(BACK_OFF), share)
+            }
+            None if self.steps.last() == Some(&Step::Retreat) => {
+                self.plan.path.backed_off(BACK_OFF)
+            }
+            _ => self.plan.path,
+        };
+        path.world_from_palm(centre + Vector3::new(0.0, self.lift, 0.0))
+    }
+}
+
+/// Whether the person sees that the step has done what it was for.
+fn is_done(step: Step, seen: &Seen) -> bool {
+    match step {
+        Step::CloseThree => {
+            matches!(seen.state, Some(StateName::Attached | StateName::Deforming))
+        }
+        Step::CloseOthers => seen.state == Some(StateName::Deforming),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softgrasp_core::mesh::{BuiltIn, generate};
+
+    fn cube() -> SoftObject {
+        SoftObject::try_new(generate(BuiltIn::Cube, 216).unwrap()).unwrap()
+    }
+
+    fn hand(name: ScriptName, object: &SoftObject) -> ScriptedHand {
+        ScriptedHand::try_new(name, HandSetup::default(), object).unwrap()
+    }
+
+    #[test]
+    fn hand_is_where_it_is_now_however_many_ticks_were_missed() {
+        let (object, seen) = (cube(), Seen::default());
+        let mut played = hand(ScriptName::Approach, &object);
+        let mut missed = hand(ScriptName::Approach, &object);
+        for ticks in [1, 7, 30, 20] {
+            let all: Vec<Sent> = (0..ticks).map(|_| played.next(&seen, &object)).collect();
+            assert!(missed.next_after(ticks, &seen, &object) == *all.last().unwrap());
+        }
+    }
+
+    #[test]
+    fn hand_does_not_jump_back_in_the_last_tick_of_a_step() {
+        let (object, seen) = (cube(), Seen::default());
+        let mut hand = hand(ScriptName::Approach, &object);
+        let mut reader = crate::hand_reader::HandReader::new(HandSetup::default());
+        let mut before: Option<Isometry3<f64>> = None;
+        for tick in 0..95 {
+            let sent = hand.next(&seen, &object);
+            let now_s = f64::from(tick) / 60.0;
+            reader.feed(&sent.arrivals, now_s);
+            let palm = reader.hand(now_s).unwrap().world_from_palm;
+            if let Some(before) = before {
+                let moved = (palm.translation.vector - before.translation.vector).norm();
+                // The way back is 22 cm in 25 ticks, at most 1.5 times as fast in the middle.
+                assert!(moved < 0.02, "{moved} m in tick {tick}");
+            }
+            before = Some(palm);
+        }
+    }
+
+    #[test]
+    fn hand_rests_and_sends_while_the_shape_is_kept_but_not_for_ever() {
+        let object = cube();
+        let mut hand = hand(ScriptName::Regrasp, &object);
+        let (free, keeping) = (Seen::default(), Seen { keeping: true, ..Seen::default() });
+        let first = hand.next(&free, &object);
+        let resting: Vec<Sent> = (0..REST_MAX).map(|_| hand.next(&keeping, &object)).collect();
+        assert!(resting.iter().all(|sent| !sent.arrivals.is_empty() && *sent == resting[0]));
+        assert!(resting[0].arrivals == first.arrivals);
+        assert!(hand.next(&keeping, &object).arrivals != first.arrivals);
+    }
+}

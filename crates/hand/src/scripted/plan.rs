@@ -1,0 +1,337 @@
+//! Finding a palm pose from which all five fingertips reach the object, as a person does by eye.
+//!
+//! The paths of the fingertips in the palm's frame are the same for every palm pose, so they are
+//! worked out once, with the angles that survive the glove's sensors, and then only moved.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use softgrasp_grasp::hand::{Finger, FingerAngles, HandColliders, JointAngles, ThumbAngles, pose};
+use softgrasp_grasp::object::RestShape;
+use softgrasp_grasp::shape::Sphere;
+use softgrasp_grasp::sphere_tree::{ContactHit, tip_hits};
+
+use super::approach::PalmPath;
+use crate::hand_reader::HandSetup;
+
+/// A palm pose and how far each finger closes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraspPlan {
+    /// The palm while it holds.
+    pub path: PalmPath,
+    /// How the hand is set before it closes.
+    pub posture: Posture,
+    /// Closure (0 open, 1 closed) at which each tip touches, thumb first.
+    pub touch: [f64; 5],
+    /// Closure at which each tip has moved on by the depth asked for.
+    pub press: [f64; 5],
+}
+
+/// How the hand is set before the fingers close.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Posture {
+    /// Thumb rotation across the palm, rad.
+    pub thumb_rotation: f64,
+    /// Thumb abduction away from the palm, rad.
+    pub thumb_abduction: f64,
+    /// How far the fingers are brought together, 0 fanned out to 1 side by side.
+    pub gather: f64,
+}
+
+impl Posture {
+    /// The open hand's.
+    pub const OPEN: Self = Self { thumb_rotation: 0.1, thumb_abduction: 0.6, gather: 0.0 };
+
+    /// Part of the way to another posture.
+    #[must_use]
+    pub fn toward(&self, other: &Self, share: f64) -> Self {
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        Self {
+            thumb_rotation: mix(self.thumb_rotation, other.thumb_rotation),
+            thumb_abduction: mix(self.thumb_abduction, other.thumb_abduction),
+            gather: mix(self.gather, other.gather),
+        }
+    }
+}
+
+/// Joint angles of a hand whose fingers have closed by `closure` (0 open, 1 closed), thumb first.
+pub fn angles(closure: &[f64; 5], posture: Posture) -> JointAngles {
+    let finger = |finger: Finger, gathered: f64| {
+        let s = closure[finger.index()];
+        FingerAngles {
+            mcp_flexion: 0.05 + 1.35 * s,
+            pip_flexion: 0.10 + 1.45 * s,
+            dip_flexion: 0.05 + 0.75 * s,
+            abduction: gathered * posture.gather,
+        }
+    };
+    let s = closure[0];
+    JointAngles {
+        thumb: ThumbAngles {
+            rotation: posture.thumb_rotation,
+            abduction: posture.thumb_abduction * (1.0 - s),
+            mcp_flexion: 0.7 * s,
+            ip_flexion: 0.9 * s,
+        },
+        index: finger(Finger::Index, -0.16),
+        middle: finger(Finger::Middle, 0.0),
+        ring: finger(Finger::Ring, 0.10),
+        little: finger(Finger::Little, 0.30),
+        ..JointAngles::flat()
+    }
+}
+
+/// Steps from open to closed while a contact is looked for.
+const STEPS: usize = 40;
+/// Closure of the first and the last contact that count: there must be room to open and to press.
+const TOUCH_RANGE: (f64, f64) = (0.08, 0.80);
+/// A tip that meets the surface at a flatter angle than this would slide and not press.
+const STRAIGHT_MIN: f64 = 0.3;
+/// Postures tried.
+const GATHERS: [f64; 3] = [0.0, 0.5, 1.0];
+const THUMB_ROTATIONS: [f64; 4] = [0.4, 0.7, 1.0, 1.3];
+const THUMB_ABDUCTIONS: [f64; 3] = [0.1, 0.4, 0.7];
+/// Tilts of the palm against the axes of the object, rad: the few that suffice for a round object,
+/// and the many that a thin or a branched one may need.
+const TILTS_FEW: [f64; 2] = [0.0, 0.45];
+const TILTS_MANY: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
+
+/// Best palm pose for grasping an object whose frame is the world's, or `None` if no pose tried
+/// lets all five tips touch.
+///
+/// Units: `press_depth` m. `avoid_gaze` is the direction of an earlier grasp; the palm will look at
+/// least 60° away from it.
+pub fn plan_grasp(
+    object: &RestShape,
+    setup: &HandSetup,
+    press_depth: f64,
+    avoid_gaze: Option<Vector3<f64>>,
+) -> Option<GraspPlan> {
+    // Five tips on five different nodes.
+    if object.surface().nodes.len() < 5 {
+        return None;
+    }
+    let few = search(object, setup, press_depth, avoid_gaze, &TILTS_FEW);
+    few.or_else(|| search(object, setup, press_depth, avoid_gaze, &TILTS_MANY))
+}
+
+fn search(
+    object: &RestShape,
+    setup: &HandSetup,
+    press_depth: f64,
+    avoid_gaze: Option<Vector3<f64>>,
+    tilts: &[f64],
+) -> Option<GraspPlan> {
+    let centre = object.centre();
+    let thumbs = thumb_paths(setup);
+    let orientations = orientations(tilts);
+    let mut best: Option<(f64, GraspPlan)> = None;
+    for gather in GATHERS {
+        let fingers = finger_paths(setup, gather);
+        for &rotation in &orientations {
+            let gaze = rotation * -Vector3::z();
+            if avoid_gaze.is_some_and(|avoid| gaze.dot(&avoid) > 0.5) {
+                continue;
+            }
+            for object_in_palm in places(object) {
+                let path = PalmPath { world_from_palm_rotation: rotation, object_in_palm };
+                let reach = Reach { object, object_from_palm: path.world_from_palm(centre) };
+                let Some(touches) = reach.touches(&fingers) else { continue };
+                let Some((score, found)) = reach.oppose(&touches, &thumbs) else { continue };
+                if best.as_ref().is_some_and(|(best_score, _)| score <= *best_score) {
+                    continue;
+                }
+                let posture = Posture { gather, ..found.0 };
+                let Some(press) = reach.press(setup, posture, &found.1, press_depth) else {
+                    continue;
+                };
+                let touch = found.1.map(|t| t.closure);
+                best = Some((score, GraspPlan { path, posture, touch, press }));
+            }
+        }
+    }
+    best.map(|(_, plan)| plan)
+}
+
+/// One fingertip at every closure, in the palm frame.
+type TipPath = Vec<Tip>;
+
+#[derive(Clone, Copy)]
+struct Tip {
+    sphere: Sphere,
+    contact_point: Point3<f64>,
+}
+
+fn tips(setup: &HandSetup, closure: &[f64; 5], posture: Posture) -> [Tip; 5] {
+    let angles = setup.felt(&angles(closure, posture));
+    let pose = pose(&setup.dimensions, &angles, Isometry3::identity());
+    HandColliders::new(&setup.dimensions, &pose)
+        .fingers
+        .map(|f| Tip { sphere: f.tip, contact_point: f.contact_point })
+}
+
+fn closures() -> impl Iterator<Item = f64> {
+    (0..=STEPS).map(|step| step as f64 / STEPS as f64)
+}
+
+/// Paths of index, middle, ring and little finger.
+fn finger_paths(setup: &HandSetup, gather: f64) -> [TipPath; 4] {
+    let posture = Posture { gather, ..Posture::OPEN };
+    let steps: Vec<[Tip; 5]> = closures().map(|s| tips(setup, &[s; 5], posture)).collect();
+    std::array::from_fn(|finger| steps.iter().map(|tips| tips[finger + 1]).collect())
+}
+
+/// Paths of the thumb in each of its postures.
+fn thumb_paths(setup: &HandSetup) -> Vec<(Posture, TipPath)> {
+    let mut all = Vec::new();
+    for thumb_rotation in THUMB_ROTATIONS {
+        for thumb_abduction in THUMB_ABDUCTIONS {
+            let posture = Posture { thumb_rotation, thumb_abduction, gather: 0.0 };
+            all.push((posture, closures().map(|s| tips(setup, &[s; 5], posture)[0]).collect()));
+        }
+    }
+    all
+}
+
+/// The 24 rotations of a cube, each straight and tilted; palm down and fingers forward comes first.
+fn orientations(tilts: &[f64]) -> Vec<UnitQuaternion<f64>> {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    // Palm frame +Z (back of the hand) up, +Y (fingers) away from the viewer (−Z).
+    let natural = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0);
+    let natural = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(natural));
+    let turn = |axis, n: i32| UnitQuaternion::from_axis_angle(&axis, quarter * f64::from(n));
+    let mut straight: Vec<UnitQuaternion<f64>> = Vec::new();
+    for (x, y, z) in (0..4).flat_map(|x| (0..4).flat_map(move |y| (0..4).map(move |z| (x, y, z)))) {
+        let rotation = turn(Vector3::z_axis(), z)
+            * turn(Vector3::y_axis(), y)
+            * turn(Vector3::x_axis(), x)
+            * natural;
+        if straight.iter().all(|known| known.angle_to(&rotation) > 0.1) {
+            straight.push(rotation);
+        }
+    }
+    let signed = |tilt: &f64| if *tilt == 0.0 { vec![0.0] } else { vec![*tilt, -tilt] };
+    let angles: Vec<f64> = tilts.iter().flat_map(signed).collect();
+    let mut all = Vec::new();
+    for &about_y in &angles {
+        for &about_z in &angles {
+            let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), about_y)
+                * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z);
+            all.extend(straight.iter().map(|rotation| rotation * tilt));
+        }
+    }
+    all
+}
+
+/// Places of the object's centre in front of the palm, nearest to a natural grip first.
+fn places(object: &RestShape) -> Vec<Vector3<f64>> {
+    let half = 0.5 * object.mesh().size();
+    let mut all = Vec::new();
+    for z in 0..6 {
+        for y in 0..6 {
+            for x in [0.0, 0.012, -0.012] {
+                let depth = 0.3 * half + 0.015 + 0.012 * f64::from(z);
+                all.push(Vector3::new(x, 0.08 + 0.013 * f64::from(y), -depth));
+            }
+        }
+    }
+    all
+}
+
+/// One palm pose under trial.
+struct Reach<'a> {
+    object: &'a RestShape,
+    object_from_palm: Isometry3<f64>,
+}
+
+/// A tip's first touch.
+#[derive(Clone, Copy)]
+struct Touch {
+    closure: f64,
+    hit: ContactHit,
+    tip: Point3<f64>,
+    /// Cosine between the tip's motion and straight into the object.
+    straight: f64,
+}
+
+impl Reach<'_> {
+    /// First touch along a path, if it is within the range that counts.
+    fn touch(&self, path: &TipPath) -> Option<Touch> {
+        for (step, (tip, closure)) in path.iter().zip(closures()).enumerate() {
+            if closure > TOUCH_RANGE.1 {
+                return None;
+            }
+            let contact_point = self.object_from_palm * tip.contact_point;
+            let sphere = Sphere { centre: self.object_from_palm * tip.sphere.centre, ..tip.sphere };
+            let (tree, normals) = (self.object.tree(), self.object.normals());
+            if let Some(hit) = tip_hits(tree, normals, &sphere, &contact_point)[0] {
+                let next = self.object_from_palm * path.get(step + 1)?.contact_point;
+                let straight = -(next - contact_point).normalize().dot(&hit.normal);
+                let counts = closure >= TOUCH_RANGE.0 && straight >= STRAIGHT_MIN;
+                return counts.then_some(Touch { closure, hit, tip: contact_point, straight });
+            }
+        }
+        None
+    }
+
+    /// Touches of the four fingers, all or none.
+    fn touches(&self, fingers: &[TipPath; 4]) -> Option<[Touch; 4]> {
+        // The middle finger reaches furthest: if it does not touch, no grasp is near.
+        let middle = self.touch(&fingers[1])?;
+        let little = self.touch(&fingers[3])?;
+        Some([self.touch(&fingers[0])?, middle, self.touch(&fingers[2])?, little])
+    }
+
+    /// The thumb posture that opposes the fingers best, with its score.
+    fn oppose(
+        &self,
+        fingers: &[Touch; 4],
+        thumbs: &[(Posture, TipPath)],
+    ) -> Option<(f64, (Posture, [Touch; 5]))> {
+        let mut best: Option<(f64, (Posture, [Touch; 5]))> = None;
+        for (posture, path) in thumbs {
+            let Some(thumb) = self.touch(path) else { continue };
+            let touches = [thumb, fingers[0], fingers[1], fingers[2], fingers[3]];
+            let Some(score) = score(&touches) else { continue };
+            if best.as_ref().is_none_or(|(b, _)| score > *b) {
+                best = Some((score, (*posture, touches)));
+            }
+        }
+        best
+    }
+
+    /// Closures at which the tips have moved by `depth` since their touch.
+    fn press(
+        &self,
+        setup: &HandSetup,
+        posture: Posture,
+        touches: &[Touch; 5],
+        depth: f64,
+    ) -> Option<[f64; 5]> {
+        let mut press = [0.0; 5];
+        for (digit, touch) in touches.iter().enumerate() {
+            let deep_enough = (1..=2 * STEPS).find_map(|step| {
+                let closure = touch.closure + step as f64 / (4 * STEPS) as f64;
+                let tip = tips(setup, &[closure; 5], posture)[digit].contact_point;
+                let moved = self.object_from_palm * tip - touch.tip;
+                (moved.norm() >= depth).then_some(closure)
+            });
+            press[digit] = deep_enough?;
+        }
+        Some(press)
+    }
+}
+
+/// How good a set of touches is to hold with: the thumb opposes the fingers, the nodes differ.
+fn score(touches: &[Touch; 5]) -> Option<f64> {
+    for (i, a) in touches.iter().enumerate() {
+        if touches[..i].iter().any(|b| b.hit.node == a.hit.node) {
+            return None;
+        }
+    }
+    let fingers: Vector3<f64> = touches[1..].iter().map(|t| t.hit.normal).sum();
+    let opposition = -touches[0].hit.normal.dot(&fingers) / 4.0;
+    // Tips far apart hold a body better than tips in a heap.
+    let spread = touches[1..].iter().map(|t| (t.tip - touches[0].tip).norm()).sum::<f64>() / 4.0;
+    let early = touches.iter().map(|t| (t.closure - 0.45).abs()).fold(0.0, f64::max);
+    let straight = touches.iter().map(|t| t.straight).fold(1.0, f64::min);
+    Some(opposition + 5.0 * spread + straight - 0.5 * early)
+}

@@ -1,0 +1,208 @@
+//! Plans the approaches of the scripted hand, beside the ticks or while a tick waits.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use softgrasp_grasp::object::{ContactModel, RestShape};
+use softgrasp_os::Beside;
+
+use super::plan::{GraspPlan, plan_grasp};
+use crate::hand_reader::HandSetup;
+
+/// An approach that is to be planned.
+#[derive(Clone)]
+pub struct PlanRequest {
+    /// The object as it stands before the hand.
+    pub object: Arc<RestShape>,
+    /// The hand.
+    pub setup: HandSetup,
+    /// What a fingertip holds: how deep it may press.
+    pub contact: ContactModel,
+    /// Direction of an earlier grasp, to be avoided where another one is possible.
+    pub avoid_gaze: Option<Vector3<f64>>,
+}
+
+/// The hand found no way to grasp.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoGrasp {
+    /// No palm pose is good.
+    #[error(
+        "the scripted hand found no palm pose from which all five fingertips reach this object \
+         ({extent_m:.3} m long); try another --object-size"
+    )]
+    OutOfReach {
+        /// Longest extent of the object.
+        extent_m: f64,
+    },
+    /// Five tips need five nodes.
+    #[error("the object has {nodes} surface nodes; five fingertips need five different ones")]
+    TooFewNodes {
+        /// Nodes on its surface.
+        nodes: usize,
+    },
+}
+
+impl PlanRequest {
+    /// The best plan; one that does not avoid the gaze where no other is found; `None` where the
+    /// object cannot be grasped. Takes up to seconds.
+    pub fn plan(&self) -> Option<GraspPlan> {
+        let depth = press_depth(&self.object, self.contact);
+        let planned = plan_grasp(&self.object, &self.setup, depth, self.avoid_gaze);
+        planned.or_else(|| {
+            self.avoid_gaze?;
+            plan_grasp(&self.object, &self.setup, depth, None)
+        })
+    }
+
+    /// The same with the reason where the object cannot be grasped.
+    ///
+    /// # Errors
+    /// [`NoGrasp`].
+    pub fn grip(&self) -> Result<GraspPlan, NoGrasp> {
+        self.plan().ok_or_else(|| match self.object.surface().nodes.len() {
+            nodes @ ..5 => NoGrasp::TooFewNodes { nodes },
+            _ => NoGrasp::OutOfReach { extent_m: self.object.mesh().size() },
+        })
+    }
+}
+
+/// Plans approaches one at a time.
+pub struct Planner {
+    way: Way,
+    /// A plan was asked for and has not been taken.
+    asked: bool,
+    /// Plans under way that nobody wants any more.
+    abandoned: usize,
+}
+
+/// Where the planning is done.
+enum Way {
+    /// While the tick waits: the plan is there in the tick that asks for it.
+    Waited(Option<Option<GraspPlan>>),
+    /// On a thread of its own: the ticks go on.
+    Beside(Beside<PlanRequest, Option<GraspPlan>>),
+}
+
+impl Planner {
+    /// A planner that lets the ticks wait.
+    pub const fn waited() -> Self {
+        Self { way: Way::Waited(None), asked: false, abandoned: 0 }
+    }
+
+    /// A planner beside the ticks.
+    ///
+    /// # Errors
+    /// The system's, when it gives no thread.
+    pub fn beside() -> std::io::Result<Self> {
+        Self::beside_by(|request: PlanRequest| request.plan())
+    }
+
+    /// The same with another way to plan.
+    ///
+    /// # Errors
+    /// The system's, when it gives no thread.
+    pub fn beside_by(
+        plan: impl FnMut(PlanRequest) -> Option<GraspPlan> + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let way = Way::Beside(Beside::start("planner", plan)?);
+        Ok(Self { way, asked: false, abandoned: 0 })
+    }
+
+    /// Asks for a plan.
+    pub fn ask(&mut self, request: PlanRequest) {
+        self.asked = true;
+        match &mut self.way {
+            Way::Waited(planned) => *planned = Some(request.plan()),
+            Way::Beside(beside) => beside.begin(request),
+        }
+    }
+
+    /// The plan that was asked for is not wanted any more.
+    pub fn abandon(&mut self) {
+        self.abandoned += usize::from(self.asked);
+        self.asked = false;
+    }
+
+    /// The plan that was asked for, once it is there; its inner `None` says that there is none.
+    pub fn take(&mut self) -> Option<Option<GraspPlan>> {
+        let taken = match &mut self.way {
+            Way::Waited(planned) => {
+                // A newer plan has replaced those that were abandoned.
+                self.abandoned = 0;
+                planned.take()
+            }
+            Way::Beside(beside) => loop {
+                match beside.take() {
+                    Some(_) if self.abandoned > 0 => self.abandoned -= 1,
+                    Some(planned) => break Some(planned),
+                    None if beside.is_busy() => break None,
+                    // The thread is gone; the hand goes on as it would without another way to
+                    // grasp.
+                    None => break Some(None),
+                }
+            },
+        };
+        self.asked &= taken.is_none();
+        taken
+    }
+}
+
+/// A squeeze presses this share of the object's extent where a tip holds a part of the surface: deep
+/// enough to be seen, and not so deep that a kept shape has elements that are inside out …
+const PRESS_SHARE: f64 = 0.08;
+/// … and this share where it holds a single node, but not more than …
+const VERTEX_PRESS_SHARE: f64 = 0.05;
+/// … this share of the spacing of its nodes: one node pushed past its neighbours would turn elements
+/// inside out.
+const VERTEX_PRESS_SPACING_SHARE: f64 = 0.45;
+
+/// How far a squeeze presses, m.
+fn press_depth(object: &RestShape, contact: ContactModel) -> f64 {
+    let mesh = object.mesh();
+    match contact {
+        ContactModel::Patch | ContactModel::Mask => PRESS_SHARE * mesh.size(),
+        ContactModel::Vertex => {
+            let edges = mesh.tets().iter().map(|t| {
+                let (a, b) = (mesh.vertices()[t[0] as usize], mesh.vertices()[t[1] as usize]);
+                (a - b).norm()
+            });
+            let spacing = edges.sum::<f64>() / mesh.tets().len() as f64;
+            (VERTEX_PRESS_SHARE * mesh.size()).min(VERTEX_PRESS_SPACING_SHARE * spacing)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softgrasp_core::mesh::{BuiltIn, generate};
+    use softgrasp_grasp::object::SoftObject;
+
+    #[test]
+    fn abandoned_plan_is_never_taken() {
+        let cube = SoftObject::try_new(generate(BuiltIn::Cube, 64).unwrap()).unwrap();
+        let request = |avoid_gaze| PlanRequest {
+            object: Arc::clone(cube.rest_shape()),
+            setup: HandSetup::default(),
+            contact: ContactModel::default(),
+            avoid_gaze,
+        };
+        // Plans are told apart by whether there is one; a real plan is made once.
+        let plan = request(None).plan();
+        assert!(plan.is_some());
+        let mut planner =
+            Planner::beside_by(move |asked: PlanRequest| asked.avoid_gaze.and(plan)).unwrap();
+        planner.ask(request(None));
+        planner.abandon();
+        planner.ask(request(Some(Vector3::x())));
+        let taken = loop {
+            if let Some(taken) = planner.take() {
+                break taken;
+            }
+            std::thread::yield_now();
+        };
+        assert_eq!(taken, plan);
+        planner.abandon();
+        assert_eq!(planner.take(), Some(None), "nothing is under way");
+    }
+}

@@ -1,0 +1,30 @@
+//! Glove and tracker on serial ports: a thread each opens the port, sets the device up, and hands
+//! over what arrives.
+
+mod arrivals;
+mod driver;
+mod facts;
+mod glove_driver;
+mod glove_replies;
+mod hand_settings;
+mod listening;
+mod port;
+mod record_assembler;
+mod serial_devices;
+mod settings;
+mod source;
+mod tracker_driver;
+mod tracker_replies;
+
+pub mod motion;
+pub mod probe;
+
+pub use arrivals::Arrived;
+pub use driver::DeviceState;
+pub use facts::{GloveFacts, TrackerFacts};
+pub use serial_devices::{SerialDevices, SerialError};
+pub use settings::{
+    GloveMode, GloveSettings, SerialSettings, SettingsError, TrackerFilter, TrackerMode,
+    TrackerSettings,
+};
+pub use source::{PortName, SerialSource, SerialSourceError};

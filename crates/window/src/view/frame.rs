@@ -1,0 +1,326 @@
+//! What there is to see of one tick: the object, the hand, the grasp and the server.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use softgrasp_grasp::grasp::{Contact, HandSegments, StateName};
+use softgrasp_grasp::hand::{HandColliders, HandDimensions, pose_of_segments};
+use softgrasp_grasp::object::RestShape;
+use softgrasp_hand::arrival::Device;
+use softgrasp_protocol::solve_report::SolveSummary;
+
+use super::camera::ViewCamera;
+
+/// One tick as the window sees it; a copy, so that the ticks go on while it is drawn.
+#[derive(Clone)]
+pub struct ViewFrame {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Time of the tick on the client's clock, s.
+    pub at_s: f64,
+    /// The object.
+    pub object: ObjectView,
+    /// The hand; `None` until both devices have spoken.
+    pub hand: Option<HandView>,
+    /// The grasp.
+    pub grasp: GraspView,
+    /// The server and its newest answer.
+    pub server: ServerView,
+    /// What happened since the frame before this one was seen, oldest first.
+    pub news: Vec<News>,
+    /// Times of the answers that came since the frame before this one was seen, oldest first.
+    pub timings: Vec<TickTiming>,
+}
+
+/// The object as it is in a tick.
+///
+/// Units: m. Frame: the object's own.
+#[derive(Clone)]
+pub struct ObjectView {
+    /// What it returns to when nothing holds it.
+    pub rest: Arc<RestShape>,
+    /// How many rest shapes there have been; another number is another shape.
+    pub rest_shapes: u64,
+    /// Rest shapes before this one that can be gone back to.
+    pub kept: usize,
+    /// Displacement of every node from the rest shape.
+    pub displacement: Vec<[f64; 3]>,
+    /// Whether the nodes inside have their displacement too, and not only the surface.
+    pub whole: bool,
+    /// Where it is.
+    pub world_from_object: Isometry3<f64>,
+}
+
+/// The hand as it is shown: segments that may not enter the object stay outside it.
+#[derive(Clone)]
+pub struct HandView {
+    /// Its size.
+    pub dimensions: HandDimensions,
+    /// The palm, as measured.
+    pub world_from_palm: Isometry3<f64>,
+    /// The segments, as the grasp shows them.
+    pub world_from_segment: HandSegments,
+}
+
+impl HandView {
+    /// Colliders of the hand as it is shown, in the world.
+    pub fn colliders(&self) -> HandColliders {
+        let pose =
+            pose_of_segments(&self.dimensions, self.world_from_palm, &self.world_from_segment);
+        HandColliders::new(&self.dimensions, &pose)
+    }
+}
+
+/// Who touches what.
+#[derive(Clone, Default)]
+pub struct GraspView {
+    /// State after the tick.
+    pub state: Option<StateName>,
+    /// Which tips hold or touch, thumb first.
+    pub tips: [bool; 5],
+    /// Where each tip holds.
+    pub contacts: [Option<Contact>; 5],
+    /// Force of each tip on the object, N, object frame; `None` where none is known.
+    pub forces: Option<[Vector3<f64>; 5]>,
+    /// Whether the shape is being made the next rest shape.
+    pub keeping: bool,
+    /// Devices that are silent: the hand is held where it was.
+    pub silent: Vec<Device>,
+}
+
+/// The link and what came over it.
+#[derive(Clone, Default)]
+pub struct ServerView {
+    /// Whether answers come.
+    pub link: LinkHealth,
+    /// Whether it is preparing the model of a new shape at rest.
+    pub is_preparing: bool,
+    /// The newest answer.
+    pub solve: Option<SolveSummary>,
+    /// Tick whose answer the object shows; `None` while it shows none of this grip.
+    pub shown_tick: Option<u64>,
+    /// Ticks that came too late and were not played, so far.
+    pub ticks_skipped: u64,
+    /// Bytes of glove and tracker that were no good records, so far.
+    pub device_faults: u64,
+}
+
+/// Whether the server is there and keeps up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LinkHealth {
+    /// It has not been reached yet, or is being looked for again.
+    #[default]
+    Reconnecting,
+    /// It is there, and what the object shows is as new as it can be.
+    Connected,
+    /// It is there, but the object shows an answer that is more than a tick late.
+    Late,
+}
+
+impl LinkHealth {
+    /// In a word or two.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Reconnecting => "looking for the server",
+            Self::Connected => "connected",
+            Self::Late => "late",
+        }
+    }
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct News {
+    /// In which tick.
+    pub tick: u64,
+    /// What, in words.
+    pub text: String,
+    /// Of what kind.
+    pub kind: NewsKind,
+}
+
+/// What a piece of news is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NewsKind {
+    /// The grasp: marked on the time line.
+    Grasp,
+    /// The server, or a work that was done.
+    Information,
+    /// Something that was asked for and cannot be.
+    Refusal,
+}
+
+/// How long one answer took, ms.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TickTiming {
+    /// Tick that asked.
+    pub tick: u64,
+    /// From sending the request to having the answer, on the client.
+    pub round_trip: f64,
+    /// Waiting for the server's threads.
+    pub queue: f64,
+    /// Assembling and ordering.
+    pub prepare: f64,
+    /// Factor, or columns of a new grip.
+    pub factor: f64,
+    /// Solving.
+    pub solve: f64,
+    /// Decoding and encoding.
+    pub codec: f64,
+}
+
+impl TickTiming {
+    /// From an answer.
+    pub fn new(tick: u64, solve: &SolveSummary) -> Self {
+        let ms = &solve.ms;
+        Self {
+            tick,
+            round_trip: solve.round_trip_ms,
+            queue: ms.queue,
+            prepare: ms.assemble + ms.order,
+            factor: ms.factor,
+            solve: ms.solve,
+            codec: ms.decode + ms.encode,
+        }
+    }
+
+    /// What the round trip has besides the server's stages: the way there and back.
+    pub fn way(&self) -> f64 {
+        let stages = self.queue + self.prepare + self.factor + self.solve + self.codec;
+        (self.round_trip - stages).max(0.0)
+    }
+}
+
+impl ViewFrame {
+    /// Every vertex as it is shown.
+    ///
+    /// Units: m. Frame: the object's.
+    pub fn shape(&self) -> Vec<Point3<f64>> {
+        let rest = self.object.rest.mesh().vertices().iter();
+        rest.zip(&self.object.displacement).map(|(p, u)| p + Vector3::from(*u)).collect()
+    }
+
+    /// Whether there is a deformed shape to be kept.
+    pub fn can_keep(&self) -> bool {
+        self.grasp.state == Some(StateName::Deforming) && !self.grasp.keeping
+    }
+
+    /// Whether the object can be turned: nothing holds it.
+    pub fn can_be_turned(&self) -> bool {
+        !matches!(self.grasp.state, Some(StateName::Attached | StateName::Deforming))
+    }
+
+    /// An eye that sees the hand and what it is about to grasp; `None` without a hand.
+    pub fn eye_beside_hand(&self) -> Option<ViewCamera> {
+        let hand = self.hand.as_ref()?;
+        let object = self.object.world_from_object * self.object.rest.centre();
+        Some(ViewCamera::beside_hand(object, &hand.world_from_palm, hand.dimensions.handedness))
+    }
+
+    /// How many ticks old the shape is that the object shows; `None` while nothing deforms it.
+    pub fn answer_age_ticks(&self) -> Option<u64> {
+        let deforming = self.grasp.state == Some(StateName::Deforming);
+        self.server.shown_tick.filter(|_| deforming).map(|shown| self.tick.saturating_sub(shown))
+    }
+
+    /// Whether the shape is visibly older than the hand. An answer that was asked for in the last
+    /// tick is as new as one can be that no tick waits for.
+    pub fn answer_is_old(&self) -> bool {
+        match (self.grasp.state, self.answer_age_ticks()) {
+            (Some(StateName::Deforming), Some(age)) => age > 1,
+            (Some(StateName::Deforming), None) => true,
+            _ => false,
+        }
+    }
+
+    /// Brings what an older frame that nobody saw had to tell into this one.
+    pub fn carry_over(&mut self, unseen: Self) {
+        let Self { mut news, mut timings, .. } = unseen;
+        news.append(&mut self.news);
+        timings.append(&mut self.timings);
+        // A window that is not drawn must not make the frames grow without end.
+        news.drain(..news.len().saturating_sub(NEWS_MAX));
+        timings.drain(..timings.len().saturating_sub(TIMINGS_MAX));
+        (self.news, self.timings) = (news, timings);
+    }
+}
+
+/// News that wait to be seen; the oldest go.
+const NEWS_MAX: usize = 256;
+/// Timings that wait to be seen; the oldest go.
+const TIMINGS_MAX: usize = 1024;
+
+#[cfg(test)]
+pub(super) mod samples {
+    //! Frames for tests.
+
+    use softgrasp_core::mesh::{BuiltIn, generate};
+
+    use super::*;
+
+    /// A frame of a small cube at rest in a tick.
+    pub fn frame(tick: u64) -> ViewFrame {
+        let rest = RestShape::try_new(generate(BuiltIn::Cube, 27).unwrap()).unwrap();
+        let displacement = vec![[0.0; 3]; rest.mesh().node_count()];
+        ViewFrame {
+            tick,
+            at_s: tick as f64 / 60.0,
+            object: ObjectView {
+                rest: Arc::new(rest),
+                rest_shapes: 1,
+                kept: 0,
+                displacement,
+                whole: true,
+                world_from_object: Isometry3::identity(),
+            },
+            hand: None,
+            grasp: GraspView::default(),
+            server: ServerView::default(),
+            news: Vec::new(),
+            timings: Vec::new(),
+        }
+    }
+
+    /// The same with a piece of news.
+    pub fn frame_with_news(tick: u64, text: &str) -> ViewFrame {
+        let news = vec![News { tick, text: text.to_owned(), kind: NewsKind::Grasp }];
+        ViewFrame { news, ..frame(tick) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::samples::frame;
+    use super::*;
+
+    #[test]
+    fn answer_of_the_last_tick_is_new_and_one_before_it_is_old() {
+        let mut frame = frame(9);
+        assert!(!frame.answer_is_old(), "nothing is deformed");
+        frame.grasp.state = Some(StateName::Deforming);
+        assert!(frame.answer_is_old(), "nothing is shown of this grip");
+        for (shown, old) in [(9, false), (8, false), (7, true)] {
+            frame.server.shown_tick = Some(shown);
+            assert_eq!(frame.answer_is_old(), old, "{shown}");
+        }
+    }
+
+    #[test]
+    fn stages_and_the_way_add_up_to_the_round_trip() {
+        let report = softgrasp_protocol::SolveReport {
+            stage_ms: softgrasp_protocol::StageMs {
+                decode: 0.1,
+                assemble: 0.2,
+                order: 0.3,
+                factor: 0.4,
+                solve: 0.5,
+                encode: 0.6,
+                queue: 0.7,
+            },
+            ..Default::default()
+        };
+        let t = TickTiming::new(3, &SolveSummary::new(&report, 5.0));
+        let sum = t.way() + t.queue + t.prepare + t.factor + t.solve + t.codec;
+        assert!((sum - 5.0).abs() < 1e-12 && (t.way() - 2.2).abs() < 1e-12);
+    }
+}

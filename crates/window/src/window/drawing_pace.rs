@@ -1,0 +1,53 @@
+//! How often pictures are drawn.
+
+use std::time::{Duration, Instant};
+
+use super::graphics::Graphics;
+
+/// When the next picture is due.
+pub struct DrawingPace {
+    last: Instant,
+    /// Pictures a second, smoothed.
+    fps: f64,
+    /// No more often than this.
+    every: Duration,
+    begun: Instant,
+    pictures: u64,
+}
+
+/// Where the processor draws, the solver needs it too.
+const EVERY_BY_SOFTWARE: Duration = Duration::from_millis(66);
+/// A card waits for its display by itself; this is for one that does not.
+const EVERY: Duration = Duration::from_millis(4);
+
+impl DrawingPace {
+    /// The pace for what draws.
+    pub fn of(graphics: &Graphics) -> Self {
+        let every = if graphics.is_software { EVERY_BY_SOFTWARE } else { EVERY };
+        let now = Instant::now();
+        Self { last: now, fps: 0.0, every, begun: now, pictures: 0 }
+    }
+
+    /// Waits until the next picture is due.
+    pub fn rest(&mut self) {
+        let took = self.last.elapsed();
+        std::thread::sleep(self.every.saturating_sub(took));
+        let period = self.last.elapsed().as_secs_f64().max(1e-6);
+        self.fps += 0.1 * (1.0 / period - self.fps);
+        self.last = Instant::now();
+        self.pictures += 1;
+        // For those who drive the window by a program: what they did before is seen now.
+        tracing::debug!(target: "softgrasp_window::places", picture = self.pictures);
+    }
+
+    /// Says in the log how many pictures were drawn.
+    pub fn tell(&self) {
+        let seconds = self.begun.elapsed().as_secs_f64();
+        tracing::info!(pictures = self.pictures, seconds, "the window is closed");
+    }
+
+    /// Pictures a second.
+    pub fn fps(&self) -> f64 {
+        self.fps
+    }
+}

@@ -1,0 +1,39 @@
+//! The window and the pictures: everything that draws (feature `window`).
+
+mod animation;
+mod app;
+mod changes;
+mod drawing_pace;
+mod drawn_hand;
+mod drawn_marks;
+mod drawn_mesh;
+mod drawn_object;
+mod drawn_spheres;
+mod environment;
+mod finger_keys;
+mod graphics;
+mod grips;
+mod ground_shade;
+mod input;
+mod lamps;
+mod lost_display;
+mod opening;
+mod panels;
+mod picture;
+mod plain_material;
+mod recorder;
+mod running;
+mod scene;
+mod stage;
+mod start;
+mod ui;
+mod units;
+
+pub use animation::{Animation, png};
+pub use app::App;
+pub use graphics::{Graphics, NoGraphics};
+pub use image::RgbImage;
+pub use opening::Opening;
+pub use picture::Pictures;
+pub use running::{About, Ticks, WhenLost};
+pub use start::{Start, Started};

@@ -1,0 +1,141 @@
+//! The scene: everything that a frame shows, and how it follows the next one.
+
+use kiss3d::prelude::{Color, SceneNode3d, Window};
+use nalgebra::Point3;
+use softgrasp_grasp::hand::Finger;
+use softgrasp_grasp::shape::Sphere;
+
+use super::drawn_hand::DrawnHand;
+use super::drawn_marks::DrawnMarks;
+use super::drawn_object::DrawnObject;
+use super::drawn_spheres::{DrawnSpheres, ENTERED, PASSED};
+use super::ground_shade::capsules;
+use super::stage::Stage;
+use crate::view::colouring::Colouring;
+use crate::view::display::{Display, Level, Spheres};
+use crate::view::frame::ViewFrame;
+use crate::view::object_skin::Look;
+
+/// A scene on the graphics card.
+pub struct Scene {
+    root: SceneNode3d,
+    stage: Stage,
+    object: Option<DrawnObject>,
+    hand: Option<DrawnHand>,
+    marks: DrawnMarks,
+    spheres: DrawnSpheres,
+    look: Look,
+}
+
+impl Scene {
+    /// A stage with nothing on it yet.
+    pub fn new(window: &mut Window) -> Self {
+        let mut root = SceneNode3d::empty();
+        let stage = Stage::new(window, &mut root);
+        let (marks, spheres) = (DrawnMarks::new(&mut root), DrawnSpheres::new(&mut root));
+        Self { root, stage, object: None, hand: None, marks, spheres, look: Look::Imported }
+    }
+
+    /// What the next object looks like.
+    pub fn set_look(&mut self, look: Look) {
+        self.look = look;
+    }
+
+    /// The node that everything hangs below.
+    pub fn root(&mut self) -> &mut SceneNode3d {
+        &mut self.root
+    }
+
+    /// Force that a metre of arrow stands for, N/m.
+    pub fn newtons_per_m(&self) -> f64 {
+        self.marks.newtons_per_m()
+    }
+
+    /// Shows a frame.
+    pub fn follow(
+        &mut self,
+        window: &mut Window,
+        frame: &ViewFrame,
+        display: &Display,
+        colouring: &Colouring,
+    ) {
+        let mut is_new = self.stage.set_level(window, display.level);
+        let shape = frame.shape();
+        let object = &frame.object;
+        if self.object.as_mut().is_none_or(|drawn| !drawn.is(object)) {
+            if let Some(before) = self.object.take() {
+                before.remove();
+            }
+            self.object = Some(DrawnObject::new(&mut self.root, self.look, object));
+            is_new = true;
+        }
+        if let Some(drawn) = &mut self.object {
+            drawn.follow(object, &shape);
+            drawn.show_ghost(display.ghost);
+            drawn.colour_by(colouring.shares(), colouring.map());
+            if display.wireframe {
+                drawn.draw_wireframe(window);
+            }
+        }
+        is_new |= self.follow_hand(frame, display);
+        if is_new {
+            self.stage.dress(&mut self.root);
+            self.spheres.keep_material();
+        }
+        if display.level == Level::Plain {
+            self.stage.shade_ground(capsules(frame, &shape, display.skin));
+        }
+        self.marks.follow(frame, &shape, display.contacts, display.forces);
+        let spheres = shown_spheres(frame, &shape, display.spheres);
+        self.spheres.show(&object.world_from_object, &spheres);
+    }
+
+    /// Whether it is another hand than before.
+    fn follow_hand(&mut self, frame: &ViewFrame, display: &Display) -> bool {
+        let Some(hand) = &frame.hand else { return false };
+        let is_new = self.hand.as_ref().is_none_or(|drawn| !drawn.fits(hand));
+        if is_new {
+            if let Some(before) = self.hand.take() {
+                before.remove();
+            }
+            self.hand = Some(DrawnHand::new(&mut self.root, hand));
+        }
+        if let Some(drawn) = &mut self.hand {
+            drawn.follow(hand);
+            drawn.show(display.skin, display.colliders);
+        }
+        is_new
+    }
+}
+
+/// Spheres of the tree around the shape as it is, with their colours.
+fn shown_spheres(
+    frame: &ViewFrame,
+    shape: &[Point3<f64>],
+    spheres: Spheres,
+) -> Vec<(Sphere, Color)> {
+    if spheres == Spheres::Hidden {
+        return Vec::new();
+    }
+    let mut tree = frame.object.rest.tree().clone();
+    // A shape that the tree cannot follow is no shape that is shown.
+    if tree.refit(shape).is_err() {
+        return Vec::new();
+    }
+    match (spheres, &frame.hand) {
+        (Spheres::Level(level), _) => {
+            let shown = tree.spheres_at_level(level).into_iter();
+            shown.map(|sphere| (sphere, PASSED)).collect()
+        }
+        (Spheres::Search, Some(hand)) => {
+            let object_from_world = frame.object.world_from_object.inverse();
+            let hand = hand.colliders().in_frame(&object_from_world);
+            let visited = tree.visited_by_sphere(&hand.finger(Finger::Index).tip);
+            let colour = |overlaps| if overlaps { ENTERED } else { PASSED };
+            // The outermost hide everything, and everybody knows them.
+            let inner = visited.into_iter().filter(|visited| visited.level >= 2);
+            inner.map(|visited| (visited.sphere, colour(visited.overlaps))).collect()
+        }
+        (Spheres::Hidden | Spheres::Search, _) => Vec::new(),
+    }
+}

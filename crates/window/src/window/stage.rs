@@ -1,0 +1,107 @@
+//! The stage on which the scene stands: light, ground, shadow, and how much of it is drawn.
+
+use std::rc::Rc;
+
+use kiss3d::post_processing::Tonemap;
+use kiss3d::prelude::{
+    Color, Fog, NumSamples, OrbitCamera3d, Projection, SceneNode3d, Vec3, Window,
+};
+
+use super::environment::{HORIZON, studio};
+use super::ground_shade::Capsule;
+use super::lamps::{FILL, FOG_M, KEY, SKY, wall};
+use super::plain_material::{PlainMaterial, SharedCapsules, SharedMaterial};
+use super::units::{UNITS_PER_M, drawn_point};
+use crate::view::camera::{FIELD_OF_VIEW, ViewCamera};
+use crate::view::display::Level;
+
+/// Lights and ground.
+pub struct Stage {
+    ground: SceneNode3d,
+    level: Option<Level>,
+    plain: SharedMaterial,
+    plain_ground: SharedMaterial,
+    /// What darkens the ground at the plain level.
+    capsules: SharedCapsules,
+}
+
+/// The ground lies so far below the object's home, m.
+pub const GROUND_M: f64 = -0.085;
+/// Radius of the ground, m: far beyond what is seen sharply.
+const GROUND_RADIUS_M: f32 = 3.0;
+
+impl Stage {
+    /// Sets up lights and ground.
+    pub fn new(window: &mut Window, scene: &mut SceneNode3d) -> Self {
+        window.set_skybox_image(&studio());
+        window.set_skybox_orientation(0.0, SKY);
+        window.set_background_color(Color::new(HORIZON[0], HORIZON[1], HORIZON[2], 1.0));
+        let [fog_begin, fog_end] = FOG_M.map(|m| m * UNITS_PER_M);
+        window.set_fog(Fog::linear(wall(), fog_begin, fog_end));
+        window.hdr_settings_mut().tonemap = Tonemap::Neutral;
+        scene.add_light(KEY.light());
+        scene.add_light(FILL.light().with_casts_shadows(false));
+        let radius = GROUND_RADIUS_M * UNITS_PER_M;
+        let mut ground = scene.add_cylinder(radius, 0.2);
+        let below = drawn_point(&nalgebra::Point3::new(0.0, GROUND_M, 0.0));
+        ground.set_position(below - Vec3::Y * 0.1);
+        ground.set_color(Color::new(0.66, 0.68, 0.71, 1.0)).set_roughness(0.85).set_metallic(0.0);
+        let (plain, capsules) = (PlainMaterial::of_bodies(), SharedCapsules::default());
+        let plain_ground = PlainMaterial::of_ground(Rc::clone(&capsules));
+        Self { ground, level: None, plain, plain_ground, capsules }
+    }
+
+    /// Draws as much as the level says; whether that is another level than before.
+    pub fn set_level(&mut self, window: &mut Window, level: Level) -> bool {
+        if self.level == Some(level) {
+            return false;
+        }
+        self.level = Some(level);
+        window.set_shadows_enabled(level != Level::Plain);
+        window.set_shadow_distance(0.9 * UNITS_PER_M);
+        window.set_shadow_resolution(if level == Level::Full { 4096 } else { 2048 });
+        window.set_shadow_softness(if level == Level::Full { 2.5 } else { 1.5 });
+        window.set_ssao_enabled(level == Level::Full);
+        window.set_samples(if level == Level::Plain { NumSamples::One } else { NumSamples::Four });
+        self.ground.set_visible(true);
+        true
+    }
+
+    /// Gives everything below the root the material of the level.
+    pub fn dress(&mut self, root: &mut SceneNode3d) {
+        if self.level == Some(Level::Plain) {
+            root.set_material_recursive(Rc::clone(&self.plain));
+            self.ground.set_material(Rc::clone(&self.plain_ground));
+        } else {
+            root.set_material_with_name_recursive("object");
+        }
+    }
+
+    /// Darkens the ground below these, at the plain level.
+    pub fn shade_ground(&mut self, capsules: Vec<Capsule>) {
+        self.capsules.replace(capsules);
+    }
+}
+
+/// The renderer's eye; none of its own ways to move it are used.
+pub fn drawn_camera() -> OrbitCamera3d {
+    let (near, far) = (0.01 * UNITS_PER_M, 12.0 * UNITS_PER_M);
+    let mut camera = OrbitCamera3d::new_with_frustum(
+        FIELD_OF_VIEW as f32,
+        near,
+        far,
+        Vec3::new(0.0, 0.0, 1.0),
+        Vec3::ZERO,
+    );
+    camera.rebind_rotate_button(None);
+    camera.rebind_drag_button(None);
+    camera.rebind_reset_key(None);
+    camera.set_dist_step(1.0);
+    camera.set_projection(Projection::Perspective);
+    camera
+}
+
+/// Puts the renderer's eye where the viewer's is.
+pub fn place_camera(drawn: &mut OrbitCamera3d, view: &ViewCamera) {
+    drawn.look_at(drawn_point(&view.eye()), drawn_point(&view.target));
+}

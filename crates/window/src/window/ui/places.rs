@@ -1,0 +1,28 @@
+//! Says in the log where the things are that can be clicked, for those who drive the window by a
+//! program.
+
+use std::collections::BTreeMap;
+
+use egui::{Context, Id, Response};
+
+/// Where each thing was last, in pixels of the window.
+#[derive(Clone, Default)]
+struct Places(BTreeMap<String, [i32; 4]>);
+
+/// Tells where a thing is, when it has moved: `RUST_LOG=softgrasp_window::places=debug`.
+pub fn tell(context: &Context, name: &str, response: &Response) {
+    if !tracing::enabled!(target: "softgrasp_window::places", tracing::Level::DEBUG) {
+        return;
+    }
+    let pixels = context.pixels_per_point();
+    let r = response.rect;
+    let place = [r.center().x, r.center().y, r.width(), r.height()].map(|v| (v * pixels) as i32);
+    let moved = context.data_mut(|data| {
+        let places = data.get_temp_mut_or_default::<Places>(Id::new("places"));
+        places.0.insert(name.to_owned(), place) != Some(place)
+    });
+    if moved {
+        let [x, y, width, height] = place;
+        tracing::debug!(target: "softgrasp_window::places", name, x, y, width, height);
+    }
+}
