@@ -1,5 +1,6 @@
 //! The reasons for which a request is refused, and the message that tells the client.
 
+use softgrasp_core::dynamics::StepError;
 use softgrasp_core::fem::MaterialError;
 use softgrasp_core::mesh::MeshError;
 use softgrasp_core::model::ModelError;
@@ -82,6 +83,12 @@ pub(crate) enum Refusal {
          {method} cannot"
     )]
     LargeMethod { method: Method },
+    #[error("rigid body {body} (from 0): {reason}")]
+    Body { body: usize, reason: String },
+    #[error("the object's pose: {reason}")]
+    ObjectPose { reason: &'static str },
+    #[error("contact frame: {0}")]
+    Step(StepError),
     #[error("a yield stress is {value} Pa; it must be a finite number above 0, or be left out")]
     Yield { value: f64 },
     #[error("this server wants a token (--token-file); say Hello with the right one first")]
@@ -106,6 +113,15 @@ impl From<DecodeError> for Refusal {
         match error {
             DecodeError::TooMany { .. } => Self::Limit(error),
             _ => Self::Decode(error),
+        }
+    }
+}
+
+impl From<StepError> for Refusal {
+    fn from(error: StepError) -> Self {
+        match error {
+            StepError::Elastic(error) => Self::Model(ModelError::Condensed(error)),
+            error => Self::Step(error),
         }
     }
 }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_protocol::{
-    Answer, Frame, FrameRequest, Hello, LargeAnswer, LargeFrame, Limits, ModelHash, ModelReady,
-    Reply, Request, UploadModel, Welcome,
+    Answer, ContactAnswer, ContactFrame, Frame, FrameRequest, Hello, LargeAnswer, LargeFrame,
+    Limits, ModelHash, ModelReady, Reply, Request, UploadModel, Welcome,
 };
 
 use crate::answer::{
-    PosedFrame, Readiness, answer_large_frame, is_finite, prefetch, prove, readiness, solve_large,
-    solve_once, solve_several, upload,
+    PosedContact, PosedFrame, Readiness, answer_large_frame, is_finite, prefetch, prove, readiness,
+    solve_large, solve_once, solve_several, upload,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;
@@ -139,6 +139,9 @@ impl RequestHandler {
             Request::LargeFrame(request) => {
                 Reply::LargeAnswer(Box::new(self.large_frame(*request, clock).await?))
             }
+            Request::ContactFrame(frame) => {
+                Reply::ContactAnswer(Box::new(self.contact_frame(*frame, clock).await?))
+            }
         };
         match is_finite(&reply) {
             true => Ok(Some(reply)),
@@ -248,6 +251,32 @@ impl RequestHandler {
         match goes_on && cost_ms <= FRAME_MS_MAX {
             true => workers.run_frame(work).await?,
             false => workers.run(self.turn(cost_ms), work).await?,
+        }
+    }
+
+    /// Answers a contact frame: among the frames where its columns are there, else by what computing
+    /// them is predicted to cost.
+    async fn contact_frame(
+        &mut self,
+        frame: ContactFrame,
+        clock: impl FnOnce() -> StageClock + Send + 'static,
+    ) -> Result<ContactAnswer, Refusal> {
+        self.held.hold(frame.model);
+        let resources = Arc::clone(&self.server.resources);
+        let workers = &self.server.resources.workers;
+        self.grasping.get_or_insert_with(|| self.server.grasping());
+        let shared = Arc::clone(&resources);
+        let among_frames = move || match PosedContact::new(&shared, frame) {
+            Err(refusal) => Ok(Err(refusal)),
+            Ok(frame) if frame.is_prepared() => Ok(frame.answer(&shared, clock())),
+            Ok(frame) => Err((Box::new(frame), clock)),
+        };
+        match workers.run_frame(among_frames).await? {
+            Ok(answered) => answered,
+            Err((frame, clock)) => {
+                let turn = self.turn(frame.predicted_ms(&resources));
+                workers.run(turn, move || frame.answer(&resources, clock())).await?
+            }
         }
     }
 

@@ -89,7 +89,11 @@ fn operator(scene: &Scene<'_>, response: &Response<'_>, points: &[ProblemPoint])
                     elastic += weight * moved[*row];
                 }
             }
-            let rigid = scene.rigid.compliance(&point.arm, &force.arm);
+            let mut rigid = scene.rigid.compliance(&point.arm, &force.arm);
+            if point.point.body == force.point.body {
+                let yields = scene.bodies[usize::from(force.point.body)].compliance;
+                rigid += yields * Matrix3::identity();
+            }
             let block = point.frame.transpose() * (answered * elastic + rigid) * force.frame;
             w.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
             if i != j {
@@ -122,7 +126,9 @@ fn free_motion(
         let point = &p.point;
         let elastic = scene.place(response, &unpressed, &point.nodes, &point.weights)
             - scene.place(response, &about.displacement, &point.nodes, &point.weights);
-        let change = shift + angle.cross(&p.arm) + elastic;
+        let body = usize::from(point.body);
+        let pushed = scene.bodies[body].compliance * about.body_forces[body];
+        let change = shift + angle.cross(&p.arm) + elastic - pushed;
         let slip = p.gap.place - scene.stuck(response, &at, point);
         let normal = p.frame.column(0);
         let moved = p.frame.transpose() * (slip + change);

@@ -1,6 +1,6 @@
 //! A rigid body that moves on a given way while the object answers.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Vector3};
 
 use crate::rigid_body::RigidShape;
 
@@ -15,21 +15,30 @@ pub struct MovingBody {
     pub world_from_body_end: Isometry3<f64>,
     /// Coefficient of friction between the body and the object, at least 0.
     pub friction: f64,
+    /// How far the body gives way to a force on it, m/N; 0 for one that keeps to its poses. A finger
+    /// that is measured inside the object presses by how far it is pushed back.
+    pub compliance: f64,
 }
 
 impl MovingBody {
     /// A body that rests.
     pub fn resting(shape: RigidShape, world_from_body: Isometry3<f64>, friction: f64) -> Self {
         let (start, end) = (world_from_body, world_from_body);
-        Self { shape, world_from_body_start: start, world_from_body_end: end, friction }
+        Self {
+            shape,
+            world_from_body_start: start,
+            world_from_body_end: end,
+            friction,
+            compliance: 0.0,
+        }
     }
 
-    /// Where a point that sticks to the body at the beginning is at the end.
-    ///
-    /// Frame: world.
-    pub fn carried(&self, point_in_world: &Point3<f64>) -> Point3<f64> {
-        self.world_from_body_end
-            * self.world_from_body_start.inverse_transform_point(point_in_world)
+    /// Pose at the end once the object has pushed it back by a force, N, world: that of the body on the
+    /// object.
+    pub fn pushed_back(&self, pose: &Isometry3<f64>, force: &Vector3<f64>) -> Isometry3<f64> {
+        let mut pushed = *pose;
+        pushed.translation.vector -= self.compliance * force;
+        pushed
     }
 
     /// The part of the way between two shares of it, turned and moved evenly.
@@ -51,6 +60,7 @@ impl MovingBody {
             world_from_body_start: at(from),
             world_from_body_end: at(to),
             friction: self.friction,
+            compliance: self.compliance,
         }
     }
 

@@ -19,6 +19,8 @@ pub(super) struct Scene<'a> {
     pub viscosity: f64,
     /// Displacement of the response's rows when the step begins.
     pub begun: Vec<Vector3<f64>>,
+    /// The bodies when the step begins, pushed back by the forces of that moment.
+    pub world_from_bodies_begun: Vec<Isometry3<f64>>,
 }
 
 /// One guess: contact forces, and what they do to pose and shape.
@@ -29,6 +31,8 @@ pub(super) struct Configuration {
     pub forces: Vec<NodeForce>,
     /// Displacement of the response's rows.
     pub displacement: Vec<Vector3<f64>>,
+    /// Sum of the forces of every body on the object, N, in the object's frame.
+    pub body_forces: Vec<Vector3<f64>>,
 }
 
 impl Scene<'_> {
@@ -62,6 +66,7 @@ impl Scene<'_> {
         at: &Configured<'_>,
     ) -> Configuration {
         let mut wrench = Wrench::default();
+        let body_forces = sums_by_body(&contacts, self.bodies.len());
         for contact in &contacts {
             let place = self.place(response, at.displacement, &contact.nodes, &contact.weights);
             wrench.force += contact.force;
@@ -70,7 +75,7 @@ impl Scene<'_> {
         let motion = self.rigid.motion(&wrench, &at.world_from_object.rotation);
         let forces = self.elastic_forces(&at_nodes(&contacts));
         let displacement = response.displacement(&forces);
-        Configuration { contacts, motion, forces, displacement }
+        Configuration { contacts, motion, forces, displacement, body_forces }
     }
 
     /// Where a point of the surface is in the object's frame.
@@ -96,10 +101,19 @@ impl Scene<'_> {
         })
     }
 
-    /// The bodies at the end of the step, in the object's frame.
+    /// The bodies at the end of the step, pushed back by the forces of the configuration.
+    fn world_from_bodies(&self, at: &Configured<'_>) -> Vec<Isometry3<f64>> {
+        let turn = at.world_from_object.rotation;
+        let pushed = |(body, force): (&MovingBody, &Vector3<f64>)| {
+            body.pushed_back(&body.world_from_body_end, &(turn * force))
+        };
+        self.bodies.iter().zip(at.body_forces).map(pushed).collect()
+    }
+
+    /// The same in the object's frame.
     pub fn object_from_bodies(&self, at: &Configured<'_>) -> Vec<Isometry3<f64>> {
         let object_from_world = at.world_from_object.inverse();
-        self.bodies.iter().map(|body| object_from_world * body.world_from_body_end).collect()
+        self.world_from_bodies(at).iter().map(|body| object_from_world * body).collect()
     }
 
     /// Where a body is from a point of the surface.
@@ -148,8 +162,13 @@ impl Scene<'_> {
     ) -> Point3<f64> {
         let begun = self.place(response, &self.begun, &point.nodes, &point.weights);
         let in_world = self.rigid.state.world_from_object * begun;
-        let carried = self.bodies[usize::from(point.body)].carried(&in_world);
-        at.world_from_object.inverse_transform_point(&carried)
+        let body = usize::from(point.body);
+        let in_body = self.world_from_bodies_begun[body].inverse_transform_point(&in_world);
+        let turn = at.world_from_object.rotation;
+        let of_body = &self.bodies[body];
+        let world_from_body =
+            of_body.pushed_back(&of_body.world_from_body_end, &(turn * at.body_forces[body]));
+        at.world_from_object.inverse_transform_point(&(world_from_body * in_body))
     }
 }
 
@@ -157,6 +176,18 @@ impl Scene<'_> {
 pub(super) struct Configured<'a> {
     pub world_from_object: Isometry3<f64>,
     pub displacement: &'a [Vector3<f64>],
+    pub body_forces: &'a [Vector3<f64>],
+}
+
+/// Sum of the forces of every body in some contacts.
+pub(super) fn sums_by_body(contacts: &[HeldContact], bodies: usize) -> Vec<Vector3<f64>> {
+    let mut sums = vec![Vector3::zeros(); bodies];
+    for contact in contacts {
+        if let Some(sum) = sums.get_mut(usize::from(contact.body)) {
+            *sum += contact.force;
+        }
+    }
+    sums
 }
 
 impl Configuration {
@@ -164,6 +195,7 @@ impl Configuration {
         Configured {
             world_from_object: self.motion.world_from_object,
             displacement: &self.displacement,
+            body_forces: &self.body_forces,
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::assemble::{ProblemPoint, problem};
 use super::bodies::MovingBody;
-use super::configuration::{Configuration, Configured, Scene};
+use super::configuration::{Configuration, Configured, Scene, sums_by_body};
 use super::features::{Candidate, MaterialPoint};
 use super::outcome::{BodyLoad, PointContact, StepOutcome};
 use super::pool::{Pool, force_at, merged};
@@ -144,10 +144,21 @@ impl ContactStep<'_> {
             rigid: RigidStep { state, mass, gravity, seconds },
             viscosity: settings.viscosity,
             begun: response.displacement(&state.forces),
+            world_from_bodies_begun: self.bodies_begun(state),
         };
         let mut rounds = Rounds { step: self, scene: &scene, response: &mut response };
         let found = rounds.play(state)?;
         Ok(self.outcome(&scene, &response, &found, wanted))
+    }
+
+    /// The bodies when the step begins, pushed back by the forces of that moment.
+    fn bodies_begun(&self, state: &ObjectState) -> Vec<Isometry3<f64>> {
+        let turn = state.world_from_object.rotation;
+        let forces = sums_by_body(&state.contacts, self.bodies.len());
+        let pushed = |(body, force): (&MovingBody, &Vector3<f64>)| {
+            body.pushed_back(&body.world_from_body_start, &(turn * force))
+        };
+        self.bodies.iter().zip(&forces).map(pushed).collect()
     }
 
     /// Size of the object: the diagonal of its bounding box, m.
@@ -176,6 +187,9 @@ impl ContactStep<'_> {
         for body in self.bodies {
             if !(body.friction >= 0.0 && body.friction.is_finite()) {
                 return setting("the friction of a body", body.friction, "a number, at least 0");
+            }
+            if !(body.compliance >= 0.0 && body.compliance.is_finite()) {
+                return setting("the compliance of a body", body.compliance, "m/N, at least 0");
             }
         }
         let poses =
@@ -324,6 +338,7 @@ impl Rounds<'_, '_, '_> {
         let start = Configured {
             world_from_object: state.world_from_object,
             displacement: &self.scene.begun,
+            body_forces: &[],
         };
         let is_known = |c: &&HeldContact| usize::from(c.body) < self.step.bodies.len();
         let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();

@@ -155,6 +155,7 @@ fn lift(depth: f64, friction: f64) -> (Vec<f64>, f64, Vec<StepOutcome>) {
             world_from_body_start: pose(side, from),
             world_from_body_end: pose(side, to),
             friction,
+            compliance: 0.0,
         };
         let found = ball.advance(&state, &[table(friction), finger(-1.0), finger(1.0)], settings);
         state = found.state.clone();
@@ -193,4 +194,41 @@ fn a_weak_pinch_slides_off_and_the_ball_stays_on_the_table() {
     let last = outcomes.last().unwrap();
     assert!(heights.last().unwrap() < &0.031, "{heights:?}");
     assert!((last.loads[0].force.z - weight).abs() < 0.01 * weight);
+}
+
+#[test]
+fn a_finger_that_gives_way_presses_by_how_far_it_is_pushed_back() {
+    let cube = Object::sized(BuiltIn::Cube, 125, 0.05, 2.0e4, 0.3);
+    let (mut state, _) = settled(&cube, ObjectState::at_rest(at(0.0, 0.0, 0.025)), 50);
+    let stiffness = 200.0;
+    let finger = |from: f64, to: f64| MovingBody {
+        shape: RigidShape::sphere(0.008).unwrap(),
+        world_from_body_start: at(0.0, 0.0, from),
+        world_from_body_end: at(0.0, 0.0, to),
+        friction: 0.5,
+        compliance: 1.0 / stiffness,
+    };
+    let settings = StepSettings { viscosity: 0.005, ..StepSettings::default() };
+    let mut height = 0.06;
+    let mut found = None;
+    for step in 0..80 {
+        // Down by 1 mm a step to 12 mm below where the top was, then still.
+        let next = f64::max(height - 0.001, 0.05 + 0.008 - 0.012);
+        let bodies = [table(0.5), finger(height, next)];
+        let outcome = cube.advance(&state, &bodies, settings);
+        let rel = outcome.contact_residual_rel;
+        assert!(rel < 1e-3, "step {step}: {rel:e}");
+        (height, state) = (next, outcome.state.clone());
+        found = Some(outcome);
+    }
+    let found = found.unwrap();
+    let force = -found.loads[1].force.z;
+    let pushed_back = force / stiffness;
+    // The lowest point of the finger as it is shown lies on the surface, which is dented.
+    let tip = height + pushed_back - 0.008;
+    assert!(force > 0.3, "{force}");
+    let touching = found.contacts.iter().filter(|c| c.body == 1);
+    let lowest = touching.map(|c| c.place.z).fold(f64::INFINITY, f64::min);
+    assert!((lowest - tip).abs() < 1e-3, "{lowest} {tip}");
+    assert!((found.loads[0].force.z - force - 9.81 * cube.mass()).abs() < 1e-6);
 }

@@ -14,6 +14,16 @@ pub(crate) fn is_finite(reply: &Reply) -> bool {
             };
             answer_is_finite(&several.answer) && several.cases.iter().all(is_case_finite)
         }
+        Reply::ContactAnswer(contact) => {
+            let vectors = |point: &softgrasp_protocol::ContactPoint| {
+                all(point.place.iter().chain(&point.normal).chain(&point.force).chain(&point.slip))
+            };
+            let state = &contact.state;
+            answer_is_finite(&contact.answer)
+                && contact.points.iter().all(vectors)
+                && all(state.pose.iter().chain(&state.velocity).chain(&state.angular_velocity))
+                && all(state.forces.iter().flatten())
+        }
         _ => true,
     }
 }

@@ -1,6 +1,7 @@
 //! Answers requests on the solving pool: a mesh or a kept model comes in, an answer goes out.
 
 mod condensed;
+mod contact_frame;
 mod direct;
 mod factor;
 mod finite;
@@ -13,6 +14,7 @@ mod several;
 mod upload;
 mod warnings;
 
+pub(crate) use contact_frame::PosedContact;
 pub(crate) use finite::is_finite;
 pub(crate) use frame::{PosedFrame, Readiness, readiness};
 pub(crate) use large_frame::answer_large_frame;

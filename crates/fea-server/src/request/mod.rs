@@ -1,10 +1,12 @@
 //! Turns a decoded message into what the core takes, checked before anything costly is done.
 
 mod checks;
+mod contact;
 mod model;
 mod question;
 
 pub(crate) use checks::{checked_forces, checked_masks, paired, pairs};
+pub(crate) use contact::{bodies_of, settings_of, state_message, state_of};
 pub(crate) use model::{
     check_node_count, element_given, element_of, model_of, name_of, poisson_max,
 };

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Model, ModelError};
-use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Touched};
+use softgrasp_core::solve::condensed::{
+    Base, Columns, CondensedError, ContactSet, FreeBody, Touched,
+};
 use softgrasp_core::solve::{Factored, Method, Stage};
 
 use super::recent::Recent;
@@ -17,6 +19,8 @@ pub(crate) struct StoredModel {
     factors: Lock<Recent<KeptFactor>>,
     base: Result<Arc<Base>, ModelError>,
     pub columns: Columns,
+    /// The body that nothing holds, once a contact frame has asked for it.
+    free_body: Lock<Option<Arc<FreeBody>>>,
     /// Whether a factor in double precision was larger than allowed.
     pub single_only: AtomicBool,
     sets: Lock<Recent<KeptSet>>,
@@ -93,6 +97,7 @@ impl StoredModel {
             factors: Lock::default(),
             base,
             columns: Columns::new(usize::try_from(column_bytes).unwrap_or(usize::MAX)),
+            free_body: Lock::default(),
             single_only: AtomicBool::default(),
             sets: Lock::default(),
             strain: Lock::default(),
@@ -104,6 +109,24 @@ impl StoredModel {
     /// The base of the condensed engine, or why there is none.
     pub fn base(&self) -> Result<Arc<Base>, ModelError> {
         self.base.clone()
+    }
+
+    /// Whether the body that nothing holds has been made.
+    pub fn has_free_body(&self) -> bool {
+        self.free_body.with(|kept| kept.is_some())
+    }
+
+    /// The body that nothing holds, made now if no contact frame has asked for it before. Two at once
+    /// may make it, the same bits each; nobody waits for the other.
+    ///
+    /// # Errors
+    /// [`CondensedError`] where it is held, or has parts that move on their own.
+    pub fn free_body(&self, base: &Base) -> Result<Arc<FreeBody>, CondensedError> {
+        if let Some(kept) = self.free_body.with(|kept| kept.clone()) {
+            return Ok(kept);
+        }
+        let made = Arc::new(FreeBody::try_new(self.model.mesh(), base)?);
+        Ok(self.free_body.with(|kept| Arc::clone(kept.get_or_insert(made))))
     }
 
     /// A contact set with the rows of some nodes, if it is kept.
@@ -161,7 +184,8 @@ impl StoredModel {
         let factors: usize =
             self.factors.with(|factors| factors.iter().map(|kept| kept.factored.bytes()).sum());
         let sets: usize = self.sets.with(|sets| sets.iter().map(|kept| kept.set.bytes()).sum());
-        self.lasting_bytes() + (columns + factors + sets) as u64
+        let free = self.free_body.with(|kept| kept.as_ref().map_or(0, |body| body.bytes()));
+        self.lasting_bytes() + (free + columns + factors + sets) as u64
     }
 
     /// Drops factors and contact sets, which can be made again.

@@ -20,9 +20,7 @@ mod session;
 mod several;
 
 pub use answer::{Answer, Displacements};
-pub use contact::{
-    BodyLoad, ContactAnswer, ContactAsk, ContactFrame, ContactPoint, ContactReport,
-};
+pub use contact::{BodyLoad, ContactAnswer, ContactAsk, ContactFrame, ContactPoint, ContactReport};
 pub use dof_value::DofValue;
 pub use large::{DeformationName, LargeAnswer, LargeFrame, LargeReport, SolveLarge};
 pub use large_ask::{

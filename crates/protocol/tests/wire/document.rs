@@ -3,7 +3,7 @@
 use softgrasp_protocol::*;
 
 use crate::golden::{bytes_of_hex, hex};
-use crate::samples::conversation;
+use crate::samples::{Message, conversation};
 
 const DOCUMENT: &str = include_str!("../../../../docs/wire.md");
 
@@ -55,6 +55,20 @@ fn the_document_lists_every_field_of_ask_and_report_of_large_deformation() {
     assert_eq!((ask.len(), report.len()), (5, 11));
     assert_eq!(first_cells("LargeAsk"), ask);
     assert_eq!(first_cells("LargeReport"), report);
+}
+
+#[test]
+fn the_document_lists_every_field_of_ask_and_report_of_contact() {
+    let Message::Request(_, Request::ContactFrame(frame)) = sample(Kind::ContactFrame) else {
+        panic!("another message")
+    };
+    assert_eq!(first_cells("ContactAsk"), fields(&format!("{:#?}", frame.ask)));
+    let report = fields(&format!("{:#?}", ContactReport::default()));
+    assert_eq!(first_cells("ContactReport"), report);
+}
+
+fn sample(kind: Kind) -> Message {
+    conversation().into_iter().find(|message| message.kind() == kind).unwrap()
 }
 
 /// Variants as the document writes them: number on the wire and name, separated by commas.

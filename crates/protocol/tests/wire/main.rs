@@ -9,6 +9,7 @@ mod document;
 mod golden;
 mod hostile;
 mod large;
+mod random_contact;
 mod random_messages;
 mod raw;
 mod round_trip;

@@ -5,6 +5,7 @@ use proptest::option;
 use proptest::prelude::*;
 use softgrasp_protocol::*;
 
+use crate::random_contact::{contact_answer, contact_frame};
 use crate::samples::{Message, masks_of};
 
 /// Any message; no NaN, so that equality can be asked for.
@@ -70,6 +71,7 @@ fn any_request() -> impl Strategy<Value = Request> {
         solve_large.prop_map(Request::SolveLarge),
         large_frame,
         solve_several,
+        contact_frame().prop_map(|frame| Request::ContactFrame(Box::new(frame))),
     ]
 }
 
@@ -118,11 +120,12 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         rejected.prop_map(Reply::Rejected),
         any::<u64>().prop_map(|nonce| Reply::Pong { nonce }),
         large_answer,
+        contact_answer().prop_map(|answer| Reply::ContactAnswer(Box::new(answer))),
         several,
     ]
 }
 
-fn answer() -> impl Strategy<Value = Answer> {
+pub fn answer() -> impl Strategy<Value = Answer> {
     let double = vec(point(), 0..9).prop_map(Displacements::F64);
     let single =
         (number(), vec(prop::array::uniform3(any::<i32>()), 0..9)).prop_map(|(scale, v)| {
@@ -283,12 +286,12 @@ fn element_choice() -> impl Strategy<Value = ElementChoice> {
     prop::sample::select(vec![ElementChoice::T4, ElementChoice::T10, ElementChoice::Auto])
 }
 
-fn point() -> impl Strategy<Value = [f64; 3]> {
+pub fn point() -> impl Strategy<Value = [f64; 3]> {
     prop::array::uniform3(number())
 }
 
 /// Every sort of double except NaN.
-fn number() -> impl Strategy<Value = f64> {
+pub fn number() -> impl Strategy<Value = f64> {
     use prop::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
     POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO | INFINITE
 }

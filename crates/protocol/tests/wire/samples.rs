@@ -103,6 +103,7 @@ fn requests() -> Vec<Message> {
     ]
     .into_iter()
     .chain(large)
+    .chain([Request::ContactFrame(Box::new(contact_frame()))])
     .zip(1..)
     .map(|(request, id)| Message::Request(id, request))
     .collect()
@@ -203,6 +204,7 @@ fn replies() -> Vec<Message> {
         Message::Reply(8, Reply::Pong { nonce: 0x0123_4567_89ab_cdef }),
         Message::Reply(10, Reply::LargeAnswer(Box::new(large_answer()))),
         Message::Reply(11, Reply::SeveralAnswers(Box::new(several))),
+        Message::Reply(12, Reply::ContactAnswer(Box::new(contact_answer()))),
     ]
 }
 
@@ -257,4 +259,89 @@ pub fn masks_of(lists: &[&[(u32, f64)]]) -> Masks {
 
 fn hash() -> ModelHash {
     ModelHash(std::array::from_fn(|i| 0xa0 ^ u8::try_from(i).unwrap()))
+}
+
+fn object_state() -> ObjectState {
+    ObjectState {
+        pose: [0.5, 0.25, -0.125, 1.0, 0.0, 0.0, 0.0],
+        velocity: [0.0, 0.0, -0.5],
+        angular_velocity: [0.25, 0.0, 0.0],
+        force_nodes: vec![2],
+        forces: vec![[0.0, 0.5, 1.0]],
+        contacts: vec![HeldContact {
+            body: 1,
+            nodes: [0, 2, 3],
+            weights: [0.5, 0.25, 0.25],
+            force: [0.0, 0.0, 1.5],
+        }],
+    }
+}
+
+fn contact_frame() -> ContactFrame {
+    let still = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+    let body =
+        |shape| BodyMotion { shape, start: still, end: still, friction: 0.5, compliance: 0.0 };
+    let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    ContactFrame {
+        model: hash(),
+        ask: ContactAsk {
+            seconds: 0.01,
+            gravity: [0.0, 0.0, -9.81],
+            density: 1000.0,
+            viscosity: 0.005,
+            penetration_rel: 1e-6,
+            residual_rel: 1e-9,
+            rounds_max: 16,
+            newton_max: 400,
+        },
+        state: object_state(),
+        bodies: vec![
+            body(BodyShape::Plane { normal: [0.0, 0.0, 1.0] }),
+            body(BodyShape::Capsule { radius: 0.008, length: 0.03 }),
+            body(BodyShape::Mesh { vertices, triangles }),
+            body(BodyShape::Sphere { radius: 0.5 }),
+            body(BodyShape::Box { half: [0.5, 0.25, 0.125] }),
+        ],
+        triangles: vec![[0, 2, 3], [1, 2, 0]],
+        triangle_bodies: vec![1, 0],
+        nodes: NodeChoice::Nodes(vec![0, 3]),
+        precision: Precision::F64,
+    }
+}
+
+fn contact_answer() -> ContactAnswer {
+    let LargeAnswer { answer, .. } = large_answer();
+    let point = ContactPoint {
+        body: 1,
+        slips: true,
+        place: [0.25, 0.5, 0.0],
+        normal: [0.0, 0.0, 1.0],
+        force: [0.5, 0.0, 1.0],
+        slip: [-0.001, 0.0, 0.0],
+    };
+    let load = BodyLoad {
+        force: [0.5, 0.0, 1.0],
+        torque: [0.0, 0.25, 0.0],
+        normal_force: 1.0,
+        contacts: 1,
+    };
+    ContactAnswer {
+        answer,
+        contact: ContactReport {
+            penetration_max: 1e-9,
+            slip_max: 0.001,
+            residual: 1e-10,
+            residual_rel: 1e-10,
+            cone_violation: 0.0,
+            is_converged: true,
+            rounds: 3,
+            sweeps: 6,
+            newton_steps: 5,
+            columns_computed: 2,
+        },
+        state: object_state(),
+        points: vec![point],
+        loads: vec![BodyLoad::default(), load],
+    }
 }

@@ -66,6 +66,12 @@ impl Columns {
         self.lock().computed
     }
 
+    /// How many of some contacts have no column in the cache.
+    pub fn missing(&self, contacts: impl IntoIterator<Item = Contact>) -> usize {
+        let kept = self.lock();
+        contacts.into_iter().filter(|contact| !kept.columns.contains_key(contact)).count()
+    }
+
     /// Columns of some nodes or masks, from the cache or computed now on the current rayon pool.
     ///
     /// # Errors

@@ -1,0 +1,212 @@
+//! Answers one step of a free object among rigid bodies, from cached columns of the compliance.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use softgrasp_core::contact::coulomb::PointState;
+use softgrasp_core::dynamics::{
+    BodyLoad, Candidate, ContactStep, MovingBody, ObjectState, PointContact, StepOutcome,
+    StepSettings,
+};
+use softgrasp_core::model::ModelError;
+use softgrasp_core::solve::Stage;
+use softgrasp_core::solve::condensed::{Contact, Elasticity};
+use softgrasp_protocol::{
+    Answer, BodyLoad as LoadMessage, ContactAnswer, ContactFrame, ContactPoint, ContactReport,
+    Displacements, NodeChoice, Precision, SolveReport,
+};
+
+use crate::clock::{StageClock, ms_since};
+use crate::machine_memory::last_peak_rss_bytes;
+use crate::plan::columns_ms;
+use crate::refusal::Refusal;
+use crate::request::{bodies_of, name_of, settings_of, state_message, state_of};
+use crate::resources::Resources;
+use crate::store::StoredModel;
+
+/// A contact frame with all that its answer needs.
+pub(crate) struct PosedContact {
+    stored: Arc<StoredModel>,
+    state: ObjectState,
+    bodies: Vec<MovingBody>,
+    triangles: Vec<[u32; 3]>,
+    candidates: Vec<Candidate>,
+    settings: StepSettings,
+    nodes: NodeChoice,
+    precision: Precision,
+}
+
+impl PosedContact {
+    /// Checks what a frame names.
+    ///
+    /// # Errors
+    /// [`Refusal`] naming what is wrong.
+    pub fn new(resources: &Resources, frame: ContactFrame) -> Result<Self, Refusal> {
+        let ContactFrame {
+            model,
+            ask,
+            state,
+            bodies,
+            triangles,
+            triangle_bodies,
+            nodes,
+            precision,
+        } = frame;
+        let stored = resources.models.find(model).ok_or(Refusal::UnknownModel(model))?;
+        let node_count = stored.model.mesh().node_count();
+        let is_there = |node: &&u32| stored.model.is_used(**node as usize);
+        let check = |what: &'static str, nodes: &[u32]| match nodes
+            .iter()
+            .find(|node| **node as usize >= node_count || !is_there(node))
+        {
+            Some(&node) => Err(Refusal::NoSuchNode { what, node, node_count }),
+            None => Ok(()),
+        };
+        check("a candidate triangle", triangles.as_flattened())?;
+        if let NodeChoice::Nodes(nodes) = &nodes {
+            check("the list of wanted nodes", nodes)?;
+        }
+        let state = state_of(state)?;
+        let held = state.contacts.iter().flat_map(|contact| contact.nodes);
+        let of_state: Vec<u32> = state.forces.iter().map(|(n, _)| *n).chain(held).collect();
+        check("the state of the object", &of_state)?;
+        let candidate = |(triangle, &body): (u32, &u32)| Candidate {
+            triangle,
+            body: u16::try_from(body).unwrap_or(u16::MAX),
+        };
+        let candidates = (0u32..).zip(&triangle_bodies).map(candidate).collect();
+        Ok(Self {
+            stored,
+            state,
+            bodies: bodies_of(bodies)?,
+            triangles,
+            candidates,
+            settings: settings_of(&ask),
+            nodes,
+            precision,
+        })
+    }
+
+    /// Whether nothing has to be made for it but a small problem.
+    pub fn is_prepared(&self) -> bool {
+        self.stored.has_free_body() && self.missing() == 0
+    }
+
+    /// What computing the columns that it may need is predicted to take.
+    ///
+    /// Units: ms.
+    pub fn predicted_ms(&self, resources: &Resources) -> f64 {
+        let Ok(base) = self.stored.base() else { return 0.0 };
+        let entries = base.bytes() as f64 / size_of::<f64>() as f64;
+        columns_ms(entries, self.missing(), &resources.rates.known())
+    }
+
+    /// Nodes near bodies whose columns are not there.
+    fn missing(&self) -> usize {
+        let mut nodes = self.triangles.as_flattened().to_vec();
+        nodes.sort_unstable();
+        nodes.dedup();
+        self.stored.columns.missing(nodes.into_iter().map(Contact::Node))
+    }
+
+    /// Makes the step.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn answer(
+        self,
+        resources: &Resources,
+        mut clock: StageClock,
+    ) -> Result<ContactAnswer, Refusal> {
+        clock.begin(Stage::Solve);
+        let base = self.stored.base()?;
+        let body = self.stored.free_body(&base).map_err(ModelError::Condensed)?;
+        let columns = &self.stored.columns;
+        let computed = columns.computed();
+        let elasticity = Elasticity { base: &base, body: &body, columns };
+        let mesh = self.stored.model.mesh();
+        let step = ContactStep {
+            vertices: mesh.vertices(),
+            triangles: &self.triangles,
+            elasticity,
+            bodies: &self.bodies,
+            candidates: &self.candidates,
+            settings: self.settings,
+        };
+        let wanted = match &self.nodes {
+            NodeChoice::All => (0..mesh.node_count() as u32).collect(),
+            NodeChoice::Nodes(nodes) => nodes.clone(),
+        };
+        let outcome = step.advance(&self.state, &wanted)?;
+        let computed = columns.computed().saturating_sub(computed);
+        resources.models.trim();
+        let mut stage_ms = clock.finish();
+        let start = Instant::now();
+        let mut answer = self.answered(outcome, computed);
+        stage_ms.encode = ms_since(start);
+        answer.answer.report.stage_ms = stage_ms;
+        Ok(answer)
+    }
+
+    fn answered(self, outcome: StepOutcome, computed: u64) -> ContactAnswer {
+        let model = &self.stored.model;
+        let known = 3 * outcome.contacts.len() as u64;
+        let report = SolveReport {
+            method: "condensed".to_owned(),
+            element: name_of(model.element()),
+            unknown_dofs: model.modelled_dofs() as u64 - known.min(model.modelled_dofs() as u64),
+            known_dofs: known,
+            residual_rel: outcome.residual_rel,
+            error_bound_why: "a contact frame has the residuals of both parts and no proven bound"
+                .to_owned(),
+            max_rotation_deg: f64::NAN,
+            max_strain: f64::NAN,
+            precision: "f64".to_owned(),
+            peak_rss_bytes: last_peak_rss_bytes(),
+            factor_reused: computed == 0,
+            chosen_because: "contact with friction".to_owned(),
+            ..SolveReport::default()
+        };
+        let contact = ContactReport {
+            penetration_max: outcome.penetration_max,
+            slip_max: outcome.slip_max,
+            residual: outcome.contact_residual,
+            residual_rel: outcome.contact_residual_rel,
+            cone_violation: outcome.cone_violation,
+            is_converged: outcome.is_converged,
+            rounds: outcome.rounds as u32,
+            sweeps: outcome.sweeps as u32,
+            newton_steps: outcome.newton_steps as u32,
+            columns_computed: u32::try_from(computed).unwrap_or(u32::MAX),
+        };
+        let displacements = Displacements::of(outcome.displacements, self.precision);
+        let (reactions, mask_forces) = (Vec::new(), Vec::new());
+        ContactAnswer {
+            answer: Answer { report, nodes: self.nodes, displacements, reactions, mask_forces },
+            contact,
+            state: state_message(&outcome.state),
+            points: outcome.contacts.iter().map(point_message).collect(),
+            loads: outcome.loads.iter().map(load_message).collect(),
+        }
+    }
+}
+
+fn point_message(point: &PointContact) -> ContactPoint {
+    ContactPoint {
+        body: u32::from(point.body),
+        slips: point.state == PointState::Slipping,
+        place: point.place.into(),
+        normal: point.normal.into(),
+        force: point.force.into(),
+        slip: point.slip.into(),
+    }
+}
+
+fn load_message(load: &BodyLoad) -> LoadMessage {
+    LoadMessage {
+        force: load.force.into(),
+        torque: load.torque.into(),
+        normal_force: load.normal_force,
+        contacts: load.contacts as u32,
+    }
+}

@@ -1,0 +1,124 @@
+//! Random contact frames and their answers.
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use softgrasp_protocol::*;
+
+use crate::random_messages::{answer, number, point};
+
+/// Any contact frame.
+pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
+    let ask = (prop::array::uniform5(number()), point(), any::<[u32; 2]>()).prop_map(
+        |(
+            [seconds, density, viscosity, penetration_rel, residual_rel],
+            gravity,
+            [rounds, steps],
+        )| {
+            ContactAsk {
+                seconds,
+                gravity,
+                density,
+                viscosity,
+                penetration_rel,
+                residual_rel,
+                rounds_max: rounds,
+                newton_max: steps,
+            }
+        },
+    );
+    let candidates = vec((any::<[u32; 3]>(), any::<u32>()), 0..6);
+    let nodes =
+        prop_oneof![Just(NodeChoice::All), vec(any::<u32>(), 0..6).prop_map(NodeChoice::Nodes)];
+    let model = any::<[u8; 32]>().prop_map(ModelHash);
+    (model, ask, object_state(), vec(body(), 0..5), candidates, nodes).prop_map(
+        |(model, ask, state, bodies, candidates, nodes)| {
+            let (triangles, triangle_bodies) = candidates.into_iter().unzip();
+            let precision = Precision::F32Quantised;
+            ContactFrame { model, ask, state, bodies, triangles, triangle_bodies, nodes, precision }
+        },
+    )
+}
+
+/// Any answer to a contact frame.
+pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
+    let report = (prop::array::uniform5(number()), any::<bool>(), any::<[u32; 4]>()).prop_map(
+        |(numbers, is_converged, [rounds, sweeps, newton_steps, columns_computed])| {
+            let [penetration_max, slip_max, residual, residual_rel, cone_violation] = numbers;
+            ContactReport {
+                penetration_max,
+                slip_max,
+                residual,
+                residual_rel,
+                cone_violation,
+                is_converged,
+                rounds,
+                sweeps,
+                newton_steps,
+                columns_computed,
+            }
+        },
+    );
+    let contact = (any::<u32>(), any::<bool>(), prop::array::uniform4(point())).prop_map(
+        |(body, slips, [place, normal, force, slip])| ContactPoint {
+            body,
+            slips,
+            place,
+            normal,
+            force,
+            slip,
+        },
+    );
+    let load = (point(), point(), number(), any::<u32>()).prop_map(
+        |(force, torque, normal_force, contacts)| BodyLoad {
+            force,
+            torque,
+            normal_force,
+            contacts,
+        },
+    );
+    (answer(), report, object_state(), vec(contact, 0..4), vec(load, 0..4)).prop_map(
+        |(answer, contact, state, points, loads)| ContactAnswer {
+            answer,
+            contact,
+            state,
+            points,
+            loads,
+        },
+    )
+}
+
+fn object_state() -> impl Strategy<Value = ObjectState> {
+    let held = (any::<u32>(), any::<[u32; 3]>(), point(), point())
+        .prop_map(|(body, nodes, weights, force)| HeldContact { body, nodes, weights, force });
+    let forces = vec((any::<u32>(), point()), 0..5);
+    (pose(), point(), point(), forces, vec(held, 0..4)).prop_map(
+        |(pose, velocity, angular_velocity, forces, contacts)| {
+            let (force_nodes, forces) = forces.into_iter().unzip();
+            ObjectState { pose, velocity, angular_velocity, force_nodes, forces, contacts }
+        },
+    )
+}
+
+fn body() -> impl Strategy<Value = BodyMotion> {
+    let shape = prop_oneof![
+        number().prop_map(|radius| BodyShape::Sphere { radius }),
+        (number(), number()).prop_map(|(radius, length)| BodyShape::Capsule { radius, length }),
+        point().prop_map(|normal| BodyShape::Plane { normal }),
+        point().prop_map(|half| BodyShape::Box { half }),
+        (vec(point(), 0..5), vec(any::<[u32; 3]>(), 0..5))
+            .prop_map(|(vertices, triangles)| BodyShape::Mesh { vertices, triangles }),
+    ];
+    (shape, pose(), pose(), number(), number()).prop_map(
+        |(shape, start, end, friction, compliance)| BodyMotion {
+            shape,
+            start,
+            end,
+            friction,
+            compliance,
+        },
+    )
+}
+
+fn pose() -> impl Strategy<Value = Pose> {
+    prop::array::uniform7(number())
+}
