@@ -22,4 +22,5 @@ pub mod commands;
 pub mod inspect;
 pub mod object;
 pub mod pace;
+pub mod press;
 pub mod run;

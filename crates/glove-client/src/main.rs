@@ -11,6 +11,7 @@ use glove_client::commands::emulate::EmulateCommand;
 use glove_client::commands::inspect::InspectCommand;
 use glove_client::commands::interruption;
 use glove_client::commands::mesh::MeshCommand;
+use glove_client::commands::press::PressCommand;
 use glove_client::commands::record::RecordCommand;
 use glove_client::commands::replay::ReplayCommand;
 use glove_client::commands::run::RunCommand;
@@ -31,6 +32,7 @@ enum Command {
     Solve(SolveCommand),
     Inspect(InspectCommand),
     Mesh(MeshCommand),
+    Press(PressCommand),
     Record(RecordCommand),
     Replay(ReplayCommand),
     Devices(DevicesCommand),
@@ -48,6 +50,7 @@ fn main() -> ExitCode {
         Command::Solve(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Mesh(command) => command.run(),
+        Command::Press(command) => command.run(),
         Command::Record(command) => command.run(),
         Command::Replay(command) => command.run(),
         Command::Devices(command) => command.run(),

@@ -2,6 +2,7 @@
 
 pub mod calculix_deck;
 pub mod connection;
+pub mod contact_frame;
 pub mod deformation;
 pub mod digest;
 pub mod discretisation;

@@ -18,6 +18,7 @@ mod live_samples;
 pub mod mesh;
 mod numbers;
 mod output;
+pub mod press;
 mod progress;
 pub mod record;
 mod recorded_samples;

@@ -1,6 +1,6 @@
 //! Numbers on the command line: a value that can never work is refused with the option's name.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;
 
 /// A finite number above 0.
@@ -42,6 +42,19 @@ pub fn place(text: &str) -> Result<Point3<f64>, String> {
             Ok(Point3::new(x, y, z))
         }
         _ => Err("it must be three numbers with commas, at most 10 m each".to_owned()),
+    }
+}
+
+/// A vector: three finite numbers with commas.
+pub fn vector(text: &str) -> Result<Vector3<f64>, String> {
+    let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, z]
+            if text.split(',').count() == 3 && numbers.iter().all(|n: &f64| n.is_finite()) =>
+        {
+            Ok(Vector3::new(x, y, z))
+        }
+        _ => Err("it must be three numbers with commas".to_owned()),
     }
 }
 

@@ -1,0 +1,288 @@
+//! `glove-client press`: rigid bodies pressed against a soft object, with friction and weight.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use nalgebra::Point3;
+use softgrasp_core::mesh::{Surface, TetMesh};
+use softgrasp_core::mesh_io::{PointField, write_vtu};
+use softgrasp_protocol::solve_report::SCHEMA;
+use softgrasp_protocol::{ContactAsk, ElementName, Material, Reply, Request};
+
+use super::access_arguments::AccessArguments;
+use super::numbers::{count, poisson, positive, speed, vector};
+use super::output::{print, write_json};
+use super::progress::Progress;
+use crate::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
+use crate::ask::contact_frame::isometry_of;
+use crate::ask::displacement_table::write_displacements;
+use crate::ask::model_upload::ModelUpload;
+use crate::object::file_writing::write_file;
+use crate::object::mesh_file::read_mesh_file;
+use crate::press::bodies_file::{PressBodies, read_bodies};
+use crate::press::course::{Course, Step};
+use crate::press::report::{PressReport, StepReport};
+
+/// Press rigid bodies against a soft object that nothing else holds, with friction and weight.
+#[derive(Args)]
+pub struct PressCommand {
+    /// Mesh file of the object, in metres; the format is recognised by its content.
+    #[arg(long, value_name = "F")]
+    mesh: PathBuf,
+    /// Rigid bodies and their ways: [[body]] with name, shape = "sphere", "capsule", "plane", "box"
+    /// or "mesh", its sizes in metres, poses = [[t, x, y, z, qw, qx, qy, qz], …]; end = T.
+    #[arg(long, value_name = "B.toml")]
+    bodies: PathBuf,
+    /// Young's modulus, Pa.
+    #[arg(long, default_value_t = 2.0e4, value_name = "PA", value_parser = positive, allow_hyphen_values = true)]
+    young: f64,
+    /// Poisson's ratio.
+    #[arg(long, default_value_t = 0.4, value_name = "NU", value_parser = poisson, allow_hyphen_values = true)]
+    poisson: f64,
+    /// Density, kg/m³.
+    #[arg(long, default_value_t = 1000.0, value_name = "KG/M3", value_parser = positive, allow_hyphen_values = true)]
+    density: f64,
+    /// Coefficient of friction of bodies that name none in their file.
+    #[arg(long, default_value_t = 0.5, value_name = "MU", value_parser = speed, allow_hyphen_values = true)]
+    friction: f64,
+    /// Acceleration of free fall, m/s²; 0,0,0 for none.
+    #[arg(long, default_value = "0,0,-9.81", value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    gravity: nalgebra::Vector3<f64>,
+    /// Time in which the shape forgets a force, s (Kelvin and Voigt); 0 for none.
+    #[arg(long, default_value_t = 0.0, value_name = "T", value_parser = speed, allow_hyphen_values = true)]
+    viscosity: f64,
+    /// Longest step, s.
+    #[arg(long, default_value_t = 0.01, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
+    step: f64,
+    /// Equations of the elastic part.
+    #[arg(long, default_value = "linear", value_name = "linear", value_parser = ["linear"])]
+    deformation: String,
+    /// Finite element.
+    #[arg(long, default_value = "t4", value_name = "t4|t4-anp", value_parser = element)]
+    element: ElementName,
+    /// Where to solve: HOST:PORT, or embedded.
+    #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
+    server: ServerChoice,
+    #[command(flatten)]
+    access: AccessArguments,
+    /// Threads of the embedded server [default: one per processor].
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    threads: Option<usize>,
+    /// File for the displacements of all nodes at the end, from rest to their place in the world.
+    #[arg(long, value_name = "U.vtu|U.csv")]
+    out: Option<PathBuf>,
+    /// Folder for the object at every step, as VTU files and a PVD file that ParaView plays.
+    #[arg(long, value_name = "DIR")]
+    series: Option<PathBuf>,
+    /// File for a JSON report of every step.
+    #[arg(long, value_name = "R.json")]
+    report: Option<PathBuf>,
+}
+
+fn element(text: &str) -> Result<ElementName, String> {
+    match text {
+        "t4" => Ok(ElementName::T4),
+        "t4-anp" => Ok(ElementName::T4Anp),
+        _ => Err("there are t4 and t4-anp".to_owned()),
+    }
+}
+
+impl PressCommand {
+    /// Reads, plays, writes.
+    ///
+    /// # Errors
+    /// One line each: what happened, where, and what to do.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let progress = Progress::start("reading");
+        let bodies = read_bodies(&self.bodies)?;
+        let mesh = read_mesh_file(&self.mesh)?.mesh;
+        let surface = Surface::from_mesh(&mesh);
+        let is_known = |path: &PathBuf| {
+            matches!(path.extension().and_then(|e| e.to_str()), Some("vtu" | "csv"))
+        };
+        if self.out.as_ref().is_some_and(|path| !is_known(path)) {
+            bail!("--out must end in .vtu or .csv");
+        }
+        progress.now("starting");
+        let host = match self.access.to(&self.server)? {
+            Some(endpoint) => Host::at(endpoint),
+            None => Host::open(&self.server, self.threads)?,
+        };
+        let mut connection = host.connect()?;
+        progress.now(&format!("{} nodes:", mesh.node_count()));
+        progress.watch(host.stage());
+        let material = Material { young: self.young, poisson: self.poisson };
+        let upload = ModelUpload::new(&mesh, 1, material, self.element);
+        give_model(&mut connection, &upload)?;
+        let course = Course {
+            mesh: &mesh,
+            surface: &surface,
+            model: upload.hash,
+            bodies: &bodies,
+            friction: self.friction,
+            ask: self.ask(),
+            whole: self.series.is_some(),
+        };
+        let names: Vec<String> = bodies.bodies.iter().map(|body| body.name.clone()).collect();
+        let mut steps = Vec::new();
+        let mut series = self.series.as_deref().map(Series::create).transpose()?;
+        let mut last = None;
+        course.play(&mut connection, |step| -> anyhow::Result<()> {
+            progress.now(&format!("{:.3} of {:.3} s", step.time, bodies.end));
+            steps.push(StepReport::new(&step, &names));
+            if let Some(series) = &mut series {
+                series.add(&mesh, &step)?;
+            }
+            last = Some(step);
+            Ok(())
+        })?;
+        drop(progress);
+        if let Some(series) = series {
+            series.finish()?;
+        }
+        if let (Some(path), Some(last)) = (&self.out, &last) {
+            write_file(path, &encode(path, &mesh, last)?)?;
+        }
+        let report = self.summary(&mesh, steps);
+        if let Some(path) = &self.report {
+            write_json(path, &report)?;
+        }
+        print(&self.describe(&report, &bodies))
+    }
+
+    fn ask(&self) -> ContactAsk {
+        ContactAsk {
+            seconds: self.step,
+            gravity: self.gravity.into(),
+            density: self.density,
+            viscosity: self.viscosity,
+            penetration_rel: 1e-7,
+            residual_rel: 1e-9,
+            rounds_max: 40,
+            newton_max: 1000,
+        }
+    }
+
+    fn summary(&self, mesh: &TetMesh, steps: Vec<StepReport>) -> PressReport {
+        let most = |number: fn(&StepReport) -> f64| steps.iter().map(number).fold(0.0, f64::max);
+        let volume: f64 = (0..mesh.tets().len()).map(|tet| mesh.signed_volume(tet)).sum();
+        PressReport {
+            schema: SCHEMA,
+            command: "press",
+            mesh: self.mesh.display().to_string(),
+            nodes: mesh.node_count(),
+            tets: mesh.tets().len(),
+            young: self.young,
+            poisson: self.poisson,
+            density: self.density,
+            mass: self.density * volume,
+            gravity: self.gravity.into(),
+            friction: self.friction,
+            viscosity: self.viscosity,
+            element: self.element.as_str().to_owned(),
+            deformation: "linear",
+            steps_not_converged: steps.iter().filter(|step| !step.converged).count(),
+            penetration_max: most(|step| step.penetration_max),
+            contact_residual_rel_max: most(|step| step.contact_residual_rel),
+            steps,
+        }
+    }
+
+    fn describe(&self, report: &PressReport, bodies: &PressBodies) -> String {
+        let mut text = format!(
+            "{}: {} nodes, {} tetrahedra, {:.1} g\n{} steps of {:.4} s, deepest penetration {:.1e} m, \
+             residual of contact {:.1e} at most\n",
+            report.mesh,
+            report.nodes,
+            report.tets,
+            1e3 * report.mass,
+            report.steps.len(),
+            bodies.end / report.steps.len().max(1) as f64,
+            report.penetration_max,
+            report.contact_residual_rel_max,
+        );
+        if report.steps_not_converged > 0 {
+            text.push_str(&format!(
+                "{} steps end above the residual asked for; the report says how far\n",
+                report.steps_not_converged
+            ));
+        }
+        if let Some(last) = report.steps.last() {
+            for (name, body) in &last.bodies {
+                let [x, y, z] = body.force;
+                text.push_str(&format!(
+                    "at the end {name} presses at {} points with {:.4} N: ({x:.4}, {y:.4}, {z:.4}) N\n",
+                    body.contacts, body.normal_force
+                ));
+            }
+        }
+        text
+    }
+}
+
+/// Uploads the model.
+fn give_model(connection: &mut ServerConnection, upload: &ModelUpload) -> Result<(), LinkError> {
+    match connection.ask(&Request::UploadModel((*upload.message).clone()))? {
+        Reply::ModelReady(_) => Ok(()),
+        other => Err(unexpected("UploadModel", &other)),
+    }
+}
+
+/// Displacements from rest to where the step has left every node in the world.
+fn world_displacement(mesh: &TetMesh, step: &Step) -> Vec<[f64; 3]> {
+    let world_from_object = isometry_of(&step.answer.state.pose);
+    let moved = |(rest, u): (&Point3<f64>, &[f64; 3])| {
+        let place = world_from_object * Point3::new(rest.x + u[0], rest.y + u[1], rest.z + u[2]);
+        [place.x - rest.x, place.y - rest.y, place.z - rest.z]
+    };
+    mesh.vertices().iter().zip(&step.displacement).map(moved).collect()
+}
+
+fn encode(path: &Path, mesh: &TetMesh, step: &Step) -> anyhow::Result<Vec<u8>> {
+    let whole = world_displacement(mesh, step);
+    if path.extension().is_some_and(|e| e == "csv") {
+        return Ok(write_displacements(&whole).into_bytes());
+    }
+    let fields = [
+        PointField { name: "displacement", values: &whole },
+        PointField { name: "elastic_displacement", values: &step.displacement },
+    ];
+    write_vtu(mesh, &fields).context("cannot form the VTU file")
+}
+
+/// Files of all steps, and the file that names them with their times.
+struct Series {
+    folder: PathBuf,
+    entries: String,
+    count: usize,
+}
+
+impl Series {
+    fn create(folder: &Path) -> anyhow::Result<Self> {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        Ok(Self { folder: folder.to_owned(), entries: String::new(), count: 0 })
+    }
+
+    fn add(&mut self, mesh: &TetMesh, step: &Step) -> anyhow::Result<()> {
+        self.count += 1;
+        let name = format!("step_{:05}.vtu", self.count);
+        let path = self.folder.join(&name);
+        write_file(&path, &encode(&path, mesh, step)?)?;
+        self.entries.push_str(&format!(
+            "    <DataSet timestep=\"{}\" part=\"0\" file=\"{name}\"/>\n",
+            step.time
+        ));
+        Ok(())
+    }
+
+    fn finish(self) -> anyhow::Result<()> {
+        let text = format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" \
+             byte_order=\"LittleEndian\">\n  <Collection>\n{}  </Collection>\n</VTKFile>\n",
+            self.entries
+        );
+        Ok(write_file(&self.folder.join("series.pvd"), text.as_bytes())?)
+    }
+}

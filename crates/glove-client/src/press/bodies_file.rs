@@ -1,0 +1,278 @@
+//! Reads the rigid bodies of a press from a TOML file: names, shapes, sizes, friction, poses.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+use serde::Deserialize;
+use softgrasp_core::mesh::Surface;
+use softgrasp_core::rigid_body::{RigidMesh, RigidMeshError, RigidShape, ShapeError};
+use softgrasp_protocol::BodyShape;
+
+use super::way::{Way, WayError};
+use crate::object::mesh_file::{MeshFileReadError, read_mesh_file};
+
+/// A rigid body of the file.
+#[derive(Clone, Debug)]
+pub struct PressBody {
+    /// Its name, which the report uses.
+    pub name: String,
+    /// Its shape.
+    pub shape: RigidShape,
+    /// The same as it travels.
+    pub on_the_wire: BodyShape,
+    /// Friction of this body; `None` takes that of all.
+    pub friction: Option<f64>,
+    /// How far it gives way to a force, m/N.
+    pub compliance: f64,
+    /// Where it is when.
+    pub way: Way,
+}
+
+/// All bodies, and how long they are followed.
+#[derive(Clone, Debug)]
+pub struct PressBodies {
+    /// The bodies, in the order of the file.
+    pub bodies: Vec<PressBody>,
+    /// When the press ends, s.
+    pub end: f64,
+}
+
+/// Why there are no bodies.
+#[derive(Debug, thiserror::Error)]
+pub enum BodiesError {
+    /// The file cannot be read.
+    #[error("cannot read {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file makes no sense.
+    #[error("{path}: {source}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// With line and column.
+        source: Box<toml::de::Error>,
+    },
+    /// No body.
+    #[error("{path} has no [[body]]")]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A time that is none.
+    #[error("{path}: end is {end} s; it must be above 0")]
+    End {
+        /// The file.
+        path: PathBuf,
+        /// As given.
+        end: f64,
+    },
+    /// A body that is none.
+    #[error("{path}: body {name:?}: {reason}")]
+    Body {
+        /// The file.
+        path: PathBuf,
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        reason: BodyError,
+    },
+}
+
+/// What is wrong with one body.
+#[derive(Debug, thiserror::Error)]
+pub enum BodyError {
+    /// A name given twice.
+    #[error("another body has the same name")]
+    Name,
+    /// A size that its shape needs.
+    #[error("{shape} needs {what}")]
+    Missing {
+        /// The shape.
+        shape: &'static str,
+        /// The field.
+        what: &'static str,
+    },
+    /// A shape that is not there.
+    #[error("no shape is called {0:?}; there are sphere, capsule, plane, box and mesh")]
+    Shape(String),
+    /// A number that can never work.
+    #[error("{what} is {value}; it must be a number, at least 0")]
+    Number {
+        /// The field.
+        what: &'static str,
+        /// As given.
+        value: f64,
+    },
+    /// Sizes.
+    #[error(transparent)]
+    Size(#[from] ShapeError),
+    /// Poses.
+    #[error(transparent)]
+    Way(#[from] WayError),
+    /// The file of a mesh.
+    #[error(transparent)]
+    File(#[from] MeshFileReadError),
+    /// The surface of a mesh.
+    #[error(transparent)]
+    Mesh(#[from] RigidMeshError),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    end: Option<f64>,
+    #[serde(default)]
+    body: Vec<Entry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: Option<String>,
+    shape: String,
+    radius: Option<f64>,
+    length: Option<f64>,
+    half: Option<[f64; 3]>,
+    normal: Option<[f64; 3]>,
+    file: Option<PathBuf>,
+    friction: Option<f64>,
+    compliance: Option<f64>,
+    poses: Vec<[f64; 8]>,
+}
+
+/// Reads a file of bodies; paths in it count from its folder.
+///
+/// # Errors
+/// [`BodiesError`] in one line that names file and body.
+pub fn read_bodies(path: &Path) -> Result<PressBodies, BodiesError> {
+    let read = |source| BodiesError::Read { path: path.to_owned(), source };
+    let text = std::fs::read_to_string(path).map_err(read)?;
+    let parse = |source| BodiesError::Parse { path: path.to_owned(), source: Box::new(source) };
+    let file: File = toml::from_str(&text).map_err(parse)?;
+    if file.body.is_empty() {
+        return Err(BodiesError::Empty { path: path.to_owned() });
+    }
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut names = BTreeSet::new();
+    let mut bodies = Vec::with_capacity(file.body.len());
+    for (at, entry) in file.body.into_iter().enumerate() {
+        let name = entry.name.clone().unwrap_or_else(|| format!("body{at}"));
+        let refuse =
+            |reason| BodiesError::Body { path: path.to_owned(), name: name.clone(), reason };
+        if !names.insert(name.clone()) {
+            return Err(refuse(BodyError::Name));
+        }
+        bodies.push(body(folder, name.clone(), entry).map_err(refuse)?);
+    }
+    let last = bodies.iter().map(|body| body.way.end()).fold(0.0, f64::max);
+    let end = file.end.unwrap_or(last);
+    match end > 0.0 && end.is_finite() {
+        true => Ok(PressBodies { bodies, end }),
+        false => Err(BodiesError::End { path: path.to_owned(), end }),
+    }
+}
+
+fn body(folder: &Path, name: String, entry: Entry) -> Result<PressBody, BodyError> {
+    let (shape, on_the_wire) = shape_of(folder, &entry)?;
+    let number = |what, value: Option<f64>| match value {
+        Some(value) if !(value >= 0.0 && value.is_finite()) => {
+            Err(BodyError::Number { what, value })
+        }
+        value => Ok(value),
+    };
+    Ok(PressBody {
+        name,
+        shape,
+        on_the_wire,
+        friction: number("friction", entry.friction)?,
+        compliance: number("compliance", entry.compliance)?.unwrap_or(0.0),
+        way: Way::try_new(&entry.poses)?,
+    })
+}
+
+fn shape_of(folder: &Path, entry: &Entry) -> Result<(RigidShape, BodyShape), BodyError> {
+    fn need<T>(shape: &'static str, what: &'static str, field: Option<T>) -> Result<T, BodyError> {
+        field.ok_or(BodyError::Missing { shape, what })
+    }
+    Ok(match entry.shape.as_str() {
+        "sphere" => {
+            let radius = need("a sphere", "radius", entry.radius)?;
+            (RigidShape::sphere(radius)?, BodyShape::Sphere { radius })
+        }
+        "capsule" => {
+            let radius = need("a capsule", "radius", entry.radius)?;
+            let length = need("a capsule", "length", entry.length)?;
+            (RigidShape::capsule(radius, length)?, BodyShape::Capsule { radius, length })
+        }
+        "plane" => {
+            let normal = need("a plane", "normal", entry.normal)?;
+            (RigidShape::plane(Vector3::from(normal))?, BodyShape::Plane { normal })
+        }
+        "box" => {
+            let half = need("a box", "half", entry.half)?;
+            (RigidShape::cuboid(Vector3::from(half))?, BodyShape::Box { half })
+        }
+        "mesh" => mesh_of(&folder.join(need("a mesh", "file", entry.file.as_ref())?))?,
+        other => return Err(BodyError::Shape(other.to_owned())),
+    })
+}
+
+/// The boundary surface of a mesh file as a rigid body.
+fn mesh_of(path: &Path) -> Result<(RigidShape, BodyShape), BodyError> {
+    let mesh = read_mesh_file(path)?.mesh;
+    let triangles = Surface::from_mesh(&mesh).triangles;
+    let vertices: Vec<Point3<f64>> = mesh.vertices().to_vec();
+    let shape = RigidShape::Mesh(Arc::new(RigidMesh::try_new(&vertices, &triangles)?));
+    let vertices = vertices.into_iter().map(Into::into).collect();
+    Ok((shape, BodyShape::Mesh { vertices, triangles }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<PressBodies, BodiesError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bodies.toml");
+        std::fs::write(&path, text).unwrap();
+        read_bodies(&path)
+    }
+
+    #[test]
+    fn bodies_of_every_simple_shape_are_read() {
+        let pose = "poses = [[0, 0, 0, 0, 1, 0, 0, 0]]";
+        let text = format!(
+            "end = 2.0\n[[body]]\nname = \"table\"\nshape = \"plane\"\nnormal = [0, 0, 1]\n{pose}\n\
+             [[body]]\nname = \"tip\"\nshape = \"sphere\"\nradius = 0.008\nfriction = 0.7\n\
+             poses = [[0, 0, 0, 0.1, 1, 0, 0, 0], [1, 0, 0, 0.05, 1, 0, 0, 0]]\n\
+             [[body]]\nshape = \"capsule\"\nradius = 0.01\nlength = 0.03\n{pose}\n\
+             [[body]]\nshape = \"box\"\nhalf = [0.1, 0.1, 0.01]\n{pose}\n"
+        );
+        let read = read(&text).unwrap();
+        let names: Vec<&str> = read.bodies.iter().map(|b| b.name.as_str()).collect();
+        assert_eq!(names, ["table", "tip", "body2", "body3"]);
+        assert_eq!((read.end, read.bodies[1].friction), (2.0, Some(0.7)));
+        assert!((read.bodies[1].way.at(0.5).translation.z - 0.075).abs() < 1e-15);
+    }
+
+    #[test]
+    fn faults_are_told_with_the_name_of_the_body() {
+        let told = |text: &str| read(text).unwrap_err().to_string();
+        let pose = "poses = [[0, 0, 0, 0, 1, 0, 0, 0]]";
+        assert!(told("end = 1.0").contains("no [[body]]"));
+        let no_radius = format!("end = 1.0\n[[body]]\nname = \"tip\"\nshape = \"sphere\"\n{pose}");
+        assert!(told(&no_radius).contains("\"tip\": a sphere needs radius"));
+        let other = format!("end = 1.0\n[[body]]\nshape = \"cone\"\n{pose}");
+        assert!(told(&other).contains("no shape is called \"cone\""));
+        let still = format!("[[body]]\nshape = \"sphere\"\nradius = 1\n{pose}");
+        assert!(told(&still).contains("end is 0 s"));
+        let unknown = format!("end = 1.0\n[[body]]\nshape = \"sphere\"\nradios = 1\n{pose}");
+        assert!(told(&unknown).contains("radios"));
+    }
+}

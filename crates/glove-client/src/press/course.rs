@@ -1,0 +1,141 @@
+//! Plays a press: one contact frame after the other, from the beginning to the end.
+
+use std::time::Instant;
+
+use softgrasp_core::dynamics::MovingBody;
+use softgrasp_core::mesh::{Surface, TetMesh};
+use softgrasp_protocol::{
+    ContactAnswer, ContactAsk, ModelHash, NodeChoice, ObjectState, Reply, Request,
+};
+
+use super::bodies_file::{PressBodies, PressBody};
+use crate::ask::connection::{LinkError, ServerConnection, unexpected};
+use crate::ask::contact_frame::{StepBody, StepObject};
+
+/// A press with all that its steps need.
+pub struct Course<'a> {
+    /// The object at rest.
+    pub mesh: &'a TetMesh,
+    /// Its boundary.
+    pub surface: &'a Surface,
+    /// The kept model.
+    pub model: ModelHash,
+    /// The bodies and when they end.
+    pub bodies: &'a PressBodies,
+    /// Friction of bodies that name none.
+    pub friction: f64,
+    /// How each step is made; `seconds` is the longest step.
+    pub ask: ContactAsk,
+    /// Whether the displacements of all nodes are wanted in every step.
+    pub whole: bool,
+}
+
+/// One step that has been made.
+pub struct Step {
+    /// Time at its end, s.
+    pub time: f64,
+    /// What the server said.
+    pub answer: ContactAnswer,
+    /// Displacement of every node in the object's frame, m; zero inside unless all are wanted.
+    pub displacement: Vec<[f64; 3]>,
+    /// From sending to having the answer.
+    pub ms: f64,
+}
+
+/// A part of a radius that a body may move in one step, so that it cannot pass through a surface.
+const WAY_OF_THICKNESS: f64 = 0.5;
+
+impl Course<'_> {
+    /// Makes all steps and hands each to `seen`.
+    ///
+    /// # Errors
+    /// [`LinkError`], or what `seen` says.
+    pub fn play<E: From<LinkError>>(
+        &self,
+        connection: &mut ServerConnection,
+        mut seen: impl FnMut(Step) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let node_count = self.mesh.node_count();
+        let mut state = ObjectState::at_rest([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+        let mut displacement = vec![[0.0; 3]; node_count];
+        let mut time = 0.0;
+        let steps = self.steps();
+        for step in 1..=steps {
+            let next = self.bodies.end * step as f64 / steps as f64;
+            // In the last step all nodes are wanted.
+            let nodes = match self.whole || step == steps {
+                true => NodeChoice::All,
+                false => NodeChoice::Nodes(self.surface.nodes.clone()),
+            };
+            let object = StepObject {
+                model: self.model,
+                vertices: self.mesh.vertices(),
+                triangles: &self.surface.triangles,
+                displacement: &displacement,
+                nodes,
+            };
+            let bodies: Vec<StepBody> =
+                self.bodies.bodies.iter().map(|body| self.body(body, time, next)).collect();
+            let ask = ContactAsk { seconds: next - time, ..self.ask };
+            let frame = object.frame(state, &bodies, ask);
+            let start = Instant::now();
+            let mut answer = match connection.ask(&Request::ContactFrame(Box::new(frame)))? {
+                Reply::ContactAnswer(answer) => *answer,
+                other => return Err(unexpected("ContactFrame", &other).into()),
+            };
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            displacement = self.spread(&mut answer);
+            state = answer.state.clone();
+            time = next;
+            seen(Step { time, answer, displacement: displacement.clone(), ms })?;
+        }
+        Ok(())
+    }
+
+    /// Number of steps: none longer than asked for, and no body goes through a surface in one.
+    fn steps(&self) -> usize {
+        let end = self.bodies.end;
+        let wanted = (end / self.ask.seconds).ceil().max(1.0);
+        let mut steps = wanted;
+        // Looked at in the steps wanted: between two of them a body goes evenly.
+        for body in &self.bodies.bodies {
+            for k in 0..wanted as usize {
+                let (from, to) = (end * k as f64 / wanted, end * (k + 1) as f64 / wanted);
+                let moving = self.body(body, from, to).moving;
+                let allowed = WAY_OF_THICKNESS * body.shape.thickness();
+                steps = steps.max(wanted * (moving.way() / allowed).ceil().min(STEPS_MORE));
+            }
+        }
+        steps as usize
+    }
+
+    fn body(&self, body: &PressBody, from: f64, to: f64) -> StepBody {
+        let moving = MovingBody {
+            shape: body.shape.clone(),
+            world_from_body_start: body.way.at(from),
+            world_from_body_end: body.way.at(to),
+            friction: body.friction.unwrap_or(self.friction),
+            compliance: body.compliance,
+        };
+        StepBody { moving, shape: body.on_the_wire.clone() }
+    }
+
+    /// Displacement of every node from what an answer has.
+    fn spread(&self, answer: &mut ContactAnswer) -> Vec<[f64; 3]> {
+        let empty = softgrasp_protocol::Displacements::F64(Vec::new());
+        let values = std::mem::replace(&mut answer.answer.displacements, empty).into_f64();
+        match &answer.answer.nodes {
+            NodeChoice::All => values,
+            NodeChoice::Nodes(nodes) => {
+                let mut all = vec![[0.0; 3]; self.mesh.node_count()];
+                for (&node, value) in nodes.iter().zip(values) {
+                    all[node as usize] = value;
+                }
+                all
+            }
+        }
+    }
+}
+
+/// Most steps that one step wanted is cut into.
+const STEPS_MORE: f64 = 64.0;
