@@ -18,12 +18,14 @@
 
 mod assemble;
 mod bodies;
+mod checks;
 mod configuration;
 mod features;
 mod near;
 mod outcome;
 mod pool;
 mod rigid_motion;
+mod rounds;
 mod state;
 mod step;
 #[cfg(test)]

@@ -38,6 +38,25 @@ pub struct StepOutcome {
     pub newton_steps: usize,
 }
 
+impl StepOutcome {
+    /// The outcome of the last part of a step, with what the parts before it have added.
+    pub(super) fn after(self, before: &Self) -> Self {
+        Self {
+            slip_max: self.slip_max + before.slip_max,
+            penetration_max: self.penetration_max.max(before.penetration_max),
+            contact_residual: self.contact_residual.max(before.contact_residual),
+            contact_residual_rel: self.contact_residual_rel.max(before.contact_residual_rel),
+            cone_violation: self.cone_violation.max(before.cone_violation),
+            residual_rel: self.residual_rel.max(before.residual_rel),
+            is_converged: self.is_converged && before.is_converged,
+            rounds: self.rounds + before.rounds,
+            sweeps: self.sweeps + before.sweeps,
+            newton_steps: self.newton_steps + before.newton_steps,
+            ..self
+        }
+    }
+}
+
 /// A point of the object that presses on a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointContact {

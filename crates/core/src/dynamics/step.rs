@@ -1,18 +1,17 @@
 //! One step of an object among rigid bodies: contact solved about where the step ends, until it is met.
 
-use std::collections::BTreeSet;
-
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::assemble::{ProblemPoint, problem};
+use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
-use super::configuration::{Configuration, Configured, Scene, sums_by_body};
-use super::features::{Candidate, MaterialPoint};
+use super::configuration::{Scene, sums_by_body};
+use super::features::Candidate;
 use super::outcome::{BodyLoad, PointContact, StepOutcome};
-use super::pool::{Pool, force_at, merged};
+use super::pool::merged;
 use super::rigid_motion::{MassProperties, RigidStep};
-use super::state::{HeldContact, ObjectState, at_nodes};
-use crate::contact::coulomb::{ContactProblem, ProblemError, SolveBudget};
+use super::rounds::{Found, Rounds};
+use super::state::{ObjectState, at_nodes};
+use crate::contact::coulomb::{FrictionCone, ProblemError, state_of};
 use crate::solve::condensed::{CondensedError, Elasticity, Response};
 
 /// How a step is made.
@@ -104,6 +103,17 @@ pub enum StepError {
         /// Nodes of the mesh.
         node_count: usize,
     },
+    /// More points touch than one problem takes.
+    #[error(
+        "{points} points of the surface touch at once, at most {max} can; take a coarser mesh, or \
+         bodies that cover less of it"
+    )]
+    TooManyPoints {
+        /// Points that touch.
+        points: usize,
+        /// Points that can.
+        max: usize,
+    },
     /// State or pose that is not finite.
     #[error("a number of the object's state or of a body's pose is not finite")]
     NotFinite,
@@ -115,15 +125,13 @@ pub enum StepError {
     Problem(#[from] ProblemError),
 }
 
-/// Points nearer to a body than this share of the object's size are in the problem from the start.
-const MARGIN: f64 = 2e-3;
-/// Share of a round's residual that its solution may leave.
-const INEXACT: f64 = 1e-3;
-/// Attempts of Newton's method in a round.
-const ATTEMPTS: usize = 8;
+/// Share of its thickness that a body moves in one part of a step at most.
+const WAY_OF_THICKNESS: f64 = 0.5;
+/// Most parts of a step.
+const PARTS_MAX: f64 = 32.0;
 
 impl ContactStep<'_> {
-    /// Makes the step.
+    /// Makes the step, in parts where a body moves so far that it could pass through the surface.
     ///
     /// Shapes: `wanted` nodes whose displacements are asked for.
     ///
@@ -131,6 +139,41 @@ impl ContactStep<'_> {
     /// [`StepError`]; a step that does not meet the law of contact is no error, it says so.
     pub fn advance(&self, state: &ObjectState, wanted: &[u32]) -> Result<StepOutcome, StepError> {
         let mass = self.check(state)?;
+        let parts = self.parts();
+        let share = |part: usize| part as f64 / parts as f64;
+        let mut made: Option<StepOutcome> = None;
+        for part in 0..parts {
+            let bodies: Vec<MovingBody> =
+                self.bodies.iter().map(|body| body.part(share(part), share(part + 1))).collect();
+            let seconds = self.settings.seconds / parts as f64;
+            let settings = StepSettings { seconds, ..self.settings };
+            let of_part = ContactStep { bodies: &bodies, settings, ..*self };
+            let begun = made.as_ref().map_or(state, |made| &made.state);
+            // Displacements are of no use before the last part.
+            let wanted = if part + 1 == parts { wanted } else { &[] };
+            let next = of_part.advance_whole(begun, mass, wanted)?;
+            made = Some(match made {
+                Some(before) => next.after(&before),
+                None => next,
+            });
+        }
+        Ok(made.expect("a step has at least one part"))
+    }
+
+    /// Number of parts in none of which a body moves by more than a share of its thickness.
+    fn parts(&self) -> usize {
+        let needed = |body: &MovingBody| body.way() / (WAY_OF_THICKNESS * body.shape.thickness());
+        let most = self.bodies.iter().map(needed).fold(1.0, f64::max);
+        most.ceil().min(PARTS_MAX) as usize
+    }
+
+    /// The whole step at once.
+    fn advance_whole(
+        &self,
+        state: &ObjectState,
+        mass: MassProperties,
+        wanted: &[u32],
+    ) -> Result<StepOutcome, StepError> {
         let mut response = self.response(state);
         response.need(state.forces.iter().map(|(node, _)| *node))?;
         response.need(at_nodes(&state.contacts).iter().map(|(node, _)| *node))?;
@@ -162,64 +205,13 @@ impl ContactStep<'_> {
     }
 
     /// Size of the object: the diagonal of its bounding box, m.
-    fn size(&self) -> f64 {
+    pub(super) fn size(&self) -> f64 {
         let (mut low, mut high) =
             (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for vertex in self.vertices {
             (low, high) = (low.inf(&vertex.coords), high.sup(&vertex.coords));
         }
         (high - low).norm()
-    }
-
-    fn check(&self, state: &ObjectState) -> Result<MassProperties, StepError> {
-        let settings = &self.settings;
-        let setting = |what, value, expected| Err(StepError::Setting { what, value, expected });
-        if !(settings.seconds > 0.0 && settings.seconds.is_finite()) {
-            return setting(
-                "the length of the step",
-                settings.seconds,
-                "a positive number of seconds",
-            );
-        }
-        if !(settings.viscosity >= 0.0 && settings.viscosity.is_finite()) {
-            return setting("the viscosity", settings.viscosity, "a number of seconds, at least 0");
-        }
-        for body in self.bodies {
-            if !(body.friction >= 0.0 && body.friction.is_finite()) {
-                return setting("the friction of a body", body.friction, "a number, at least 0");
-            }
-            if !(body.compliance >= 0.0 && body.compliance.is_finite()) {
-                return setting("the compliance of a body", body.compliance, "m/N, at least 0");
-            }
-        }
-        let poses =
-            self.bodies.iter().flat_map(|b| [b.world_from_body_start, b.world_from_body_end]);
-        let poses_are_finite = poses.into_iter().all(|pose| {
-            pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
-        });
-        if !state.is_finite()
-            || !poses_are_finite
-            || !settings.gravity.iter().all(|x| x.is_finite())
-        {
-            return Err(StepError::NotFinite);
-        }
-        for (candidate, named) in self.candidates.iter().enumerate() {
-            let Candidate { triangle, body } = *named;
-            let (triangles, bodies) = (self.triangles.len(), self.bodies.len());
-            if triangle as usize >= triangles || usize::from(body) >= bodies {
-                return Err(StepError::Candidate { candidate, triangle, triangles, body, bodies });
-            }
-        }
-        let node_count = self.vertices.len();
-        let held = state.contacts.iter().flat_map(|contact| contact.nodes);
-        let mut named = state.forces.iter().map(|(node, _)| *node).chain(held);
-        if let Some(node) = named.find(|node| *node as usize >= node_count) {
-            return Err(StepError::Node { node, node_count });
-        }
-        MassProperties::of(self.elasticity.body, settings.density).map_or_else(
-            || setting("the density", settings.density, "a positive number of kg/m³"),
-            Ok,
-        )
     }
 
     /// The response of all nodes that the step can meet.
@@ -267,14 +259,14 @@ impl ContactStep<'_> {
                 normal,
                 force,
                 slip: world_from_object.rotation * slip,
-                state: crate::contact::coulomb::state_of(&local, body.friction),
+                state: state_of(&local, body.friction),
             });
         }
         let force_max = contacts.iter().map(|c| c.force.norm()).fold(0.0, f64::max);
         let relative = if force_max > 0.0 { found.residual / force_max } else { 0.0 };
         let violation = |(point, force): &(ProblemPoint, Vector3<f64>)| {
             let friction = self.bodies[usize::from(point.point.body)].friction;
-            crate::contact::coulomb::FrictionCone { friction }.violation(point.local(force))
+            FrictionCone { friction }.violation(point.local(force))
         };
         StepOutcome {
             state: ObjectState {
@@ -299,181 +291,4 @@ impl ContactStep<'_> {
             newton_steps: found.newton_steps,
         }
     }
-}
-
-/// Where the rounds have ended.
-struct Found {
-    end: Configuration,
-    pressing: Vec<(ProblemPoint, Vector3<f64>)>,
-    penetration: f64,
-    residual: f64,
-    is_converged: bool,
-    rounds: usize,
-    sweeps: usize,
-    newton_steps: usize,
-}
-
-/// The contact problem, made anew about where it ended.
-struct Rounds<'s, 'r, 'a> {
-    step: &'s ContactStep<'a>,
-    scene: &'s Scene<'s>,
-    response: &'r mut Response<'s>,
-}
-
-/// A contact problem and what it begins with.
-struct Round {
-    points: Vec<ProblemPoint>,
-    problem: ContactProblem,
-    /// Forces of the configuration it is about.
-    lambda: Vec<f64>,
-    residual: f64,
-    penetration: f64,
-}
-
-impl Rounds<'_, '_, '_> {
-    fn play(&mut self, state: &ObjectState) -> Result<Found, StepError> {
-        let settings = &self.step.settings;
-        let size = self.step.size();
-        let allowed = settings.penetration_rel * size;
-        let start = Configured {
-            world_from_object: state.world_from_object,
-            displacement: &self.scene.begun,
-            body_forces: &[],
-        };
-        let is_known = |c: &&HeldContact| usize::from(c.body) < self.step.bodies.len();
-        let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();
-        let mut pool = self.corners();
-        held.iter().for_each(|contact| pool.add(contact.into(), &[]));
-        let mut about = self.scene.configuration(self.response, held, &start);
-        let (mut rounds, mut sweeps, mut newton_steps) = (0, 0, 0);
-        let mut best: Option<(f64, Configuration, Round)> = None;
-        loop {
-            let round = self.round(&about, &mut pool, (MARGIN * size, allowed))?;
-            let force_max =
-                about.contacts.iter().map(|contact| contact.force.norm()).fold(0.0, f64::max);
-            // How far the round is from what is asked for: at most 1 where it is met.
-            let allowed_residual = settings.residual_rel * force_max;
-            let far = (round.penetration / allowed).max(match allowed_residual > 0.0 {
-                true => round.residual / allowed_residual,
-                false if round.residual == 0.0 => 0.0,
-                false => f64::INFINITY,
-            });
-            let is_converged = far <= 1.0;
-            let is_last = rounds >= settings.rounds_max || newton_steps >= settings.newton_max;
-            if is_converged || is_last {
-                let is_best = best.as_ref().is_none_or(|(best_far, ..)| far <= *best_far);
-                let (end, round) = match (is_best, best) {
-                    (false, Some((_, end, round))) => (end, round),
-                    _ => (about, round),
-                };
-                let (penetration, residual) = (round.penetration, round.residual);
-                let pressing = round.into_pressing();
-                return Ok(Found {
-                    end,
-                    pressing,
-                    penetration,
-                    residual,
-                    is_converged,
-                    rounds,
-                    sweeps,
-                    newton_steps,
-                });
-            }
-            // A problem that will be made anew is solved no better than that is worth.
-            let budget = SolveBudget {
-                residual_rel: 0.1 * settings.residual_rel,
-                residual: INEXACT * round.residual,
-                attempts_max: ATTEMPTS,
-            };
-            let solution = round.problem.solve(&round.lambda, budget);
-            rounds += 1;
-            sweeps += solution.sweeps;
-            newton_steps += solution.newton_steps;
-            let contacts = pressing(&round.points, &solution.lambda);
-            let next = self.scene.configuration(self.response, contacts, &about.configured());
-            let about_now = std::mem::replace(&mut about, next);
-            if best.as_ref().is_none_or(|(best_far, ..)| far < *best_far) {
-                best = Some((far, about_now, round));
-            }
-        }
-    }
-
-    /// The corners of all candidates.
-    fn corners(&self) -> Pool {
-        let corner =
-            |c: &Candidate| self.step.triangles[c.triangle as usize].map(|node| (c.body, node));
-        let corners: BTreeSet<(u16, u32)> = self.step.candidates.iter().flat_map(corner).collect();
-        let corner = |(body, node)| MaterialPoint::corner(body, node);
-        Pool { corners: corners.into_iter().map(corner).collect(), inside: Vec::new() }
-    }
-
-    /// The contact problem about a configuration, and how well the configuration answers it. Points
-    /// that are missing join the pool.
-    fn round(
-        &mut self,
-        about: &Configuration,
-        pool: &mut Pool,
-        (margin, allowed): (f64, f64),
-    ) -> Result<Round, StepError> {
-        let (scene, at) = (self.scene, about.configured());
-        let bodies = scene.object_from_bodies(&at);
-        let mut penetration: f64 = 0.0;
-        for (point, distance) in scene.deepest_points(self.response, &at, &bodies) {
-            penetration = penetration.max(-distance);
-            if distance < -0.5 * allowed {
-                pool.add(point, &about.contacts);
-            }
-        }
-        let force_of = |point: &MaterialPoint| force_at(&about.contacts, point);
-        let mut chosen = Vec::new();
-        for point in pool.iter() {
-            let gap = scene.gap(self.response, &at, &bodies, point);
-            let force = force_of(point);
-            if gap.distance < margin || force.is_some() {
-                penetration = penetration.max(-gap.distance);
-                chosen.push((*point, gap, force.unwrap_or_default()));
-            }
-        }
-        self.response.need(chosen.iter().flat_map(|(p, ..)| p.weighted()).map(|(n, _)| n))?;
-        let mut points = Vec::with_capacity(chosen.len());
-        let mut lambda = Vec::with_capacity(3 * chosen.len());
-        for (point, gap, force) in chosen {
-            let point = ProblemPoint::new(scene, self.response, point, gap);
-            lambda.extend(point.local(&force).iter());
-            points.push(point);
-        }
-        let problem = problem(scene, self.response, about, &points)?;
-        let residual = problem.residual_of(&lambda, &problem.motion(&lambda));
-        Ok(Round { points, problem, lambda, residual, penetration })
-    }
-}
-
-impl Round {
-    /// The points that press, and their forces in the object's frame.
-    fn into_pressing(self) -> Vec<(ProblemPoint, Vector3<f64>)> {
-        let forces = self.lambda.chunks_exact(3).map(Vector3::from_column_slice);
-        let pressing = self.points.into_iter().zip(forces).filter(|(_, local)| local.x > 0.0);
-        pressing
-            .map(|(point, local)| {
-                let force = point.frame * local;
-                (point, force)
-            })
-            .collect()
-    }
-}
-
-/// The contacts that press.
-fn pressing(points: &[ProblemPoint], lambda: &[f64]) -> Vec<HeldContact> {
-    let forces = lambda.chunks_exact(3).map(Vector3::from_column_slice);
-    points
-        .iter()
-        .zip(forces)
-        .filter(|(_, local)| local.x > 0.0)
-        .map(|(point, local)| HeldContact {
-            body: point.point.body,
-            nodes: point.point.nodes,
-            weights: point.point.weights,
-            force: point.frame * local,
-        })
-        .collect()
 }

@@ -42,9 +42,6 @@ pub struct Step {
     pub ms: f64,
 }
 
-/// A part of a radius that a body may move in one step, so that it cannot pass through a surface.
-const WAY_OF_THICKNESS: f64 = 0.5;
-
 impl Course<'_> {
     /// Makes all steps and hands each to `seen`.
     ///
@@ -59,7 +56,7 @@ impl Course<'_> {
         let mut state = ObjectState::at_rest([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
         let mut displacement = vec![[0.0; 3]; node_count];
         let mut time = 0.0;
-        let steps = self.steps();
+        let steps = (self.bodies.end / self.ask.seconds).ceil().max(1.0) as usize;
         for step in 1..=steps {
             let next = self.bodies.end * step as f64 / steps as f64;
             // In the last step all nodes are wanted.
@@ -92,23 +89,6 @@ impl Course<'_> {
         Ok(())
     }
 
-    /// Number of steps: none longer than asked for, and no body goes through a surface in one.
-    fn steps(&self) -> usize {
-        let end = self.bodies.end;
-        let wanted = (end / self.ask.seconds).ceil().max(1.0);
-        let mut steps = wanted;
-        // Looked at in the steps wanted: between two of them a body goes evenly.
-        for body in &self.bodies.bodies {
-            for k in 0..wanted as usize {
-                let (from, to) = (end * k as f64 / wanted, end * (k + 1) as f64 / wanted);
-                let moving = self.body(body, from, to).moving;
-                let allowed = WAY_OF_THICKNESS * body.shape.thickness();
-                steps = steps.max(wanted * (moving.way() / allowed).ceil().min(STEPS_MORE));
-            }
-        }
-        steps as usize
-    }
-
     fn body(&self, body: &PressBody, from: f64, to: f64) -> StepBody {
         let moving = MovingBody {
             shape: body.shape.clone(),
@@ -136,6 +116,3 @@ impl Course<'_> {
         }
     }
 }
-
-/// Most steps that one step wanted is cut into.
-const STEPS_MORE: f64 = 64.0;

@@ -1,0 +1,204 @@
+//! The contact problem of a step, made anew about where it ended, until gaps and forces agree.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+
+use super::assemble::{ProblemPoint, problem};
+use super::configuration::{Configuration, Configured, Scene};
+use super::features::{Candidate, MaterialPoint};
+use super::pool::{Pool, force_at};
+use super::state::{HeldContact, ObjectState};
+use super::step::{ContactStep, StepError};
+use crate::contact::coulomb::{ContactProblem, SolveBudget};
+use crate::solve::condensed::Response;
+
+/// Points nearer to a body than this share of the object's size are in the problem from the start.
+const MARGIN: f64 = 2e-3;
+/// Share of a round's residual that its solution may leave.
+const INEXACT: f64 = 1e-3;
+/// Points of one contact problem: its matrix grows with the square, its time with the cube.
+const POINTS_MAX: usize = 600;
+/// Attempts of Newton's method in a round.
+const ATTEMPTS: usize = 8;
+
+/// Where the rounds have ended.
+pub(super) struct Found {
+    pub end: Configuration,
+    pub pressing: Vec<(ProblemPoint, Vector3<f64>)>,
+    pub penetration: f64,
+    pub residual: f64,
+    pub is_converged: bool,
+    pub rounds: usize,
+    pub sweeps: usize,
+    pub newton_steps: usize,
+}
+
+/// The contact problem, made anew about where it ended.
+pub(super) struct Rounds<'s, 'r, 'a> {
+    pub step: &'s ContactStep<'a>,
+    pub scene: &'s Scene<'s>,
+    pub response: &'r mut Response<'s>,
+}
+
+/// A contact problem and what it begins with.
+struct Round {
+    points: Vec<ProblemPoint>,
+    problem: ContactProblem,
+    /// Forces of the configuration it is about.
+    lambda: Vec<f64>,
+    residual: f64,
+    penetration: f64,
+}
+
+impl Rounds<'_, '_, '_> {
+    pub fn play(&mut self, state: &ObjectState) -> Result<Found, StepError> {
+        let settings = &self.step.settings;
+        let size = self.step.size();
+        let allowed = settings.penetration_rel * size;
+        let start = Configured {
+            world_from_object: state.world_from_object,
+            displacement: &self.scene.begun,
+            body_forces: &[],
+        };
+        let is_known = |c: &&HeldContact| usize::from(c.body) < self.step.bodies.len();
+        let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();
+        let mut pool = self.corners();
+        held.iter().for_each(|contact| pool.add(contact.into(), &[]));
+        let mut about = self.scene.configuration(self.response, held, &start);
+        let (mut rounds, mut sweeps, mut newton_steps) = (0, 0, 0);
+        let mut best: Option<(f64, Configuration, Round)> = None;
+        loop {
+            let round = self.round(&about, &mut pool, (MARGIN * size, allowed))?;
+            let force_max =
+                about.contacts.iter().map(|contact| contact.force.norm()).fold(0.0, f64::max);
+            // How far the round is from what is asked for: at most 1 where it is met.
+            let allowed_residual = settings.residual_rel * force_max;
+            let far = (round.penetration / allowed).max(match allowed_residual > 0.0 {
+                true => round.residual / allowed_residual,
+                false if round.residual == 0.0 => 0.0,
+                false => f64::INFINITY,
+            });
+            let is_converged = far <= 1.0;
+            let is_last = rounds >= settings.rounds_max || newton_steps >= settings.newton_max;
+            if is_converged || is_last {
+                let is_best = best.as_ref().is_none_or(|(best_far, ..)| far <= *best_far);
+                let (end, round) = match (is_best, best) {
+                    (false, Some((_, end, round))) => (end, round),
+                    _ => (about, round),
+                };
+                let (penetration, residual) = (round.penetration, round.residual);
+                let pressing = round.into_pressing();
+                return Ok(Found {
+                    end,
+                    pressing,
+                    penetration,
+                    residual,
+                    is_converged,
+                    rounds,
+                    sweeps,
+                    newton_steps,
+                });
+            }
+            // A problem that will be made anew is solved no better than that is worth.
+            let budget = SolveBudget {
+                residual_rel: 0.1 * settings.residual_rel,
+                residual: INEXACT * round.residual,
+                attempts_max: ATTEMPTS,
+            };
+            let solution = round.problem.solve(&round.lambda, budget);
+            rounds += 1;
+            sweeps += solution.sweeps;
+            newton_steps += solution.newton_steps;
+            let contacts = pressing(&round.points, &solution.lambda);
+            let next = self.scene.configuration(self.response, contacts, &about.configured());
+            let about_now = std::mem::replace(&mut about, next);
+            if best.as_ref().is_none_or(|(best_far, ..)| far < *best_far) {
+                best = Some((far, about_now, round));
+            }
+        }
+    }
+
+    /// The corners of all candidates.
+    fn corners(&self) -> Pool {
+        let corner =
+            |c: &Candidate| self.step.triangles[c.triangle as usize].map(|node| (c.body, node));
+        let corners: BTreeSet<(u16, u32)> = self.step.candidates.iter().flat_map(corner).collect();
+        let corner = |(body, node)| MaterialPoint::corner(body, node);
+        Pool { corners: corners.into_iter().map(corner).collect(), inside: Vec::new() }
+    }
+
+    /// The contact problem about a configuration, and how well the configuration answers it. Points
+    /// that are missing join the pool.
+    fn round(
+        &mut self,
+        about: &Configuration,
+        pool: &mut Pool,
+        (margin, allowed): (f64, f64),
+    ) -> Result<Round, StepError> {
+        let (scene, at) = (self.scene, about.configured());
+        let bodies = scene.object_from_bodies(&at);
+        let mut penetration: f64 = 0.0;
+        for (point, distance) in scene.deepest_points(self.response, &at, &bodies) {
+            penetration = penetration.max(-distance);
+            if distance < -0.5 * allowed {
+                pool.add(point, &about.contacts);
+            }
+        }
+        let force_of = |point: &MaterialPoint| force_at(&about.contacts, point);
+        let mut chosen = Vec::new();
+        for point in pool.iter() {
+            let gap = scene.gap(self.response, &at, &bodies, point);
+            let force = force_of(point);
+            if gap.distance < margin || force.is_some() {
+                penetration = penetration.max(-gap.distance);
+                chosen.push((*point, gap, force.unwrap_or_default()));
+            }
+        }
+        let points = chosen.len();
+        if points > POINTS_MAX {
+            return Err(StepError::TooManyPoints { points, max: POINTS_MAX });
+        }
+        self.response.need(chosen.iter().flat_map(|(p, ..)| p.weighted()).map(|(n, _)| n))?;
+        let mut points = Vec::with_capacity(chosen.len());
+        let mut lambda = Vec::with_capacity(3 * chosen.len());
+        for (point, gap, force) in chosen {
+            let point = ProblemPoint::new(scene, self.response, point, gap);
+            lambda.extend(point.local(&force).iter());
+            points.push(point);
+        }
+        let problem = problem(scene, self.response, about, &points)?;
+        let residual = problem.residual_of(&lambda, &problem.motion(&lambda));
+        Ok(Round { points, problem, lambda, residual, penetration })
+    }
+}
+
+impl Round {
+    /// The points that press, and their forces in the object's frame.
+    fn into_pressing(self) -> Vec<(ProblemPoint, Vector3<f64>)> {
+        let forces = self.lambda.chunks_exact(3).map(Vector3::from_column_slice);
+        let pressing = self.points.into_iter().zip(forces).filter(|(_, local)| local.x > 0.0);
+        pressing
+            .map(|(point, local)| {
+                let force = point.frame * local;
+                (point, force)
+            })
+            .collect()
+    }
+}
+
+/// The contacts that press.
+fn pressing(points: &[ProblemPoint], lambda: &[f64]) -> Vec<HeldContact> {
+    let forces = lambda.chunks_exact(3).map(Vector3::from_column_slice);
+    points
+        .iter()
+        .zip(forces)
+        .filter(|(_, local)| local.x > 0.0)
+        .map(|(point, local)| HeldContact {
+            body: point.point.body,
+            nodes: point.point.nodes,
+            weights: point.point.weights,
+            force: point.frame * local,
+        })
+        .collect()
+}
