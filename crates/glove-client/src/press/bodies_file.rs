@@ -80,7 +80,7 @@ pub enum BodiesError {
         /// Its name.
         name: String,
         /// What is wrong.
-        reason: BodyError,
+        reason: Box<BodyError>,
     },
 }
 
@@ -163,8 +163,11 @@ pub fn read_bodies(path: &Path) -> Result<PressBodies, BodiesError> {
     let mut bodies = Vec::with_capacity(file.body.len());
     for (at, entry) in file.body.into_iter().enumerate() {
         let name = entry.name.clone().unwrap_or_else(|| format!("body{at}"));
-        let refuse =
-            |reason| BodiesError::Body { path: path.to_owned(), name: name.clone(), reason };
+        let refuse = |reason| {
+            let (path, name) = (path.to_owned(), name.clone());
+            BodiesError::Body { path, name, reason: Box::new(reason) }
+        };
+
         if !names.insert(name.clone()) {
             return Err(refuse(BodyError::Name));
         }

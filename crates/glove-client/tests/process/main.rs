@@ -16,6 +16,7 @@ mod emulator;
 mod full_disk;
 mod interruption;
 mod numbers;
+mod press;
 mod recordings;
 mod references;
 mod runs;

@@ -52,7 +52,7 @@ impl PointProblem {
         let mut best = (f64::INFINITY, PointForce::new(-b.x / self.w[(0, 0)], 0.0, 0.0));
         let step = std::f64::consts::TAU / DIRECTIONS as f64;
         let consider = |angle: f64, found: &mut (f64, PointForce)| {
-            let Some((turn, along, force)) = self.at(angle, b) else { return None };
+            let (turn, along, force) = self.at(angle, b)?;
             // Where the slip goes along friction the law is broken: not a root.
             if along <= 0.0 && turn.abs() < found.0 {
                 *found = (turn.abs(), force);

@@ -1,0 +1,112 @@
+//! `glove-client press`: weight on a table, a pinch that lifts, and what it refuses.
+
+use serde_json::Value;
+
+use crate::start::{Folder, displacements, fail, succeed};
+
+const TABLE: &str = "[[body]]\nname = \"table\"\nshape = \"plane\"\nnormal = [0, 0, 1]\n\
+                     poses = [[0, 0, 0, -0.035, 1, 0, 0, 0]]\n";
+
+/// A ball of 7 cm on a table whose bodies are these besides it.
+fn folder(end: f64, bodies: &str) -> Folder {
+    let folder = Folder::new();
+    succeed(&["mesh", "sphere", "--nodes", "300", "--out", &folder.path("ball.msh")]);
+    folder.write("bodies.toml", &format!("end = {end}\n{TABLE}{bodies}"));
+    folder
+}
+
+fn report(folder: &Folder, more: &[&str]) -> Value {
+    let [mesh, bodies, report] = ["ball.msh", "bodies.toml", "r.json"].map(|f| folder.path(f));
+    let mut arguments = vec!["press", "--mesh", &mesh, "--bodies", &bodies, "--report", &report];
+    arguments.extend(more);
+    succeed(&arguments);
+    serde_json::from_str(&folder.read("r.json")).unwrap()
+}
+
+fn number(value: &Value, path: &str) -> f64 {
+    value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} in {value}"))
+}
+
+/// Two fingertips that close from the sides until 0.6 s, then rise by 3 cm until 1.1 s.
+fn pinch(closed: f64) -> String {
+    let finger = |name: &str, side: f64| {
+        let row = |t: f64, x: f64, z: f64| format!("[{t}, {}, 0, {z}, 1, 0, 0, 0]", side * x);
+        format!(
+            "[[body]]\nname = \"{name}\"\nshape = \"sphere\"\nradius = 0.01\nfriction = 1.0\n\
+             poses = [{}, {}, {}, {}]\n",
+            row(0.0, 0.047, 0.0),
+            row(0.3, 0.047, 0.0),
+            row(0.6, closed, 0.0),
+            row(1.1, closed, 0.03),
+        )
+    };
+    finger("left", -1.0) + &finger("right", 1.0)
+}
+
+#[test]
+fn table_carries_the_weight_of_what_lies_on_it() {
+    let folder = folder(1.5, "");
+    let out = folder.path("u.csv");
+    let report = report(&folder, &["--viscosity", "0.02", "--out", &out]);
+    let steps = report["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 150);
+    let last = steps.last().unwrap();
+    let weight = 9.81 * number(&report, "/mass");
+    let carried = number(last, "/bodies/table/force/2");
+    assert!((carried - weight).abs() < 1e-3 * weight, "{carried} of {weight} N");
+    for step in steps {
+        assert!(number(step, "/penetration_max") < 1e-6 * 0.07);
+        assert_eq!(step["friction_law"], "coulomb");
+    }
+    // What is written is where the nodes are in the world: the ball has sunk, and its lowest node
+    // is on the table and not in it.
+    let mesh = std::fs::read(folder.path("ball.msh")).unwrap();
+    let mesh = softgrasp_core::mesh_io::parse("ball", &mesh, &mut |_| None).unwrap().mesh;
+    let lowest = displacements(&folder.read("u.csv"))
+        .into_iter()
+        .map(|(node, u)| mesh.vertices()[node].z + u[2])
+        .fold(f64::INFINITY, f64::min);
+    assert!((lowest + 0.035).abs() < 1e-7, "{lowest}");
+}
+
+#[test]
+fn two_fingertips_lift_a_ball_and_let_it_slide_when_they_press_too_little() {
+    for (closed, is_lifted) in [(0.033, true), (0.0435, false)] {
+        let report = report(&folder(1.6, &pinch(closed)), &["--viscosity", "0.01"]);
+        let last = report["steps"].as_array().unwrap().last().unwrap();
+        let height = number(last, "/object_pose/2");
+        let on_the_table = number(last, "/bodies/table/contacts");
+        match is_lifted {
+            true => {
+                assert!(height > 0.02, "{height}");
+                assert_eq!(on_the_table, 0.0);
+                let held =
+                    number(last, "/bodies/left/force/2") + number(last, "/bodies/right/force/2");
+                let weight = 9.81 * number(&report, "/mass");
+                assert!((held - weight).abs() < 0.02 * weight, "{held} of {weight} N");
+            }
+            false => assert!(height < 0.005 && on_the_table > 0.0, "{height}"),
+        }
+    }
+}
+
+#[test]
+fn series_is_a_file_for_each_step_and_one_that_names_them_all() {
+    let folder = folder(0.05, "");
+    let series = folder.path("series");
+    report(&folder, &["--series", &series]);
+    let list = folder.read("series/series.pvd");
+    for step in 1..=5 {
+        let name = format!("step_{step:05}.vtu");
+        assert!(list.contains(&name), "{list}");
+        assert!(folder.read(&format!("series/{name}")).contains("elastic_displacement"));
+    }
+}
+
+#[test]
+fn bodies_that_make_no_sense_are_told_by_name() {
+    let folder = folder(1.0, "[[body]]\nname = \"tip\"\nshape = \"sphere\"\nposes = []\n");
+    let [mesh, bodies] = ["ball.msh", "bodies.toml"].map(|f| folder.path(f));
+    let told = fail(1, &["press", "--mesh", &mesh, "--bodies", &bodies]);
+    assert!(told.contains("\"tip\": a sphere needs radius"), "{told}");
+}
