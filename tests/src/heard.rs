@@ -90,6 +90,7 @@ impl Heard {
             Reply::Answer(answer) => Self::Answer(AnswerBits::of(answer)),
             Reply::LargeAnswer(answered) => Self::Answer(AnswerBits::of(&answered.answer)),
             Reply::SeveralAnswers(answers) => Self::Answer(AnswerBits::of(&answers.answer)),
+            Reply::ContactAnswer(answered) => Self::Answer(AnswerBits::of(&answered.answer)),
             Reply::ModelState { .. } => Self::ModelState,
             Reply::ModelReady(ready) => Self::ModelReady {
                 model: ready.model,

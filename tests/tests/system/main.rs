@@ -9,6 +9,7 @@
 mod access;
 mod bad_requests;
 mod bad_streams;
+mod contact_frames;
 mod control;
 mod controlled;
 mod crowd;

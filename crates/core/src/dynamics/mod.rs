@@ -26,8 +26,10 @@ mod outcome;
 mod pool;
 mod rigid_motion;
 mod rounds;
+mod settings;
 mod state;
 mod step;
+mod step_error;
 #[cfg(test)]
 mod tests;
 
@@ -36,5 +38,7 @@ pub use features::Candidate;
 pub use near::near_triangles;
 pub use outcome::{BodyLoad, PointContact, StepOutcome};
 pub use rigid_motion::MassProperties;
+pub use settings::StepSettings;
 pub use state::{HeldContact, ObjectState};
-pub use step::{ContactStep, StepError, StepSettings};
+pub use step::ContactStep;
+pub use step_error::StepError;

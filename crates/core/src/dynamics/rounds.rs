@@ -8,8 +8,9 @@ use super::assemble::{ProblemPoint, problem};
 use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint};
 use super::pool::{Pool, force_at};
+use super::settings::StepSettings;
 use super::state::{HeldContact, ObjectState};
-use super::step::{ContactStep, StepError};
+use super::step_error::StepError;
 use crate::contact::coulomb::{ContactProblem, SolveBudget};
 use crate::solve::condensed::Response;
 
@@ -35,8 +36,10 @@ pub(super) struct Found {
 }
 
 /// The contact problem, made anew about where it ended.
-pub(super) struct Rounds<'s, 'r, 'a> {
-    pub step: &'s ContactStep<'a>,
+pub(super) struct Rounds<'s, 'r> {
+    pub settings: &'s StepSettings,
+    /// Size of the object, m.
+    pub size: f64,
     pub scene: &'s Scene<'s>,
     pub response: &'r mut Response<'s>,
 }
@@ -51,17 +54,16 @@ struct Round {
     penetration: f64,
 }
 
-impl Rounds<'_, '_, '_> {
+impl Rounds<'_, '_> {
     pub fn play(&mut self, state: &ObjectState) -> Result<Found, StepError> {
-        let settings = &self.step.settings;
-        let size = self.step.size();
+        let (settings, size) = (self.settings, self.size);
         let allowed = settings.penetration_rel * size;
         let start = Configured {
             world_from_object: state.world_from_object,
             displacement: &self.scene.begun,
             body_forces: &[],
         };
-        let is_known = |c: &&HeldContact| usize::from(c.body) < self.step.bodies.len();
+        let is_known = |c: &&HeldContact| usize::from(c.body) < self.scene.bodies.len();
         let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();
         let mut pool = self.corners();
         held.iter().for_each(|contact| pool.add(contact.into(), &[]));
@@ -122,8 +124,8 @@ impl Rounds<'_, '_, '_> {
     /// The corners of all candidates.
     fn corners(&self) -> Pool {
         let corner =
-            |c: &Candidate| self.step.triangles[c.triangle as usize].map(|node| (c.body, node));
-        let corners: BTreeSet<(u16, u32)> = self.step.candidates.iter().flat_map(corner).collect();
+            |c: &Candidate| self.scene.triangles[c.triangle as usize].map(|node| (c.body, node));
+        let corners: BTreeSet<(u16, u32)> = self.scene.candidates.iter().flat_map(corner).collect();
         let corner = |(body, node)| MaterialPoint::corner(body, node);
         Pool { corners: corners.into_iter().map(corner).collect(), inside: Vec::new() }
     }

@@ -4,51 +4,18 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
+use super::checks::{check, check_names, check_nodes, mass_of};
 use super::configuration::{Scene, sums_by_body};
 use super::features::Candidate;
 use super::outcome::{BodyLoad, PointContact, StepOutcome};
 use super::pool::merged;
 use super::rigid_motion::{MassProperties, RigidStep};
 use super::rounds::{Found, Rounds};
+use super::settings::StepSettings;
 use super::state::{ObjectState, at_nodes};
-use crate::contact::coulomb::{FrictionCone, ProblemError, state_of};
-use crate::solve::condensed::{CondensedError, Elasticity, Response};
-
-/// How a step is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepSettings {
-    /// Length of the step, s.
-    pub seconds: f64,
-    /// Acceleration of free fall, m/s², world.
-    pub gravity: Vector3<f64>,
-    /// Density of the object, kg/m³.
-    pub density: f64,
-    /// Time in which the shape forgets a force (Kelvin and Voigt), s.
-    pub viscosity: f64,
-    /// Penetration that is small enough, as a share of the object's size.
-    pub penetration_rel: f64,
-    /// Residual of the contact law that is small enough, as a share of the largest force.
-    pub residual_rel: f64,
-    /// Most times that the contact problem is made anew.
-    pub rounds_max: usize,
-    /// Steps of Newton's method after which no further round is begun.
-    pub newton_max: usize,
-}
-
-impl Default for StepSettings {
-    fn default() -> Self {
-        Self {
-            seconds: 0.01,
-            gravity: Vector3::new(0.0, 0.0, -9.81),
-            density: 1000.0,
-            viscosity: 0.0,
-            penetration_rel: 1e-6,
-            residual_rel: 1e-9,
-            rounds_max: 16,
-            newton_max: 400,
-        }
-    }
-}
+use super::step_error::StepError;
+use crate::contact::coulomb::{FrictionCone, state_of};
+use crate::solve::condensed::{Elasticity, Response};
 
 /// An object, the bodies around it, and how long the step is.
 pub struct ContactStep<'a> {
@@ -66,65 +33,6 @@ pub struct ContactStep<'a> {
     pub settings: StepSettings,
 }
 
-/// Why a step cannot be made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum StepError {
-    /// A setting out of range.
-    #[error("{what} is {value}; it must be {expected}")]
-    Setting {
-        /// Which one.
-        what: &'static str,
-        /// What it is.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
-    /// A candidate that names what is not there.
-    #[error(
-        "candidate {candidate} names triangle {triangle} of {triangles} and body {body} of {bodies}"
-    )]
-    Candidate {
-        /// Position in the list.
-        candidate: usize,
-        /// Triangle named.
-        triangle: u32,
-        /// Triangles there are.
-        triangles: usize,
-        /// Body named.
-        body: u16,
-        /// Bodies there are.
-        bodies: usize,
-    },
-    /// A node of the state that is not there.
-    #[error("the state names node {node}, but the mesh has {node_count} nodes (0-based)")]
-    Node {
-        /// The node.
-        node: u32,
-        /// Nodes of the mesh.
-        node_count: usize,
-    },
-    /// More points touch than one problem takes.
-    #[error(
-        "{points} points of the surface touch at once, at most {max} can; take a coarser mesh, or \
-         bodies that cover less of it"
-    )]
-    TooManyPoints {
-        /// Points that touch.
-        points: usize,
-        /// Points that can.
-        max: usize,
-    },
-    /// State or pose that is not finite.
-    #[error("a number of the object's state or of a body's pose is not finite")]
-    NotFinite,
-    /// The elastic part failed.
-    #[error(transparent)]
-    Elastic(#[from] CondensedError),
-    /// The contact problem could not be made.
-    #[error(transparent)]
-    Problem(#[from] ProblemError),
-}
-
 /// Share of its thickness that a body moves in one part of a step at most.
 const WAY_OF_THICKNESS: f64 = 0.5;
 /// Most parts of a step.
@@ -138,7 +46,10 @@ impl ContactStep<'_> {
     /// # Errors
     /// [`StepError`]; a step that does not meet the law of contact is no error, it says so.
     pub fn advance(&self, state: &ObjectState, wanted: &[u32]) -> Result<StepOutcome, StepError> {
-        let mass = self.check(state)?;
+        check(&self.settings, self.bodies, state)?;
+        check_names(self.candidates, (self.triangles.len(), self.bodies.len()))?;
+        check_nodes(state, self.vertices.len())?;
+        let mass = mass_of(self.elasticity.body, &self.settings)?;
         let parts = self.parts();
         let share = |part: usize| part as f64 / parts as f64;
         let mut made: Option<StepOutcome> = None;
@@ -189,7 +100,8 @@ impl ContactStep<'_> {
             begun: response.displacement(&state.forces),
             world_from_bodies_begun: self.bodies_begun(state),
         };
-        let mut rounds = Rounds { step: self, scene: &scene, response: &mut response };
+        let size = self.size();
+        let mut rounds = Rounds { settings, size, scene: &scene, response: &mut response };
         let found = rounds.play(state)?;
         Ok(self.outcome(&scene, &response, &found, wanted))
     }
@@ -205,7 +117,7 @@ impl ContactStep<'_> {
     }
 
     /// Size of the object: the diagonal of its bounding box, m.
-    pub(super) fn size(&self) -> f64 {
+    fn size(&self) -> f64 {
         let (mut low, mut high) =
             (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for vertex in self.vertices {

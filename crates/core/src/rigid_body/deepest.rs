@@ -3,16 +3,8 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::closest::{Barycentric, area_normal, of_triangle_and_segment, on_triangle, point_at};
-use super::shape::{RigidShape, SignedDistance};
-
-/// A point of a triangle and its distance from a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Deepest {
-    /// Weights of the corners.
-    pub weights: Barycentric,
-    /// Signed distance, and the way out of the body.
-    pub distance: SignedDistance,
-}
+use super::distance::{Deepest, SignedDistance};
+use super::shape::RigidShape;
 
 /// Steps of a search by thirds: each takes a third of the stretch away.
 const THIRDS: usize = 60;

@@ -2,10 +2,11 @@
 
 mod closest;
 mod deepest;
+mod distance;
 mod shape;
 mod triangles;
 
 pub use closest::Barycentric;
-pub use deepest::Deepest;
-pub use shape::{RigidShape, ShapeError, SignedDistance};
+pub use distance::{Deepest, SignedDistance};
+pub use shape::{RigidShape, ShapeError};
 pub use triangles::{RigidMesh, RigidMeshError};

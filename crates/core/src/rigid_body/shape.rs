@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
+use super::distance::SignedDistance;
 use super::triangles::RigidMesh;
 
 /// A rigid body in a frame of its own.
@@ -51,15 +52,6 @@ pub enum ShapeError {
     /// A normal without a direction.
     #[error("the normal of a plane must have a direction")]
     Normal,
-}
-
-/// Distance of a point from a body's surface, and the way out of the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SignedDistance {
-    /// Positive outside, negative inside, m.
-    pub distance: f64,
-    /// The direction in which the distance grows: out of the body.
-    pub normal: Unit<Vector3<f64>>,
 }
 
 impl RigidShape {

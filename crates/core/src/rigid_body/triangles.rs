@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::closest::{Barycentric, area_normal, on_triangle, point_at};
-use super::deepest::Deepest;
-use super::shape::SignedDistance;
+use super::distance::{Deepest, SignedDistance};
 
 /// The inside of a closed surface of triangles.
 ///

@@ -1,0 +1,63 @@
+//! Why a step in time cannot be made.
+
+use crate::contact::coulomb::ProblemError;
+use crate::solve::condensed::CondensedError;
+
+/// Why a step cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// A setting out of range.
+    #[error("{what} is {value}; it must be {expected}")]
+    Setting {
+        /// Which one.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// A candidate that names what is not there.
+    #[error(
+        "candidate {candidate} names triangle {triangle} of {triangles} and body {body} of {bodies}"
+    )]
+    Candidate {
+        /// Position in the list.
+        candidate: usize,
+        /// Triangle named.
+        triangle: u32,
+        /// Triangles there are.
+        triangles: usize,
+        /// Body named.
+        body: u16,
+        /// Bodies there are.
+        bodies: usize,
+    },
+    /// A node of the state that is not there.
+    #[error("the state names node {node}, but the mesh has {node_count} nodes (0-based)")]
+    Node {
+        /// The node.
+        node: u32,
+        /// Nodes of the mesh.
+        node_count: usize,
+    },
+    /// More points touch than one problem takes.
+    #[error(
+        "{points} points of the surface touch at once, at most {max} can; take a coarser mesh, or \
+         bodies that cover less of it"
+    )]
+    TooManyPoints {
+        /// Points that touch.
+        points: usize,
+        /// Points that can.
+        max: usize,
+    },
+    /// State or pose that is not finite.
+    #[error("a number of the object's state or of a body's pose is not finite")]
+    NotFinite,
+    /// The elastic part failed.
+    #[error(transparent)]
+    Elastic(#[from] CondensedError),
+    /// The contact problem could not be made.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
+}
