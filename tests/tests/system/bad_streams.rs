@@ -179,7 +179,7 @@ fn sound_frames_without_a_sound_message_are_refused_and_the_session_lives() {
         let pong = session.ask(1000 + id, &ping(id));
         assert_eq!(pong, Reply::Pong { nonce: id });
     };
-    for kind in [0x0000, 0x000c, 0x7fff, 0xffff] {
+    for kind in [0x0000, 0x000d, 0x7fff, 0xffff] {
         expect(&mut session, kind, &[], "unknown message kind");
     }
     for kind in Kind::ALL.into_iter().filter(|kind| kind.is_reply()) {

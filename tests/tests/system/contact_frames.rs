@@ -137,13 +137,16 @@ fn another_server_goes_on_with_the_state_that_one_has_given() {
     }
 }
 
+/// Puts something wrong into a frame.
+type Damage = fn(&mut ContactFrame);
+
 #[test]
 fn frames_that_make_no_sense_are_refused_and_the_session_lives() {
     let server = server(2);
     let mut connection = client(&server);
     let scene = Scene::new(&mut connection);
     let sound = || scene.frame(ObjectState::at_rest(STILL), 0);
-    let damages: [(&str, fn(&mut ContactFrame)); 13] = [
+    let damages: [(&str, Damage); 13] = [
         ("names node", |f| f.triangles[3][1] = 1_000_000),
         ("names node", |f| f.nodes = NodeChoice::Nodes(vec![77_777])),
         ("names triangle", |f| f.triangle_bodies[0] = 9),
@@ -175,7 +178,7 @@ fn huge_numbers_give_an_answer_of_finite_numbers_or_a_refusal() {
     let server = server(2);
     let mut connection = client(&server);
     let scene = Scene::new(&mut connection);
-    let damages: [fn(&mut ContactFrame); 7] = [
+    let damages: [Damage; 7] = [
         |f| f.state.velocity = [0.0, -1e308, 0.0],
         |f| f.state.angular_velocity = [1e200, 0.0, 0.0],
         |f| f.ask.gravity = [0.0, -1e300, 0.0],
