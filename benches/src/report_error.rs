@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use glove_client::ask::connection::LinkError;
 use softgrasp_core::contact::MaskError;
+use softgrasp_core::dynamics::StepError;
 use softgrasp_core::fem::MaterialError;
 use softgrasp_core::mesh::{GenerateError, MeshError};
 use softgrasp_core::model::ModelError;
@@ -38,6 +39,9 @@ pub enum ReportError {
     /// Contacts that do not hold.
     #[error(transparent)]
     Condensed(#[from] CondensedError),
+    /// A step of a free object in contact could not be made.
+    #[error(transparent)]
+    Step(#[from] StepError),
     /// Known degrees of freedom that do not fit.
     #[error(transparent)]
     Partition(#[from] PartitionError),

@@ -100,12 +100,12 @@ offscreen() {
         --eye -75,14,0.40
 
     # Figures 4.24 to 4.29: squeezed, kept, squeezed again from another side.
-    picture figure-4.24.png --at deforming --eye "$eye"
-    picture figure-4.25.png --at detached --eye "$eye"
-    picture figure-4.26.png --at free:2 --eye "$eye"
-    picture figure-4.27.png --at attached:2 --eye "$eye"
-    picture figure-4.28.png --at deforming:2 --eye "$eye"
-    picture figure-4.29.png --at detached:2 --eye "$eye"
+    picture figure-4.24.png --hand scripted:regrasp --at deforming --eye "$eye"
+    picture figure-4.25.png --hand scripted:regrasp --at detached --eye "$eye"
+    picture figure-4.26.png --hand scripted:regrasp --at free:2 --eye "$eye"
+    picture figure-4.27.png --hand scripted:regrasp --at attached:2 --eye "$eye"
+    picture figure-4.28.png --hand scripted:regrasp --at deforming:2 --eye "$eye"
+    picture figure-4.29.png --hand scripted:regrasp --at detached:2 --eye "$eye"
 
     # Figures 6.2 to 6.5.
     interaction figure-6.2 -30,25,0.38 cube
@@ -119,8 +119,11 @@ offscreen() {
 
     # The first thing that a reader sees.
     picture grasp.png "${squeeze[@]}" --at deforming --eye "$eye" --show hand
+    say lift.gif
+    "$BIN" run --headless --light fair --shading plain --show hand --picture-size 420x280 --eye 155,8,0.46 \
+        --animation "$PICTURES/lift.gif" > "$WORK/run.out" 2> "$WORK/run.log"
     say grasp.gif
-    "$BIN" run --headless --hand scripted:release --light fair --picture-size 420x280 --eye -120,14,0.42 \
+    "$BIN" run --headless --hand scripted:release --light fair --picture-size 420x280 \
         --animation "$PICTURES/grasp.gif" > "$WORK/run.out" 2> "$WORK/run.log"
 }
 

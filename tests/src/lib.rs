@@ -12,4 +12,5 @@ pub mod quoting;
 pub mod random;
 pub mod raw_session;
 pub mod server_process;
+pub mod shared;
 pub mod watchdog;

@@ -4,7 +4,8 @@
 //! accepted stays the same when it is written and read again.
 
 use glove_client::object::scene::SceneFile;
-use softgrasp_core::mesh_io::{parse, write_msh41};
+use softgrasp_core::mesh_io::{parse, parse_surface, write_msh41};
+use softgrasp_core::surface::MendedSurface;
 use softgrasp_hand::devices::calibration::Calibration;
 use softgrasp_hand::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
 use softgrasp_hand::devices::fastrak::{
@@ -28,6 +29,8 @@ pub enum Parser {
     Reply,
     /// A mesh file of any format; what follows a line `--companion--` is the other file it asks for.
     Mesh,
+    /// A surface file of any format.
+    Surface,
     /// Bytes of a glove; the first one chooses sensors and options.
     Glove,
     /// Bytes of a tracker; the first one chooses the format.
@@ -49,11 +52,12 @@ const COMPANION: &[u8] = b"--companion--\n";
 
 impl Parser {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Frames,
         Self::Request,
         Self::Reply,
         Self::Mesh,
+        Self::Surface,
         Self::Glove,
         Self::Tracker,
         Self::Joints,
@@ -70,6 +74,7 @@ impl Parser {
             Self::Request => "request",
             Self::Reply => "reply",
             Self::Mesh => "mesh",
+            Self::Surface => "surface",
             Self::Glove => "glove",
             Self::Tracker => "tracker",
             Self::Joints => "joints",
@@ -90,6 +95,7 @@ impl Parser {
             Self::Request => request(bytes),
             Self::Reply => reply(bytes),
             Self::Mesh => mesh(bytes),
+            Self::Surface => surface(bytes),
             Self::Glove => glove(bytes),
             Self::Tracker => tracker(bytes),
             Self::Joints => JointsParser::new().feed_all(bytes, drop),
@@ -184,6 +190,14 @@ fn mesh(bytes: &[u8]) {
     let again = parse("written", &write_msh41(&read.mesh), &mut |_| None)
         .expect("what was written can be read");
     assert_eq!(again.mesh.node_count(), count);
+}
+
+/// What can be read can be mended, and then has corners that are there.
+fn surface(bytes: &[u8]) {
+    let Ok(read) = parse_surface("fuzzed", bytes, &mut |_| Some(bytes.to_vec())) else { return };
+    let Ok(mended) = MendedSurface::new(&read.surface) else { return };
+    let count = mended.surface.points().len();
+    assert!(mended.surface.triangles().iter().flatten().all(|n| (*n as usize) < count));
 }
 
 fn glove(bytes: &[u8]) {

@@ -1,4 +1,4 @@
-//! Every figure of README's section "Numbers" stands in a committed report.
+//! Every figure of the sections "Numbers" of README and of the reports' own page stands in a committed report.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,6 +17,12 @@ fn readme() -> String {
     fs::read_to_string(root().join("README.md")).expect("README.md can be read")
 }
 
+/// The page in the folder of reports, with its links as from the root.
+fn page_of_reports() -> String {
+    let page = report("README.md").expect("reports/README.md can be read");
+    page.replace("](", "](reports/")
+}
+
 /// A committed file of a report.
 fn report(name: &str) -> Option<String> {
     fs::read_to_string(root().join("reports").join(name)).ok()
@@ -24,8 +30,16 @@ fn report(name: &str) -> Option<String> {
 
 #[test]
 fn every_figure_of_the_readme_is_in_a_report() {
-    let found = faults(&readme(), SECTION, &report);
-    assert!(found.is_empty(), "README and reports differ:\n  {}", found.join("\n  "));
+    for (name, page) in [("README", readme()), ("reports/README", page_of_reports())] {
+        let found = faults(&page, SECTION, &report);
+        assert!(found.is_empty(), "{name} and reports differ:\n  {}", found.join("\n  "));
+    }
+}
+
+#[test]
+fn readme_is_a_page_and_a_half() {
+    let bytes = readme().len();
+    assert!(bytes <= 8192, "README.md has {bytes} bytes");
 }
 
 /// One more in the last digit, written as the figure is.
@@ -46,7 +60,8 @@ fn changed(figure: &Figure) -> String {
 #[test]
 fn a_figure_of_the_readme_that_is_changed_is_noticed() {
     let mut count = 0;
-    for item in items(&readme(), SECTION) {
+    let pages = [readme(), page_of_reports()];
+    for item in pages.iter().flat_map(|page| items(page, SECTION)) {
         for figure in figures(&item.text) {
             let mut altered = item.clone();
             altered

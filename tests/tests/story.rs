@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
@@ -26,6 +26,7 @@ use softgrasp_grasp::object::{ContactModel, SoftObject};
 use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_protocol::{ElementName, Material, MethodName};
+use softgrasp_tests::shared::shared;
 
 #[derive(Parser)]
 struct Arguments {
@@ -41,17 +42,6 @@ fn play(flags: &[&str]) -> Value {
     all.extend(flags);
     Arguments::parse_from(all).run.run().unwrap();
     serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap()
-}
-
-fn shared(name: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes").join(name);
-    let given =
-        std::env::var_os("SOFTGRASP_SHARED").map(|s| Path::new(&s).join("meshes").join(name));
-    let found = given.into_iter().chain([beside]).find(|path| path.exists());
-    if found.is_none() {
-        eprintln!("skipped: {name} is not there (a folder `shared` beside the repository)");
-    }
-    found
 }
 
 /// Compares the grasp events of a run with its golden file.
@@ -116,7 +106,8 @@ fn every_built_in_object_is_squeezed_kept_and_grasped_again() {
 #[test]
 fn meshes_of_other_programs_are_squeezed_kept_and_grasped_again() {
     for file in ["liver.msh1.msh", "turtle.veg", "bunny.wrong-extension.vtk"] {
-        if let Some(path) = shared(file) {
+        let meshes = shared("meshes");
+        if let Some(path) = meshes.map(|folder| folder.join(file)).filter(|path| path.exists()) {
             check(file.split('.').next().unwrap(), path.to_str().unwrap());
         }
     }

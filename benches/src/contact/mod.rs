@@ -2,6 +2,7 @@
 
 mod half_space;
 mod report;
+mod steps;
 mod tips;
 mod verify;
 

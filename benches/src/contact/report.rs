@@ -6,9 +6,9 @@ use glove_client::ask::connection::{Host, ServerChoice, ServerConnection};
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{Answer, FrameRequest, ModelHash, Question, Request, SolveReport};
 
-use super::half_space;
 use super::tips::{DEPTH, RADIUS, Tips, WANT_ALL};
 use super::verify::verify;
+use super::{half_space, steps};
 use crate::axis::Scale;
 use crate::echo::{Echo, Ends};
 use crate::plot::{Mark, Plot, PlotPoint, Series};
@@ -71,6 +71,8 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     report.table(press_table(&pressings));
     report.figure("contact", FIGURE, figure(&pressings)?);
     report.table(frames);
+    report.text(steps::TEXT.to_owned());
+    report.table(steps::table(options.is_quick)?);
     Ok(report)
 }
 

@@ -95,6 +95,8 @@ impl Tips {
     pub fn question(&self, contact: ContactModel, scale: f64, want: Want) -> Question {
         let mut question = Question { method: MethodName::auto(), want, ..Question::default() };
         match contact {
+            // Fingers that press with friction prescribe no displacement.
+            ContactModel::Friction => {}
             ContactModel::Vertex => {
                 let touches = self.touches.iter();
                 question.known = touches.flat_map(|&(n, u)| at_node(n, u, scale)).collect();

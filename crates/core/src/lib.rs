@@ -2,8 +2,9 @@
 //!
 //! [`mesh_io`] reads a mesh file, [`mesh`] holds and judges a mesh, [`fem`] makes its stiffness,
 //! [`contact`] says what a round fingertip covers and solves contact with Coulomb friction,
-//! [`rigid_body`] is what an object touches, [`dynamics`] moves it one step at a time, [`model`] is what depends on the shape only, and
-//! [`solve`] factors, condenses, follows large deformation, and says how wrong an answer is. No I/O,
+//! [`rigid_body`] is what an object touches, [`dynamics`] moves it one step at a time, [`surface`]
+//! asks triangles what is inside, [`fill`] makes tetrahedra of it, [`model`] is what depends on the
+//! shape only, and [`solve`] factors, condenses, follows large deformation, and says how wrong an answer is. No I/O,
 //! no clock, no threads of its own: bytes come in as slices, time as an argument, and parallel loops
 //! run on the rayon pool of whoever calls.
 //!
@@ -21,8 +22,11 @@
 pub mod contact;
 pub mod dynamics;
 pub mod fem;
+pub mod fill;
 pub mod mesh;
 pub mod mesh_io;
 pub mod model;
 pub mod rigid_body;
 pub mod solve;
+mod stuffing;
+pub mod surface;

@@ -14,7 +14,7 @@ pub(crate) struct Awaited {
     is_over: Arc<AtomicBool>,
 }
 
-/// What work unwinds with that nobody waits for; see [`Awaited::go_on`].
+/// Panic payload of work that ends because its client has gone; see [`Awaited::go_on`].
 pub(crate) struct Abandoned;
 
 impl Waiting {
@@ -31,8 +31,9 @@ impl Drop for Waiting {
 }
 
 impl Awaited {
-    /// Returns if somebody waits. Otherwise the work ends here: it unwinds, which gives back all that it
-    /// holds, and whoever began it knows [`Abandoned`] from a fault. The panic hook hears nothing.
+    /// Returns if the client still waits for the answer. Otherwise the work unwinds with the payload
+    /// [`Abandoned`], which gives back all that it holds and is told from a fault by whoever began it. The
+    /// panic hook is not called.
     pub fn go_on(&self) {
         if self.is_over.load(Ordering::Relaxed) {
             resume_unwind(Box::new(Abandoned));

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3};
 use softgrasp_grasp::hand::{HandDimensions, HandPose, JointAngles, pose};
 
 use crate::arrival::{Arrival, Device};
-use crate::devices::calibration::Calibration;
+use crate::devices::calibration::{Calibration, sensor_name};
 use crate::devices::cyberglove::{
     self, GloveEvent, GloveParser, GloveRecord, RecordKind, RecordOptions, SensorCount,
     SensorHealth, SensorSet,
@@ -13,7 +13,9 @@ use crate::devices::fastrak::{
     self, Encoding, FastrakEvent, FastrakFormat, FastrakParser, FastrakRecord, LengthUnit,
     OutputList, Station,
 };
-use crate::devices::{Detected, Freshness, HandSample, ReceiverMount, SampleHold};
+use crate::devices::{
+    Detected, Freshness, HandSample, Heard, PoseGate, ReceiverMount, SampleHold, SensorGate,
+};
 use crate::joints_reader::{FitErrors, JointsReader};
 
 /// Everything that says how a hand, its glove and its tracker are set up.
@@ -93,9 +95,25 @@ pub struct HandReader {
     joints: JointsReader,
     hold: SampleHold,
     health: SensorHealth,
+    /// What keeps out readings that no hand brings about; `None` for devices without a line.
+    gates: Option<Gates>,
+    /// Dead sensors that have been told.
+    dead: SensorSet,
+    /// When the first device spoke, s.
+    first_s: Option<f64>,
+    news: Vec<String>,
+    /// What came of glove and tracker.
+    heard: [Heard; 2],
     faults: DeviceFaults,
     /// The tracker takes the receiver for its mirror image through the transmitter.
     is_flipped: bool,
+}
+
+/// Keeps out what a damaged line brings.
+#[derive(Default)]
+struct Gates {
+    glove: SensorGate,
+    tracker: PoseGate,
 }
 
 /// How often the devices' bytes were not good records.
@@ -107,12 +125,18 @@ pub struct DeviceFaults {
     pub tracker: u64,
     /// Jumps of the tracker to the opposite side of its field.
     pub hemisphere_flips: u64,
+    /// Readings of sensors that no finger can have brought about, and were not taken.
+    pub glove_jumps: u64,
+    /// Poses of the tracker that no hand can have come to, and were not taken.
+    pub tracker_jumps: u64,
     /// Bad lines of joints, and lines that no hand fits.
     pub joints: u64,
 }
 
 /// A sample that is older than this is stale: the hand is held where it was, s.
 pub const SAMPLE_AGE_MAX_S: f64 = 0.25;
+/// A device may take so long to speak after the other one did: a glove restarts in 2.5 s, s.
+const START_MAX_S: f64 = 5.0;
 
 impl HandReader {
     /// A reader that has heard nothing yet, for devices that send what the set-up says.
@@ -143,7 +167,8 @@ impl HandReader {
         let others = others.map(|(encoding, output)| FastrakFormat { encoding, output, ..told });
         let formats = std::iter::once(told).chain(others.filter(|format| *format != told));
         let tracker = Detected::one_of(formats.map(FastrakParser::new));
-        Self::with(setup, glove, tracker, world_from_sender)
+        let gates = Some(Gates::default());
+        Self { gates, ..Self::with(setup, glove, tracker, world_from_sender) }
     }
 
     fn with(
@@ -160,6 +185,11 @@ impl HandReader {
             joints,
             hold: SampleHold::default(),
             health: SensorHealth::default(),
+            gates: None,
+            dead: SensorSet::EMPTY,
+            first_s: None,
+            news: Vec::new(),
+            heard: Default::default(),
             faults: DeviceFaults::default(),
             is_flipped: false,
         }
@@ -172,7 +202,13 @@ impl HandReader {
 
     /// Faults so far.
     pub fn faults(&self) -> DeviceFaults {
-        DeviceFaults { joints: self.joints.faults(), ..self.faults }
+        let gates = self.gates.as_ref();
+        DeviceFaults {
+            glove_jumps: gates.map_or(0, |gates| gates.glove.refused()),
+            tracker_jumps: gates.map_or(0, |gates| gates.tracker.refused()),
+            joints: self.joints.faults(),
+            ..self.faults
+        }
     }
 
     /// How well the hand fits a sender's joints.
@@ -186,11 +222,15 @@ impl HandReader {
     pub fn feed(&mut self, arrivals: &[Arrival], now_s: f64) {
         for Arrival { device, at_s, is_datagram, bytes } in arrivals {
             let time_s = at_s.unwrap_or(now_s);
+            self.first_s.get_or_insert(time_s);
             match device {
                 Device::Glove => self.feed_glove(bytes, time_s),
                 Device::Tracker => self.feed_tracker(bytes, time_s),
                 Device::Joints => {
-                    self.joints.feed(bytes, *is_datagram, time_s);
+                    let told = self.joints.feed(bytes, *is_datagram, time_s);
+                    if self.gates.is_some() {
+                        self.news.extend(told);
+                    }
                     self.setup.dimensions = *self.joints.dimensions();
                 }
             }
@@ -198,6 +238,7 @@ impl HandReader {
     }
 
     fn feed_glove(&mut self, bytes: &[u8], time_s: f64) {
+        self.heard[0].bytes(bytes);
         let read = |parser: &mut GloveParser| {
             let mut events = Vec::new();
             parser.feed_all(bytes, |event| events.push(event));
@@ -205,10 +246,7 @@ impl HandReader {
         };
         for event in self.glove.feed(read, |event| matches!(event, GloveEvent::Record(_))) {
             match event {
-                GloveEvent::Record(record) => {
-                    self.health.observe(&record.sensors);
-                    self.hold.on_glove(&record, time_s);
-                }
+                GloveEvent::Record(record) => self.take_glove(record, time_s),
                 GloveEvent::Fault(fault) => {
                     tracing::debug!(?fault, "glove");
                     self.faults.glove += 1;
@@ -217,7 +255,43 @@ impl HandReader {
         }
     }
 
+    fn take_glove(&mut self, record: GloveRecord, time_s: f64) {
+        if let Some(rate) = self.heard[0].record(time_s).filter(|_| self.gates.is_some()) {
+            let sensors = record.sensors.count().number();
+            self.news.push(format!("a glove of {sensors} sensors, {rate:.0} records a second"));
+        }
+        self.health.observe(&record.sensors);
+        let Some(Gates { glove, .. }) = &mut self.gates else {
+            return self.hold.on_glove(&record, time_s);
+        };
+        let sensors = glove.take(&record.sensors, time_s);
+        self.hold.on_glove(&GloveRecord { sensors, ..record }, time_s);
+        self.news.extend(glove.take_news());
+        let dead = self.health.dead();
+        for sensor in dead.iter().filter(|sensor| !self.dead.contains(*sensor)) {
+            self.news.push(format!(
+                "the glove's sensor {} has shown one end of its range only and counts as dead: its \
+                 joint is held at rest",
+                sensor_name(sensor)
+            ));
+        }
+        self.dead = dead;
+    }
+
+    /// What is wrong with what the devices send, a sentence each; none while all is as it should be.
+    pub fn complaints(&self) -> Vec<String> {
+        let of_lines = [Device::Glove, Device::Tracker].into_iter().zip(&self.heard);
+        let of_lines = of_lines.filter_map(|(device, heard)| heard.complaint(device));
+        of_lines.chain(self.joints.doubt()).collect()
+    }
+
+    /// What is to be told of the devices since the last call, a sentence each.
+    pub fn take_news(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.news)
+    }
+
     fn feed_tracker(&mut self, bytes: &[u8], time_s: f64) {
+        self.heard[1].bytes(bytes);
         let read = |parser: &mut FastrakParser| {
             let mut events = Vec::new();
             parser.feed_all(bytes, |event| events.push(event));
@@ -226,8 +300,22 @@ impl HandReader {
         for event in self.tracker.feed(read, |event| matches!(event, FastrakEvent::Record(_))) {
             match event {
                 FastrakEvent::Record(record) => {
+                    if let Some(rate) =
+                        self.heard[1].record(time_s).filter(|_| self.gates.is_some())
+                    {
+                        let unit = self.setup.tracker.units.name();
+                        let text = format!("a tracker, {unit}, {rate:.0} records a second");
+                        self.news.push(text);
+                    }
                     let record = if self.is_flipped { record.mirrored() } else { record };
-                    self.hold.on_tracker(&record, time_s);
+                    let gate = self.gates.as_mut().map(|gates| &mut gates.tracker);
+                    let goes_on = |gate: &mut PoseGate| {
+                        gate.take(record.world_from_receiver(), time_s).is_some()
+                    };
+                    // A failed self-test is not taken either, and is no place to compare with.
+                    if record.error.is_some() || gate.is_none_or(goes_on) {
+                        self.hold.on_tracker(&record, time_s);
+                    }
                 }
                 FastrakEvent::HemisphereFlip(flip) => {
                     tracing::warn!(?flip, "the tracker jumped to the opposite side of its field");
@@ -275,21 +363,39 @@ impl HandReader {
         if ages.iter().all(|(_, freshness)| *freshness == Freshness::Missing) {
             return Vec::new();
         }
-        let silent = ages.iter().filter(|(_, freshness)| *freshness != Freshness::Fresh);
+        // A device that is still being set up is not silent yet.
+        let is_starting = self.first_s.is_some_and(|first_s| now_s - first_s < START_MAX_S);
+        let silent = ages.iter().filter(|(_, freshness)| match freshness {
+            Freshness::Fresh => false,
+            Freshness::Stale { .. } => true,
+            Freshness::Missing => !is_starting,
+        });
         silent.map(|(device, _)| *device).collect()
     }
 
     /// Pose of the hand by the newest samples, however old; `None` until all devices have spoken.
     pub fn hand(&self, now_s: f64) -> Option<HandPose> {
-        if let Some(hand) = self.joints.hand() {
-            return Some(hand);
+        let (angles, world_from_palm) = self.measured(now_s)?;
+        Some(pose(&self.setup.dimensions, &angles, world_from_palm))
+    }
+
+    /// Joint angles and palm by the newest samples, however old; `None` until all devices have spoken.
+    pub fn measured(&self, now_s: f64) -> Option<(JointAngles, Isometry3<f64>)> {
+        if let Some(measured) = self.joints.measured() {
+            return Some(measured);
         }
         let sample = self.hold.sample(now_s);
-        let angles = self.setup.calibration.angles(&sample.glove?.sensors, self.health.dead());
+        // A sensor that starts at an end of its range is held at rest until it leaves it, so that the
+        // hand does not jump when it is known to be dead.
+        let dead = match self.gates {
+            Some(_) => self.health.only_at_one_end(),
+            None => self.health.dead(),
+        };
+        let angles = self.setup.calibration.angles(&sample.glove?.sensors, dead);
         let world_from_receiver = self.setup.world_from_stand * sample.tracker?.world_from_receiver;
         let hand = self.setup.dimensions.handedness;
         let world_from_palm = self.setup.mount.world_from_palm(&world_from_receiver, &angles, hand);
-        Some(pose(&self.setup.dimensions, &angles, world_from_palm))
+        Some((angles, world_from_palm))
     }
 }
 

@@ -6,7 +6,7 @@ use crate::foreign_recording::ForeignHand;
 use crate::live_hand::LiveHand;
 use crate::mouse::MouseHand;
 use crate::recording::ReplayHand;
-use crate::scripted::{ScriptedHand, Seen};
+use crate::scripted::{GraspPlan, ScriptedHand, Seen};
 use crate::sent::Sent;
 
 /// A source of device bytes.
@@ -58,6 +58,32 @@ impl HandSource {
             Self::Scripted(hand) => hand.is_planning(),
             Self::Mouse(hand) => hand.is_planning(),
             Self::Live(_) | Self::Replay(_) | Self::Foreign(_) => false,
+        }
+    }
+
+    /// How it will grasp the object, where it has a plan. Frame: the object's, as if it were the
+    /// world's.
+    pub fn plan(&self) -> Option<GraspPlan> {
+        match self {
+            Self::Scripted(hand) => Some(*hand.plan()),
+            Self::Mouse(hand) => hand.plan(),
+            Self::Live(_) | Self::Replay(_) | Self::Foreign(_) => None,
+        }
+    }
+
+    /// Whether its script is over.
+    pub fn is_over(&self) -> bool {
+        match self {
+            Self::Scripted(hand) => hand.is_over(),
+            Self::Mouse(_) | Self::Live(_) | Self::Replay(_) | Self::Foreign(_) => false,
+        }
+    }
+
+    /// Whether it does something by itself that a person asked for, and takes no other wish.
+    pub fn is_on_its_way(&self) -> bool {
+        match self {
+            Self::Mouse(hand) => hand.is_on_its_way(),
+            Self::Scripted(_) | Self::Live(_) | Self::Replay(_) | Self::Foreign(_) => false,
         }
     }
 

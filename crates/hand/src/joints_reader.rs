@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 use serde::Serialize;
-use softgrasp_grasp::hand::{HandDimensions, HandPose, pose};
+use softgrasp_grasp::hand::{HandDimensions, JointAngles};
 
 use crate::joints::{
-    FittedHand, HandFit, JointsEvent, JointsParser, JointsRecord, fitted_dimensions,
+    Doubts, FittedHand, HandFit, JointsEvent, JointsParser, JointsRecord, fitted_dimensions,
 };
 
 /// Joints of one hand, and the kinematic hand that follows them.
@@ -19,6 +19,9 @@ pub struct JointsReader {
     newest: Option<(FittedHand, f64)>,
     faults: u64,
     fit_errors: FitErrors,
+    doubts: Doubts,
+    /// When the first hand came, s.
+    first_s: Option<f64>,
 }
 
 /// How well the hand fits, over a run.
@@ -34,6 +37,8 @@ pub struct FitErrors {
 
 /// A hand is measured by so many records, and is of the usual size before.
 const MEASURED: usize = 30;
+/// Who speaks is told after so many hands.
+const INTRODUCED_AFTER: u64 = 60;
 /// The first palm is placed here in the world, m: before the object, to the right of its middle.
 const FIRST_PALM_M: Vector3<f64> = Vector3::new(0.0, 0.08, 0.16);
 
@@ -51,18 +56,20 @@ impl JointsReader {
             newest: None,
             faults: 0,
             fit_errors: FitErrors::default(),
+            doubts: Doubts::default(),
+            first_s: None,
         }
     }
 
-    /// Takes bytes that came at a time, s.
-    pub fn feed(&mut self, bytes: &[u8], is_datagram: bool, time_s: f64) {
+    /// Takes bytes that came at a time, s; what there is to tell of the sender, once.
+    pub fn feed(&mut self, bytes: &[u8], is_datagram: bool, time_s: f64) -> Option<String> {
         let mut records = Vec::new();
-        let mut faults = 0;
+        let mut faults = Vec::new();
         let mut on_event = |event| match event {
             JointsEvent::Record(record) => records.push(*record),
             JointsEvent::Fault(fault) => {
                 tracing::debug!(?fault, "joints");
-                faults += 1;
+                faults.push(fault.kind);
             }
         };
         if is_datagram {
@@ -70,13 +77,33 @@ impl JointsReader {
         } else {
             self.parser.feed_all(bytes, &mut on_event);
         }
-        self.faults += faults;
-        records.iter().for_each(|record| self.follow(record, time_s));
+        self.faults += faults.len() as u64;
+        faults.iter().for_each(|fault| self.doubts.fault(fault));
+        let told = records.iter().filter_map(|record| self.follow(record, time_s));
+        told.collect::<Vec<_>>().pop()
     }
 
     /// Bad lines, and records that no hand fits.
     pub fn faults(&self) -> u64 {
         self.faults
+    }
+
+    /// What is wrong with the stream as a whole, in a sentence; `None` while nothing seems to be.
+    pub fn doubt(&self) -> Option<String> {
+        self.doubts.sentence()
+    }
+
+    /// What speaks, once there is a hand to tell it by: hand, unit, rate and fit.
+    fn introduction(&self, time_s: f64) -> Option<String> {
+        let first_s = self.first_s?;
+        let FitErrors { records, rms_m, .. } = self.fit_errors;
+        let is_time = records == INTRODUCED_AFTER && time_s > first_s;
+        is_time.then(|| {
+            let hand = self.fit.dimensions().handedness.name();
+            let rate = (records - 1) as f64 / (time_s - first_s);
+            let mm = 1e3 * rms_m;
+            format!("joints of a {hand} hand, metres, {rate:.0} a second, fitted to {mm:.1} mm")
+        })
     }
 
     /// How well the hand fits.
@@ -94,14 +121,19 @@ impl JointsReader {
         self.newest.map(|(_, time_s)| time_s)
     }
 
-    /// Pose of the hand by the newest record.
-    pub fn hand(&self) -> Option<HandPose> {
+    /// Joint angles and palm (world) by the newest record.
+    pub fn measured(&self) -> Option<(JointAngles, Isometry3<f64>)> {
         let (fitted, _) = self.newest?;
-        let world_from_palm = self.world_from_sender? * fitted.world_from_palm;
-        Some(pose(self.fit.dimensions(), &fitted.angles, world_from_palm))
+        Some((fitted.angles, self.world_from_sender? * fitted.world_from_palm))
     }
 
-    fn follow(&mut self, record: &JointsRecord, time_s: f64) {
+    /// Takes a record; once, what speaks.
+    fn follow(&mut self, record: &JointsRecord, time_s: f64) -> Option<String> {
+        // Of a stream in another unit no joint is where it says.
+        if !self.doubts.is_of_human_size(record) {
+            self.faults += 1;
+            return None;
+        }
         self.measure(record);
         match self.fit.fit(record) {
             Ok(fitted) => {
@@ -116,10 +148,14 @@ impl JointsReader {
                 let mean = (squares + fitted.fit_error_rms_m.powi(2)) / errors.records as f64;
                 errors.rms_m = mean.sqrt();
                 errors.most_m = errors.most_m.max(fitted.fit_error_max_m);
+                self.first_s.get_or_insert(time_s);
+                self.doubts.fitted(record, &fitted, self.fit.dimensions());
+                self.introduction(time_s)
             }
             Err(error) => {
                 tracing::debug!(%error, "joints");
                 self.faults += 1;
+                None
             }
         }
     }

@@ -18,6 +18,8 @@
 //! ```
 
 pub mod arrival;
+#[cfg(test)]
+mod damaged_lines_tests;
 pub mod devices;
 pub mod foreign_recording;
 pub mod hand_choice;

@@ -78,11 +78,19 @@ impl LiveHand {
             Source::Serial(devices) => {
                 let states = devices.states().into_iter();
                 let named = states.zip([Device::Glove, Device::Tracker]);
-                named.filter_map(|(state, device)| complaint(device, &state)).collect()
+                let states = named.filter_map(|(state, device)| complaint(device, &state));
+                let disobeys = devices.tracker_facts().disobeys;
+                let told = disobeys.map(|why| format!("the tracker is set up wrongly: {why}"));
+                states.chain(told).collect()
             }
             Source::Joints(listener) if listener.senders() == 0 => {
                 vec![format!("nobody sends joints to {}", listener.local_addr())]
             }
+            Source::Joints(listener) if listener.senders() > 1 => vec![format!(
+                "{} senders send joints to {}: one hand is followed, end the others",
+                listener.senders(),
+                listener.local_addr()
+            )],
             Source::Joints(_) => Vec::new(),
         }
     }
@@ -98,4 +106,29 @@ fn complaint(device: Device, state: &DeviceState) -> Option<String> {
         DeviceState::SettingUp => format!("the {name} is being set up"),
         DeviceState::Lost { why } => format!("the {name} is lost: {why}"),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::UdpSocket;
+    use std::time::Duration;
+
+    #[test]
+    fn second_sender_of_joints_is_told() {
+        let listener = JointsListener::bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let address = listener.local_addr();
+        let mut hand = LiveHand::joints(listener, "joints".to_owned());
+        assert!(hand.complaints()[0].contains("nobody sends joints"));
+        let senders = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+        let told = (0..500).any(|_| {
+            for sender in &senders {
+                sender.send_to(b"{\"joints\":[]}\n", address).unwrap();
+            }
+            std::thread::sleep(Duration::from_millis(10));
+            hand.take(0.0);
+            hand.complaints().iter().any(|text| text.starts_with("2 senders send joints"))
+        });
+        assert!(told, "{:?}", hand.complaints());
+    }
 }

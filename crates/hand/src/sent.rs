@@ -23,6 +23,10 @@ pub struct Sent {
 pub struct RecordedAnswers {
     /// Method that answered what it asked; `None` if no tick took an answer to it.
     pub answered_by: Option<String>,
+    /// Whether that answer's path at large deformation began at rest.
+    pub from_rest: bool,
+    /// Whether there was no shape that the object could spring back to.
+    pub springback_refused: bool,
     /// Ticks whose answers it takes, in that order.
     pub taken: Vec<u64>,
     /// Whether it takes a rest shape that was made beside the ticks.

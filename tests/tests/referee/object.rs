@@ -6,6 +6,7 @@ use clap::Parser;
 use glove_client::commands::mesh::MeshCommand;
 use glove_client::object::mesh_file::read_mesh_file;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
+use softgrasp_tests::shared::shared;
 
 /// A mesh and the file it was read from.
 pub struct Object {
@@ -47,14 +48,7 @@ pub fn built_in(folder: &Path, nodes: usize) -> Vec<Object> {
 /// Files of `shared/meshes`, in the order of their names; in the short form those of few nodes.
 /// Says that the test is skipped when there is no such folder.
 pub fn files() -> Option<Vec<Object>> {
-    let named = std::env::var_os("SOFTGRASP_SHARED").map(PathBuf::from);
-    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|dir| dir.join("shared"));
-    let mut folders = named.into_iter().chain(above).map(|shared| shared.join("meshes"));
-    let Some(folder) = folders.find(|folder| folder.is_dir()) else {
-        println!("skipped: there is no folder shared/meshes (SOFTGRASP_SHARED names shared/)");
-        return None;
-    };
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let entries = std::fs::read_dir(shared("meshes")?).unwrap().map(|entry| entry.unwrap().path());
     // An .ele file is read with its .node file.
     let is_mesh = |path: &PathBuf| {
         !["md", "ele"].contains(&path.extension().and_then(|e| e.to_str()).unwrap_or("md"))

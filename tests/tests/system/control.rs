@@ -30,13 +30,7 @@ fn model_hash(object: &SoftObject) -> ModelHash {
 fn loaded(mesh: TetMesh) -> Box<LoadedObject> {
     let object = SoftObject::try_new(mesh).unwrap();
     let rest = std::sync::Arc::clone(object.rest_shape());
-    let plan = PlanRequest {
-        object: rest,
-        setup: HandSetup::default(),
-        contact: ContactModel::default(),
-        avoid_gaze: None,
-    }
-    .grip();
+    let plan = PlanRequest::new(rest, HandSetup::default(), ContactModel::default()).grip();
     Box::new(LoadedObject { summary: summary(&object), brought_to_m: None, object, plan })
 }
 
@@ -62,6 +56,60 @@ fn undone_shape_is_the_earlier_one_to_the_bit() {
     run.deform(5);
     let report = run.finish();
     assert!(report.summary.solves > 40 && report.summary.shapes_kept == 1);
+}
+
+#[test]
+fn dent_is_gone_when_the_story_is_played_from_the_beginning() {
+    let mut run = Controlled::by_script(cube(216), ScriptName::Squeeze);
+    let rest = run.object().rest().vertices().to_vec();
+    for _ in 0..2 {
+        run.deform(40);
+        run.ask(Control::KeepShape);
+        let kept = run.object().rest_shapes() + 1;
+        run.until("the shape is kept", |run, _| run.object().rest_shapes() == kept);
+        if run.session.grasp_loop().undo_count() == 1 {
+            run.ask(Control::ReplaceHand(scripted_again(&run)));
+        }
+    }
+    assert_eq!(run.session.grasp_loop().undo_count(), 2);
+    run.ask(Control::Restart);
+    run.until("it is as it was", |run, _| run.object().rest().vertices() == rest);
+    run.assert_told(NoticeKind::Done, "that it began with");
+    assert_eq!(run.session.grasp_loop().undo_count(), 0);
+    run.deform(5);
+}
+
+#[test]
+fn stiffer_object_takes_more_force_to_squeeze_and_stays_in_the_hand() {
+    let mut run = Controlled::by_script(cube(216), ScriptName::Squeeze);
+    run.session.apply(Control::SetForces(true));
+    run.deform(250);
+    let force = |run: &Controlled| {
+        let forces = run.session.grasp_loop().fingertip_forces();
+        forces.map_or(0.0, |all| all.iter().map(Vector3::norm).sum::<f64>())
+    };
+    let soft = force(&run);
+    assert!(soft > 0.0);
+    let stiff = softgrasp_protocol::Material { young: 10.0 * MATERIAL.young, ..MATERIAL };
+    run.ask(Control::SetMaterial(stiff));
+    run.until("it is of the other material", |run, _| run.object().rest_shapes() == 2);
+    run.until("it is squeezed as before", |run, _| force(run) > 0.0);
+    assert_eq!(run.session.grasp_loop().state(), StateName::Deforming);
+    let ratio = force(&run) / soft;
+    // The same displacements of a material ten times as stiff.
+    assert!((ratio - 10.0).abs() < 0.5, "{ratio}");
+    run.ask(Control::SetMaterial(softgrasp_protocol::Material { poisson: 0.7, ..MATERIAL }));
+    run.assert_told(NoticeKind::Refused, "the material is not taken");
+}
+
+/// A hand that squeezes the object as it is now.
+fn scripted_again(run: &Controlled) -> Box<softgrasp_hand::hand_source::HandSource> {
+    let hand = softgrasp_hand::scripted::ScriptedHand::try_new(
+        ScriptName::Squeeze,
+        HandSetup::default(),
+        run.object(),
+    );
+    Box::new(hand.unwrap().into())
 }
 
 /// The nodes that were saved are the nodes as they are now, and the inside follows.

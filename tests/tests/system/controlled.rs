@@ -7,6 +7,7 @@ use glove_client::ask::link::Link;
 use glove_client::ask::solve_settings::SolveSettings;
 use glove_client::pace::tick_budget::Priority;
 use glove_client::pace::{Due, Pace};
+use glove_client::run::contact_grasp::ContactScene;
 use glove_client::run::grasp_loop::GraspLoop;
 use glove_client::run::run_report::RunReport;
 use glove_client::run::session::Session;
@@ -14,7 +15,7 @@ use glove_client::run::tick_outcome::TickOutcome;
 use nalgebra::Isometry3;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_grasp::grasp::{Grasp, StateName};
-use softgrasp_grasp::object::SoftObject;
+use softgrasp_grasp::object::{ContactModel, SoftObject, lying};
 use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::hand_source::HandSource;
 use softgrasp_hand::loaded_object::ObjectSummary;
@@ -40,6 +41,11 @@ pub struct Controlled {
     _server: RunningServer,
 }
 
+/// How they are solved.
+fn settings() -> SolveSettings {
+    SolveSettings { material: MATERIAL, ..linear_settings() }
+}
+
 /// A summary for the report.
 pub fn summary(object: &SoftObject) -> ObjectSummary {
     ObjectSummary {
@@ -58,6 +64,18 @@ impl Controlled {
         Self::new(SoftObject::try_new(mesh).unwrap(), mouse.into())
     }
 
+    /// A mouse hand before an object that lies on a table and is grasped by contact with friction.
+    pub fn by_mouse_with_friction(mesh: TetMesh) -> Self {
+        let object = SoftObject::try_new(lying(&mesh).unwrap().0).unwrap();
+        let mouse = MouseHand::new(HandSetup::default(), Planner::waited(), 1.0 / 60.0)
+            .holding(ContactModel::Friction);
+        let table_y = Some(object.rest_shape().bottom());
+        let settings = SolveSettings { contact: ContactModel::Friction, ..settings() };
+        Self::begin(object, mouse.into(), settings, |grasp_loop| {
+            grasp_loop.grasp_with_friction(ContactScene { table_y, ..ContactScene::default() });
+        })
+    }
+
     /// A script before an object.
     pub fn by_script(mesh: TetMesh, script: ScriptName) -> Self {
         let object = SoftObject::try_new(mesh).unwrap();
@@ -66,8 +84,16 @@ impl Controlled {
     }
 
     fn new(object: SoftObject, hand: HandSource) -> Self {
+        Self::begin(object, hand, settings(), |_| {})
+    }
+
+    fn begin(
+        object: SoftObject,
+        hand: HandSource,
+        settings: SolveSettings,
+        set_up: impl FnOnce(&mut GraspLoop),
+    ) -> Self {
         let server = server(1);
-        let settings = SolveSettings { material: MATERIAL, ..linear_settings() };
         let report = RunReport::new(
             summary(&object),
             hand.name(),
@@ -78,8 +104,9 @@ impl Controlled {
         let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M).unwrap();
         let link = Link::start(server.address().to_string(), Priority::Ordinary).unwrap();
         let reader = HandReader::new(HandSetup::default());
-        let grasp_loop =
+        let mut grasp_loop =
             GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();
+        set_up(&mut grasp_loop);
         let session = Session::new(grasp_loop, hand, report, Priority::Ordinary, false);
         session.wait_idle(Duration::from_secs(60));
         Self { session, notices: Vec::new(), tick: 0, _server: server }

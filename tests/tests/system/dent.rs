@@ -7,14 +7,14 @@ use glove_client::pace::Pace;
 use glove_client::pace::tick_budget::Priority;
 use glove_client::run::grasp_loop::GraspLoop;
 use nalgebra::Isometry3;
-use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
+use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_grasp::grasp::{Grasp, StateName};
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_protocol::LawName;
 
-use crate::settings::linear_settings;
+use crate::settings::{linear_settings, sized};
 use crate::start::server;
 
 /// How deep the largest dent of a squeezed strawberry is, over how far it was pressed in, and how
@@ -60,9 +60,7 @@ fn squeezed(mesh: &TetMesh, yield_stress: f64, pace: Pace) -> (f64, u64) {
 }
 
 fn strawberry() -> TetMesh {
-    let mesh = generate(BuiltIn::Strawberry, 300).unwrap();
-    let larger = mesh.vertices().iter().map(|p| p * (0.08 / mesh.size())).collect();
-    mesh.with_vertices(larger).unwrap()
+    sized(BuiltIn::Strawberry, 300, 0.08)
 }
 
 #[test]

@@ -147,7 +147,15 @@ fn kept_models_make_room_for_a_request_that_needs_it() {
     connection.ask(&Request::UploadModel(upload(&kept))).unwrap();
     let known = Request::HaveModel(ModelHash::of(&upload(&kept)));
     assert_eq!(connection.ask(&known).unwrap(), Reply::ModelState { known: true });
-    assert_eq!(ask(&mut connection, once(&large, "auto")).report.method, "front");
+    // While the server still proves the bound of the kept model, that work holds its memory.
+    let made_room = (0..200).any(|_| {
+        let took = ask(&mut connection, once(&large, "auto")).report.method;
+        took == "front" || {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            false
+        }
+    });
+    assert!(made_room, "the kept model never made room");
     assert_eq!(connection.ask(&known).unwrap(), Reply::ModelState { known: false });
 }
 

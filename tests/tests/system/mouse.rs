@@ -9,6 +9,7 @@ use softgrasp_hand::notice::NoticeKind;
 use softgrasp_window::view::control::Control;
 
 use crate::controlled::Controlled;
+use crate::settings::sized;
 
 fn wish(run: &mut Controlled, input: MouseInput) {
     run.ask(Control::Mouse(input));
@@ -68,6 +69,33 @@ fn cube_is_grasped_by_reach_and_close() {
 #[test]
 fn sphere_is_grasped_by_reach_and_close() {
     grasps_and_lets_go(BuiltIn::Sphere);
+}
+
+#[test]
+fn strawberry_is_lifted_from_the_table_by_reach_close_and_move() {
+    let mut run = Controlled::by_mouse_with_friction(sized(BuiltIn::Strawberry, 400, 0.08));
+    let height =
+        |run: &Controlled| run.session.grasp_loop().world_from_object().translation.vector.y;
+    arrive(&mut run);
+    for _ in 0..2 {
+        wish(&mut run, MouseInput::Reach);
+        arrive(&mut run);
+        wish(&mut run, MouseInput::CloseTo(Digits::All, 2.0));
+        run.deform(120);
+        let lay = height(&run);
+        wish(&mut run, MouseInput::Move(Vector3::new(0.0, 0.06, 0.0)));
+        (0..90).for_each(|_| drop(run.tick()));
+        let raised = height(&run) - lay;
+        assert!((raised - 0.06).abs() < 5e-3, "the hand moved 60 mm and the fruit {raised} m");
+        // Back to the table, and let go.
+        wish(&mut run, MouseInput::Move(Vector3::new(0.0, -0.06, 0.0)));
+        (0..90).for_each(|_| drop(run.tick()));
+        wish(&mut run, MouseInput::CloseTo(Digits::All, 0.0));
+        run.until_state(StateName::Free);
+        wish(&mut run, MouseInput::Retreat);
+        arrive(&mut run);
+        assert!((height(&run) - lay).abs() < 5e-3, "{} after {lay}", height(&run));
+    }
 }
 
 #[test]

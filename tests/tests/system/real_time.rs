@@ -102,7 +102,7 @@ fn is_deforming(outcome: &TickOutcome) -> bool {
 /// The invariant of the report, by its records.
 fn check_counts(report: &RunReport) {
     let s = &report.summary;
-    assert_eq!(report.ticks, report.played.len() as u64 + s.ticks_skipped);
+    assert_eq!(report.ticks, report.played.count() + s.ticks_skipped);
     assert_eq!(s.deforming_ticks, s.solves as u64 + s.unanswered.total());
     for record in &report.played {
         let told = usize::from(record.solve.is_some()) + usize::from(record.unanswered.is_some());
@@ -145,7 +145,7 @@ fn slow_plan_delays_no_tick_and_the_grip_after_it_is_answered() {
     let report = play.finish();
     check_counts(&report);
     assert_eq!(report.summary.shapes_kept, 1);
-    let answered = |record: &&glove_client::run::run_report::TickRecord| record.solve.is_some();
+    let answered = |record: &&glove_client::run::played_ticks::TickRecord| record.solve.is_some();
     let second: Vec<_> = report.played.iter().filter(|r| r.tick >= second_grip_from).collect();
     let deforming = second.iter().filter(|r| r.state == "Deforming").count();
     let answers = second.into_iter().filter(answered).count();

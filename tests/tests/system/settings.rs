@@ -1,7 +1,8 @@
-//! How the objects of these tests are solved.
+//! What the objects of these tests are, and how they are solved.
 
 use glove_client::ask::deformation::Elasticity;
 use glove_client::ask::solve_settings::{SolveSettings, Subscription};
+use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{ElementName, Material, MethodName};
 
@@ -16,4 +17,11 @@ pub fn linear_settings() -> SolveSettings {
         elasticity: Elasticity::LINEAR,
         max_error: None,
     }
+}
+
+/// A built-in object whose longest extent is this, m.
+pub fn sized(shape: BuiltIn, nodes: usize, size_m: f64) -> TetMesh {
+    let mesh = generate(shape, nodes).unwrap();
+    let scaled = mesh.vertices().iter().map(|p| p * (size_m / mesh.size())).collect();
+    mesh.with_vertices(scaled).unwrap()
 }

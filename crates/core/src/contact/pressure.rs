@@ -43,7 +43,8 @@ impl SurfaceStars {
         Self { starts, around }
     }
 
-    fn of_node(&self, node: u32) -> &[u32] {
+    /// Positions of the surface triangles around a node, ascending; empty for a node inside.
+    pub fn of_node(&self, node: u32) -> &[u32] {
         let ends = (self.starts.get(node as usize), self.starts.get(node as usize + 1));
         let (Some(&start), Some(&end)) = ends else { return &[] };
         self.around.get(start as usize..end as usize).unwrap_or_default()

@@ -66,7 +66,13 @@ impl MovingBody {
 
     /// Bound on how far a point of the body goes, m; for a half space the points near its origin count.
     pub fn way(&self) -> f64 {
-        let (start, end) = (&self.world_from_body_start, &self.world_from_body_end);
+        self.way_between(&Isometry3::identity(), &Isometry3::identity())
+    }
+
+    /// The same as it is seen from a frame that moves too, from one pose in the world to another.
+    pub fn way_between(&self, before: &Isometry3<f64>, after: &Isometry3<f64>) -> f64 {
+        let start = before.inverse() * self.world_from_body_start;
+        let end = after.inverse() * self.world_from_body_end;
         let reach = self.shape.reach();
         let reach = if reach.is_finite() { reach } else { 0.0 };
         let turn = start.rotation.angle_to(&end.rotation);

@@ -75,7 +75,12 @@ impl MaterialPoint {
 
     /// Whether two points are one, or too near to tell apart.
     pub fn is_same(&self, other: &Self) -> bool {
-        let near = |(a, b): (&f64, &f64)| (a - b).abs() < SAME;
+        self.is_near(other, SAME)
+    }
+
+    /// Whether two points of one triangle have weights that differ by less than a number.
+    pub fn is_near(&self, other: &Self, difference: f64) -> bool {
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() < difference;
         self.body == other.body
             && self.nodes == other.nodes
             && self.weights.iter().zip(&other.weights).all(near)

@@ -21,6 +21,8 @@ mod bodies;
 mod checks;
 mod configuration;
 mod features;
+#[cfg(test)]
+mod law_tests;
 mod near;
 mod outcome;
 mod pool;

@@ -13,6 +13,8 @@ pub(super) struct Pool {
     pub inside: Vec<MaterialPoint>,
 }
 
+/// Points of one edge or triangle whose weights differ by less are nearly one.
+const NEAR: f64 = 0.02;
 /// Points on one edge or inside one triangle: three say all about a flat triangle.
 const POINTS_OF_TRIANGLE: usize = 3;
 
@@ -22,9 +24,10 @@ impl Pool {
         self.corners.iter().chain(&self.inside)
     }
 
-    /// Adds a point that is not there yet. Where its triangle has enough of them, one without a
-    /// force makes room.
-    pub fn add(&mut self, point: MaterialPoint, forces: &[HeldContact]) {
+    /// Adds a point that is not there yet. A point of the same triangle that is near moves there with its
+    /// force: two that are nearly one would share their force at will. Where the triangle has enough
+    /// points, one without a force makes room.
+    pub fn add(&mut self, point: MaterialPoint, forces: &mut [HeldContact]) {
         if self.iter().any(|other| other.is_same(&point)) {
             return;
         }
@@ -36,6 +39,15 @@ impl Pool {
             |other: &MaterialPoint| other.body == point.body && other.nodes == point.nodes;
         let beside: Vec<usize> =
             (0..self.inside.len()).filter(|&at| is_beside(&self.inside[at])).collect();
+        let near = beside.iter().copied().find(|&at| self.inside[at].is_near(&point, NEAR));
+        if let Some(at) = near {
+            let before = std::mem::replace(&mut self.inside[at], point);
+            let held = forces.iter_mut().find(|held| before.is_same(&(&**held).into()));
+            if let Some(held) = held {
+                held.weights = point.weights;
+            }
+            return;
+        }
         let is_open = |at: &usize| force_at(forces, &self.inside[*at]).is_none();
         if beside.len() >= POINTS_OF_TRIANGLE
             && let Some(open) = beside.into_iter().find(is_open)

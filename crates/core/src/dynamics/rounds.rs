@@ -66,12 +66,12 @@ impl Rounds<'_, '_> {
         let is_known = |c: &&HeldContact| usize::from(c.body) < self.scene.bodies.len();
         let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();
         let mut pool = self.corners();
-        held.iter().for_each(|contact| pool.add(contact.into(), &[]));
+        held.iter().for_each(|contact| pool.add(contact.into(), &mut []));
         let mut about = self.scene.configuration(self.response, held, &start);
         let (mut rounds, mut sweeps, mut newton_steps) = (0, 0, 0);
         let mut best: Option<(f64, Configuration, Round)> = None;
         loop {
-            let round = self.round(&about, &mut pool, (MARGIN * size, allowed))?;
+            let round = self.round(&mut about, &mut pool, (MARGIN * size, allowed))?;
             let force_max =
                 about.contacts.iter().map(|contact| contact.force.norm()).fold(0.0, f64::max);
             // How far the round is from what is asked for: at most 1 where it is met.
@@ -134,19 +134,22 @@ impl Rounds<'_, '_> {
     /// that are missing join the pool.
     fn round(
         &mut self,
-        about: &Configuration,
+        about: &mut Configuration,
         pool: &mut Pool,
         (margin, allowed): (f64, f64),
     ) -> Result<Round, StepError> {
-        let (scene, at) = (self.scene, about.configured());
-        let bodies = scene.object_from_bodies(&at);
+        let scene = self.scene;
+        let bodies = scene.object_from_bodies(&about.configured());
         let mut penetration: f64 = 0.0;
-        for (point, distance) in scene.deepest_points(self.response, &at, &bodies) {
+        let deepest = scene.deepest_points(self.response, &about.configured(), &bodies);
+        for (point, distance) in deepest {
             penetration = penetration.max(-distance);
             if distance < -0.5 * allowed {
-                pool.add(point, &about.contacts);
+                pool.add(point, &mut about.contacts);
             }
         }
+        let about = &*about;
+        let at = about.configured();
         let force_of = |point: &MaterialPoint| force_at(&about.contacts, point);
         let mut chosen = Vec::new();
         for point in pool.iter() {

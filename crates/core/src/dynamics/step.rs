@@ -1,6 +1,8 @@
 //! One step of an object among rigid bodies: contact solved about where the step ends, until it is met.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use std::collections::BTreeSet;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
@@ -50,7 +52,7 @@ impl ContactStep<'_> {
         check_names(self.candidates, (self.triangles.len(), self.bodies.len()))?;
         check_nodes(state, self.vertices.len())?;
         let mass = mass_of(self.elasticity.body, &self.settings)?;
-        let parts = self.parts();
+        let parts = self.parts(state, &mass);
         let share = |part: usize| part as f64 / parts as f64;
         let mut made: Option<StepOutcome> = None;
         for part in 0..parts {
@@ -71,10 +73,18 @@ impl ContactStep<'_> {
         Ok(made.expect("a step has at least one part"))
     }
 
-    /// Number of parts in none of which a body moves by more than a share of its thickness.
-    fn parts(&self) -> usize {
-        let needed = |body: &MovingBody| body.way() / (WAY_OF_THICKNESS * body.shape.thickness());
-        let most = self.bodies.iter().map(needed).fold(1.0, f64::max);
+    /// Number of parts in none of which a body that can touch moves by more than a share of its
+    /// thickness, seen from an object that goes on as it does: one that is carried along is still.
+    fn parts(&self, state: &ObjectState, mass: &MassProperties) -> usize {
+        let before = &state.world_from_object;
+        let after = drifted(state, mass, self.settings.seconds);
+        let touching: BTreeSet<u16> = self.candidates.iter().map(|c| c.body).collect();
+        let needed = |body: &u16| {
+            let body = &self.bodies[usize::from(*body)];
+            let way = body.way_between(before, &after);
+            way / (WAY_OF_THICKNESS * body.shape.thickness())
+        };
+        let most = touching.iter().map(needed).fold(1.0, f64::max);
         most.ceil().min(PARTS_MAX) as usize
     }
 
@@ -203,4 +213,12 @@ impl ContactStep<'_> {
             newton_steps: found.newton_steps,
         }
     }
+}
+
+/// Where the object would be after some seconds if nothing acted on it.
+fn drifted(state: &ObjectState, mass: &MassProperties, seconds: f64) -> Isometry3<f64> {
+    let centre = state.world_from_object * mass.centre;
+    let turn = UnitQuaternion::from_scaled_axis(seconds * state.angular_velocity);
+    let shift = Translation3::from(centre.coords + seconds * state.velocity);
+    shift * turn * Translation3::from(-centre.coords) * state.world_from_object
 }

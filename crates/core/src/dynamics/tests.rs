@@ -10,16 +10,16 @@ use crate::rigid_body::RigidShape;
 use crate::solve::condensed::{Base, Columns, Elasticity, FreeBody};
 
 /// A soft object with all that a step needs.
-struct Object {
-    model: Model,
-    surface: Surface,
+pub(super) struct Object {
+    pub(super) model: Model,
+    pub(super) surface: Surface,
     base: Base,
     body: FreeBody,
     columns: Columns,
 }
 
 impl Object {
-    fn new(mesh: TetMesh, young: f64, poisson: f64) -> Self {
+    pub(super) fn new(mesh: TetMesh, young: f64, poisson: f64) -> Self {
         let surface = Surface::from_mesh(&mesh);
         let material = Material::try_new(young, poisson).unwrap();
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
@@ -29,7 +29,7 @@ impl Object {
     }
 
     /// A built-in object scaled to a size.
-    fn sized(shape: BuiltIn, nodes: usize, size: f64, young: f64, poisson: f64) -> Self {
+    pub(super) fn sized(shape: BuiltIn, nodes: usize, size: f64, young: f64, poisson: f64) -> Self {
         let mesh = generate(shape, nodes).unwrap();
         let (low, high) = mesh.bounds();
         let scale = size / (high - low).max();
@@ -38,7 +38,7 @@ impl Object {
         Self::new(mesh.with_vertices(vertices).unwrap(), young, poisson)
     }
 
-    fn advance(
+    pub(super) fn advance(
         &self,
         state: &ObjectState,
         bodies: &[MovingBody],
@@ -66,21 +66,25 @@ impl Object {
     }
 
     /// Mass at a density of 1000 kg/m³.
-    fn mass(&self) -> f64 {
+    pub(super) fn mass(&self) -> f64 {
         1000.0 * self.body.volume()
     }
 }
 
-fn table(friction: f64) -> MovingBody {
+pub(super) fn table(friction: f64) -> MovingBody {
     MovingBody::resting(RigidShape::plane(Vector3::z()).unwrap(), Isometry3::identity(), friction)
 }
 
-fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
+pub(super) fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::identity())
 }
 
 /// Lets an object rest on a table for some steps.
-fn settled(object: &Object, state: ObjectState, steps: usize) -> (ObjectState, StepOutcome) {
+pub(super) fn settled(
+    object: &Object,
+    state: ObjectState,
+    steps: usize,
+) -> (ObjectState, StepOutcome) {
     let settings = StepSettings { viscosity: 0.02, ..StepSettings::default() };
     let mut found = object.advance(&state, &[table(0.5)], settings);
     for _ in 1..steps {
@@ -231,4 +235,77 @@ fn a_finger_that_gives_way_presses_by_how_far_it_is_pushed_back() {
     let lowest = touching.map(|c| c.place.z).fold(f64::INFINITY, f64::min);
     assert!((lowest - tip).abs() < 1e-3, "{lowest} {tip}");
     assert!((found.loads[0].force.z - force - 9.81 * cube.mass()).abs() < 1e-6);
+}
+
+/// A ball pressed between two planes. Hertz's law is of half spaces; the far load moves the near pole by
+/// what a point load does at the distance 2 R (Boussinesq), `(1 + ν)(3 − 2 ν) F / (4 π E R)`.
+///
+/// Source: Hertz (1881), F = 4/3 E* √R δ^(3/2); Boussinesq (1885).
+#[test]
+fn ball_between_two_planes_presses_as_hertz_says_on_finer_and_finer_meshes() {
+    let (radius, young, poisson): (f64, f64, f64) = (0.03, 2.0e4, 0.4);
+    let mut worst = Vec::new();
+    for (nodes, allowed) in [(500, 0.06), (1500, 0.045), (4000, 0.02)] {
+        let ball = Object::sized(BuiltIn::Sphere, nodes, 2.0 * radius, young, poisson);
+        let (low, high) = ball.model.mesh().bounds();
+        let floor = MovingBody { friction: 0.0, ..table(0.0) };
+        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let settings = StepSettings { gravity: Vector3::zeros(), ..StepSettings::default() };
+        let mut state = ObjectState::at_rest(at(0.0, 0.0, -low.z));
+        let mut errors = Vec::new();
+        for depth in [0.001, 0.002] {
+            let height = Translation3::new(0.0, 0.0, high.z - low.z - 2.0 * depth);
+            let lid = MovingBody {
+                world_from_body_start: Isometry3::from_parts(height, half_turn),
+                world_from_body_end: Isometry3::from_parts(height, half_turn),
+                ..floor.clone()
+            };
+            let mut force = 0.0;
+            for _ in 0..12 {
+                let found = ball.advance(&state, &[floor.clone(), lid.clone()], settings);
+                force = found.loads[1].normal_force;
+                assert!(found.is_converged, "{nodes} nodes, {depth} m");
+                state = found.state;
+            }
+            let reduced = young / (1.0 - poisson * poisson);
+            let local = (force / (4.0 / 3.0 * reduced * radius.sqrt())).powf(2.0 / 3.0);
+            let pi = std::f64::consts::PI;
+            let far = (1.0 + poisson) * (3.0 - 2.0 * poisson) * force / (4.0 * pi * young * radius);
+            errors.push(((local - far) / depth - 1.0).abs());
+        }
+        let most = errors.iter().copied().fold(0.0, f64::max);
+        assert!(most < allowed, "{nodes} nodes: depth off by {errors:?}");
+        worst.push(most);
+    }
+    assert!(worst[2] < worst[0], "no better on a finer mesh: {worst:?}");
+}
+
+#[test]
+fn closed_cycle_of_a_finger_takes_energy_and_never_gives_it() {
+    let cube = Object::sized(BuiltIn::Cube, 125, 0.05, 2.0e4, 0.4);
+    let settings = StepSettings { viscosity: 0.02, ..StepSettings::default() };
+    let (mut state, _) = settled(&cube, ObjectState::at_rest(at(0.0, 0.0, 0.025)), 60);
+    // Down into the top, around, and up again.
+    let place = |k: usize| {
+        let turn = std::f64::consts::TAU * k as f64 / 80.0;
+        let depth = 0.004 * (1.0 - (2.0 * turn).cos()).min(1.0);
+        Vector3::new(0.006 * turn.sin(), 0.006 * (1.0 - turn.cos()), 0.0585 - depth)
+    };
+    let (mut work, mut pressed) = (0.0, 0.0f64);
+    for k in 0..80 {
+        let pose =
+            |k| Isometry3::from_parts(Translation3::from(place(k)), UnitQuaternion::identity());
+        let tip = MovingBody {
+            world_from_body_start: pose(k),
+            world_from_body_end: pose(k + 1),
+            ..MovingBody::resting(RigidShape::sphere(0.008).unwrap(), pose(k), 0.6)
+        };
+        let found = cube.advance(&state, &[table(0.6), tip], settings);
+        let load = found.loads[1];
+        work += load.force.dot(&(place(k + 1) - place(k)));
+        pressed = pressed.max(load.normal_force);
+        state = found.state;
+    }
+    assert!(pressed > 0.05, "never pressed: {pressed} N");
+    assert!(work > 0.0, "the finger got {work} J back");
 }

@@ -202,7 +202,7 @@ mod tests {
         let linear = crate::mesh::generate(crate::mesh::BuiltIn::Sphere, 100).unwrap();
         let mesh = QuadraticMesh::try_new(&linear).unwrap();
         let pattern = StiffnessPattern::quadratic(&mesh);
-        let mut expected = vec![std::collections::BTreeSet::new(); mesh.node_count()];
+        let mut expected = vec![std::collections::BTreeSet::<u32>::new(); mesh.node_count()];
         for tet in mesh.tets() {
             for &row in tet {
                 expected[row as usize].extend(tet);

@@ -1,6 +1,7 @@
 //! Connected parts of a mesh: bodies are connected through nodes, pieces through faces.
 
 use super::TetMesh;
+use super::disjoint_sets::DisjointSets;
 use super::faces::Faces;
 
 /// Which body and which piece every element belongs to.
@@ -101,30 +102,6 @@ fn label(roots: impl Iterator<Item = usize>, root_count: usize) -> (Vec<u32>, Ve
         })
         .collect();
     (labels, counts)
-}
-
-/// Union-find with path halving; the smaller root wins, so results do not depend on the order.
-struct DisjointSets {
-    parent: Vec<usize>,
-}
-
-impl DisjointSets {
-    fn new(count: usize) -> Self {
-        Self { parent: (0..count).collect() }
-    }
-
-    fn root(&mut self, mut at: usize) -> usize {
-        while self.parent[at] != at {
-            self.parent[at] = self.parent[self.parent[at]];
-            at = self.parent[at];
-        }
-        at
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b)] = a.min(b);
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Tetrahedral meshes: the mesh itself, its surface, its quality, and the built-in objects.
 
 mod bodies;
+mod disjoint_sets;
 mod faces;
 mod folds;
 mod generate;
@@ -10,6 +11,7 @@ mod surface;
 mod tet_mesh;
 
 pub use bodies::Bodies;
+pub(crate) use disjoint_sets::DisjointSets;
 pub use folds::Folds;
 pub use generate::{BuiltIn, GenerateError, NODES_MAX, NODES_MIN, UnknownShape, generate};
 pub use inversion::Inversion;

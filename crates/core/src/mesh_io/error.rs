@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::mesh::MeshError;
 use crate::mesh_io::{Companion, Foreign};
+use crate::surface::SurfaceError;
 
 /// A mesh file that could not be used, and why.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -93,6 +94,12 @@ pub enum Fault {
         /// What the file has instead.
         found: String,
     },
+    /// A surface was wanted.
+    #[error("this is no surface that is read here; there are STL, OBJ, PLY, OFF and glTF")]
+    NoSurface,
+    /// The file was read, but its content is no surface.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
     /// The file was read, but its content is not a mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),

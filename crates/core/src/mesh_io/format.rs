@@ -79,6 +79,8 @@ pub enum Foreign {
     Ply,
     /// OFF surface.
     Off,
+    /// glTF surface, text or binary.
+    Gltf,
     /// XDMF or DOLFIN XML.
     Xdmf,
     /// HDF5 container (Exodus, MED, VTKHDF).
@@ -95,9 +97,10 @@ impl Foreign {
     /// What to do about it, as the second half of a sentence.
     pub fn advice(self) -> &'static str {
         match self {
-            Self::Stl | Self::Obj | Self::Ply | Self::Off | Self::MujocoLegacy => {
-                "it has no tetrahedra; fill it with TetGen, fTetWild or Gmsh first"
+            Self::Stl | Self::Obj | Self::Ply | Self::Off | Self::Gltf => {
+                "it has no tetrahedra; `glove-client fill` makes them"
             }
+            Self::MujocoLegacy => "it has no tetrahedra; write it as OBJ and fill that",
             Self::Gzip | Self::Zip | Self::OtherCompression => "unpack it first",
             _ => "convert it with Gmsh or meshio to MSH 4.1",
         }
@@ -120,6 +123,7 @@ impl fmt::Display for Foreign {
             Self::Obj => "a Wavefront OBJ surface",
             Self::Ply => "a PLY surface",
             Self::Off => "an OFF surface",
+            Self::Gltf => "a glTF scene",
             Self::Xdmf => "an XDMF or DOLFIN XML mesh",
             Self::Hdf5 => "an HDF5 file (Exodus, MED, VTKHDF)",
             Self::Gzip => "a gzip file",

@@ -32,9 +32,8 @@ pub fn sniff(bytes: &[u8]) -> Option<Sniffed> {
         s if s.starts_with(b"ply") && s.get(3).is_some_and(u8::is_ascii_whitespace) => {
             foreign(Foreign::Ply)
         }
-        s if s.starts_with(b"off") && s.get(3).is_some_and(u8::is_ascii_whitespace) => {
-            foreign(Foreign::Off)
-        }
+        s if is_off(s) => foreign(Foreign::Off),
+        [b'{', ..] if find(text, b"\"asset\"").is_some() => foreign(Foreign::Gltf),
         s if s.starts_with(b"solid") && find(text, b"facet").is_some() => foreign(Foreign::Stl),
         [b'(', b'0'..=b'9', ..] => foreign(Foreign::Fluent),
         [b'<', ..] => by_xml(text),
@@ -48,8 +47,17 @@ pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
+/// Whether a text begins like OFF, perhaps with the letters of what every
+/// point has besides its place.
+fn is_off(start: &[u8]) -> bool {
+    [&b"off"[..], b"coff", b"noff", b"cnoff", b"stoff"].iter().any(|word| {
+        start.starts_with(word) && start.get(word.len()).is_none_or(u8::is_ascii_whitespace)
+    })
+}
+
 fn by_magic(bytes: &[u8]) -> Option<Foreign> {
-    const MAGICS: [(&[u8], Foreign); 8] = [
+    const MAGICS: [(&[u8], Foreign); 9] = [
+        (b"glTF", Foreign::Gltf),
         (b"\x1f\x8b", Foreign::Gzip),
         (b"PK\x03\x04", Foreign::Zip),
         (b"PK\x05\x06", Foreign::Zip),
@@ -132,7 +140,10 @@ fn by_first_line(text: &[u8]) -> Option<Sniffed> {
     if first.starts_with(b"*") {
         return star_keywords(text);
     }
-    if matches!(first, b"v" | b"vn" | b"vt" | b"t" | b"f" | b"o" | b"g" | b"mtllib") {
+    if matches!(
+        first,
+        b"v" | b"vn" | b"vt" | b"t" | b"f" | b"o" | b"g" | b"s" | b"mtllib" | b"usemtl"
+    ) {
         return letter_lines(text);
     }
     parse_integer(first)?;

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 pub type Barycentric = [f64; 3];
 
 /// The point of a triangle with some weights.
-pub(super) fn point_at(corners: &[Point3<f64>; 3], weights: &Barycentric) -> Point3<f64> {
+pub(crate) fn point_at(corners: &[Point3<f64>; 3], weights: &Barycentric) -> Point3<f64> {
     let [a, b, c] = corners.map(|p| p.coords);
     Point3::from(weights[0] * a + weights[1] * b + weights[2] * c)
 }
@@ -21,7 +21,7 @@ pub(super) fn on_segment(a: &Point3<f64>, b: &Point3<f64>, point: &Point3<f64>) 
 /// The point of a triangle that is closest to another point.
 ///
 /// Source: Ericson, Real-Time Collision Detection (2005), 5.1.5: the region of Voronoi decides.
-pub(super) fn on_triangle(corners: &[Point3<f64>; 3], point: &Point3<f64>) -> Barycentric {
+pub(crate) fn on_triangle(corners: &[Point3<f64>; 3], point: &Point3<f64>) -> Barycentric {
     let [a, b, c] = corners;
     let (ab, ac) = (b - a, c - a);
     let dots = |p: &Point3<f64>| (ab.dot(&(point - p)), ac.dot(&(point - p)));
@@ -130,7 +130,7 @@ fn crossing(
 
 /// Twice the area of a triangle along its normal; outward where the corners are counter-clockwise
 /// seen from outside.
-pub(super) fn area_normal(corners: &[Point3<f64>; 3]) -> Vector3<f64> {
+pub(crate) fn area_normal(corners: &[Point3<f64>; 3]) -> Vector3<f64> {
     (corners[1] - corners[0]).cross(&(corners[2] - corners[0]))
 }
 

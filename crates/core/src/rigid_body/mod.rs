@@ -7,6 +7,7 @@ mod shape;
 mod triangles;
 
 pub use closest::Barycentric;
+pub(crate) use closest::{area_normal, on_triangle, point_at};
 pub use distance::{Deepest, SignedDistance};
 pub use shape::{RigidShape, ShapeError};
 pub use triangles::{RigidMesh, RigidMeshError};

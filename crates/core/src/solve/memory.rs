@@ -39,9 +39,9 @@ pub struct Problem {
 /// A factor over fronts takes at most so many times what is predicted from the size of the mesh;
 /// counted on the shapes of `examples/work_law.rs`.
 pub const MOST_OVER_PREDICTED: f64 = 2.0;
-/// It takes at least the predicted over this. More room than counted on those shapes, because a
-/// slender body takes less the more slender it is, and what is refused by a prediction has no other
-/// chance.
+/// A factor over fronts takes at least the predicted memory over this. The number is larger than was counted
+/// on those shapes: a slender body takes the less the more slender it is, and a request that is refused by
+/// the prediction is never counted.
 pub const PREDICTED_OVER_LEAST: f64 = 3.0;
 
 /// Bytes of a node of a model: coordinates, marks, starts of rows.

@@ -3,8 +3,10 @@
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use softgrasp_emulator::emulation::PseudoTerminal;
-use softgrasp_emulator::{EmulatedGloveKind, EmulatedTrackerKind, Fault, FaultSetting};
+use softgrasp_emulator::emulation::{PseudoTerminal, TrackerLine};
+use softgrasp_emulator::{
+    EmulatedGloveKind, EmulatedTracker, EmulatedTrackerKind, Fault, FaultSetting,
+};
 use softgrasp_hand::devices::cyberglove::{
     GloveEncoding, GloveParser, GloveRecord, RecordKind, SensorCount, encode_record,
 };
@@ -15,7 +17,7 @@ use softgrasp_hand::serial::{
 
 use super::reader::{FORMATS, Reader};
 use super::served::{
-    HANG, Served, glove_line, glove_settings, numbered, open_glove, open_tracker, port,
+    HANG, Served, glove_line, glove_settings, numbered, open_glove, open_tracker, place, port,
     tracker_line,
 };
 
@@ -213,4 +215,32 @@ fn a_glove_that_answers_no_query_is_polled_all_the_same() {
     assert_eq!(reader.devices.glove_facts(), GloveFacts::default());
     drop(reader);
     drop(served.end());
+}
+
+/// The order for centimetres is lost once: without a second one every length would be 0.39 times what it
+/// is.
+#[test]
+fn a_tracker_whose_order_for_centimetres_was_lost_is_told_again_and_not_left_in_inches() {
+    let line = TrackerLine {
+        terminal: PseudoTerminal::open(None).unwrap(),
+        tracker: EmulatedTracker::new(EmulatedTrackerKind::default()),
+    };
+    let path = line.terminal.path().to_owned();
+    let mut is_lost = false;
+    let served = Served::start(&path, line, move |line, now_s, made| {
+        let mut heard = line.terminal.read();
+        if let (false, Some(at)) = (is_lost, heard.iter().position(|byte| *byte == b'u')) {
+            heard.remove(at);
+            is_lost = true;
+        }
+        line.tracker.receive(&heard, now_s);
+        line.speak(now_s, |_, _| place(made.fetch_add(1, Ordering::Relaxed)));
+    });
+    let settings = TrackerSettings::new(port(&served.path));
+    let format = settings.format;
+    let mut reader = Reader::of_tracker(open_tracker(settings), format);
+    // Places are read in the unit that was told; those of another are no numbers of records.
+    reader.until_number("a tracker left in inches", 50);
+    assert_eq!(reader.devices.tracker_facts().disobeys, None);
+    served.end();
 }

@@ -1,7 +1,7 @@
 //! Makes contact frames: the surface as it is, the bodies near it, and what can touch in a step.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
-use softgrasp_core::dynamics::{MovingBody, near_triangles};
+use softgrasp_core::dynamics::{Candidate, MovingBody, near_triangles};
 use softgrasp_protocol::{
     BodyMotion, BodyShape, ContactAsk, ContactFrame, ModelHash, NodeChoice, ObjectState, Pose,
     Precision,
@@ -34,7 +34,7 @@ pub struct StepObject<'a> {
 const MARGIN_OF_SIZE: f64 = 0.02;
 
 impl StepObject<'_> {
-    /// The frame of one step from a state.
+    /// The frame of one step from a state; what can touch is found by looking at all triangles.
     pub fn frame(&self, state: ObjectState, bodies: &[StepBody], ask: ContactAsk) -> ContactFrame {
         let places: Vec<Point3<f64>> = self
             .vertices
@@ -44,8 +44,19 @@ impl StepObject<'_> {
             .collect();
         let moving: Vec<MovingBody> = bodies.iter().map(|body| body.moving.clone()).collect();
         let world_from_object = isometry_of(&state.pose);
-        let margin = self.margin(&state, &moving, &ask);
+        let margin = reach_of_step(extent(self.vertices), &state, &moving, &ask);
         let near = near_triangles(&places, self.triangles, &world_from_object, &moving, margin);
+        self.frame_among(state, bodies, ask, &near)
+    }
+
+    /// The frame of one step in which these triangles can touch these bodies.
+    pub fn frame_among(
+        &self,
+        state: ObjectState,
+        bodies: &[StepBody],
+        ask: ContactAsk,
+        near: &[Candidate],
+    ) -> ContactFrame {
         let motion = |body: &StepBody| BodyMotion {
             shape: body.shape.clone(),
             start: pose_of(&body.moving.world_from_body_start),
@@ -64,20 +75,29 @@ impl StepObject<'_> {
             precision: Precision::F64,
         }
     }
+}
 
-    /// How near a triangle must be to be able to touch: what bodies and object move in the step, and a
-    /// share of the object's size for what the surface moves.
-    fn margin(&self, state: &ObjectState, bodies: &[MovingBody], ask: &ContactAsk) -> f64 {
-        let mut size = 0.0f64;
-        if let Some(first) = self.vertices.first() {
-            size = self.vertices.iter().map(|v| (v - first).norm()).fold(0.0, f64::max);
-        }
-        let norm = |v: &[f64; 3]| v[0].hypot(v[1]).hypot(v[2]);
-        let (h, speed) = (ask.seconds, norm(&state.velocity) + norm(&ask.gravity) * ask.seconds);
-        let turning = norm(&state.angular_velocity) * size;
-        let way = bodies.iter().map(MovingBody::way).fold(0.0, f64::max);
-        2.0 * way + 2.0 * h * (speed + turning) + MARGIN_OF_SIZE * size
-    }
+/// How near a triangle must be to be able to touch: what bodies and object move in the step, and a share
+/// of the object's extent for what the surface moves.
+///
+/// Units: m.
+pub fn reach_of_step(
+    extent: f64,
+    state: &ObjectState,
+    bodies: &[MovingBody],
+    ask: &ContactAsk,
+) -> f64 {
+    let norm = |v: &[f64; 3]| v[0].hypot(v[1]).hypot(v[2]);
+    let (h, speed) = (ask.seconds, norm(&state.velocity) + norm(&ask.gravity) * ask.seconds);
+    let turning = norm(&state.angular_velocity) * extent;
+    let way = bodies.iter().map(MovingBody::way).fold(0.0, f64::max);
+    2.0 * way + 2.0 * h * (speed + turning) + MARGIN_OF_SIZE * extent
+}
+
+/// Largest distance of a node from the first one, m.
+pub fn extent(vertices: &[Point3<f64>]) -> f64 {
+    let Some(first) = vertices.first() else { return 0.0 };
+    vertices.iter().map(|v| (v - first).norm()).fold(0.0, f64::max)
 }
 
 /// A pose as it travels.

@@ -1,7 +1,7 @@
 //! Digests of numbers, so that two runs can be compared bit by bit.
 
 use nalgebra::Isometry3;
-use softgrasp_protocol::{NodeChoice, Question};
+use softgrasp_protocol::{ContactFrame, NodeChoice, ObjectState, Question};
 
 /// 128 bits of a BLAKE3 hash over the exact bits of numbers, in the making.
 #[derive(Default)]
@@ -55,6 +55,33 @@ pub fn request_digest(question: &Question) -> String {
     match &question.want.nodes {
         NodeChoice::All => digest.text("all"),
         NodeChoice::Nodes(nodes) => digest.count(nodes.len() as u64),
+    }
+    digest.end()
+}
+
+/// Digest of what a step of a free object asks: its state, the ways of the bodies, what can touch.
+pub fn step_digest(frame: &ContactFrame) -> String {
+    let mut digest = Digest::default();
+    digest.numbers(&[frame.ask.seconds]);
+    let ObjectState { pose, velocity, angular_velocity, force_nodes, forces, contacts } =
+        &frame.state;
+    digest.numbers(pose);
+    digest.numbers(velocity);
+    digest.numbers(angular_velocity);
+    force_nodes.iter().for_each(|node| digest.count(u64::from(*node)));
+    forces.iter().for_each(|force| digest.numbers(force));
+    for contact in contacts {
+        digest.count(u64::from(contact.body));
+        digest.numbers(&contact.weights);
+        digest.numbers(&contact.force);
+    }
+    for body in &frame.bodies {
+        digest.numbers(&body.start);
+        digest.numbers(&body.end);
+    }
+    for (nodes, body) in frame.triangles.iter().zip(&frame.triangle_bodies) {
+        nodes.iter().for_each(|node| digest.count(u64::from(*node)));
+        digest.count(u64::from(*body));
     }
     digest.end()
 }

@@ -49,6 +49,8 @@ impl HeldNodes {
                     self.held = fingers.map(|(finger, node)| (node, finger)).collect();
                 }
                 ContactModel::Patch => self.held = patches(object, tip_radii, &touched),
+                // Fingers that press with friction hold nothing.
+                ContactModel::Friction => {}
                 ContactModel::Mask => fingers.for_each(|(finger, node)| {
                     self.masks
                         .push(object.rest_shape().tip_mask(node, tip_radii[finger]).entries());

@@ -78,7 +78,9 @@ impl Hint {
                 ContactModel::Mask => {
                     hint.masks.push(rest.tip_mask(node, tip_radii[finger]).entries());
                 }
-                ContactModel::Vertex | ContactModel::Patch => hint.nodes.push(node),
+                ContactModel::Vertex | ContactModel::Patch | ContactModel::Friction => {
+                    hint.nodes.push(node);
+                }
             }
         }
         hint

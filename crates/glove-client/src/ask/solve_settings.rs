@@ -1,5 +1,7 @@
 //! What the object is made of and how its displacements are solved for.
 
+use softgrasp_core::fem::Element;
+use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{ElementName, Material, MethodName};
 
@@ -36,6 +38,15 @@ impl SolveSettings {
 /// Estimated error of a frame at large deformation, over the largest displacement, unless another is
 /// asked for: a hundredth of what linear elasticity is off by.
 pub const ERROR_OF_FRAMES: f64 = 2e-3;
+
+/// The element of frames for a material, by Poisson's ratio: the cheapest that does not lock.
+pub fn element_for_frames(poisson: f64) -> ElementName {
+    match cheapest_element(poisson) {
+        Element::Tet4 => ElementName::T4,
+        Element::Tet4Anp => ElementName::T4Anp,
+        Element::Tet10 => ElementName::T10,
+    }
+}
 
 /// Nodes whose displacements each tick asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

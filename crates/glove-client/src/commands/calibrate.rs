@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use softgrasp_grasp::hand::{HandDimensions, Handedness};
 use softgrasp_hand::devices::calibration::{
@@ -66,7 +66,8 @@ impl CalibrateCommand {
     /// Takes the gestures, writes the files, says how it went.
     ///
     /// # Errors
-    /// One line each: a wrong size, a silent glove, a file that cannot be read or written.
+    /// One line each: a wrong size, a silent glove, gestures that make no calibration, a file that
+    /// cannot be read or written. Without a calibration older files stay as they are.
     pub fn run(&self) -> anyhow::Result<()> {
         let mut configuration = self.configuration()?;
         let setup = &configuration.setup;
@@ -79,6 +80,9 @@ impl CalibrateCommand {
         let plan = Plan::new(setup.sensors, self.thumb);
         let mut bars = SensorBars::on_standard_error();
         let report = take_gestures(&start, &mut source, &plan, &Patience::PERSON, &mut bars)?;
+        if let Some(refusal) = report.refusal() {
+            bail!("no calibration, and no file was written: {refusal}");
+        }
         self.write(&report.calibration, &configuration)?;
         if let Some(path) = &self.setup {
             configuration.calibration_file = Some(relative_to(path, &self.out));
@@ -141,7 +145,8 @@ impl CalibrateCommand {
         let names = |set: SensorSet| set.iter().map(sensor_name).collect::<Vec<_>>().join(", ");
         let mut lines = Vec::new();
         for (outcome, what) in [
-            (SensorFit::Unmoved, "did not move and keep their default gain"),
+            (SensorFit::Unmoved, "hardly moved and keep their default gain"),
+            (SensorFit::Reversed, "went the wrong way and keep their default gain and offset"),
             (SensorFit::Dead, "are dead and held at rest"),
         ] {
             let set = report.with_outcome(outcome);
@@ -229,6 +234,30 @@ mod tests {
         let again = read_configuration(&folder.path().join("hand.toml")).unwrap();
         assert_eq!(again.setup.dimensions, setup.dimensions);
         assert_eq!(again.calibration_file, Some(PathBuf::from("me.toml")));
+    }
+
+    #[test]
+    fn swapped_gestures_and_a_hand_that_never_moved_write_no_file_and_leave_older_ones_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        recorded(folder.path(), SensorCount::TwentyTwo);
+        let file = |name: &str| folder.path().join(name);
+        run(folder.path(), "--from @ --out @me.cal --setup @hand.toml").unwrap();
+        let before = ["me.cal", "hand.toml"].map(|name| std::fs::read(file(name)).unwrap());
+        let [flat, fist] = ["flat.bin", "fist.bin"].map(|name| std::fs::read(file(name)).unwrap());
+        for (first, second, words) in
+            [(&fist, &flat, "in the wrong order"), (&flat, &flat, "only 0 of the 8 sensors")]
+        {
+            std::fs::write(file("flat.bin"), first).unwrap();
+            std::fs::write(file("fist.bin"), second).unwrap();
+            let words_of = "--from @ --out @me.cal --setup @hand.toml";
+            let error = run(folder.path(), words_of).unwrap_err().to_string();
+            assert!(error.contains(words) && error.contains("no file was written"), "{error}");
+            let error = run(folder.path(), "--from @ --out @new.cal").unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+            let after = ["me.cal", "hand.toml"].map(|name| std::fs::read(file(name)).unwrap());
+            assert!(before == after, "older files are as they were");
+            assert!(!file("new.cal").exists());
+        }
     }
 
     #[test]

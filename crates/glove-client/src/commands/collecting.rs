@@ -9,14 +9,21 @@ use anyhow::bail;
 pub(super) struct Patience {
     /// Count-down before each gesture.
     pub(super) get_ready: Duration,
-    /// A device that sends nothing for so long is given up.
+    /// A device that sends nothing for so long in a gesture has the gesture begin again: who holds it
+    /// does not hold it for ever.
+    pub(super) gap: Duration,
+    /// A device that sends nothing for so long is given up. Its driver sets it up again and again
+    /// until then, as in a run.
     pub(super) silence: Duration,
 }
 
 impl Patience {
-    /// For a person.
-    pub(super) const PERSON: Self =
-        Self { get_ready: Duration::from_secs(3), silence: Duration::from_secs(2) };
+    /// For a person. A CyberGlove takes up to 2.5 s to restart, a FASTRAK 10 s.
+    pub(super) const PERSON: Self = Self {
+        get_ready: Duration::from_secs(3),
+        gap: Duration::from_secs(1),
+        silence: Duration::from_secs(30),
+    };
 }
 
 /// Where a gesture is.
@@ -34,7 +41,8 @@ pub(super) enum Phase {
     },
 }
 
-/// Waits out the count-down, then collects `wanted` samples; `seen` gets every sample of both.
+/// Waits out the count-down from the first sample on, then collects `wanted` samples; `seen` gets
+/// every sample of both. After a gap in the gesture both begin again.
 ///
 /// # Errors
 /// A sentence when the device is silent for too long.
@@ -44,8 +52,8 @@ pub(super) fn collect<T>(
     patience: &Patience,
     mut seen: impl FnMut(Phase, &T),
 ) -> anyhow::Result<Vec<T>> {
-    let start = Instant::now();
-    let mut heard = start;
+    let mut heard = Instant::now();
+    let mut begun: Option<Instant> = None;
     let mut held = Vec::new();
     while held.len() < wanted {
         let Some(sample) = next() else {
@@ -59,8 +67,12 @@ pub(super) fn collect<T>(
             std::thread::sleep(Duration::from_millis(2));
             continue;
         };
+        if begun.is_some() && heard.elapsed() >= patience.gap {
+            held.clear();
+            begun = None;
+        }
         heard = Instant::now();
-        let waiting = patience.get_ready.saturating_sub(start.elapsed());
+        let waiting = patience.get_ready.saturating_sub(begun.get_or_insert(heard).elapsed());
         if waiting.is_zero() {
             seen(Phase::Hold { left: wanted - held.len() }, &sample);
             held.push(sample);
@@ -75,10 +87,40 @@ pub(super) fn collect<T>(
 mod tests {
     use super::*;
 
+    const PATIENT: Patience = Patience {
+        get_ready: Duration::ZERO,
+        gap: Duration::from_secs(20),
+        silence: Duration::from_secs(30),
+    };
+
+    /// Longer than a glove takes to restart, and longer than it was given once.
+    #[test]
+    fn glove_that_restarts_for_two_and_a_half_seconds_is_waited_for_as_in_a_run() {
+        assert!(Patience::PERSON.silence >= Duration::from_secs(20), "a restart and a lost order");
+        let begun = Instant::now();
+        let mut next = || (begun.elapsed() > Duration::from_millis(2600)).then_some(7);
+        let patience = Patience { get_ready: Duration::ZERO, ..Patience::PERSON };
+        assert_eq!(collect(&mut next, 3, &patience, |_, _| {}).unwrap(), [7, 7, 7]);
+    }
+
+    #[test]
+    fn gap_in_a_gesture_begins_it_again_and_does_not_abort() {
+        let patience = Patience { gap: Duration::from_millis(40), ..PATIENT };
+        let mut number = 0;
+        let mut next = || {
+            number += 1;
+            if number == 3 {
+                std::thread::sleep(Duration::from_millis(60));
+                return None;
+            }
+            Some(number)
+        };
+        assert_eq!(collect(&mut next, 4, &patience, |_, _| {}).unwrap(), [4, 5, 6, 7]);
+    }
+
     #[test]
     fn samples_of_the_count_down_are_shown_and_not_kept() {
-        let patience =
-            Patience { get_ready: Duration::from_millis(30), silence: Duration::from_secs(20) };
+        let patience = Patience { get_ready: Duration::from_millis(30), ..PATIENT };
         let mut number = 0;
         let mut next = || {
             std::thread::sleep(Duration::from_millis(1));
@@ -100,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_silent_device_is_given_up_with_advice() {
-        let patience = Patience { get_ready: Duration::ZERO, silence: Duration::from_millis(20) };
+        let patience = Patience { silence: Duration::from_millis(20), ..PATIENT };
         let error = collect(&mut || None::<u8>, 1, &patience, |_, _| {}).unwrap_err();
         assert!(error.to_string().contains("sent nothing"), "{error}");
     }

@@ -97,6 +97,13 @@ impl DisplayArguments {
         self.snapshot.is_some() || self.frames_dir.is_some() || self.animation.is_some()
     }
 
+    /// Whether what is shown needs the nodes inside the object: a moving picture whose colours were
+    /// not chosen shows strain.
+    pub(super) fn needs_inside(&self) -> bool {
+        self.display().shading.needs_inside()
+            || (self.animation.is_some() && self.shading.is_none())
+    }
+
     /// What is shown at first.
     pub(super) fn display(&self) -> Display {
         let mut display = Display {

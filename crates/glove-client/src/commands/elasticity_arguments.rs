@@ -27,6 +27,12 @@ pub(super) struct ElasticityArguments {
 }
 
 impl ElasticityArguments {
+    /// Whether large deformation was asked for.
+    pub fn wants_large(&self) -> bool {
+        self.yield_stress.is_some()
+            || matches!(self.deformation, Some(Deformation::Large | Deformation::Auto))
+    }
+
     /// Those of a run: flags win over the scene, and who names a method of linear elasticity gets
     /// linear elasticity.
     ///

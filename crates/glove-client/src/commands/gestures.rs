@@ -179,8 +179,11 @@ mod tests {
     use softgrasp_hand::devices::calibration::{SensorFit, ThumbFit};
     use softgrasp_hand::devices::cyberglove::Sensor;
 
-    const AT_ONCE: Patience =
-        Patience { get_ready: Duration::ZERO, silence: Duration::from_secs(30) };
+    const AT_ONCE: Patience = Patience {
+        get_ready: Duration::ZERO,
+        gap: Duration::from_secs(30),
+        silence: Duration::from_secs(30),
+    };
 
     /// A glove that shows gestures in turn, each for so many readings.
     fn glove(gestures: Vec<JointAngles>, readings: usize) -> GloveSource {

@@ -4,7 +4,7 @@ use anyhow::bail;
 
 use super::run_arguments::{RunArguments, RunPlan};
 use crate::pace::Due;
-use crate::run::grasp_loop::GraspLoop;
+use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;
 
 /// Never made.
@@ -31,7 +31,7 @@ impl RunPictures {
         _: Due,
         _: f64,
         _: &TickOutcome,
-        _: &GraspLoop,
+        _: &Session,
     ) -> anyhow::Result<()> {
         match *self {}
     }

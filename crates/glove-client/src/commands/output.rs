@@ -1,19 +1,21 @@
 //! Prints what a command has to say, and writes its reports.
 
+use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context;
 
-use crate::object::file_writing::write_file;
+use crate::object::file_writing::write_file_by;
 
 /// Writes a value as indented JSON with a final newline.
 ///
 /// # Errors
 /// The system's reason with the path.
 pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
-    let mut text = serde_json::to_vec_pretty(value).context("cannot form the JSON report")?;
-    text.push(b'\n');
-    Ok(write_file(path, &text)?)
+    Ok(write_file_by(path, |file| {
+        serde_json::to_writer_pretty(&mut *file, value)?;
+        file.write_all(b"\n")
+    })?)
 }
 
 /// Prints to standard output; a closed pipe (`| head`) is not an error worth words.
@@ -21,7 +23,6 @@ pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::
 /// # Errors
 /// Any other failure to write.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
-    use std::io::Write as _;
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {

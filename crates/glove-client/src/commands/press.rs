@@ -19,7 +19,8 @@ use crate::ask::contact_frame::isometry_of;
 use crate::ask::displacement_table::write_displacements;
 use crate::ask::model_upload::ModelUpload;
 use crate::object::file_writing::write_file;
-use crate::object::mesh_file::read_mesh_file;
+use crate::object::object_file::{ObjectFile, read_object_file};
+use crate::object::scene::NODES_DEFAULT;
 use crate::press::bodies_file::{PressBodies, read_bodies};
 use crate::press::course::{Course, Step};
 use crate::press::report::{PressReport, StepReport};
@@ -27,7 +28,8 @@ use crate::press::report::{PressReport, StepReport};
 /// Press rigid bodies against a soft object that nothing else holds, with friction and weight.
 #[derive(Args)]
 pub struct PressCommand {
-    /// Mesh file of the object, in metres; the format is recognised by its content.
+    /// Mesh file of the object, in metres, or a surface (STL, OBJ, PLY, OFF, glTF), which is filled
+    /// with about 1000 nodes; the format is recognised by its content.
     #[arg(long, value_name = "F")]
     mesh: PathBuf,
     /// Rigid bodies and their ways: [[body]] with name, shape = "sphere", "capsule", "plane", "box"
@@ -96,7 +98,7 @@ impl PressCommand {
     pub fn run(&self) -> anyhow::Result<()> {
         let progress = Progress::start("reading");
         let bodies = read_bodies(&self.bodies)?;
-        let mesh = read_mesh_file(&self.mesh)?.mesh;
+        let mesh = self.read_object()?;
         let surface = Surface::from_mesh(&mesh);
         let is_known = |path: &PathBuf| {
             matches!(path.extension().and_then(|e| e.to_str()), Some("vtu" | "csv"))
@@ -149,6 +151,24 @@ impl PressCommand {
             write_json(path, &report)?;
         }
         print(&self.describe(&report, &bodies))
+    }
+
+    /// The mesh, or what fills the surface; a surface and what was done to it are told.
+    fn read_object(&self) -> anyhow::Result<TetMesh> {
+        match read_object_file(&self.mesh, NODES_DEFAULT)? {
+            ObjectFile::Mesh(file) => Ok(file.mesh),
+            ObjectFile::Surface(surface) => {
+                let doubt = surface.doubtful_unit().map(|doubt| {
+                    format!("{doubt}: `glove-client fill {} --scale S` first", self.mesh.display())
+                });
+                for line in
+                    [surface.told(&self.mesh)].into_iter().chain(surface.faults()).chain(doubt)
+                {
+                    eprintln!("glove-client: {line}");
+                }
+                Ok(surface.filled.mesh)
+            }
+        }
     }
 
     fn ask(&self) -> ContactAsk {

@@ -9,6 +9,7 @@ use softgrasp_protocol::{ElementName, LawName, Material};
 
 use crate::ask::deformation::Elasticity;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
+use crate::run::contact_grasp::ContactScene;
 
 /// The settings of a recorded run.
 ///
@@ -34,6 +35,19 @@ pub(super) fn recorded_settings(setup: &RecordedSetup) -> anyhow::Result<SolveSe
             yield_stress: setup.yield_pa,
         },
         max_error: setup.max_error,
+    })
+}
+
+/// What a recorded grasp by contact with friction was like; `None` where the thesis's rules held.
+pub(super) fn recorded_scene(setup: &RecordedSetup) -> Option<ContactScene> {
+    let recorded = setup.friction.as_ref()?;
+    Some(ContactScene {
+        friction: recorded.friction,
+        finger_compliance: recorded.finger_compliance_m_n,
+        density: recorded.density_kg_m3,
+        viscosity: recorded.viscosity_s,
+        gravity: recorded.gravity.into(),
+        table_y: None,
     })
 }
 

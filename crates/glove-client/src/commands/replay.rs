@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
+use softgrasp_grasp::object::ObjectChoice;
 use softgrasp_hand::hand_request::HandRequest;
 
 use super::access_arguments::AccessArguments;
@@ -20,12 +21,15 @@ pub struct ReplayCommand {
     #[arg(value_name = "F.mcap")]
     recording: PathBuf,
     /// Ends with exit code 1 if anything differs, and names the tick and the first stage that does:
-    /// pose, contacts, request or displacement.
+    /// pose, contacts, request or displacement; also if the recording is damaged or not complete.
     #[arg(long)]
     check: bool,
     /// How fast: 1 as it was, 0 as fast as it goes.
     #[arg(long, value_name = "FACTOR", value_parser = speed, default_value = "0", allow_hyphen_values = true)]
     speed: f64,
+    /// The recorded object, where its mesh file is not below the recording's folder any more.
+    #[arg(long, value_name = "FILE|SHAPE")]
+    object: Option<ObjectChoice>,
     /// Where to solve: HOST:PORT, or embedded [default: embedded].
     #[arg(long, value_name = "ADDR|embedded")]
     server: Option<ServerChoice>,
@@ -48,6 +52,7 @@ impl ReplayCommand {
         let arguments = RunArguments {
             hand: Some(HandRequest::Replay(self.recording.clone())),
             speed: Some(self.speed),
+            object: self.object.clone(),
             server: self.server.clone(),
             access: self.access.clone(),
             threads: self.threads,
@@ -58,14 +63,8 @@ impl ReplayCommand {
         let run = RunCommand { arguments };
         let report = run.without_window(&run.arguments.plan()?)?;
         tell(self.report.as_deref(), &report)?;
-        let difference = report.replay.as_ref().and_then(|replay| replay.difference.as_ref());
-        match difference {
-            Some(difference) if self.check => {
-                bail!("the replay differs from its recording in {difference}")
-            }
-            Some(_) | None if report.interrupted && self.check => {
-                bail!("the replay was ended before the recording was over")
-            }
+        match report.replay.as_ref().and_then(|replay| replay.failed(report.interrupted)) {
+            Some(failed) if self.check => bail!(failed),
             Some(_) | None => Ok(()),
         }
     }

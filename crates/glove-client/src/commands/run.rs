@@ -80,8 +80,10 @@ impl RunCommand {
         let progress = Progress::start("preparing the object");
         let setup = Setup {
             record: self.arguments.record.clone(),
+            report: self.arguments.report.clone(),
             threads: self.arguments.threads,
             ends_with_script: self.arguments.frames.is_none(),
+            squeeze_times: if self.arguments.shown.animation.is_some() { 3 } else { 1 },
         };
         let at = |stage| match stage {
             SetupStage::Object(_) => {}
@@ -110,7 +112,7 @@ impl RunCommand {
         let interrupted = ticks.play(interruption::asked, |session, outcome, due, now_s| {
             status.show(due.tick, outcome);
             if let Some(pictures) = &mut pictures {
-                pictures.add(due, now_s, outcome, session.grasp_loop())?;
+                pictures.add(due, now_s, outcome, session)?;
             }
             match &mut key_frames {
                 Some(frames) => frames.add(due.tick, outcome, session.grasp_loop().object()),

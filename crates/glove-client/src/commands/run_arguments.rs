@@ -6,12 +6,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use nalgebra::{Isometry3, Point3, Translation3};
-use softgrasp_core::fem::{Element, Material as ElasticMaterial};
-use softgrasp_core::solve::choose::cheapest_element;
+use softgrasp_core::fem::Material as ElasticMaterial;
 use softgrasp_grasp::hand::HandDimensions;
-use softgrasp_grasp::object::{ContactModel, ObjectChoice};
+use softgrasp_grasp::object::ObjectChoice;
 use softgrasp_hand::foreign_recording::is_foreign;
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::hand_request::HandRequest;
@@ -21,17 +20,22 @@ use softgrasp_hand::scripted::ScriptName;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 
 use super::access_arguments::AccessArguments;
+use super::contact_arguments::{ContactArguments, GraspRule};
 use super::display_arguments::DisplayArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::hand_files::read_configuration;
 use super::numbers::{count, place, poisson, positive, speed, ticks};
-use super::recorded_settings::{recorded_hand, recorded_place, recorded_settings};
+use super::recorded_object::recorded_object;
+use super::recorded_settings::{recorded_hand, recorded_place, recorded_scene, recorded_settings};
 use crate::ask::connection::ServerChoice;
+use crate::ask::deformation::Elasticity;
 use crate::ask::endpoint::Endpoint;
-use crate::ask::solve_settings::{SolveSettings, Subscription};
+use crate::ask::solve_settings::{SolveSettings, Subscription, element_for_frames};
 use crate::object::loading::ObjectRequest;
+use crate::object::object_place::ObjectPlace;
 use crate::object::scene::{NODES_DEFAULT, SceneFile, size_to_hold};
 use crate::pace::Pace;
+use crate::run::contact_grasp::ContactScene;
 
 /// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
 #[derive(Args, Clone, Default)]
@@ -40,6 +44,9 @@ pub struct RunArguments {
     #[arg(long, value_name = "F.toml")]
     pub(super) scene: Option<PathBuf>,
     /// cube, sphere, strawberry, toothpaste, or a mesh file [default: strawberry].
+    #[arg(value_name = "FILE|SHAPE", conflicts_with = "object")]
+    pub(super) named_object: Option<ObjectChoice>,
+    /// The same as an option.
     #[arg(long, value_name = "FILE|SHAPE")]
     pub(super) object: Option<ObjectChoice>,
     /// Nodes of a built-in object [default: 1000].
@@ -49,7 +56,7 @@ pub struct RunArguments {
     /// other built-ins].
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     pub(super) object_size: Option<f64>,
-    /// The hand: scripted[:approach|attach|squeeze|release|regrasp], mouse (in a window),
+    /// The hand: scripted[:lift|approach|attach|squeeze|release|regrasp], mouse (in a window),
     /// serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, or replay:F.mcap.
     #[arg(long, value_name = "SOURCE")]
     pub(super) hand: Option<HandRequest>,
@@ -66,6 +73,10 @@ pub struct RunArguments {
     /// Place of the object in the frame of a sender of joints, m [default: before its first hand].
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     pub(super) joints_origin: Option<Point3<f64>>,
+    /// Where the object is put: home, or hand, between thumb and fingers of the first hand that is heard
+    /// of [default: home].
+    #[arg(long, value_name = "home|hand")]
+    pub(super) place: Option<PlaceChoice>,
     /// Where to solve: HOST:PORT, or embedded [default: embedded].
     #[arg(long, value_name = "ADDR|embedded")]
     pub(super) server: Option<ServerChoice>,
@@ -81,10 +92,8 @@ pub struct RunArguments {
     /// t4-anp from there on [default: auto].
     #[arg(long, value_name = "t4|t4-anp|auto")]
     pub(super) element: Option<ElementChoice>,
-    /// What a fingertip holds: vertex (the node it touched, as in the thesis), patch (every surface
-    /// node under it) or mask (their mean, weighted by the tip's pressure) [default: mask].
-    #[arg(long, value_name = "vertex|patch|mask")]
-    pub(super) contact: Option<ContactModel>,
+    #[command(flatten)]
+    pub(super) grasp: ContactArguments,
     /// Young's modulus, Pa [default: 20000, a soft fruit].
     #[arg(long, value_name = "PA", value_parser = positive, allow_hyphen_values = true)]
     pub(super) young: Option<f64>,
@@ -123,16 +132,30 @@ pub struct RunArguments {
     pub(super) report: Option<PathBuf>,
 }
 
+/// Where the object is put.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum PlaceChoice {
+    /// At its home.
+    Home,
+    /// In front of the first hand.
+    Hand,
+}
+
+impl PlaceChoice {
+    fn place(self) -> ObjectPlace {
+        match self {
+            Self::Home => ObjectPlace::Home,
+            Self::Hand => ObjectPlace::Hand,
+        }
+    }
+}
+
 /// The element that ticks are solved with; they need one whose system is condensed.
-fn element_for_frames(choice: ElementChoice, poisson: f64) -> anyhow::Result<ElementName> {
+fn chosen_element(choice: ElementChoice, poisson: f64) -> anyhow::Result<ElementName> {
     match choice {
         ElementChoice::T4 => Ok(ElementName::T4),
         ElementChoice::T4Anp => Ok(ElementName::T4Anp),
-        ElementChoice::Auto => Ok(match cheapest_element(poisson) {
-            Element::Tet4 => ElementName::T4,
-            Element::Tet4Anp => ElementName::T4Anp,
-            Element::Tet10 => ElementName::T10,
-        }),
+        ElementChoice::Auto => Ok(element_for_frames(poisson)),
         ElementChoice::T10 => bail!(
             "run has no ten-node elements: a frame would take as long as a whole solve; take t4, \
              t4-anp or auto, or solve one request with `glove-client solve --element t10`"
@@ -151,6 +174,10 @@ pub(super) struct RunPlan {
     pub(super) object_size: Option<f64>,
     /// Material and solving.
     pub(super) settings: SolveSettings,
+    /// What a grasp by contact with friction is like; `None` for the thesis's rules.
+    pub(super) contact_scene: Option<ContactScene>,
+    /// Where the object is put.
+    pub(super) place: ObjectPlace,
     /// Where to solve.
     pub(super) server: ServerChoice,
     /// How a server elsewhere is spoken to.
@@ -171,6 +198,13 @@ pub(super) struct RunPlan {
     pub(super) recording: Option<Arc<Recording>>,
 }
 
+/// How a run grasps, by which equations, and with which hand.
+struct Grasping {
+    rule: GraspRule,
+    elasticity: Elasticity,
+    hand: HandRequest,
+}
+
 /// Ticks per second where a person watches.
 const WATCHED_RATE_HZ: f64 = 60.0;
 /// Longest time from tick to tick, s: an hour is as good as any.
@@ -180,6 +214,11 @@ impl RunArguments {
     /// Whether the run is played without a window: pictures are drawn tick by tick.
     pub(super) fn is_without_window(&self) -> bool {
         self.headless || self.shown.wants_pictures()
+    }
+
+    /// The object that was named, with `--object` or without.
+    pub(super) fn asked_object(&self) -> Option<&ObjectChoice> {
+        self.object.as_ref().or(self.named_object.as_ref())
     }
 
     /// Puts flags and scene file together.
@@ -196,7 +235,7 @@ impl RunArguments {
             Some(path) => SceneFile::read(path)?,
             None => SceneFile::default(),
         };
-        let object = match (&self.object, &scene.object) {
+        let object = match (self.asked_object(), &scene.object) {
             (Some(choice), _) => choice.clone(),
             (None, Some(name)) => name.parse()?,
             (None, None) => "strawberry".parse()?,
@@ -218,13 +257,7 @@ impl RunArguments {
         // Flags have been checked; what is wrong here stands in the scene file.
         ElasticMaterial::try_new(material.young, material.poisson)
             .context("the scene's material")?;
-        let contact = match (self.contact, &scene.contact) {
-            (Some(contact), _) => contact,
-            (None, Some(name)) => name.parse().context("the scene's contact")?,
-            (None, None) => ContactModel::default(),
-        };
-        let elasticity = self.elasticity.of_run(&scene, &method)?;
-        let hand = self.hand.clone().unwrap_or(HandRequest::Scripted(ScriptName::default()));
+        let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
         // A person at a terminal watches; a pipe wants the result.
         let watched = console_is_watched() && !self.is_without_window();
         // Devices have a time of their own.
@@ -239,16 +272,18 @@ impl RunArguments {
             object_size,
             settings: SolveSettings {
                 material,
-                element: element_for_frames(element, material.poisson)?,
+                element: chosen_element(element, material.poisson)?,
                 method,
-                contact,
-                subscription: match (&self.out_dir, self.shown.display().shading.needs_inside()) {
+                contact: rule.contact,
+                subscription: match (&self.out_dir, self.shown.needs_inside()) {
                     (None, false) => Subscription::Surface,
                     (Some(_), _) | (_, true) => Subscription::Whole,
                 },
                 elasticity,
                 max_error: self.max_error,
             },
+            contact_scene: rule.scene,
+            place: self.place.map_or(ObjectPlace::Home, PlaceChoice::place),
             endpoint: self.access.to(&server)?,
             server,
             pace: if period.is_some() { Pace::Free } else { Pace::Lockstep },
@@ -259,6 +294,29 @@ impl RunArguments {
             world_from_sender: self.joints_origin.map(|at| Translation3::from(-at.coords).into()),
             recording: None,
         })
+    }
+
+    /// How the run grasps, by which equations, and with which hand.
+    fn grasping(&self, scene: &SceneFile, method: &MethodName) -> anyhow::Result<Grasping> {
+        // A run of which nothing was said picks a strawberry from a table. Hands that are no script of the
+        // thesis's grasp grasp as hands do.
+        let lifts = match &self.hand {
+            Some(HandRequest::Scripted(script)) => *script == ScriptName::Lift,
+            Some(_) => true,
+            None => self.asked_object().is_none() && self.scene.is_none(),
+        };
+        let needs_thesis = !lifts || *method != MethodName::auto();
+        let rule = self.grasp.of_run(scene, &self.elasticity, needs_thesis)?;
+        let elasticity = match rule.scene {
+            Some(_) => Elasticity::LINEAR,
+            None => self.elasticity.of_run(scene, method)?,
+        };
+        let script = if rule.scene.is_some() { ScriptName::Lift } else { ScriptName::default() };
+        let hand = self.hand.clone().unwrap_or(HandRequest::Scripted(script));
+        if rule.scene.is_none() && hand == HandRequest::Scripted(ScriptName::Lift) {
+            bail!("the script lift needs --grasp contact");
+        }
+        Ok(Grasping { rule, elasticity, hand })
     }
 
     /// The hand of the file that was named, in the size that was given.
@@ -288,10 +346,15 @@ impl RunArguments {
         let period = (speed > 0.0).then(|| (recorded_s / speed).min(PERIOD_MAX_S));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
         Ok(RunPlan {
-            object: self.object.clone().map_or_else(|| setup.object.parse(), Ok)?,
+            object: match self.asked_object() {
+                Some(named) => named.clone(),
+                None => recorded_object(path, &setup.object)?,
+            },
             nodes: setup.nodes,
             object_size: setup.size_m,
             settings: recorded_settings(setup)?,
+            contact_scene: recorded_scene(setup),
+            place: if setup.placed_in_hand { ObjectPlace::Hand } else { ObjectPlace::Home },
             endpoint: self.access.to(&server)?,
             server,
             hand: HandRequest::Replay(path.to_owned()),

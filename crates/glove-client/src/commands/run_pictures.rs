@@ -1,21 +1,25 @@
 //! Pictures of a run without a window: one moment, every tick, or a moving picture.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::Context;
+use softgrasp_grasp::grasp::StateName;
 use softgrasp_window::view::camera::ViewCamera;
 use softgrasp_window::view::display::{Display, Level};
-use softgrasp_window::view::frame::ViewFrame;
+use softgrasp_window::view::eye_search::eye_on_squeeze;
+use softgrasp_window::view::frame::{HandView, ViewFrame};
 use softgrasp_window::view::moment::{Moment, Watch};
 use softgrasp_window::view::object_skin::Look;
+use softgrasp_window::view::shading::Shading;
 use softgrasp_window::window::{Animation, Pictures, RgbImage, png};
 
 use super::display_arguments::DisplayArguments;
 use super::run_arguments::{RunArguments, RunPlan};
 use crate::object::file_writing::write_file;
 use crate::pace::Due;
-use crate::run::grasp_loop::GraspLoop;
-use crate::run::observer::Observer;
+use crate::run::observer::{Foresight, Observer};
+use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;
 
 /// Draws what was asked for, tick by tick.
@@ -24,6 +28,13 @@ pub(super) struct RunPictures {
     display: Display,
     /// `None` until the first hand places the eye.
     camera: Option<ViewCamera>,
+    eye_is_chosen: bool,
+    /// The squeeze that the eye is placed for, and the eye that it goes to.
+    placed_for: Option<Arc<HandView>>,
+    aimed: Option<ViewCamera>,
+    foresight: Foresight,
+    /// A moving picture shows strain while the hand squeezes.
+    directs_colours: bool,
     observer: Observer,
     snapshot: Option<Snapshot>,
     frames_dir: Option<PathBuf>,
@@ -34,7 +45,7 @@ pub(super) struct RunPictures {
 struct Snapshot {
     path: PathBuf,
     watch: Watch,
-    /// The tick that is the moment if no later one is.
+    /// The last tick so far that the snapshot could be of; a later tick may take its place.
     kept: Option<Box<ViewFrame>>,
     /// Paths of light a pixel, where light is traced.
     paths: Option<u32>,
@@ -42,6 +53,8 @@ struct Snapshot {
     moment: Option<Moment>,
 }
 
+/// Part of its way that an eye goes in a tick.
+const EYE_SHARE: f64 = 0.06;
 /// Ticks from one picture of an animation to the next: 15 a second where there are 60 ticks.
 const ANIMATED_TICKS: u64 = 4;
 
@@ -75,6 +88,11 @@ impl RunPictures {
             display: Display { level: level(shown, &pictures), ..shown.display() },
             pictures,
             camera: shown.eye.map(|_| shown.camera()),
+            eye_is_chosen: shown.eye.is_some(),
+            placed_for: None,
+            aimed: None,
+            foresight: Foresight::default(),
+            directs_colours: shown.shading.is_none(),
             observer: Observer::default(),
             snapshot,
             frames_dir: shown.frames_dir.clone(),
@@ -91,11 +109,18 @@ impl RunPictures {
         due: Due,
         now_s: f64,
         outcome: &TickOutcome,
-        grasp_loop: &GraspLoop,
+        session: &Session,
     ) -> anyhow::Result<()> {
         self.observer.note(due, outcome);
-        let frame = self.observer.frame(due, now_s, outcome, grasp_loop);
+        let mut frame = self.observer.frame(due, now_s, outcome, session.grasp_loop());
+        frame.acts = self.foresight.acts(session.hand(), session.grasp_loop());
         let camera = self.camera(&frame);
+        if self.animation.is_some() && self.directs_colours {
+            self.display.shading = match frame.grasp.state {
+                Some(StateName::Deforming) => Shading::Strain,
+                _ => Shading::Plain,
+            };
+        }
         let animates = self.animation.is_some() && due.tick.is_multiple_of(ANIMATED_TICKS);
         if self.frames_dir.is_some() || animates {
             let picture = self.pictures.draw(&frame, &self.display, &camera);
@@ -131,8 +156,26 @@ impl RunPictures {
         Ok(())
     }
 
-    /// Where the eye is: where it was asked to be, or beside the first hand.
+    /// Where the eye is: where it was asked to be, where it sees most of the squeeze, or beside the
+    /// first hand that has no plan.
     fn camera(&mut self, frame: &ViewFrame) -> ViewCamera {
+        if self.eye_is_chosen {
+            return self.camera.unwrap_or_default();
+        }
+        if let Some(squeezing) = &frame.acts.squeezing {
+            if self.placed_for.as_ref().is_none_or(|before| !Arc::ptr_eq(before, squeezing)) {
+                self.placed_for = Some(Arc::clone(squeezing));
+                let object = &frame.object;
+                let to = eye_on_squeeze(&object.rest, &object.world_from_object, squeezing);
+                self.aimed = Some(to);
+            }
+            // An eye that has to go elsewhere goes there in about a second.
+            self.camera = match (self.camera, self.aimed) {
+                (Some(now), Some(to)) => Some(now.toward(&to, EYE_SHARE)),
+                (None, aimed) => aimed,
+                (now, None) => now,
+            };
+        }
         self.camera = self.camera.or_else(|| frame.eye_beside_hand());
         self.camera.unwrap_or_default()
     }

@@ -5,11 +5,12 @@ use std::path::Path;
 use anyhow::ensure;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_hand::loaded_object::LoadedObject;
-use softgrasp_hand::recording::{RecordedSetup, Recorder, VERSION};
+use softgrasp_hand::recording::{RecordedFriction, RecordedSetup, Recorder, VERSION};
 
 use super::run_arguments::RunPlan;
 use crate::ask::digest::Digest;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
+use crate::object::object_place::ObjectPlace;
 
 /// Begins the recording of a run.
 ///
@@ -40,6 +41,14 @@ pub(super) fn start_recorder(
         law: elasticity.law.to_string(),
         yield_pa: elasticity.yield_stress,
         max_error: *max_error,
+        placed_in_hand: plan.place == ObjectPlace::Hand,
+        friction: plan.contact_scene.map(|scene| RecordedFriction {
+            friction: scene.friction,
+            finger_compliance_m_n: scene.finger_compliance,
+            density_kg_m3: scene.density,
+            viscosity_s: scene.viscosity,
+            gravity: scene.gravity.into(),
+        }),
         hand,
         period_s: plan.period.map(|period| period.as_secs_f64()),
         hand_setup: plan.hand_configuration.to_text(),

@@ -27,6 +27,7 @@ use crate::commands::interruption;
 use crate::object::loading::load;
 use crate::pace::Pace;
 use crate::pace::tick_budget::Priority;
+use crate::run::contact_grasp::ContactScene;
 use crate::run::grasp_loop::GraspLoop;
 use crate::run::run_report::RunReport;
 use crate::run::session::{Session, priority_for};
@@ -52,10 +53,14 @@ pub(super) enum SetupStage {
 pub(super) struct Setup {
     /// File that the run is recorded to.
     pub(super) record: Option<PathBuf>,
+    /// File for a report of every tick.
+    pub(super) report: Option<PathBuf>,
     /// Threads of an embedded server; `None` takes one per processor.
     pub(super) threads: Option<usize>,
     /// Whether it ends with the script.
     pub(super) ends_with_script: bool,
+    /// How many times as long a script squeezes and holds.
+    pub(super) squeeze_times: u32,
 }
 
 /// Makes a run ready; says at which stage it is. `seen` is shown the object before the first tick.
@@ -84,7 +89,7 @@ pub(super) fn make_ready(
         recorder.map(|path| start_recorder(path, plan, &loaded, hand_name)).transpose()?;
     let LoadedObject { summary, mut object, plan: grip, .. } = loaded;
     seen(&object)?;
-    let hand = hand_of(plan, grip)?;
+    let hand = hand_of(plan, setup, grip)?;
     let priority = match plan.pace {
         Pace::Lockstep => Priority::Ordinary,
         Pace::Free => priority_for(&mut object)?,
@@ -103,13 +108,16 @@ pub(super) fn make_ready(
     if std::io::stderr().is_terminal() {
         summary.notes.iter().for_each(|note| eprintln!("glove-client: {note}"));
     }
-    let report = RunReport::new(
+    let mut report = RunReport::new(
         summary,
         hand.name(),
         plan.server.to_string(),
         plan.pace,
         plan.settings.contact,
     );
+    if let Some(path) = &setup.report {
+        report.played.keep_older(path);
+    }
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M)?;
     let reader = match plan.is_live {
         true => HandReader::of_devices(hand_setup, plan.world_from_sender),
@@ -118,6 +126,11 @@ pub(super) fn make_ready(
     let settings = plan.settings.clone();
     let mut grasp_loop = GraspLoop::try_new(reader, object, grasp, link, settings, plan.pace)
         .context("cannot start a thread beside the ticks")?;
+    if let Some(scene) = plan.contact_scene {
+        let table_y = Some(grasp_loop.object().rest_shape().bottom());
+        grasp_loop.grasp_with_friction(ContactScene { table_y, ..scene });
+    }
+    grasp_loop.put_object(plan.place);
     if let Some(period) = plan.period {
         grasp_loop.tick_every(period);
     }
@@ -129,7 +142,11 @@ pub(super) fn make_ready(
 }
 
 /// The hand of a run; `grip` is how the scripted one grasps the object.
-fn hand_of(plan: &RunPlan, grip: Result<GraspPlan, NoGrasp>) -> anyhow::Result<HandSource> {
+fn hand_of(
+    plan: &RunPlan,
+    setup: &Setup,
+    grip: Result<GraspPlan, NoGrasp>,
+) -> anyhow::Result<HandSource> {
     let hand_setup = &plan.hand_configuration.setup;
     let planner = || Planner::beside().context("cannot start the planner's thread");
     let contact = plan.settings.contact;
@@ -138,10 +155,12 @@ fn hand_of(plan: &RunPlan, grip: Result<GraspPlan, NoGrasp>) -> anyhow::Result<H
             MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).holding(contact).into()
         }
         (HandRequest::Scripted(script), Pace::Lockstep) => {
-            ScriptedHand::following(*script, hand_setup.clone(), grip?).holding(contact).into()
+            let hand = ScriptedHand::following(*script, hand_setup.clone(), grip?);
+            hand.squeezing_longer(setup.squeeze_times).holding(contact).into()
         }
         (HandRequest::Scripted(script), Pace::Free) => {
             let hand = ScriptedHand::following(*script, hand_setup.clone(), grip?);
+            let hand = hand.squeezing_longer(setup.squeeze_times);
             hand.holding(contact).with_planner(planner()?).into()
         }
         (HandRequest::Serial(source), _) => {

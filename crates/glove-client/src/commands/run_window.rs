@@ -6,14 +6,16 @@ use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::loaded_object::LoadStage;
 use softgrasp_os::one_line;
 use softgrasp_window::view::control::Control;
 use softgrasp_window::view::loading::LoadObject;
 use softgrasp_window::view::outlet::outlet;
-use softgrasp_window::window::{About, App, Opening, Start, Started, Ticks, WhenLost};
+use softgrasp_window::window::{
+    About, App, End, Opening, SQUEEZE_TIMES, Start, Started, Ticks, WhenLost,
+};
 
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
@@ -21,8 +23,9 @@ use super::tell_report::tell;
 use crate::ask::connection::{Host, ServerChoice};
 use crate::commands::interruption;
 use crate::object::loading::{ObjectRequest, load};
-use crate::run::observer::Observer;
+use crate::run::observer::{Foresight, Observer};
 use crate::run::run_report::RunReport;
+use crate::run::run_words::{words_of_contact, words_of_server};
 use crate::run::tick_loop::Timing;
 use crate::run::tick_thread::TickThread;
 
@@ -44,6 +47,7 @@ pub(super) fn show(
         display: arguments.shown.display(),
         camera: arguments.shown.camera(),
         eye_is_chosen: arguments.shown.eye.is_some(),
+        shading_is_chosen: arguments.shown.shading.is_some(),
         level_is_chosen: arguments.shown.light.is_some(),
         object: plan.object.clone(),
         contact: plan.settings.contact,
@@ -68,8 +72,13 @@ pub(super) fn show(
 
 /// Loads other objects of the same size.
 fn load_beside(request: ObjectRequest) -> LoadObject {
-    Arc::new(move |choice, goes_on| {
-        let request = ObjectRequest { choice, ..request.clone() };
+    Arc::new(move |wish, goes_on| {
+        let request = ObjectRequest {
+            choice: wish.choice,
+            nodes: wish.nodes.unwrap_or(request.nodes),
+            size_m: wish.size_m.or(request.size_m),
+            ..request.clone()
+        };
         load(&request, goes_on).map_err(|error| error.to_string()).transpose()
     })
 }
@@ -87,11 +96,11 @@ fn in_window(thread: &mut TickThread, report: Option<PathBuf>) -> Ticks {
     }
 }
 
-/// Lets a run whose display was lost go on to the end of its script, tells how it ended, and ends the
-/// process with its exit code.
+/// Lets a run whose window ended go on to the end of its script, tells how it ended, and ends the
+/// process: with the run's exit code where the display went, with 1 where the window failed.
 fn when_lost(thread: &TickThread, report: Option<PathBuf>) -> WhenLost {
     let (controls, end) = (thread.controls(), thread.run_end());
-    Box::new(move || {
+    Box::new(move |window| {
         // A run that is over does not hear it.
         let _ = controls.send(Control::EndWithScript);
         while !end.is_there() {
@@ -101,7 +110,15 @@ fn when_lost(thread: &TickThread, report: Option<PathBuf>) -> WhenLost {
             std::thread::sleep(LOOK_EVERY);
         }
         let ended = end.wait().map_err(anyhow::Error::from);
-        let told = ended.and_then(|ran| tell(report.as_deref(), &ran));
+        let told = ended.and_then(|mut ran| {
+            // Nobody has closed the window.
+            ran.interrupted &= interruption::asked();
+            tell(report.as_deref(), &ran)
+        });
+        let told = told.and_then(|()| match window {
+            End::DisplayLost => Ok(()),
+            End::Failed(why) => Err(anyhow!("{why}; this is a fault of the program")),
+        });
         if let Err(error) = &told {
             eprintln!("glove-client: {}", one_line(error.as_ref()));
         }
@@ -118,30 +135,42 @@ fn start(
     let plan = plan.for_window();
     let report = arguments.report.clone();
     let record = arguments.record.clone();
-    let setup = Setup { record, threads: arguments.threads, ends_with_script: false };
+    let setup = Setup {
+        record,
+        report: arguments.report.clone(),
+        threads: arguments.threads,
+        ends_with_script: false,
+        squeeze_times: SQUEEZE_TIMES,
+    };
     let timing = Timing { period: plan.period, ticks_max: arguments.frames };
+    // What is recorded, or counted in ticks, is one story.
+    let begins_anew = arguments.record.is_none() && arguments.frames.is_none();
     Start::begin(move |at| {
-        let ReadyRun { session, host } =
+        let ReadyRun { mut session, host } =
             make_ready(&plan, &setup, |stage| at(step(stage)), |_| Ok(()))?;
+        session.await_model();
         let about = About {
             object: plan.object.to_string(),
-            server: plan.server.to_string(),
-            contact: plan.settings.contact.to_string(),
+            server: words_of_server(&plan.server.to_string()),
+            contact: words_of_contact(&plan.settings.contact.to_string()),
+            is_lifted: plan.contact_scene.is_some(),
             material: plan.elastic_material()?,
             hand: plan.hand.choice(),
             method: plan.settings.method.to_string(),
             max_error: None,
             tick_s: plan.tick_s(),
+            begins_anew,
             server_stage: server_stage(&plan.server, &host),
         };
         let (mut out, inlet) = outlet(FRAMES_EVERY);
-        let mut observer = Observer::default();
+        let (mut observer, mut foresight) = (Observer::default(), Foresight::default());
         let sink = move |session: &crate::run::session::Session, outcome: &_, due, now_s| {
             // The server lives as long as the ticks.
             let _ = &host;
             observer.note(due, outcome);
             if out.is_due() {
-                let frame = observer.frame(due, now_s, outcome, session.grasp_loop());
+                let mut frame = observer.frame(due, now_s, outcome, session.grasp_loop());
+                frame.acts = foresight.acts(session.hand(), session.grasp_loop());
                 out.publish(Box::new(frame));
             }
         };

@@ -1,7 +1,7 @@
 //! Writes a file completely, or leaves an older one as it was.
 
 use std::fs::File;
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -31,17 +31,29 @@ pub enum FileWriteError {
 /// # Errors
 /// [`FileWriteError`] with the path and the system's reason.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), FileWriteError> {
+    write_file_by(path, |file| file.write_all(bytes))
+}
+
+/// The same for a file that need not be in memory as a whole: `write` writes it piece by piece.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn write_file_by(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), FileWriteError> {
     let system = |source| FileWriteError::System { path: path.to_owned(), source };
     if path.is_dir() {
         return Err(FileWriteError::Directory { path: path.to_owned() });
     }
     // Devices and pipes (/dev/stdout) cannot be replaced by renaming.
     if path.exists() && !path.is_file() {
-        return std::fs::write(path, bytes).map_err(system);
+        let open = File::options().write(true).open(path);
+        return open.and_then(|mut device| buffered(&mut device, write)).map_err(system);
     }
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let part = beside(&target);
-    let written = write_and_sync(&part, bytes, &target)
+    let written = write_and_sync(&part, write, &target)
         .and_then(|()| std::fs::rename(&part, &target))
         .and_then(|()| sync_folder(&target));
     if written.is_err() {
@@ -61,13 +73,26 @@ fn beside(path: &Path) -> PathBuf {
 }
 
 /// Writes the bytes so that they lie on the disk, with the permissions of the file they are to replace.
-fn write_and_sync(part: &Path, bytes: &[u8], replaces: &Path) -> std::io::Result<()> {
+fn write_and_sync(
+    part: &Path,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+    replaces: &Path,
+) -> std::io::Result<()> {
     let mut file = File::create_new(part)?;
-    file.write_all(bytes)?;
+    buffered(&mut file, write)?;
     if let Ok(older) = std::fs::metadata(replaces) {
         file.set_permissions(older.permissions())?;
     }
     file.sync_all()
+}
+
+fn buffered(
+    file: &mut File,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let mut pieces = BufWriter::new(file);
+    write(&mut pieces)?;
+    pieces.flush()
 }
 
 /// Makes a new name in a folder lie on the disk as well.

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use softgrasp_grasp::object::{ContactModel, ObjectChoice, ObjectError, SoftObject};
+use softgrasp_grasp::object::{ContactModel, ObjectChoice, ObjectError, SoftObject, lying};
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject, ObjectSummary};
 use softgrasp_hand::scripted::{NoGrasp, PlanRequest};
@@ -40,6 +40,9 @@ pub enum LoadError {
 const ENLARGE: f64 = 1.25;
 const ENLARGED_MAX_M: f64 = 0.2;
 
+/// An object that is turned by less than this lies as it was, rad.
+const TURN_WORTH_SAYING: f64 = 1e-3;
+
 /// Makes an object ready; says at which stage it is, and asks whether to go on: a caller who does
 /// not want it any more gets `None` soon.
 ///
@@ -57,7 +60,15 @@ pub fn load(
         if !goes_on(LoadStage::Mesh) {
             return Ok(None);
         }
-        let SceneObject { mesh, notes } = load_object(choice, *nodes, size)?;
+        let SceneObject { mut mesh, mut notes } = load_object(choice, *nodes, size)?;
+        if *contact == ContactModel::Friction {
+            let (lies, turn) = lying(&mesh).map_err(ObjectError::Shape)?;
+            mesh = lies;
+            if turn.angle() > TURN_WORTH_SAYING {
+                let degrees = turn.angle().to_degrees();
+                notes.push(format!("turned by {degrees:.0}° so that it lies on the table"));
+            }
+        }
         let summary = ObjectSummary {
             name: choice.to_string(),
             nodes: mesh.node_count(),
@@ -73,9 +84,7 @@ pub fn load(
             return Ok(None);
         }
         let rest = Arc::clone(object.rest_shape());
-        let plan =
-            PlanRequest { object: rest, setup: setup.clone(), contact: *contact, avoid_gaze: None };
-        let plan = plan.grip();
+        let plan = PlanRequest::new(rest, setup.clone(), *contact).grip();
         match plan {
             Err(NoGrasp::OutOfReach { extent_m })
                 if size_m.is_none()

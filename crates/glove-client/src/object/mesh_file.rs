@@ -3,7 +3,9 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use softgrasp_core::fill::FillError;
 use softgrasp_core::mesh_io::{self, Companion, MeshFile, MeshFileError};
+use softgrasp_core::surface::SurfaceError;
 
 /// Why a mesh file gives no mesh.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +21,24 @@ pub enum MeshFileReadError {
     /// Its content is no usable mesh; the message names the file.
     #[error(transparent)]
     Parse(#[from] MeshFileError),
+    /// Its surface cannot be filled.
+    #[error("{path}: {source}")]
+    Fill {
+        /// As given.
+        path: PathBuf,
+        /// Why not.
+        source: FillError,
+    },
+    /// Its surface cannot be scaled.
+    #[error("{path} cannot be scaled by {scale}: {source}")]
+    Scale {
+        /// As given.
+        path: PathBuf,
+        /// The factor.
+        scale: f64,
+        /// What broke.
+        source: SurfaceError,
+    },
 }
 
 /// Reads a mesh file of any known format, with the files beside it that it needs.
@@ -26,13 +46,18 @@ pub enum MeshFileReadError {
 /// # Errors
 /// [`MeshFileReadError`] in one line that names file and place.
 pub fn read_mesh_file(path: &Path) -> Result<MeshFile, MeshFileReadError> {
-    let read_error = |source| MeshFileReadError::Read { path: path.to_owned(), source };
-    let bytes = std::fs::read(path).map_err(read_error)?;
+    let bytes = read_bytes(path)?;
     let mut companion = |wanted: &Companion| std::fs::read(companion_path(path, wanted)).ok();
     Ok(mesh_io::parse(&path.display().to_string(), &bytes, &mut companion)?)
 }
 
-fn companion_path(path: &Path, wanted: &Companion) -> PathBuf {
+/// All bytes of a file.
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshFileReadError> {
+    std::fs::read(path).map_err(|source| MeshFileReadError::Read { path: path.to_owned(), source })
+}
+
+/// Where a file that another one names is looked for.
+pub(super) fn companion_path(path: &Path, wanted: &Companion) -> PathBuf {
     match wanted {
         Companion::Extension(extension) => path.with_extension(extension),
         // Only files beside the mesh: a name from inside a file must not reach other folders.

@@ -5,6 +5,8 @@ pub mod loading;
 pub mod mesh_file;
 pub mod mesh_writing;
 pub mod object_changes;
+pub mod object_file;
+pub mod object_place;
 pub mod object_work;
 pub mod saving;
 pub mod scene;

@@ -22,6 +22,10 @@ pub struct ObjectChanges {
 pub enum Replacement {
     /// Its rest shape before the last one was kept.
     EarlierShape,
+    /// Its rest shape before the first one was kept.
+    FirstShape,
+    /// The same rest shape of another material.
+    OtherMaterial,
     /// Another object, by name.
     Other(String),
 }

@@ -5,17 +5,20 @@ use std::path::{Path, PathBuf};
 use nalgebra::Point3;
 use serde::Deserialize;
 use softgrasp_core::mesh::{Bodies, BuiltIn, GenerateError, MeshError, TetMesh, generate};
+use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_grasp::object::ObjectChoice;
 
-use crate::object::mesh_file::{MeshFileReadError, read_mesh_file};
+use crate::object::mesh_file::MeshFileReadError;
+use crate::object::object_file::{ObjectFile, read_object_file};
 
 /// A scene; every field can also be set by a flag, which wins.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneFile {
-    /// cube, sphere, strawberry, toothpaste, or a mesh file (relative to the scene file).
+    /// cube, sphere, strawberry, toothpaste, or a file of a mesh or a surface (relative to the scene
+    /// file).
     pub object: Option<String>,
-    /// Nodes of a built-in object.
+    /// Nodes of a built-in object or of a surface that is filled.
     pub nodes: Option<usize>,
     /// Longest extent, m; a mesh file is scaled to it.
     pub object_size_m: Option<f64>,
@@ -29,6 +32,12 @@ pub struct SceneFile {
     pub element: Option<String>,
     /// vertex, patch or mask.
     pub contact: Option<String>,
+    /// contact (with friction and weight) or thesis.
+    pub grasp: Option<String>,
+    /// Coefficient of friction of hand and table.
+    pub friction: Option<f64>,
+    /// Density, kg/m³.
+    pub density_kg_m3: Option<f64>,
     /// linear, large or auto.
     pub deformation: Option<String>,
     /// Law of large deformation: neo-hookean or neo-hookean-log.
@@ -144,28 +153,14 @@ pub fn load_object(
     let mut notes = Vec::new();
     let mesh = match choice {
         ObjectChoice::BuiltIn(shape) => generate(*shape, nodes)?,
-        ObjectChoice::File(path) => {
-            let file = read_mesh_file(path)?;
-            let findings = &file.findings;
-            notes.push(format!(
-                "{}: {}, {} nodes, {} tetrahedra",
-                path.display(),
-                file.format,
-                file.mesh.node_count(),
-                file.mesh.tets().len()
-            ));
-            if !findings.flipped.is_empty() {
-                notes.push(format!("{} inverted tetrahedra were turned", findings.flipped.len()));
+        ObjectChoice::File(path) => match read_object_file(path, nodes)? {
+            ObjectFile::Mesh(file) => read_mesh(path, &file, &mut notes),
+            ObjectFile::Surface(surface) => {
+                notes.push(surface.told(path));
+                notes.extend(surface.faults());
+                surface.filled.mesh
             }
-            let dropped = findings.degenerate.len() + findings.repeated.len();
-            if dropped > 0 {
-                notes.push(format!(
-                    "{dropped} tetrahedra without volume, or repeated, were dropped; `glove-client \
-                     inspect` lists them"
-                ));
-            }
-            largest_piece(&file.mesh, &mut notes)
-        }
+        },
     };
     let size_m = match choice {
         ObjectChoice::BuiltIn(_) => size_m,
@@ -177,6 +172,29 @@ pub fn load_object(
     let mesh =
         scaled_and_centred(&mesh, factor).map_err(|source| SceneError::Scale { size_m, source })?;
     Ok(SceneObject { mesh, notes })
+}
+
+/// The largest piece of a mesh file, with what is to be said of the file.
+fn read_mesh(path: &Path, file: &MeshFile, notes: &mut Vec<String>) -> TetMesh {
+    let findings = &file.findings;
+    notes.push(format!(
+        "{}: {}, {} nodes, {} tetrahedra",
+        path.display(),
+        file.format,
+        file.mesh.node_count(),
+        file.mesh.tets().len()
+    ));
+    if !findings.flipped.is_empty() {
+        notes.push(format!("{} inverted tetrahedra were turned", findings.flipped.len()));
+    }
+    let dropped = findings.degenerate.len() + findings.repeated.len();
+    if dropped > 0 {
+        notes.push(format!(
+            "{dropped} tetrahedra without volume, or repeated, were dropped; `glove-client inspect` \
+             lists them"
+        ));
+    }
+    largest_piece(&file.mesh, notes)
 }
 
 fn scaled_and_centred(mesh: &TetMesh, factor: f64) -> Result<TetMesh, MeshError> {

@@ -28,6 +28,11 @@ impl ShapeHistory {
         self.earlier.back()
     }
 
+    /// The first shape that is still known.
+    pub fn first(&self) -> Option<&Arc<RestShape>> {
+        self.earlier.front()
+    }
+
     /// The shape before has become the one there is.
     pub fn pop(&mut self) {
         self.earlier.pop_back();

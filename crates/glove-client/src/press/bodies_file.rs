@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use serde::Deserialize;
 use softgrasp_core::mesh::Surface;
 use softgrasp_core::rigid_body::{RigidMesh, RigidMeshError, RigidShape, ShapeError};
@@ -12,6 +12,7 @@ use softgrasp_protocol::BodyShape;
 
 use super::way::{Way, WayError};
 use crate::object::mesh_file::{MeshFileReadError, read_mesh_file};
+use crate::object::object_file::{holds_surface, read_surface_file};
 
 /// A rigid body of the file.
 #[derive(Clone, Debug)]
@@ -226,11 +227,18 @@ fn shape_of(folder: &Path, entry: &Entry) -> Result<(RigidShape, BodyShape), Bod
     })
 }
 
-/// The boundary surface of a mesh file as a rigid body.
+/// The boundary of a mesh file, or a closed surface file, as a rigid body.
 fn mesh_of(path: &Path) -> Result<(RigidShape, BodyShape), BodyError> {
-    let mesh = read_mesh_file(path)?.mesh;
-    let triangles = Surface::from_mesh(&mesh).triangles;
-    let vertices: Vec<Point3<f64>> = mesh.vertices().to_vec();
+    let (vertices, triangles) = match holds_surface(path)? {
+        true => {
+            let surface = read_surface_file(path)?.surface;
+            (surface.points().to_vec(), surface.triangles().to_vec())
+        }
+        false => {
+            let mesh = read_mesh_file(path)?.mesh;
+            (mesh.vertices().to_vec(), Surface::from_mesh(&mesh).triangles)
+        }
+    };
     let shape = RigidShape::Mesh(Arc::new(RigidMesh::try_new(&vertices, &triangles)?));
     let vertices = vertices.into_iter().map(Into::into).collect();
     Ok((shape, BodyShape::Mesh { vertices, triangles }))

@@ -35,7 +35,13 @@ impl GraspLoop {
                 question.method = method;
             }
         }
-        let large = self.large_ask();
+        let mut large = self.large_ask();
+        // A server that was started anew in the middle of a grip began at rest.
+        if let (Some(large), Some(recorded)) = (&mut large, &self.recorded)
+            && recorded.from_rest
+        {
+            large.path = PathChoice::FromRest;
+        }
         if large.is_some_and(|large| large.pace == FramePace::Timely) {
             question.deadline_ms = self.answer_within_ms;
         }
@@ -76,6 +82,11 @@ impl GraspLoop {
         taken.collect()
     }
 
+    /// Whether the tick, when it was recorded, got no shape that the object springs back to.
+    fn springback_was_refused(&self) -> bool {
+        self.recorded.as_ref().is_some_and(|recorded| recorded.springback_refused)
+    }
+
     /// Takes what has come from the server.
     pub(crate) fn pick_up(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
         let (events, ended) = self.link.take();
@@ -93,11 +104,22 @@ impl GraspLoop {
         }
         for RequestEnd { tick, reached } in self.take_ended(ended) {
             match reached {
+                Ok(_) if tick == SPRINGBACK && self.springback_was_refused() => {
+                    self.refuse_springback(outcome)?;
+                }
                 Ok(reached) if tick == SPRINGBACK => self.take_springback(*reached, outcome)?,
                 Err(_) if tick == SPRINGBACK => self.refuse_springback(outcome)?,
-                Ok(reached) => self.show(tick, *reached, outcome)?,
+                Ok(mut reached) => match reached.step.take() {
+                    Some(step) => self.take_step(tick, *reached, step, outcome)?,
+                    None => self.show(tick, *reached, outcome)?,
+                },
                 Err(_) if tick == UNCOUNTED => self.refuse_to_save_unanswered(outcome),
-                Err(why) => outcome.unanswered.push((tick, why)),
+                Err(why) => {
+                    if let Some(contact) = &mut self.contact {
+                        contact.give_up(tick);
+                    }
+                    outcome.unanswered.push((tick, why));
+                }
             }
         }
         Ok(())
@@ -112,6 +134,7 @@ impl GraspLoop {
     ) -> Result<(), ObjectError> {
         let Reached {
             rest_shape,
+            from_rest,
             nodes,
             displacement,
             reactions,
@@ -120,11 +143,13 @@ impl GraspLoop {
             large,
             round_trip,
             bytes,
+            step: _,
         } = reached;
         let ms = round_trip.as_secs_f64() * 1e3;
         if tick != UNCOUNTED {
             let summary = SolveSummary::new(&report, ms).with_large(large.as_ref());
             outcome.answers.push((tick, summary.with_bytes(bytes)));
+            outcome.from_rest.extend(from_rest.then_some(tick));
         }
         let current = rest_shape == self.object.rest_shapes()
             && self.deforming_since.is_some_and(|since| tick >= since)

@@ -23,16 +23,22 @@ use crate::ask::prefetch::Prefetched;
 use crate::ask::solve_settings::{AnswerWishes, SolveSettings, Subscription};
 use crate::ask::unanswered::Unanswered;
 use crate::object::object_changes::ObjectChanges;
+use crate::object::object_place::ObjectPlace;
 use crate::object::object_work::{ObjectJob, ObjectWork};
 use crate::pace::Pace;
+use crate::run::contact_grasp::ContactGrasp;
 use crate::run::keep::Keep;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
 /// The client between devices and server.
 pub struct GraspLoop {
-    reader: HandReader,
+    pub(crate) reader: HandReader,
     pub(crate) object: SoftObject,
     pub(crate) grasp: Grasp,
+    /// The grasp by contact with friction, which then takes the place of the thesis's rules.
+    pub(crate) contact: Option<Box<ContactGrasp>>,
+    /// Where the object is put when the first hand comes.
+    pub(crate) place: ObjectPlace,
     pub(crate) link: Link,
     pub(crate) settings: SolveSettings,
     pub(crate) wishes: AnswerWishes,
@@ -56,7 +62,7 @@ pub struct GraspLoop {
     pub(crate) prefetched: Prefetched,
     pub(crate) world_from_object: Isometry3<f64>,
     hand: Option<HandPose>,
-    shown_segments: HandSegments,
+    pub(crate) shown_segments: HandSegments,
     /// Devices that were silent in the last tick.
     silent: Vec<Device>,
     /// Whether digests of requests are wanted.
@@ -96,6 +102,8 @@ impl GraspLoop {
             reader,
             object,
             grasp,
+            contact: None,
+            place: ObjectPlace::Home,
             link,
             settings,
             wishes: AnswerWishes { max_error, ..AnswerWishes::default() },
@@ -148,7 +156,10 @@ impl GraspLoop {
 
     /// State of the grasp.
     pub fn state(&self) -> StateName {
-        self.grasp.state().name()
+        match &self.contact {
+            Some(contact) => contact.state_name(),
+            None => self.grasp.state().name(),
+        }
     }
 
     /// The hand as measured in the last tick.
@@ -225,8 +236,17 @@ impl GraspLoop {
         self.look_at_devices(now_s, &mut outcome);
         // Until both devices have spoken there is no hand to act with.
         let Some(hand) = self.reader.hand(now_s) else { return Ok(outcome) };
+        self.meet_first_hand(&hand, now_s);
         self.take_work(&mut outcome);
         let command = self.allowed(sent.command, &mut outcome);
+        // In lockstep a shape is kept in the next tick, and the hand goes on.
+        let keeping = self.pace == Pace::Free && !matches!(self.keep, Keep::NotWanted);
+        if self.contact.is_some() {
+            self.tick_with_friction(tick, now_s, &hand, command, &mut outcome)?;
+            self.hand = Some(hand);
+            outcome.seen.keeping = keeping;
+            return Ok(outcome);
+        }
         let step = self.step(&hand, command, &mut outcome);
         self.follow(tick, &step, &mut outcome)?;
         self.world_from_object = step.world_from_object;
@@ -257,6 +277,7 @@ impl GraspLoop {
         let tell = |device: &Device| format!("the {} speaks again", device.name());
         outcome.events.extend(back.map(tell).map(LoopEvent::Device));
         self.silent.clone_from(&outcome.silent);
+        outcome.events.extend(self.reader.take_news().into_iter().map(LoopEvent::Device));
     }
 
     fn step(
@@ -330,12 +351,7 @@ impl GraspLoop {
         if self.keep.is_dent() {
             return Ok(());
         }
-        (self.shown_tick, self.shown_forces) = (None, None);
-        if !matches!(self.keep, Keep::NotWanted) {
-            self.keep = Keep::NotWanted;
-            let text = "the hand let go before the shape could be kept";
-            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
-        }
+        self.stop_keeping(outcome);
         self.refuse_to_save_half(outcome);
         self.link.cancel();
         self.object.relax()
@@ -367,7 +383,11 @@ impl GraspLoop {
     }
 
     /// Lets the server prepare the columns of what a fingertip is about to touch.
-    fn prefetch(&mut self, tips_in_object: &[Point3<f64>; 5], outcome: &mut TickOutcome) {
+    pub(crate) fn prefetch(
+        &mut self,
+        tips_in_object: &[Point3<f64>; 5],
+        outcome: &mut TickOutcome,
+    ) {
         // Only condensed frames are made of columns.
         if !matches!(self.settings.method.as_str(), "auto" | "condensed") {
             return;

@@ -54,6 +54,16 @@ impl GraspLoop {
         });
     }
 
+    /// Nothing deforms the object any more: a shape that waits to be kept is not kept.
+    pub(crate) fn stop_keeping(&mut self, outcome: &mut TickOutcome) {
+        (self.shown_tick, self.shown_forces) = (None, None);
+        if !matches!(self.keep, Keep::NotWanted) {
+            self.keep = Keep::NotWanted;
+            let text = "the hand let go before the shape could be kept";
+            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
+        }
+    }
+
     /// Takes what has been done beside the ticks.
     pub(crate) fn take_work(&mut self, outcome: &mut TickOutcome) {
         while let Some(done) = self.take_done() {

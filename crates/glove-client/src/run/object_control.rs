@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use softgrasp_grasp::grasp::GraspError;
+use softgrasp_core::fem::Material as ElasticMaterial;
+use softgrasp_grasp::grasp::{GraspError, StateName};
 use softgrasp_grasp::object::{ObjectError, RestShape};
 use softgrasp_hand::notice::Notice;
-use softgrasp_protocol::{MethodName, NodeChoice};
+use softgrasp_protocol::{Material, MethodName, NodeChoice};
 
-use crate::ask::solve_settings::{AnswerWishes, Subscription};
+use crate::ask::solve_settings::{AnswerWishes, Subscription, element_for_frames};
 use crate::object::object_changes::{Replacement, UNCOUNTED};
 use crate::object::object_work::{KeptShape, ObjectJob};
 use crate::object::saving::ShapeToSave;
@@ -33,6 +34,25 @@ impl GraspLoop {
         Ok(())
     }
 
+    /// Puts the object back to where it began, with the shape at rest that it began with. The news
+    /// come with a later tick.
+    ///
+    /// # Errors
+    /// Why not, in a sentence.
+    pub fn begin_anew(&mut self) -> Result<(), Notice> {
+        self.refuse_while_changing()?;
+        self.put_object_home();
+        if let Some(first) = self.changes.history.first().map(Arc::clone) {
+            self.begin_to_replace(first, Replacement::FirstShape);
+        }
+        Ok(())
+    }
+
+    /// Whether the object is what was asked for, and the server there and prepared for it.
+    pub fn is_object_ready(&self) -> bool {
+        self.is_connected() && self.is_model_prepared() && !self.changes.are_under_way()
+    }
+
     /// Puts another object in the place of this one; it will be at home and free. The news come
     /// with a later tick.
     ///
@@ -41,6 +61,25 @@ impl GraspLoop {
     pub fn replace_object(&mut self, rest: Arc<RestShape>, name: &str) -> Result<(), Notice> {
         self.refuse_while_changing()?;
         self.begin_to_replace(rest, Replacement::Other(name.to_owned()));
+        Ok(())
+    }
+
+    /// Makes the object of another material; what holds it goes on holding it. An element that is the
+    /// cheapest that does not lock follows Poisson's ratio. The news come with a later tick.
+    ///
+    /// # Errors
+    /// Why not, in a sentence.
+    pub fn set_material(&mut self, material: Material) -> Result<(), Notice> {
+        ElasticMaterial::try_new(material.young, material.poisson)
+            .map_err(|error| Notice::refused(format!("the material is not taken: {error}")))?;
+        self.refuse_while_changing()?;
+        let before = element_for_frames(self.settings.material.poisson);
+        if self.settings.element == before {
+            self.settings.element = element_for_frames(material.poisson);
+        }
+        self.settings.material = material;
+        let rest = Arc::clone(self.object.rest_shape());
+        self.begin_to_replace(rest, Replacement::OtherMaterial);
         Ok(())
     }
 
@@ -56,7 +95,13 @@ impl GraspLoop {
         let mut turned: Isometry3<f64> =
             about * rotation * about.inverse() * self.world_from_object;
         turned.rotation.renormalize();
-        self.grasp.place(turned)?;
+        match &mut self.contact {
+            Some(contact) if contact.state_name() == StateName::Deforming => {
+                return Err(GraspError::Held);
+            }
+            Some(contact) => contact.put(turned),
+            None => self.grasp.place(turned)?,
+        }
         self.world_from_object = turned;
         Ok(())
     }
@@ -64,6 +109,9 @@ impl GraspLoop {
     /// Lets go of the object where it is, because the hand is replaced.
     pub fn let_object_go(&mut self) {
         self.grasp.let_go();
+        if let Some(contact) = &mut self.contact {
+            contact.let_go();
+        }
     }
 
     /// Lets go of the object and puts it back to where it began.
@@ -74,6 +122,7 @@ impl GraspLoop {
         if self.grasp.place(home).is_ok() {
             self.world_from_object = home;
         }
+        self.lay_another_object();
     }
 
     /// Saves the object as it is now, whole. Where the inside is not known it is asked for first.
@@ -151,9 +200,20 @@ impl GraspLoop {
         let text = match self.changes.replacement.take() {
             // Nobody waits for it.
             None => return,
+            Some(Replacement::OtherMaterial) => {
+                self.refuse_to_save_half(outcome);
+                self.show_from_now_on(made);
+                (self.deforming_since, self.keep) = (None, Keep::NotWanted);
+                outcome.events.push(LoopEvent::Shape(words_of_material(self.settings.material)));
+                return;
+            }
             Some(Replacement::EarlierShape) => {
                 self.changes.history.pop();
                 "the object has the shape back that it had before".to_owned()
+            }
+            Some(Replacement::FirstShape) => {
+                self.changes.history.clear();
+                "the object has the shape back that it began with".to_owned()
             }
             Some(Replacement::Other(name)) => {
                 self.changes.history.clear();
@@ -237,4 +297,9 @@ impl GraspLoop {
             displacement: self.object.displacement().to_vec(),
         }));
     }
+}
+
+fn words_of_material(material: Material) -> String {
+    let Material { young, poisson } = material;
+    format!("the object is now of {} kPa, Poisson's ratio {poisson}", 1e-3 * young)
 }

@@ -3,14 +3,51 @@
 use std::sync::Arc;
 
 use softgrasp_grasp::grasp::StateName;
+use softgrasp_hand::hand_source::HandSource;
+use softgrasp_hand::scripted::GraspPlan;
 use softgrasp_protocol::solve_report::SolveSummary;
 use softgrasp_window::view::frame::{
-    GraspView, HandView, LinkHealth, News, NewsKind, ObjectView, ServerView, TickTiming, ViewFrame,
+    GraspView, HandActs, HandView, LinkHealth, News, NewsKind, ObjectView, ServerView, TickTiming,
+    ViewFrame,
 };
 
 use crate::pace::Due;
 use crate::run::grasp_loop::GraspLoop;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
+
+/// The hand as it will squeeze the object, made anew when its plan changes.
+#[derive(Default)]
+pub struct Foresight {
+    made_for: Option<GraspPlan>,
+    squeezing: Option<Arc<HandView>>,
+}
+
+impl Foresight {
+    /// What the hand of a run does by itself.
+    pub fn acts(&mut self, hand: &HandSource, grasp_loop: &GraspLoop) -> HandActs {
+        let plan = hand.plan();
+        if plan != self.made_for {
+            self.made_for = plan;
+            self.squeezing = plan.map(|plan| {
+                let setup = grasp_loop.reader().setup();
+                let centre = grasp_loop.object().rest_shape().centre();
+                let in_object = plan.squeezing(setup, centre);
+                let mut seen = HandView::of_pose(setup.dimensions, &in_object);
+                let world_from_object = grasp_loop.world_from_object();
+                seen.world_from_palm = world_from_object * seen.world_from_palm;
+                for segment in seen.world_from_segment.iter_mut().flatten() {
+                    *segment = world_from_object * *segment;
+                }
+                Arc::new(seen)
+            });
+        }
+        HandActs {
+            story_is_over: hand.is_over(),
+            is_on_its_way: hand.is_on_its_way(),
+            squeezing: self.squeezing.clone(),
+        }
+    }
+}
 
 /// What is to be told with the next frame, gathered tick by tick.
 #[derive(Default)]
@@ -19,12 +56,19 @@ pub struct Observer {
     timings: Vec<TickTiming>,
     solve: Option<SolveSummary>,
     ticks_skipped: u64,
+    /// What was heard of the server last.
+    said: Option<String>,
 }
 
 impl Observer {
     /// Takes note of a tick, whether or not it becomes a frame.
     pub fn note(&mut self, due: Due, outcome: &TickOutcome) {
         self.ticks_skipped += due.skipped;
+        let heard = outcome.events.iter().rev().find_map(|event| match event {
+            LoopEvent::Server(text) => Some(text.clone()),
+            _ => None,
+        });
+        self.said = heard.or(self.said.take());
         self.news.extend(outcome.events.iter().map(|event| news(due.tick, event)));
         for (tick, solve) in &outcome.answers {
             self.timings.push(TickTiming::new(*tick, solve));
@@ -53,6 +97,7 @@ impl Observer {
                 displacement: object.displacement().to_vec(),
                 whole: object.is_whole(),
                 world_from_object: *grasp_loop.world_from_object(),
+                table_y: grasp_loop.contact_grasp().and_then(|contact| contact.scene().table_y),
             },
             hand: grasp_loop.hand().map(|hand| HandView {
                 dimensions: setup.dimensions,
@@ -74,7 +119,9 @@ impl Observer {
                 shown_tick: outcome.shown_tick,
                 ticks_skipped: self.ticks_skipped,
                 device_faults: faults.glove + faults.tracker,
+                said: self.said.clone(),
             },
+            acts: HandActs::default(),
             news: std::mem::take(&mut self.news),
             timings: std::mem::take(&mut self.timings),
         }
@@ -96,8 +143,12 @@ fn news(tick: u64, event: &LoopEvent) -> News {
         LoopEvent::Grasp(event) => (event.to_string(), NewsKind::Grasp),
         LoopEvent::KeepRefused(text) => (text.clone(), NewsKind::Refusal),
         LoopEvent::Device(text) => (text.clone(), NewsKind::Information),
-        LoopEvent::Server(text) if text.starts_with("lost") || text.starts_with("refused") => {
-            (format!("the server: {text}"), NewsKind::Refusal)
+        LoopEvent::Server(text) if text.starts_with("lost") => {
+            let said = "the server is gone; the window looks for it again (F2 tells what happened)";
+            (said.to_owned(), NewsKind::Refusal)
+        }
+        LoopEvent::Server(text) if text.starts_with("refused") => {
+            (format!("the server {text}"), NewsKind::Refusal)
         }
         LoopEvent::Server(text) | LoopEvent::Shape(text) => (text.clone(), NewsKind::Information),
     };

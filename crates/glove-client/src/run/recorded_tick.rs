@@ -1,7 +1,11 @@
 //! What a recording keeps of a tick, in plain numbers.
 
+use softgrasp_core::mesh::Surface;
+use softgrasp_grasp::hand::HandPose;
+use softgrasp_grasp::object::SoftObject;
 use softgrasp_hand::recording::{
-    AnswerSeen, EventSeen, PoseSeen, StageDigests, TickNews, TickSeen,
+    AnswerSeen, EventSeen, HandSeen, PoseSeen, SPRINGBACK_REFUSED, SceneSeen, StageDigests,
+    SurfaceSeen, TickNews, TickSeen,
 };
 
 use crate::ask::digest::Digest;
@@ -39,13 +43,18 @@ pub fn news(outcome: &TickOutcome) -> TickNews {
         element: solve.element.to_owned(),
         residual_rel: solve.residual_rel,
         round_trip_ms: solve.round_trip_ms,
+        from_rest: outcome.from_rest.contains(tick),
     });
     let springback = outcome.sprung_back.then(|| AnswerSeen {
         tick: SPRINGBACK,
-        method: "springback".to_owned(),
+        method: match outcome.springback_refused {
+            true => SPRINGBACK_REFUSED.to_owned(),
+            false => "springback".to_owned(),
+        },
         element: String::new(),
         residual_rel: 0.0,
         round_trip_ms: 0.0,
+        from_rest: false,
     });
     let events = outcome.events.iter().map(|event| {
         let (kind, what) = event.kind_and_words();
@@ -58,18 +67,51 @@ pub fn news(outcome: &TickOutcome) -> TickNews {
     }
 }
 
-/// Where hand and object are after a tick; `None` until both devices have spoken.
-pub fn pose(tick: u64, grasp_loop: &GraspLoop) -> Option<PoseSeen> {
+/// Hand and object after a tick, the object with its surface or without; `None` until both devices have
+/// spoken.
+///
+/// Units: `now_s` s on the client's clock.
+pub fn scene(
+    tick: u64,
+    now_s: f64,
+    grasp_loop: &GraspLoop,
+    with_surface: bool,
+) -> Option<SceneSeen> {
+    let (angles, _) = grasp_loop.reader().measured(now_s)?;
     let hand = grasp_loop.hand()?;
+    Some(SceneSeen {
+        pose: pose(tick, hand, grasp_loop),
+        hand: HandSeen {
+            world_from_palm: hand.world_from_palm,
+            world_from_segments: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
+            angles_rad: angles.to_array(),
+            dimensions: grasp_loop.reader().setup().dimensions,
+        },
+        world_from_object: *grasp_loop.world_from_object(),
+        surface: with_surface.then(|| surface(grasp_loop.object())),
+    })
+}
+
+/// The deformed surface, with its nodes numbered anew.
+fn surface(object: &SoftObject) -> SurfaceSeen {
+    let Surface { nodes, triangles, .. } = object.surface();
+    let place_of = |node: &u32| nodes.binary_search(node).map_or(0, |place| place as u32);
+    SurfaceSeen {
+        points: nodes.iter().map(|&node| object.shape()[node as usize]).collect(),
+        triangles: triangles.iter().map(|t| [0, 1, 2].map(|corner| place_of(&t[corner]))).collect(),
+    }
+}
+
+fn pose(tick: u64, hand: &HandPose, grasp_loop: &GraspLoop) -> PoseSeen {
     let (palm, object) = (hand.world_from_palm, grasp_loop.world_from_object());
-    Some(PoseSeen {
+    PoseSeen {
         tick,
         palm_m: palm.translation.vector.into(),
         palm_xyzw: palm.rotation.coords.into(),
         fingertips_m: hand.fingers.map(|finger| finger.tip().into()),
         object_m: object.translation.vector.into(),
         object_xyzw: object.rotation.coords.into(),
-    })
+    }
 }
 
 /// Digests of a tick that has just been played.

@@ -1,7 +1,7 @@
 //! The report of a run in words, for a person who has never seen the program.
 
 use crate::pace::Pace;
-use crate::run::run_report::{EventRecord, ReplaySummary, RunReport};
+use crate::run::run_report::{ReplaySummary, RunReport};
 
 impl RunReport {
     /// Why the run is a failure: answers were asked for and none came. `None` if it is none.
@@ -9,16 +9,19 @@ impl RunReport {
         if let Some(why) = &self.recording_failed {
             return Some(why.clone());
         }
+        if let Some(why) = &self.no_hand {
+            let why = match &why[..] {
+                [] => "its devices sent nothing that tells where it is".to_owned(),
+                why => why.join("; "),
+            };
+            return Some(format!("there was never a hand: {why}"));
+        }
         let s = &self.summary;
         if s.solves > 0 || s.deforming_ticks == 0 || self.interrupted {
             return None;
         }
-        let said = |event: &&EventRecord| {
-            event.kind == "server"
-                && ["refused ", "lost: "].iter().any(|w| event.what.starts_with(w))
-        };
-        let why = match self.events.iter().rfind(said) {
-            Some(event) => format!("the server {}", event.what.replacen("lost", "was lost", 1)),
+        let why = match &self.last_failure {
+            Some(what) => format!("the server {}", what.replacen("lost", "was lost", 1)),
             None => {
                 s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
             }
@@ -29,17 +32,16 @@ impl RunReport {
     /// One screen for a person who has never seen the program.
     pub fn describe(&self) -> String {
         let s = &self.summary;
-        let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
-        let solve = self.played.iter().rev().find_map(|record| record.solve.as_ref());
         let mut text = format!(
-            "\n{} ({} nodes, {} tetrahedra, {:.0} mm) in the {} hand, held by {}, solved by {}\n",
+            "\n{} ({} nodes, {} tetrahedra, {:.0} mm), grasped by the hand {}\n  \
+             a fingertip holds {}; solved {}\n",
             self.object.name,
             self.object.nodes,
             self.object.tets,
             1e3 * self.object.size_m,
             self.hand,
-            self.contact,
-            self.server
+            words_of_contact(&self.contact),
+            words_of_server(&self.server)
         );
         for note in &self.object.notes {
             text.push_str(&format!("  {note}\n"));
@@ -47,6 +49,9 @@ impl RunReport {
         text.push_str("\nWhat happened:\n");
         for event in &self.events {
             text.push_str(&format!("  tick {:>5}  {}\n", event.tick, event.what));
+        }
+        if self.events_left_out > 0 {
+            text.push_str(&format!("  and {} events more\n", self.events_left_out));
         }
         text.push_str(&format!("\n  ticks               {}", self.ticks));
         if s.ticks_skipped > 0 {
@@ -70,31 +75,38 @@ impl RunReport {
                 s.ticks_over_1_ms, s.compute_ms_max
             ));
         }
-        if let Some(solve) = solve {
-            text.push_str(&format!(
-                "  equations           {} unknown, {} prescribed, by {}\n  \
-                 answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
-                 residual            {:.1e} at most\n",
-                solve.unknown_dofs,
-                solve.known_dofs,
-                solve.method,
-                ms(s.round_trip_ms_p50),
-                ms(s.round_trip_ms_p99),
-                ms(s.round_trip_ms_max),
-                s.residual_rel_max,
-            ));
-            if let (Some(turned), Some(strain)) = (s.max_rotation_deg, s.max_strain) {
-                text.push_str(&format!(
-                    "  shape               turned by {turned:.1} degrees, strained by {:.0} % at most\n",
-                    100.0 * strain,
-                ));
-            }
-        }
+        text.push_str(&self.words_of_answers());
         text.push_str(&self.words_of_age());
         text.push_str(&self.words_of_large());
+        text.push_str(&self.summary.contact.as_ref().map_or(String::new(), |c| c.words()));
         text.push_str(&self.words_of_devices());
         if self.interrupted {
             text.push_str("  ended by the user\n");
+        }
+        text
+    }
+
+    /// How large the systems of equations were, how soon they were solved, and how well.
+    fn words_of_answers(&self) -> String {
+        let (s, Some(solve)) = (&self.summary, self.last_answer()) else { return String::new() };
+        let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
+        let mut text = format!(
+            "  equations           {} unknown, {} prescribed, by {}\n  \
+             answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
+             residual            {:.1e} at most\n",
+            solve.unknown_dofs,
+            solve.known_dofs,
+            solve.method,
+            ms(s.round_trip_ms_p50),
+            ms(s.round_trip_ms_p99),
+            ms(s.round_trip_ms_max),
+            s.residual_rel_max,
+        );
+        if let (Some(turned), Some(strain)) = (s.max_rotation_deg, s.max_strain) {
+            text.push_str(&format!(
+                "  shape               turned by {turned:.1} degrees, strained by {:.0} % at most\n",
+                100.0 * strain,
+            ));
         }
         text
     }
@@ -134,6 +146,12 @@ impl RunReport {
                 s.ticks_held
             ));
         }
+        let jumps = s.glove_jumps + s.tracker_jumps;
+        if jumps > 0 {
+            text.push_str(&format!(
+                "  damaged records     {jumps} readings jumped as no hand does and were not taken\n"
+            ));
+        }
         if let Some(fit) = &s.joint_fit {
             text.push_str(&format!(
                 "  hand fits joints    to {:.1} mm (root mean square), {:.1} mm at most\n",
@@ -154,11 +172,31 @@ impl RunReport {
     }
 }
 
+/// What a fingertip holds, by the name of `--contact`.
+pub fn words_of_contact(contact: &str) -> String {
+    match contact {
+        "vertex" => "the node that it touches (vertex)".to_owned(),
+        "patch" => "every node under it (patch)".to_owned(),
+        "mask" => "what lies under it, weighted by its pressure (mask)".to_owned(),
+        "friction" => "nothing: the hand presses with friction".to_owned(),
+        other => other.to_owned(),
+    }
+}
+
+/// Where it is solved, by the name of `--server`.
+pub fn words_of_server(server: &str) -> String {
+    match server {
+        "embedded" => "in this program".to_owned(),
+        address => format!("by the server at {address}"),
+    }
+}
+
 impl ReplaySummary {
     /// A line or two.
     fn words(&self) -> String {
-        let Self { ticks, requests, difference, cut } = self;
+        let Self { ticks, requests, difference, cut, .. } = self;
         let found = match difference {
+            None if *ticks == 0 => "nothing was compared".to_owned(),
             None => {
                 "poses, contacts, requests and displacements are the same bit by bit".to_owned()
             }
@@ -167,9 +205,7 @@ impl ReplaySummary {
         let mut text =
             format!("  replay              {ticks} ticks, {requests} with requests: {found}\n");
         if let Some(why) = cut {
-            text.push_str(&format!(
-                "                      the recording was cut off there: {why}\n"
-            ));
+            text.push_str(&format!("                      the recording ends there: {why}\n"));
         }
         text
     }

@@ -10,6 +10,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use softgrasp_grasp::grasp::{Command, GraspEvent, StateName};
 use softgrasp_grasp::object::{ObjectError, SoftObject};
 use softgrasp_hand::hand_source::HandSource;
+use softgrasp_hand::live_hand::LiveHand;
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::recording::{Intervention, Recorder, Replayed};
@@ -22,7 +23,7 @@ use crate::pace::tick_budget::{LIMIT, Priority, TickBudget};
 use crate::pace::{Due, Pace};
 use crate::run::grasp_loop::GraspLoop;
 use crate::run::latency::LatencyLedger;
-use crate::run::recorded_tick::{news, pose, stage_digests, tick_seen};
+use crate::run::recorded_tick::{news, scene, stage_digests, tick_seen};
 use crate::run::run_report::{ReplaySummary, RunReport};
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
@@ -43,6 +44,8 @@ pub struct Session {
     latency: LatencyLedger,
     /// What was wrong with devices when they were looked at last.
     complaints: Vec<String>,
+    /// A script does not reach for an object that the server is still preparing.
+    awaits_model: bool,
 }
 
 /// Devices are looked at every so many ticks.
@@ -75,7 +78,13 @@ impl Session {
             recorder: None,
             latency: LatencyLedger::default(),
             complaints: Vec::new(),
+            awaits_model: false,
         }
+    }
+
+    /// From now on a script waits until the server has prepared the object: for a person who watches.
+    pub fn await_model(&mut self) {
+        self.awaits_model = true;
     }
 
     /// Plays the tick that is due; `None` when the script is over. Ticks that were missed are
@@ -90,6 +99,7 @@ impl Session {
         let began = Instant::now();
         // Between the ticks the object may have been turned or replaced.
         self.seen.world_from_object = *self.grasp_loop.world_from_object();
+        self.seen.object_awaited = self.awaits_model && !self.grasp_loop.is_object_ready();
         let (due, now_s, mut sent) = self.next(due, now_s);
         if sent.over && self.ends_with_script {
             self.report.add_skipped(due.skipped);
@@ -146,10 +156,16 @@ impl Session {
         if tick % COMPLAIN_EVERY != COMPLAIN_EVERY - 1 {
             return;
         }
-        let complaints = hand.complaints();
+        let complaints = self.complaints_of(hand);
         let new = complaints.iter().filter(|text| !self.complaints.contains(text));
         outcome.events.extend(new.cloned().map(LoopEvent::Device));
         self.complaints = complaints;
+    }
+
+    /// What is wrong with devices, and with what they send.
+    fn complaints_of(&self, hand: &LiveHand) -> Vec<String> {
+        let of_reader = self.grasp_loop.reader().complaints();
+        hand.complaints().into_iter().chain(of_reader).collect()
     }
 
     /// Writes down what a tick did, and holds it against what was written down.
@@ -161,7 +177,10 @@ impl Session {
             let grasp_loop = &self.grasp_loop;
             let stages = stage_digests(grasp_loop, outcome);
             let made = tick_seen(due, now_s, grasp_loop, outcome, stages);
-            recorder.tick(sent, news(outcome), pose(due.tick, grasp_loop), made);
+            let nodes = grasp_loop.object().surface().nodes.len();
+            let with_surface = recorder.wants_surface(now_s, nodes);
+            let scene = scene(due.tick, now_s, grasp_loop, with_surface);
+            recorder.tick(sent, news(outcome), scene, made);
         }
     }
 
@@ -241,6 +260,14 @@ impl Session {
                 self.grasp_loop.set_method(method);
                 Ok(())
             }
+            Control::SetMaterial(material) => {
+                let set = self.grasp_loop.set_material(material);
+                if set.is_ok() {
+                    let what = "the object became of another material".to_owned();
+                    self.intervened(Intervention::NotReplayed(what));
+                }
+                set
+            }
             Control::SetMaxError(max_error) => self.set_max_error(max_error),
             Control::SetForces(forces) => {
                 self.grasp_loop.wishes_mut().forces = forces;
@@ -311,6 +338,9 @@ impl Session {
         self.report.summary.joint_fit = (fit.records > 0).then_some(fit);
         if let HandSource::Live(hand) = &self.hand {
             self.report.summary.pieces_dropped = hand.dropped();
+            if self.grasp_loop.hand().is_none() {
+                self.report.no_hand = Some(self.complaints_of(hand));
+            }
         }
         if let HandSource::Replay(hand) = self.hand {
             self.report.replay = Some(ReplaySummary::of(&hand));
@@ -384,8 +414,8 @@ impl Session {
             let text = "only a script can be played again from its beginning";
             return Err(Notice::refused(text));
         };
+        self.grasp_loop.begin_anew()?;
         hand.restart(None);
-        self.grasp_loop.put_object_home();
         self.intervened(Intervention::NotReplayed("the script began again".to_owned()));
         Ok(())
     }

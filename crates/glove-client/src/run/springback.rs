@@ -114,6 +114,7 @@ impl GraspLoop {
 
     fn go_back_to_rest(&mut self, why: &str, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
         self.keep = Keep::NotWanted;
+        outcome.springback_refused = true;
         let text = format!("the object goes back to its rest shape without a dent: {why}");
         outcome.events.push(LoopEvent::Shape(text));
         self.object.relax()

@@ -7,6 +7,7 @@ use softgrasp_hand::scripted::Seen;
 use softgrasp_protocol::solve_report::SolveSummary;
 
 use crate::ask::unanswered::Unanswered;
+use crate::run::contact_ledger::StepRecord;
 
 /// What happened, for the report; in the order it happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,14 +53,20 @@ pub struct TickOutcome {
     pub recalled: [u8; 5],
     /// Answers that came, with the tick they were asked for in.
     pub answers: Vec<(u64, SolveSummary)>,
+    /// Steps of a grasp by friction that were answered.
+    pub steps: Vec<StepRecord>,
     /// Deforming ticks of which it is now certain that no answer comes, and why.
     pub unanswered: Vec<(u64, Unanswered)>,
     /// Tick whose answer the object shows now; `None` while it shows none of this grip.
     pub shown_tick: Option<u64>,
     /// Devices that are silent: the hand is held where it was.
     pub silent: Vec<Device>,
-    /// Whether the answer to what the object springs back to was taken.
+    /// Ticks among the answers whose path at large deformation began at rest.
+    pub from_rest: Vec<u64>,
+    /// Whether the answer to what the object springs back to was taken, or its refusal.
     pub sprung_back: bool,
+    /// Whether there was no shape to spring back to.
+    pub springback_refused: bool,
     /// Whether a rest shape that was made beside the ticks was taken.
     pub took_work: bool,
     /// Digest of what the server is asked, where that is recorded or held against a recording.

@@ -58,20 +58,104 @@ fn recording_of_a_replay_is_the_recording() {
 }
 
 #[test]
-fn recording_that_was_cut_off_is_replayed_up_to_the_cut() {
+fn recording_that_was_cut_off_is_replayed_up_to_the_cut_and_its_check_fails() {
     let folder = Folder::new();
     let path = record(&folder, &["--hand", "scripted:squeeze"]);
     let whole = std::fs::read(&path).unwrap();
     let all = replay(&folder, &path, &[])["replay"]["ticks"].as_u64().unwrap();
-    let cut = folder.path("cut.mcap");
+    let (cut, report) = (folder.path("cut.mcap"), folder.path("cut.json"));
     std::fs::write(&cut, &whole[..whole.len() * 6 / 10]).unwrap();
-    let report = replay(&folder, &cut, &[]);
+    succeed(&["replay", &cut, "--report", &report]);
+    let report: serde_json::Value = serde_json::from_str(&folder.read("cut.json")).unwrap();
     let ticks = report["replay"]["ticks"].as_u64().unwrap();
     assert!(report["replay"]["cut"].is_string() && ticks < all, "{}", report["replay"]);
+    check_fails(&cut, &format!("only its first {ticks} ticks could be compared"));
+}
+
+/// `replay --check` of this recording ends with exit code 1 and says this.
+fn check_fails(path: &str, words: &str) {
+    let output = run(&["replay", path, "--check"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains(words), "{said}");
+}
+
+#[test]
+fn check_fails_for_a_recording_with_a_flipped_bit_and_for_one_without_ticks() {
+    let folder = Folder::new();
+    let path = record(&folder, &["--hand", "scripted:approach"]);
+    let mut bytes = std::fs::read(&path).unwrap();
+    let at = bytes.len() * 6 / 10;
+    bytes[at] ^= 4;
+    let damaged = folder.path("damaged.mcap");
+    std::fs::write(&damaged, bytes).unwrap();
+    check_fails(&damaged, "the recording is not whole");
+    let empty = folder.path("empty.mcap");
+    rewrite_where(&path, &empty, |topic| topic == "/setup", |_, text| text.to_owned());
+    check_fails(&empty, "nothing was compared");
+}
+
+/// A recording that somebody sends must not open files elsewhere, nor show what is in them.
+#[test]
+fn recording_that_names_a_file_outside_its_folder_is_refused_and_nothing_of_it_is_shown() {
+    let folder = Folder::new();
+    let path = record(&folder, &["--hand", "scripted:approach"]);
+    let secret = folder.write("secret.msh", "root:x:0:0: the words of a secret");
+    let inner = Folder::new();
+    let changed = inner.path("changed.mcap");
+    for named in [secret.as_str(), "/etc/passwd", "../../../../../../etc/passwd"] {
+        rewrite(&path, &changed, |at, text| match at {
+            "/setup" => text.replacen("\"strawberry\"", &format!("{named:?}"), 1),
+            _ => text.to_owned(),
+        });
+        let hand = format!("replay:{changed}");
+        for words in [&["replay", &changed, "--check"][..], &["run", "--headless", "--hand", &hand]]
+        {
+            let said = fail(1, words);
+            assert!(said.contains("is no file below the recording's folder"), "{said}");
+            assert!(!said.contains("root"), "{said}");
+        }
+        // Whoever plays it may name the file; then it is read as any mesh that was named.
+        let said = fail(1, &["replay", &changed, "--object", &secret]);
+        assert!(said.contains("secret.msh") && !said.contains("below"), "{said}");
+    }
+}
+
+#[test]
+fn mesh_file_beside_its_recording_is_found_from_any_folder() {
+    let folder = Folder::new();
+    let (mesh, path) = (folder.path("box.msh"), folder.path("run.mcap"));
+    succeed(&["mesh", "cube", "--nodes", "64", "--out", &mesh]);
+    succeed(&[
+        "run",
+        "--headless",
+        "--object",
+        &mesh,
+        "--hand",
+        "scripted:approach",
+        "--record",
+        &path,
+    ]);
+    let moved = Folder::new();
+    for file in ["box.msh", "run.mcap"] {
+        std::fs::copy(folder.path(file), moved.path(file)).unwrap();
+    }
+    drop(folder);
+    succeed(&["replay", &moved.path("run.mcap"), "--check"]);
 }
 
 /// Writes a recording anew, its messages changed.
 fn rewrite(path: &str, to: &str, change: impl Fn(&str, &str) -> String) {
+    rewrite_where(path, to, |_| true, change);
+}
+
+/// Writes a recording anew, with the messages of some topics, changed.
+fn rewrite_where(
+    path: &str,
+    to: &str,
+    wanted: impl Fn(&str) -> bool,
+    change: impl Fn(&str, &str) -> String,
+) {
     let bytes = std::fs::read(path).unwrap();
     let mut file = mcap::WriteOptions::new()
         .compression(None)
@@ -79,6 +163,9 @@ fn rewrite(path: &str, to: &str, change: impl Fn(&str, &str) -> String) {
         .unwrap();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let mut message = message.unwrap();
+        if !wanted(&message.channel.topic) {
+            continue;
+        }
         let text = std::str::from_utf8(&message.data).unwrap();
         message.data = change(&message.channel.topic, text).into_bytes().into();
         file.write(&message).unwrap();

@@ -17,13 +17,17 @@ fn emulated(links: &str, more: &[&str]) -> Emulator {
     Emulator::start(&[&usual[..], more].concat())
 }
 
-/// A run with that hand, which is recorded.
+/// A run with that hand, by the rules that the emulators' script is planned for, which is recorded.
 fn run(folder: &Folder, links: &str, frames: &str) -> Child {
     let hand = format!("serial:glove={links}/glove,tracker={links}/tracker");
+    run_with(folder, &hand, frames)
+}
+
+fn run_with(folder: &Folder, hand: &str, frames: &str) -> Child {
     let object = ["run", "--headless", "--object", "strawberry", "--nodes", "300", "--frames"];
     command()
         .args(object)
-        .args([frames, "--hand", &hand, "--rate", "60"])
+        .args([frames, "--hand", hand, "--rate", "60", "--grasp", "thesis"])
         .args(["--record", &folder.path("run.mcap"), "--report", &folder.path("run.json")])
         .stdout(Stdio::null())
         .spawn()
@@ -157,9 +161,25 @@ fn raw_records_of_devices_that_answer_nothing_move_the_hand_while_a_cable_is_pul
 fn devices_that_are_not_there_are_named_while_the_run_waits_for_them() {
     let folder = Folder::new();
     let mut run = run(&folder, &folder.path("nowhere"), "60");
-    assert_eq!(run.wait().unwrap().code(), Some(0));
+    // There never was a hand.
+    assert_eq!(run.wait().unwrap().code(), Some(1));
     let report = report(&folder, "run.json");
     for words in ["the glove is not there", "the tracker is not there"] {
         assert!(happened(&report, words), "{words}: {}", report["events"]);
+        assert!(report["no_hand"].to_string().contains(words), "{}", report["no_hand"]);
     }
+}
+
+#[test]
+fn swapped_devices_end_a_run_with_the_sentence_that_says_so() {
+    let folder = Folder::new();
+    let links = folder.path("ports");
+    let emulator = emulated(&links, &[]);
+    let hand = format!("serial:glove={links}/tracker,tracker={links}/glove");
+    let mut run = run_with(&folder, &hand, "900");
+    assert_eq!(run.wait().unwrap().code(), Some(1));
+    emulator.stop();
+    let report = report(&folder, "run.json");
+    assert!(happened(&report, "glove and tracker are swapped"), "{}", report["events"]);
+    assert!(report["no_hand"].to_string().contains("swapped"), "{}", report["no_hand"]);
 }

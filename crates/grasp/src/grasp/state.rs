@@ -187,6 +187,16 @@ impl Grasp {
         Ok(())
     }
 
+    /// Another home, where the object, which nothing holds, is put at once.
+    ///
+    /// # Errors
+    /// As [`Grasp::place`].
+    pub fn set_home(&mut self, world_from_home: Isometry3<f64>) -> Result<(), GraspError> {
+        self.place(world_from_home)?;
+        self.home = world_from_home;
+        Ok(())
+    }
+
     /// Where the object is when the palm is at `world_from_palm`: it follows while it is attached.
     ///
     /// Sense against this pose, then step with the same palm pose.

@@ -12,6 +12,25 @@ pub enum Handedness {
     Left,
 }
 
+impl Handedness {
+    /// `right` or `left`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Left => "left",
+        }
+    }
+
+    /// The other hand.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Right => Self::Left,
+            Self::Left => Self::Right,
+        }
+    }
+}
+
 /// One of the four fingers.
 ///
 /// Units: m, rad. Frame: palm frame of a right hand (`docs/frames.md`).

@@ -99,6 +99,33 @@ pub struct JointAngles {
 /// Number of angles in [`JointAngles`].
 pub const ANGLE_COUNT: usize = 23;
 
+/// Their names, in the order of [`JointAngles::to_array`].
+pub const ANGLE_NAMES: [&str; ANGLE_COUNT] = [
+    "thumb rotation",
+    "thumb mpj",
+    "thumb ij",
+    "thumb abduction",
+    "index mpj",
+    "index pij",
+    "index dij",
+    "index abduction",
+    "middle mpj",
+    "middle pij",
+    "middle dij",
+    "middle abduction",
+    "ring mpj",
+    "ring pij",
+    "ring dij",
+    "ring abduction",
+    "little mpj",
+    "little pij",
+    "little dij",
+    "little abduction",
+    "palm arch",
+    "wrist pitch",
+    "wrist yaw",
+];
+
 impl JointAngles {
     /// The flat hand: fingers straight and in line with their metacarpals.
     pub const fn flat() -> Self {

@@ -5,13 +5,15 @@ mod dimensions;
 mod jacobian;
 mod joints;
 mod kinematics;
+mod rigid_bodies;
 
 pub use colliders::{FingerColliders, HandColliders};
 pub use dimensions::{
     DimensionsError, FingerDimensions, HandDimensions, Handedness, ThumbDimensions,
 };
 pub use jacobian::contact_jacobian;
-pub use joints::{ANGLE_COUNT, Finger, FingerAngles, JointAngles, ThumbAngles};
+pub use joints::{ANGLE_COUNT, ANGLE_NAMES, Finger, FingerAngles, JointAngles, ThumbAngles};
 pub use kinematics::{
     FingerPose, HandPose, SegmentPose, forearm_from_palm, pose, pose_of_segments,
 };
+pub use rigid_bodies::{HAND_BODIES, HandBody, clearance, hand_bodies};

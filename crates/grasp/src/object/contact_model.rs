@@ -1,4 +1,5 @@
-//! Which nodes follow a fingertip: the one it touched, all that it covers, or the average of those.
+//! What a fingertip does to the surface: it holds the node it touched, all that it covers or the average
+//! of those, or it presses with friction.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,11 +16,14 @@ pub enum ContactModel {
     /// (`reports/contact.md`).
     #[default]
     Mask,
+    /// Nothing is held: every segment of the hand presses on the surface with friction, and the object
+    /// has weight (`docs/contact.md`).
+    Friction,
 }
 
 /// A name that is no contact model's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no contact model is called '{0}'; there are vertex, patch and mask")]
+#[error("no contact model is called '{0}'; there are vertex, patch, mask and friction")]
 pub struct UnknownContact(String);
 
 impl FromStr for ContactModel {
@@ -30,6 +34,7 @@ impl FromStr for ContactModel {
             "vertex" => Ok(Self::Vertex),
             "patch" => Ok(Self::Patch),
             "mask" => Ok(Self::Mask),
+            "friction" => Ok(Self::Friction),
             _ => Err(UnknownContact(name.to_owned())),
         }
     }
@@ -41,6 +46,7 @@ impl fmt::Display for ContactModel {
             Self::Vertex => "vertex",
             Self::Patch => "patch",
             Self::Mask => "mask",
+            Self::Friction => "friction",
         })
     }
 }

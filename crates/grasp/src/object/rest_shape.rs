@@ -94,6 +94,11 @@ impl RestShape {
         &self.normals
     }
 
+    /// Surface triangles around each node.
+    pub fn stars(&self) -> &SurfaceStars {
+        &self.stars
+    }
+
     /// Mask of a tip that touches a node of the surface.
     ///
     /// Units: m.
@@ -105,6 +110,11 @@ impl RestShape {
     pub fn centre(&self) -> Point3<f64> {
         let (low, high) = self.mesh.bounds();
         nalgebra::center(&low, &high)
+    }
+
+    /// Height of its lowest point, m: the height of the table that it lies on.
+    pub fn bottom(&self) -> f64 {
+        self.mesh.bounds().0.y
     }
 }
 

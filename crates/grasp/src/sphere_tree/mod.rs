@@ -11,9 +11,11 @@ mod search;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod triangles;
 mod visited;
 
 pub use contact::{Closeness, ContactHit, TIP_HITS_MAX, tip_hits, vertex_normals};
 pub use overlap::{cylinder_meets_sphere, sphere_meets_sphere};
 pub use tree::{SphereTree, TreeError};
+pub use triangles::{SearchedSurface, triangles_near};
 pub use visited::VisitedSphere;

@@ -134,7 +134,7 @@ impl HandConfiguration {
         // Right is also what a text that does not say is read as.
         let says_so = form == Form::Toml || calibration.hand == Handedness::Left;
         if says_so && calibration.hand != hand {
-            let (calibration, hand) = (side_word(calibration.hand), side_word(hand));
+            let (calibration, hand) = (calibration.hand.name(), hand.name());
             return Err(HandFileError::OtherHand { calibration, hand });
         }
         calibration.hand = hand;
@@ -158,10 +158,7 @@ impl HandConfiguration {
             OutputList::PositionEuler => "angles",
             OutputList::PositionQuaternion => "quaternion",
         };
-        let units = match tracker.units {
-            LengthUnit::Inches => "inches",
-            LengthUnit::Centimetres => "centimetres",
-        };
+        let units = tracker.units.name();
         let encoding = match tracker.encoding {
             Encoding::Ascii => "text",
             Encoding::Binary => "binary",
@@ -178,7 +175,7 @@ impl HandConfiguration {
              [mount]\non = \"{part}\"\n{}\n\
              # The transmitter's Y-up frame in the world.\n\
              [world_from_stand]\n{}",
-            side_word(dimensions.handedness),
+            dimensions.handedness.name(),
             dimensions.hand_length,
             dimensions.hand_breadth,
             sensors.number(),
@@ -190,13 +187,6 @@ impl HandConfiguration {
             pose_lines(receiver_from_part),
             pose_lines(world_from_stand),
         )
-    }
-}
-
-fn side_word(hand: Handedness) -> &'static str {
-    match hand {
-        Handedness::Right => "right",
-        Handedness::Left => "left",
     }
 }
 

@@ -3,6 +3,7 @@
 mod bones;
 mod cut;
 mod decode;
+mod doubts;
 mod fault;
 mod fit;
 mod leap;
@@ -26,6 +27,7 @@ mod start;
 
 pub use bones::{HandSize, SizeError, hand_size};
 pub use cut::LINE_MAX;
+pub use doubts::Doubts;
 pub use fault::{JointsFault, JointsFaultKind, RANGE_M};
 pub use fit::{FitError, FittedHand, HandFit};
 pub use limits::AngleLimits;

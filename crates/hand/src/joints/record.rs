@@ -117,10 +117,7 @@ impl JointsRecord {
     }
 
     fn line_of(&self, joints: &[Option<JointSample>]) -> String {
-        let hand = match self.hand {
-            Handedness::Right => "right",
-            Handedness::Left => "left",
-        };
+        let hand = self.hand.name();
         let mut line = format!("{{\"hand\":\"{hand}\"");
         if let Some(time_s) = self.time_s {
             let _ = write!(line, ",\"time\":{time_s}");

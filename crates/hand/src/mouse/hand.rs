@@ -26,23 +26,29 @@ pub struct MouseHand {
     tick_s: f64,
     plan: Option<Planned>,
     /// Rest shape for which a plan is being made.
-    planning_for: Option<u64>,
+    planning_for: Option<(u64, UnitQuaternion<f64>)>,
     errand: Option<Errand>,
     /// Ways still to go, the first one begun.
     ways: VecDeque<Glide>,
     world_from_palm: Isometry3<f64>,
     /// Where the mouse wants the palm.
     wished: Isometry3<f64>,
+    /// How fast the palm goes there, m/s.
+    speed: f64,
     posture: Posture,
     grip: Grip,
     notices: Vec<Notice>,
 }
 
-/// A plan and the rest shape it was made for. Frame: the object's, as if it were the world's.
+/// A plan, the rest shape it was made for and how that was turned then.
+///
+/// Frame: that of the object turned so, as if it were the world's; for fingertips that hold it the turn
+/// is none, and the plan turns with the object.
 #[derive(Clone, Copy)]
 struct Planned {
     plan: GraspPlan,
     rest_shape: u64,
+    turn: UnitQuaternion<f64>,
 }
 
 /// What the hand does by itself.
@@ -58,6 +64,8 @@ const AIM_OFF: f64 = 0.10;
 const AROUND_OFF: f64 = 0.22;
 /// A hand that has to turn further than this, rad, goes around the object.
 const TURNS: f64 = 0.2;
+/// An object that has rolled by more than this, rad, is grasped by another plan.
+const ROLLED: f64 = 0.1;
 /// A hand that is further than this from where it aims, sideways, m, aims before it reaches.
 const ASIDE: f64 = 0.04;
 /// The palm stays within this distance of the world's origin, m: the tracker stands at 0.6 m.
@@ -88,6 +96,7 @@ impl MouseHand {
             ways: VecDeque::new(),
             world_from_palm,
             wished: world_from_palm,
+            speed: 0.0,
             posture: Posture::OPEN,
             grip: Grip::default(),
             notices: Vec::new(),
@@ -98,6 +107,14 @@ impl MouseHand {
     #[must_use]
     pub fn holding(self, contact: ContactModel) -> Self {
         Self { contact, ..self }
+    }
+
+    /// The same hand, which begins where another one was.
+    ///
+    /// Frame: world.
+    #[must_use]
+    pub fn taking_over_at(self, world_from_palm: Isometry3<f64>) -> Self {
+        Self { world_from_palm, wished: world_from_palm, ..self }
     }
 
     /// Takes a wish. Moving or turning ends what the hand does by itself.
@@ -143,12 +160,15 @@ impl MouseHand {
             Some(way) => {
                 let arrived = way.advance(seconds);
                 (self.world_from_palm, self.posture) = (way.world_from_palm(), way.posture());
-                self.wished = self.world_from_palm;
+                (self.wished, self.speed) = (self.world_from_palm, 0.0);
                 if arrived {
                     self.ways.pop_front();
                 }
             }
-            None => self.world_from_palm = limited(&self.world_from_palm, &self.wished, seconds),
+            None => {
+                let (from, to) = (&self.world_from_palm, &self.wished);
+                self.world_from_palm = limited(from, to, &mut self.speed, seconds);
+            }
         }
         self.grip.advance(seconds, self.plan.as_ref().map(|planned| &planned.plan));
         let joint_angles = angles(self.grip.closure(), self.posture);
@@ -159,6 +179,12 @@ impl MouseHand {
     /// Closing of each finger that is wished for, thumb first, for a slider.
     pub fn closing(&self) -> [f64; 5] {
         self.grip.wished()
+    }
+
+    /// How the hand will grasp the object, once it knows. Frame: the object's, as if it were the
+    /// world's.
+    pub fn plan(&self) -> Option<GraspPlan> {
+        self.plan.as_ref().map(|planned| planned.plan)
     }
 
     /// Whether a plan is being made.
@@ -203,27 +229,43 @@ impl MouseHand {
     fn go_on(&mut self, seen: &Seen, object: &SoftObject) {
         let Some(errand) = self.errand else { return };
         let holds = matches!(seen.state, Some(StateName::Attached | StateName::Deforming));
-        if !self.grip.is_open() || holds || seen.keeping || !self.plans(errand, object) {
+        if !self.grip.is_open() || holds || seen.keeping || !self.plans(errand, seen, object) {
             return;
         }
         self.errand = None;
         let Some(planned) = self.plan else {
-            let text = "the hand found no place from which all five fingertips reach this object; \
-                        move and turn it yourself";
-            return self.notices.push(Notice::refused(text));
+            return self.notices.push(Notice::refused(match self.contact {
+                ContactModel::Friction => {
+                    "the hand found no place from which thumb and fingers can pinch this object; \
+                     move and turn it yourself"
+                }
+                ContactModel::Vertex | ContactModel::Patch | ContactModel::Mask => {
+                    "the hand found no place from which all five fingertips reach this object; \
+                     move and turn it yourself"
+                }
+            }));
         };
         let centre = seen.world_from_object * object.rest_shape().centre();
-        self.ways = self.ways_to(errand, &planned.plan, seen.world_from_object, centre);
+        let turned_since = seen.world_from_object.rotation * planned.turn.inverse();
+        self.ways = self.ways_to(errand, &planned.plan, turned_since, centre);
     }
 
     /// Whether there is a plan for the errand, or it is known that there is none.
-    fn plans(&mut self, errand: Errand, object: &SoftObject) -> bool {
+    fn plans(&mut self, errand: Errand, seen: &Seen, object: &SoftObject) -> bool {
         let rest_shape = object.rest_shapes();
-        if self.planning_for.is_some_and(|planned_for| planned_for != rest_shape) {
+        if self.planning_for.is_some_and(|(planned_for, _)| planned_for != rest_shape) {
             self.planner.abandon();
             self.planning_for = None;
         }
-        let known = self.plan.filter(|planned| planned.rest_shape == rest_shape);
+        // An object that rolls on a table is grasped another way when it lies otherwise.
+        let turn = match self.contact {
+            ContactModel::Friction => seen.world_from_object.rotation,
+            _ => UnitQuaternion::identity(),
+        };
+        let lies_so = |planned: &Planned| {
+            self.contact != ContactModel::Friction || planned.turn.angle_to(&turn) < ROLLED
+        };
+        let known = self.plan.filter(|p| p.rest_shape == rest_shape && lies_so(p));
         let elsewhere = errand == Errand::Aim { elsewhere: true };
         if self.planning_for.is_none() {
             if known.is_some() && !elsewhere {
@@ -236,12 +278,13 @@ impl MouseHand {
                 setup: self.setup.clone(),
                 contact: self.contact,
                 avoid_gaze: last,
+                turn,
             });
-            self.planning_for = Some(rest_shape);
+            self.planning_for = Some((rest_shape, turn));
         }
         let Some(made) = self.planner.take() else { return false };
-        self.planning_for = None;
-        self.plan = made.map(|plan| Planned { plan, rest_shape });
+        let turn = self.planning_for.take().map_or(turn, |(_, turn)| turn);
+        self.plan = made.map(|plan| Planned { plan, rest_shape, turn });
         // The plan is there: what is left is to go.
         self.errand = Some(if elsewhere { Errand::Aim { elsewhere: false } } else { errand });
         true
@@ -252,13 +295,12 @@ impl MouseHand {
         &self,
         errand: Errand,
         plan: &GraspPlan,
-        world_from_object: Isometry3<f64>,
+        turned_since: UnitQuaternion<f64>,
         centre: Point3<f64>,
     ) -> VecDeque<Glide> {
         let here = self.path_from_here(centre);
         let grasp = PalmPath {
-            world_from_palm_rotation: world_from_object.rotation
-                * plan.path.world_from_palm_rotation,
+            world_from_palm_rotation: turned_since * plan.path.world_from_palm_rotation,
             object_in_palm: plan.path.object_in_palm,
         };
         let turns = here.world_from_palm_rotation.angle_to(&grasp.world_from_palm_rotation) > TURNS;

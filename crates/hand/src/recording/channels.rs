@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::foxglove;
 use crate::arrival::Device;
 
 /// A channel.
@@ -19,13 +20,21 @@ pub enum Channel {
     Request,
     /// What it answered.
     Answer,
+    /// Joint angles of the hand, for other programs.
+    Angles,
+    /// Where palm, segments and object are, for other programs.
+    Transforms,
+    /// What hand and object look like, for other programs.
+    Scene,
+    /// What happened, for other programs.
+    Log,
     /// A tick is over; what came since the one before belongs to it.
     Tick,
 }
 
 impl Channel {
     /// All channels.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 13] = [
         Self::Setup,
         Self::Device(Device::Glove),
         Self::Device(Device::Tracker),
@@ -34,6 +43,10 @@ impl Channel {
         Self::Event,
         Self::Request,
         Self::Answer,
+        Self::Angles,
+        Self::Transforms,
+        Self::Scene,
+        Self::Log,
         Self::Tick,
     ];
 
@@ -48,6 +61,10 @@ impl Channel {
             Self::Event => "/event",
             Self::Request => "/request",
             Self::Answer => "/answer",
+            Self::Angles => "/joint_angles",
+            Self::Transforms => "/tf",
+            Self::Scene => "/scene",
+            Self::Log => "/log",
             Self::Tick => "/tick",
         }
     }
@@ -66,6 +83,10 @@ impl Channel {
             Self::Event => "softgrasp.Event",
             Self::Request => "softgrasp.Request",
             Self::Answer => "softgrasp.Answer",
+            Self::Angles => "softgrasp.JointAngles",
+            Self::Transforms => foxglove::TRANSFORMS,
+            Self::Scene => foxglove::SCENE,
+            Self::Log => foxglove::LOG,
             Self::Tick => "softgrasp.Tick",
         }
     }
@@ -102,8 +123,12 @@ impl Channel {
             }),
             Self::Answer => json!({
                 "tick": integer, "method": text, "element": text, "residual_rel": number,
-                "round_trip_ms": number,
+                "round_trip_ms": number, "from_rest": flag,
             }),
+            Self::Angles => json!({"tick": integer, "names": list(&text), "rad": list(&number)}),
+            Self::Transforms | Self::Scene | Self::Log => {
+                return foxglove::schema(self.schema_name());
+            }
             Self::Tick => json!({
                 "tick": integer, "skipped": integer, "now_s": number,
                 "command": {"type": ["string", "null"]}, "interventions": list(&json!({})),

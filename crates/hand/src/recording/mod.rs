@@ -1,7 +1,10 @@
 //! Recordings of runs: what came in, what was done with it, and replaying them bit by bit.
 
 mod channels;
+#[cfg(test)]
+mod damage_tests;
 mod file;
+mod foxglove;
 mod read;
 mod recorder;
 mod replay;
@@ -15,5 +18,6 @@ pub use replay::{ReplayHand, Replayed};
 pub use replay_check::{Difference, ReplayCheck};
 pub use stages::{Stage, StageDigests};
 pub use tick::{
-    AnswerSeen, EventSeen, Intervention, PoseSeen, RecordedSetup, RecordedTick, TickSeen,
+    AnswerSeen, EventSeen, HandSeen, Intervention, PoseSeen, RecordedFriction, RecordedSetup,
+    RecordedTick, SPRINGBACK_REFUSED, SceneSeen, SurfaceSeen, TickSeen,
 };

@@ -11,7 +11,7 @@ use mcap::sans_io::LinearReaderOptions;
 
 use super::channels::Channel;
 use super::file::{DeviceBytes, bytes_of};
-use super::tick::{AnswerSeen, RecordedSetup, RecordedTick, TickSeen};
+use super::tick::{AnswerSeen, RecordedSetup, RecordedTick, SPRINGBACK_REFUSED, TickSeen};
 use crate::arrival::Arrival;
 
 /// A recording.
@@ -75,7 +75,12 @@ pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
         Ok(file) => file,
         Err(source) => return Err(ReadError::Open { path, source }),
     };
-    let options = LinearReaderOptions::default().with_record_length_limit(RECORD_MAX);
+    // Every check sum is looked at, that of a chunk before its messages are taken.
+    let options = LinearReaderOptions::default()
+        .with_record_length_limit(RECORD_MAX)
+        .with_prevalidate_chunk_crcs(true)
+        .with_validate_data_section_crc(true)
+        .with_validate_summary_section_crc(true);
     let messages = MessageReader::new_with_options(BufReader::new(file), options);
     let mut setup: Option<RecordedSetup> = None;
     let mut ticks: Vec<RecordedTick> = Vec::new();
@@ -87,7 +92,7 @@ pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
             Ok(message) => message,
             Err(source) if setup.is_none() => return Err(ReadError::NotMcap { path, source }),
             Err(error) => {
-                cut = Some(error.to_string());
+                cut = Some(why_cut(&error));
                 break;
             }
         };
@@ -107,10 +112,13 @@ pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
             }
             Some(Channel::Answer) => {
                 let answer: Option<AnswerSeen> = serde_json::from_slice(data).ok();
+                next.springback_refused |=
+                    answer.as_ref().is_some_and(|answer| answer.method == SPRINGBACK_REFUSED);
                 answers.extend(answer.clone());
                 answer.is_some()
             }
             Some(Channel::Tick) => match serde_json::from_slice::<TickSeen>(data) {
+                Ok(seen) if ticks.last().is_some_and(|last| last.seen.tick >= seen.tick) => false,
                 Ok(seen) => {
                     next.seen = seen;
                     ticks.push(std::mem::take(&mut next));
@@ -118,7 +126,8 @@ pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
                 }
                 Err(_) => false,
             },
-            Some(Channel::Pose | Channel::Event | Channel::Request) | None => true,
+            // What a replay does not need.
+            Some(_) | None => true,
         };
         if !taken {
             cut = Some(format!("a message on {} makes no sense", message.channel.topic));
@@ -133,12 +142,24 @@ pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
     Ok(Recording { setup, ticks, cut })
 }
 
+/// Why a file ends before its end.
+fn why_cut(error: &McapError) -> String {
+    match error {
+        McapError::UnexpectedEof => {
+            "the file ends in the middle: whoever wrote it was ended, or the disk was full"
+                .to_owned()
+        }
+        error => format!("the file is damaged: {error}"),
+    }
+}
+
 /// Tells each tick which method answered what it asked, where a tick took the answer.
 fn join_answers(ticks: &mut [RecordedTick], answers: &[AnswerSeen]) {
     let taken: BTreeSet<u64> = ticks.iter().flat_map(|tick| tick.seen.answers.clone()).collect();
     for answer in answers.iter().filter(|answer| taken.contains(&answer.tick)) {
         if let Ok(at) = ticks.binary_search_by_key(&answer.tick, |tick| tick.seen.tick) {
             ticks[at].answered_by = Some(answer.method.clone());
+            ticks[at].from_rest = answer.from_rest;
         }
     }
 }

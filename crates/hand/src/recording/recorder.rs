@@ -7,10 +7,12 @@ use std::time::{Duration, Instant};
 
 use mcap::{McapError, McapResult};
 use serde_json::json;
+use softgrasp_grasp::hand::{ANGLE_NAMES, HandDimensions};
 
 use super::channels::Channel;
 use super::file::{DeviceBytes, RecordingFile, hex_of};
-use super::tick::{AnswerSeen, EventSeen, Intervention, PoseSeen, RecordedSetup, TickSeen};
+use super::foxglove;
+use super::tick::{AnswerSeen, EventSeen, Intervention, RecordedSetup, SceneSeen, TickSeen};
 use crate::arrival::Arrival;
 use crate::sent::Sent;
 
@@ -21,6 +23,8 @@ pub struct Recorder {
     thread: Option<JoinHandle<McapResult<()>>>,
     /// What was taken between the ticks, and belongs to the next one.
     between: Between,
+    /// When a surface was last recorded, s.
+    surface_at_s: Option<f64>,
 }
 
 /// Why a recording is not complete.
@@ -69,7 +73,7 @@ enum Message {
 /// A tick with all that belongs to it.
 struct TickMessage {
     arrivals: Vec<Arrival>,
-    pose: Option<PoseSeen>,
+    scene: Option<SceneSeen>,
     events: Vec<EventSeen>,
     answers: Vec<AnswerSeen>,
     seen: TickSeen,
@@ -77,6 +81,10 @@ struct TickMessage {
 
 /// The file is made readable so often: that much a crash loses.
 const FLUSH_EVERY: Duration = Duration::from_millis(250);
+/// The surface of the object is written so often, s …
+const SURFACE_EVERY_S: f64 = 0.1;
+/// … if it has no more nodes than this: half a megabyte a time.
+const SURFACE_NODES_MAX: usize = 5000;
 
 impl Recorder {
     /// Begins a recording; the file is there when this returns.
@@ -94,7 +102,7 @@ impl Recorder {
         let thread = thread.spawn(move || write_all(file, &to_write));
         let thread = thread.map_err(|_| RecordError::Thread { path: path.clone() })?;
         let (messages, thread) = (Some(messages), Some(thread));
-        Ok(Self { path, messages, thread, between: Between::default() })
+        Ok(Self { path, messages, thread, between: Between::default(), surface_at_s: None })
     }
 
     /// Something was done to the object.
@@ -107,9 +115,22 @@ impl Recorder {
         self.between.news.add(news);
     }
 
+    /// Whether a tick at this time is to bring the surface of an object of so many surface nodes: ten
+    /// times a second, and not of large ones.
+    ///
+    /// Units: s.
+    pub fn wants_surface(&mut self, now_s: f64, nodes: usize) -> bool {
+        let is_due = self.surface_at_s.is_none_or(|at_s| now_s - at_s >= SURFACE_EVERY_S);
+        let wants = is_due && nodes <= SURFACE_NODES_MAX;
+        if wants {
+            self.surface_at_s = Some(now_s);
+        }
+        wants
+    }
+
     /// A tick is over. `made` is what it made, but for what [`Recorder`] knows itself: the command,
     /// and what was done and taken since the tick before.
-    pub fn tick(&mut self, sent: &Sent, news: TickNews, pose: Option<PoseSeen>, made: TickSeen) {
+    pub fn tick(&mut self, sent: &Sent, news: TickNews, scene: Option<SceneSeen>, made: TickSeen) {
         let Between { interventions, news: mut all } = std::mem::take(&mut self.between);
         all.add(news);
         let TickNews { events, answers, took_work } = all;
@@ -120,7 +141,7 @@ impl Recorder {
             took_work,
             ..made
         };
-        let message = TickMessage { arrivals: sent.arrivals.clone(), pose, events, answers, seen };
+        let message = TickMessage { arrivals: sent.arrivals.clone(), scene, events, answers, seen };
         if let Some(messages) = &self.messages {
             // A thread that could not write says so at the end.
             let _ = messages.send(Message::Tick(Box::new(message)));
@@ -157,13 +178,14 @@ impl Drop for Recorder {
 
 fn write_all(mut file: RecordingFile, messages: &Receiver<Message>) -> McapResult<()> {
     let mut flushed = Instant::now();
+    let mut drawn = None;
     loop {
         match messages.recv_timeout(FLUSH_EVERY) {
             Ok(Message::Setup(setup)) => {
                 file.write(Channel::Setup, 0.0, &setup)?;
                 file.flush()?;
             }
-            Ok(Message::Tick(tick)) => write_tick(&mut file, &tick)?,
+            Ok(Message::Tick(tick)) => write_tick(&mut file, &tick, &mut drawn)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return file.finish(),
         }
@@ -174,19 +196,25 @@ fn write_all(mut file: RecordingFile, messages: &Receiver<Message>) -> McapResul
     }
 }
 
-fn write_tick(file: &mut RecordingFile, message: &TickMessage) -> McapResult<()> {
-    let TickMessage { arrivals, pose, events, answers, seen } = message;
+/// Writes a tick; `drawn` is the size of the hand that was drawn last.
+fn write_tick(
+    file: &mut RecordingFile,
+    message: &TickMessage,
+    drawn: &mut Option<HandDimensions>,
+) -> McapResult<()> {
+    let TickMessage { arrivals, scene, events, answers, seen } = message;
     let now_s = seen.now_s;
     for Arrival { device, at_s, is_datagram, bytes } in arrivals {
         let data = DeviceBytes { at_s: *at_s, datagram: *is_datagram, hex: hex_of(bytes) };
         file.write(Channel::Device(*device), at_s.unwrap_or(now_s), &data)?;
     }
-    if let Some(pose) = pose {
-        file.write(Channel::Pose, now_s, pose)?;
+    if let Some(scene) = scene {
+        write_scene(file, seen, scene, drawn)?;
     }
     for EventSeen { kind, what } in events {
         let event = json!({"tick": seen.tick, "kind": kind, "what": what});
         file.write(Channel::Event, now_s, &event)?;
+        file.write(Channel::Log, now_s, &foxglove::log_line(kind, what, now_s))?;
     }
     if !seen.stages.request.is_empty() {
         let request = json!({"tick": seen.tick, "digest": seen.stages.request});
@@ -196,6 +224,28 @@ fn write_tick(file: &mut RecordingFile, message: &TickMessage) -> McapResult<()>
         file.write(Channel::Answer, now_s, answer)?;
     }
     file.write(Channel::Tick, now_s, seen)
+}
+
+fn write_scene(
+    file: &mut RecordingFile,
+    seen: &TickSeen,
+    scene: &SceneSeen,
+    drawn: &mut Option<HandDimensions>,
+) -> McapResult<()> {
+    let (now_s, hand) = (seen.now_s, &scene.hand);
+    file.write(Channel::Pose, now_s, &scene.pose)?;
+    let angles = json!({"tick": seen.tick, "names": ANGLE_NAMES, "rad": hand.angles_rad});
+    file.write(Channel::Angles, now_s, &angles)?;
+    let transforms = foxglove::frame_transforms(hand, &scene.world_from_object, now_s);
+    file.write(Channel::Transforms, now_s, &transforms)?;
+    if *drawn != Some(hand.dimensions) {
+        *drawn = Some(hand.dimensions);
+        file.write(Channel::Scene, now_s, &foxglove::hand_scene(&hand.dimensions, now_s))?;
+    }
+    if let Some(surface) = &scene.surface {
+        file.write(Channel::Scene, now_s, &foxglove::object_scene(surface, now_s))?;
+    }
+    Ok(())
 }
 
 impl TickNews {

@@ -51,10 +51,13 @@ impl ReplayHand {
 
     /// The next tick; `None` when the recording is over.
     pub fn next_tick(&mut self) -> Option<Replayed> {
-        let RecordedTick { seen, arrivals, answered_by } = self.recording.ticks.get(self.next)?;
+        let recorded = self.recording.ticks.get(self.next)?;
+        let RecordedTick { seen, arrivals, answered_by, from_rest, springback_refused } = recorded;
         self.next += 1;
         let recorded = RecordedAnswers {
             answered_by: answered_by.clone(),
+            from_rest: *from_rest,
+            springback_refused: *springback_refused,
             taken: seen.answers.clone(),
             took_work: seen.took_work,
         };

@@ -1,6 +1,8 @@
 //! What a recording holds: how the run was set up, and each tick.
 
+use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
+use softgrasp_grasp::hand::{ANGLE_COUNT, HandDimensions};
 
 use super::stages::StageDigests;
 use crate::arrival::Arrival;
@@ -44,6 +46,12 @@ pub struct RecordedSetup {
     /// Largest relative error asked for.
     #[serde(default)]
     pub max_error: Option<f64>,
+    /// A grasp by contact with friction; `None` where the thesis's rules hold.
+    #[serde(default)]
+    pub friction: Option<RecordedFriction>,
+    /// Whether the object was put in front of the first hand.
+    #[serde(default)]
+    pub placed_in_hand: bool,
     /// Where the hand came from.
     pub hand: String,
     /// From tick to tick in real time, s.
@@ -57,6 +65,21 @@ pub struct RecordedSetup {
     /// Where a sender of joints was placed: m, then quaternion x y z w; `None` where its first hand
     /// was placed before the object.
     pub world_from_sender: Option<[f64; 7]>,
+}
+
+/// What a grasp by contact with friction was like.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordedFriction {
+    /// Coefficient of friction of hand and table.
+    pub friction: f64,
+    /// How far a finger gives way to a force, m/N.
+    pub finger_compliance_m_n: f64,
+    /// Density of the object, kg/m³.
+    pub density_kg_m3: f64,
+    /// Time in which the shape forgets a force, s.
+    pub viscosity_s: f64,
+    /// Acceleration of free fall, m/s², world.
+    pub gravity: [f64; 3],
 }
 
 fn linear() -> String {
@@ -114,7 +137,14 @@ pub struct AnswerSeen {
     pub residual_rel: f64,
     /// From asking to taking, ms.
     pub round_trip_ms: f64,
+    /// Whether its path at large deformation began at rest. A server that was started anew in the
+    /// middle of a grip begins there; a replay asks for the same.
+    #[serde(default)]
+    pub from_rest: bool,
 }
+
+/// Method of an answer of which it is recorded that there was no shape to spring back to.
+pub const SPRINGBACK_REFUSED: &str = "springback refused";
 
 /// Something that happened in a tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -144,6 +174,45 @@ pub struct PoseSeen {
     pub object_xyzw: [f64; 4],
 }
 
+/// Hand and object of a tick, for programs that draw them; a replay does not need it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneSeen {
+    /// Where they were.
+    pub pose: PoseSeen,
+    /// The hand.
+    pub hand: HandSeen,
+    /// Where the object was.
+    pub world_from_object: Isometry3<f64>,
+    /// Its surface, now and then.
+    pub surface: Option<SurfaceSeen>,
+}
+
+/// The hand of a tick, as it was measured.
+///
+/// Units: m. Frame: world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandSeen {
+    /// The palm.
+    pub world_from_palm: Isometry3<f64>,
+    /// The segments, thumb first, from the palm outward, +Y along the bone.
+    pub world_from_segments: [[Isometry3<f64>; 3]; 5],
+    /// Joint angles in the order of `JointAngles::to_array`, rad.
+    pub angles_rad: [f64; ANGLE_COUNT],
+    /// Its size.
+    pub dimensions: HandDimensions,
+}
+
+/// The deformed surface of the object.
+///
+/// Units: m. Frame: the object's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceSeen {
+    /// Its nodes.
+    pub points: Vec<Point3<f64>>,
+    /// Three of these points each, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
 /// A tick of a recording, with the bytes that it took.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordedTick {
@@ -153,4 +222,8 @@ pub struct RecordedTick {
     pub arrivals: Vec<Arrival>,
     /// Method that answered what it asked; `None` if no tick took an answer to it.
     pub answered_by: Option<String>,
+    /// Whether that answer's path at large deformation began at rest.
+    pub from_rest: bool,
+    /// Whether it found that there was no shape that the object could spring back to.
+    pub springback_refused: bool,
 }

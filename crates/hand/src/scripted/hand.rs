@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use softgrasp_grasp::grasp::{Command, StateName};
 use softgrasp_grasp::hand::{Finger, JointAngles};
 use softgrasp_grasp::object::{ContactModel, SoftObject};
 
-use super::approach::PalmPath;
-use super::plan::{GraspPlan, Posture, angles};
+use super::approach::{BACK_OFF, PalmPath, above_ground};
+use super::grasp_plan::GraspPlan;
 use super::planner::{NoGrasp, PlanRequest, Planner};
+use super::posture::{Posture, angles};
 use super::script::{ScriptName, Step};
 use crate::hand_reader::HandSetup;
 use crate::sent::Sent;
@@ -25,6 +26,12 @@ pub struct Seen {
     pub state: Option<StateName>,
     /// The shape is being kept beside the ticks; the hand holds still until it is.
     pub keeping: bool,
+    /// The object, which is free to move, lies still.
+    pub is_still: bool,
+    /// The object has not answered what the hand did before: a hand that lifts waits for it.
+    pub is_late: bool,
+    /// The object is being prepared and the person waits for it: the hand does not reach before.
+    pub object_awaited: bool,
 }
 
 /// How the hand stands at one moment.
@@ -70,23 +77,32 @@ pub struct ScriptedHand {
     step_tick: u32,
     /// Share of the step that is over, from 0 to 1, gently at both ends.
     progress: f64,
-    /// Ticks for which the hand has held still because the shape is being kept.
+    /// Ticks of holding still because the shape is being kept or the object is late.
     rested: u32,
+    /// How often longer it squeezes and holds.
+    squeeze_times: u32,
     plan: GraspPlan,
     /// Where the palm came from when the hand turns to the other side.
     turned_from: PalmPath,
     closure: [f64; 5],
     closure_before: [f64; 5],
     lift: f64,
+    /// Centre of the object that the hand came for, world.
+    came_for: Option<Point3<f64>>,
+    /// How the object lay that the plan was made for, where it had rolled.
+    planned_for: Option<UnitQuaternion<f64>>,
 }
 
-/// The hand holds still for so many ticks at most while the shape is being kept; by then the server
-/// is lost, or has refused.
+/// The hand holds still for so many ticks at most while it waits.
 const REST_MAX: u32 = 200;
-/// How far the hand keeps away while it is not grasping, m.
-const BACK_OFF: f64 = 0.22;
 /// How far the hand lifts the object while it squeezes, m.
 const LIFT: f64 = 0.03;
+/// An object that has rolled by more than this, rad, is grasped by another plan.
+const ROLLED: f64 = 0.03;
+/// How far the hand lifts an object from its table, m.
+const RAISE: f64 = 0.06;
+/// A squeeze presses so many times as deep as the grip that lifts.
+const SQUEEZE: f64 = 1.5;
 /// Closure per tick far from and near the expected touch.
 const CLOSE_FAST: f64 = 0.03;
 const CLOSE_SLOW: f64 = 0.008;
@@ -105,7 +121,7 @@ impl ScriptedHand {
     ) -> Result<Self, NoGrasp> {
         let object = Arc::clone(object.rest_shape());
         let contact = ContactModel::default();
-        let request = PlanRequest { object, setup, contact, avoid_gaze: None };
+        let request = PlanRequest::new(object, setup, contact);
         let plan = request.grip()?;
         Ok(Self::following(name, request.setup, plan))
     }
@@ -124,11 +140,14 @@ impl ScriptedHand {
             step_tick: 0,
             progress: 0.0,
             rested: 0,
+            squeeze_times: 1,
             plan,
             turned_from: plan.path,
             closure: [0.0; 5],
             closure_before: [0.0; 5],
             lift: 0.0,
+            came_for: None,
+            planned_for: None,
         }
     }
 
@@ -141,6 +160,7 @@ impl ScriptedHand {
         self.plan = plan.unwrap_or(self.plan);
         (self.at, self.step_tick, self.progress, self.rested) = (0, 0, 0.0, 0);
         (self.closure, self.closure_before, self.lift) = ([0.0; 5], [0.0; 5], 0.0);
+        (self.came_for, self.planned_for) = (None, None);
     }
 
     /// Which script it plays.
@@ -158,6 +178,17 @@ impl ScriptedHand {
     #[must_use]
     pub fn holding(self, contact: ContactModel) -> Self {
         Self { contact, ..self }
+    }
+
+    /// The same hand, which squeezes and holds so many times as long.
+    #[must_use]
+    pub fn squeezing_longer(self, squeeze_times: u32) -> Self {
+        Self { squeeze_times: squeeze_times.max(1), ..self }
+    }
+
+    /// Whether its script is over.
+    pub fn is_over(&self) -> bool {
+        self.at >= self.steps.len()
     }
 
     /// The plan being followed.
@@ -193,8 +224,9 @@ impl ScriptedHand {
             if self.step_tick == 0 {
                 self.progress = 0.0;
             }
-            // A person who waits to see something goes on after it, however long it took.
-            if self.rests(seen) || !self.is_ready_for(step, object) {
+            // Who waits to see something goes on after it, however long it took.
+            let awaits = seen.object_awaited && step == Step::Reach && self.step_tick == 0;
+            if awaits || self.rests(seen) || !self.is_ready_for(step, seen, object) {
                 break;
             }
             if self.advance(step, seen) {
@@ -202,17 +234,27 @@ impl ScriptedHand {
                 break;
             }
         }
+        let mut centre = object.rest_shape().centre();
+        if self.name == ScriptName::Lift {
+            // Until the fingers close the hand goes to where the object is.
+            if matches!(step, Some(Step::Look | Step::Reach)) {
+                self.came_for = Some(seen.world_from_object * centre);
+            }
+            centre = self.came_for.unwrap_or(centre);
+        }
         let moment = Moment {
             closure: self.closure,
             posture: self.posture(step),
-            world_from_palm: self.world_from_palm(step, object.rest_shape().centre()),
+            world_from_palm: self.world_from_palm(step, centre),
         };
         Played { moment, command, over: step.is_none() }
     }
 
-    /// Whether the hand holds still because the shape is being kept.
+    /// Whether the hand holds still because the shape is being kept, or the object that it lifts is late:
+    /// not for ever, the server may be gone.
     fn rests(&mut self, seen: &Seen) -> bool {
-        self.rested = if seen.keeping { self.rested + 1 } else { 0 };
+        let waits = seen.keeping || (seen.is_late && self.name == ScriptName::Lift);
+        self.rested = if waits { self.rested + 1 } else { 0 };
         (1..=REST_MAX).contains(&self.rested)
     }
 
@@ -222,36 +264,46 @@ impl ScriptedHand {
             self.closure_before = self.closure;
         }
         self.step_tick += 1;
-        let t = (f64::from(self.step_tick) / f64::from(step.ticks_max())).min(1.0);
+        let ticks_max = match step {
+            Step::Press | Step::Hold => self.squeeze_times * step.ticks_max(),
+            _ => step.ticks_max(),
+        };
+        let t = (f64::from(self.step_tick) / f64::from(ticks_max)).min(1.0);
         self.progress = t * t * (3.0 - 2.0 * t);
         self.close(step, seen);
-        if self.step_tick >= step.ticks_max() || is_done(step, seen) {
+        if self.step_tick >= ticks_max || is_done(step, seen) {
             self.at += 1;
             self.step_tick = 0;
         }
         step == Step::Keep
     }
 
-    /// Whether the step can go on: turning to the other side needs a plan of what follows, and so
-    /// does the beginning where the object may have changed.
-    fn is_ready_for(&mut self, step: Step, object: &SoftObject) -> bool {
+    /// Whether the step can go on: it may need a plan for the other side, or for an object that has
+    /// changed or rolled.
+    fn is_ready_for(&mut self, step: Step, seen: &Seen, object: &SoftObject) -> bool {
         let begins = self.plans_first && self.at == 0;
-        if self.step_tick > 0 || !(begins || step == Step::TurnToOtherSide) {
+        let turn = seen.world_from_object.rotation;
+        let rolled = self.name == ScriptName::Lift && step == Step::Reach && turn.angle() > ROLLED;
+        if self.step_tick > 0 || !(begins || rolled || step == Step::TurnToOtherSide) {
+            return true;
+        }
+        if rolled && self.planned_for.is_some_and(|lay| lay.angle_to(&turn) < ROLLED) {
             return true;
         }
         if !self.planning {
             self.planning = true;
             self.turned_from = self.plan.path;
+            self.planned_for = rolled.then_some(turn);
             self.planner.ask(PlanRequest {
                 object: Arc::clone(object.rest_shape()),
                 setup: self.setup.clone(),
                 contact: self.contact,
-                avoid_gaze: (!begins).then(|| self.plan.path.gaze()),
+                avoid_gaze: (step == Step::TurnToOtherSide).then(|| self.plan.path.gaze()),
+                turn: if rolled { turn } else { UnitQuaternion::identity() },
             });
         }
         let Some(planned) = self.planner.take() else { return false };
         (self.planning, self.plans_first) = (false, false);
-        // A shape that cannot be grasped any more is reached for as before.
         self.plan = planned.unwrap_or(self.plan);
         true
     }
@@ -269,13 +321,31 @@ impl ScriptedHand {
                 }
                 self.lift = LIFT * progress;
             }
+            Step::Pinch => self.close_to(&plan.touch, progress),
+            Step::Grip => self.close_to(&plan.press, progress),
+            Step::Squeeze => {
+                let deeper = |digit: usize| {
+                    plan.touch[digit] + SQUEEZE * (plan.press[digit] - plan.touch[digit])
+                };
+                self.close_to(&std::array::from_fn(deeper), progress);
+            }
+            Step::Raise => self.lift = RAISE * progress,
+            Step::Lower => self.lift = RAISE * (1.0 - progress),
             Step::Open => {
                 for digit in 0..5 {
                     self.closure[digit] = self.closure_before[digit] * (1.0 - progress);
                 }
             }
             Step::TurnToOtherSide => self.lift = self.lift.min(LIFT * (1.0 - progress)),
-            Step::Reach | Step::Hold | Step::Keep | Step::Retreat => {}
+            Step::Look | Step::Reach | Step::Hold | Step::Keep | Step::Retreat => {}
+        }
+    }
+
+    /// Part of the way from where the step began to other closures.
+    fn close_to(&mut self, closure: &[f64; 5], progress: f64) {
+        for digit in 0..5 {
+            let before = self.closure_before[digit];
+            self.closure[digit] = before + progress * (closure[digit] - before);
         }
     }
 
@@ -297,7 +367,7 @@ impl ScriptedHand {
         let set = match step {
             Some(Step::Reach) => self.progress,
             Some(Step::Retreat) => 1.0 - self.progress,
-            Some(Step::TurnToOtherSide) => 0.0,
+            Some(Step::TurnToOtherSide | Step::Look) => 0.0,
             None if self.steps.last() == Some(&Step::Retreat) => 0.0,
             // A script that does not end with letting go holds on.
             Some(_) | None => 1.0,
@@ -307,6 +377,7 @@ impl ScriptedHand {
 
     fn world_from_palm(&self, step: Option<Step>, centre: Point3<f64>) -> Isometry3<f64> {
         let path = match step {
+            Some(Step::Look) => self.plan.path.backed_off(BACK_OFF),
             Some(Step::Reach) => self.plan.path.backed_off(BACK_OFF * (1.0 - self.progress)),
             Some(Step::Retreat) => self.plan.path.backed_off(BACK_OFF * self.progress),
             Some(Step::TurnToOtherSide) => {
@@ -320,7 +391,15 @@ impl ScriptedHand {
             }
             _ => self.plan.path,
         };
-        path.world_from_palm(centre + Vector3::new(0.0, self.lift, 0.0))
+        let palm = path.world_from_palm(centre + Vector3::new(0.0, self.lift, 0.0));
+        let away = match step {
+            Some(Step::Reach) => 1.0 - self.progress,
+            Some(Step::Retreat) => self.progress,
+            Some(Step::Look | Step::TurnToOtherSide) => 1.0,
+            None if self.steps.last() == Some(&Step::Retreat) => 1.0,
+            _ => 0.0,
+        };
+        above_ground(&palm, away)
     }
 }
 
@@ -331,63 +410,11 @@ fn is_done(step: Step, seen: &Seen) -> bool {
             matches!(seen.state, Some(StateName::Attached | StateName::Deforming))
         }
         Step::CloseOthers => seen.state == Some(StateName::Deforming),
+        Step::Look => seen.is_still,
         _ => false,
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use softgrasp_core::mesh::{BuiltIn, generate};
-
-    fn cube() -> SoftObject {
-        SoftObject::try_new(generate(BuiltIn::Cube, 216).unwrap()).unwrap()
-    }
-
-    fn hand(name: ScriptName, object: &SoftObject) -> ScriptedHand {
-        ScriptedHand::try_new(name, HandSetup::default(), object).unwrap()
-    }
-
-    #[test]
-    fn hand_is_where_it_is_now_however_many_ticks_were_missed() {
-        let (object, seen) = (cube(), Seen::default());
-        let mut played = hand(ScriptName::Approach, &object);
-        let mut missed = hand(ScriptName::Approach, &object);
-        for ticks in [1, 7, 30, 20] {
-            let all: Vec<Sent> = (0..ticks).map(|_| played.next(&seen, &object)).collect();
-            assert!(missed.next_after(ticks, &seen, &object) == *all.last().unwrap());
-        }
-    }
-
-    #[test]
-    fn hand_does_not_jump_back_in_the_last_tick_of_a_step() {
-        let (object, seen) = (cube(), Seen::default());
-        let mut hand = hand(ScriptName::Approach, &object);
-        let mut reader = crate::hand_reader::HandReader::new(HandSetup::default());
-        let mut before: Option<Isometry3<f64>> = None;
-        for tick in 0..95 {
-            let sent = hand.next(&seen, &object);
-            let now_s = f64::from(tick) / 60.0;
-            reader.feed(&sent.arrivals, now_s);
-            let palm = reader.hand(now_s).unwrap().world_from_palm;
-            if let Some(before) = before {
-                let moved = (palm.translation.vector - before.translation.vector).norm();
-                // The way back is 22 cm in 25 ticks, at most 1.5 times as fast in the middle.
-                assert!(moved < 0.02, "{moved} m in tick {tick}");
-            }
-            before = Some(palm);
-        }
-    }
-
-    #[test]
-    fn hand_rests_and_sends_while_the_shape_is_kept_but_not_for_ever() {
-        let object = cube();
-        let mut hand = hand(ScriptName::Regrasp, &object);
-        let (free, keeping) = (Seen::default(), Seen { keeping: true, ..Seen::default() });
-        let first = hand.next(&free, &object);
-        let resting: Vec<Sent> = (0..REST_MAX).map(|_| hand.next(&keeping, &object)).collect();
-        assert!(resting.iter().all(|sent| !sent.arrivals.is_empty() && *sent == resting[0]));
-        assert!(resting[0].arrivals == first.arrivals);
-        assert!(hand.next(&keeping, &object).arrivals != first.arrivals);
-    }
-}
+#[path = "hand_tests.rs"]
+mod tests;

@@ -1,15 +1,19 @@
 //! The scripted hand: plays a person who looks, reaches, grasps and squeezes, as device bytes.
 
 mod approach;
+mod grasp_plan;
 mod hand;
 mod plan;
 mod planner;
+mod posture;
 mod rehearsal;
 mod script;
 
 pub use approach::PalmPath;
+pub use grasp_plan::GraspPlan;
 pub use hand::{ScriptedHand, Seen};
-pub use plan::{GraspPlan, Posture, angles, plan_grasp};
+pub use plan::{GraspWish, plan_grasp};
 pub use planner::{NoGrasp, PlanRequest, Planner};
+pub use posture::{Posture, angles};
 pub use rehearsal::Rehearsal;
 pub use script::{ScriptName, UnknownScript};

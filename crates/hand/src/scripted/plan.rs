@@ -4,80 +4,15 @@
 //! worked out once, with the angles that survive the glove's sensors, and then only moved.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use softgrasp_grasp::hand::{Finger, FingerAngles, HandColliders, JointAngles, ThumbAngles, pose};
+use softgrasp_grasp::hand::{HandColliders, pose};
 use softgrasp_grasp::object::RestShape;
 use softgrasp_grasp::shape::Sphere;
 use softgrasp_grasp::sphere_tree::{ContactHit, tip_hits};
 
 use super::approach::PalmPath;
+use super::grasp_plan::{GraspPlan, is_over, open_outline};
+use super::posture::{Posture, angles};
 use crate::hand_reader::HandSetup;
-
-/// A palm pose and how far each finger closes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GraspPlan {
-    /// The palm while it holds.
-    pub path: PalmPath,
-    /// How the hand is set before it closes.
-    pub posture: Posture,
-    /// Closure (0 open, 1 closed) at which each tip touches, thumb first.
-    pub touch: [f64; 5],
-    /// Closure at which each tip has moved on by the depth asked for.
-    pub press: [f64; 5],
-}
-
-/// How the hand is set before the fingers close.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Posture {
-    /// Thumb rotation across the palm, rad.
-    pub thumb_rotation: f64,
-    /// Thumb abduction away from the palm, rad.
-    pub thumb_abduction: f64,
-    /// How far the fingers are brought together, 0 fanned out to 1 side by side.
-    pub gather: f64,
-}
-
-impl Posture {
-    /// The open hand's.
-    pub const OPEN: Self = Self { thumb_rotation: 0.1, thumb_abduction: 0.6, gather: 0.0 };
-
-    /// Part of the way to another posture.
-    #[must_use]
-    pub fn toward(&self, other: &Self, share: f64) -> Self {
-        let mix = |a: f64, b: f64| a + share * (b - a);
-        Self {
-            thumb_rotation: mix(self.thumb_rotation, other.thumb_rotation),
-            thumb_abduction: mix(self.thumb_abduction, other.thumb_abduction),
-            gather: mix(self.gather, other.gather),
-        }
-    }
-}
-
-/// Joint angles of a hand whose fingers have closed by `closure` (0 open, 1 closed), thumb first.
-pub fn angles(closure: &[f64; 5], posture: Posture) -> JointAngles {
-    let finger = |finger: Finger, gathered: f64| {
-        let s = closure[finger.index()];
-        FingerAngles {
-            mcp_flexion: 0.05 + 1.35 * s,
-            pip_flexion: 0.10 + 1.45 * s,
-            dip_flexion: 0.05 + 0.75 * s,
-            abduction: gathered * posture.gather,
-        }
-    };
-    let s = closure[0];
-    JointAngles {
-        thumb: ThumbAngles {
-            rotation: posture.thumb_rotation,
-            abduction: posture.thumb_abduction * (1.0 - s),
-            mcp_flexion: 0.7 * s,
-            ip_flexion: 0.9 * s,
-        },
-        index: finger(Finger::Index, -0.16),
-        middle: finger(Finger::Middle, 0.0),
-        ring: finger(Finger::Ring, 0.10),
-        little: finger(Finger::Little, 0.30),
-        ..JointAngles::flat()
-    }
-}
 
 /// Steps from open to closed while a contact is looked for.
 const STEPS: usize = 40;
@@ -85,6 +20,13 @@ const STEPS: usize = 40;
 const TOUCH_RANGE: (f64, f64) = (0.08, 0.80);
 /// A tip that meets the surface at a flatter angle than this would slide and not press.
 const STRAIGHT_MIN: f64 = 0.3;
+/// A finger that does not touch closes by this share of what the middle finger does.
+const ALONG: f64 = 0.8;
+/// The line between thumb and fingers meets the surface at least so straight (cosine): well within the cone
+/// of friction of a dry skin.
+const GRIP_STRAIGHT_MIN: f64 = 0.85;
+/// The palm of a hand above a table looks up by no more than this (sine of the angle).
+const GAZE_UP_MAX: f64 = 0.3;
 /// Postures tried.
 const GATHERS: [f64; 3] = [0.0, 0.5, 1.0];
 const THUMB_ROTATIONS: [f64; 4] = [0.4, 0.7, 1.0, 1.3];
@@ -94,57 +36,89 @@ const THUMB_ABDUCTIONS: [f64; 3] = [0.1, 0.4, 0.7];
 const TILTS_FEW: [f64; 2] = [0.0, 0.45];
 const TILTS_MANY: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 
+/// What a grasp is to be like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraspWish {
+    /// How far the tips move on after their touch, m.
+    pub press_depth: f64,
+    /// Direction of an earlier grasp: the palm will look at least 60° away from it.
+    pub avoid_gaze: Option<Vector3<f64>>,
+    /// Height (y, world) of the table that the object lies on, m: no part of the hand goes below it, from
+    /// the reach to the press.
+    pub table_y: Option<f64>,
+    /// Only grasps that friction can hold.
+    pub holds_well: bool,
+}
+
 /// Best palm pose for grasping an object whose frame is the world's, or `None` if no pose tried
 /// lets all five tips touch.
-///
-/// Units: `press_depth` m. `avoid_gaze` is the direction of an earlier grasp; the palm will look at
-/// least 60° away from it.
-pub fn plan_grasp(
-    object: &RestShape,
-    setup: &HandSetup,
-    press_depth: f64,
-    avoid_gaze: Option<Vector3<f64>>,
-) -> Option<GraspPlan> {
+pub fn plan_grasp(object: &RestShape, setup: &HandSetup, wish: &GraspWish) -> Option<GraspPlan> {
     // Five tips on five different nodes.
     if object.surface().nodes.len() < 5 {
         return None;
     }
-    let few = search(object, setup, press_depth, avoid_gaze, &TILTS_FEW);
-    few.or_else(|| search(object, setup, press_depth, avoid_gaze, &TILTS_MANY))
+    let few = search(object, setup, wish, &TILTS_FEW);
+    let many = few.or_else(|| search(object, setup, wish, &TILTS_MANY));
+    // An object that friction cannot hold in this hand is grasped as it can be.
+    many.or_else(|| {
+        wish.holds_well
+            .then(|| plan_grasp(object, setup, &GraspWish { holds_well: false, ..*wish }))?
+    })
 }
 
 fn search(
     object: &RestShape,
     setup: &HandSetup,
-    press_depth: f64,
-    avoid_gaze: Option<Vector3<f64>>,
+    wish: &GraspWish,
     tilts: &[f64],
 ) -> Option<GraspPlan> {
-    let centre = object.centre();
+    let (centre, size) = (object.centre(), object.mesh().size());
     let thumbs = thumb_paths(setup);
     let orientations = orientations(tilts);
     let mut best: Option<(f64, GraspPlan)> = None;
     for gather in GATHERS {
         let fingers = finger_paths(setup, gather);
+        let outline = open_outline(setup, gather);
         for &rotation in &orientations {
             let gaze = rotation * -Vector3::z();
-            if avoid_gaze.is_some_and(|avoid| gaze.dot(&avoid) > 0.5) {
+            if wish.table_y.is_some() && gaze.y > GAZE_UP_MAX {
+                continue;
+            }
+            if wish.avoid_gaze.is_some_and(|avoid| gaze.dot(&avoid) > 0.5) {
                 continue;
             }
             for object_in_palm in places(object) {
                 let path = PalmPath { world_from_palm_rotation: rotation, object_in_palm };
-                let reach = Reach { object, object_from_palm: path.world_from_palm(centre) };
-                let Some(touches) = reach.touches(&fingers) else { continue };
-                let Some((score, found)) = reach.oppose(&touches, &thumbs) else { continue };
+                let world_from_palm = path.world_from_palm(centre);
+                // Most poses end here: the open hand would be in the table.
+                if wish.table_y.is_some_and(|y| !is_over(&outline, &world_from_palm, y)) {
+                    continue;
+                }
+                let reach = Reach { object, object_from_palm: world_from_palm, centre, size };
+                let touches = match wish.table_y {
+                    Some(_) => reach.pinch(&fingers),
+                    None => reach.touches(&fingers),
+                };
+                let Some(touches) = touches else { continue };
+                let Some((score, found)) = reach.oppose(&touches, &thumbs, wish) else { continue };
                 if best.as_ref().is_some_and(|(best_score, _)| score <= *best_score) {
                     continue;
                 }
                 let posture = Posture { gather, ..found.0 };
-                let Some(press) = reach.press(setup, posture, &found.1, press_depth) else {
+                let touch = found.1.map(|t| t.closure);
+                let touching = GraspPlan { path, posture, touch, press: touch };
+                let is_possible =
+                    |y| touching.is_above(setup, centre, y) && touching.has_room(setup, object);
+                if !wish.table_y.is_none_or(is_possible) {
+                    continue;
+                }
+                let Some(press) = reach.press(setup, posture, &found.1, wish.press_depth) else {
                     continue;
                 };
-                let touch = found.1.map(|t| t.closure);
-                best = Some((score, GraspPlan { path, posture, touch, press }));
+                let plan = GraspPlan { press, ..touching };
+                if wish.table_y.is_none_or(|y| plan.is_above(setup, centre, y)) {
+                    best = Some((score, plan));
+                }
             }
         }
     }
@@ -240,6 +214,9 @@ fn places(object: &RestShape) -> Vec<Vector3<f64>> {
 struct Reach<'a> {
     object: &'a RestShape,
     object_from_palm: Isometry3<f64>,
+    /// Centre and extent of the object.
+    centre: Point3<f64>,
+    size: f64,
 }
 
 /// A tip's first touch.
@@ -250,6 +227,8 @@ struct Touch {
     tip: Point3<f64>,
     /// Cosine between the tip's motion and straight into the object.
     straight: f64,
+    /// Whether the tip touches at all: of a pinch, ring and little finger need not.
+    holds: bool,
 }
 
 impl Reach<'_> {
@@ -266,7 +245,14 @@ impl Reach<'_> {
                 let next = self.object_from_palm * path.get(step + 1)?.contact_point;
                 let straight = -(next - contact_point).normalize().dot(&hit.normal);
                 let counts = closure >= TOUCH_RANGE.0 && straight >= STRAIGHT_MIN;
-                return counts.then_some(Touch { closure, hit, tip: contact_point, straight });
+                let holds = true;
+                return counts.then_some(Touch {
+                    closure,
+                    hit,
+                    tip: contact_point,
+                    straight,
+                    holds,
+                });
             }
         }
         None
@@ -280,22 +266,58 @@ impl Reach<'_> {
         Some([self.touch(&fingers[0])?, middle, self.touch(&fingers[2])?, little])
     }
 
+    /// Touches of index and middle finger; ring and little finger close along where they do not touch.
+    fn pinch(&self, fingers: &[TipPath; 4]) -> Option<[Touch; 4]> {
+        let middle = self.touch(&fingers[1])?;
+        let index = self.touch(&fingers[0])?;
+        let along = Touch { closure: ALONG * middle.closure, holds: false, ..middle };
+        let other = |finger: &TipPath| self.touch(finger).unwrap_or(along);
+        Some([index, middle, other(&fingers[2]), other(&fingers[3])])
+    }
+
     /// The thumb posture that opposes the fingers best, with its score.
     fn oppose(
         &self,
         fingers: &[Touch; 4],
         thumbs: &[(Posture, TipPath)],
+        wish: &GraspWish,
     ) -> Option<(f64, (Posture, [Touch; 5]))> {
         let mut best: Option<(f64, (Posture, [Touch; 5]))> = None;
         for (posture, path) in thumbs {
             let Some(thumb) = self.touch(path) else { continue };
             let touches = [thumb, fingers[0], fingers[1], fingers[2], fingers[3]];
-            let Some(score) = score(&touches) else { continue };
+            let Some(mut score) = score(&touches) else { continue };
+            if wish.holds_well {
+                let Some(grip) = self.grip(&touches) else { continue };
+                score += grip;
+            }
             if best.as_ref().is_none_or(|(b, _)| score > *b) {
                 best = Some((score, (*posture, touches)));
             }
         }
         best
+    }
+
+    /// How well friction can hold between thumb and fingers, with the object's weight: best where the line
+    /// between them is level, goes through the middle of the object and meets the surface straight on both
+    /// sides; `None` where it leaves the cones of friction.
+    ///
+    /// Source: Nguyen (1988), force closure of two contacts with friction.
+    fn grip(&self, touches: &[Touch; 5]) -> Option<f64> {
+        let [thumb, fingers @ ..] = touches;
+        let opposite: Vector3<f64> =
+            fingers.iter().map(|t| t.tip.coords).sum::<Vector3<f64>>() / 4.0;
+        let normal = fingers.iter().map(|t| t.hit.normal).sum::<Vector3<f64>>();
+        let across = opposite - thumb.tip.coords;
+        let line = across.try_normalize(f64::MIN_POSITIVE)?;
+        let straight = (-line.dot(&thumb.hit.normal)).min(line.dot(&normal.try_normalize(1e-9)?));
+        let to_centre = self.centre.coords - thumb.tip.coords;
+        let aside = (to_centre - line * line.dot(&to_centre)).norm() / self.size;
+        // Tips above the middle press the object onto the table instead of lifting it.
+        let tips = nalgebra::center(&thumb.tip, &Point3::from(opposite));
+        let above = ((tips.y - self.centre.y) / self.size).max(-0.05);
+        let held = 3.0 * straight - 2.0 * line.y.abs() - 20.0 * aside - 10.0 * above;
+        (straight > GRIP_STRAIGHT_MIN).then_some(held)
     }
 
     /// Closures at which the tips have moved by `depth` since their touch.
@@ -308,6 +330,10 @@ impl Reach<'_> {
     ) -> Option<[f64; 5]> {
         let mut press = [0.0; 5];
         for (digit, touch) in touches.iter().enumerate() {
+            if !touch.holds {
+                press[digit] = touch.closure;
+                continue;
+            }
             let deep_enough = (1..=2 * STEPS).find_map(|step| {
                 let closure = touch.closure + step as f64 / (4 * STEPS) as f64;
                 let tip = tips(setup, &[closure; 5], posture)[digit].contact_point;
@@ -322,16 +348,19 @@ impl Reach<'_> {
 
 /// How good a set of touches is to hold with: the thumb opposes the fingers, the nodes differ.
 fn score(touches: &[Touch; 5]) -> Option<f64> {
-    for (i, a) in touches.iter().enumerate() {
-        if touches[..i].iter().any(|b| b.hit.node == a.hit.node) {
+    let held: Vec<&Touch> = touches.iter().filter(|touch| touch.holds).collect();
+    for (i, a) in held.iter().enumerate() {
+        if held[..i].iter().any(|b| b.hit.node == a.hit.node) {
             return None;
         }
     }
-    let fingers: Vector3<f64> = touches[1..].iter().map(|t| t.hit.normal).sum();
-    let opposition = -touches[0].hit.normal.dot(&fingers) / 4.0;
+    let (thumb, fingers) = (held[0], &held[1..]);
+    let count = fingers.len() as f64;
+    let normals: Vector3<f64> = fingers.iter().map(|t| t.hit.normal).sum();
+    let opposition = -thumb.hit.normal.dot(&normals) / count;
     // Tips far apart hold a body better than tips in a heap.
-    let spread = touches[1..].iter().map(|t| (t.tip - touches[0].tip).norm()).sum::<f64>() / 4.0;
-    let early = touches.iter().map(|t| (t.closure - 0.45).abs()).fold(0.0, f64::max);
-    let straight = touches.iter().map(|t| t.straight).fold(1.0, f64::min);
+    let spread = fingers.iter().map(|t| (t.tip - thumb.tip).norm()).sum::<f64>() / count;
+    let early = held.iter().map(|t| (t.closure - 0.45).abs()).fold(0.0, f64::max);
+    let straight = held.iter().map(|t| t.straight).fold(1.0, f64::min);
     Some(opposition + 5.0 * spread + straight - 0.5 * early)
 }

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use softgrasp_grasp::object::{ContactModel, RestShape};
 use softgrasp_os::Beside;
 
-use super::plan::{GraspPlan, plan_grasp};
+use super::grasp_plan::GraspPlan;
+use super::plan::{GraspWish, plan_grasp};
 use crate::hand_reader::HandSetup;
 
 /// An approach that is to be planned.
@@ -20,6 +21,9 @@ pub struct PlanRequest {
     pub contact: ContactModel,
     /// Direction of an earlier grasp, to be avoided where another one is possible.
     pub avoid_gaze: Option<Vector3<f64>>,
+    /// How the object has been turned since it was at home, for fingertips that press with friction: the
+    /// plan is then for the turned object, and above the table that it lies on.
+    pub turn: UnitQuaternion<f64>,
 }
 
 /// The hand found no way to grasp.
@@ -43,15 +47,33 @@ pub enum NoGrasp {
 }
 
 impl PlanRequest {
+    /// An approach to an object at home, from wherever is best.
+    pub fn new(object: Arc<RestShape>, setup: HandSetup, contact: ContactModel) -> Self {
+        Self { object, setup, contact, avoid_gaze: None, turn: UnitQuaternion::identity() }
+    }
+
     /// The best plan; one that does not avoid the gaze where no other is found; `None` where the
     /// object cannot be grasped. Takes up to seconds.
     pub fn plan(&self) -> Option<GraspPlan> {
-        let depth = press_depth(&self.object, self.contact);
-        let planned = plan_grasp(&self.object, &self.setup, depth, self.avoid_gaze);
-        planned.or_else(|| {
+        let by_friction = self.contact == ContactModel::Friction;
+        let turned = match by_friction && self.turn.angle() > TURN_MIN {
+            true => Some(turned(&self.object, &self.turn)?),
+            false => None,
+        };
+        let object = turned.as_ref().unwrap_or(&self.object);
+        let wish = GraspWish {
+            press_depth: press_depth(object, self.contact),
+            avoid_gaze: self.avoid_gaze,
+            table_y: by_friction.then(|| object.bottom()),
+            holds_well: by_friction,
+        };
+        let planned = plan_grasp(object, &self.setup, &wish).or_else(|| {
             self.avoid_gaze?;
-            plan_grasp(&self.object, &self.setup, depth, None)
-        })
+            plan_grasp(object, &self.setup, &GraspWish { avoid_gaze: None, ..wish })
+        });
+        // The middle of the turned box is not the turned middle of the box.
+        let shift = self.object.centre() - object.centre();
+        planned.map(|plan| plan.about(shift))
     }
 
     /// The same with the reason where the object cannot be grasped.
@@ -156,11 +178,30 @@ const VERTEX_PRESS_SHARE: f64 = 0.05;
 /// inside out.
 const VERTEX_PRESS_SPACING_SHARE: f64 = 0.45;
 
+/// A pinch that is to lift closes by this share of the object's smallest extent beyond the first touch: part
+/// of it dents the object, part of it pushes the fingers back.
+const PINCH_SHARE: f64 = 0.12;
+
+/// An object that is turned by less than this is taken as it was, rad.
+const TURN_MIN: f64 = 1e-3;
+
+/// The object turned about the middle of its box.
+fn turned(object: &RestShape, turn: &UnitQuaternion<f64>) -> Option<RestShape> {
+    let centre = object.centre();
+    let turned = object.mesh().vertices().iter().map(|vertex| centre + turn * (vertex - centre));
+    let mesh = object.mesh().with_vertices(turned.collect()).ok()?;
+    RestShape::try_new(mesh).ok()
+}
+
 /// How far a squeeze presses, m.
 fn press_depth(object: &RestShape, contact: ContactModel) -> f64 {
     let mesh = object.mesh();
     match contact {
         ContactModel::Patch | ContactModel::Mask => PRESS_SHARE * mesh.size(),
+        ContactModel::Friction => {
+            let (low, high) = mesh.bounds();
+            PINCH_SHARE * (high - low).min()
+        }
         ContactModel::Vertex => {
             let edges = mesh.tets().iter().map(|t| {
                 let (a, b) = (mesh.vertices()[t[0] as usize], mesh.vertices()[t[1] as usize]);
@@ -186,6 +227,7 @@ mod tests {
             setup: HandSetup::default(),
             contact: ContactModel::default(),
             avoid_gaze,
+            turn: UnitQuaternion::identity(),
         };
         // Plans are told apart by whether there is one; a real plan is made once.
         let plan = request(None).plan();

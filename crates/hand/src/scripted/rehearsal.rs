@@ -5,8 +5,8 @@ use softgrasp_grasp::grasp::StateName;
 use softgrasp_grasp::hand::{Finger, JointAngles};
 use softgrasp_grasp::object::SoftObject;
 
+use super::grasp_plan::GraspPlan;
 use super::hand::{Moment, ScriptedHand, Seen};
-use super::plan::GraspPlan;
 use super::script::ScriptName;
 use crate::hand_reader::HandSetup;
 
@@ -100,12 +100,7 @@ mod tests {
         let cube = SoftObject::try_new(generate(BuiltIn::Cube, 216).unwrap()).unwrap();
         let setup = HandSetup::default();
         let object = Arc::clone(cube.rest_shape());
-        let request = PlanRequest {
-            object,
-            setup: setup.clone(),
-            contact: ContactModel::default(),
-            avoid_gaze: None,
-        };
+        let request = PlanRequest::new(object, setup.clone(), ContactModel::default());
         let plan = request.grip().unwrap();
         let of = |script| (script, Rehearsal::of(script, setup.clone(), plan, &cube));
         (ScriptName::ALL.map(of).to_vec(), plan)

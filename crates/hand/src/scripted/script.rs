@@ -17,17 +17,22 @@ pub enum ScriptName {
     /// Grasp, squeeze, keep the shape, grasp again from another side, squeeze, open (thesis 4.6).
     #[default]
     Regrasp,
+    /// Pinch the object on its table, lift it, squeeze it, keep the shape, put it down (contact with
+    /// friction).
+    Lift,
 }
 
 /// A name that is no script's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no script is called '{0}'; there are approach, attach, squeeze, release and regrasp")]
+#[error(
+    "no script is called '{0}'; there are lift, approach, attach, squeeze, release and regrasp"
+)]
 pub struct UnknownScript(String);
 
 impl ScriptName {
     /// All scripts.
-    pub const ALL: [Self; 5] =
-        [Self::Approach, Self::Attach, Self::Squeeze, Self::Release, Self::Regrasp];
+    pub const ALL: [Self; 6] =
+        [Self::Lift, Self::Approach, Self::Attach, Self::Squeeze, Self::Release, Self::Regrasp];
 
     /// The name on the command line.
     pub const fn as_str(self) -> &'static str {
@@ -37,15 +42,23 @@ impl ScriptName {
             Self::Squeeze => "squeeze",
             Self::Release => "release",
             Self::Regrasp => "regrasp",
+            Self::Lift => "lift",
         }
     }
 
     /// What the hand does, in order.
     pub(super) fn steps(self) -> Vec<Step> {
-        use Step::{CloseOthers, CloseThree, Hold, Keep, Open, Press, Reach, Retreat};
+        use Step::{
+            CloseOthers, CloseThree, Grip, Hold, Keep, Look, Lower, Open, Pinch, Press, Raise,
+            Reach, Retreat, Squeeze,
+        };
         let squeeze = [Reach, CloseThree, CloseOthers, Press, Hold];
         match self {
             Self::Approach => vec![Reach, Hold, Retreat],
+            Self::Lift => vec![
+                Look, Reach, Pinch, Grip, Raise, Hold, Squeeze, Hold, Keep, Hold, Lower, Open,
+                Retreat,
+            ],
             Self::Attach => vec![Reach, CloseThree, Hold, Open, Retreat],
             Self::Squeeze => squeeze.to_vec(),
             Self::Release => [&squeeze[..], &[Open, Retreat]].concat(),
@@ -82,6 +95,18 @@ pub(super) enum Step {
     CloseThree,
     CloseOthers,
     Press,
+    /// The hand waits until the object lies still, and looks how it lies.
+    Look,
+    /// All fingers close at once until they touch.
+    Pinch,
+    /// They press as deep as was planned.
+    Grip,
+    /// The hand lifts what it holds.
+    Raise,
+    /// The fingers press deeper.
+    Squeeze,
+    /// The hand comes down again.
+    Lower,
     Hold,
     Keep,
     Open,
@@ -95,7 +120,10 @@ impl Step {
         match self {
             Self::Reach => 50,
             Self::CloseThree | Self::CloseOthers => 90,
-            Self::Press => 50,
+            Self::Press | Self::Grip | Self::Squeeze => 50,
+            Self::Look => 150,
+            Self::Pinch => 60,
+            Self::Raise | Self::Lower => 70,
             Self::Hold => 15,
             Self::Keep => 1,
             Self::Open => 20,

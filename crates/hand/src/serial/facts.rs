@@ -32,4 +32,7 @@ pub struct TrackerFacts {
     pub status: Option<String>,
     /// Its complaints about what it was set to.
     pub complaints: Vec<String>,
+    /// In what it is not as it was told to be, by its status after all orders; lengths are read in
+    /// the unit that it was told.
+    pub disobeys: Option<String>,
 }

@@ -9,7 +9,7 @@ use super::listening::{Poll, ask, serve, wait_until_quiet};
 use super::port::{Lost, Port};
 use super::record_assembler::Cut;
 use super::settings::{TrackerFilter, TrackerMode, TrackerSettings};
-use super::tracker_replies::{complaints, find_status};
+use super::tracker_replies::{complaints as refusals, disobeyed, find_status};
 use crate::devices::fastrak::{Encoding, LengthUnit, OutputList};
 
 /// Ends continuous output.
@@ -20,6 +20,9 @@ const QUIET: Duration = Duration::from_millis(60);
 const QUIET_MAX: Duration = Duration::from_secs(2);
 /// How long the status record may take.
 const STATUS_MAX: Duration = Duration::from_millis(500);
+
+/// All orders are given so many times at most.
+const ORDERS_MAX: usize = 3;
 
 /// Serves an open port until it is lost or the thread is to end.
 pub(super) fn serve_tracker(
@@ -59,18 +62,32 @@ fn set_up(
     port.write(STOP)?;
     wait_until_quiet(context, port, QUIET, QUIET_MAX)?;
     port.discard_input();
-    let status = ask(context, port, b"S", STATUS_MAX, find_status)?;
-    port.write(commands(settings).as_bytes())?;
-    let heard = wait_until_quiet(context, port, QUIET, STATUS_MAX)?;
-    let complaints = complaints(&heard);
-    for complaint in &complaints {
+    let mut status = ask(context, port, b"S", STATUS_MAX, find_status)?;
+    let answers = status.is_some();
+    let mut complaints = Vec::new();
+    let mut disobeys = None;
+    // An order that was lost is given again: a tracker left in inches is wrong by a factor of 2.54.
+    for _ in 0..ORDERS_MAX {
+        port.write(commands(settings).as_bytes())?;
+        let heard = wait_until_quiet(context, port, QUIET, STATUS_MAX)?;
+        complaints = refusals(&heard);
+        disobeys = None;
+        if answers {
+            status = ask(context, port, b"S", STATUS_MAX, find_status)?.or(status);
+            disobeys = status.as_ref().and_then(|status| disobeyed(status, settings.format));
+        }
+        if disobeys.is_none() {
+            break;
+        }
+    }
+    for complaint in complaints.iter().chain(&disobeys) {
         tracing::warn!(complaint, "the tracker refuses a command");
     }
     port.discard_input();
     if settings.mode == TrackerMode::Continuous {
         port.write(b"C")?;
     }
-    Ok(TrackerFacts { status, complaints })
+    Ok(TrackerFacts { status, complaints, disobeys })
 }
 
 /// Everything that the tracker is to be set to.

@@ -1,8 +1,24 @@
 //! The tracker's replies to the commands of its set-up.
 
+use crate::devices::fastrak::{Encoding, FastrakFormat, LengthUnit};
+
 /// The status record among what was heard, without CR LF.
 pub(super) fn find_status(heard: &[u8]) -> Option<String> {
     lines(heard).find(|line| line.get(2) == Some(&b'S') && is_reply(line)).map(text)
+}
+
+/// What a status record says that a tracker is not as it was told to be: text or floats, and the
+/// unit. `None` where all is as it was told, or the record does not say.
+pub(super) fn disobeyed(status: &str, told: FastrakFormat) -> Option<String> {
+    let bits = u16::from_str_radix(status.get(3..6)?, 16).ok()?;
+    let is_binary = bits & 1 != 0;
+    let units = if bits & 2 != 0 { LengthUnit::Centimetres } else { LengthUnit::Inches };
+    if units != told.units {
+        let (is, was_told) = (units.name(), told.units.name());
+        return Some(format!("it stays in {is} though it was told to send {was_told}"));
+    }
+    (is_binary != (told.encoding == Encoding::Binary))
+        .then(|| "it did not take the order for text or bytes".to_owned())
 }
 
 /// The error records among what was heard.
@@ -35,6 +51,23 @@ fn is_reply(line: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::devices::fastrak::OutputList;
+
+    #[test]
+    fn status_tells_a_tracker_that_was_left_in_inches() {
+        let told = FastrakFormat {
+            encoding: Encoding::Binary,
+            output: OutputList::PositionQuaternion,
+            units: LengthUnit::Centimetres,
+        };
+        assert_eq!(disobeyed("21S3F3    F31  2.10", told), None);
+        let inches = disobeyed("21S3F1    F31  2.10", told).expect("said");
+        assert_eq!(inches, "it stays in inches though it was told to send centimetres");
+        assert!(disobeyed("21S3F2    F31  2.10", told).is_some_and(|why| why.contains("text")));
+        for unclear in ["", "21S", "21SXYZ", "21Sé"] {
+            assert_eq!(disobeyed(unclear, told), None, "{unclear}");
+        }
+    }
 
     #[test]
     fn status_and_complaints_are_found_among_other_bytes() {

@@ -48,6 +48,8 @@ pub enum Action {
     NextShading,
     /// Show the next level of the sphere tree, and after the last one none.
     NextSphereLevel,
+    /// Show the level of the sphere tree before this one.
+    LastSphereLevel,
     /// Look at the whole scene.
     FrameAll,
     /// Go on, or stand still: hands that are played only.
@@ -78,13 +80,14 @@ impl Action {
             Self::Hand(HandChoice::Replay) => "Recording".to_owned(),
             Self::Method(name) => name.clone(),
             Self::MaxError(None) => "rounding only".to_owned(),
-            Self::MaxError(Some(share)) => format!("{} %", 100.0 * share),
+            Self::MaxError(Some(share)) => Shading::Error.text(*share),
             Self::Toggle(toggle) => toggle.label().to_owned(),
             Self::Page(page) => page.label().to_owned(),
             Self::Shade(shading) => shading.title().to_owned(),
-            Self::Light(level) => capitalised(&level.to_string()),
+            Self::Light(level) => capitalised(&format!("{level} light")),
             Self::NextShading => "Next colouring".to_owned(),
             Self::NextSphereLevel => "Next level of the sphere tree".to_owned(),
+            Self::LastSphereLevel => "Last level of the sphere tree".to_owned(),
             Self::FrameAll => "Frame the scene".to_owned(),
             Self::PlayOrPause => "Play or pause".to_owned(),
             Self::Step => "One tick".to_owned(),
@@ -106,6 +109,7 @@ impl Action {
             Self::Exit => "Ctrl+Q",
             Self::NextShading => "C",
             Self::NextSphereLevel => "T",
+            Self::LastSphereLevel => "Shift+T",
             Self::FrameAll => "F",
             Self::PlayOrPause => "Enter",
             Self::Step => ".",
@@ -144,6 +148,7 @@ mod tests {
             Action::Exit,
             Action::NextShading,
             Action::NextSphereLevel,
+            Action::LastSphereLevel,
             Action::FrameAll,
             Action::PlayOrPause,
             Action::Step,
@@ -152,5 +157,11 @@ mod tests {
         let keys: BTreeSet<&str> = actions.iter().map(Action::key).collect();
         assert_eq!(keys.len(), actions.len(), "{keys:?}");
         assert!(!keys.contains(""));
+    }
+
+    #[test]
+    fn errors_that_are_accepted_are_read_as_round_numbers() {
+        let read = [1e-2, 1e-4, 1e-6].map(|share| Action::MaxError(Some(share)).label());
+        assert_eq!(read, ["1 %", "0.01 %", "0.0001 %"]);
     }
 }

@@ -62,6 +62,20 @@ impl ViewCamera {
         eye
     }
 
+    /// Part of the way to another eye, the shorter way around.
+    #[must_use]
+    pub fn toward(&self, other: &Self, share: f64) -> Self {
+        let pi = std::f64::consts::PI;
+        let turn = (other.yaw - self.yaw + pi).rem_euclid(2.0 * pi) - pi;
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        Self {
+            target: self.target + (other.target - self.target) * share,
+            distance: mix(self.distance, other.distance),
+            yaw: self.yaw + share * turn,
+            pitch: mix(self.pitch, other.pitch),
+        }
+    }
+
     /// Where the eye is.
     pub fn eye(&self) -> Point3<f64> {
         self.target + self.world_from_eye_rotation() * Vector3::new(0.0, 0.0, self.distance)
@@ -193,6 +207,16 @@ mod tests {
                 assert!(towards_eye.dot(&back) < 0.75, "{turn:?}, {hand:?}");
             }
         }
+    }
+
+    #[test]
+    fn eye_that_goes_elsewhere_takes_the_shorter_way_around() {
+        let from = ViewCamera { yaw: 3.0, ..ViewCamera::default() };
+        let to = ViewCamera { yaw: -3.0, pitch: 0.6, ..from };
+        let half = from.toward(&to, 0.5);
+        assert!((half.yaw.sin()).abs() < 1e-12 && half.yaw.cos() < 0.0, "{half:?}");
+        let there = from.toward(&to, 1.0);
+        assert!((there.eye() - to.eye()).norm() < 1e-12);
     }
 
     #[test]

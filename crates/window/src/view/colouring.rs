@@ -21,8 +21,10 @@ pub struct Colouring {
     remark: String,
 }
 
-/// The legend of strain, stress and error ends above so large a share of the surface's nodes.
+/// The legend of strain, stress and error ends above so large a share of the surface's nodes, and
+/// not below so large a part of the highest value: the few highest values have one colour.
 const COLOURED_SHARE: f64 = 0.9;
+const COLOURED_PART: f64 = 0.6;
 
 struct Shaded {
     /// Rest shape that it is made for.
@@ -41,6 +43,12 @@ impl Colouring {
             shares: Vec::new(),
             remark: String::new(),
         }
+    }
+
+    /// From now on objects are of another material.
+    pub fn set_material(&mut self, material: Material) {
+        self.material = material;
+        self.shaded = None;
     }
 
     /// Works out the colours of a frame.
@@ -73,7 +81,7 @@ impl Colouring {
         let coloured = match shading {
             Shading::Displacement | Shading::Plain => largest,
             Shading::Strain | Shading::VonMises | Shading::Error => {
-                shaded.seen_by_share(COLOURED_SHARE)
+                shaded.seen_by_share(COLOURED_SHARE).max(COLOURED_PART * largest)
             }
         };
         self.legend.follow(coloured, now_s);

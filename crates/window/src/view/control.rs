@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 use softgrasp_hand::hand_source::HandSource;
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::mouse::MouseInput;
-use softgrasp_protocol::MethodName;
+use softgrasp_protocol::{Material, MethodName};
 
 /// One wish. It takes effect at the beginning of the next tick; what becomes of it is told by a
 /// [`softgrasp_hand::notice::Notice`].
@@ -26,6 +26,8 @@ pub enum Control {
     ReplaceObject(Box<LoadedObject>),
     /// Put another hand in the place of this one.
     ReplaceHand(Box<HandSource>),
+    /// Make the object of another elastic material; what holds it goes on holding it.
+    SetMaterial(Material),
     /// Solve by another method.
     SetMethod(MethodName),
     /// Largest relative error of an answer; `None` leaves it to the method.

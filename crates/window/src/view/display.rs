@@ -142,6 +142,17 @@ impl Display {
         };
     }
 
+    /// Shows the level of a tree that has so many before the one that is shown, the other way round
+    /// than [`Display::next_spheres`].
+    pub fn last_spheres(&mut self, levels: usize) {
+        self.spheres = match self.spheres {
+            Spheres::Hidden => Spheres::Search,
+            Spheres::Search => Spheres::Level(levels.saturating_sub(1)),
+            Spheres::Level(0) => Spheres::Hidden,
+            Spheres::Level(level) => Spheres::Level(level - 1),
+        };
+    }
+
     /// Shows the next quantity in colours.
     pub fn next_shading(&mut self) {
         let all = Shading::ALL;
@@ -164,6 +175,10 @@ mod tests {
         }
         use Spheres::{Hidden, Level, Search};
         assert_eq!(shown, [Level(0), Level(1), Search, Hidden]);
+        for before in [Search, Level(1), Level(0), Hidden] {
+            display.last_spheres(2);
+            assert_eq!(display.spheres, before, "there is a way back");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use softgrasp_grasp::grasp::{Contact, HandSegments, StateName};
-use softgrasp_grasp::hand::{HandColliders, HandDimensions, pose_of_segments};
+use softgrasp_grasp::hand::{HandColliders, HandDimensions, HandPose, pose_of_segments};
 use softgrasp_grasp::object::RestShape;
 use softgrasp_hand::arrival::Device;
 use softgrasp_protocol::solve_report::SolveSummary;
@@ -26,6 +26,8 @@ pub struct ViewFrame {
     pub grasp: GraspView,
     /// The server and its newest answer.
     pub server: ServerView,
+    /// What the hand does by itself.
+    pub acts: HandActs,
     /// What happened since the frame before this one was seen, oldest first.
     pub news: Vec<News>,
     /// Times of the answers that came since the frame before this one was seen, oldest first.
@@ -49,6 +51,8 @@ pub struct ObjectView {
     pub whole: bool,
     /// Where it is.
     pub world_from_object: Isometry3<f64>,
+    /// Height of the table that it can lie on, y of the world; `None` where it has no weight.
+    pub table_y: Option<f64>,
 }
 
 /// The hand as it is shown: segments that may not enter the object stay outside it.
@@ -63,6 +67,17 @@ pub struct HandView {
 }
 
 impl HandView {
+    /// A hand of a size in a pose.
+    pub fn of_pose(dimensions: HandDimensions, pose: &HandPose) -> Self {
+        Self {
+            dimensions,
+            world_from_palm: pose.world_from_palm,
+            world_from_segment: pose
+                .fingers
+                .map(|finger| finger.segments.map(|segment| segment.world_from_segment)),
+        }
+    }
+
     /// Colliders of the hand as it is shown, in the world.
     pub fn colliders(&self) -> HandColliders {
         let pose =
@@ -88,6 +103,17 @@ pub struct GraspView {
     pub silent: Vec<Device>,
 }
 
+/// What the hand does by itself.
+#[derive(Clone, Default)]
+pub struct HandActs {
+    /// Its script has come to its end.
+    pub story_is_over: bool,
+    /// It goes somewhere by itself, because a person asked for that, and takes no other wish.
+    pub is_on_its_way: bool,
+    /// The hand as it will squeeze the object, where it has a plan; another one when it has another.
+    pub squeezing: Option<Arc<HandView>>,
+}
+
 /// The link and what came over it.
 #[derive(Clone, Default)]
 pub struct ServerView {
@@ -103,6 +129,8 @@ pub struct ServerView {
     pub ticks_skipped: u64,
     /// Bytes of glove and tracker that were no good records, so far.
     pub device_faults: u64,
+    /// What was heard of the server last, in its own words.
+    pub said: Option<String>,
 }
 
 /// Whether the server is there and keeps up.
@@ -192,6 +220,13 @@ impl TickTiming {
 }
 
 impl ViewFrame {
+    /// How hard the hand grips, N: the force of the fingers against that of the thumb, half of what
+    /// all fingertips exert together. `None` where no force is known.
+    pub fn grip_newtons(&self) -> Option<f64> {
+        let forces = self.grasp.forces.as_ref()?;
+        Some(0.5 * forces.iter().map(Vector3::norm).sum::<f64>())
+    }
+
     /// Every vertex as it is shown.
     ///
     /// Units: m. Frame: the object's.
@@ -251,7 +286,7 @@ const NEWS_MAX: usize = 256;
 const TIMINGS_MAX: usize = 1024;
 
 #[cfg(test)]
-pub(super) mod samples {
+pub(crate) mod samples {
     //! Frames for tests.
 
     use softgrasp_core::mesh::{BuiltIn, generate};
@@ -272,10 +307,12 @@ pub(super) mod samples {
                 displacement,
                 whole: true,
                 world_from_object: Isometry3::identity(),
+                table_y: None,
             },
             hand: None,
             grasp: GraspView::default(),
             server: ServerView::default(),
+            acts: HandActs::default(),
             news: Vec::new(),
             timings: Vec::new(),
         }

@@ -7,10 +7,28 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use softgrasp_grasp::object::ObjectChoice;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 
+/// The object that a person wants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectWish {
+    /// Which.
+    pub choice: ObjectChoice,
+    /// Nodes of a built-in object, where another number than that of the run is wanted.
+    pub nodes: Option<usize>,
+    /// Longest extent, m, where another one than that of the run is wanted.
+    pub size_m: Option<f64>,
+}
+
+impl From<ObjectChoice> for ObjectWish {
+    /// An object as fine and as large as it usually is.
+    fn from(choice: ObjectChoice) -> Self {
+        Self { choice, nodes: None, size_m: None }
+    }
+}
+
 /// Loads an object. It says at which stage it is and asks whether to go on; an object that nobody
 /// wants any more gives `None`, one that cannot be loaded a sentence.
 pub type LoadObject = Arc<
-    dyn Fn(ObjectChoice, &mut dyn FnMut(LoadStage) -> bool) -> Option<Result<LoadedObject, String>>
+    dyn Fn(ObjectWish, &mut dyn FnMut(LoadStage) -> bool) -> Option<Result<LoadedObject, String>>
         + Send
         + Sync,
 >;
@@ -30,7 +48,7 @@ impl Loading {
     ///
     /// # Errors
     /// The system's, when it gives no thread.
-    pub fn start(load: LoadObject, choice: ObjectChoice) -> std::io::Result<Self> {
+    pub fn start(load: LoadObject, wish: ObjectWish) -> std::io::Result<Self> {
         let stage = Arc::new(AtomicU8::new(0));
         let (sender, result) = channel();
         let shared = Arc::clone(&stage);
@@ -39,7 +57,7 @@ impl Loading {
                 let tell = |was| (was != CANCELLED).then_some(at as u8);
                 shared.fetch_update(Ordering::Relaxed, Ordering::Relaxed, tell).is_ok()
             };
-            if let Some(loaded) = load(choice, &mut goes_on) {
+            if let Some(loaded) = load(wish, &mut goes_on) {
                 // Whoever cancelled does not listen.
                 let _ = sender.send(loaded);
             }
@@ -106,16 +124,17 @@ mod tests {
     fn object_comes_once_after_its_stages_and_what_fails_comes_as_a_sentence() {
         let (gate, passed) = channel::<()>();
         let passed = std::sync::Mutex::new(passed);
-        let load: LoadObject = Arc::new(move |choice, goes_on| {
+        let load: LoadObject = Arc::new(move |wish, goes_on| {
             assert!(goes_on(LoadStage::Plan));
             let _ = passed.lock().unwrap().recv();
             assert!(goes_on(LoadStage::Ready));
-            Some(match choice {
+            Some(match wish.choice {
                 ObjectChoice::BuiltIn(_) => Ok(cube()),
                 ObjectChoice::File(path) => Err(format!("cannot read {}", path.display())),
             })
         });
-        let loading = Loading::start(Arc::clone(&load), "cube".parse().unwrap()).unwrap();
+        let wish = |name: &str| ObjectWish::from(name.parse::<ObjectChoice>().unwrap());
+        let loading = Loading::start(Arc::clone(&load), wish("cube")).unwrap();
         while loading.stage() < LoadStage::Plan {
             std::thread::yield_now();
         }
@@ -123,7 +142,7 @@ mod tests {
         gate.send(()).unwrap();
         assert_eq!(wait(&loading).unwrap().summary.nodes, 64);
         assert_eq!(loading.stage(), LoadStage::Ready);
-        let refused = Loading::start(load, "no-such-file.msh".parse().unwrap()).unwrap();
+        let refused = Loading::start(load, wish("no-such-file.msh")).unwrap();
         gate.send(()).unwrap();
         assert_eq!(wait(&refused).err().unwrap(), "cannot read no-such-file.msh");
     }
@@ -138,7 +157,8 @@ mod tests {
             told.send(()).unwrap();
             None
         });
-        drop(Loading::start(load, "cube".parse().unwrap()).unwrap());
+        let cube: ObjectChoice = "cube".parse().unwrap();
+        drop(Loading::start(load, cube.into()).unwrap());
         stopped.recv().unwrap();
     }
 }

@@ -8,6 +8,7 @@ pub mod colouring;
 pub mod control;
 pub mod display;
 pub mod eye_place;
+pub mod eye_search;
 pub mod frame;
 pub mod hand_skin;
 pub mod history;

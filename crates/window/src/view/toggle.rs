@@ -26,6 +26,8 @@ pub enum Page {
     Information,
     /// The graph of times.
     Timings,
+    /// How soft the object is.
+    Softness,
 }
 
 impl Toggle {
@@ -60,7 +62,7 @@ impl Toggle {
 
 impl Page {
     /// All of them, in the order of a menu.
-    pub const ALL: [Self; 3] = [Self::Help, Self::Information, Self::Timings];
+    pub const ALL: [Self; 4] = [Self::Help, Self::Information, Self::Timings, Self::Softness];
 
     /// What the menu calls it.
     pub const fn label(self) -> &'static str {
@@ -68,6 +70,7 @@ impl Page {
             Self::Help => "Help",
             Self::Information => "Information",
             Self::Timings => "Timings",
+            Self::Softness => "Softness and size",
         }
     }
 
@@ -77,6 +80,7 @@ impl Page {
             Self::Help => "F1",
             Self::Information => "F2",
             Self::Timings => "F3",
+            Self::Softness => "F4",
         }
     }
 }

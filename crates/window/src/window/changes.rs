@@ -1,8 +1,10 @@
 //! Changes that take their time: another object, another hand; made beside window and ticks.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
+use nalgebra::Isometry3;
 use softgrasp_grasp::object::{ContactModel, ObjectChoice, RestShape};
 use softgrasp_hand::hand_choice::HandChoice;
 use softgrasp_hand::hand_reader::HandSetup;
@@ -12,7 +14,10 @@ use softgrasp_hand::mouse::MouseHand;
 use softgrasp_hand::scripted::{PlanRequest, Planner, ScriptedHand};
 
 use crate::view::control::Control;
-use crate::view::loading::{LoadObject, Loading};
+use crate::view::loading::{LoadObject, Loading, ObjectWish};
+
+/// A hand that a person watches squeezes and holds so many times as long.
+pub const SQUEEZE_TIMES: u32 = 3;
 
 /// A change on its way.
 #[derive(Default)]
@@ -34,6 +39,8 @@ pub enum Changed {
     Hand(Control, HandChoice),
     /// There is neither; why, in a sentence.
     Failed(String),
+    /// The file gives no object; why, in a sentence.
+    Refused(PathBuf, String),
 }
 
 impl Change {
@@ -41,25 +48,28 @@ impl Change {
     ///
     /// # Errors
     /// A sentence, where the system gives no thread.
-    pub fn object(load: LoadObject, choice: ObjectChoice) -> Result<Self, String> {
-        match Loading::start(load, choice.clone()) {
+    pub fn object(load: LoadObject, wish: ObjectWish) -> Result<Self, String> {
+        let choice = wish.choice.clone();
+        match Loading::start(load, wish) {
             Ok(loading) => Ok(Self::Object(loading, choice)),
             Err(error) => Err(format!("cannot load {choice}: {error}")),
         }
     }
 
-    /// Begins to make a hand for an object at rest; `contact` is what its fingertips hold.
+    /// Begins to make a hand for an object at rest; `contact` is what its fingertips hold. A hand
+    /// that the person moves takes over at `world_from_palm`.
     pub fn hand(
         wish: HandChoice,
         object: Arc<RestShape>,
         contact: ContactModel,
         tick_s: f64,
+        world_from_palm: Option<Isometry3<f64>>,
     ) -> Self {
         let (made, result) = channel();
         let thread = std::thread::Builder::new().name("hand".to_owned());
         let started = thread.spawn(move || {
             // Nobody may be waiting any more.
-            let _ = made.send(hand(wish, object, contact, tick_s));
+            let _ = made.send(hand(wish, object, contact, tick_s, world_from_palm));
         });
         if let Err(error) = started {
             tracing::warn!(%error, "cannot start a thread that makes a hand");
@@ -81,7 +91,10 @@ impl Change {
             Self::None => return None,
             Self::Object(loading, choice) => match loading.take()? {
                 Ok(loaded) => Changed::Object(Box::new(loaded), choice.clone()),
-                Err(error) => Changed::Failed(format!("{error}; choose another file")),
+                Err(error) => match choice {
+                    ObjectChoice::File(path) => Changed::Refused(path.clone(), error),
+                    ObjectChoice::BuiltIn(_) => Changed::Failed(error),
+                },
             },
             Self::Hand(result, wish) => match result.try_recv() {
                 Err(TryRecvError::Empty) => return None,
@@ -103,19 +116,26 @@ fn hand(
     object: Arc<RestShape>,
     contact: ContactModel,
     tick_s: f64,
+    world_from_palm: Option<Isometry3<f64>>,
 ) -> Result<HandSource, String> {
     let setup = HandSetup::default();
     let planner = Planner::beside().map_err(|error| format!("cannot start a thread: {error}"))?;
     match wish {
-        HandChoice::Mouse => Ok(MouseHand::new(setup, planner, tick_s).holding(contact).into()),
+        HandChoice::Mouse => {
+            let hand = MouseHand::new(setup, planner, tick_s).holding(contact);
+            Ok(match world_from_palm {
+                Some(palm) => hand.taking_over_at(palm).into(),
+                None => hand.into(),
+            })
+        }
         HandChoice::Live | HandChoice::Replay => {
             Err("name the devices or the recording with --hand when you start the program"
                 .to_owned())
         }
         HandChoice::Scripted(script) => {
-            let request = PlanRequest { object, setup: setup.clone(), contact, avoid_gaze: None };
+            let request = PlanRequest::new(object, setup.clone(), contact);
             let grip = request.grip().map_err(|error| error.to_string())?;
-            let hand = ScriptedHand::following(script, setup, grip);
+            let hand = ScriptedHand::following(script, setup, grip).squeezing_longer(SQUEEZE_TIMES);
             Ok(hand.holding(contact).with_planner(planner).into())
         }
     }

@@ -17,6 +17,8 @@ pub struct DrawingPace {
 
 /// Where the processor draws, the solver needs it too.
 const EVERY_BY_SOFTWARE: Duration = Duration::from_millis(66);
+/// A picture that nobody sees, or that is the same as the one before, is drawn no more often.
+const EVERY_STILL: Duration = Duration::from_millis(250);
 /// A card waits for its display by itself; this is for one that does not.
 const EVERY: Duration = Duration::from_millis(4);
 
@@ -28,10 +30,11 @@ impl DrawingPace {
         Self { last: now, fps: 0.0, every, begun: now, pictures: 0 }
     }
 
-    /// Waits until the next picture is due.
-    pub fn rest(&mut self) {
+    /// Waits until the next picture is due; longer where nothing changes in it.
+    pub fn rest(&mut self, is_still: bool) {
         let took = self.last.elapsed();
-        std::thread::sleep(self.every.saturating_sub(took));
+        let every = if is_still { EVERY_STILL } else { self.every };
+        std::thread::sleep(every.saturating_sub(took));
         let period = self.last.elapsed().as_secs_f64().max(1e-6);
         self.fps += 0.1 * (1.0 / period - self.fps);
         self.last = Instant::now();

@@ -87,7 +87,9 @@ impl DrawnMarks {
                 mark.show_contact(&place, &(world_from_object * normal), radius);
             }
             if let (true, Some(all)) = (forces, &frame.grasp.forces) {
-                mark.show_force(&place, &arrow(&all[finger], scale, world_from_object));
+                let radius = frame.hand.as_ref().map_or(0.006, |hand| tip_radius(hand, finger));
+                let arrow = arrow(&all[finger], scale, world_from_object);
+                mark.show_force(&place, &arrow, 2.2 * radius);
             }
         }
     }
@@ -121,15 +123,18 @@ impl Mark {
         set_size(&mut self.patch, radius as f32, 0.24 * radius as f32);
     }
 
-    /// An arrow whose point is at the place.
-    fn show_force(&mut self, place: &Point3<f64>, arrow: &Vector3<f64>) {
+    /// An arrow that points at the place and ends so far before it, outside the finger: what is inside
+    /// it is not seen.
+    ///
+    /// Units: `before` m.
+    fn show_force(&mut self, place: &Point3<f64>, arrow: &Vector3<f64>, before: f64) {
         let length = arrow.norm() as f32;
         if length < 1e-4 {
             return;
         }
         let rotation = rotation_from_y(arrow);
         let towards = rotation * Vec3::Y;
-        let at = drawn_point(place);
+        let at = drawn_point(place) - towards * (before as f32 * UNITS_PER_M);
         let head = HEAD_LENGTH_M.min(0.6 * length);
         let shaft = length - head;
         self.head.set_visible(true).set_rotation(rotation);

@@ -81,6 +81,12 @@ pub fn set_texture(node: &mut SceneNode3d, name: &str, picture: &Picture) {
     }
 }
 
+/// Takes the picture off a mesh, which has the plain colour of its material then.
+pub fn remove_texture(node: &mut SceneNode3d) {
+    // The renderer's own white texture has no name to ask for it by.
+    node.set_texture(TextureManager::get_global_manager(|textures| textures.get_default()));
+}
+
 /// Gives a mesh a fine relief by a picture of its slopes.
 ///
 /// Values: linear.

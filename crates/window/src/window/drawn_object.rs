@@ -6,7 +6,7 @@ use kiss3d::prelude::{Color, SceneNode3d, Vec3, Window};
 use nalgebra::{Isometry3, Point3};
 use softgrasp_grasp::object::RestShape;
 
-use super::drawn_mesh::{DrawnMesh, set_relief, set_texture};
+use super::drawn_mesh::{DrawnMesh, remove_texture, set_relief, set_texture};
 use super::units::{UNITS_PER_M, drawn_pose};
 use crate::view::colour_map::{ColourMap, texture_u};
 use crate::view::frame::ObjectView;
@@ -103,7 +103,7 @@ impl DrawnObject {
             }
         } else if self.is_coloured {
             drawn.set_uvs(&body.uvs);
-            drawn.node().set_texture_with_name("default");
+            remove_texture(drawn.node());
             set_material(drawn.node(), &self.name, body.name, &body.material);
         }
         self.is_coloured = !shares.is_empty();
@@ -165,7 +165,7 @@ fn ghost(group: &mut SceneNode3d, skin: &ObjectSkin) -> DrawnMesh {
         (&body.triangles[..], &body.positions[..], &body.normals[..], &body.uvs[..])
     });
     let mut ghost = DrawnMesh::new(group, triangles, positions, normals, uvs);
-    ghost.node().set_color(Color::new(0.35, 0.55, 0.95, 0.22));
+    ghost.node().set_color(Color::new(0.20, 0.42, 0.95, 0.45));
     ghost.node().set_roughness(0.9).set_casts_shadows(false);
     ghost.node().set_visible(false);
     ghost

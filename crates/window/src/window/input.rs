@@ -121,6 +121,7 @@ pub fn wish_of_key(key: Key, modifiers: Modifiers) -> Option<Action> {
         (Key::P, _) => Action::Snapshot,
         (Key::R, _) => Action::Record,
         (Key::C, _) => Action::NextShading,
+        (Key::T, _) if modifiers.contains(Modifiers::Shift) => Action::LastSphereLevel,
         (Key::T, _) => Action::NextSphereLevel,
         (Key::F, _) => Action::FrameAll,
         (Key::Return, _) => Action::PlayOrPause,
@@ -135,6 +136,7 @@ pub fn wish_of_key(key: Key, modifiers: Modifiers) -> Option<Action> {
         (Key::F1, _) => Action::Page(Page::Help),
         (Key::F2, _) => Action::Page(Page::Information),
         (Key::F3, _) => Action::Page(Page::Timings),
+        (Key::F4, _) => Action::Page(Page::Softness),
         _ => return None,
     })
 }

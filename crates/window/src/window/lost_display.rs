@@ -1,17 +1,28 @@
-//! What is done when the X server goes away while a window is open.
+//! What is done when the window ends although nobody closed it: the X server goes away, or drawing
+//! fails.
 //!
-//! Xlib, which the window stands on, calls a handler then and ends the process when it returns. So
-//! the handler never returns: what is left to do is done beside it, and ends the process.
+//! Xlib, which the window stands on, calls a handler when the server goes and ends the process when
+//! it returns. So the handler never returns: what is left to do is done beside it, and ends the
+//! process.
 
 use std::sync::Mutex;
 
-/// What is left to do; it does not return.
-pub type Rest = Box<dyn FnOnce() + Send>;
+/// Why there is no window any more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The display went.
+    DisplayLost,
+    /// It could not be drawn any more although its display is there; why, in a sentence.
+    Failed(String),
+}
 
-/// What is left to do when the display is lost now.
+/// What is left to do; it does not return.
+pub type Rest = Box<dyn FnOnce(End) + Send>;
+
+/// What is left to do when there is no window any more.
 static REST: Mutex<Option<Rest>> = Mutex::new(None);
 
-/// From now on this is done when the display is lost; it ends the process.
+/// From now on this is done when there is no window any more; it ends the process.
 pub fn set_rest(rest: Rest) {
     *lock() = Some(rest);
 }
@@ -23,6 +34,27 @@ pub fn clear_rest() {
 
 fn lock() -> std::sync::MutexGuard<'static, Option<Rest>> {
     REST.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// Whether a display answers. Where there is no Xlib to ask, one is taken to be there.
+#[cfg(all(unix, not(target_os = "macos")))]
+pub fn is_there() -> bool {
+    if std::env::var_os("DISPLAY").is_none_or(|name| name.is_empty()) {
+        return true;
+    }
+    let Ok(xlib) = x11_dl::xlib::Xlib::open() else { return true };
+    // SAFETY: a null name stands for the display that DISPLAY names; what is opened is closed at
+    // once, on the same thread, and nothing else holds it.
+    unsafe {
+        let display = (xlib.XOpenDisplay)(std::ptr::null());
+        !display.is_null() && (xlib.XCloseDisplay)(display) == 0
+    }
+}
+
+/// Other systems have no Xlib.
+#[cfg(not(all(unix, not(target_os = "macos"))))]
+pub fn is_there() -> bool {
+    true
 }
 
 /// Asks Xlib to call [`REST`] when the display is lost. Does nothing where there is no Xlib.
@@ -39,23 +71,34 @@ pub fn hear() {
 pub fn hear() {}
 
 /// Called by Xlib on the thread that uses the display; nothing may unwind through its frames.
-///
-/// What is left is done on another thread, which ends the process: on this one the libraries of the
-/// window would tidy up then, and fail at it without a display.
 #[cfg(all(unix, not(target_os = "macos")))]
 extern "C" fn display_is_lost(_display: *mut x11_dl::xlib::Display) -> std::ffi::c_int {
+    do_rest("the display was lost", End::DisplayLost)
+}
+
+/// Does what is left to do where the window cannot be drawn any more, for this reason; the process
+/// ends with it.
+pub fn go_on_without(why: &str) -> ! {
+    let end = if is_there() { End::Failed(why.to_owned()) } else { End::DisplayLost };
+    do_rest(why, end)
+}
+
+/// What is left is done on another thread, which ends the process: on this one the libraries of the
+/// window would tidy up then, and fail at it as drawing did.
+fn do_rest(why: &str, end: End) -> ! {
     let rest = lock().take();
+    let why = why.to_owned();
     let work = move || {
         let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| match rest {
             Some(rest) => {
-                eprintln!("glove-client: the display was lost; the run goes on without it");
-                rest();
+                eprintln!("glove-client: {why}; the run goes on without it");
+                rest(end);
             }
-            None => eprintln!("glove-client: the display was lost"),
+            None => eprintln!("glove-client: {why}"),
         }));
         std::process::exit(if done.is_ok() { 1 } else { 101 })
     };
-    if std::thread::Builder::new().name("without display".to_owned()).spawn(work).is_err() {
+    if std::thread::Builder::new().name("without window".to_owned()).spawn(work).is_err() {
         std::process::abort();
     }
     loop {

@@ -3,6 +3,7 @@
 mod animation;
 mod app;
 mod changes;
+mod director;
 mod drawing_pace;
 mod drawn_hand;
 mod drawn_marks;
@@ -19,20 +20,28 @@ mod lamps;
 mod lost_display;
 mod opening;
 mod panels;
+#[cfg(test)]
+mod panels_tests;
 mod picture;
 mod plain_material;
 mod recorder;
 mod running;
 mod scene;
+mod scene_input;
+mod seen_window;
 mod stage;
 mod start;
+mod story;
 mod ui;
 mod units;
+mod wishes;
 
 pub use animation::{Animation, png};
 pub use app::App;
+pub use changes::SQUEEZE_TIMES;
 pub use graphics::{Graphics, NoGraphics};
 pub use image::RgbImage;
+pub use lost_display::End;
 pub use opening::Opening;
 pub use picture::Pictures;
 pub use running::{About, Ticks, WhenLost};

@@ -13,6 +13,8 @@ pub struct Opening {
     pub display: Display,
     /// Where the eye is at first.
     pub camera: ViewCamera,
+    /// Whether the person chose what the colours show; else a script shows strain while it squeezes.
+    pub shading_is_chosen: bool,
     /// Whether the person chose where the eye is; else the first hand does.
     pub eye_is_chosen: bool,
     /// Whether the person chose the level of drawing; else the machine does.

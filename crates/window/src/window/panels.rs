@@ -1,7 +1,10 @@
 //! All menus, cards and dialogs of one picture, and what was asked for on them.
 
-use egui::Context;
+use std::time::{Duration, Instant};
+
+use egui::{Align2, Context, Ui};
 use nalgebra::Vector2;
+use softgrasp_grasp::object::ObjectChoice;
 use softgrasp_hand::hand_choice::HandChoice;
 use softgrasp_hand::mouse::MouseInput;
 
@@ -13,13 +16,16 @@ use super::ui::information_card::{self, RunFacts};
 use super::ui::legend_card::{self, LegendText};
 use super::ui::menu::{self, MenuFacts, PopUp};
 use super::ui::notices::Notices;
+use super::ui::preparing_card::{self, Preparing};
+use super::ui::softness_card::{Is, Softness, SoftnessWish};
 use super::ui::status_card::{self, Told};
 use super::ui::timeline::{self, Playing, TimelineWish};
 use super::ui::timings_card::Timings;
-use super::ui::{help_card, loading_card, theme};
+use super::ui::{help_card, loading_card, theme, turn_card};
 use crate::view::action::Action;
 use crate::view::colouring::Colouring;
 use crate::view::display::Display;
+use crate::view::frame::ViewFrame;
 use crate::view::shading::Shading;
 use crate::view::toggle::Page;
 
@@ -38,9 +44,13 @@ pub struct Panels {
     help: bool,
     information: bool,
     shows_timings: bool,
+    shows_softness: bool,
+    softness: Softness,
     /// The first-run hint, until it has been seen.
     hint_gone: bool,
     is_set_up: bool,
+    /// Since when the server has been preparing the object.
+    prepares_since: Option<Instant>,
 }
 
 /// What was asked for.
@@ -58,6 +68,10 @@ pub struct Asked {
     pub newest: bool,
     /// What is being loaded is not wanted any more.
     pub cancel: bool,
+    /// The person takes the hand of the script.
+    pub takes_hand: bool,
+    /// Another material, size or mesh of the object.
+    pub softness: Option<SoftnessWish>,
 }
 
 /// What the panels show.
@@ -78,8 +92,21 @@ pub struct Seen<'a> {
     pub is_recording: bool,
     /// Force that a metre of arrow stands for, N/m.
     pub newtons_per_m: f64,
+    /// How long it is until a script that is over begins anew.
+    pub story_begins_in: Option<Duration>,
 }
 
+/// Names of the columns.
+const LEFT: &str = "left";
+const RIGHT: &str = "right";
+const TOP: &str = "top";
+/// Width of the column at the left, points.
+const LEFT_WIDTH: f32 = 222.0;
+/// Width of the column at the right, and where only the legend is there, points.
+const RIGHT_WIDTH: f32 = 366.0;
+const LEGEND_WIDTH: f32 = 176.0;
+/// What is told is at most so wide, points.
+const TOLD_WIDTH: f32 = 560.0;
 /// The hint goes after so many ticks of a hand that is played.
 const HINT_TICKS: u64 = 900;
 
@@ -105,6 +132,7 @@ impl Panels {
             Page::Help => self.help = !self.help,
             Page::Information => self.information = !self.information,
             Page::Timings => self.shows_timings = !self.shows_timings,
+            Page::Softness => self.shows_softness = !self.shows_softness,
         }
         self.hint_gone |= page == Page::Help;
     }
@@ -129,8 +157,13 @@ impl Panels {
         if let Some((stage, name)) = seen.change.stage() {
             asked.cancel |= loading_card::show(context, &name, stage as usize);
         }
+        if seen.running.is_none() {
+            let offset = [0.0, theme::BELOW_BAR];
+            theme::column(context, TOP, Align2::CENTER_TOP, offset, [TOLD_WIDTH, 200.0], |ui| {
+                self.notices.show(ui);
+            });
+        }
         asked.file = self.dialog.show(context);
-        self.notices.show(context);
         asked
     }
 
@@ -147,39 +180,141 @@ impl Panels {
         let is_played = running.about.hand.is_played();
         if is_played {
             self.show_timeline(context, running, asked);
-        } else if running.about.hand == HandChoice::Mouse {
-            asked.mouse = self.sliders.show(context);
-            let closes = |input: &MouseInput| matches!(input, MouseInput::CloseTo(..));
-            self.hint_gone |= asked.mouse.iter().any(closes);
         }
+        let above = if is_played { timeline::HEIGHT } else { 0.0 };
         if let Some(frame) = running.frame() {
             let told = Told {
                 tick_s: running.about.tick_s,
-                preparing: (running.about.server_stage)(),
                 newtons_per_m: seen.display.forces.then_some(seen.newtons_per_m),
+                above,
             };
             status_card::show(context, frame, &told);
             self.hint_gone |= is_played && frame.tick > HINT_TICKS;
         }
-        if seen.display.shading != Shading::Plain {
-            legend_card::show(context, seen.colouring.map(), &legend_text(seen.colouring));
-        }
-        if self.shows_timings {
-            self.timings.show(context, seen.graphics.1);
-        }
-        if self.information {
-            let facts = run_facts(running, seen.graphics.0);
-            information_card::show(context, &facts, running.frame().map(AsRef::as_ref));
-        }
+        self.show_left(context, running, asked);
+        self.show_right(context, seen, running, asked);
+        self.show_top(context, seen, running, asked);
         if self.help {
             help_card::show(context, running.about.hand);
-        } else if !self.hint_gone {
-            help_card::hint(context, running.about.hand);
         }
     }
 
+    /// The hand of the mouse, below the bar.
+    fn show_left(&mut self, context: &Context, running: &Running, asked: &mut Asked) {
+        if running.about.hand != HandChoice::Mouse {
+            return;
+        }
+        let status = theme::size_of(context, "status").y;
+        let height = context.content_rect().height() - theme::BELOW_BAR - status - 28.0;
+        let offset = [theme::MARGIN, theme::BELOW_BAR];
+        theme::column(context, LEFT, Align2::LEFT_TOP, offset, [LEFT_WIDTH, height], |ui| {
+            asked.mouse = self.sliders.show(ui);
+        });
+        let closes = |input: &MouseInput| matches!(input, MouseInput::CloseTo(..));
+        self.hint_gone |= asked.mouse.iter().any(closes);
+    }
+
+    /// Times, legend and information, at the right.
+    fn show_right(
+        &mut self,
+        context: &Context,
+        seen: &Seen<'_>,
+        running: &Running,
+        asked: &mut Asked,
+    ) {
+        if !self.has_right(seen) {
+            return;
+        }
+        let is_coloured = seen.display.shading != Shading::Plain;
+        let above = if running.about.hand.is_played() { timeline::HEIGHT } else { 0.0 };
+        let height = context.content_rect().height() - above - 2.0 * theme::MARGIN;
+        let offset = [-theme::MARGIN, theme::MARGIN];
+        let is_wide = self.shows_timings || self.information || self.shows_softness;
+        let width = if is_wide { RIGHT_WIDTH } else { LEGEND_WIDTH };
+        theme::column(context, RIGHT, Align2::RIGHT_TOP, offset, [width, height], |ui| {
+            if is_coloured {
+                legend_card::show(ui, seen.colouring.map(), &legend_text(seen.colouring));
+            }
+            if let (true, Some(frame)) = (self.shows_softness, running.newest()) {
+                asked.softness = self.softness.show(ui, &softness_of(running, frame));
+            }
+            if self.shows_timings {
+                self.timings.show(ui, seen.graphics.1);
+            }
+            if self.information {
+                let facts = run_facts(running, seen.graphics.0);
+                information_card::show(ui, &facts, running.frame().map(AsRef::as_ref));
+            }
+        });
+    }
+
+    fn has_right(&self, seen: &Seen<'_>) -> bool {
+        let is_coloured = seen.display.shading != Shading::Plain;
+        is_coloured || self.shows_timings || self.information || self.shows_softness
+    }
+
+    /// What has to be told, between the left and the right.
+    fn show_top(
+        &mut self,
+        context: &Context,
+        seen: &Seen<'_>,
+        running: &Running,
+        asked: &mut Asked,
+    ) {
+        let width = context.content_rect().width();
+        let beside = |name| match theme::size_of(context, name).x {
+            0.0 => theme::MARGIN,
+            taken => taken + 2.0 * theme::MARGIN,
+        };
+        let is_mouse = running.about.hand == HandChoice::Mouse;
+        let left = if is_mouse { beside(LEFT) } else { theme::MARGIN };
+        let right = if self.has_right(seen) { beside(RIGHT) } else { theme::MARGIN };
+        let room = (width - left - right).max(100.0);
+        let offset = [0.5 * (left - right), theme::BELOW_BAR];
+        let height = context.content_rect().height() - 2.0 * theme::BELOW_BAR;
+        let size_max = [room.min(TOLD_WIDTH), height];
+        theme::column(context, TOP, Align2::CENTER_TOP, offset, size_max, |ui| {
+            self.tell(ui, seen, running, asked);
+            self.notices.show(ui);
+        });
+    }
+
+    /// The one thing that the person is to know now.
+    fn tell(&mut self, ui: &mut Ui, seen: &Seen<'_>, running: &Running, asked: &mut Asked) {
+        if seen.story_begins_in.is_some() {
+            self.hint_gone = true;
+            let begins_in = seen.story_begins_in.filter(|_| running.about.begins_anew);
+            asked.takes_hand = turn_card::show(ui, &running.about.object, begins_in);
+        } else if let Some(preparing) = self.preparing(running) {
+            preparing_card::show(ui, &preparing);
+        } else if !self.hint_gone {
+            help_card::hint(ui, running.about.hand, running.about.is_lifted);
+        }
+    }
+
+    /// What a server that has prepared the object for a while is at.
+    fn preparing<'a>(&mut self, running: &'a Running) -> Option<Preparing<'a>> {
+        let frame = running.frame().filter(|frame| frame.server.is_preparing);
+        let Some(frame) = frame else {
+            self.prepares_since = None;
+            return None;
+        };
+        let since = self.prepares_since.get_or_insert_with(Instant::now).elapsed();
+        (since > preparing_card::BRIEF).then(|| Preparing {
+            object: &running.about.object,
+            nodes: frame.object.rest.mesh().node_count(),
+            stage: (running.about.server_stage)(),
+            since,
+            is_awaited: matches!(running.about.hand, HandChoice::Scripted(_)),
+        })
+    }
+
     fn show_timeline(&self, context: &Context, running: &Running, asked: &mut Asked) {
-        let playing = Playing { is_paused: running.is_paused(), looked_at: running.looked_at() };
+        let playing = Playing {
+            is_paused: running.is_paused(),
+            looked_at: running.looked_at(),
+            first_tick: running.first_tick(),
+        };
         match timeline::show(context, running.history(), &playing) {
             Some(TimelineWish::Do(action)) => asked.actions.push(action),
             Some(TimelineWish::LookAt(tick)) => asked.look_at = Some(tick),
@@ -197,10 +332,23 @@ fn menu_facts<'a>(seen: &Seen<'a>, running: &'a Running) -> MenuFacts<'a> {
         hand: about.hand,
         object: &about.object,
         method: &about.method,
+        solved_by: newest.and_then(|frame| Some(frame.server.solve.as_ref()?.method.as_str())),
         max_error: about.max_error,
         can_undo: newest.is_some_and(|frame| frame.object.kept > 0),
         is_recording: seen.is_recording,
         can_keep: newest.is_some_and(|frame| frame.can_keep()),
+    }
+}
+
+fn softness_of(running: &Running, frame: &ViewFrame) -> Is {
+    let (material, mesh) = (&running.about.material, frame.object.rest.mesh());
+    Is {
+        young: material.young(),
+        poisson: material.poisson(),
+        size_m: mesh.size(),
+        nodes: mesh.node_count(),
+        can_be_refined: matches!(running.about.object.parse(), Ok(ObjectChoice::BuiltIn(_))),
+        grip_newtons: frame.grip_newtons(),
     }
 }
 

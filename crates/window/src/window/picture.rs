@@ -82,3 +82,41 @@ impl Pictures {
         place_camera(&mut self.camera, camera);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::frame::samples::frame;
+    use crate::view::shading::Shading;
+
+    /// `None`, and a line that says so, where nothing can draw.
+    fn pictures() -> Option<Pictures> {
+        let material = Material::try_new(2.0e4, 0.4).unwrap();
+        match Pictures::try_new(96, 64, Look::Imported, material) {
+            Ok(pictures) => Some(pictures),
+            Err(error) => {
+                println!("skipped: {error}");
+                None
+            }
+        }
+    }
+
+    #[test]
+    fn colours_that_are_taken_off_again_do_not_end_the_window() {
+        let Some(mut pictures) = pictures() else { return };
+        let mut frame = frame(3);
+        let bend = |p: &nalgebra::Point3<f64>| [0.1 * p.y, 0.0, 0.02 * p.x];
+        frame.object.displacement = frame.object.rest.mesh().vertices().iter().map(bend).collect();
+        let camera = ViewCamera::default();
+        let mut seen = |shading| {
+            let display = Display { shading, ..Display::default() };
+            pictures.draw(&frame, &display, &camera)
+        };
+        let plain = seen(Shading::Plain);
+        for shading in Shading::ALL {
+            let coloured = seen(shading);
+            assert_eq!(coloured == plain, shading == Shading::Plain, "{shading}");
+            assert!(seen(Shading::Plain) == plain, "{shading} leaves something behind");
+        }
+    }
+}

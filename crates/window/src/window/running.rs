@@ -9,6 +9,7 @@ use softgrasp_hand::hand_choice::HandChoice;
 use softgrasp_hand::notice::{Notice, NoticeKind};
 use softgrasp_protocol::MethodName;
 
+use super::lost_display::End;
 use crate::view::control::Control;
 use crate::view::frame::{News, NewsKind, TickTiming, ViewFrame};
 use crate::view::history::History;
@@ -23,6 +24,10 @@ pub struct Running {
     /// The tick that is looked at, where it is not the newest.
     looked_at: Option<u64>,
     is_paused: bool,
+    /// The script has come to its end, and stands still there.
+    is_at_end: bool,
+    /// Ticks are told from this one on: the first of the script that is played.
+    first_tick: u64,
     /// The script stands still until its first picture has been seen: making that takes its time.
     waits_for_picture: bool,
     /// What can be said of it.
@@ -37,13 +42,13 @@ pub struct Ticks {
     pub notices: Receiver<Notice>,
     /// Whether the run is over.
     pub is_over: Box<dyn Fn() -> bool>,
-    /// What is left to do where the display is lost, which ends the process: the run goes on to the
-    /// end of its script, and its report is told.
+    /// What is left to do where the window ends although nobody closed it, which ends the process:
+    /// the run goes on to the end of its script, and its report is told.
     pub when_lost: Option<WhenLost>,
 }
 
-/// Work that can be done on any thread.
-pub type WhenLost = Box<dyn FnOnce() + Send>;
+/// Work that can be done on any thread, and is told why.
+pub type WhenLost = Box<dyn FnOnce(End) + Send>;
 
 /// What a window says of a run.
 pub struct About {
@@ -53,6 +58,8 @@ pub struct About {
     pub server: String,
     /// What a fingertip holds.
     pub contact: String,
+    /// Whether fingers press with friction, so that an object is pinched and lifted.
+    pub is_lifted: bool,
     /// Material.
     pub material: Material,
     /// The hand that acts.
@@ -63,6 +70,8 @@ pub struct About {
     pub max_error: Option<f64>,
     /// From tick to tick, s.
     pub tick_s: f64,
+    /// Whether a script that is over stands still, and begins anew after a pause.
+    pub begins_anew: bool,
     /// What a server in this process is at, in a word.
     pub server_stage: Box<dyn Fn() -> &'static str + Send>,
 }
@@ -89,6 +98,8 @@ impl Running {
             newest: None,
             looked_at: None,
             is_paused: false,
+            is_at_end: false,
+            first_tick: 0,
             waits_for_picture,
             about,
         };
@@ -112,7 +123,10 @@ impl Running {
             }
             arrived.sentences.extend(frame.news.iter().filter_map(sentence));
             let frame = Arc::new(*frame);
-            self.history.add(Arc::clone(&frame));
+            // A frame that was on its way when the script began again is of the one before.
+            if frame.tick >= self.first_tick {
+                self.history.add(Arc::clone(&frame));
+            }
             self.newest = Some(frame);
         }
         arrived
@@ -164,6 +178,15 @@ impl Running {
         let _ = self.ticks.controls.send(control);
     }
 
+    /// Another object is there: its script is played from the beginning.
+    pub fn object_is(&mut self, object: String) {
+        self.about.object = object;
+        self.looked_at = None;
+        if std::mem::take(&mut self.is_at_end) {
+            self.play_or_pause();
+        }
+    }
+
     /// Looks at a tick that was seen; the run stands still meanwhile.
     pub fn look_at(&mut self, tick: u64) {
         if !self.is_paused {
@@ -177,8 +200,29 @@ impl Running {
         self.looked_at = None;
     }
 
-    /// Goes on, or stands still.
+    /// The tick that a person counts from: the first of the script that is played.
+    pub fn first_tick(&self) -> u64 {
+        self.first_tick
+    }
+
+    /// Whether a frame is of the script before the one that is played now.
+    pub fn has_begun_anew(&self, frame: &ViewFrame) -> bool {
+        frame.tick < self.first_tick
+    }
+
+    /// Stands still because the script has come to its end.
+    pub fn stand_at_end(&mut self) {
+        if !self.is_paused {
+            self.play_or_pause();
+        }
+        self.is_at_end = true;
+    }
+
+    /// Goes on, or stands still; a script that is over begins again.
     pub fn play_or_pause(&mut self) {
+        if self.is_at_end {
+            return self.restart();
+        }
         self.is_paused = !self.is_paused;
         self.looked_at = None;
         self.ask(if self.is_paused { Control::Pause } else { Control::Resume });
@@ -192,14 +236,18 @@ impl Running {
 
     /// Plays the script from its beginning.
     pub fn restart(&mut self) {
-        (self.is_paused, self.looked_at) = (false, None);
+        (self.is_paused, self.is_at_end, self.looked_at) = (false, false, None);
+        self.history = History::default();
+        self.first_tick = self.newest.as_ref().map_or(0, |frame| frame.tick + 1);
         self.ask(Control::Restart);
     }
 
     /// Another hand acts from now on.
     pub fn hand_is(&mut self, hand: HandChoice) {
-        (self.is_paused, self.looked_at) = (false, None);
+        (self.is_paused, self.is_at_end, self.looked_at) = (false, false, None);
         self.about.hand = hand;
+        // Another script would stand still where this one did.
+        self.ask(Control::Resume);
     }
 
     /// Writes the object.
@@ -224,7 +272,7 @@ impl Running {
         self.about.max_error = max_error;
     }
 
-    /// What is left to do where the display is lost; it is there once.
+    /// What is left to do where the window ends although nobody closed it; it is there once.
     pub fn when_lost(&mut self) -> Option<WhenLost> {
         self.ticks.when_lost.take()
     }

@@ -1,6 +1,6 @@
 //! The scene: everything that a frame shows, and how it follows the next one.
 
-use kiss3d::prelude::{Color, SceneNode3d, Window};
+use kiss3d::prelude::{SceneNode3d, Window};
 use nalgebra::Point3;
 use softgrasp_grasp::hand::Finger;
 use softgrasp_grasp::shape::Sphere;
@@ -8,9 +8,9 @@ use softgrasp_grasp::shape::Sphere;
 use super::drawn_hand::DrawnHand;
 use super::drawn_marks::DrawnMarks;
 use super::drawn_object::DrawnObject;
-use super::drawn_spheres::{DrawnSpheres, ENTERED, PASSED};
+use super::drawn_spheres::{DrawnSpheres, Visit};
 use super::ground_shade::capsules;
-use super::stage::Stage;
+use super::stage::{GROUND_M, Stage};
 use crate::view::colouring::Colouring;
 use crate::view::display::{Display, Level, Spheres};
 use crate::view::frame::ViewFrame;
@@ -62,6 +62,7 @@ impl Scene {
         let mut is_new = self.stage.set_level(window, display.level);
         let shape = frame.shape();
         let object = &frame.object;
+        self.stage.set_ground(object.table_y.unwrap_or(GROUND_M));
         if self.object.as_mut().is_none_or(|drawn| !drawn.is(object)) {
             if let Some(before) = self.object.take() {
                 before.remove();
@@ -78,16 +79,15 @@ impl Scene {
             }
         }
         is_new |= self.follow_hand(frame, display);
+        let spheres = shown_spheres(frame, &shape, display.spheres);
+        is_new |= self.spheres.show(&object.world_from_object, &spheres);
         if is_new {
             self.stage.dress(&mut self.root);
-            self.spheres.keep_material();
         }
         if display.level == Level::Plain {
             self.stage.shade_ground(capsules(frame, &shape, display.skin));
         }
         self.marks.follow(frame, &shape, display.contacts, display.forces);
-        let spheres = shown_spheres(frame, &shape, display.spheres);
-        self.spheres.show(&object.world_from_object, &spheres);
     }
 
     /// Whether it is another hand than before.
@@ -113,7 +113,7 @@ fn shown_spheres(
     frame: &ViewFrame,
     shape: &[Point3<f64>],
     spheres: Spheres,
-) -> Vec<(Sphere, Color)> {
+) -> Vec<(Sphere, Visit)> {
     if spheres == Spheres::Hidden {
         return Vec::new();
     }
@@ -125,16 +125,16 @@ fn shown_spheres(
     match (spheres, &frame.hand) {
         (Spheres::Level(level), _) => {
             let shown = tree.spheres_at_level(level).into_iter();
-            shown.map(|sphere| (sphere, PASSED)).collect()
+            shown.map(|sphere| (sphere, Visit::Passed)).collect()
         }
         (Spheres::Search, Some(hand)) => {
             let object_from_world = frame.object.world_from_object.inverse();
             let hand = hand.colliders().in_frame(&object_from_world);
             let visited = tree.visited_by_sphere(&hand.finger(Finger::Index).tip);
-            let colour = |overlaps| if overlaps { ENTERED } else { PASSED };
+            let visit = |overlaps| if overlaps { Visit::Entered } else { Visit::Passed };
             // The outermost hide everything, and everybody knows them.
             let inner = visited.into_iter().filter(|visited| visited.level >= 2);
-            inner.map(|visited| (visited.sphere, colour(visited.overlaps))).collect()
+            inner.map(|visited| (visited.sphere, visit(visited.overlaps))).collect()
         }
         (Spheres::Hidden | Spheres::Search, _) => Vec::new(),
     }

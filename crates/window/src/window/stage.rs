@@ -18,6 +18,8 @@ use crate::view::display::Level;
 /// Lights and ground.
 pub struct Stage {
     ground: SceneNode3d,
+    /// Height of the ground, m.
+    ground_m: f64,
     level: Option<Level>,
     plain: SharedMaterial,
     plain_ground: SharedMaterial,
@@ -25,7 +27,7 @@ pub struct Stage {
     capsules: SharedCapsules,
 }
 
-/// The ground lies so far below the object's home, m.
+/// The ground lies so far below the object's home where there is no table, m.
 pub const GROUND_M: f64 = -0.085;
 /// Radius of the ground, m: far beyond what is seen sharply.
 const GROUND_RADIUS_M: f32 = 3.0;
@@ -48,7 +50,18 @@ impl Stage {
         ground.set_color(Color::new(0.66, 0.68, 0.71, 1.0)).set_roughness(0.85).set_metallic(0.0);
         let (plain, capsules) = (PlainMaterial::of_bodies(), SharedCapsules::default());
         let plain_ground = PlainMaterial::of_ground(Rc::clone(&capsules));
-        Self { ground, level: None, plain, plain_ground, capsules }
+        Self { ground, ground_m: GROUND_M, level: None, plain, plain_ground, capsules }
+    }
+
+    /// Puts the ground at a height: the table that an object lies on, or [`GROUND_M`].
+    ///
+    /// Units: m. Frame: y of the world.
+    pub fn set_ground(&mut self, height: f64) {
+        if self.ground_m != height {
+            self.ground_m = height;
+            let top = drawn_point(&nalgebra::Point3::new(0.0, height, 0.0));
+            self.ground.set_position(top - Vec3::Y * 0.1);
+        }
     }
 
     /// Draws as much as the level says; whether that is another level than before.

@@ -5,6 +5,11 @@
 //! the forces it begins with (proximal point method): its matrix has an inverse, and forces that it does
 //! not change any more are those of the problem itself.
 
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::lu::partial_pivoting::factor::{lu_in_place, lu_in_place_scratch};
+use faer::linalg::lu::partial_pivoting::solve::{solve_in_place, solve_in_place_scratch};
+use faer::prelude::*;
+use faer::{MatMut, Par, Spec};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::cone::PointForce;
@@ -109,12 +114,30 @@ impl<'a> Proximal<'a> {
                 None => continue,
             }
         }
-        let change = jacobian.lu().solve(&right)?;
+        let change = solved(jacobian, right);
         for r in 0..rows {
             next[row_of(r)] = kept[row_of(r)] + change[r];
         }
         next.iter().all(|x| x.is_finite()).then_some(next)
     }
+}
+
+/// The solution of a square system, by elimination with row exchanges on one thread: the same bits however
+/// many there are. Numbers that are not finite where it has none.
+fn solved(mut matrix: DMatrix<f64>, right: DVector<f64>) -> Vec<f64> {
+    let n = right.len();
+    let mut solution: Vec<f64> = right.data.into();
+    let (mut rows, mut places) = (vec![0usize; n], vec![0usize; n]);
+    let need = lu_in_place_scratch::<usize, f64>(n, n, Par::Seq, Spec::default())
+        .or(solve_in_place_scratch::<usize, f64>(n, 1, Par::Seq));
+    let mut memory = MemBuffer::new(need);
+    let stack = MemStack::new(&mut memory);
+    let mut lu = MatMut::from_column_major_slice_mut(matrix.as_mut_slice(), n, n);
+    let (_, order) =
+        lu_in_place(lu.rb_mut(), &mut rows, &mut places, Par::Seq, stack, Spec::default());
+    let column = MatMut::from_column_major_slice_mut(&mut solution, n, 1);
+    solve_in_place(lu.rb(), lu.rb(), order, column, Par::Seq, stack);
+    solution
 }
 
 /// A slipping point: what its two tangential rows are made of.

@@ -52,15 +52,18 @@ pub struct Solution {
 
 /// Steps of Newton's method in one attempt.
 const NEWTON_STEPS: usize = 8;
-/// Sweeps after an attempt that failed.
-const SWEEPS: usize = 3;
+/// Sweeps after an attempt that failed: so many at a time …
+const SWEEPS: usize = 10;
+/// … as long as a batch leaves no more than this share of the residual, and no more batches than these.
+const PAYS: f64 = 0.7;
+const BATCHES: usize = 10;
 /// Share of its own compliance that is added to a point in the first attempt, and its limits.
-const SHARE_FIRST: f64 = 1e-8;
-const SHARE_MIN: f64 = 1e-9;
+const SHARE_FIRST: f64 = 1e-4;
+const SHARE_MIN: f64 = 1e-7;
 const SHARE_MAX: f64 = 0.1;
 /// The share shrinks after an attempt that succeeded, and grows after one that failed.
-const SHRINK: f64 = 0.03;
-const GROW: f64 = 30.0;
+const SHRINK: f64 = 0.1;
+const GROW: f64 = 10.0;
 /// An attempt has succeeded if it leaves so little of the residual …
 const SUCCESS: f64 = 0.3;
 /// … or if it solves its own problem so much better than that.
@@ -102,10 +105,17 @@ impl ContactProblem {
                     lambda = found.lambda;
                 }
                 let mut motion = self.motion(&lambda);
+                residual = self.residual_of(&lambda, &motion);
                 let sweeper = sweeper.get_or_insert_with(|| Sweeps::new(self));
-                (0..SWEEPS).for_each(|_| sweeper.sweep(&mut lambda, &mut motion));
-                sweeps += SWEEPS;
-                residual = self.residual_of(&lambda, &self.motion(&lambda));
+                for _ in 0..BATCHES {
+                    (0..SWEEPS).for_each(|_| sweeper.sweep(&mut lambda, &mut motion));
+                    sweeps += SWEEPS;
+                    let before =
+                        std::mem::replace(&mut residual, self.residual_of(&lambda, &motion));
+                    if is_small(residual, &lambda) || residual > PAYS * before {
+                        break;
+                    }
+                }
             }
             if residual < best.0 {
                 best = (residual, lambda.clone());

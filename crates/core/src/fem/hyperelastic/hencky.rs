@@ -29,9 +29,9 @@ pub(super) struct TrialStrains {
     size: f64,
 }
 
-/// Share of the yield stress above it up to which slopes are elastic: a state that was made
-/// permanent lies on the yield surface to rounding, and what it does next is to be let go as well
-/// as to flow on.
+/// Up to this share above the yield stress the tangent is the elastic one. A shape whose plastic strain was
+/// made permanent lies on the yield surface but for rounding, and from there unloading is as likely as
+/// further flow.
 const ON_YIELD: f64 = 1e-9;
 
 impl Hencky {

@@ -1,11 +1,11 @@
 //! Finds the lattice whose stuffed solid has the number of nodes asked for.
 
 use super::lattice::Lattice;
-use super::smooth::smooth;
 use super::solid::Solid;
 use super::split::split_inner_edges;
-use super::stuffing::{Stuffing, stuff};
+use super::stuffing::stuff;
 use crate::mesh::{Bodies, Quality, Surface, TetMesh};
+use crate::stuffing::{Stuffing, smooth};
 
 /// Mesh of `solid` with `nodes` nodes, or as near as the lattices tried come.
 ///
@@ -76,7 +76,8 @@ fn finish(solid: Solid, spacing: f64, mut stuffing: Stuffing, nodes: usize) -> O
     for n in &surface.nodes {
         on_surface[*n as usize] = true;
     }
-    smooth(solid, spacing, &mut stuffing, &on_surface);
+    let spacings = vec![spacing; on_surface.len()];
+    smooth(&mut stuffing, &on_surface, &spacings, |p, spacing| solid.project(p, spacing));
     for sine_min in SPLIT_SINES {
         let missing = nodes.saturating_sub(stuffing.vertices.len());
         split_inner_edges(&mut stuffing, missing, sine_min);

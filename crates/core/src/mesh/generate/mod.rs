@@ -4,7 +4,6 @@ mod built_in;
 mod cube;
 mod fit;
 mod lattice;
-mod smooth;
 mod solid;
 mod split;
 mod strawberry;

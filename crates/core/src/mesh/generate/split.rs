@@ -2,8 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::smooth::{Incidence, least_sine};
-use super::stuffing::Stuffing;
+use crate::stuffing::{Incidence, Stuffing, least_sine};
 
 /// Splits up to `count` inner edges, spread over the solid, no two at one element.
 ///

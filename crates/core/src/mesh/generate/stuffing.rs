@@ -8,39 +8,7 @@ use nalgebra::Point3;
 
 use super::lattice::Lattice;
 use super::solid::Solid;
-use crate::mesh::signed_volume;
-
-/// Vertices and elements as they come out of the lattice, elements positive, no orphans.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Stuffing {
-    pub(super) vertices: Vec<Point3<f64>>,
-    pub(super) tets: Vec<[u32; 4]>,
-}
-
-/// Where the surface crosses a lattice edge.
-#[derive(Clone, Copy, Debug)]
-struct Cut {
-    /// Lattice points, ascending.
-    ends: [usize; 2],
-    is_long: bool,
-    position: Point3<f64>,
-}
-
-/// Side of the surface a lattice point is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Inside,
-    /// Moved onto the surface (or there from the start).
-    On,
-    Outside,
-}
-
-/// A corner of the mesh before numbering: a lattice point or the cut with that index.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Corner {
-    Point(usize),
-    Cut(usize),
-}
+use crate::stuffing::{Cut, Pieces, Side, Stuffing, warp};
 
 /// Fills `solid` with tetrahedra cut from `lattice`.
 pub(super) fn stuff(solid: Solid, lattice: &Lattice) -> Stuffing {
@@ -54,8 +22,9 @@ pub(super) fn stuff(solid: Solid, lattice: &Lattice) -> Stuffing {
         .collect();
     let mut sides: Vec<Side> = depths.iter().map(|d| side_of(*d)).collect();
     let cuts = find_cuts(solid, lattice, &points, &depths, &sides);
-    warp(lattice, &cuts, &mut points, &mut sides);
-    let mut pieces = Pieces { lattice, points, sides, cuts, tets: Vec::new() };
+    warp(&cuts, &mut points, &mut sides);
+    let parities = (0..points.len()).map(|p| lattice.parity(p) as u8).collect();
+    let mut pieces = Pieces::new(points, sides, parities, cuts);
     lattice.for_each_tet(|corners| pieces.add(corners));
     pieces.finish()
 }
@@ -87,7 +56,8 @@ fn find_cuts(
             let depth_at = |t: f64| solid.depth(&at(t), lattice.spacing());
             let t = find_root(depth_at, depths[inside], depths[outside]);
             let ends = [inside.min(outside), inside.max(outside)];
-            cuts.push(Cut { ends, is_long, position: at(t) });
+            let spacings = [lattice.spacing(); 2];
+            cuts.push(Cut { ends, is_long, position: at(t), spacings });
         }
     }
     cuts.sort_unstable_by_key(|c| c.ends);
@@ -123,159 +93,13 @@ fn find_root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Moves every lattice point with a cut too close to it onto the nearest such cut.
-fn warp(lattice: &Lattice, cuts: &[Cut], points: &mut [Point3<f64>], sides: &mut [Side]) {
-    let mut close: Vec<(usize, f64, usize)> = Vec::new();
-    for (index, cut) in cuts.iter().enumerate() {
-        let limit = if cut.is_long { WARP_LONG } else { WARP_SHORT * 0.75f64.sqrt() };
-        for end in cut.ends {
-            let distance = (cut.position - points[end]).norm() / lattice.spacing();
-            if distance < limit {
-                close.push((end, distance, index));
-            }
-        }
-    }
-    close.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    for (point, _, cut) in close {
-        // A cut vanishes as soon as one of its ends lies on the surface itself.
-        if cuts[cut].ends.iter().all(|end| sides[*end] != Side::On) {
-            points[point] = cuts[cut].position;
-            sides[point] = Side::On;
-        }
-    }
-}
-
-/// The elements as they are cut, one lattice tetrahedron after the other.
-struct Pieces<'a> {
-    lattice: &'a Lattice,
-    points: Vec<Point3<f64>>,
-    sides: Vec<Side>,
-    cuts: Vec<Cut>,
-    tets: Vec<[Corner; 4]>,
-}
-
-impl Pieces<'_> {
-    /// Adds what lies inside of one lattice tetrahedron.
-    fn add(&mut self, corners: [usize; 4]) {
-        // Nearly all are whole or empty; they need no lists.
-        if corners.iter().all(|c| self.sides[*c] != Side::Inside) {
-            return;
-        }
-        if corners.iter().all(|c| self.sides[*c] != Side::Outside) {
-            self.tets.push(corners.map(Corner::Point));
-            return;
-        }
-        let (mut inside, mut on, mut outside) = (Vec::new(), Vec::new(), Vec::new());
-        for c in corners {
-            match self.sides[c] {
-                Side::Inside => inside.push(c),
-                Side::On => on.push(Corner::Point(c)),
-                Side::Outside => outside.push(c),
-            }
-        }
-        match (&inside[..], &on[..], &outside[..]) {
-            (&[a], _, _) => {
-                let mut tet = [Corner::Point(a); 4];
-                let rest = on.iter().copied().chain(outside.iter().map(|o| self.cut(a, *o)));
-                for (slot, corner) in tet[1..].iter_mut().zip(rest) {
-                    *slot = corner;
-                }
-                self.tets.push(tet);
-            }
-            (&[a, b], &[apex], &[o]) => {
-                let quad = [Corner::Point(a), Corner::Point(b), self.cut(b, o), self.cut(a, o)];
-                self.add_pyramid(quad, apex);
-            }
-            (&[a, b], _, &[o, p]) => self.add_prism(
-                [Corner::Point(a), self.cut(a, o), self.cut(a, p)],
-                [Corner::Point(b), self.cut(b, o), self.cut(b, p)],
-            ),
-            (&[a, b, c], _, &[o, ..]) => self.add_prism(
-                [a, b, c].map(Corner::Point),
-                [self.cut(a, o), self.cut(b, o), self.cut(c, o)],
-            ),
-            _ => unreachable!("a cut tetrahedron has 1 to 3 corners inside, one or more outside"),
-        }
-    }
-
-    fn cut(&self, a: usize, b: usize) -> Corner {
-        let ends = [a.min(b), a.max(b)];
-        let found = self.cuts.binary_search_by_key(&ends, |c| c.ends);
-        Corner::Cut(found.expect("every edge between inside and outside has a cut"))
-    }
-
-    /// Order in which corners claim the diagonals of the quadrilaterals they belong to.
-    ///
-    /// The rule depends on the corner only, so the two elements at a face agree.
-    fn rank(&self, corner: Corner) -> (usize, usize) {
-        match corner {
-            Corner::Cut(c) if self.cuts[c].is_long => (0, c),
-            Corner::Point(p) => (1 + self.lattice.parity(p), p),
-            Corner::Cut(c) => (3, c),
-        }
-    }
-
-    /// Splits a pyramid along the diagonal at the lowest-ranked corner of its base.
-    fn add_pyramid(&mut self, base: [Corner; 4], apex: Corner) {
-        let lowest = (0..4).min_by_key(|i| self.rank(base[*i])).expect("a base has four corners");
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| base[(lowest + i) % 4]);
-        self.tets.push([a, b, c, apex]);
-        self.tets.push([a, c, d, apex]);
-    }
-
-    /// Splits a prism between two triangles whose corners face each other: the lowest-ranked
-    /// corner sees the opposite triangle and the one quadrilateral it is not part of.
-    fn add_prism(&mut self, bottom: [Corner; 3], top: [Corner; 3]) {
-        let all = [bottom, top].concat();
-        let lowest = (0..6).min_by_key(|i| self.rank(all[*i])).expect("a prism has six corners");
-        let (near, far) = if lowest < 3 { (bottom, top) } else { (top, bottom) };
-        let [i, j, k] = [0, 1, 2].map(|step| (lowest + step) % 3);
-        self.tets.push([near[i], far[i], far[j], far[k]]);
-        self.add_pyramid([near[j], near[k], far[k], far[j]], near[i]);
-    }
-
-    /// Numbers the corners in use, lattice points first, and turns every element positive.
-    fn finish(self) -> Stuffing {
-        let point_count = self.points.len();
-        let slot = |corner: Corner| match corner {
-            Corner::Point(p) => p,
-            Corner::Cut(c) => point_count + c,
-        };
-        let mut numbers = vec![u32::MAX; point_count + self.cuts.len()];
-        for corner in self.tets.iter().flatten() {
-            numbers[slot(*corner)] = 0;
-        }
-        let positions = self.points.iter().chain(self.cuts.iter().map(|c| &c.position));
-        let mut vertices = Vec::new();
-        for (number, position) in numbers.iter_mut().zip(positions).filter(|(n, _)| **n == 0) {
-            *number = u32::try_from(vertices.len()).expect("node counts are limited far below u32");
-            vertices.push(*position);
-        }
-        let orient = |tet: &[Corner; 4]| {
-            let mut nodes = tet.map(|corner| numbers[slot(corner)]);
-            if signed_volume(&nodes.map(|n| vertices[n as usize])) < 0.0 {
-                nodes.swap(0, 1);
-            }
-            nodes
-        };
-        let tets = self.tets.iter().map(orient).collect();
-        Stuffing { vertices, tets }
-    }
-}
-
-/// A cut nearer to a point than this part of a long edge moves the point (Labelle and Shewchuk,
-/// table 1, the thresholds for the best smallest angle).
-const WARP_LONG: f64 = 0.24999;
-
-/// The same for short edges.
-const WARP_SHORT: f64 = 0.41189;
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
     use crate::mesh::{Quality, Surface, TetMesh};
+    use crate::stuffing::smooth;
 
     #[test]
     fn root_of_a_cubic_is_found() {
@@ -318,6 +142,29 @@ mod tests {
                 let depth = solid.depth(&mesh.vertices()[*n as usize], spacing);
                 prop_assert!(depth.abs() < 1e-6 * spacing, "{depth:e}");
             }
+        }
+    }
+
+    #[test]
+    fn thin_elements_get_better_and_surface_nodes_stay_on_the_surface() {
+        let (solid, spacing) = (Solid::Toothpaste, 0.006);
+        let (low, high) = solid.bounds(spacing);
+        let mut stuffing = stuff(solid, &Lattice::around(low, high, spacing, [0.1, 0.4, 0.7]));
+        let mesh = |s: &Stuffing| {
+            TetMesh::try_new(s.vertices.clone(), s.tets.clone(), Vec::new()).unwrap()
+        };
+        let before = mesh(&stuffing);
+        let surface = Surface::from_mesh(&before);
+        let mut on_surface = vec![false; before.node_count()];
+        surface.nodes.iter().for_each(|n| on_surface[*n as usize] = true);
+        let spacings = vec![spacing; on_surface.len()];
+        smooth(&mut stuffing, &on_surface, &spacings, |p, spacing| solid.project(p, spacing));
+        let after = mesh(&stuffing);
+        let angle = |m: &TetMesh| Quality::from_mesh(m, 0).dihedral_min.to_degrees();
+        assert!(angle(&before) < 20.0 && angle(&after) > 24.0);
+        for n in surface.nodes {
+            let depth = solid.depth(&after.vertices()[n as usize], spacing);
+            assert!(depth.abs() < 2e-4 * spacing);
         }
     }
 }

@@ -52,7 +52,7 @@ fn refusals_are_one_line_with_advice() {
     let known = "f: this is an MFEM mesh, which is not read here; \
                  convert it with Gmsh or meshio to MSH 4.1";
     assert_eq!(error, known);
-    assert!(refusal("ply\n").contains("it has no tetrahedra; fill it with TetGen"));
+    assert!(refusal("ply\n").contains("it has no tetrahedra; `glove-client fill`"));
     assert!(refusal([0x1f, 0x8b]).contains("unpack it first"));
 }
 

@@ -23,11 +23,11 @@ const DIRECTIONS: [[f32; 3]; 13] = [
 const AXES_ONLY: usize = 500;
 /// Layers that planes of one direction pass between.
 const LAYERS: usize = 256;
-/// Looks for a smaller separator near the last one found.
+/// How often a smaller separator is looked for near the last one found.
 const SEARCHES: usize = 4;
 /// A side has at most this share of a part, so that few levels lead to the smallest.
 const SIDE_MAX: f64 = 0.9;
-/// How much a separator with sides of different size costs more.
+/// Weight of the imbalance, the difference of its two sides over the part, in the cost of a separator.
 const IMBALANCE: f64 = 0.5;
 
 /// What a separator costs; `None` where a side is empty or too large.
@@ -36,8 +36,8 @@ fn cost_of(separated: &Separated) -> Option<f64> {
     cost(*left, *right, sides.len() - left - right)
 }
 
-/// Vertices between, and more of them the more the sides differ; `None` where a side is empty or
-/// too large.
+/// Cost of a separator: its vertices, and more the larger the imbalance of the two sides is; `None` where a
+/// side is empty or too large.
 fn cost(left: usize, right: usize, between: usize) -> Option<f64> {
     let all = (left + right + between) as f64;
     let is_cut = left > 0 && right > 0 && left.max(right) as f64 <= SIDE_MAX * all;

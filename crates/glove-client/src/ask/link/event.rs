@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use softgrasp_protocol::{DofValue, LargeReport, ModelReady, NodeChoice, SolveReport};
+use softgrasp_protocol::{
+    BodyLoad, ContactReport, DofValue, LargeReport, ModelReady, NodeChoice, ObjectState,
+    SolveReport,
+};
 
 use crate::ask::unanswered::Unanswered;
 
@@ -54,8 +57,24 @@ pub struct Reached {
     pub report: Box<SolveReport>,
     /// What is reported of large deformation; `None` for an answer to a linear question.
     pub large: Option<LargeReport>,
+    /// Whether its path at large deformation began at rest, and not where the answer before ended.
+    pub from_rest: bool,
+    /// What is answered to a step of a free object among rigid bodies; `None` for an answer to
+    /// prescribed displacements.
+    pub step: Option<ReachedStep>,
     /// From sending to having the answer.
     pub round_trip: Duration,
     /// Bytes of request and answer.
     pub bytes: [u64; 2],
+}
+
+/// The part of an answer that only a step of a free object has.
+#[derive(Debug)]
+pub struct ReachedStep {
+    /// How well the law of contact is met.
+    pub contact: ContactReport,
+    /// The object at the end of the step.
+    pub state: ObjectState,
+    /// What each body does to the object, in the order of the bodies asked about.
+    pub loads: Vec<BodyLoad>,
 }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use softgrasp_protocol::{LargeAsk, Question};
+use softgrasp_protocol::{ContactFrame, LargeAsk, Question};
 
 use super::event::{LinkEvent, RequestEnd};
-use super::outbox::{Activity, LinkState, Shared, TickRequest};
+use super::outbox::{Activity, LinkState, Shared, TickQuestion, TickRequest};
 use super::worker::Worker;
 use crate::ask::endpoint::Endpoint;
 use crate::ask::model_upload::ModelUpload;
@@ -51,7 +51,18 @@ impl Link {
     /// `grip` is the tick in which the grip began; at large deformation its first answer begins at
     /// the shape at rest, the others where the one before ended.
     pub fn ask(&self, tick: u64, grip: u64, question: Question, large: Option<LargeAsk>) {
-        self.shared.lock().replace_request(TickRequest { tick, grip, question, large });
+        let asked = TickQuestion::Held { question: Box::new(question), large };
+        self.replace(TickRequest { tick, grip, asked });
+    }
+
+    /// Asks for a step of the free object; a request that has not been sent yet is replaced. The model
+    /// is the link's to say. A server that refuses is asked again when `grip` is another.
+    pub fn ask_step(&self, tick: u64, grip: u64, frame: ContactFrame) {
+        self.replace(TickRequest { tick, grip, asked: TickQuestion::Step(Box::new(frame)) });
+    }
+
+    fn replace(&self, request: TickRequest) {
+        self.shared.lock().replace_request(request);
         self.shared.notify();
     }
 

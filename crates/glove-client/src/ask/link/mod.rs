@@ -10,5 +10,5 @@ mod handle;
 mod outbox;
 mod worker;
 
-pub use event::{LinkEvent, Reached, RequestEnd};
+pub use event::{LinkEvent, Reached, ReachedStep, RequestEnd};
 pub use handle::Link;

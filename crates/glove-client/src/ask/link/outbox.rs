@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use softgrasp_protocol::{LargeAsk, Question};
+use softgrasp_protocol::{ContactFrame, LargeAsk, Question};
 
 use super::event::{LinkEvent, RequestEnd};
 use crate::ask::model_upload::ModelUpload;
@@ -18,10 +18,21 @@ pub struct TickRequest {
     /// Tick in which the grip began that it belongs to.
     pub grip: u64,
     /// What is asked.
-    pub question: Question,
-    /// What is asked of large deformation; `None` for a linear answer. Where its path begins is the
-    /// link's to say.
-    pub large: Option<LargeAsk>,
+    pub asked: TickQuestion,
+}
+
+/// What a tick asks.
+pub enum TickQuestion {
+    /// The shape under prescribed displacements.
+    Held {
+        /// The displacements.
+        question: Box<Question>,
+        /// What is asked of large deformation; `None` for a linear answer. Where its path begins is
+        /// the link's to say.
+        large: Option<LargeAsk>,
+    },
+    /// A step of the free object among rigid bodies. Its model is the link's to say.
+    Step(Box<ContactFrame>),
 }
 
 /// What the link's thread is doing.
@@ -167,7 +178,8 @@ mod tests {
     use super::*;
 
     fn request(tick: u64) -> TickRequest {
-        TickRequest { tick, grip: 0, question: Question::default(), large: None }
+        let asked = TickQuestion::Held { question: Box::default(), large: None };
+        TickRequest { tick, grip: 0, asked }
     }
 
     #[test]

@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
-    Answer, FrameRequest, LargeAsk, LargeFrame, LargeReport, ModelHash, PathChoice, Prefetch,
-    RejectCode, Rejected, Reply, Request, UploadModel,
+    Answer, ContactAnswer, ContactFrame, FrameRequest, LargeAsk, LargeFrame, LargeReport,
+    ModelHash, PathChoice, Prefetch, RejectCode, Rejected, Reply, Request, UploadModel,
 };
 
-use super::event::{LinkEvent, Reached, RequestEnd};
-use super::outbox::{Activity, LinkState, Shared, TickRequest};
+use super::event::{LinkEvent, Reached, ReachedStep, RequestEnd};
+use super::outbox::{Activity, LinkState, Shared, TickQuestion, TickRequest};
 use crate::ask::connection::{LinkError, ServerConnection, unexpected};
 use crate::ask::endpoint::Endpoint;
 use crate::ask::model_upload::ModelUpload;
@@ -279,38 +279,60 @@ impl Session {
         budget: &mut TickBudget,
     ) -> Result<Reached, LinkError> {
         budget.begin();
-        let question = request.question.clone();
         let start = Instant::now();
-        let asked = match request.large {
-            None => Request::Frame(FrameRequest { model: model.hash, question }),
-            Some(large) => {
-                let is_first = self.answered_grip != Some(request.grip);
-                let path = if is_first { PathChoice::FromRest } else { PathChoice::Continue };
-                let large = LargeAsk { path, ..large };
-                Request::LargeFrame(Box::new(LargeFrame { model: model.hash, large, question }))
-            }
-        };
+        let asked = self.message_of(model, request);
+        let from_rest = matches!(
+            &asked,
+            Request::LargeFrame(frame) if frame.large.path == PathChoice::FromRest
+        );
         let reply = self.connection.ask_awake(&asked);
         let round_trip = start.elapsed();
         let bytes = self.connection.bytes_of_exchange();
-        let reached = |answer: Answer, large: Option<LargeReport>| Reached {
-            rest_shape: model.rest_shape,
-            round_trip,
-            bytes,
-            nodes: answer.nodes,
-            displacement: answer.displacements.into_f64(),
-            reactions: answer.reactions,
-            mask_forces: answer.mask_forces,
-            report: Box::new(answer.report),
-            large,
-        };
+        let reached =
+            |answer: Answer, large: Option<LargeReport>, step: Option<ReachedStep>| Reached {
+                rest_shape: model.rest_shape,
+                from_rest,
+                round_trip,
+                bytes,
+                nodes: answer.nodes,
+                displacement: answer.displacements.into_f64(),
+                reactions: answer.reactions,
+                mask_forces: answer.mask_forces,
+                report: Box::new(answer.report),
+                large,
+                step,
+            };
         let reached = match reply? {
-            Reply::Answer(answer) => reached(*answer, None),
-            Reply::LargeAnswer(answered) => reached(answered.answer, Some(answered.large)),
+            Reply::Answer(answer) => reached(*answer, None, None),
+            Reply::LargeAnswer(answered) => reached(answered.answer, Some(answered.large), None),
+            Reply::ContactAnswer(answered) => {
+                let ContactAnswer { answer, contact, state, points: _, loads } = *answered;
+                reached(answer, None, Some(ReachedStep { contact, state, loads }))
+            }
             other => return Err(unexpected("Frame", &other)),
         };
         budget.end();
         Ok(reached)
+    }
+
+    /// What is sent for a request.
+    fn message_of(&self, model: &ModelUpload, request: &TickRequest) -> Request {
+        match &request.asked {
+            TickQuestion::Held { question, large: None } => {
+                Request::Frame(FrameRequest { model: model.hash, question: (**question).clone() })
+            }
+            TickQuestion::Held { question, large: Some(large) } => {
+                let is_first = self.answered_grip != Some(request.grip);
+                let path = if is_first { PathChoice::FromRest } else { large.path };
+                let large = LargeAsk { path, ..*large };
+                let question = (**question).clone();
+                Request::LargeFrame(Box::new(LargeFrame { model: model.hash, large, question }))
+            }
+            TickQuestion::Step(frame) => {
+                let frame = ContactFrame { model: model.hash, ..(**frame).clone() };
+                Request::ContactFrame(Box::new(frame))
+            }
+        }
     }
 }
 
@@ -341,7 +363,8 @@ fn end(shared: &Shared, request: Option<TickRequest>, reached: Result<Box<Reache
 impl TickRequest {
     /// Whether a refusal is about where this tick would have gone, not about the grip.
     fn is_passing(&self, rejected: &Rejected) -> bool {
-        self.large.is_some() && rejected.code == RejectCode::Uncertain
+        matches!(&self.asked, TickQuestion::Held { large: Some(_), .. })
+            && rejected.code == RejectCode::Uncertain
     }
 }
 
@@ -386,8 +409,10 @@ mod tests {
 
     #[test]
     fn lost_request_waits_for_the_server_and_ends_when_a_newer_one_has_come() {
-        let request =
-            |tick| TickRequest { tick, grip: 0, question: Default::default(), large: None };
+        let request = |tick| {
+            let asked = TickQuestion::Held { question: Default::default(), large: None };
+            TickRequest { tick, grip: 0, asked }
+        };
         let upload = UploadModel {
             mesh: softgrasp_protocol::MeshData { vertices: vec![], tets: vec![], regions: vec![] },
             materials: vec![],

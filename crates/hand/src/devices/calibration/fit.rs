@@ -15,8 +15,10 @@ pub enum SensorFit {
     Full,
     /// The gestures hardly differ at this joint: the offset is new, the gain was kept.
     OffsetOnly,
-    /// The gestures differ but the readings do not: the offset is new, the gain was kept.
+    /// The gestures differ but the readings hardly do: the offset is new, the gain was kept.
     Unmoved,
+    /// A bending joint whose reading went the wrong way: the line was kept.
+    Reversed,
     /// Stuck at an end of its range in every reading: marked dead, the line was kept.
     Dead,
     /// No reading of this sensor: the line was kept.
@@ -57,7 +59,59 @@ impl FitReport {
         }
         found
     }
+
+    /// Why the fit is no calibration: the hand would open when it closes, or hardly move. `None` for
+    /// one that may be used, whatever its complaints are.
+    pub fn refusal(&self) -> Option<FitRefusal> {
+        let count =
+            |outcome| KNUCKLES.into_iter().filter(|s| self.outcomes[s.index()] == outcome).count();
+        let (moved, reversed) = (count(SensorFit::Full), count(SensorFit::Reversed));
+        match (moved, reversed) {
+            (_, REVERSED_MAX..) => Some(FitRefusal::Reversed { reversed }),
+            (..MOVED_MIN, _) => Some(FitRefusal::Unmoved { moved }),
+            _ => None,
+        }
+    }
 }
+
+/// Why a fit is no calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FitRefusal {
+    /// The readings of fingers that bent went the wrong way.
+    #[error(
+        "{reversed} of the 8 sensors of the fingers' MPJ and PIJ went the wrong way: the flat hand \
+         and the fist were shown in the wrong order"
+    )]
+    Reversed {
+        /// How many.
+        reversed: usize,
+    },
+    /// Too few fingers moved.
+    #[error(
+        "only {moved} of the 8 sensors of the fingers' MPJ and PIJ moved as a fist moves them: show \
+         the flat hand, then a tight fist"
+    )]
+    Unmoved {
+        /// How many moved.
+        moved: usize,
+    },
+}
+
+/// The sensors that every fist moves.
+const KNUCKLES: [Sensor; 8] = [
+    Sensor::IndexMcp,
+    Sensor::IndexPip,
+    Sensor::MiddleMcp,
+    Sensor::MiddlePip,
+    Sensor::RingMcp,
+    Sensor::RingPip,
+    Sensor::LittleMcp,
+    Sensor::LittlePip,
+];
+/// So many of them must move: a glove may have dead sensors.
+const MOVED_MIN: usize = 5;
+/// So many that went the wrong way are no fault of the sensors.
+const REVERSED_MAX: usize = 3;
 
 /// A gesture that is held: the joint angles it is believed to have, and what the glove read.
 #[derive(Clone, Copy, Debug)]
@@ -117,7 +171,7 @@ pub fn fit_gestures(
         let readings = [flat, fist].map(|gesture| values(gesture.readings, sensor));
         let line = start.sensor(sensor);
         qualities[sensor.index()] = SensorQuality::of(&readings, expected(line, angles));
-        let (fitted, outcome) = fit_line(line, angles, readings);
+        let (fitted, outcome) = fit_line(line, angles, readings, &qualities[sensor.index()]);
         calibration.sensors[sensor.index()] = fitted;
         outcomes[sensor.index()] = outcome;
     }
@@ -154,6 +208,7 @@ fn fit_line(
     start: &SensorCalibration,
     angles: [f64; 2],
     readings: [Vec<u8>; 2],
+    quality: &SensorQuality,
 ) -> (SensorCalibration, SensorFit) {
     let [flat, fist] = &readings;
     let (Some(&first), false) = (flat.first(), fist.is_empty()) else {
@@ -176,8 +231,12 @@ fn fit_line(
     if angle_change.abs() < MIN_ANGLE {
         return kept_gain(SensorFit::OffsetOnly);
     }
-    if count_change.abs() < MIN_COUNTS {
+    // A line through readings that are nearly the same would be steep and its sign that of the noise.
+    if count_change.abs() < MIN_COUNTS || quality.is_small() {
         return kept_gain(SensorFit::Unmoved);
+    }
+    if quality.is_reversed(start.sensor) {
+        return (SensorCalibration { dead: false, ..*start }, SensorFit::Reversed);
     }
     let gain_rad_per_count = angle_change / count_change;
     let offset_counts = counts[0] - angles[0] / gain_rad_per_count;
@@ -310,6 +369,8 @@ mod tests {
         let sentence = "index PIJ fell where it should rise; show the flat hand first and then the \
                         fist, and try again";
         assert!(told(&swapped).contains(&sentence.to_owned()), "{:?}", told(&swapped));
+        assert_eq!(swapped.refusal(), Some(FitRefusal::Reversed { reversed: 8 }));
+        assert_eq!((good.refusal(), report.refusal()), (None, None));
         let mut shaking = moved(&[], &fist);
         for (i, reading) in shaking.iter_mut().enumerate() {
             let sway = if i % 2 == 0 { 10 } else { 0 };
@@ -325,6 +386,26 @@ mod tests {
             ["ring PIJ trembled by 5 counts; hold each gesture still and try again"]
         );
         assert_eq!(report.qualities[Sensor::RingPip.index()].noise_counts, 5.0);
+    }
+
+    #[test]
+    fn sensor_that_went_the_wrong_way_or_hardly_moved_never_gets_a_gain_of_the_wrong_sign() {
+        let (flat, fist) = (JointAngles::flat(), JointAngles::fist());
+        let start = Calibration::default();
+        // The palm arch fell by many counts, the little finger's MPJ by a few.
+        let readings = moved(&[(Sensor::PalmArch, 20), (Sensor::LittleMcp, 55)], &fist);
+        let report = fit_two_gestures(&start, (&flat, &moved(&[], &flat)), (&fist, &readings));
+        for (sensor, outcome) in
+            [(Sensor::PalmArch, SensorFit::Reversed), (Sensor::LittleMcp, SensorFit::Unmoved)]
+        {
+            assert_eq!(report.outcomes[sensor.index()], outcome);
+            let gains = [&report.calibration, &start].map(|c| c.sensor(sensor).gain_rad_per_count);
+            assert_eq!(gains[0], gains[1], "{sensor:?}");
+        }
+        assert_eq!(report.refusal(), None, "the other fingers are good");
+        let nothing =
+            fit_two_gestures(&start, (&flat, &moved(&[], &flat)), (&fist, &moved(&[], &flat)));
+        assert_eq!(nothing.refusal(), Some(FitRefusal::Unmoved { moved: 0 }));
     }
 
     #[test]

@@ -34,16 +34,27 @@ impl SensorQuality {
 
     /// What to say about this sensor, if anything.
     pub(super) fn complaint(&self, sensor: Sensor) -> Option<Complaint> {
-        let Self { span_counts, expected_counts, noise_counts } = *self;
+        let Self { span_counts, noise_counts, .. } = *self;
         if noise_counts > MAX_NOISE_COUNTS {
             return Some(Complaint::Unsteady { sensor, noise_counts });
         }
-        let expected = expected_counts?;
-        if span_counts.abs() < MIN_SHARE * expected.abs() {
+        if self.is_small() {
             return Some(Complaint::Small { sensor, span_counts: span_counts.abs() });
         }
-        let reversed = bends(sensor) && span_counts * expected < 0.0;
+        let reversed = self.is_reversed(sensor);
         reversed.then_some(Complaint::Reversed { sensor, rises: span_counts > 0.0 })
+    }
+
+    /// Whether the sensor moved by much less than one of an average glove.
+    pub(super) fn is_small(&self) -> bool {
+        let expected = self.expected_counts;
+        expected.is_some_and(|expected| self.span_counts.abs() < MIN_SHARE * expected.abs())
+    }
+
+    /// Whether the reading of a bending joint went the wrong way.
+    pub(super) fn is_reversed(&self, sensor: Sensor) -> bool {
+        let expected = self.expected_counts;
+        bends(sensor) && expected.is_some_and(|expected| self.span_counts * expected < 0.0)
     }
 }
 

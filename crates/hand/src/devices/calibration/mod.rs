@@ -19,7 +19,9 @@ mod virtual_hand_notes;
 mod virtual_hand_reading;
 
 pub use checks::CalibrationError;
-pub use fit::{FitReport, Gesture, SensorFit, fit_gestures, fit_two_gestures, thumb_across};
+pub use fit::{
+    FitRefusal, FitReport, Gesture, SensorFit, fit_gestures, fit_two_gestures, thumb_across,
+};
 pub use fit_quality::{Complaint, SensorQuality};
 pub use form::Form;
 pub use linear::{Calibration, DipRule, SensorCalibration, sensor_angle};

@@ -128,10 +128,7 @@ impl Calibration {
 
 /// The lines for a person.
 fn header_lines(calibration: &Calibration, header: &CalibrationHeader<'_>) -> Vec<String> {
-    let hand = match calibration.hand {
-        softgrasp_grasp::hand::Handedness::Right => "right",
-        softgrasp_grasp::hand::Handedness::Left => "left",
-    };
+    let hand = calibration.hand.name();
     let mut lines = vec![
         "Calibration of an instrumented glove, VirtualHand form".to_owned(),
         format!("written by {}", header.program),

@@ -12,10 +12,7 @@ pub(super) const NOTE_MARK: &str = "! softgrasp ";
 
 /// Keys and values of a calibration, in the order in which they are written.
 pub(super) fn notes_of(calibration: &Calibration) -> Vec<(String, String)> {
-    let hand = match calibration.hand {
-        Handedness::Right => "right",
-        Handedness::Left => "left",
-    };
+    let hand = calibration.hand.name();
     let [rotation, abduction] = calibration.thumb_coupling.terms();
     let mut notes = vec![
         ("hand".to_owned(), hand.to_owned()),

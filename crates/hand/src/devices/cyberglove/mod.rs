@@ -12,4 +12,4 @@ pub use record::{
 };
 pub use sensor::{RawSensors, RawSensorsError, Sensor, SensorCount, SensorSet};
 pub use sensor_health::SensorHealth;
-pub(in crate::devices) use sensor_health::is_rail;
+pub(crate) use sensor_health::is_rail;

@@ -35,9 +35,15 @@ impl SensorHealth {
 
     /// The sensors that are dead by the readings so far.
     pub fn dead(&self) -> SensorSet {
-        if self.records < Self::RECORDS {
-            return SensorSet::EMPTY;
+        match self.records < Self::RECORDS {
+            true => SensorSet::EMPTY,
+            false => self.only_at_one_end(),
         }
+    }
+
+    /// The sensors that have shown one end of the range only, from the first reading on: those that
+    /// will be dead, if they go on.
+    pub fn only_at_one_end(&self) -> SensorSet {
         let stuck = |sensor: &Sensor| {
             let constant = !self.varied.contains(*sensor);
             constant && self.first[sensor.index()].is_some_and(is_rail)
@@ -47,7 +53,7 @@ impl SensorHealth {
 }
 
 /// Whether a value is an end of the range, where a broken sensor stays.
-pub(in crate::devices) fn is_rail(value: u8) -> bool {
+pub(crate) fn is_rail(value: u8) -> bool {
     matches!(value, 0 | 1 | 254 | 255)
 }
 
@@ -70,6 +76,7 @@ mod tests {
         for _ in 1..SensorHealth::RECORDS {
             health.observe(&reading(254, 1, 100));
             assert!(health.dead().is_empty(), "too early to tell");
+            assert_eq!(health.only_at_one_end().iter().count(), 2);
         }
         health.observe(&reading(254, 1, 100));
         let dead: Vec<_> = health.dead().iter().collect();

@@ -47,6 +47,14 @@ impl LengthUnit {
             Self::Centimetres => 0.01,
         }
     }
+
+    /// `inches` or `centimetres`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Inches => "inches",
+            Self::Centimetres => "centimetres",
+        }
+    }
 }
 
 /// Everything a parser must know about how the tracker was set up.

@@ -13,7 +13,7 @@ pub enum Look {
     Cube,
     /// A ball in two colours.
     Sphere,
-    /// Soft clay.
+    /// Clay of a bluish green, which no hand has.
     Imported,
 }
 

@@ -177,4 +177,4 @@ fn dress_tube(rest: &RestShape, body: &mut Body) -> Dressed {
 /// Height of the strawberry that seeds and leaves were measured for, m.
 const FRUIT_HEIGHT: f64 = 0.065;
 /// Linear colour of clay.
-const CLAY: [f32; 3] = [0.56, 0.25, 0.14];
+const CLAY: [f32; 3] = [0.10, 0.34, 0.38];

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
 
-use egui::{Align2, Context, Key, ScrollArea, TextEdit, Ui};
+use egui::{Context, Key, RichText, TextEdit, Ui};
 
+use super::file_list::{Clicked, FileList};
 use super::{places, theme};
 
 /// The dialog that is open.
@@ -24,10 +26,12 @@ pub enum Dialog {
 /// A question for a file.
 pub struct FileQuestion {
     typed: String,
-    /// Meshes in the folder.
-    offered: Vec<String>,
-    /// The native dialog, while it is open.
-    native: Option<Receiver<Option<PathBuf>>>,
+    /// Meshes and folders.
+    list: FileList,
+    /// The native dialog, while it is open, and since when.
+    native: Option<(Receiver<Option<PathBuf>>, Instant)>,
+    /// Why the last answer was none, in a sentence.
+    refusal: Option<String>,
     is_new: bool,
 }
 
@@ -42,16 +46,23 @@ pub enum FileAnswer {
 
 /// Formats that are written, by extension.
 pub const WRITTEN: [&str; 3] = ["msh", "vtu", "txt"];
-/// Formats that are read.
-const READ: [&str; 12] =
-    ["msh", "vtu", "vtk", "inp", "mesh", "txt", "node", "ele", "xml", "json", "off", "gz"];
-/// Files offered at most.
-const OFFERED_MAX: usize = 60;
+/// Extensions of what is read, for the system's own dialog.
+const READ: [&str; 9] = ["msh", "vtu", "vtk", "mesh", "txt", "node", "ele", "veg", "tet"];
+/// A system without a dialog of its own says so within this time; no person chooses so fast.
+const NO_PERSON: Duration = Duration::from_millis(400);
 
 impl Dialog {
     /// Asks which mesh is to be read.
     pub fn read() -> Self {
         Self::Read(FileQuestion::new(String::new()))
+    }
+
+    /// Asks again which mesh is to be read, because this one cannot be; why, in a sentence.
+    pub fn read_again(path: &Path, why: String) -> Self {
+        let mut question = FileQuestion::new(path.to_string_lossy().into_owned());
+        question.list = FileList::of(path.parent().unwrap_or(Path::new("")));
+        question.refusal = Some(why);
+        Self::Read(question)
     }
 
     /// Asks for a name, with a proposal.
@@ -99,21 +110,29 @@ enum Step {
 
 impl FileQuestion {
     fn new(typed: String) -> Self {
-        Self { typed, offered: meshes_in(Path::new(".")), native: None, is_new: true }
+        let list = FileList::of(Path::new(""));
+        Self { typed, list, native: None, refusal: None, is_new: true }
     }
 
     fn ask(&mut self, context: &Context, is_save: bool) -> Step {
-        if let Some(native) = &self.native {
+        if let Some((native, since)) = &self.native {
             match native.try_recv() {
                 Ok(Some(path)) => return Step::Chosen(path),
                 // Closed without a choice, or there is no native dialog here: the typed name stays.
-                Ok(None) | Err(std::sync::mpsc::TryRecvError::Disconnected) => self.native = None,
+                Ok(None) | Err(std::sync::mpsc::TryRecvError::Disconnected) => {
+                    if since.elapsed() < NO_PERSON {
+                        let text = "This system has no file dialog of its own (no portal, no zenity); \
+                                    type the path, or choose it in the list.";
+                        self.refusal = Some(text.to_owned());
+                    }
+                    self.native = None;
+                }
                 Err(std::sync::mpsc::TryRecvError::Empty) => {}
             }
         }
         let mut step = Step::Stay;
         let title = if is_save { "Save as" } else { "Read file" };
-        theme::card(context, title, Align2::CENTER_CENTER, [0.0, -20.0], |ui| {
+        theme::dialog(context, title, |ui| {
             ui.set_width(440.0);
             ui.heading(title);
             step = self.content(ui, is_save);
@@ -126,6 +145,9 @@ impl FileQuestion {
 
     fn content(&mut self, ui: &mut Ui, is_save: bool) -> Step {
         let mut chosen = self.name_field(ui, is_save);
+        if let Some(refusal) = &self.refusal {
+            ui.label(RichText::new(refusal).color(theme::BAD));
+        }
         if is_save {
             self.formats(ui);
         } else {
@@ -140,8 +162,10 @@ impl FileQuestion {
             if button.clicked() {
                 chosen = Some(PathBuf::from(self.typed.trim()));
             }
-            if ui.add_enabled(self.native.is_none(), egui::Button::new("Browse …")).clicked() {
-                self.native = Some(browse(is_save, self.typed.clone()));
+            let browses = ui.add_enabled(self.native.is_none(), egui::Button::new("Browse …"));
+            places::tell(ui.ctx(), "Browse", &browses);
+            if browses.clicked() {
+                self.native = Some((browse(is_save, self.typed.clone()), Instant::now()));
             }
             let cancel = ui.button("Cancel");
             places::tell(ui.ctx(), "Cancel", &cancel);
@@ -190,30 +214,19 @@ impl FileQuestion {
         });
     }
 
-    /// Meshes of the folder, to be clicked.
+    /// Folders and meshes, to be clicked.
     fn offers(&mut self, ui: &mut Ui) -> Option<PathBuf> {
-        let mut chosen = None;
-        if self.offered.is_empty() {
-            ui.label(theme::quiet("there is no mesh file in this folder"));
+        match self.list.show(ui, &self.typed)? {
+            Clicked::Folder(folder) => self.list = FileList::of(&folder),
+            Clicked::File(path) => self.typed = path.to_string_lossy().into_owned(),
+            Clicked::FileTwice(path) => return Some(path),
         }
-        ScrollArea::vertical().max_height(220.0).show(ui, |ui| {
-            for name in &self.offered {
-                let response = ui.selectable_label(self.typed == *name, name);
-                places::tell(ui.ctx(), name, &response);
-                if response.clicked() {
-                    self.typed.clone_from(name);
-                }
-                if response.double_clicked() {
-                    chosen = Some(PathBuf::from(name));
-                }
-            }
-        });
-        chosen
+        None
     }
 }
 
 fn ask_to_replace(context: &Context, path: &Path) -> Option<bool> {
-    theme::card(context, "replace", Align2::CENTER_CENTER, [0.0, -20.0], |ui| {
+    theme::dialog(context, "replace", |ui| {
         ui.set_width(400.0);
         ui.heading("Replace the file?");
         ui.label(format!("{} is there already.", path.display()));
@@ -246,20 +259,6 @@ fn browse(is_save: bool, proposal: String) -> Receiver<Option<PathBuf>> {
         tracing::warn!(%error, "cannot open the system's file dialog");
     }
     answered
-}
-
-fn meshes_in(folder: &Path) -> Vec<String> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
-    let is_mesh =
-        |path: &Path| path.extension().and_then(|e| e.to_str()).is_some_and(|e| READ.contains(&e));
-    let mut names: Vec<String> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.is_file() && is_mesh(path))
-        .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
-        .collect();
-    names.sort();
-    names.truncate(OFFERED_MAX);
-    names
 }
 
 /// A name that is not taken: the object's, with a number.

@@ -1,6 +1,6 @@
 //! The panel that moves the mouse hand: aim, reach, close the fingers.
 
-use egui::{Align2, Context, Response, Slider, Ui};
+use egui::{Response, Slider, Ui};
 use softgrasp_grasp::hand::Finger;
 use softgrasp_hand::mouse::{CLOSING_MAX, Digits, MouseInput};
 
@@ -42,11 +42,10 @@ impl FingerSliders {
         }
     }
 
-    /// Shows the panel at the left; what was asked for.
-    pub fn show(&mut self, context: &Context) -> Vec<MouseInput> {
+    /// Shows the panel; what was asked for.
+    pub fn show(&mut self, ui: &mut Ui) -> Vec<MouseInput> {
         let mut wishes = Vec::new();
-        let offset = [theme::MARGIN, -60.0];
-        theme::card(context, "mouse hand", Align2::LEFT_CENTER, offset, |ui| {
+        theme::sheet(ui, |ui| {
             ui.set_width(190.0);
             ui.strong("Your hand");
             let go = [

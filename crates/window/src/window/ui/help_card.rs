@@ -1,6 +1,6 @@
 //! The page that explains mouse and keys (F1), and the hint that a newcomer sees first.
 
-use egui::{Align2, Context, Grid, RichText, Ui};
+use egui::{Context, Grid, RichText, ScrollArea, Ui};
 use softgrasp_hand::hand_choice::HandChoice;
 
 use super::theme;
@@ -17,14 +17,18 @@ const ALWAYS: [(&str, &str); 13] = [
     ("Ctrl+O / Ctrl+S", "read a file / save as"),
     ("C", "next colouring: displacement, strain, stress, error"),
     ("W G H L O N", "elements, shape at rest, hand, colliders, contacts, forces"),
-    ("T", "next level of the sphere tree"),
+    ("T (Shift)", "next (last) level of the sphere tree"),
     ("P / R", "snapshot / record pictures"),
-    ("F1 F2 F3", "this page, information, timings"),
+    ("F1 F2 F3 F4", "this page, information, timings, softness and size"),
 ];
 
 /// What they do besides for a hand that is played.
-const PLAYED: [(&str, &str); 3] =
-    [("Enter", "play or pause"), (". ", "one tick"), (", ", "from the beginning")];
+const PLAYED: [(&str, &str); 4] = [
+    ("Space (hold)", "take the hand yourself"),
+    ("Enter", "play or pause"),
+    (". ", "one tick"),
+    (", ", "from the beginning"),
+];
 
 /// What they do besides for a hand that the mouse moves.
 const MOUSE: [(&str, &str); 6] = [
@@ -38,16 +42,19 @@ const MOUSE: [(&str, &str); 6] = [
 
 /// Shows the page.
 pub fn show(context: &Context, hand: HandChoice) {
-    theme::card(context, "help", Align2::CENTER_CENTER, [0.0, 0.0], |ui| {
+    let height_max = context.content_rect().height() - 130.0;
+    theme::dialog(context, "help", |ui| {
         ui.heading("Mouse and keys");
         ui.add_space(4.0);
-        rows(ui, "always", &ALWAYS);
-        ui.separator();
-        match hand {
-            HandChoice::Scripted(_) | HandChoice::Replay => rows(ui, "played", &PLAYED),
-            HandChoice::Mouse => rows(ui, "mouse", &MOUSE),
-            HandChoice::Live => {}
-        }
+        ScrollArea::vertical().max_height(height_max).show(ui, |ui| {
+            match hand {
+                HandChoice::Scripted(_) | HandChoice::Replay => rows(ui, "played", &PLAYED),
+                HandChoice::Mouse => rows(ui, "mouse", &MOUSE),
+                HandChoice::Live => {}
+            }
+            ui.separator();
+            rows(ui, "always", &ALWAYS);
+        });
         ui.add_space(4.0);
         ui.label(theme::quiet("F1 closes this page."));
     });
@@ -63,20 +70,27 @@ fn rows(ui: &mut Ui, name: &str, rows: &[(&str, &str)]) {
     });
 }
 
-/// One line at the top for whoever sees the window for the first time.
-pub fn hint(context: &Context, hand: HandChoice) {
-    let text = match hand {
-        HandChoice::Mouse => {
-            "Press Reach, then hold Space or draw “close all” to grasp.  Right button: menu.  F1: help."
+/// What whoever sees the window for the first time has to know of a hand, and of an object that
+/// `is_lifted` by friction or glued to the fingertips.
+pub fn hint(ui: &mut Ui, hand: HandChoice, is_lifted: bool) {
+    let first = match (hand, is_lifted) {
+        (HandChoice::Mouse, true) => {
+            "Press Reach, hold Space to pinch it, then drag the hand up to lift it."
         }
-        HandChoice::Live => {
-            "Touch with index, middle and ring finger to hold, with all five to squeeze.  Right button: menu.  F1: help."
+        (HandChoice::Mouse, false) => {
+            "Press Reach, then hold Space or draw “close all” to squeeze."
         }
-        HandChoice::Replay => "A recording is played again.  Right button: menu.  F1: help.",
-        HandChoice::Scripted(_) => {
-            "A scripted hand grasps. Right button: menu.  Menu Hand, Mouse and keyboard: do it yourself.  F1: help."
+        (HandChoice::Live, true) => "Pinch it with thumb and fingers, and lift it.",
+        (HandChoice::Live, false) => {
+            "Touch with index, middle and ring finger to hold, with all five to squeeze."
+        }
+        (HandChoice::Replay, _) => "A recording is played again.",
+        (HandChoice::Scripted(_), true) => {
+            "A hand lifts it by itself.  Hold Space: do it yourself."
+        }
+        (HandChoice::Scripted(_), false) => {
+            "A hand squeezes by itself.  Hold Space: do it yourself."
         }
     };
-    let offset = [0.0, theme::MARGIN + 48.0];
-    theme::card(context, "hint", Align2::CENTER_TOP, offset, |ui| ui.label(text));
+    theme::sheet(ui, |ui| ui.label(format!("{first}  Right button: menu.  F1: help.")));
 }

@@ -1,6 +1,6 @@
 //! What runs and where (F2): object, material, equations, server, why this method.
 
-use egui::{Align2, Context, Grid, Ui};
+use egui::{Grid, RichText, Ui};
 
 use super::theme;
 use crate::view::frame::ViewFrame;
@@ -23,10 +23,9 @@ pub struct RunFacts {
 }
 
 /// Shows the card.
-pub fn show(context: &Context, facts: &RunFacts, frame: Option<&ViewFrame>) {
-    let offset = [-theme::MARGIN, -theme::MARGIN - 64.0];
-    theme::card(context, "information", Align2::RIGHT_BOTTOM, offset, |ui| {
-        ui.set_max_width(420.0);
+pub fn show(ui: &mut Ui, facts: &RunFacts, frame: Option<&ViewFrame>) {
+    theme::sheet(ui, |ui| {
+        ui.set_max_width(340.0);
         ui.strong("Information");
         Grid::new("information grid").num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
             of_run(ui, facts);
@@ -45,7 +44,7 @@ pub fn show(context: &Context, facts: &RunFacts, frame: Option<&ViewFrame>) {
 
 fn row(ui: &mut Ui, name: &str, value: impl Into<String>) {
     ui.label(theme::quiet(name));
-    ui.label(value.into());
+    ui.add(egui::Label::new(RichText::new(value.into())).wrap());
     ui.end_row();
 }
 
@@ -53,7 +52,7 @@ fn of_run(ui: &mut Ui, facts: &RunFacts) {
     let (young, poisson) = facts.material;
     row(ui, "object", facts.object.clone());
     row(ui, "material", format!("{} kPa, Poisson's ratio {poisson}", young / 1e3));
-    row(ui, "hand", format!("{}, holds by {}", facts.hand, facts.contact));
+    row(ui, "hand", format!("{}; a fingertip holds {}", facts.hand, facts.contact));
     row(ui, "server", facts.server.clone());
     row(ui, "drawn by", facts.graphics.clone());
 }
@@ -65,9 +64,25 @@ fn of_frame(ui: &mut Ui, frame: &ViewFrame) {
         format!("{} nodes, {} tetrahedra, {size:.0} mm", mesh.node_count(), mesh.tets().len());
     row(ui, "mesh", counts);
     row(ui, "shape at rest", format!("number {}", frame.object.rest_shapes));
+    row(ui, "tick", format!("{}  ({:.1} s)", frame.tick, frame.at_s));
+    row(ui, "ticks missed", frame.server.ticks_skipped.to_string());
+    row(ui, "device records that could not be read", frame.server.device_faults.to_string());
+    row(ui, "link to the server", frame.server.link.name());
+    if let Some(said) = &frame.server.said {
+        row(ui, "last heard of the server", said.clone());
+    }
     let Some(solve) = &frame.server.solve else { return };
     let equations = format!("{} unknown, {} prescribed", solve.unknown_dofs, solve.known_dofs);
     row(ui, "equations", equations);
+    row(ui, "method", format!("{} on {}", solve.method, solve.element));
+    row(ui, "question to answer", format!("{:.2} ms", solve.round_trip_ms));
+    row(ui, "residual", format!("{:.1e}", solve.residual_rel));
+    let bound = match (solve.error_bound_rel, &solve.why) {
+        (Some(bound), _) => format!("{bound:.1e}, proven"),
+        (None, Some(why)) => format!("none: {why}"),
+        (None, None) => "none for this answer".to_owned(),
+    };
+    row(ui, "bound of the error", bound);
     row(ui, "precision", solve.precision.clone());
     let turned = match solve.max_rotation_deg.is_finite() {
         true => format!("{:.1}°, {:.0} %", solve.max_rotation_deg, 100.0 * solve.max_strain),

@@ -1,6 +1,6 @@
 //! The legend of the colours: what they show, in which unit, from nothing to the most.
 
-use egui::{Align2, Color32, Context, Pos2, Rect, Sense, Vec2};
+use egui::{Align2, Color32, Pos2, Rect, Sense, Ui, Vec2};
 
 use super::theme;
 use crate::view::colour_map::ColourMap;
@@ -18,10 +18,10 @@ pub struct LegendText {
 
 const SIZE: Vec2 = Vec2::new(22.0, 180.0);
 
-/// Shows the legend at the right.
-pub fn show(context: &Context, map: &ColourMap, text: &LegendText) {
-    let offset = [-theme::MARGIN, -30.0];
-    theme::card(context, "legend", Align2::RIGHT_CENTER, offset, |ui| {
+/// Shows the legend.
+pub fn show(ui: &mut Ui, map: &ColourMap, text: &LegendText) {
+    theme::sheet(ui, |ui| {
+        ui.set_max_width(150.0);
         ui.strong(&text.title);
         ui.add_space(4.0);
         let room = Vec2::new(110.0, SIZE.y + 14.0);

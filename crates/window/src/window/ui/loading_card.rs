@@ -1,6 +1,6 @@
 //! Shows how far a new object is on its way to the hand, and lets it be called off.
 
-use egui::{Align2, Context, RichText};
+use egui::{Context, RichText};
 
 use super::{places, theme};
 
@@ -18,7 +18,7 @@ pub const STEPS: [&str; 6] = [
 ///
 /// `step` counts in [`STEPS`].
 pub fn show(context: &Context, name: &str, step: usize) -> bool {
-    theme::card(context, "loading", Align2::CENTER_CENTER, [0.0, 0.0], |ui| {
+    theme::dialog(context, "loading", |ui| {
         ui.set_min_width(280.0);
         ui.horizontal(|ui| {
             ui.spinner();

@@ -23,6 +23,8 @@ pub struct MenuFacts<'a> {
     pub object: &'a str,
     /// The method asked for.
     pub method: &'a str,
+    /// The method of the newest answer.
+    pub solved_by: Option<&'a str>,
     /// The error budget.
     pub max_error: Option<f64>,
     /// Whether there is a kept shape to go back from.
@@ -171,6 +173,11 @@ fn objects(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     if plain_entry(ui, facts, &Action::ReadFile, true) {
         chosen = Some(Action::ReadFile);
     }
+    ui.separator();
+    let softness = Action::Page(Page::Softness);
+    if plain_entry(ui, facts, &softness, true) {
+        chosen = Some(softness);
+    }
     chosen
 }
 
@@ -188,9 +195,14 @@ fn hands(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
 fn methods(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     let mut chosen = None;
     ui.label(theme::quiet("Method"));
-    for name in METHODS {
+    // One that was named when the program was started may be none of the usual ones.
+    let other = Some(facts.method).filter(|method| !METHODS.contains(method));
+    for name in METHODS.into_iter().chain(other) {
         let action = Action::Method(name.to_owned());
         chosen = choice(ui, action, facts.method == name).or(chosen);
+    }
+    if let Some(solved_by) = facts.solved_by {
+        ui.label(theme::quiet(format!("the last answer: {solved_by}")).small());
     }
     ui.separator();
     ui.label(theme::quiet("Error that is accepted"));
@@ -218,8 +230,10 @@ fn views(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
             chosen = Some(Action::Toggle(toggle));
         }
     }
-    if plain_entry(ui, facts, &Action::NextSphereLevel, true) {
-        chosen = Some(Action::NextSphereLevel);
+    for action in [Action::NextSphereLevel, Action::LastSphereLevel] {
+        if plain_entry(ui, facts, &action, true) {
+            chosen = Some(action);
+        }
     }
     ui.separator();
     ui.label(theme::quiet("Light"));

@@ -1,6 +1,7 @@
 //! Everything that lies over the scene: menus, cards, dialogs.
 
 pub mod dialogs;
+pub mod file_list;
 pub mod hand_card;
 pub mod help_card;
 pub mod information_card;
@@ -9,7 +10,10 @@ pub mod loading_card;
 pub mod menu;
 pub mod notices;
 pub mod places;
+pub mod preparing_card;
+pub mod softness_card;
 pub mod status_card;
 pub mod theme;
 pub mod timeline;
 pub mod timings_card;
+pub mod turn_card;

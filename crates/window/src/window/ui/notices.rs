@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use egui::{Align2, Context, RichText};
+use egui::{RichText, Ui};
 
 use super::theme;
 
@@ -36,15 +36,13 @@ impl Notices {
         }
     }
 
-    /// Shows them at the top; a click takes them away.
-    pub fn show(&mut self, context: &Context) {
+    /// Shows them; a click takes them away.
+    pub fn show(&mut self, ui: &mut Ui) {
         self.shown.retain(|(since, _, _)| since.elapsed() < STAYS);
         if self.shown.is_empty() {
             return;
         }
-        let offset = [0.0, theme::MARGIN + 92.0];
-        let clicked = theme::card(context, "notices", Align2::CENTER_TOP, offset, |ui| {
-            ui.set_max_width(620.0);
+        let clicked = theme::sheet(ui, |ui| {
             for (_, text, is_refusal) in &self.shown {
                 let colour = if *is_refusal { theme::BAD } else { theme::GOOD };
                 ui.label(RichText::new(text).color(colour));

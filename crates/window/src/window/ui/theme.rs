@@ -2,7 +2,7 @@
 
 use egui::{
     Align2, Area, Color32, Context, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Order,
-    RichText, Shadow, Stroke, TextStyle, Ui, Vec2, Visuals,
+    RichText, ScrollArea, Shadow, Stroke, TextStyle, Ui, Vec2, Visuals,
 };
 
 /// Good, on time.
@@ -40,6 +40,9 @@ pub fn set_up(context: &Context) {
     });
 }
 
+/// Height of the bar of menus with its margins, points: what lies below it begins here.
+pub const BELOW_BAR: f32 = 60.0;
+
 /// A card with content at an edge or corner of the window.
 pub fn card<R>(
     context: &Context,
@@ -53,6 +56,51 @@ pub fn card<R>(
         .order(Order::Middle)
         .show(context, |ui| card_frame().show(ui, content).inner)
         .inner
+}
+
+/// A card that waits for an answer: it lies over all others.
+pub fn dialog<R>(context: &Context, name: &str, content: impl FnOnce(&mut Ui) -> R) -> R {
+    Area::new(Id::new(name))
+        .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
+        .order(Order::Foreground)
+        .show(context, |ui| card_frame().show(ui, content).inner)
+        .inner
+}
+
+/// Cards one below the other at a corner of the window, not larger than `size_max`; those that find no
+/// room are scrolled to.
+pub fn column<R>(
+    context: &Context,
+    name: &str,
+    anchor: Align2,
+    offset: [f32; 2],
+    size_max: [f32; 2],
+    content: impl FnOnce(&mut Ui) -> R,
+) -> R {
+    Area::new(Id::new(name))
+        .anchor(anchor, Vec2::from(offset))
+        .order(Order::Middle)
+        .show(context, |ui| {
+            // An area offers no more room than its content took in the picture before.
+            let [width, height] = size_max.map(|length| length.max(80.0));
+            ui.set_max_size(Vec2::new(width, height));
+            let scroll = ScrollArea::vertical().id_salt(name).max_height(height);
+            scroll.show(ui, content).inner
+        })
+        .inner
+}
+
+/// A card in a column.
+pub fn sheet<R>(ui: &mut Ui, content: impl FnOnce(&mut Ui) -> R) -> R {
+    card_frame().show(ui, content).inner
+}
+
+/// Where cards of a name were in the last picture; nothing where there were none.
+pub fn size_of(context: &Context, name: &str) -> Vec2 {
+    let area = context.memory(|memory| memory.area_rect(Id::new(name)));
+    // An area that has been named but not measured yet is nowhere.
+    let size = area.map_or(Vec2::ZERO, |rect| rect.size());
+    if size.is_finite() { size.max(Vec2::ZERO) } else { Vec2::ZERO }
 }
 
 /// The frame of a card.

@@ -13,6 +13,8 @@ pub struct Playing {
     pub is_paused: bool,
     /// The tick that is looked at, where it is not the newest.
     pub looked_at: Option<u64>,
+    /// The tick that a person counts from.
+    pub first_tick: u64,
 }
 
 /// What was asked for on the time line.
@@ -25,14 +27,16 @@ pub enum TimelineWish {
     Newest,
 }
 
-/// Room that the status at the left and the card's own buttons take, points.
-const TAKEN: f32 = 620.0;
+/// Room that the card's own buttons take beside the track, points.
+const TAKEN: f32 = 340.0;
+/// Height of the card with its margin, points: what stands at the bottom stands above it.
+pub const HEIGHT: f32 = 62.0;
 
 /// Shows the time line at the bottom.
 pub fn show(context: &Context, history: &History, playing: &Playing) -> Option<TimelineWish> {
     let (first, last) = history.ticks()?;
-    let offset = [-theme::MARGIN, -theme::MARGIN];
-    theme::card(context, "time line", Align2::RIGHT_BOTTOM, offset, |ui| {
+    let offset = [0.0, -theme::MARGIN];
+    theme::card(context, "time line", Align2::CENTER_BOTTOM, offset, |ui| {
         let mut wish = None;
         ui.horizontal(|ui| {
             let mut button = |ui: &mut Ui, sign: &str, action: Action| {
@@ -46,10 +50,10 @@ pub fn show(context: &Context, history: &History, playing: &Playing) -> Option<T
             button(ui, if playing.is_paused { "▶" } else { "⏸" }, Action::PlayOrPause);
             button(ui, "⏭", Action::Step);
             let now = playing.looked_at.unwrap_or(last);
-            if let Some(tick) = track(ui, history.marks(), (first, last), now) {
+            if let Some(tick) = track(ui, history.marks(), (first, last), now, playing.first_tick) {
                 wish = Some(TimelineWish::LookAt(tick));
             }
-            ui.monospace(format!("{now:>5}"));
+            ui.monospace(format!("{:>5}", now.saturating_sub(playing.first_tick)));
             let newest = ui.add_enabled(playing.looked_at.is_some(), egui::Button::new("newest"));
             if newest.clicked() {
                 wish = Some(TimelineWish::Newest);
@@ -60,8 +64,14 @@ pub fn show(context: &Context, history: &History, playing: &Playing) -> Option<T
 }
 
 /// The line with its marks; the tick that was dragged to.
-fn track(ui: &mut Ui, marks: &[News], (first, last): (u64, u64), now: u64) -> Option<u64> {
-    let width = (ui.ctx().content_rect().width() - TAKEN).clamp(120.0, 900.0);
+fn track(
+    ui: &mut Ui,
+    marks: &[News],
+    (first, last): (u64, u64),
+    now: u64,
+    first_tick: u64,
+) -> Option<u64> {
+    let width = (ui.ctx().content_rect().width() - TAKEN).clamp(120.0, 1400.0);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 26.0), Sense::click_and_drag());
     places::tell(ui.ctx(), "time line", &response);
     let span = (last - first).max(1) as f32;
@@ -90,7 +100,11 @@ fn track(ui: &mut Ui, marks: &[News], (first, last): (u64, u64), now: u64) -> Op
         .hover_pos()
         .and_then(|at| marks.iter().rfind(|mark| (x(mark.tick) - at.x).abs() < 5.0));
     if let Some(mark) = near {
-        response.on_hover_text(format!("tick {}: {}", mark.tick, mark.text));
+        response.on_hover_text(format!(
+            "tick {}: {}",
+            mark.tick.saturating_sub(first_tick),
+            mark.text
+        ));
     }
     let share = (pointer?.x - rect.left()) / rect.width();
     Some(first + (f64::from(share.clamp(0.0, 1.0)) * (last - first) as f64).round() as u64)

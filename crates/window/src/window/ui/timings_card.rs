@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use egui::{Align2, Color32, Context, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2};
+use egui::{Align2, Color32, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2};
 
 use super::theme;
 use crate::view::frame::TickTiming;
@@ -35,10 +35,9 @@ impl Timings {
         }
     }
 
-    /// Shows the graph at the right.
-    pub fn show(&self, context: &Context, fps: f64) {
-        let offset = [-theme::MARGIN, theme::MARGIN];
-        theme::card(context, "timings", Align2::RIGHT_TOP, offset, |ui| {
+    /// Shows the graph.
+    pub fn show(&self, ui: &mut Ui, fps: f64) {
+        theme::sheet(ui, |ui| {
             ui.set_width(300.0);
             ui.horizontal(|ui| {
                 ui.strong("Times of the answers");

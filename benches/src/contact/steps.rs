@@ -1,0 +1,248 @@
+//! Steps of an object that five fingers pinch, lift and hold by friction: time by phase, beside how well the law
+//! of contact is met.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use softgrasp_core::dynamics::{
+    ContactStep, MovingBody, ObjectState, StepOutcome, StepSettings, near_triangles,
+};
+use softgrasp_core::fem::{Element, Material};
+use softgrasp_core::mesh::{BuiltIn, Surface, generate};
+use softgrasp_core::model::Model;
+use softgrasp_core::rigid_body::RigidShape;
+use softgrasp_core::solve::condensed::{Base, Columns, Elasticity, FreeBody};
+
+use crate::report::{ReportError, check, progress};
+use crate::sample::timed_ms;
+use crate::table::{Cell, Table};
+use crate::tail::Tail;
+
+/// Diameter of the ball, m, and what it is made of.
+const SIZE: f64 = 0.07;
+const YOUNG: f64 = 5.0e4;
+const POISSON: f64 = 0.4;
+/// Radius of a fingertip, m, how deep it presses, and how high it lifts.
+const TIP: f64 = 0.008;
+const DEPTH: f64 = 0.008;
+const LIFT: f64 = 0.04;
+const FRICTION: f64 = 0.8;
+/// Steps a second, as in a run.
+const RATE_HZ: f64 = 60.0;
+/// Steps of each phase: it settles, is pinched, lifted, and held.
+const SETTLE: u32 = 30;
+const PINCH: u32 = 60;
+const RAISE: u32 = 60;
+const HOLD: u32 = 300;
+/// Forces on the held ball add up to its weight to this, relative.
+const BALANCE_ALLOWED: f64 = 1e-3;
+
+/// The ball with all that a step needs.
+struct Ball {
+    model: Model,
+    surface: Surface,
+    base: Base,
+    body: FreeBody,
+    columns: Columns,
+}
+
+/// What the steps of a phase took and how well they met the law.
+#[derive(Default)]
+struct Phase {
+    times_ms: Vec<f64>,
+    points_most: usize,
+    converged: usize,
+    penetration_max: f64,
+    residual_rel_max: f64,
+}
+
+impl Ball {
+    fn try_new(nodes: usize) -> Result<Self, ReportError> {
+        let mesh = generate(BuiltIn::Sphere, nodes)?;
+        let (low, high) = mesh.bounds();
+        let scale = SIZE / (high - low).max();
+        let scaled = mesh.vertices().iter().map(|p| Point3::from(scale * p.coords)).collect();
+        let mesh = mesh.with_vertices(scaled)?;
+        let surface = Surface::from_mesh(&mesh);
+        let material = Material::try_new(YOUNG, POISSON)?;
+        let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {})?;
+        let base = model.condense(&mut |_| {})?;
+        let body = FreeBody::try_new(model.mesh(), &base)?;
+        Ok(Self { model, surface, base, body, columns: Columns::new(usize::MAX) })
+    }
+
+    /// A step, and the time that it took without the search for triangles near the fingers.
+    fn step(
+        &self,
+        state: &ObjectState,
+        bodies: &[MovingBody],
+    ) -> Result<(f64, StepOutcome), ReportError> {
+        let vertices = self.model.mesh().vertices();
+        let triangles = &self.surface.triangles;
+        let near =
+            near_triangles(vertices, triangles, &state.world_from_object, bodies, 0.2 * SIZE);
+        let step = ContactStep {
+            vertices,
+            triangles,
+            elasticity: Elasticity { base: &self.base, body: &self.body, columns: &self.columns },
+            bodies,
+            candidates: &near,
+            // As a run asks.
+            settings: StepSettings {
+                seconds: 1.0 / RATE_HZ,
+                gravity: Vector3::new(0.0, -9.81, 0.0),
+                viscosity: 0.02,
+                residual_rel: 1e-6,
+                rounds_max: 12,
+                newton_max: 40,
+                ..StepSettings::default()
+            },
+        };
+        let (ms, found) = timed_ms(|| step.advance(state, &self.surface.nodes));
+        Ok((ms, found?))
+    }
+
+    /// The table and five fingertips, a thumb and four fingers opposite, on their way in a step.
+    fn bodies(step: u32) -> Vec<MovingBody> {
+        let share = |step: u32, from: u32, lasts: u32| {
+            let t = (f64::from(step) - f64::from(from)) / f64::from(lasts);
+            let t = t.clamp(0.0, 1.0);
+            t * t * (3.0 - 2.0 * t)
+        };
+        let centre = |step: u32, around: f64, along: f64| {
+            let closed = share(step, SETTLE, PINCH);
+            let radius = 0.5 * SIZE + TIP + 0.003 - closed * (0.003 + DEPTH);
+            let lifted = LIFT * share(step, SETTLE + PINCH, RAISE);
+            let place = Vector3::new(
+                radius * around.cos() * along.cos(),
+                radius * along.sin() + lifted,
+                radius * around.sin() * along.cos(),
+            );
+            Isometry3::from_parts(Translation3::from(place), UnitQuaternion::identity())
+        };
+        let mut bodies = vec![MovingBody::resting(
+            RigidShape::Plane { normal: Vector3::y_axis() },
+            Isometry3::translation(0.0, -0.5 * SIZE, 0.0),
+            FRICTION,
+        )];
+        let half_turn = std::f64::consts::PI;
+        for around in [half_turn, -0.6, -0.2, 0.2, 0.6] {
+            bodies.push(MovingBody {
+                shape: RigidShape::Sphere { radius: TIP },
+                world_from_body_start: centre(step, around, 0.0),
+                world_from_body_end: centre(step + 1, around, 0.0),
+                friction: FRICTION,
+                compliance: 1e-3,
+            });
+        }
+        bodies
+    }
+}
+
+impl Phase {
+    fn add(&mut self, ms: f64, found: &StepOutcome) {
+        self.times_ms.push(ms);
+        self.points_most = self.points_most.max(found.contacts.len());
+        self.converged += usize::from(found.is_converged);
+        self.penetration_max = self.penetration_max.max(found.penetration_max);
+        self.residual_rel_max = self.residual_rel_max.max(found.contact_residual_rel);
+    }
+
+    fn row(
+        self,
+        nodes: usize,
+        name: &str,
+        drift_m: Option<f64>,
+        balance: Option<f64>,
+    ) -> Vec<Cell> {
+        let steps = self.times_ms.len();
+        let Tail { p50, p99, max, .. } = Tail::of(self.times_ms);
+        vec![
+            nodes.into(),
+            name.into(),
+            steps.into(),
+            self.points_most.into(),
+            p50.into(),
+            p99.into(),
+            max.into(),
+            self.converged.into(),
+            self.penetration_max.into(),
+            self.residual_rel_max.into(),
+            drift_m.into(),
+            balance.into(),
+        ]
+    }
+}
+
+/// The table of steps.
+///
+/// # Errors
+/// A ball that is not lifted, or whose forces do not add up to its weight, is one.
+pub(super) fn table(is_quick: bool) -> Result<Table, ReportError> {
+    let sizes: &[usize] = if is_quick { &[300] } else { &[1000, 4000, 10_648] };
+    let title = "Steps of a ball that five fingers pinch, lift and hold by friction";
+    let mut table = Table::new("contact-steps", title, &COLUMNS);
+    for &nodes in sizes {
+        progress("contact", &format!("pinch, lift and hold, {nodes} nodes"));
+        let ball = Ball::try_new(nodes)?;
+        let nodes = ball.model.mesh().node_count();
+        let weight = 9.81 * 1000.0 * ball.body.volume();
+        let mut state = ObjectState::at_rest(Isometry3::identity());
+        let mut step = 0;
+        for (name, lasts) in [("settle", SETTLE), ("pinch", PINCH), ("lift", RAISE), ("hold", HOLD)]
+        {
+            let mut phase = Phase::default();
+            let mut heights = Vec::new();
+            let mut balance = 0.0f64;
+            for _ in 0..lasts {
+                let (ms, found) = ball.step(&state, &Ball::bodies(step))?;
+                step += 1;
+                phase.add(ms, &found);
+                let sum: Vector3<f64> = found.loads.iter().map(|load| load.force).sum();
+                balance = (sum - weight * Vector3::y()).norm() / weight;
+                heights.push(found.state.world_from_object.translation.y);
+                state = found.state;
+            }
+            // Drift: of the last four seconds, after the swing of the lift has died away.
+            let is_held = name == "hold";
+            let drift = heights.last().zip(heights.get(60)).map(|(end, begin)| (end - begin).abs());
+            if is_held {
+                let lifted = heights.last().copied().unwrap_or_default();
+                check(|| format!("{nodes} nodes: lifted"), LIFT - lifted, 0.2 * LIFT)?;
+                check(|| format!("{nodes} nodes: forces and weight"), balance, BALANCE_ALLOWED)?;
+            }
+            table.push(phase.row(
+                nodes,
+                name,
+                drift.filter(|_| is_held),
+                is_held.then_some(balance),
+            ));
+        }
+    }
+    Ok(table)
+}
+
+const COLUMNS: [&str; 12] = [
+    "nodes",
+    "phase",
+    "steps",
+    "points_most",
+    "p50_ms",
+    "p99_ms",
+    "slowest_ms",
+    "steps_converged",
+    "penetration_max_m",
+    "residual_rel_max",
+    "drift_m",
+    "balance_error_rel",
+];
+
+/// What the table says.
+pub(super) const TEXT: &str = "\
+The steps are those of `run --grasp contact`, sixty a second: a ball of 70 mm (50 kPa, Poisson's ratio 0.4, \
+1000 kg/m³) settles on a table, is pinched by a thumb and four fingers opposite, which close 8 mm beyond the \
+touch (spheres of 8 mm, friction 0.8, 1000 N/m), lifted by 40 mm and held for five seconds. The time is that of \
+the contact problem in the server, on one thread, without the search for triangles near the fingers and without the wire; new contacts \
+pay for their columns, which a run's hints prefetch. `points_most` is the most points that press at once. A \
+step is `converged` where penetration is below 1e-6 of the object and the residual of the law of Signorini \
+and Coulomb below 1e-6 of the largest force, within 40 steps of Newton's method; what the others reach is in \
+`penetration_max_m` and `residual_rel_max`. Before times are told the ball must have been lifted, and the \
+forces on it must add up to its weight within 1e-3; `drift_m` is how far it sinks in the last four seconds.";

@@ -1,0 +1,121 @@
+"""Softgrasp from Python: displacements and forces of soft objects from a finite element server.
+
+All numbers are in SI units: lengths in m, forces in N, moduli in Pa. Displacements count from the
+shape at rest, in the frame of the mesh; contact frames say where that frame is in the world.
+"""
+
+from .address import Tls
+from .answer import Answer, CaseAnswer, LargeAnswer, Reactions, SeveralAnswers
+from .asynchronous import AsyncKeptModel, AsyncServer
+from .body import Body, Box, Capsule, ClosedSurface, Plane, Shape, Sphere
+from .calls import ModelReady, Welcome
+from .contact import (
+    BodyLoads,
+    ContactAnswer,
+    ContactPoints,
+    ContactStep,
+    ObjectState,
+    candidate_triangles,
+)
+from .errors import (
+    REFUSALS,
+    BadRequest,
+    BadStream,
+    Busy,
+    ConnectionLost,
+    DeadlineMissed,
+    InternalFault,
+    MemoryLimit,
+    MeshFileError,
+    NoAnswerInTime,
+    NotAuthorised,
+    NotPositiveDefinite,
+    Refused,
+    RigidMotionFree,
+    ServerNotStarted,
+    ShuttingDown,
+    SoftgraspError,
+    TooLarge,
+    Uncertain,
+    UnknownMethod,
+    UnknownModel,
+    UnsupportedVersion,
+)
+from .large import LargeDeformation
+from .limits import Limits
+from .load_case import LoadCase, Mask
+from .mesh import Mesh
+from .model import Element, Material, Model
+from .pose import Pose
+from .program import ServerProgram
+from .question import Precision, Question
+from .report import ContactReport, LargeReport, SolveReport, StageTimes
+from .server import KeptModel, Server
+
+__all__ = [
+    "Answer",
+    "AsyncKeptModel",
+    "AsyncServer",
+    "BadRequest",
+    "BadStream",
+    "Body",
+    "BodyLoads",
+    "Box",
+    "Busy",
+    "Capsule",
+    "CaseAnswer",
+    "ClosedSurface",
+    "ConnectionLost",
+    "ContactAnswer",
+    "ContactPoints",
+    "ContactReport",
+    "ContactStep",
+    "DeadlineMissed",
+    "Element",
+    "InternalFault",
+    "KeptModel",
+    "LargeAnswer",
+    "LargeDeformation",
+    "LargeReport",
+    "Limits",
+    "LoadCase",
+    "Mask",
+    "Material",
+    "MemoryLimit",
+    "Mesh",
+    "MeshFileError",
+    "Model",
+    "ModelReady",
+    "NoAnswerInTime",
+    "NotAuthorised",
+    "NotPositiveDefinite",
+    "ObjectState",
+    "Plane",
+    "Pose",
+    "Precision",
+    "Question",
+    "REFUSALS",
+    "Reactions",
+    "Refused",
+    "RigidMotionFree",
+    "Server",
+    "ServerNotStarted",
+    "ServerProgram",
+    "SeveralAnswers",
+    "Shape",
+    "ShuttingDown",
+    "SoftgraspError",
+    "SolveReport",
+    "Sphere",
+    "StageTimes",
+    "Tls",
+    "TooLarge",
+    "Uncertain",
+    "UnknownMethod",
+    "UnknownModel",
+    "UnsupportedVersion",
+    "Welcome",
+    "candidate_triangles",
+]
+
+__version__ = "0.1.0"

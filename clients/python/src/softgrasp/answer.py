@@ -1,0 +1,194 @@
+"""Answers: displacements, reactions, and the report that says how far to trust them."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import F32, Floats, Numbers, numbers
+from .payload import PayloadReader
+from .report import LargeReport, SolveReport, read_large_report, read_solve_report
+
+
+@dataclass(frozen=True, eq=False)
+class Reactions:
+    """The forces that hold the body at its known degrees of freedom; they act on the body."""
+
+    dofs: Numbers
+    """Degrees of freedom, ascending, each once."""
+    forces: Floats
+    """Forces, N."""
+
+    def total(self, nodes: ArrayLike | None = None) -> Floats:
+        """The sum of the forces on some nodes, or on all: x, y, z, N."""
+        dofs, forces = self.dofs, self.forces
+        if nodes is not None:
+            chosen = np.isin(dofs // 3, numbers(nodes, "nodes"))
+            dofs, forces = dofs[chosen], forces[chosen]
+        total: Floats = np.bincount(dofs % 3, weights=forces, minlength=3).astype(np.float64)
+        return total
+
+    def at(self, nodes: ArrayLike) -> Floats:
+        """The force on each of some nodes, N; shape (nodes, 3), 0 where nothing is known."""
+        chosen = numbers(nodes, "nodes")
+        wanted = 3 * chosen.astype(np.int64)[:, None] + np.arange(3)
+        if len(self.dofs) == 0:
+            return np.zeros(wanted.shape)
+        place = np.minimum(np.searchsorted(self.dofs, wanted), len(self.dofs) - 1)
+        return np.where(self.dofs[place] == wanted, self.forces[place], 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Displacements and what is known of their error.
+
+    Arrays are views into the bytes that came and cannot be written to; copy what is to be changed.
+    """
+
+    nodes: Numbers | None
+    """Nodes of the displacements, in the order of the question; None: all, in that of the mesh."""
+    displacements: Floats
+    """Displacements from rest, m; shape (nodes, 3)."""
+    reactions: Reactions
+    """Forces at known degrees of freedom; empty where they were not asked for."""
+    mask_forces: Floats
+    """Force of each mask on the body, N; shape (masks, 3)."""
+    report: SolveReport
+    """How the answer was found and how wrong it can be."""
+
+    @property
+    def residual_rel(self) -> float:
+        """Norm of the residual, relative: how well the answer fits its equations."""
+        return self.report.residual_rel
+
+    @property
+    def error_bound_rel(self) -> float | None:
+        """Proven bound of the error, relative, or None; `error_bound_why` says why."""
+        return self.report.error_bound_rel
+
+    @property
+    def error_bound_why(self) -> str:
+        """Why there is no bound; empty where there is one."""
+        return self.report.error_bound_why
+
+    def on_mesh(self, node_count: int) -> Floats:
+        """Displacements of all nodes, m; 0 for those that were not asked for."""
+        if self.nodes is None:
+            return self.displacements
+        spread = np.zeros((node_count, 3))
+        spread[self.nodes] = self.displacements
+        return spread
+
+
+@dataclass(frozen=True, eq=False)
+class LargeAnswer(Answer):
+    """An equilibrium of the deformed body, or a linear answer where that was good enough."""
+
+    large: LargeReport
+    """How the equilibrium was found."""
+
+
+@dataclass(frozen=True, eq=False)
+class CaseAnswer:
+    """Displacements and reactions of one case of several."""
+
+    displacements: Floats
+    """Displacements from rest, m; shape (nodes, 3)."""
+    reactions: Reactions
+    """Forces at known degrees of freedom."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeveralAnswers:
+    """Answers for several sets of displacements of the same degrees of freedom."""
+
+    nodes: Numbers | None
+    """Nodes of the displacements; None: all."""
+    cases: tuple[CaseAnswer, ...]
+    """One for each set, in the order of the question."""
+    report: SolveReport
+    """One report for all; what it says of errors is the worst of them."""
+
+
+class AnswerCounts(NamedTuple):
+    """The last fields of an answer's part, which announce its arrays."""
+
+    listed: bool
+    quantised: bool
+    scale: float
+    node_count: int
+    reaction_count: int
+    mask_count: int
+
+
+def read_answer(reader: PayloadReader) -> Answer:
+    """Reads a whole `Answer`."""
+    report, counts = read_answer_part(reader)
+    reader.end_part()
+    answer = read_answer_arrays(reader, report, counts)
+    reader.finish()
+    return answer
+
+
+def read_large_answer(reader: PayloadReader) -> LargeAnswer:
+    """Reads a whole `LargeAnswer`."""
+    report, counts = read_answer_part(reader)
+    large = read_large_report(reader)
+    reader.end_part()
+    answer = read_answer_arrays(reader, report, counts)
+    reader.finish()
+    return LargeAnswer(
+        answer.nodes, answer.displacements, answer.reactions, answer.mask_forces, report, large
+    )
+
+
+def read_several_answers(reader: PayloadReader) -> SeveralAnswers:
+    """Reads a whole `SeveralAnswers`."""
+    report, counts = read_answer_part(reader)
+    case_count = reader.u32()
+    reader.end_part()
+    first = read_answer_arrays(reader, report, counts)
+    if case_count and not (counts.node_count or counts.reaction_count):
+        # Cases without a number take no bytes, so any count of them would pass.
+        case_count = reader.claimed(case_count, 0, "cases without a number")
+    cases = [CaseAnswer(first.displacements, first.reactions)]
+    limits = reader.limits
+    for _ in range(reader.claimed(case_count, limits.dof_count_max, "cases")):
+        displacements = reader.floats(counts.node_count, limits.node_count_max, "nodes", 3)
+        forces = reader.floats(counts.reaction_count, limits.dof_count_max, "reactions")
+        cases.append(CaseAnswer(displacements, Reactions(first.reactions.dofs, forces)))
+    reader.finish()
+    return SeveralAnswers(first.nodes, tuple(cases), report)
+
+
+def read_answer_part(reader: PayloadReader) -> tuple[SolveReport, AnswerCounts]:
+    """Reads the fields that all answers begin with."""
+    report = read_solve_report(reader)
+    listed, precision, *rest = reader.fields(_COUNTS)
+    precision = reader.named(precision, ("f64", "f32"), "precision")
+    return report, AnswerCounts(reader.truth(listed), precision == "f32", *rest)
+
+
+def read_answer_arrays(reader: PayloadReader, report: SolveReport, counts: AnswerCounts) -> Answer:
+    """Reads the arrays that all answers begin with."""
+    limits = reader.limits
+    count = reader.claimed(counts.node_count, limits.node_count_max, "answered nodes")
+    nodes = reader.numbers(count, limits.node_count_max, "nodes") if counts.listed else None
+    if counts.quantised:
+        rounded = reader.array(F32, 3 * count, 3 * limits.node_count_max, "displacements")
+        with np.errstate(all="ignore"):
+            scaled = np.multiply(rounded, counts.scale, dtype=np.float64)
+            displacements = scaled.reshape(count, 3)
+    else:
+        displacements = reader.floats(count, limits.node_count_max, "displacements", 3)
+    dofs = reader.numbers(counts.reaction_count, limits.dof_count_max, "reactions")
+    forces = reader.floats(counts.reaction_count, limits.dof_count_max, "reactions")
+    mask_forces = reader.floats(counts.mask_count, limits.dof_count_max, "forces of masks", 3)
+    return Answer(nodes, displacements, Reactions(dofs, forces), mask_forces, report)
+
+
+_COUNTS = struct.Struct("<BId3I")

@@ -1,0 +1,83 @@
+"""What is asked about a load case: method, nodes, precision, and how exact and how soon."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, TypedDict, cast, get_args
+
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import NO_NUMBERS, Numbers, numbers, positive
+from .load_case import LoadCase, mask_arrays
+from .payload import Part
+
+Precision = Literal["f64", "f32"]
+"""How displacements travel: in double precision, or in half the bytes, to 2⁻²⁴ of the largest."""
+PRECISIONS: tuple[str, ...] = get_args(Precision)
+
+
+class Options(TypedDict, total=False):
+    """The keyword arguments of everything that asks for displacements; see `Question`."""
+
+    method: str
+    nodes: ArrayLike | None
+    reactions: bool
+    precision: Precision
+    max_error: float | None
+    deadline_ms: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked. Raises `ValueError` for what no server could take."""
+
+    method: str = "auto"
+    """Method by which the equations are solved; `auto` leaves the choice to the server."""
+    nodes: ArrayLike | None = None
+    """Nodes whose displacements are wanted, in any order; None for all."""
+    reactions: bool = True
+    """Whether the forces are wanted that hold the body at its known degrees of freedom."""
+    precision: Precision = "f64"
+    """How displacements travel."""
+    max_error: float | None = None
+    """Relative error that is good enough; an answer that misses it has a warning."""
+    deadline_ms: float | None = None
+    """Time after which the answer is of little use; a late answer has a warning."""
+
+    def __post_init__(self) -> None:
+        if self.precision not in PRECISIONS:
+            raise ValueError(f"precision is one of {PRECISIONS}, not {self.precision!r}")
+        if self.nodes is not None:
+            object.__setattr__(self, "nodes", numbers(self.nodes, "wanted nodes"))
+        for name in ("max_error", "deadline_ms"):
+            value = getattr(self, name)
+            if value is not None:
+                positive(value, name)
+
+    def part(self, case: LoadCase) -> Part:
+        """The fields of the question on the wire."""
+        part = Part().text(self.method)
+        precision = PRECISIONS.index(self.precision)
+        if self.nodes is None:
+            part.fields("I?I", 0, self.reactions, precision)
+        else:
+            part.fields("II?I", 1, len(self._wanted()), self.reactions, precision)
+        part.option(self.max_error).option(self.deadline_ms)
+        mask_nodes = sum([len(mask.nodes) for mask in case.masks])
+        counts = (len(case.known_dofs), len(case.force_dofs), len(case.masks), mask_nodes)
+        return part.fields("4I", *counts)
+
+    def arrays(self, case: LoadCase) -> tuple[NDArray[Any], ...]:
+        """The arrays of the question on the wire."""
+        return (
+            case.known_dofs,
+            case.known_displacements,
+            case.force_dofs,
+            case.forces,
+            self._wanted(),
+            *mask_arrays(case.masks),
+        )
+
+    def _wanted(self) -> Numbers:
+        """The wanted nodes, which were checked; none where all are wanted."""
+        return NO_NUMBERS if self.nodes is None else cast(Numbers, self.nodes)

@@ -1,0 +1,242 @@
+"""A server that is asked and waited for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, TypeVar
+
+from numpy.typing import ArrayLike
+
+from . import calls
+from .address import Tls, split_address, tls_context
+from .answer import Answer, LargeAnswer, SeveralAnswers
+from .body import Body
+from .calls import Call, ModelReady
+from .connection import Connection
+from .contact import ContactAnswer, ContactStep, ObjectState
+from .errors import UnknownModel
+from .large import AT_LARGE, LargeDeformation
+from .limits import Limits
+from .load_case import LoadCase, Mask
+from .model import Model
+from .program import ServerProgram
+from .question import Options, Precision, Question
+from .session import CLIENT, NamedModel, Session
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+T = TypeVar("T")
+
+
+class Server(Session):
+    """A session with a server; one request at a time, threads take turns.
+
+    Use it in a `with` block, or call `close`. Everything that asks raises `Refused` (by its
+    subclasses, one for each number), `ConnectionLost`, `NoAnswerInTime` and `BadStream`, and
+    `ValueError` for arguments that no server could take.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        token: str | None = None,
+        tls: Tls = None,
+        timeout: float | None = None,
+        limits: Limits | None = None,
+    ) -> None:
+        """Connects to `HOST:PORT` and introduces itself.
+
+        `token` is what the server was started with, `tls` how the way is encrypted (see
+        `softgrasp.address.Tls`), `timeout` how many seconds an answer may take: None waits as
+        long as it takes. `limits` are what is read at most. Raises what every request raises,
+        `ssl.SSLError` for a certificate that is not trusted, and `OSError` for one not readable.
+        """
+        super().__init__(address, token, tls, timeout, limits)
+        self._connect()
+
+    @classmethod
+    def spawn(
+        cls,
+        program: str | os.PathLike[str] | None = None,
+        *,
+        threads: int | None = None,
+        arguments: Sequence[str] = (),
+        timeout: float | None = None,
+    ) -> Server:
+        """Starts a server of one's own on this machine and connects to it.
+
+        It listens on a free port of the loopback and ends with the session. `program` is its path;
+        without one `fea-server` is looked for on the PATH. `arguments` are further options of the
+        program. Raises `ServerNotStarted`.
+        """
+        started = ServerProgram(program, arguments, threads=threads)
+        try:
+            server = cls(started.address, timeout=timeout)
+        except BaseException:
+            started.end()
+            raise
+        server._program = started
+        return server
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nothing has ended the session, as far as is known."""
+        return self._connection.is_open
+
+    def solve(self, model: Model, case: LoadCase, **options: Unpack[Options]) -> Answer:
+        """Solves a load case once, by linear elasticity; the server keeps nothing.
+
+        Options are those of `Question`.
+        """
+        return self._ask(calls.solve(model, case, Question(**options)))
+
+    def solve_several(
+        self,
+        model: Model,
+        case: LoadCase,
+        displacements: ArrayLike,
+        *,
+        estimate: bool = True,
+        **options: Unpack[Options],
+    ) -> SeveralAnswers:
+        """Solves for several sets of values of the case's known displacements by one factor.
+
+        `displacements` has the shape (sets, known degrees of freedom), m; the values of `case`
+        itself do not matter. Forces act in all sets, masks are not allowed. Without `estimate`
+        the report has no estimates, which then take no time.
+        """
+        call = calls.solve_several(model, case, displacements, estimate, Question(**options))
+        return self._ask(call)
+
+    def solve_large(
+        self,
+        model: Model,
+        case: LoadCase,
+        large: LargeDeformation = AT_LARGE,
+        **options: Unpack[Options],
+    ) -> LargeAnswer:
+        """Finds an equilibrium at large deformation, from rest; the server keeps nothing."""
+        return self._ask(calls.solve_large(model, case, large, Question(**options)))
+
+    def keep(self, model: Model, fixed: ArrayLike = ()) -> KeptModel:
+        """Has the server keep a model for frames; uploads it unless it is there already.
+
+        All three axes of the nodes `fixed` stay at zero in frames that do not prescribe them.
+        """
+        return KeptModel(self, model, fixed)
+
+    def ping(self) -> None:
+        """Waits until the server has done all that was asked before."""
+        self._ask(calls.ping())
+
+    def reconnect(self) -> None:
+        """Ends the session and begins a new one with the same server.
+
+        Models stay where the server lives on; a large deformation begins at rest again.
+        """
+        self._connection.close()
+        self._connect()
+
+    def close(self) -> None:
+        """Ends the session, and a server that was spawned; may be called again."""
+        self._connection.close()
+        if self._program is not None:
+            self._program.end()
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _connect(self) -> None:
+        host, port = split_address(self.address)
+        context = tls_context(self._tls)
+        self._connection = Connection(host, port, context, self._timeout, self._limits)
+        try:
+            self._welcome = self._ask(calls.hello(CLIENT, self._token))
+        except BaseException:
+            self._connection.close()
+            raise
+        self._connection.conversation.server_limits = self._welcome.limits
+
+    def _ask(self, call: Call[T]) -> T:
+        return self._connection.ask(call)
+
+    def _tell(self, call: Call[None]) -> None:
+        self._connection.tell(call)
+
+
+class KeptModel(NamedModel):
+    """A model that a server keeps: frames send only what changes.
+
+    A server may have to forget it; it is then uploaded again by itself.
+    """
+
+    def __init__(self, server: Server, model: Model, fixed: ArrayLike) -> None:
+        super().__init__(model, fixed)
+        self._server = server
+        if not server._ask(calls.have_model(self.hash)):
+            self.upload()
+
+    def upload(self) -> ModelReady:
+        """Sends the model, which makes it ready for frames; without harm where it is there."""
+        return self._server._ask(calls.upload_model(self.model, self.fixed_dofs))
+
+    def frame(self, case: LoadCase, **options: Unpack[Options]) -> Answer:
+        """Solves a load case by linear elasticity; the fixed nodes stay at zero."""
+        return self._ask(calls.frame(self.hash, case, Question(**options)))
+
+    def large_frame(
+        self,
+        case: LoadCase,
+        large: LargeDeformation = AT_LARGE,
+        **options: Unpack[Options],
+    ) -> LargeAnswer:
+        """Finds an equilibrium at large deformation, from this session's last one on the model."""
+        return self._ask(calls.large_frame(self.hash, case, large, Question(**options)))
+
+    def contact_frame(
+        self,
+        state: ObjectState,
+        bodies: Sequence[Body],
+        step: ContactStep,
+        *,
+        nodes: ArrayLike | None = None,
+        precision: Precision = "f64",
+    ) -> ContactAnswer:
+        """Makes one step in time of the free object among rigid bodies, with friction.
+
+        The model must have no fixed nodes. `state` is that of the last answer, or
+        `ObjectState(pose)` for an object that is put down; the server keeps nothing of it. With
+        `nodes`, which should then be the boundary's at least, others count as not displaced when
+        triangles near a body are looked for.
+        """
+        mesh = self.model.mesh
+        return self._ask(
+            calls.contact_frame(self.hash, mesh, state, bodies, step, nodes, precision)
+        )
+
+    def prefetch(self, nodes: ArrayLike = (), masks: Sequence[Mask] = ()) -> None:
+        """Names what will probably be touched soon, so that its first frame takes less time."""
+        self._server._tell(calls.prefetch(self.hash, nodes, masks))
+
+    def drop(self) -> None:
+        """Gives the model up; the server forgets it unless another session holds it."""
+        self._server._tell(calls.drop(self.hash))
+
+    def _ask(self, call: Call[T]) -> T:
+        try:
+            return self._server._ask(call)
+        except UnknownModel:
+            self.upload()
+            return self._server._ask(call)

@@ -1,0 +1,55 @@
+"""What a session and a kept model have, whether their answers are waited for or awaited."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from .address import Tls
+from .calls import Welcome
+from .limits import Limits
+from .model import Model
+from .program import ServerProgram
+
+CLIENT = "softgrasp for Python 0.1.0"
+"""How this package calls itself in the server's log."""
+
+
+class Session:
+    """Where the server is, how it is spoken to, and what it said of itself."""
+
+    _welcome: Welcome
+
+    def __init__(
+        self,
+        address: str,
+        token: str | None,
+        tls: Tls,
+        timeout: float | None,
+        limits: Limits | None,
+    ) -> None:
+        """Keeps what a connection is made with; connects to nothing."""
+        self.address = address
+        self._program: ServerProgram | None = None
+        self._token, self._tls, self._timeout = token, tls, timeout
+        self._limits = Limits() if limits is None else limits
+
+    @property
+    def welcome(self) -> Welcome:
+        """Name, version, threads and limits of the server."""
+        return self._welcome
+
+    @property
+    def program(self) -> ServerProgram | None:
+        """The program of a server that was spawned."""
+        return self._program
+
+
+class NamedModel:
+    """A model with its fixed degrees of freedom and the name that a server keeps it by."""
+
+    def __init__(self, model: Model, fixed: ArrayLike) -> None:
+        """All three axes of the nodes `fixed` are fixed."""
+        self.model = model
+        self.fixed_dofs = model.fixed_dofs(fixed)
+        self.hash = model.hash(self.fixed_dofs)
+        """Name of the model: 32 bytes."""

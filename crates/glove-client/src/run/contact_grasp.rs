@@ -1,0 +1,457 @@
+//! A grasp by contact with friction: the free object among the bodies of the hand and above a table, one
+//! step of time at a time.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use softgrasp_core::dynamics::{Candidate, MovingBody};
+use softgrasp_core::rigid_body::RigidShape;
+use softgrasp_grasp::grasp::StateName;
+use softgrasp_grasp::hand::{HAND_BODIES, HandBody};
+use softgrasp_grasp::object::SoftObject;
+use softgrasp_grasp::sphere_tree::{SearchedSurface, triangles_near};
+use softgrasp_protocol::{
+    BodyLoad, BodyShape, ContactAsk, ContactFrame, ContactReport, ModelHash, NodeChoice,
+    ObjectState,
+};
+
+use crate::ask::contact_frame::{
+    StepBody, StepObject, extent, isometry_of, pose_of, reach_of_step,
+};
+use crate::ask::link::ReachedStep;
+use crate::run::contact_ledger::StepRecord;
+
+/// What an object and the hand that grasps it with friction are like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactScene {
+    /// Coefficient of friction between hand and object, and between table and object.
+    pub friction: f64,
+    /// How far a finger gives way to a force on it, m/N: the measured finger may close further than the
+    /// shown one, which presses by the difference over this.
+    pub finger_compliance: f64,
+    /// Density of the object, kg/m³.
+    pub density: f64,
+    /// Time in which the shape forgets a force (Kelvin and Voigt), s.
+    pub viscosity: f64,
+    /// Acceleration of free fall, m/s², world; −y is down.
+    pub gravity: Vector3<f64>,
+    /// Height (y, world) of the table; `None` where there is none.
+    pub table_y: Option<f64>,
+}
+
+impl Default for ContactScene {
+    fn default() -> Self {
+        Self {
+            friction: 0.8,
+            finger_compliance: 1e-3,
+            density: 1000.0,
+            viscosity: 0.02,
+            gravity: Vector3::new(0.0, -9.81, 0.0),
+            table_y: None,
+        }
+    }
+}
+
+/// The state of such a grasp.
+pub struct ContactGrasp {
+    scene: ContactScene,
+    /// Where the object returns to.
+    world_from_home: Isometry3<f64>,
+    /// The object as the last answer has it.
+    state: ObjectState,
+    /// When and where the hand was at the end of the last step that was answered.
+    hand: Option<HandMoment>,
+    /// The step that is asked for.
+    asked: Option<Asked>,
+    /// What each body does to the object, of the last answer: the table, then the hand.
+    loads: Vec<BodyLoad>,
+    /// How well the last step meets the law of contact.
+    report: ContactReport,
+    /// The hand has to leave the object before it can touch it.
+    is_apart: bool,
+    /// Steps in a row in which nothing has moved.
+    still_steps: u32,
+    /// Steps in a row in which nobody would see it move.
+    slow_steps: u32,
+    /// The state that was told last.
+    told: Option<StateName>,
+}
+
+/// Where the bodies of a hand are at a time, s.
+#[derive(Clone, Debug)]
+struct HandMoment {
+    time_s: f64,
+    world_from_bodies: [Isometry3<f64>; HAND_BODIES],
+}
+
+/// What has become of the answer to a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TakenStep {
+    /// It is the object's state now.
+    Taken,
+    /// It is not the one that is waited for.
+    NotAsked,
+    /// It was not solved, and the object is where it was.
+    Lost,
+}
+
+struct Asked {
+    tick: u64,
+    hand: HandMoment,
+    /// Extent of the object at rest, m ([`extent`]).
+    extent: f64,
+}
+
+/// Bodies before those of the hand: the table.
+const TABLE: usize = 1;
+/// Longest step, s: a run that is slower than this goes on in slow motion.
+const STEP_MAX_S: f64 = 1.0 / 60.0;
+/// A step shorter than this is left to the next tick, s.
+const STEP_MIN_S: f64 = 2e-4;
+/// A hand that comes farther than this in one step was not seen meanwhile, m: it has to leave the object
+/// first.
+const LEAP_M: f64 = 0.15;
+/// A hand that was inside the object is clear of it at this distance, m.
+const CLEAR_M: f64 = 2e-3;
+/// An object slower than this lies still, m/s and (times its extent) rad/s …
+const STILL_SPEED: f64 = 1e-4;
+/// … when it has been so for so many steps.
+const STILL_STEPS: u32 = 20;
+/// Nobody sees an object move that is slower than this, m/s …
+const SLOW_SPEED: f64 = 3e-3;
+/// … for so many steps.
+const SLOW_STEPS: u32 = 12;
+/// A step that was not solved is not taken where the surface is deeper in a body than this, or the object has
+/// gone farther, over its extent.
+const LOST_DEPTH: f64 = 0.1;
+const LOST_WAY: f64 = 0.5;
+/// Effort of a step in a run: a later tick asks again anyway.
+const ROUNDS_MAX: u32 = 12;
+const NEWTON_MAX: u32 = 40;
+/// Exact enough to be seen and felt; the report of every step says what was reached.
+const PENETRATION_REL: f64 = 1e-6;
+const RESIDUAL_REL: f64 = 1e-6;
+
+impl ContactGrasp {
+    /// A grasp of an object that lies at its home at rest. A hand that begins inside the object has to
+    /// leave it first.
+    pub fn new(scene: ContactScene, world_from_home: Isometry3<f64>) -> Self {
+        Self {
+            scene,
+            world_from_home,
+            state: ObjectState::at_rest(pose_of(&world_from_home)),
+            hand: None,
+            asked: None,
+            loads: Vec::new(),
+            report: ContactReport::default(),
+            is_apart: true,
+            still_steps: 0,
+            slow_steps: 0,
+            told: None,
+        }
+    }
+
+    /// What object and hand are like.
+    pub fn scene(&self) -> &ContactScene {
+        &self.scene
+    }
+
+    /// Where the object is.
+    pub fn world_from_object(&self) -> Isometry3<f64> {
+        isometry_of(&self.state.pose)
+    }
+
+    /// Another home, to which the object goes at once; a table stays as far below it as it was.
+    pub fn set_home(&mut self, world_from_home: Isometry3<f64>) {
+        let raised = world_from_home.translation.y - self.world_from_home.translation.y;
+        self.scene.table_y = self.scene.table_y.map(|table_y| table_y + raised);
+        self.world_from_home = world_from_home;
+        self.return_home();
+    }
+
+    /// Puts the object, at rest and undeformed, where its home is.
+    pub fn return_home(&mut self) {
+        self.put(self.world_from_home);
+    }
+
+    /// Puts the object, at rest and undeformed, somewhere.
+    pub fn put(&mut self, world_from_object: Isometry3<f64>) {
+        self.state = ObjectState::at_rest(pose_of(&world_from_object));
+        self.loads.clear();
+        self.let_go();
+        (self.asked, self.still_steps) = (None, 0);
+    }
+
+    /// The hand lets go: it has to leave the object before it can touch it again.
+    pub fn let_go(&mut self) {
+        self.is_apart = true;
+        self.still_steps = 0;
+    }
+
+    /// The shape that the object has now is its rest shape from now on; it stays where it is.
+    pub fn meet_new_shape(&mut self) {
+        self.state = ObjectState::at_rest(self.state.pose);
+        (self.asked, self.still_steps) = (None, 0);
+    }
+
+    /// Another object, with a table of its own height.
+    pub fn meet_new_object(&mut self, table_y: Option<f64>) {
+        self.scene.table_y = table_y;
+        self.return_home();
+    }
+
+    /// The question of a tick: the step from the last answer to now, or `None` where there is nothing to
+    /// ask: a step is under way, or the object lies still and no hand is near.
+    ///
+    /// Units: `now_s` s on the client's clock.
+    pub fn step(
+        &mut self,
+        tick: u64,
+        now_s: f64,
+        hand: &[HandBody; HAND_BODIES],
+        object: &SoftObject,
+        nodes: NodeChoice,
+    ) -> Option<ContactFrame> {
+        if self.asked.is_some() {
+            return None;
+        }
+        let world_from_bodies = std::array::from_fn(|i| hand[i].world_from_body);
+        let moment = HandMoment { time_s: now_s, world_from_bodies };
+        let before = self.hand.get_or_insert_with(|| moment.clone());
+        let seconds = match now_s - before.time_s {
+            0.0 if tick == 0 => STEP_MAX_S,
+            seconds if seconds < STEP_MIN_S => return None,
+            seconds => seconds.min(STEP_MAX_S),
+        };
+        let leap = (0..HAND_BODIES).map(|i| {
+            let (a, b) = (&before.world_from_bodies[i], &moment.world_from_bodies[i]);
+            (a.translation.vector - b.translation.vector).norm()
+        });
+        let leapt = leap.fold(0.0, f64::max) > LEAP_M;
+        if leapt {
+            before.world_from_bodies = moment.world_from_bodies;
+            self.is_apart = true;
+        }
+        let bodies = self.bodies(hand);
+        let ask = self.ask(seconds);
+        let extent = extent(object.rest().vertices());
+        let near = self.candidates(&bodies, object, extent, &ask);
+        let is_touchable = near.iter().any(|candidate| usize::from(candidate.body) >= TABLE);
+        if self.still_steps >= STILL_STEPS && !is_touchable {
+            self.hand = Some(moment);
+            return None;
+        }
+        let step_object = StepObject {
+            // The link names the model.
+            model: ModelHash([0; 32]),
+            vertices: object.rest().vertices(),
+            triangles: &object.surface().triangles,
+            displacement: object.displacement(),
+            nodes,
+        };
+        self.asked = Some(Asked { tick, hand: moment, extent });
+        Some(step_object.frame_among(self.state.clone(), &bodies, ask, &near))
+    }
+
+    fn ask(&self, seconds: f64) -> ContactAsk {
+        ContactAsk {
+            seconds,
+            gravity: self.scene.gravity.into(),
+            density: self.scene.density,
+            viscosity: self.scene.viscosity,
+            penetration_rel: PENETRATION_REL,
+            residual_rel: RESIDUAL_REL,
+            rounds_max: ROUNDS_MAX,
+            newton_max: NEWTON_MAX,
+        }
+    }
+
+    /// The table, then the hand, on the way from where it was at the last answer to where it is.
+    fn bodies(&self, hand: &[HandBody; HAND_BODIES]) -> Vec<StepBody> {
+        let friction = self.scene.friction;
+        // Without a table a plane far below stands for it: the places of the others stay.
+        let table_y = self.scene.table_y.unwrap_or(-1e3);
+        let up = Vector3::y_axis();
+        let table = StepBody {
+            moving: MovingBody::resting(
+                RigidShape::Plane { normal: up },
+                Isometry3::translation(0.0, table_y, 0.0),
+                friction,
+            ),
+            shape: BodyShape::Plane { normal: up.into_inner().into() },
+        };
+        let of_hand = hand.iter().enumerate().map(|(i, body)| {
+            let start = self.hand.as_ref().map_or(body.world_from_body, |h| h.world_from_bodies[i]);
+            StepBody {
+                moving: MovingBody {
+                    shape: body.shape(),
+                    world_from_body_start: start,
+                    world_from_body_end: body.world_from_body,
+                    friction,
+                    compliance: self.scene.finger_compliance,
+                },
+                shape: BodyShape::Capsule { radius: body.radius, length: body.length },
+            }
+        });
+        std::iter::once(table).chain(of_hand).collect()
+    }
+
+    /// Triangles that can touch a body; a hand that has to leave the object first touches none.
+    ///
+    /// Units: `extent` of the object m.
+    fn candidates(
+        &mut self,
+        bodies: &[StepBody],
+        object: &SoftObject,
+        extent: f64,
+        ask: &ContactAsk,
+    ) -> Vec<Candidate> {
+        let surface = SearchedSurface {
+            tree: object.tree(),
+            stars: object.rest_shape().stars(),
+            triangles: &object.surface().triangles,
+            places: object.shape(),
+        };
+        let moving: Vec<MovingBody> = bodies.iter().map(|body| body.moving.clone()).collect();
+        let world_from_object = self.world_from_object();
+        if self.is_apart {
+            let hand = &moving[TABLE..];
+            self.is_apart = !triangles_near(&surface, &world_from_object, hand, CLEAR_M).is_empty();
+        }
+        let touching = if self.is_apart { &moving[..TABLE] } else { &moving[..] };
+        let margin = reach_of_step(extent, &self.state, touching, ask);
+        triangles_near(&surface, &world_from_object, touching, margin)
+    }
+
+    /// Takes the answer to the step of a tick. A step that was not solved and would throw the object away
+    /// is not taken: the object stays where it was, undeformed, and the hand has to leave it.
+    pub fn take(&mut self, tick: u64, reached: ReachedStep) -> TakenStep {
+        let Some(asked) = self.asked.take_if(|asked| asked.tick == tick) else {
+            return TakenStep::NotAsked;
+        };
+        let ReachedStep { contact, state, loads } = reached;
+        let extent = asked.extent;
+        let moved = Vector3::from_fn(|axis, _| state.pose[axis] - self.state.pose[axis]).norm();
+        let is_far = contact.penetration_max > LOST_DEPTH * extent || moved > LOST_WAY * extent;
+        if !contact.is_converged && is_far {
+            self.put(self.world_from_object());
+            self.hand = Some(asked.hand);
+            return TakenStep::Lost;
+        }
+        let norm = |v: &[f64; 3]| v[0].hypot(v[1]).hypot(v[2]);
+        let speed = norm(&state.velocity).max(norm(&state.angular_velocity) * extent);
+        let is_still = speed < STILL_SPEED;
+        self.still_steps = if is_still { self.still_steps.saturating_add(1) } else { 0 };
+        self.slow_steps = if speed < SLOW_SPEED { self.slow_steps.saturating_add(1) } else { 0 };
+        (self.state, self.loads, self.report) = (state, loads, contact);
+        self.hand = Some(asked.hand);
+        TakenStep::Taken
+    }
+
+    /// The step of a tick is not answered; the next tick asks again.
+    pub fn give_up(&mut self, tick: u64) {
+        self.asked.take_if(|asked| asked.tick == tick);
+    }
+
+    /// Whether each finger presses on the object, thumb first.
+    pub fn touching(&self) -> [bool; 5] {
+        std::array::from_fn(|digit| self.loads_of(digit).iter().any(|load| load.contacts > 0))
+    }
+
+    /// Force of each finger on the object, N, world, thumb first; zero where it does not touch.
+    pub fn finger_forces(&self) -> [Vector3<f64>; 5] {
+        std::array::from_fn(|digit| {
+            self.loads_of(digit).iter().map(|load| Vector3::from(load.force)).sum()
+        })
+    }
+
+    /// What the segments of a finger do; nothing before the first answer.
+    fn loads_of(&self, digit: usize) -> &[BodyLoad] {
+        let first = TABLE + 3 * digit;
+        self.loads.get(first..first + 3).unwrap_or_default()
+    }
+
+    /// What the last step did and how well it meets the law of contact.
+    pub fn record(&self, tick: u64, round_trip_ms: f64) -> StepRecord {
+        let table = self.loads.get(..TABLE).unwrap_or_default();
+        let palm = self.loads.get(TABLE + 15..).unwrap_or_default();
+        let fingers = std::array::from_fn(|digit| self.loads_of(digit));
+        StepRecord::new(tick, round_trip_ms, &self.report, (table, fingers, palm))
+    }
+
+    /// Whether the state is another than when this was called last: an answer may have changed it.
+    pub fn enters(&mut self, state: StateName) -> bool {
+        self.told.replace(state) != Some(state)
+    }
+
+    /// Whether a step that was asked for before a tick is still not answered.
+    pub fn is_late(&self, tick: u64) -> bool {
+        self.asked.as_ref().is_some_and(|asked| asked.tick < tick)
+    }
+
+    /// Whether the object lies or is held still.
+    pub fn is_still(&self) -> bool {
+        self.slow_steps >= SLOW_STEPS
+    }
+
+    /// What hand and object are to each other: `Detached` while the hand has to leave the object,
+    /// `Deforming` from the first touch on.
+    pub fn state_name(&self) -> StateName {
+        let of_hand = self.loads.get(TABLE..).unwrap_or_default();
+        match self.is_apart {
+            true => StateName::Detached,
+            false if of_hand.iter().any(|load| load.contacts > 0) => StateName::Deforming,
+            false => StateName::Free,
+        }
+    }
+
+    /// How far the shown hand is from the measured one, m, world: each segment of a finger gives way to
+    /// what presses on it.
+    pub fn pushed_back(&self) -> [[Vector3<f64>; 3]; 5] {
+        let compliance = self.scene.finger_compliance;
+        std::array::from_fn(|digit| {
+            let loads = self.loads_of(digit);
+            std::array::from_fn(|i| {
+                loads
+                    .get(i)
+                    .map_or(Vector3::zeros(), |load| -compliance * Vector3::from(load.force))
+            })
+        })
+    }
+}
+
+/// The segments of a hand that gives way: a joint moves as far as the segments on both sides of it and those
+/// before it are pushed back, so that none is left in the object, and every segment turns so that it still
+/// joins its two ends.
+///
+/// Shapes: `segments` world from segment, thumb first, from the palm outward, +Y along the bone; `ends`
+/// the tip of each finger. Units: m. Frame: world.
+pub fn given_way(
+    segments: &[[Isometry3<f64>; 3]; 5],
+    ends: &[Point3<f64>; 5],
+    pushed_back: &[[Vector3<f64>; 3]; 5],
+) -> [[Isometry3<f64>; 3]; 5] {
+    std::array::from_fn(|digit| {
+        let push = &pushed_back[digit];
+        if push.iter().all(|p| *p == Vector3::zeros()) {
+            return segments[digit];
+        }
+        let joint = |i: usize| Point3::from(segments[digit][i].translation.vector);
+        let before = [joint(0), joint(1), joint(2), ends[digit]];
+        // What pushes a segment moves both its ends and all beyond it.
+        let after = [
+            before[0] + push[0],
+            before[1] + longest(&push[..2]),
+            before[2] + longest(push),
+            before[3] + longest(push),
+        ];
+        std::array::from_fn(|i| {
+            let (old, new) = (before[i + 1] - before[i], after[i + 1] - after[i]);
+            let turn = UnitQuaternion::rotation_between(&old, &new).unwrap_or_default();
+            let rotation = turn * segments[digit][i].rotation;
+            Isometry3::from_parts(Translation3::from(after[i].coords), rotation)
+        })
+    })
+}
+
+fn longest(pushes: &[Vector3<f64>]) -> Vector3<f64> {
+    pushes.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default()
+}

@@ -1,0 +1,147 @@
+//! How well the steps of a grasp by friction met the law of contact, step by step and in all.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+use softgrasp_protocol::{BodyLoad, ContactReport};
+
+/// One answered step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct StepRecord {
+    /// Tick that asked for it.
+    pub tick: u64,
+    /// Force of each finger on the object, N, thumb first.
+    pub finger_force_n: [f64; 5],
+    /// Force of the palm on the object, N.
+    pub palm_force_n: f64,
+    /// Force of the table on the object, N.
+    pub table_force_n: f64,
+    /// Points that press.
+    pub contacts: u32,
+    /// Deepest point of the surface in a body, m.
+    pub penetration_max_m: f64,
+    /// Longest slip of a pressing point in the step, m.
+    pub slip_max_m: f64,
+    /// Largest residual of the law of Signorini and Coulomb, N.
+    pub residual_n: f64,
+    /// The same over the largest force of a point.
+    pub residual_rel: f64,
+    /// Largest part of a force outside its cone of friction, N.
+    pub cone_violation_n: f64,
+    /// Whether penetration and residual are within what was asked for.
+    pub converged: bool,
+    /// Times the contact problem was made.
+    pub rounds: u32,
+    /// Steps of Newton's method.
+    pub newton_steps: u32,
+    /// From asking to having the answer, ms.
+    pub round_trip_ms: f64,
+}
+
+/// All answered steps of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ContactTotals {
+    /// Steps.
+    pub steps: u64,
+    /// Steps whose penetration or residual is above what was asked for.
+    pub not_converged: u64,
+    /// Deepest point of the surface in a body, m.
+    pub penetration_max_m: f64,
+    /// Largest residual of the law of contact over the largest force of its step.
+    pub residual_rel_max: f64,
+    /// Largest residual of the law of contact, N.
+    pub residual_max_n: f64,
+    /// Largest part of a force outside its cone of friction, N.
+    pub cone_violation_max_n: f64,
+    /// Largest force of a finger, N.
+    pub finger_force_max_n: f64,
+}
+
+impl StepRecord {
+    /// The record of a step; `of_fingers` are the loads of each finger, `table` that of the table.
+    pub fn new(
+        tick: u64,
+        round_trip_ms: f64,
+        report: &ContactReport,
+        (table, of_fingers, of_palm): (&[BodyLoad], [&[BodyLoad]; 5], &[BodyLoad]),
+    ) -> Self {
+        let force = |loads: &[BodyLoad]| {
+            loads.iter().map(|load| Vector3::from(load.force)).sum::<Vector3<f64>>().norm()
+        };
+        let all = of_fingers.iter().copied().chain([table, of_palm]).flatten();
+        Self {
+            tick,
+            finger_force_n: of_fingers.map(force),
+            palm_force_n: force(of_palm),
+            table_force_n: force(table),
+            contacts: all.map(|load| load.contacts).sum(),
+            penetration_max_m: report.penetration_max,
+            slip_max_m: report.slip_max,
+            residual_n: report.residual,
+            residual_rel: report.residual_rel,
+            cone_violation_n: report.cone_violation,
+            converged: report.is_converged,
+            rounds: report.rounds,
+            newton_steps: report.newton_steps,
+            round_trip_ms,
+        }
+    }
+}
+
+impl ContactTotals {
+    /// Adds a step.
+    pub fn add(&mut self, step: &StepRecord) {
+        self.steps += 1;
+        self.not_converged += u64::from(!step.converged);
+        self.penetration_max_m = self.penetration_max_m.max(step.penetration_max_m);
+        self.residual_rel_max = self.residual_rel_max.max(step.residual_rel);
+        self.residual_max_n = self.residual_max_n.max(step.residual_n);
+        self.cone_violation_max_n = self.cone_violation_max_n.max(step.cone_violation_n);
+        let force = step.finger_force_n.into_iter().fold(0.0, f64::max);
+        self.finger_force_max_n = self.finger_force_max_n.max(force);
+    }
+
+    /// What is to be said of them; nothing where there were none.
+    pub fn words(&self) -> String {
+        if self.steps == 0 {
+            return String::new();
+        }
+        format!(
+            "  contact             {} steps, surface at most {:.1e} m deep, law of contact met to {:.1e} N \
+             ({:.1e} of the largest force), {} steps above what was asked for\n  \
+             finger force        {:.2} N at most\n",
+            self.steps,
+            self.penetration_max_m,
+            self.residual_max_n,
+            self.residual_rel_max,
+            self.not_converged,
+            self.finger_force_max_n,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn totals_hold_the_worst_of_all_steps() {
+        let load =
+            |force: f64| BodyLoad { force: [0.0, force, 0.0], contacts: 2, ..BodyLoad::default() };
+        let (table, thumb, palm) = ([load(1.0)], [load(0.3), load(0.4)], [load(0.0)]);
+        let mut totals = ContactTotals::default();
+        assert!(totals.words().is_empty());
+        for (tick, residual) in [(1, 2e-3), (2, 1e-6)] {
+            let report = ContactReport {
+                residual,
+                is_converged: residual < 1e-4,
+                ..ContactReport::default()
+            };
+            let loads = (&table[..], [&thumb[..], &[], &[], &[], &[]], &palm[..]);
+            let step = StepRecord::new(tick, 1.0, &report, loads);
+            assert!((step.finger_force_n[0] - 0.7).abs() < 1e-12 && step.contacts == 8);
+            totals.add(&step);
+        }
+        assert_eq!((totals.steps, totals.not_converged, totals.residual_max_n), (2, 1, 2e-3));
+        assert!(totals.words().contains("1 steps above"));
+    }
+}

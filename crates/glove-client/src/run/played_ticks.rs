@@ -1,0 +1,222 @@
+//! The ticks of a run, one record each: the newest in memory, older ones in a file.
+
+use std::collections::VecDeque;
+use std::collections::vec_deque::Iter;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use serde::ser::{Error as _, SerializeSeq as _};
+use serde::{Serialize, Serializer};
+use softgrasp_grasp::grasp::StateName;
+use softgrasp_protocol::solve_report::SolveSummary;
+
+use crate::run::contact_ledger::StepRecord;
+
+/// One tick that was played.
+#[derive(Clone, Debug, Serialize)]
+pub struct TickRecord {
+    /// Number, from 0.
+    pub tick: u64,
+    /// When it began, ms since the first tick was due.
+    pub at_ms: f64,
+    /// Grasp state after it.
+    pub state: String,
+    /// Which tips touch: thumb, index, middle, ring, little.
+    pub tips: [bool; 5],
+    /// Segments shown at their last free pose, by finger.
+    pub recalled: [u8; 5],
+    /// The answer to what was asked in this tick; null when nothing was asked or no answer came.
+    pub solve: Option<SolveSummary>,
+    /// The step of a grasp by friction that was asked for in this tick; null where none was answered.
+    pub contact: Option<StepRecord>,
+    /// Why a deforming tick has no answer; null for all others.
+    pub unanswered: Option<&'static str>,
+    /// Tick whose answer the object shows after this one; null while it shows none of this grip.
+    pub shown_tick: Option<u64>,
+    /// Time for which the tick computed, ms.
+    pub compute_ms: f64,
+}
+
+impl TickRecord {
+    /// Whether the fingers deformed the object.
+    pub(crate) fn deforms(&self) -> bool {
+        self.state == StateName::Deforming.to_string()
+    }
+
+    /// Whether the fingers deformed the object and nothing has become of it.
+    pub(crate) fn is_open(&self) -> bool {
+        self.deforms() && self.solve.is_none() && self.unanswered.is_none()
+    }
+}
+
+/// The records of a run, in order. Memory does not grow with the run: beyond the newest, records are
+/// written to a file without a name, if they are wanted at all.
+#[derive(Debug, Default)]
+pub struct PlayedTicks {
+    newest: VecDeque<TickRecord>,
+    /// Records that are older, one line of JSON each; `None` where nobody wants them.
+    older: Option<File>,
+    /// Lines of that file that are not in it yet.
+    to_write: Vec<u8>,
+    count: u64,
+    /// Why there is no file, where there should be one.
+    no_file: Option<String>,
+    /// Why older records are not all there.
+    failed: Option<String>,
+}
+
+/// So many records are in memory: more than a minute at 60 ticks a second. No answer is later.
+const NEWEST_MAX: usize = 4096;
+/// The file is written in pieces of this size.
+const PIECE_BYTES: usize = 1 << 16;
+
+impl PlayedTicks {
+    /// Older records are wanted, for a report at this path. They are kept in a file without a name
+    /// beside it, or where the system has its temporary files.
+    pub fn keep_older(&mut self, report: &Path) {
+        let folder = report.parent().filter(|folder| *folder != Path::new(""));
+        let beside = tempfile::tempfile_in(folder.unwrap_or(Path::new(".")));
+        match beside.or_else(|_| tempfile::tempfile()) {
+            Ok(file) => self.older = Some(file),
+            Err(error) => self.no_file = Some(error.to_string()),
+        }
+    }
+
+    /// Adds a record; the one that leaves memory for it.
+    pub fn push(&mut self, record: TickRecord) -> Option<TickRecord> {
+        self.count += 1;
+        self.newest.push_back(record);
+        let oldest = (self.newest.len() > NEWEST_MAX).then(|| self.newest.pop_front()).flatten();
+        if let Some(oldest) = &oldest {
+            self.write_older(oldest);
+        }
+        oldest
+    }
+
+    fn write_older(&mut self, record: &TickRecord) {
+        let Some(file) = &mut self.older else {
+            let why = self.no_file.as_ref();
+            self.failed = why.map(|error| format!("older ticks could not be kept: {error}"));
+            return;
+        };
+        // Plain numbers and texts have a JSON form.
+        if serde_json::to_writer(&mut self.to_write, record).is_err() {
+            return;
+        }
+        self.to_write.push(b'\n');
+        if self.to_write.len() < PIECE_BYTES {
+            return;
+        }
+        if let Err(error) = file.write_all(&self.to_write) {
+            self.no_file = Some(error.to_string());
+            self.older = None;
+        }
+        self.to_write.clear();
+    }
+
+    /// Why older records are missing, if they are wanted and are not there.
+    pub fn why_missing(&self) -> Option<&str> {
+        self.failed.as_deref()
+    }
+
+    /// How many ticks were played.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The records in memory, oldest first.
+    pub fn iter(&self) -> Iter<'_, TickRecord> {
+        self.newest.iter()
+    }
+
+    /// The newest record.
+    pub fn last(&self) -> Option<&TickRecord> {
+        self.newest.back()
+    }
+
+    /// The newest record, to be changed.
+    pub fn last_mut(&mut self) -> Option<&mut TickRecord> {
+        self.newest.back_mut()
+    }
+
+    /// The record of a tick, if it was played and is in memory.
+    pub fn get(&self, tick: u64) -> Option<&TickRecord> {
+        let at = self.newest.binary_search_by_key(&tick, |record| record.tick).ok()?;
+        self.newest.get(at)
+    }
+
+    /// The same, to be changed.
+    pub fn get_mut(&mut self, tick: u64) -> Option<&mut TickRecord> {
+        let at = self.newest.binary_search_by_key(&tick, |record| record.tick).ok()?;
+        self.newest.get_mut(at)
+    }
+}
+
+impl<'a> IntoIterator for &'a PlayedTicks {
+    type Item = &'a TickRecord;
+    type IntoIter = Iter<'a, TickRecord>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+/// All records, older ones as they come from their file.
+impl Serialize for PlayedTicks {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut all = serializer.serialize_seq(None)?;
+        if let Some(mut file) = self.older.as_ref() {
+            file.seek(SeekFrom::Start(0)).map_err(S::Error::custom)?;
+            for line in BufReader::new(file).chain(&self.to_write[..]).lines() {
+                let line = line.map_err(S::Error::custom)?;
+                // Numbers come back from their text as they were.
+                let record: serde_json::Value =
+                    serde_json::from_str(&line).map_err(S::Error::custom)?;
+                all.serialize_element(&record)?;
+            }
+        }
+        self.newest.iter().try_for_each(|record| all.serialize_element(record))?;
+        all.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(tick: u64) -> TickRecord {
+        TickRecord {
+            tick,
+            at_ms: 16.7 * tick as f64,
+            state: "Free".to_owned(),
+            tips: [false; 5],
+            recalled: [0; 5],
+            solve: None,
+            contact: None,
+            unanswered: None,
+            shown_tick: None,
+            compute_ms: 0.25,
+        }
+    }
+
+    #[test]
+    fn memory_of_a_long_run_is_bounded_and_its_report_has_every_tick() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut played = PlayedTicks::default();
+        played.keep_older(&folder.path().join("report.json"));
+        let all = 3 * NEWEST_MAX as u64 + 17;
+        let left: Vec<u64> =
+            (0..all).filter_map(|tick| played.push(record(tick))).map(|r| r.tick).collect();
+        assert_eq!(left, (0..all - NEWEST_MAX as u64).collect::<Vec<_>>(), "each leaves once");
+        assert_eq!((played.newest.len(), played.count()), (NEWEST_MAX, all));
+        assert!(played.to_write.len() < PIECE_BYTES);
+        assert!(played.get(0).is_none() && played.get(all - 1).is_some());
+        let text = serde_json::to_string_pretty(&played).unwrap();
+        let read: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
+        let ticks: Vec<u64> = read.iter().map(|r| r["tick"].as_u64().unwrap()).collect();
+        assert_eq!(ticks, (0..all).collect::<Vec<_>>());
+        assert_eq!(read[0]["compute_ms"], 0.25);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
+    }
+}

@@ -1,0 +1,76 @@
+//! Runs in which the hand grasps by contact with friction.
+
+use serde_json::Value;
+
+use crate::start::{Folder, fail, succeed};
+
+/// A run of a strawberry of 300 nodes; its report.
+fn lifted(folder: &Folder, more: &[&str]) -> Value {
+    let report = folder.path("lift.json");
+    let run = ["run", "--headless", "--nodes", "300", "--threads", "2", "--report", &report];
+    succeed(&[&run[..], more].concat());
+    serde_json::from_str(&folder.read("lift.json")).unwrap()
+}
+
+#[test]
+fn run_of_which_nothing_is_said_lifts_a_strawberry_and_says_how_wrong_every_step_is() {
+    let folder = Folder::new();
+    let report = lifted(&folder, &[]);
+    assert_eq!(report["hand"], "scripted:lift");
+    assert_eq!(report["contact"], "friction");
+    let frames = report["frames"].as_array().unwrap();
+    let steps: Vec<&Value> =
+        frames.iter().map(|frame| &frame["contact"]).filter(|step| !step.is_null()).collect();
+    assert!(steps.len() > 100, "{} steps", steps.len());
+    // Once it is lifted the fingers carry its weight and the table nothing.
+    let carried = steps.iter().filter(|step| {
+        let fingers: f64 =
+            step["finger_force_n"].as_array().unwrap().iter().map(|f| f.as_f64().unwrap()).sum();
+        step["table_force_n"] == 0.0 && fingers > 0.5
+    });
+    assert!(carried.count() > 60, "the hand never carried it");
+    for step in steps {
+        for number in ["penetration_max_m", "residual_n", "residual_rel", "cone_violation_n"] {
+            assert!(step[number].as_f64().unwrap() >= 0.0, "{number} in {step}");
+        }
+    }
+    let all = &report["summary"]["contact"];
+    assert!(all["penetration_max_m"].as_f64().unwrap() < 5e-4, "{all}");
+    assert!(all["steps"].as_u64() > all["not_converged"].as_u64(), "{all}");
+}
+
+#[test]
+fn grasp_by_friction_is_replayed_bit_by_bit() {
+    let folder = Folder::new();
+    let path = folder.path("lift.mcap");
+    lifted(&folder, &["--record", &path]);
+    for threads in ["1", "3"] {
+        let report = folder.path("replay.json");
+        succeed(&["replay", &path, "--check", "--threads", threads, "--report", &report]);
+        let replayed: Value = serde_json::from_str(&folder.read("replay.json")).unwrap();
+        assert_eq!(replayed["replay"]["difference"], Value::Null);
+        assert!(replayed["replay"]["requests"].as_u64().unwrap() > 100, "{}", replayed["replay"]);
+    }
+}
+
+/// The last step of a run in real time is asked for and never answered; its replay differed there.
+#[test]
+fn grasp_by_friction_in_real_time_is_replayed_to_its_last_unanswered_step() {
+    let folder = Folder::new();
+    let path = folder.path("live.mcap");
+    lifted(&folder, &["--record", &path, "--rate", "60"]);
+    let report = folder.path("replay.json");
+    succeed(&["replay", &path, "--check", "--report", &report]);
+    let replayed: Value = serde_json::from_str(&folder.read("replay.json")).unwrap();
+    assert_eq!(replayed["replay"]["difference"], Value::Null);
+}
+
+#[test]
+fn thesis_and_contact_do_not_mix_and_it_is_said_why() {
+    let said = fail(1, &["run", "--headless", "--grasp", "contact", "--contact", "patch"]);
+    assert!(said.contains("--grasp thesis"), "{said}");
+    let said = fail(1, &["run", "--headless", "--grasp", "contact", "--deformation", "large"]);
+    assert!(said.contains("linear elasticity"), "{said}");
+    let said = fail(1, &["run", "--headless", "--grasp", "thesis", "--hand", "scripted:lift"]);
+    assert!(said.contains("--grasp contact"), "{said}");
+}

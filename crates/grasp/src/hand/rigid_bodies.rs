@@ -1,0 +1,162 @@
+//! The hand as rigid bodies that press on objects with friction: a capsule for every segment and for
+//! every metacarpal of the palm.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use softgrasp_core::rigid_body::RigidShape;
+
+use super::dimensions::HandDimensions;
+use super::joints::Finger;
+use super::kinematics::HandPose;
+
+/// Bodies of a hand: three segments of five fingers, thumb first and from the palm outward, and four
+/// metacarpals, index first.
+pub const HAND_BODIES: usize = 3 * 5 + 4;
+
+/// One rigid body of the hand.
+///
+/// Units: m. Frames: the capsule lies along z of the body, its middle at the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandBody {
+    /// Finger that it belongs to; `None` for the palm.
+    pub finger: Option<Finger>,
+    /// Radius of the capsule.
+    pub radius: f64,
+    /// Length of its segment, between the centres of the two half balls.
+    pub length: f64,
+    /// Pose in the world.
+    pub world_from_body: Isometry3<f64>,
+}
+
+impl HandBody {
+    /// Its shape.
+    pub fn shape(&self) -> RigidShape {
+        RigidShape::Capsule { radius: self.radius, length: self.length }
+    }
+
+    /// Centres of the two half balls it ends with.
+    ///
+    /// Units: m. Frame: world.
+    pub fn ends(&self) -> [Point3<f64>; 2] {
+        [-0.5, 0.5].map(|share| self.world_from_body * Point3::new(0.0, 0.0, share * self.length))
+    }
+
+    /// Distance of a point of the world from its surface, below 0 inside, m.
+    pub fn distance(&self, point: &Point3<f64>) -> f64 {
+        self.shape().distance(&self.world_from_body.inverse_transform_point(point)).distance
+    }
+}
+
+/// Distance of the nearest of some points from the bodies of a hand, below 0 where one is inside, m;
+/// infinite where there are no points.
+///
+/// Frame: world.
+pub fn clearance(
+    bodies: &[HandBody; HAND_BODIES],
+    points: impl Iterator<Item = Point3<f64>>,
+) -> f64 {
+    let nearest = |point: Point3<f64>| {
+        bodies.iter().map(|body| body.distance(&point)).fold(f64::INFINITY, f64::min)
+    };
+    points.map(nearest).fold(f64::INFINITY, f64::min)
+}
+
+/// Radius of the capsules of the palm over the breadth of the hand: half the thickness of a palm.
+const PALM_RADIUS_SHARE: f64 = 0.13;
+/// The metacarpals come together at the wrist: there they are so far apart, over their distance at the
+/// knuckles.
+const WRIST_SHARE: f64 = 0.5;
+/// A metacarpal's capsule begins this share of the way from the wrist to the knuckle.
+const WRIST_START: f64 = 0.15;
+
+/// Rigid bodies of a hand in one pose.
+///
+/// A segment's radius is the mean of its two ends, the distal one has the fingertip's and ends with its
+/// hemisphere.
+///
+/// Units: m. Frame: world. `dimensions` must be those that the pose was made with.
+pub fn hand_bodies(dimensions: &HandDimensions, pose: &HandPose) -> [HandBody; HAND_BODIES] {
+    let (radii, tip_radii) = (dimensions.segment_radii(), dimensions.tip_radii());
+    let palm_radius = PALM_RADIUS_SHARE * dimensions.hand_breadth;
+    std::array::from_fn(|position| {
+        if let Some(digit) = position.checked_sub(15) {
+            let knuckle = pose.fingers[digit + 1].segments[0].start();
+            let in_palm = pose.world_from_palm.inverse_transform_point(&knuckle);
+            let wrist = Point3::new(WRIST_SHARE * in_palm.x, 0.0, in_palm.z);
+            let start = pose.world_from_palm
+                * Point3::from(wrist.coords.lerp(&in_palm.coords, WRIST_START));
+            return capsule(None, start, knuckle, palm_radius);
+        }
+        let (digit, segment) = (position / 3, position % 3);
+        let finger = &pose.fingers[digit];
+        let start = finger.segments[segment].start();
+        let (end, radius) = match segment {
+            2 => (finger.tip_centre, tip_radii[digit]),
+            _ => {
+                let mean = 0.5 * (radii[digit][segment] + radii[digit][segment + 1]);
+                (finger.segments[segment].end(), mean)
+            }
+        };
+        capsule(Some(finger.finger), start, end, radius)
+    })
+}
+
+/// The capsule between two points.
+fn capsule(finger: Option<Finger>, start: Point3<f64>, end: Point3<f64>, radius: f64) -> HandBody {
+    let along = end - start;
+    let middle = nalgebra::center(&start, &end);
+    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along)
+        // Opposite directions: half a turn about any axis across.
+        .unwrap_or_else(|| {
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+        });
+    HandBody {
+        finger,
+        radius,
+        length: along.norm(),
+        world_from_body: Isometry3::from_parts(Translation3::from(middle.coords), turn),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand::{HandColliders, JointAngles, pose};
+
+    #[test]
+    fn bodies_lie_on_the_segments_and_the_fingertips_end_where_the_colliders_do() {
+        let hand = HandDimensions::default();
+        for closed in [0.0, 0.6, 1.2] {
+            let angles = JointAngles::from_array(&[closed; 23]);
+            let world_from_palm =
+                Isometry3::new(Vector3::new(0.1, 0.2, -0.3), Vector3::y() * closed);
+            let pose = pose(&hand, &angles, world_from_palm);
+            let bodies = hand_bodies(&hand, &pose);
+            let colliders = HandColliders::new(&hand, &pose);
+            for (digit, finger) in colliders.fingers.iter().enumerate() {
+                let tip = &bodies[3 * digit + 2];
+                assert!(tip.distance(&finger.contact_point).abs() < 1e-9, "digit {digit}");
+                for segment in 0..3 {
+                    let body = &bodies[3 * digit + segment];
+                    assert_eq!(body.finger, Some(finger.finger));
+                    let start = pose.fingers[digit].segments[segment].start();
+                    assert!(body.distance(&start) < 0.0);
+                    assert!((body.ends()[0] - start).norm() < 1e-9);
+                }
+            }
+            assert!(bodies[15..].iter().all(|body| body.finger.is_none()));
+        }
+    }
+
+    #[test]
+    fn palm_is_solid_between_wrist_and_knuckles() {
+        let hand = HandDimensions::default();
+        let pose = pose(&hand, &JointAngles::flat(), Isometry3::identity());
+        let bodies = hand_bodies(&hand, &pose);
+        for (x, y) in [(0.0, 0.03), (-0.01, 0.07), (0.02, 0.06)] {
+            let point = Point3::new(x, y, 0.0);
+            let inside = bodies[15..].iter().any(|body| body.distance(&point) < 0.0);
+            assert!(inside, "({x}, {y}) is in no body of the palm");
+            assert!(clearance(&bodies, std::iter::once(point)) < 0.0);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! A plan to grasp an object: the palm, the posture, how far each finger closes, and whether the hand has
+//! room for that beside object and table.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use softgrasp_grasp::hand::{Finger, HandBody, HandPose, clearance, hand_bodies, pose};
+use softgrasp_grasp::object::RestShape;
+
+use super::approach::{BACK_OFF, PalmPath};
+use super::posture::{Posture, angles};
+use crate::hand_reader::HandSetup;
+
+/// A palm pose and how far each finger closes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraspPlan {
+    /// The palm while it holds.
+    pub path: PalmPath,
+    /// How the hand is set before it closes.
+    pub posture: Posture,
+    /// Closure (0 open, 1 closed) at which each tip touches, thumb first.
+    pub touch: [f64; 5],
+    /// Closure at which each tip has moved on by the depth asked for.
+    pub press: [f64; 5],
+}
+
+impl GraspPlan {
+    /// The hand as it squeezes an object that is centred at a point of the world.
+    pub fn squeezing(&self, setup: &HandSetup, centre: Point3<f64>) -> HandPose {
+        let angles = setup.felt(&angles(&self.press, self.posture));
+        pose(&setup.dimensions, &angles, self.path.world_from_palm(centre))
+    }
+
+    /// The same grasp told by another point of the object than its centre, which is so far from there.
+    ///
+    /// Units: m. Frame: world.
+    #[must_use]
+    pub fn about(mut self, shift: Vector3<f64>) -> Self {
+        let path = &mut self.path;
+        path.object_in_palm += path.world_from_palm_rotation.inverse() * shift;
+        self
+    }
+
+    /// Whether the open hand, and the hand that nearly touches, are outside of the object.
+    pub(super) fn has_room(&self, setup: &HandSetup, object: &RestShape) -> bool {
+        [self.touch.map(|_| 0.0), self.touch.map(|touch| NEARLY * touch)].iter().all(|closure| {
+            let angles = setup.felt(&angles(closure, self.posture));
+            let palm = self.path.world_from_palm(object.centre());
+            let hand = pose(&setup.dimensions, &angles, palm);
+            let bodies = hand_bodies(&setup.dimensions, &hand);
+            let vertices = object.mesh().vertices();
+            let surface = object.surface().nodes.iter().map(|&node| vertices[node as usize]);
+            clearance(&bodies, surface) > -ROOM
+        })
+    }
+
+    /// Whether the hand stays above a table while it reaches, touches and presses.
+    pub(super) fn is_above(&self, setup: &HandSetup, centre: Point3<f64>, table_y: f64) -> bool {
+        let moments = [
+            (self.path.backed_off(BACK_OFF), [0.0; 5], Posture::OPEN),
+            (
+                self.path.backed_off(0.5 * BACK_OFF),
+                [0.0; 5],
+                Posture::OPEN.toward(&self.posture, 0.5),
+            ),
+            (self.path, [0.0; 5], self.posture),
+            (self.path, self.touch.map(|touch| 0.5 * touch), self.posture),
+            (self.path, self.touch, self.posture),
+            (self.path, self.press, self.posture),
+        ];
+        moments.iter().all(|(path, closure, posture)| {
+            let angles = setup.felt(&angles(closure, *posture));
+            let hand = pose(&setup.dimensions, &angles, path.world_from_palm(centre));
+            let bodies = hand_bodies(&setup.dimensions, &hand);
+            is_over(&outline(&bodies), &Isometry3::identity(), table_y + TABLE_CLEARANCE)
+        })
+    }
+}
+
+/// Room between the hand and the table, m.
+const TABLE_CLEARANCE: f64 = 1e-3;
+/// A hand that nearly touches has closed by this share.
+const NEARLY: f64 = 0.85;
+/// Depth in the object that is no collision of a hand that does not touch yet, m.
+const ROOM: f64 = 1e-3;
+
+/// Ends of the capsules of an open hand without its thumb, in the palm frame, and their radii.
+pub(super) fn open_outline(setup: &HandSetup, gather: f64) -> Vec<(Point3<f64>, f64)> {
+    let angles = setup.felt(&angles(&[0.0; 5], Posture { gather, ..Posture::OPEN }));
+    let hand = pose(&setup.dimensions, &angles, Isometry3::identity());
+    let bodies = hand_bodies(&setup.dimensions, &hand);
+    let without_thumb = bodies.iter().filter(|body| body.finger != Some(Finger::Thumb));
+    outline(without_thumb)
+}
+
+/// Ends of capsules, world, and their radii.
+fn outline<'a>(bodies: impl IntoIterator<Item = &'a HandBody>) -> Vec<(Point3<f64>, f64)> {
+    let ends = bodies.into_iter().flat_map(|body| body.ends().map(|end| (end, body.radius)));
+    ends.collect()
+}
+
+/// Whether an outline is above a table.
+pub(super) fn is_over(
+    outline: &[(Point3<f64>, f64)],
+    world_from_palm: &Isometry3<f64>,
+    table_y: f64,
+) -> bool {
+    outline.iter().all(|(end, radius)| (world_from_palm * end).y - radius > table_y)
+}

@@ -1,0 +1,131 @@
+//! The cards of the window do not lie over each other, in windows of all sizes and in all states.
+
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use egui::{Context, Id, Pos2, RawInput, Rect, Vec2};
+use nalgebra::Vector3;
+use softgrasp_core::fem::Material;
+use softgrasp_grasp::grasp::StateName;
+use softgrasp_hand::arrival::Device;
+use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::scripted::ScriptName;
+
+use super::changes::Change;
+use super::panels::{Panels, Seen};
+use super::running::{About, Running, Ticks};
+use crate::view::colouring::Colouring;
+use crate::view::display::Display;
+use crate::view::frame::samples::frame;
+use crate::view::outlet::outlet;
+use crate::view::shading::Shading;
+use crate::view::toggle::Page;
+
+/// Cards that are there at the same time.
+const CARDS: [&str; 6] = ["bar", "status", "time line", "left", "right", "top"];
+const SIZES: [[f32; 2]; 4] = [[800.0, 600.0], [1000.0, 700.0], [1280.0, 800.0], [1920.0, 1080.0]];
+
+/// A run in the worst of states: everything is late, silent and squeezed.
+fn running(hand: HandChoice) -> Running {
+    let (controls, _obeyed) = channel();
+    let (_told, notices) = channel();
+    let ticks = Ticks { controls, notices, is_over: Box::new(|| false), when_lost: None };
+    let (mut out, inlet) = outlet(Duration::ZERO);
+    let mut frame = frame(12_345);
+    frame.grasp.state = Some(StateName::Deforming);
+    frame.grasp.forces = Some([Vector3::new(1.0, 2.0, 3.0); 5]);
+    frame.grasp.silent = vec![Device::Glove, Device::Tracker];
+    frame.server.shown_tick = Some(1);
+    frame.server.said = Some("lost: the connection broke: reset by peer (os error 104)".to_owned());
+    out.publish(Box::new(frame));
+    let about = About {
+        object: "strawberry".to_owned(),
+        server: "in this program".to_owned(),
+        contact: "what lies under it, weighted by its pressure (mask)".to_owned(),
+        is_lifted: false,
+        material: Material::try_new(2.0e4, 0.4).unwrap(),
+        hand,
+        method: "auto".to_owned(),
+        max_error: None,
+        tick_s: 1.0 / 60.0,
+        begins_anew: true,
+        server_stage: Box::new(|| "factoring"),
+    };
+    let mut running = Running::new(ticks, inlet, about);
+    running.look();
+    running
+}
+
+/// Where the cards are in the fifth picture: the first ones measure them.
+fn cards(
+    size: [f32; 2],
+    running: &Running,
+    shading: Shading,
+    pages: &[Page],
+) -> Vec<(&'static str, Rect)> {
+    let (context, mut panels) = (Context::default(), Panels::default());
+    pages.iter().for_each(|page| panels.toggle(*page));
+    panels.notices.add("a sentence that says at some length what cannot be done and why", true);
+    panels.notices.add("shape kept", false);
+    let display = Display { shading, ..Display::default() };
+    let colouring = Colouring::new(running.about.material);
+    let seen = Seen {
+        running: Some(running),
+        display: &display,
+        colouring: &colouring,
+        change: &Change::None,
+        starting: None,
+        graphics: ("a graphics card with a long name (Vulkan)", 15.0),
+        is_recording: false,
+        newtons_per_m: 20.0,
+        story_begins_in: running.about.hand.is_played().then_some(Duration::from_secs(5)),
+    };
+    let screen = Rect::from_min_size(Pos2::ZERO, Vec2::from(size));
+    for _ in 0..5 {
+        let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
+        let output = context.run_ui(input, |ui| {
+            panels.show(ui.ctx(), &seen);
+        });
+        output.drop_without_applying_deltas();
+    }
+    let place = |name: &'static str| {
+        let rect = context.memory(|memory| memory.area_rect(Id::new(name)))?;
+        Some((name, rect))
+    };
+    CARDS.into_iter().filter_map(place).collect()
+}
+
+#[test]
+fn panels_do_not_overlap_in_windows_of_any_size() {
+    let hands = [HandChoice::Scripted(ScriptName::Regrasp), HandChoice::Mouse, HandChoice::Live];
+    let every = [Page::Information, Page::Timings, Page::Softness];
+    for hand in hands {
+        let running = running(hand);
+        for size in SIZES {
+            for pages in [&[][..], &every[..1], &every[1..2], &every[2..], &every[..]] {
+                for shading in [Shading::Plain, Shading::Strain] {
+                    let all = cards(size, &running, shading, pages);
+                    assert!(all.len() >= 3, "{all:?}");
+                    let top = all.iter().find(|(name, _)| *name == "top");
+                    let tells = top.map_or(0.0, |(_, rect)| rect.height());
+                    assert!(tells > 90.0, "what is told is cut off: {tells} points are seen");
+                    let screen = Rect::from_min_size(Pos2::ZERO, Vec2::from(size));
+                    for (place, (name, rect)) in all.iter().enumerate() {
+                        assert!(
+                            screen.expand(0.5).contains_rect(*rect),
+                            "{name} {rect:?} of {size:?}"
+                        );
+                        for (other, of_other) in &all[..place] {
+                            let shared = rect.intersect(*of_other);
+                            assert!(
+                                shared.width() <= 0.5 || shared.height() <= 0.5,
+                                "{name} {rect:?} lies over {other} {of_other:?} in {size:?}, \
+                                 {hand:?}, {pages:?}, {shading}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
