@@ -197,19 +197,33 @@ take_report() {
 
 reported() { grep -qE "$1" "$work/r.json"; }
 
-whole_run_through_the_compose_file() {
-    # Nothing but the file's own commands.
-    quietly 120 "${compose[@]}" up -d --force-recreate
-    take_report 600
+# The last run entered these states of a grasp, had frames solved, and never lost the server.
+undisturbed_run_entered() {
     local state
-    for state in Free Avoiding Attached Deforming Detached; do
+    for state in "$@"; do
         reported "\"entered $state\"" || fail "the run never entered $state"
     done
     reported '"solves": [1-9]' || fail "no frame was solved"
     if reported '"what": "(lost|refused):'; then
         fail "the server was lost or refused in an undisturbed run"
     fi
-    say "run: 600 ticks, every grasp state, frames solved by the other container"
+}
+
+whole_run_through_the_compose_file() {
+    # Nothing but the file's own commands: a grasp by contact, which deforms from the first touch on.
+    quietly 120 "${compose[@]}" up -d --force-recreate
+    take_report 600
+    reported '"contact": "friction"' || fail "the run did not grasp by contact"
+    undisturbed_run_entered Free Deforming
+    say "run: 600 ticks by contact, frames solved by the other container"
+}
+
+whole_run_by_the_rules_of_the_thesis() {
+    SOFTGRASP_CLIENT_COMMAND="run --headless --server server:7878 --frames 600 \
+        --grasp thesis --report /out/r.json" quietly 120 "${compose[@]}" up -d --force-recreate
+    take_report 600
+    undisturbed_run_entered Free Avoiding Attached Deforming Detached
+    say "run: 600 ticks by the thesis's rules, every grasp state, frames solved by the other container"
 }
 
 # Starts a run in real time and waits until its link to the server stands: the first session only
@@ -276,6 +290,7 @@ build_images
 same_bits_in_containers_as_on_the_host
 lost_server_ends_solve_with_one_line
 whole_run_through_the_compose_file
+whole_run_by_the_rules_of_the_thesis
 lost_server_never_stops_a_tick
 restarted_server_is_found_again
 parted_container_is_found_again server
