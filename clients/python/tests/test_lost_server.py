@@ -55,10 +55,22 @@ def test_server_killed_while_it_works_is_noticed_at_once(spawn: Spawn) -> None:
         assert noticed - killed[0] < AT_ONCE
 
 
+def stop(pid: int) -> None:
+    """Stops a process and waits until all its threads stand: a signal takes its time on a busy machine."""
+    os.kill(pid, signal.SIGSTOP)
+    given_up = time.monotonic() + 10.0
+    while any(
+        stat.read_text().rpartition(")")[2].split()[0] not in "Tt"
+        for stat in pathlib.Path(f"/proc/{pid}/task").glob("*/stat")
+    ):
+        assert time.monotonic() < given_up
+        time.sleep(0.01)
+
+
 def test_stopped_server_is_given_up_in_time(spawn: Spawn, bar: Bar) -> None:
     program = spawn()
     with Server(program.address, timeout=0.5) as server:
-        os.kill(program.pid, signal.SIGSTOP)
+        stop(program.pid)
         try:
             start = time.monotonic()
             with pytest.raises(softgrasp.NoAnswerInTime) as caught:
