@@ -13,8 +13,8 @@ pub(super) struct Pool {
     pub inside: Vec<MaterialPoint>,
 }
 
-/// Points of one edge or triangle whose weights differ by less are nearly one.
-const NEAR: f64 = 0.02;
+/// Points of one edge or triangle whose weights differ by less are one point that moves.
+const NEAR: f64 = 0.1;
 /// Points on one edge or inside one triangle: three say all about a flat triangle.
 const POINTS_OF_TRIANGLE: usize = 3;
 
@@ -24,16 +24,18 @@ impl Pool {
         self.corners.iter().chain(&self.inside)
     }
 
-    /// Adds a point that is not there yet. A point of the same triangle that is near moves there with its
-    /// force: two that are nearly one would share their force at will. Where the triangle has enough
-    /// points, one without a force makes room.
-    pub fn add(&mut self, point: MaterialPoint, forces: &mut [HeldContact]) {
+    /// Adds a point that is not there yet. A point of the same triangle that is near moves instead: to the
+    /// new place, or with a force half of the way there. A force tilts the triangle, so that the deepest
+    /// point is on its other side next; all of the way it would go to and fro between two places for ever,
+    /// and two points so near would share their force at will. Where the triangle has enough points, one
+    /// without a force makes room. Says whether a force has moved.
+    pub fn add(&mut self, point: MaterialPoint, forces: &mut [HeldContact]) -> bool {
         if self.iter().any(|other| other.is_same(&point)) {
-            return;
+            return false;
         }
         if point.nodes[0] == point.nodes[1] {
             self.corners.push(point);
-            return;
+            return false;
         }
         let is_beside =
             |other: &MaterialPoint| other.body == point.body && other.nodes == point.nodes;
@@ -43,10 +45,13 @@ impl Pool {
         if let Some(at) = near {
             let before = std::mem::replace(&mut self.inside[at], point);
             let held = forces.iter_mut().find(|held| before.is_same(&(&**held).into()));
+            let has_force = held.is_some();
             if let Some(held) = held {
-                held.weights = point.weights;
+                let moved = &mut self.inside[at].weights;
+                moved.iter_mut().zip(before.weights).for_each(|(w, old)| *w = 0.5 * (*w + old));
+                held.weights = *moved;
             }
-            return;
+            return has_force;
         }
         let is_open = |at: &usize| force_at(forces, &self.inside[*at]).is_none();
         if beside.len() >= POINTS_OF_TRIANGLE
@@ -55,6 +60,7 @@ impl Pool {
             self.inside.remove(open);
         }
         self.inside.push(point);
+        false
     }
 }
 

@@ -52,6 +52,8 @@ struct Round {
     lambda: Vec<f64>,
     residual: f64,
     penetration: f64,
+    /// Whether a force acts elsewhere than in the configuration that the problem is about.
+    has_moved: bool,
 }
 
 impl Rounds<'_, '_> {
@@ -66,7 +68,9 @@ impl Rounds<'_, '_> {
         let is_known = |c: &&HeldContact| usize::from(c.body) < self.scene.bodies.len();
         let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();
         let mut pool = self.corners();
-        held.iter().for_each(|contact| pool.add(contact.into(), &mut []));
+        for contact in &held {
+            pool.add(contact.into(), &mut []);
+        }
         let mut about = self.scene.configuration(self.response, held, &start);
         let (mut rounds, mut sweeps, mut newton_steps) = (0, 0, 0);
         let mut best: Option<(f64, Configuration, Round)> = None;
@@ -81,7 +85,7 @@ impl Rounds<'_, '_> {
                 false if round.residual == 0.0 => 0.0,
                 false => f64::INFINITY,
             });
-            let is_converged = far <= 1.0;
+            let is_converged = far <= 1.0 && !round.has_moved;
             let is_last = rounds >= settings.rounds_max || newton_steps >= settings.newton_max;
             if is_converged || is_last {
                 let is_best = best.as_ref().is_none_or(|(best_far, ..)| far <= *best_far);
@@ -140,12 +144,12 @@ impl Rounds<'_, '_> {
     ) -> Result<Round, StepError> {
         let scene = self.scene;
         let bodies = scene.object_from_bodies(&about.configured());
-        let mut penetration: f64 = 0.0;
+        let (mut penetration, mut has_moved): (f64, bool) = (0.0, false);
         let deepest = scene.deepest_points(self.response, &about.configured(), &bodies);
         for (point, distance) in deepest {
             penetration = penetration.max(-distance);
             if distance < -0.5 * allowed {
-                pool.add(point, &mut about.contacts);
+                has_moved |= pool.add(point, &mut about.contacts);
             }
         }
         let about = &*about;
@@ -174,7 +178,7 @@ impl Rounds<'_, '_> {
         }
         let problem = problem(scene, self.response, about, &points)?;
         let residual = problem.residual_of(&lambda, &problem.motion(&lambda));
-        Ok(Round { points, problem, lambda, residual, penetration })
+        Ok(Round { points, problem, lambda, residual, penetration, has_moved })
     }
 }
 

@@ -1,10 +1,13 @@
 //! Contact with Coulomb friction between points: the cone, the problem, its solution, its residual.
 
 mod cone;
+#[cfg(test)]
 mod local;
 mod newton;
 mod problem;
 mod solution;
+mod splitting;
+#[cfg(test)]
 mod sweeps;
 
 pub use cone::{FrictionCone, PointForce};

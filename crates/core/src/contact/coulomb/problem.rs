@@ -1,6 +1,6 @@
 //! The linear contact problem: gaps and slips of points as a function of their forces.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::cone::{FrictionCone, PointForce};
 
@@ -114,11 +114,6 @@ impl ContactProblem {
             self.cones[i].residual(force, motion, self.rho[i])
         });
         residuals.fold(0.0, f64::max)
-    }
-
-    /// The block of a point with itself.
-    pub(super) fn own(&self, point: usize) -> Matrix3<f64> {
-        self.w.fixed_view::<3, 3>(3 * point, 3 * point).into_owned()
     }
 }
 

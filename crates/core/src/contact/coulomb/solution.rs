@@ -1,9 +1,9 @@
-//! The solution of a contact problem: Newton's method, with sweeps over the points where it strays.
+//! The solution of a contact problem: Newton's method, with sweeps of a splitting where it strays.
 
 use super::cone::PointForce;
 use super::newton::Proximal;
 use super::problem::{ContactProblem, at};
-use super::sweeps::Sweeps;
+use super::splitting::Splitting;
 
 /// How exactly and how long to solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +12,7 @@ pub struct SolveBudget {
     pub residual_rel: f64,
     /// Residual that is small enough in any case, N.
     pub residual: f64,
-    /// Most attempts of Newton's method.
+    /// Most attempts, each of Newton's method and then of the splitting.
     pub attempts_max: usize,
 }
 
@@ -42,7 +42,7 @@ pub struct Solution {
     pub motion: Vec<f64>,
     /// Largest residual of the natural map, N.
     pub residual: f64,
-    /// Sweeps that were made.
+    /// Sweeps of the splitting that were made.
     pub sweeps: usize,
     /// Steps of Newton's method.
     pub newton_steps: usize,
@@ -50,87 +50,133 @@ pub struct Solution {
     pub is_converged: bool,
 }
 
-/// Steps of Newton's method in one attempt.
-const NEWTON_STEPS: usize = 8;
-/// Sweeps after an attempt that failed: so many at a time …
-const SWEEPS: usize = 10;
-/// … as long as a batch leaves no more than this share of the residual, and no more batches than these.
-const PAYS: f64 = 0.7;
-const BATCHES: usize = 10;
-/// Share of its own compliance that is added to a point in the first attempt, and its limits.
+/// Steps of Newton's method from one set of forces …
+const NEWTON_STEPS: usize = 5;
+/// … and how often it may go on from where it ended, in one attempt.
+const NEWTON_ROUNDS: usize = 6;
+/// Share of its own compliance that is added to a point for Newton's method, at first and at least.
 const SHARE_FIRST: f64 = 1e-4;
-const SHARE_MIN: f64 = 1e-7;
-const SHARE_MAX: f64 = 0.1;
-/// The share shrinks after an attempt that succeeded, and grows after one that failed.
-const SHRINK: f64 = 0.1;
-const GROW: f64 = 10.0;
-/// An attempt has succeeded if it leaves so little of the residual …
-const SUCCESS: f64 = 0.3;
-/// … or if it solves its own problem so much better than that.
-const OWN_SUCCESS: f64 = 1e-3;
+const SHARE_MIN: f64 = 1e-6;
+/// The share shrinks by this where Newton's method left so little of the residual.
+const SHRINK: f64 = 0.3;
+const LEFT_TO_SHRINK: f64 = 0.1;
+/// Newton's method goes on where it solved its own problem and left no more of the residual than this …
+const LEFT_IF_SOLVED: f64 = 0.7;
+/// … or no more than this in any case.
+const LEFT: f64 = 0.3;
+/// Sweeps of the splitting after Newton's method has strayed, and the shares of compliance that they are
+/// made with in turn: no single one suits far and near, and every system of points.
+const SWEEPS: usize = 150;
+const SPLITTING_SHARES: [f64; 3] = [1.0, 0.03, 0.005];
+/// The first of these shares is left out where the residual is below this part of the largest force.
+const NEAR: f64 = 0.1;
+/// The splitting begins anew at what Newton's method found where that left no more than this.
+const LEFT_TO_BEGIN_ANEW: f64 = 0.2;
+
+/// Over the largest force, or a newton, a residual that is no approximation of anything.
+const RUNAWAY: f64 = 10.0;
 
 impl ContactProblem {
     /// The forces that obey the law of Signorini and Coulomb: exactly that law, no relaxation of it.
     ///
     /// Shapes: `warm` 3n forces to begin with, those of the last tick, N.
     pub fn solve(&self, warm: &[f64], budget: SolveBudget) -> Solution {
-        let n = self.point_count();
-        let mut lambda = match warm.len() == 3 * n {
+        let lambda = match warm.len() == 3 * self.point_count() {
             true => self.projected(warm),
-            false => vec![0.0; 3 * n],
+            false => vec![0.0; 3 * self.point_count()],
         };
-        let mut residual = self.residual_of(&lambda, &self.motion(&lambda));
-        let mut best = (residual, lambda.clone());
-        let (mut sweeps, mut newton_steps) = (0, 0);
-        let mut sweeper = None;
-        let mut share = SHARE_FIRST;
-        let is_small = |residual: f64, lambda: &[f64]| {
-            residual <= budget.residual.max(budget.residual_rel * force_max(lambda))
-        };
-        for _ in 0..budget.attempts_max {
-            if is_small(residual, &lambda) {
+        let mut now = self.forces(lambda);
+        let mut best = now.clone();
+        let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
+        let mut splitting: Option<Splitting<'_>> = None;
+        let first = usize::from(now.residual < NEAR * force_max(&now.lambda));
+        for turn in (first..).take(budget.attempts_max) {
+            let before = now.residual;
+            if !now.is_within(&budget) {
+                newton_steps += self.newton(&mut now, &mut share, &budget);
+            }
+            if now.residual < best.residual {
+                best.clone_from(&now);
+            }
+            if best.is_within(&budget) {
                 break;
             }
-            let allowed = budget.residual.max(budget.residual_rel * force_max(&lambda));
-            let found = Proximal::new(self, &lambda, share).solve(NEWTON_STEPS, 0.1 * allowed);
-            newton_steps += found.steps;
-            let now = self.residual_of(&found.lambda, &self.motion(&found.lambda));
-            let own_limit = (0.1 * allowed).max(OWN_SUCCESS * residual);
-            if found.residual <= own_limit || now < SUCCESS * residual {
-                (lambda, residual) = (found.lambda, now);
-                share = (SHRINK * share).max(SHARE_MIN);
-            } else {
-                share = (GROW * share).min(SHARE_MAX);
-                if now < residual {
-                    lambda = found.lambda;
-                }
-                let mut motion = self.motion(&lambda);
-                residual = self.residual_of(&lambda, &motion);
-                let sweeper = sweeper.get_or_insert_with(|| Sweeps::new(self));
-                for _ in 0..BATCHES {
-                    (0..SWEEPS).for_each(|_| sweeper.sweep(&mut lambda, &mut motion));
-                    sweeps += SWEEPS;
-                    let before =
-                        std::mem::replace(&mut residual, self.residual_of(&lambda, &motion));
-                    if is_small(residual, &lambda) || residual > PAYS * before {
-                        break;
-                    }
-                }
+            let mut begins_anew = now.residual < LEFT_TO_BEGIN_ANEW * before;
+            // Friction can make the splitting run away: no descent is proven for it.
+            let is_bounded = now.residual < force_max(&best.lambda).max(1.0) * RUNAWAY;
+            if !is_bounded {
+                now.clone_from(&best);
+                begins_anew = true;
             }
-            if residual < best.0 {
-                best = (residual, lambda.clone());
+            let of_turn = SPLITTING_SHARES[turn % SPLITTING_SHARES.len()];
+            match &mut splitting {
+                Some(splitting) => splitting.change_share(of_turn),
+                None => splitting = Splitting::new(self, &now.lambda, of_turn),
+            }
+            let Some(splitting) = &mut splitting else { break };
+            if begins_anew {
+                splitting.begin_at(&now.lambda);
+            }
+            now = self.forces(splitting.advance(SWEEPS));
+            sweeps += SWEEPS;
+        }
+        let is_converged = best.is_within(&budget);
+        let motion = self.motion(&best.lambda);
+        let Forces { lambda, residual } = best;
+        Solution { lambda, motion, residual, sweeps, newton_steps, is_converged }
+    }
+
+    /// Newton's method from some forces, again and again while it pays; the number of its steps.
+    fn newton(&self, now: &mut Forces, share: &mut f64, budget: &SolveBudget) -> usize {
+        let (first, mut steps) = (now.residual, 0);
+        for _ in 0..NEWTON_ROUNDS {
+            let tolerance = 0.1 * now.allowed(budget);
+            let found = Proximal::new(self, &now.lambda, *share).solve(NEWTON_STEPS, tolerance);
+            steps += found.steps;
+            let is_solved = found.residual <= tolerance;
+            let next = self.forces(found.lambda);
+            let left = next.residual / now.residual;
+            if left < 1.0 {
+                *now = next;
+            }
+            let pays = left < LEFT || is_solved && left < LEFT_IF_SOLVED;
+            if !pays || now.is_within(budget) {
+                break;
+            }
+            if now.residual < LEFT_TO_SHRINK * first {
+                *share = (SHRINK * *share).max(SHARE_MIN);
             }
         }
-        let (residual, lambda) = best;
-        let motion = self.motion(&lambda);
-        let is_converged = is_small(residual, &lambda);
-        Solution { lambda, motion, residual, sweeps, newton_steps, is_converged }
+        steps
+    }
+
+    fn forces(&self, lambda: Vec<f64>) -> Forces {
+        let residual = self.residual_of(&lambda, &self.motion(&lambda));
+        Forces { lambda, residual }
     }
 
     /// Every force moved into its cone.
     pub(super) fn projected(&self, lambda: &[f64]) -> Vec<f64> {
         let points = self.cones.iter().enumerate();
         points.flat_map(|(point, cone)| <[f64; 3]>::from(cone.project(at(lambda, point)))).collect()
+    }
+}
+
+/// Forces of all points, 3n, and their residual of the natural map, N.
+#[derive(Clone)]
+struct Forces {
+    lambda: Vec<f64>,
+    residual: f64,
+}
+
+impl Forces {
+    /// Residual that is small enough, N.
+    fn allowed(&self, budget: &SolveBudget) -> f64 {
+        budget.residual.max(budget.residual_rel * force_max(&self.lambda))
+    }
+
+    fn is_within(&self, budget: &SolveBudget) -> bool {
+        self.residual <= self.allowed(budget)
     }
 }
 

@@ -14,7 +14,10 @@ pub(super) struct Sweeps<'a> {
 impl<'a> Sweeps<'a> {
     pub fn new(problem: &'a ContactProblem) -> Self {
         let points = (0..problem.point_count())
-            .map(|i| PointProblem::new(problem.own(i), problem.cones[i].friction))
+            .map(|i| {
+                let own = problem.w.fixed_view::<3, 3>(3 * i, 3 * i).into_owned();
+                PointProblem::new(own, problem.cones[i].friction)
+            })
             .collect();
         Self { problem, points }
     }

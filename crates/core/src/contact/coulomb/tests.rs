@@ -113,8 +113,46 @@ fn compliance(n: usize, seed: &[f64]) -> DMatrix<f64> {
     })
 }
 
+/// A fingertip on a fine surface: three points within a thousandth of each place, so that the compliance
+/// is nearly the same for all of them, pressed and sheared by a sphere that touches the middle most.
+///
+fn fingertip(
+    places: &[(f64, f64)],
+    press: f64,
+    shear: (f64, f64),
+    friction: f64,
+) -> ContactProblem {
+    let mut seed = Vec::new();
+    for (x, y) in places {
+        for k in 0..3 {
+            let turn = f64::from(k) * 2.1;
+            seed.extend([x + 1e-3 * turn.cos(), y + 1e-3 * turn.sin(), 0.0]);
+        }
+    }
+    let n = seed.len() / 3;
+    let w = compliance(n, &seed);
+    let b = (0..n).flat_map(|i| {
+        let away = seed[3 * i].hypot(seed[3 * i + 1]);
+        [away * away - press, shear.0, shear.1]
+    });
+    ContactProblem::try_new(w, b.collect(), vec![FrictionCone { friction }; n]).unwrap()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn three_points_at_every_place_of_a_fingertip_are_solved_too(
+        places in prop::collection::vec((-1.0..1.0f64, -1.0..1.0f64), 4..14),
+        press in 0.2..1.5f64,
+        shear in (-0.8..0.8f64, -0.8..0.8f64),
+        friction in 0.2..0.9f64,
+    ) {
+        let problem = fingertip(&places, press, shear, friction);
+        let budget = SolveBudget { residual_rel: 1e-8, residual: 0.0, attempts_max: 20 };
+        let found = problem.solve(&[], budget);
+        prop_assert!(found.is_converged, "residual {:e} of {:e} N", found.residual, found.force_max());
+    }
 
     #[test]
     fn random_problems_are_solved_and_sweeps_alone_find_the_same_motion(
