@@ -77,8 +77,8 @@ impl Ball {
     ) -> Result<(f64, StepOutcome), ReportError> {
         let vertices = self.model.mesh().vertices();
         let triangles = &self.surface.triangles;
-        let near =
-            near_triangles(vertices, triangles, &state.world_from_object, bodies, 0.2 * SIZE);
+        let reach = reach_of_step(state, bodies);
+        let near = near_triangles(vertices, triangles, &state.world_from_object, bodies, reach);
         let step = ContactStep {
             vertices,
             triangles,
@@ -92,7 +92,7 @@ impl Ball {
                 viscosity: 0.02,
                 residual_rel: 1e-6,
                 rounds_max: 12,
-                newton_max: 40,
+                newton_max: 80,
                 ..StepSettings::default()
             },
         };
@@ -135,6 +135,15 @@ impl Ball {
         }
         bodies
     }
+}
+
+/// How near a triangle must be to be able to touch, as a run has it: what bodies and object move in the
+/// step, and a share of the object's size for what the surface moves, m.
+fn reach_of_step(state: &ObjectState, bodies: &[MovingBody]) -> f64 {
+    let h = 1.0 / RATE_HZ;
+    let way = bodies.iter().map(MovingBody::way).fold(0.0, f64::max);
+    let speed = state.velocity.norm() + 9.81 * h + state.angular_velocity.norm() * SIZE;
+    2.0 * way + 2.0 * h * speed + 0.02 * SIZE
 }
 
 impl Phase {
@@ -243,6 +252,6 @@ touch (spheres of 8 mm, friction 0.8, 1000 N/m), lifted by 40 mm and held for fi
 the contact problem in the server, on one thread, without the search for triangles near the fingers and without the wire; new contacts \
 pay for their columns, which a run's hints prefetch. `points_most` is the most points that press at once. A \
 step is `converged` where penetration is below 1e-6 of the object and the residual of the law of Signorini \
-and Coulomb below 1e-6 of the largest force, within 40 steps of Newton's method; what the others reach is in \
+and Coulomb below 1e-6 of the largest force, within 80 steps of Newton's method; what the others reach is in \
 `penetration_max_m` and `residual_rel_max`. Before times are told the ball must have been lifted, and the \
 forces on it must add up to its weight within 1e-3; `drift_m` is how far it sinks in the last four seconds.";

@@ -6,7 +6,7 @@ use super::configuration::{Configuration, Scene};
 use super::features::{Gap, MaterialPoint};
 use super::rigid_motion::Wrench;
 use crate::contact::coulomb::{ContactProblem, FrictionCone, PointForce, ProblemError};
-use crate::solve::condensed::{Relief, Response};
+use crate::solve::condensed::{FreeBody, Relief, Response};
 
 /// A point in the problem.
 pub(super) struct ProblemPoint {
@@ -30,6 +30,16 @@ impl ProblemPoint {
             arm: gap.place - scene.rigid.mass.centre,
             relief: response.body().relief_of(&point.nodes, &point.weights),
         }
+    }
+
+    /// Where the point is from where it would be if it stuck to the body, m, in the object's frame.
+    fn slip(
+        &self,
+        scene: &Scene<'_>,
+        response: &Response<'_>,
+        about: &Configuration,
+    ) -> Vector3<f64> {
+        self.gap.place - scene.stuck(response, &about.configured(), &self.point)
     }
 
     /// A force in the object's frame as normal and tangential parts.
@@ -65,36 +75,22 @@ pub(super) fn problem(
 /// `W`: place of every point per force at every point.
 fn operator(scene: &Scene<'_>, response: &Response<'_>, points: &[ProblemPoint]) -> DMatrix<f64> {
     let n = points.len();
-    let answered = scene.answered();
     let mut w = DMatrix::zeros(3 * n, 3 * n);
-    let mut moved = vec![Matrix3::zeros(); response.rows().len()];
-    let rows: Vec<[Option<usize>; 3]> =
-        points.iter().map(|p| p.point.nodes.map(|node| response.row_of(node))).collect();
+    // Held displacement of every point under the force of one.
+    let mut moved = vec![Matrix3::zeros(); n];
     for (j, force) in points.iter().enumerate() {
-        // Held displacement of all rows under the force of this point.
-        moved.fill(Matrix3::zeros());
-        for (&node, &weight) in force.point.nodes.iter().zip(&force.point.weights) {
-            if weight != 0.0 {
-                for (moved, block) in moved.iter_mut().zip(response.held(node)) {
-                    *moved += weight * block;
+        moved[j..].fill(Matrix3::zeros());
+        for (node, of_force) in force.point.weighted() {
+            let held = response.held(node);
+            for (moved, point) in moved[j..].iter_mut().zip(&points[j..]) {
+                for (row, weight) in point.point.weighted() {
+                    *moved += of_force * weight * held.at(row);
                 }
             }
         }
         // Symmetric: what lies above the diagonal is what lies below.
         for i in j..n {
-            let point = &points[i];
-            let mut elastic = response.body().relieved(&point.relief, &force.relief);
-            for (row, &weight) in rows[i].iter().zip(&point.point.weights) {
-                if let Some(row) = row {
-                    elastic += weight * moved[*row];
-                }
-            }
-            let mut rigid = scene.rigid.compliance(&point.arm, &force.arm);
-            if point.point.body == force.point.body {
-                let yields = scene.bodies[usize::from(force.point.body)].compliance;
-                rigid += yields * Matrix3::identity();
-            }
-            let block = point.frame.transpose() * (answered * elastic + rigid) * force.frame;
+            let block = block(scene, &points[i], force, &moved[i]);
             w.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
             if i != j {
                 w.fixed_view_mut::<3, 3>(3 * j, 3 * i).copy_from(&block.transpose());
@@ -105,6 +101,52 @@ fn operator(scene: &Scene<'_>, response: &Response<'_>, points: &[ProblemPoint])
         w.fixed_view_mut::<3, 3>(3 * j, 3 * j).copy_from(&symmetric);
     }
     w
+}
+
+/// One block of `W`, in the frames of its points, from the held displacement of the first.
+fn block(
+    scene: &Scene<'_>,
+    point: &ProblemPoint,
+    force: &ProblemPoint,
+    held: &Matrix3<f64>,
+) -> Matrix3<f64> {
+    let elastic = held + FreeBody::relieved(&point.relief, &force.relief);
+    let mut rigid = scene.rigid.compliance(&point.arm, &force.arm);
+    if point.point.body == force.point.body {
+        let yields = scene.bodies[usize::from(force.point.body)].compliance;
+        rigid += yields * Matrix3::identity();
+    }
+    point.frame.transpose() * (scene.answered() * elastic + rigid) * force.frame
+}
+
+/// How far the forces of a configuration are from obeying the law there, N: the largest residual of the
+/// natural map.
+///
+/// Shapes: `lambda` 3n, N, of the points.
+pub(super) fn residual(
+    scene: &Scene<'_>,
+    response: &Response<'_>,
+    about: &Configuration,
+    (points, lambda): (&[ProblemPoint], &[f64]),
+) -> f64 {
+    let of_point = |(point, force): (&ProblemPoint, &[f64])| {
+        let mut held = Matrix3::zeros();
+        for (node, of_force) in point.point.weighted() {
+            let columns = response.held(node);
+            for (row, weight) in point.point.weighted() {
+                held += of_force * weight * columns.at(row);
+            }
+        }
+        let own = block(scene, point, point, &held);
+        let slip = point.frame.transpose() * point.slip(scene, response, about);
+        let motion = PointForce::new(point.gap.distance, slip.y, slip.z);
+        let friction = scene.bodies[usize::from(point.point.body)].friction;
+        let force = PointForce::from_column_slice(force);
+        FrictionCone { friction }.residual(force, motion, 1.0 / own[(0, 0)])
+    };
+    let residuals = points.iter().zip(lambda.chunks_exact(3)).map(of_point);
+    // A maximum passes over what is no number; here it must not.
+    residuals.fold(0.0, |most, r| if r.is_nan() { f64::INFINITY } else { r.max(most) })
 }
 
 /// `b`: gap and slip of every point if no contact pressed, to first order about the configuration.
@@ -129,9 +171,8 @@ fn free_motion(
         let body = usize::from(point.body);
         let pushed = scene.bodies[body].compliance * about.body_forces[body];
         let change = shift + angle.cross(&p.arm) + elastic - pushed;
-        let slip = p.gap.place - scene.stuck(response, &at, point);
         let normal = p.frame.column(0);
-        let moved = p.frame.transpose() * (slip + change);
+        let moved = p.frame.transpose() * (p.slip(scene, response, about) + change);
         b.extend([p.gap.distance + normal.dot(&change), moved.y, moved.z]);
     }
     b

@@ -93,8 +93,8 @@ impl From<&HeldContact> for MaterialPoint {
     }
 }
 
-/// The deepest point of a triangle in a body, where the body is on the triangle's outer side; a half
-/// space is met by corners alone.
+/// The deepest point of a triangle in a body, where the triangle reaches into it and the body is on the
+/// triangle's outer side; a half space is met by corners alone.
 ///
 /// Shapes: `corners` in the object's frame.
 pub(super) fn deepest(
@@ -106,6 +106,12 @@ pub(super) fn deepest(
         return None;
     }
     let in_body = corners.map(|c| object_from_body.inverse_transform_point(&Point3::from(c)));
+    // No point of the triangle is nearer to the body than its middle by more than its distance from there.
+    let middle = Point3::from((in_body[0].coords + in_body[1].coords + in_body[2].coords) / 3.0);
+    let reach = in_body.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max);
+    if shape.distance(&middle).distance > reach {
+        return None;
+    }
     let deepest = shape.deepest(&in_body);
     let out_of_body = object_from_body.rotation * deepest.distance.normal;
     let [a, b, c] = corners;

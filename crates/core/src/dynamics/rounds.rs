@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use super::assemble::{ProblemPoint, problem};
+use super::assemble::{ProblemPoint, problem, residual};
 use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint};
 use super::pool::{Pool, force_at};
 use super::settings::StepSettings;
 use super::state::{HeldContact, ObjectState};
 use super::step_error::StepError;
-use crate::contact::coulomb::{ContactProblem, SolveBudget};
+use crate::contact::coulomb::SolveBudget;
 use crate::solve::condensed::Response;
 
 /// Points nearer to a body than this share of the object's size are in the problem from the start.
@@ -44,10 +44,9 @@ pub(super) struct Rounds<'s, 'r> {
     pub response: &'r mut Response<'s>,
 }
 
-/// A contact problem and what it begins with.
+/// The points of a contact problem, and how well the configuration that it is about answers it.
 struct Round {
     points: Vec<ProblemPoint>,
-    problem: ContactProblem,
     /// Forces of the configuration it is about.
     lambda: Vec<f64>,
     residual: f64,
@@ -112,7 +111,8 @@ impl Rounds<'_, '_> {
                 residual: INEXACT * round.residual,
                 attempts_max: ATTEMPTS,
             };
-            let solution = round.problem.solve(&round.lambda, budget);
+            let problem = problem(self.scene, self.response, &about, &round.points)?;
+            let solution = problem.solve(&round.lambda, budget);
             rounds += 1;
             sweeps += solution.sweeps;
             newton_steps += solution.newton_steps;
@@ -134,8 +134,8 @@ impl Rounds<'_, '_> {
         Pool { corners: corners.into_iter().map(corner).collect(), inside: Vec::new() }
     }
 
-    /// The contact problem about a configuration, and how well the configuration answers it. Points
-    /// that are missing join the pool.
+    /// The points of the contact problem about a configuration, and how well the configuration answers
+    /// it. Points that are missing join the pool.
     fn round(
         &mut self,
         about: &mut Configuration,
@@ -176,9 +176,8 @@ impl Rounds<'_, '_> {
             lambda.extend(point.local(&force).iter());
             points.push(point);
         }
-        let problem = problem(scene, self.response, about, &points)?;
-        let residual = problem.residual_of(&lambda, &problem.motion(&lambda));
-        Ok(Round { points, problem, lambda, residual, penetration, has_moved })
+        let residual = residual(scene, self.response, about, (&points, &lambda));
+        Ok(Round { points, lambda, residual, penetration, has_moved })
     }
 }
 

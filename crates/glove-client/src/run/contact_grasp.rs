@@ -125,7 +125,7 @@ const LOST_DEPTH: f64 = 0.1;
 const LOST_WAY: f64 = 0.5;
 /// Effort of a step in a run: a later tick asks again anyway.
 const ROUNDS_MAX: u32 = 12;
-const NEWTON_MAX: u32 = 40;
+const NEWTON_MAX: u32 = 80;
 /// Exact enough to be seen and felt; the report of every step says what was reached.
 const PENETRATION_REL: f64 = 1e-6;
 const RESIDUAL_REL: f64 = 1e-6;

@@ -9,6 +9,7 @@ mod solution;
 mod splitting;
 #[cfg(test)]
 mod sweeps;
+mod working_set;
 
 pub use cone::{FrictionCone, PointForce};
 pub use problem::{ContactProblem, ProblemError};

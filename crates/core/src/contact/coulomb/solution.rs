@@ -1,4 +1,4 @@
-//! The solution of a contact problem: Newton's method, with sweeps of a splitting where it strays.
+//! The solution of a contact problem, all points at once: Newton's method, with sweeps of a splitting where it strays.
 
 use super::cone::PointForce;
 use super::newton::Proximal;
@@ -77,14 +77,10 @@ const LEFT_TO_BEGIN_ANEW: f64 = 0.2;
 const RUNAWAY: f64 = 10.0;
 
 impl ContactProblem {
-    /// The forces that obey the law of Signorini and Coulomb: exactly that law, no relaxation of it.
+    /// The forces of all points at once, from some to begin with, each in its cone.
     ///
-    /// Shapes: `warm` 3n forces to begin with, those of the last tick, N.
-    pub fn solve(&self, warm: &[f64], budget: SolveBudget) -> Solution {
-        let lambda = match warm.len() == 3 * self.point_count() {
-            true => self.projected(warm),
-            false => vec![0.0; 3 * self.point_count()],
-        };
+    /// Shapes: `lambda` 3n, N.
+    pub(super) fn solve_whole(&self, lambda: Vec<f64>, budget: SolveBudget) -> Solution {
         let mut now = self.forces(lambda);
         let mut best = now.clone();
         let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
@@ -172,11 +168,18 @@ struct Forces {
 impl Forces {
     /// Residual that is small enough, N.
     fn allowed(&self, budget: &SolveBudget) -> f64 {
-        budget.residual.max(budget.residual_rel * force_max(&self.lambda))
+        budget.allowed(&self.lambda)
     }
 
     fn is_within(&self, budget: &SolveBudget) -> bool {
         self.residual <= self.allowed(budget)
+    }
+}
+
+impl SolveBudget {
+    /// Residual that is small enough for some forces, N.
+    pub(super) fn allowed(&self, lambda: &[f64]) -> f64 {
+        self.residual.max(self.residual_rel * force_max(lambda))
     }
 }
 

@@ -170,23 +170,26 @@ impl FreeBody {
     ///
     /// Shapes: `nodes` and `weights` of a point. Frame: the object's.
     pub fn relief_of(&self, nodes: &[u32; 3], weights: &[f64; 3]) -> Relief {
-        let mut relief = Relief { acceleration: Matrix6x3::zeros(), response: Matrix3x6::zeros() };
+        let mut relief = Relief {
+            acceleration: Matrix6x3::zeros(),
+            response: Matrix3x6::zeros(),
+            left: Matrix6x3::zeros(),
+        };
         for (&node, &weight) in nodes.iter().zip(weights) {
             if weight != 0.0 {
                 relief.acceleration += weight * self.acceleration(node as usize);
                 relief.response += weight * self.response[node as usize];
             }
         }
+        relief.left = self.own * relief.acceleration - relief.response.transpose();
         relief
     }
 
     /// The change of the compliance between two points by inertia: what is added to the held one.
     ///
     /// Units: m/N. Shapes: rows displacement at `a`, columns force at `b`.
-    pub fn relieved(&self, a: &Relief, b: &Relief) -> Matrix3<f64> {
-        let of_own = self.own * b.acceleration;
-        -a.response * b.acceleration
-            + a.acceleration.transpose() * (of_own - b.response.transpose())
+    pub fn relieved(a: &Relief, b: &Relief) -> Matrix3<f64> {
+        a.acceleration.transpose() * b.left - a.response * b.acceleration
     }
 
     /// Displacement of node `a` under a unit force along each axis at the node of some columns.
@@ -217,13 +220,21 @@ impl FreeBody {
             answered += self.response[*node as usize].transpose() * force;
         }
         let mean = self.inverse * (answered - self.own * acceleration);
-        displacement.par_iter_mut().zip(nodes).for_each(|(u, &node)| {
+        let relieve = |(u, &node): (&mut [f64; 3], &u32)| {
             let node = node as usize;
             let change = self.response[node] * acceleration + self.motions(node) * mean;
             (0..3).for_each(|axis| u[axis] -= change[axis]);
-        });
+        };
+        // Other threads are asked only where that costs less than the work.
+        match nodes.len() > NODES_ALONE {
+            true => displacement.par_iter_mut().zip(nodes).for_each(relieve),
+            false => displacement.iter_mut().zip(nodes).for_each(relieve),
+        }
     }
 }
+
+/// Nodes that one thread relieves by itself.
+const NODES_ALONE: usize = 1024;
 
 /// How inertia answers a force at a point, and how the held body answers inertia there.
 #[derive(Clone, Copy, Debug)]
@@ -232,6 +243,9 @@ pub struct Relief {
     acceleration: Matrix6x3<f64>,
     /// Displacement of the point under `M R`, held.
     response: Matrix3x6<f64>,
+    /// What the mean of the displacements leaves of both: `Rᵀ M K⁻ M R` times the acceleration, less the
+    /// response.
+    left: Matrix6x3<f64>,
 }
 
 /// A quarter of the volume of every element for each of its corners.

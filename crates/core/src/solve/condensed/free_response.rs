@@ -31,8 +31,7 @@ pub struct Elasticity<'a> {
 pub struct Response<'a> {
     elasticity: Elasticity<'a>,
     rows: Vec<u32>,
-    /// Held compliance of the rows, by node of the force.
-    held: BTreeMap<u32, Vec<Matrix3<f64>>>,
+    /// Columns of the held compliance, by node of the force.
     kept: BTreeMap<u32, Arc<ContactColumns>>,
 }
 
@@ -42,7 +41,7 @@ const TASK_ROWS: usize = 512;
 impl<'a> Response<'a> {
     /// Shapes: `rows` ascending nodes.
     pub fn new(elasticity: Elasticity<'a>, rows: Vec<u32>) -> Self {
-        Self { elasticity, rows, held: BTreeMap::new(), kept: BTreeMap::new() }
+        Self { elasticity, rows, kept: BTreeMap::new() }
     }
 
     /// The nodes whose displacement can be asked for, ascending.
@@ -69,21 +68,16 @@ impl<'a> Response<'a> {
         }
         let contacts: Vec<Contact> = missing.iter().map(|&node| Contact::Node(node)).collect();
         let Elasticity { base, columns, .. } = self.elasticity;
-        for (node, columns) in missing.into_iter().zip(columns.of_contacts(base, &contacts)?) {
-            let block =
-                |&row: &u32| Matrix3::from_fn(|r, c| columns.fields[c][3 * row as usize + r]);
-            self.held.insert(node, self.rows.iter().map(block).collect());
-            self.kept.insert(node, columns);
-        }
+        self.kept.extend(missing.into_iter().zip(columns.of_contacts(base, &contacts)?));
         Ok(())
     }
 
-    /// Held compliance of all rows under forces at a node.
+    /// Held compliance of all nodes under forces at one.
     ///
     /// # Panics
     /// If the node was not named to [`Response::need`].
-    pub fn held(&self, node: u32) -> &[Matrix3<f64>] {
-        &self.held[&node]
+    pub fn held(&self, node: u32) -> HeldCompliance<'_> {
+        HeldCompliance { fields: self.kept[&node].fields.each_ref().map(Vec::as_slice) }
     }
 
     /// The free body.
@@ -97,10 +91,7 @@ impl<'a> Response<'a> {
     pub fn displacement(&self, forces: &[NodeForce]) -> Vec<Vector3<f64>> {
         let mut u = vec![[0.0; 3]; self.rows.len()];
         for (node, force) in forces {
-            for (u, block) in u.iter_mut().zip(self.held(*node)) {
-                let moved = block * force;
-                (0..3).for_each(|axis| u[axis] += moved[axis]);
-            }
+            self.held(*node).add(force, &self.rows, &mut u);
         }
         self.body().relieve(forces, &self.rows, &mut u);
         u.into_iter().map(Vector3::from).collect()
@@ -111,19 +102,11 @@ impl<'a> Response<'a> {
     /// Units: N, m. Frame: the object's.
     pub fn displacement_of(&self, nodes: &[u32], forces: &[NodeForce]) -> Vec<[f64; 3]> {
         let mut u = vec![[0.0; 3]; nodes.len()];
-        let columns: Vec<(&ContactColumns, &Vector3<f64>)> =
-            forces.iter().map(|(node, force)| (&*self.kept[node], force)).collect();
+        let columns: Vec<(HeldCompliance<'_>, &Vector3<f64>)> =
+            forces.iter().map(|(node, force)| (self.held(*node), force)).collect();
         u.par_chunks_mut(TASK_ROWS).zip(nodes.par_chunks(TASK_ROWS)).for_each(|(u, nodes)| {
             for (columns, force) in &columns {
-                let [x, y, z] = &columns.fields;
-                for (u, &node) in u.iter_mut().zip(nodes) {
-                    let at = 3 * node as usize;
-                    for axis in 0..3 {
-                        u[axis] += force.x * x[at + axis]
-                            + force.y * y[at + axis]
-                            + force.z * z[at + axis];
-                    }
-                }
+                columns.add(force, nodes, u);
             }
         });
         self.body().relieve(forces, nodes, &mut u);
@@ -140,5 +123,31 @@ impl<'a> Response<'a> {
         }
         residual += self.body().residual(forces);
         if square > 0.0 { residual / square.sqrt() } else { 0.0 }
+    }
+}
+
+/// Displacements of all nodes of the held body under a unit force along each axis at one node.
+///
+/// Units: m/N.
+#[derive(Clone, Copy)]
+pub struct HeldCompliance<'a> {
+    fields: [&'a [f64]; 3],
+}
+
+impl HeldCompliance<'_> {
+    /// Displacement of a node, rows, by axis of the force, columns.
+    pub fn at(&self, node: u32) -> Matrix3<f64> {
+        Matrix3::from_fn(|row, column| self.fields[column][3 * node as usize + row])
+    }
+
+    /// Adds what a force does to some nodes.
+    fn add(&self, force: &Vector3<f64>, nodes: &[u32], displacement: &mut [[f64; 3]]) {
+        let [x, y, z] = self.fields;
+        for (u, &node) in displacement.iter_mut().zip(nodes) {
+            let at = 3 * node as usize;
+            for axis in 0..3 {
+                u[axis] += force.x * x[at + axis] + force.y * y[at + axis] + force.z * z[at + axis];
+            }
+        }
     }
 }
