@@ -1,6 +1,7 @@
 """A server that is killed, stopped, silent or forgetful: an error at once, and a way on."""
 
 import os
+import pathlib
 import signal
 import threading
 import time
