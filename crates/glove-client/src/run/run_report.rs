@@ -351,11 +351,28 @@ impl RunReport {
         }
     }
 
+    /// The ticks of which nothing has become, and why. A tick before one that was answered did not wait
+    /// for the end of the run: its answer was lost with the server, or a newer request took its place.
+    fn open_ticks(&self) -> Vec<(u64, Unanswered)> {
+        let answered = self.played.iter().filter(|record| record.solve.is_some());
+        let last_answered = answered.map(|record| record.tick).max();
+        let lost =
+            self.events.iter().filter(|e| e.kind == "server" && e.what.starts_with("lost: "));
+        let last_lost = lost.map(|event| event.tick).max();
+        let why = |tick: u64| match (last_answered > Some(tick), last_lost >= Some(tick)) {
+            (false, _) => Unanswered::RunEnded,
+            (true, true) => Unanswered::ServerLost,
+            (true, false) => Unanswered::AnswerLate,
+        };
+        let open = self.played.iter().filter(|record| record.is_open());
+        open.map(|record| (record.tick, why(record.tick))).collect()
+    }
+
     /// Fills the summary. What is not answered by now never is.
     pub fn finish(&mut self, faults: DeviceFaults, budget: &TickBudget) {
-        let open = self.played.iter().filter(|record| record.is_open());
-        let open: Vec<u64> = open.map(|record| record.tick).collect();
-        open.into_iter().for_each(|tick| self.add_unanswered(tick, Unanswered::RunEnded));
+        for (tick, why) in self.open_ticks() {
+            self.add_unanswered(tick, why);
+        }
         self.frames_missing = self.played.why_missing().map(str::to_owned);
         let (counted, answers) = (&self.summary, &self.answers);
         self.summary = RunSummary {
@@ -399,82 +416,4 @@ impl RunReport {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pace::tick_budget::Priority;
-
-    fn report() -> RunReport {
-        let object = ObjectSummary {
-            name: "cube".to_owned(),
-            nodes: 8,
-            tets: 6,
-            size_m: 0.1,
-            notes: vec![],
-        };
-        let contact = ContactModel::default();
-        RunReport::new(object, "none".to_owned(), "none".to_owned(), Pace::Free, contact)
-    }
-
-    fn tick(report: &mut RunReport, tick: u64, skipped: u64, outcome: TickOutcome) {
-        report.add(Due { tick, skipped }, 0.01 * tick as f64, &outcome);
-    }
-
-    fn deforming() -> TickOutcome {
-        TickOutcome { state: Some(StateName::Deforming), ..TickOutcome::default() }
-    }
-
-    #[test]
-    fn every_deforming_tick_is_answered_or_has_one_reason() {
-        let mut report = report();
-        let free = TickOutcome { state: Some(StateName::Free), ..TickOutcome::default() };
-        tick(&mut report, 0, 0, free.clone());
-        // Missed while nothing is deformed: no answer is missing.
-        tick(&mut report, 4, 3, deforming());
-        // Missed while something is.
-        let solve = SolveSummary::new(&softgrasp_protocol::SolveReport::default(), 0.5);
-        let answered = TickOutcome { answers: vec![(4, solve)], ..deforming() };
-        tick(&mut report, 7, 2, answered);
-        let late = (7, Unanswered::AnswerLate);
-        tick(&mut report, 8, 0, TickOutcome { unanswered: vec![late, late], ..deforming() });
-        tick(&mut report, 9, 0, free);
-        report.add_skipped(2);
-        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
-        let s = &report.summary;
-        assert_eq!((report.ticks, s.ticks_skipped), (12, 7));
-        let mut counts = UnansweredCounts::default();
-        counts.add(Unanswered::TickSkipped, 2);
-        counts.add(Unanswered::AnswerLate, 1);
-        counts.add(Unanswered::RunEnded, 1);
-        assert_eq!(s.unanswered, counts);
-        assert_eq!(s.deforming_ticks, s.solves as u64 + s.unanswered.total());
-        assert_eq!(report.failure(), None);
-    }
-
-    #[test]
-    fn age_of_a_shape_is_the_time_since_the_tick_that_asked_for_it() {
-        let mut report = report();
-        for (number, shown_tick) in [(0, None), (1, Some(0)), (2, Some(0)), (3, Some(3))] {
-            tick(&mut report, number, 0, TickOutcome { shown_tick, ..deforming() });
-        }
-        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
-        let RunSummary { shown_age_ms_p50, shown_age_ms_max, .. } = report.summary;
-        // Quantiles are good to 0.1 %.
-        assert!((shown_age_ms_p50.unwrap() - 10.0).abs() < 1e-2);
-        assert!((shown_age_ms_max.unwrap() - 20.0).abs() < 2e-2);
-    }
-
-    #[test]
-    fn run_without_any_answer_says_what_the_server_refused() {
-        let mut report = report();
-        let refused = LoopEvent::Server("refused the model (BadRequest): too soft".to_owned());
-        let unanswered = vec![(0, Unanswered::Refused)];
-        tick(&mut report, 0, 0, TickOutcome { events: vec![refused], unanswered, ..deforming() });
-        report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
-        let why = report.failure().unwrap();
-        assert_eq!(
-            why,
-            "none of 1 deforming ticks was answered: the server refused the model (BadRequest): \
-             too soft"
-        );
-    }
-}
+mod tests;
