@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use softgrasp_core::dynamics::{
-    ContactStep, MovingBody, ObjectState, StepOutcome, StepSettings, near_triangles,
+    ContactStep, MovingBody, ObjectState, StepOutcome, StepSettings, near_triangles, reach_of_step,
 };
 use softgrasp_core::fem::{Element, Material};
 use softgrasp_core::mesh::{BuiltIn, Surface, generate};
@@ -77,7 +77,11 @@ impl Ball {
     ) -> Result<(f64, StepOutcome), ReportError> {
         let vertices = self.model.mesh().vertices();
         let triangles = &self.surface.triangles;
-        let reach = reach_of_step(state, bodies);
+        // As near as a run looks.
+        let h = 1.0 / RATE_HZ;
+        let speed = state.velocity.norm() + 9.81 * h;
+        let turning = state.angular_velocity.norm();
+        let reach = reach_of_step(SIZE, bodies, h, (speed, turning));
         let near = near_triangles(vertices, triangles, &state.world_from_object, bodies, reach);
         let step = ContactStep {
             vertices,
@@ -135,15 +139,6 @@ impl Ball {
         }
         bodies
     }
-}
-
-/// How near a triangle must be to be able to touch, as a run has it: what bodies and object move in the
-/// step, and a share of the object's size for what the surface moves, m.
-fn reach_of_step(state: &ObjectState, bodies: &[MovingBody]) -> f64 {
-    let h = 1.0 / RATE_HZ;
-    let way = bodies.iter().map(MovingBody::way).fold(0.0, f64::max);
-    let speed = state.velocity.norm() + 9.81 * h + state.angular_velocity.norm() * SIZE;
-    2.0 * way + 2.0 * h * speed + 0.02 * SIZE
 }
 
 impl Phase {

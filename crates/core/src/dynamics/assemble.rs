@@ -6,7 +6,7 @@ use super::configuration::{Configuration, Scene};
 use super::features::{Gap, MaterialPoint};
 use super::rigid_motion::Wrench;
 use crate::contact::coulomb::{ContactProblem, FrictionCone, PointForce, ProblemError};
-use crate::solve::condensed::{FreeBody, Relief, Response};
+use crate::solve::condensed::{FreeBody, HeldCompliance, Relief, Response};
 
 /// A point in the problem.
 pub(super) struct ProblemPoint {
@@ -42,6 +42,18 @@ impl ProblemPoint {
         self.gap.place - scene.stuck(response, &about.configured(), &self.point)
     }
 
+    /// What Coulomb's law allows the body that the point touches.
+    fn cone(&self, scene: &Scene<'_>) -> FrictionCone {
+        FrictionCone { friction: scene.bodies[usize::from(self.point.body)].friction }
+    }
+
+    /// Adds the point's held displacement under a share of the forces at the node of some columns, m/N.
+    fn add_held(&self, columns: &HeldCompliance<'_>, share: f64, held: &mut Matrix3<f64>) {
+        for (node, weight) in self.point.weighted() {
+            *held += share * weight * columns.at(node);
+        }
+    }
+
     /// A force in the object's frame as normal and tangential parts.
     pub fn local(&self, force: &Vector3<f64>) -> PointForce {
         self.frame.transpose() * force
@@ -67,8 +79,7 @@ pub(super) fn problem(
 ) -> Result<ContactProblem, ProblemError> {
     let w = operator(scene, response, points);
     let b = free_motion(scene, response, about, points);
-    let friction = |p: &ProblemPoint| scene.bodies[usize::from(p.point.body)].friction;
-    let cones = points.iter().map(|p| FrictionCone { friction: friction(p) }).collect();
+    let cones = points.iter().map(|point| point.cone(scene)).collect();
     ContactProblem::try_new(w, b, cones)
 }
 
@@ -81,11 +92,9 @@ fn operator(scene: &Scene<'_>, response: &Response<'_>, points: &[ProblemPoint])
     for (j, force) in points.iter().enumerate() {
         moved[j..].fill(Matrix3::zeros());
         for (node, of_force) in force.point.weighted() {
-            let held = response.held(node);
+            let columns = response.held(node);
             for (moved, point) in moved[j..].iter_mut().zip(&points[j..]) {
-                for (row, weight) in point.point.weighted() {
-                    *moved += of_force * weight * held.at(row);
-                }
+                point.add_held(&columns, of_force, moved);
             }
         }
         // Symmetric: what lies above the diagonal is what lies below.
@@ -132,17 +141,13 @@ pub(super) fn residual(
     let of_point = |(point, force): (&ProblemPoint, &[f64])| {
         let mut held = Matrix3::zeros();
         for (node, of_force) in point.point.weighted() {
-            let columns = response.held(node);
-            for (row, weight) in point.point.weighted() {
-                held += of_force * weight * columns.at(row);
-            }
+            point.add_held(&response.held(node), of_force, &mut held);
         }
         let own = block(scene, point, point, &held);
         let slip = point.frame.transpose() * point.slip(scene, response, about);
         let motion = PointForce::new(point.gap.distance, slip.y, slip.z);
-        let friction = scene.bodies[usize::from(point.point.body)].friction;
         let force = PointForce::from_column_slice(force);
-        FrictionCone { friction }.residual(force, motion, 1.0 / own[(0, 0)])
+        point.cone(scene).residual(force, motion, 1.0 / own[(0, 0)])
     };
     let residuals = points.iter().zip(lambda.chunks_exact(3)).map(of_point);
     // A maximum passes over what is no number; here it must not.

@@ -37,7 +37,7 @@ mod tests;
 
 pub use bodies::MovingBody;
 pub use features::Candidate;
-pub use near::near_triangles;
+pub use near::{near_triangles, reach_of_step};
 pub use outcome::{BodyLoad, PointContact, StepOutcome};
 pub use rigid_motion::MassProperties;
 pub use settings::StepSettings;

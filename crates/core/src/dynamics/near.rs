@@ -1,9 +1,27 @@
-//! Triangles near bodies by looking at all of them: the oracle of every quicker search.
+//! Which triangles can touch in a step: how near they must be, and a search that looks at all of them,
+//! the oracle of every quicker one.
 
 use nalgebra::{Isometry3, Point3};
 
 use super::bodies::MovingBody;
 use super::features::Candidate;
+
+/// What lies farther from a body than this share of the object's size is never asked about.
+const MARGIN_OF_SIZE: f64 = 0.02;
+
+/// How near a triangle must be to be able to touch: what bodies and object move in the step, and a share
+/// of the object's extent for what the surface moves.
+///
+/// Units: m, s; `speed` of the object's middle in the step at most m/s, `turning` rad/s.
+pub fn reach_of_step(
+    extent: f64,
+    bodies: &[MovingBody],
+    seconds: f64,
+    (speed, turning): (f64, f64),
+) -> f64 {
+    let way = bodies.iter().map(MovingBody::way).fold(0.0, f64::max);
+    2.0 * way + 2.0 * seconds * (speed + turning * extent) + MARGIN_OF_SIZE * extent
+}
 
 /// Triangles whose distance from a body at the end of the step can be below a margin.
 ///

@@ -1,7 +1,7 @@
 //! Makes contact frames: the surface as it is, the bodies near it, and what can touch in a step.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
-use softgrasp_core::dynamics::{Candidate, MovingBody, near_triangles};
+use softgrasp_core::dynamics::{self, Candidate, MovingBody, near_triangles};
 use softgrasp_protocol::{
     BodyMotion, BodyShape, ContactAsk, ContactFrame, ModelHash, NodeChoice, ObjectState, Pose,
     Precision,
@@ -29,9 +29,6 @@ pub struct StepObject<'a> {
     /// Nodes whose displacements are wanted.
     pub nodes: NodeChoice,
 }
-
-/// What lies farther from a body than this share of the object's size is never asked about.
-const MARGIN_OF_SIZE: f64 = 0.02;
 
 impl StepObject<'_> {
     /// The frame of one step from a state; what can touch is found by looking at all triangles.
@@ -77,8 +74,7 @@ impl StepObject<'_> {
     }
 }
 
-/// How near a triangle must be to be able to touch: what bodies and object move in the step, and a share
-/// of the object's extent for what the surface moves.
+/// How near a triangle must be to be able to touch in a step that is asked for.
 ///
 /// Units: m.
 pub fn reach_of_step(
@@ -88,10 +84,9 @@ pub fn reach_of_step(
     ask: &ContactAsk,
 ) -> f64 {
     let norm = |v: &[f64; 3]| v[0].hypot(v[1]).hypot(v[2]);
-    let (h, speed) = (ask.seconds, norm(&state.velocity) + norm(&ask.gravity) * ask.seconds);
-    let turning = norm(&state.angular_velocity) * extent;
-    let way = bodies.iter().map(MovingBody::way).fold(0.0, f64::max);
-    2.0 * way + 2.0 * h * (speed + turning) + MARGIN_OF_SIZE * extent
+    let speed = norm(&state.velocity) + norm(&ask.gravity) * ask.seconds;
+    let turning = norm(&state.angular_velocity);
+    dynamics::reach_of_step(extent, bodies, ask.seconds, (speed, turning))
 }
 
 /// Largest distance of a node from the first one, m.

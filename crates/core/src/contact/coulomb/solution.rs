@@ -72,7 +72,6 @@ const SPLITTING_SHARES: [f64; 3] = [1.0, 0.03, 0.005];
 const NEAR: f64 = 0.1;
 /// The splitting begins anew at what Newton's method found where that left no more than this.
 const LEFT_TO_BEGIN_ANEW: f64 = 0.2;
-
 /// Over the largest force, or a newton, a residual that is no approximation of anything.
 const RUNAWAY: f64 = 10.0;
 
@@ -106,13 +105,15 @@ impl ContactProblem {
             }
             let of_turn = SPLITTING_SHARES[turn % SPLITTING_SHARES.len()];
             match &mut splitting {
-                Some(splitting) => splitting.change_share(of_turn),
+                Some(splitting) => {
+                    splitting.change_share(of_turn);
+                    if begins_anew {
+                        splitting.begin_at(&now.lambda);
+                    }
+                }
                 None => splitting = Splitting::new(self, &now.lambda, of_turn),
             }
             let Some(splitting) = &mut splitting else { break };
-            if begins_anew {
-                splitting.begin_at(&now.lambda);
-            }
             now = self.forces(splitting.advance(SWEEPS));
             sweeps += SWEEPS;
         }

@@ -45,5 +45,5 @@ pub use certificate::{Certificate, Delivery};
 pub use columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
 pub use contact_set::{ContactAnswer, ContactSet};
 pub use free_body::{FreeBody, Relief};
-pub use free_response::{Elasticity, NodeForce, Response};
+pub use free_response::{Elasticity, HeldCompliance, NodeForce, Response};
 pub use touched::{Contact, Touched};
