@@ -12,7 +12,7 @@ XVFB_PID=""
 start_display() {
     local numbers="$WORK/display"
     : > "$numbers"
-    Xvfb -displayfd 3 -screen 0 1280x800x24 -nolisten tcp 3> "$numbers" 2> "$WORK/xvfb.log" &
+    Xvfb -displayfd 3 -screen 0 1280x800x24 -nolisten tcp -noreset 3> "$numbers" 2> "$WORK/xvfb.log" &
     XVFB_PID=$!
     wait_until 20 "the X server" test -s "$numbers"
     DISPLAY=":$(cat "$numbers")"
