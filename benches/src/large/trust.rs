@@ -137,7 +137,21 @@ mod tests {
         let count = judged.ratios.len();
         assert!(count > 150, "{count} frames are judged");
         assert!(judged.above * 100 <= count, "{} of {count} above", judged.above);
-        assert!(judged.above_twice * 150 <= count, "{} of {count} above twice", judged.above_twice);
+        assert_eq!(judged.above_twice, 0, "of {count} above twice");
         assert_eq!(judged.over_budget, 0, "above the budget");
+    }
+
+    /// Near its end a branch is soft, and one short correction among long ones was taken for the last:
+    /// errors were 1.2 and 2.5 times what was told.
+    #[test]
+    fn a_correction_that_is_short_by_chance_near_the_end_of_a_branch_is_not_taken_for_the_last() {
+        let (_, mesh) = drawn_object(2, 400).unwrap();
+        let trial = Trial::draw(mesh, 27_010).unwrap();
+        let reference = Reference::follow(&trial).unwrap();
+        assert_eq!(reference.len(), trial.frames);
+        for budget in [1e-2, 1e-6] {
+            let judged = judge(&trial, &reference, budget).unwrap();
+            assert_eq!(judged.above, 0, "budget {budget}: {:?}", judged.ratios);
+        }
     }
 }

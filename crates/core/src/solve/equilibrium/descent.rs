@@ -51,6 +51,8 @@ struct Tangent {
 
 /// Largest change of an element's deformation gradient in one piece.
 const GRADIENT_STEP: f64 = 0.35;
+/// The same times the root of a material's first Lamé constant over its second.
+const GRADIENT_STEP_OF_STIFF_VOLUME: f64 = 5.0;
 /// Smallest piece of a motion.
 const PIECE_MIN: f64 = 1.0 / 4096.0;
 /// Pieces that may fail one after the other.
@@ -148,10 +150,23 @@ impl Path {
     fn share_within_reach(&self, led: &[f64], left: f64, cap: f64) -> f64 {
         // What is drawn out already may be drawn out by the same ratio again.
         let step_max = GRADIENT_STEP * self.elements.summary(&self.q).stretch_max.max(1.0);
-        let share = cap.min(step_max * left / self.elements.gradient_change_max(led));
+        let share = cap.min(
+            step_max.min(self.step_of_volume()) * left / self.elements.gradient_change_max(led),
+        );
         let part: Vec<f64> = led.iter().map(|d| d * (share / left).min(1.0)).collect();
         let limit = self.elements.step_limit(&self.q, &part);
         if limit < 1.0 { 0.8 * limit * share } else { share }
+    }
+
+    /// Largest change of an element's deformation gradient that keeps its volume well enough: a tangent
+    /// keeps volume to first order only, and what is left, squared, is held against by λ/μ.
+    fn step_of_volume(&self) -> f64 {
+        let poisson = self.elements.poisson_max();
+        let first_over_second = 2.0 * poisson / (1.0 - 2.0 * poisson);
+        match first_over_second > 0.0 {
+            true => GRADIENT_STEP_OF_STIFF_VOLUME / first_over_second.sqrt(),
+            false => f64::INFINITY,
+        }
     }
 
     /// Goes down from a shape that is no minimum, a saddle for one; says whether it had to.

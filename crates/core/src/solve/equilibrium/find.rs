@@ -12,7 +12,7 @@ use crate::solve::vectors::largest;
 /// Pieces of the motion that may fail before energy is minimised instead.
 const FAILED_PIECES_MAX: u32 = 6;
 /// Operations that may be spent on factors of descents: a few seconds.
-const OPERATIONS_MAX: f64 = 3e10;
+const OPERATIONS_MAX: f64 = 6e10;
 /// Operations of a tangent for each node, about.
 const OPERATIONS_OF_A_NODE: f64 = 5e4;
 /// Factors of descents at least and at most.
@@ -91,7 +91,9 @@ impl Path {
             let counts = self.counts;
             self.restore(before);
             self.counts = counts;
-            let patience = Patience { failed_pieces: 40, solves: solves + SOLVES_OF_SMALL_PIECES };
+            let more = (OPERATIONS_OF_SMALL_PIECES / (OPERATIONS_OF_A_CORRECTION * nodes)) as u32;
+            let solves = solves + more.min(SOLVES_OF_SMALL_PIECES);
+            let patience = Patience { failed_pieces: 40, solves };
             if let Ok(found) = self.follow(goal, wish, patience)
                 && self.is_stable(&mut purse).is_ok_and(|is_stable| is_stable)
             {
@@ -156,8 +158,11 @@ impl Path {
 
 /// Poisson's ratio from which on small pieces are tried at last.
 const POISSON_OF_SMALL_PIECES: f64 = 0.48;
-/// Solves that may go into them.
+/// Solves and operations that may go into them.
 const SOLVES_OF_SMALL_PIECES: u32 = 1500;
+const OPERATIONS_OF_SMALL_PIECES: f64 = 1e10;
+/// Operations of a correction for each node, about.
+const OPERATIONS_OF_A_CORRECTION: f64 = 2e4;
 /// Estimated error of the first of two parts.
 const PART_ERROR_REL: f64 = 1e-3;
 /// Pieces up to which a motion that was followed has not left the stable branch.

@@ -63,6 +63,10 @@ impl Contraction {
 /// frame in 200 was wrong by more than twice what is expected, and is one in 1500 by more than twice what
 /// is told.
 const SAFETY: f64 = 2.5;
+/// A residual, relative to the forces that hold the body, leaves a displacement off by so much of the
+/// largest one at least. A short correction among long ones says little: where a branch nears its end
+/// one in ten steps is short by chance, and only the residual knows.
+const ERROR_OF_RESIDUAL: f64 = 10.0;
 
 /// How a settling ended.
 pub(super) struct Settled {
@@ -195,6 +199,7 @@ impl Path {
             (evaluated, balance) = (after, after_balance);
             error = if share == 1.0 { contraction.left_after(largest) } else { largest };
             error = SAFETY * (error + self.left_along_soft(&balance.residual));
+            error = error.max(ERROR_OF_RESIDUAL * balance.residual_rel * self.size());
             energy_error = contraction.left_after(size);
             let is_good = |tolerance: f64| error <= tolerance * self.size();
             if wish.error_rel.is_some_and(is_good) {
