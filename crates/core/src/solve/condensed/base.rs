@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::rigid::{Mode, Rigid};
 use super::rounding::asymmetry;
+use super::surface_columns::SurfaceNodes;
 use crate::fem::Stiffness;
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::definite::{hold, motions};
@@ -30,6 +31,8 @@ pub struct Base {
     pub(super) stiffest: f64,
     /// Bound on how far a symmetric matrix of entries of `K` is from its symmetric part, N/m.
     pub(super) asymmetry: f64,
+    /// The nodes of the boundary surface.
+    pub(super) surface: SurfaceNodes,
     /// The modes as one basis; `None` without modes or where the basis is not proven to be one.
     pub(super) rigid: Option<Rigid>,
     /// Skeel's condition number of `K_B`, once somebody has asked for it.
@@ -200,6 +203,7 @@ impl Base {
             partition,
             factor,
             fixed: fixed.to_vec(),
+            surface: SurfaceNodes::from_mesh(mesh),
             rigid: Rigid::new(&modes, &held, asymmetry),
             held,
             modes,
@@ -239,7 +243,7 @@ impl Base {
 
     /// Bytes of the factor and the modes.
     pub fn bytes(&self) -> usize {
-        self.factor.bytes() + self.modes.len() * 8 * self.dof_count()
+        self.factor.bytes() + self.modes.len() * 8 * self.dof_count() + self.surface.bytes()
     }
 }
 

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::base::{Base, CondensedError};
 use super::rounding::{rounding_of_product, settled};
+use super::surface_columns::Block;
 use super::touched::Contact;
 use crate::solve::vectors::norm;
 
@@ -18,6 +19,8 @@ pub struct ContactColumns {
     pub contact: Contact,
     /// Displacement of every degree of freedom under a unit force along x, y, z; 3 × 3N.
     pub(super) fields: [Vec<f64>; 3],
+    /// The same at the nodes of the surface, of a contact on one node; none of a mask.
+    pub(super) surface: Vec<Block>,
     pub(super) norms: [f64; 3],
     /// Norms of `e − K_B g` over the free degrees of freedom, as computed.
     pub(super) residuals: [f64; 3],
@@ -46,9 +49,9 @@ impl Columns {
         Self { bound, kept: Mutex::default() }
     }
 
-    /// Bytes the columns of one contact take.
+    /// Bytes the columns of one contact take at most.
     pub fn bytes_per_contact(base: &Base) -> usize {
-        3 * 8 * base.dof_count()
+        3 * 8 * base.dof_count() + base.surface.block_bytes()
     }
 
     /// Bytes held now.
@@ -181,8 +184,14 @@ fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
         .iter()
         .filter_map(|contact| {
             let [x, y, z] = [fields.next()?, fields.next()?, fields.next()?];
+            let fields = [&x, &y, &z].map(|column| column.field.as_slice());
+            let surface = match contact {
+                Contact::Node(_) => base.surface.blocks(fields),
+                Contact::Mask(_) => Vec::new(),
+            };
             Some(ContactColumns {
                 contact: contact.clone(),
+                surface,
                 norms: [x.norm, y.norm, z.norm],
                 residuals: [x.residual, y.residual, z.residual],
                 residual_bounds: [x.residual_bound, y.residual_bound, z.residual_bound],

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::base::{Base, CondensedError};
 use super::columns::{Columns, ContactColumns};
 use super::free_body::FreeBody;
+use super::surface_columns::{Block, SurfaceNodes};
 use super::touched::Contact;
 
 /// A force at a node, N, in the object's frame.
@@ -77,7 +78,12 @@ impl<'a> Response<'a> {
     /// # Panics
     /// If the node was not named to [`Response::need`].
     pub fn held(&self, node: u32) -> HeldCompliance<'_> {
-        HeldCompliance { fields: self.kept[&node].fields.each_ref().map(Vec::as_slice) }
+        let columns = &self.kept[&node];
+        HeldCompliance {
+            nodes: &self.elasticity.base.surface,
+            surface: &columns.surface,
+            fields: columns.fields.each_ref().map(Vec::as_slice),
+        }
     }
 
     /// The free body.
@@ -131,23 +137,35 @@ impl<'a> Response<'a> {
 /// Units: m/N.
 #[derive(Clone, Copy)]
 pub struct HeldCompliance<'a> {
+    nodes: &'a SurfaceNodes,
+    surface: &'a [Block],
     fields: [&'a [f64]; 3],
 }
 
 impl HeldCompliance<'_> {
     /// Displacement of a node, rows, by axis of the force, columns.
     pub fn at(&self, node: u32) -> Matrix3<f64> {
-        Matrix3::from_fn(|row, column| self.fields[column][3 * node as usize + row])
+        Matrix3::from_column_slice(&self.block(node))
+    }
+
+    /// What unit forces along x, y and z do to a node: from its block if it is one of the surface.
+    fn block(&self, node: u32) -> Block {
+        match self.nodes.place_of(node) {
+            Some(place) => self.surface[place],
+            None => {
+                let at = 3 * node as usize;
+                std::array::from_fn(|k| self.fields[k / 3][at + k % 3])
+            }
+        }
     }
 
     /// Adds what a force does to some nodes.
     fn add(&self, force: &Vector3<f64>, nodes: &[u32], displacement: &mut [[f64; 3]]) {
-        let [x, y, z] = self.fields;
         for (u, &node) in displacement.iter_mut().zip(nodes) {
-            let at = 3 * node as usize;
-            for axis in 0..3 {
-                u[axis] += force.x * x[at + axis] + force.y * y[at + axis] + force.z * z[at + axis];
-            }
+            let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = self.block(node);
+            u[0] += force.x * xx + force.y * yx + force.z * zx;
+            u[1] += force.x * xy + force.y * yy + force.z * zy;
+            u[2] += force.x * xz + force.y * yz + force.z * zz;
         }
     }
 }

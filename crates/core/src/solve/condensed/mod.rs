@@ -35,6 +35,7 @@ mod mask_tests;
 mod overlap;
 mod rigid;
 mod rounding;
+mod surface_columns;
 #[cfg(test)]
 mod tests;
 mod touched;

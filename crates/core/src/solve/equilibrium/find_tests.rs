@@ -16,6 +16,7 @@ struct Case {
     known: Known,
     forces: Vec<f64>,
     is_single: bool,
+    law: Law,
 }
 
 fn cube(nodes: usize, young: f64, poisson: f64, element: Element) -> Model {
@@ -39,7 +40,7 @@ impl Case {
         }
         let known = model.known(pairs).unwrap();
         let forces = vec![0.0; 3 * model.system_node_count()];
-        Self { model, known, forces, is_single: false }
+        Self { model, known, forces, is_single: false, law: Law::NeoHookean }
     }
 
     /// Round patches of the surface about a tip each, pressed towards the origin and turned about that
@@ -61,12 +62,12 @@ impl Case {
         }
         let known = model.known(pairs).unwrap();
         let forces = vec![0.0; 3 * model.system_node_count()];
-        Self { model, known, forces, is_single: false }
+        Self { model, known, forces, is_single: false, law: Law::NeoHookean }
     }
 
     fn path(&self) -> Path {
         let hold = self.model.hold(&self.known.dofs, vec![], None).unwrap();
-        let elements = Arc::new(self.model.hyperelastic(Law::NeoHookean).unwrap());
+        let elements = Arc::new(self.model.hyperelastic(self.law).unwrap());
         let rest = vec![0.0; 3 * self.model.system_node_count()];
         Path::new(elements, self.model.stiffness(), Arc::new(hold), rest, self.is_single)
     }
@@ -147,6 +148,21 @@ fn two_turned_presses_near_the_incompressible_limit_are_found() {
     ];
     let (_, found) = Case::patches(model, &patches).found();
     assert!(found.residual_rel < 1e-9 && found.jacobian_min > 0.3, "{found:?}");
+}
+
+/// The other law loses its stability in such a pull before any mesh does.
+#[test]
+fn cube_pulled_to_eleven_times_its_height_is_found_by_the_logarithmic_law() {
+    for (poisson, volume) in [(0.0, 11.0), (0.3, 1.4), (0.45, 0.5)] {
+        let pulled = |place: &Vector3<f64>, is_upper: bool| match is_upper {
+            true => place + Vector3::z() * 0.6,
+            false => *place,
+        };
+        let mut case = Case::faces(cube(125, 2.0e4, poisson, Element::Tet4), pulled);
+        case.law = Law::NeoHookeanLog;
+        let (_, found) = case.found();
+        assert!(found.residual_rel < 1e-9 && found.jacobian_min > volume - 1e-9, "{found:?}");
+    }
 }
 
 #[test]
