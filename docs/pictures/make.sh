@@ -120,7 +120,8 @@ offscreen() {
     # The first thing that a reader sees.
     picture grasp.png "${squeeze[@]}" --at deforming --eye "$eye" --show hand
     say lift.gif
-    "$BIN" run --headless --light fair --shading plain --show hand --picture-size 420x280 --eye 155,8,0.46 \
+    # By the eye and in the colours that the window directs.
+    "$BIN" run --headless --light fair --show hand --picture-size 420x280 \
         --animation "$PICTURES/lift.gif" > "$WORK/run.out" 2> "$WORK/run.log"
     say grasp.gif
     "$BIN" run --headless --hand scripted:release --light fair --picture-size 420x280 \

@@ -46,7 +46,7 @@ open_window() {
     : > "$WINDOW_LOG"
     mkdir -p "$WORK/desk"
     (cd "$WORK/desk" \
-        && exec env NO_COLOR=1 RUST_LOG=warn,glove_client=info,glove_client::places=debug \
+        && exec env NO_COLOR=1 RUST_LOG=warn,glove_client=info,softgrasp_hand=info,softgrasp_window=info,softgrasp_window::places=debug \
             "$BIN" run "$@" > "$WORK/window.out" 2> "$WINDOW_LOG") &
     WINDOW_PID=$!
     wait_until 90 "the window" is_told File

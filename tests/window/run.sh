@@ -124,12 +124,8 @@ xdotool key Return
 await 'notice .*is_refusal=true'
 new_lines | grep 'is_refusal=true' | grep -q 'nothing.msh' ||
     fail "the sentence does not name the file"
-# The dialog stays, for another name.
-xdotool key Escape
-settle
 
-step "a mesh is read by mouse"
-menu "Read file …"
+step "the dialog stays after a refused file: another mesh is read by mouse"
 click "toothpaste.msh"
 click "Read"
 notice "the object is now toothpaste"
@@ -284,6 +280,24 @@ without "a display that is not there" DISPLAY=:9999
 step "no graphics driver: a sentence, and a run without a window"
 without "no driver" VK_DRIVER_FILES=/nonexistent VK_ICD_FILENAMES=/nonexistent \
     LIBGL_DRIVERS_PATH=/nonexistent __EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent
+
+step "a window that fails although nobody closed it: a sentence, the run goes on, and the exit code is 1"
+begin failing run --object cube --hand scripted:release --report failing.json
+# Somebody else takes the window away; the display stays.
+xdotool windowclose "$window"
+end=$((SECONDS + patience))
+while kill -0 "$client_pid" 2>/dev/null; do
+    [ $SECONDS -lt $end ] || fail "the program does not end within $patience s"
+    sleep 0.1
+done
+code=0
+wait "$client_pid" || code=$?
+client_pid=""
+[ $code = 1 ] || fail "the run whose window failed ended with $code"
+grep -q 'glove-client: .*the run goes on without it' "$log" || fail "there is no sentence"
+grep -q 'glove-client: .*this is a fault of the program' "$log" || fail "it is not said to be a fault"
+! grep -q 'ended by the user' "$out" || fail "it is said that the user ended it"
+grep -q '"Deforming"' failing.json || fail "the run did not go on"
 
 step "the display is lost: a sentence, and the run goes on to its end and its report"
 begin lost run --object cube --hand scripted:release --report lost.json

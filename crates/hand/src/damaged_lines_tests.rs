@@ -5,6 +5,7 @@ use softgrasp_grasp::hand::JointAngles;
 
 use crate::arrival::{Arrival, Device};
 use crate::hand_reader::{HandReader, HandSetup};
+use crate::notice::NoticeKind;
 
 /// Numbers that look like chance and are the same every time.
 struct Chance(u64);
@@ -116,7 +117,7 @@ fn sensor_that_breaks_is_told_and_the_hand_does_not_jump() {
     let most = tips.windows(2).map(|pair| (pair[1] - pair[0]).norm()).fold(0.0, f64::max);
     assert!(most < 0.01, "the fingertip jumps by {most} m");
     let told = reader.take_news();
-    assert!(told.iter().any(|text| text.contains("as a broken one")), "{told:?}");
+    assert!(told.iter().any(|notice| notice.text.contains("as a broken one")), "{told:?}");
 }
 
 #[test]
@@ -133,7 +134,18 @@ fn sensor_that_is_dead_from_the_start_is_told_and_the_hand_does_not_jump_when_th
     let most = tips.windows(2).map(|pair| (pair[1] - pair[0]).norm()).fold(0.0, f64::max);
     assert!(most < 0.01, "the fingertip jumps by {most} m");
     let told = reader.take_news();
-    assert!(told.iter().any(|text| text.contains("counts as dead")), "{told:?}");
+    assert!(told.iter().any(|notice| notice.text.contains("counts as dead")), "{told:?}");
+}
+
+#[test]
+fn good_news_of_a_healthy_glove_and_tracker_is_no_refusal() {
+    let mut reader = play(400, |_, _| {}, |_, _, _| {});
+    let told = reader.take_news();
+    for words in ["a glove of 22 sensors", "a tracker, centimetres"] {
+        let news = told.iter().find(|notice| notice.text.starts_with(words));
+        assert_eq!(news.map(|notice| notice.kind), Some(NoticeKind::Done), "{told:?}");
+    }
+    assert_eq!(told.len(), 2, "{told:?}");
 }
 
 #[test]

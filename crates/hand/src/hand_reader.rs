@@ -17,6 +17,7 @@ use crate::devices::{
     Detected, Freshness, HandSample, Heard, PoseGate, ReceiverMount, SampleHold, SensorGate,
 };
 use crate::joints_reader::{FitErrors, JointsReader};
+use crate::notice::Notice;
 
 /// Everything that says how a hand, its glove and its tracker are set up.
 #[derive(Clone, Debug)]
@@ -101,7 +102,7 @@ pub struct HandReader {
     dead: SensorSet,
     /// When the first device spoke, s.
     first_s: Option<f64>,
-    news: Vec<String>,
+    news: Vec<Notice>,
     /// What came of glove and tracker.
     heard: [Heard; 2],
     faults: DeviceFaults,
@@ -229,7 +230,7 @@ impl HandReader {
                 Device::Joints => {
                     let told = self.joints.feed(bytes, *is_datagram, time_s);
                     if self.gates.is_some() {
-                        self.news.extend(told);
+                        self.news.extend(told.map(Notice::done));
                     }
                     self.setup.dimensions = *self.joints.dimensions();
                 }
@@ -258,7 +259,8 @@ impl HandReader {
     fn take_glove(&mut self, record: GloveRecord, time_s: f64) {
         if let Some(rate) = self.heard[0].record(time_s).filter(|_| self.gates.is_some()) {
             let sensors = record.sensors.count().number();
-            self.news.push(format!("a glove of {sensors} sensors, {rate:.0} records a second"));
+            let text = format!("a glove of {sensors} sensors, {rate:.0} records a second");
+            self.news.push(Notice::done(text));
         }
         self.health.observe(&record.sensors);
         let Some(Gates { glove, .. }) = &mut self.gates else {
@@ -269,11 +271,11 @@ impl HandReader {
         self.news.extend(glove.take_news());
         let dead = self.health.dead();
         for sensor in dead.iter().filter(|sensor| !self.dead.contains(*sensor)) {
-            self.news.push(format!(
+            self.news.push(Notice::refused(format!(
                 "the glove's sensor {} has shown one end of its range only and counts as dead: its \
                  joint is held at rest",
                 sensor_name(sensor)
-            ));
+            )));
         }
         self.dead = dead;
     }
@@ -285,8 +287,9 @@ impl HandReader {
         of_lines.chain(self.joints.doubt()).collect()
     }
 
-    /// What is to be told of the devices since the last call, a sentence each.
-    pub fn take_news(&mut self) -> Vec<String> {
+    /// What is to be told of the devices since the last call, a sentence each: what speaks, and what is
+    /// wrong with it.
+    pub fn take_news(&mut self) -> Vec<Notice> {
         std::mem::take(&mut self.news)
     }
 
@@ -305,7 +308,7 @@ impl HandReader {
                     {
                         let unit = self.setup.tracker.units.name();
                         let text = format!("a tracker, {unit}, {rate:.0} records a second");
-                        self.news.push(text);
+                        self.news.push(Notice::done(text));
                     }
                     let record = if self.is_flipped { record.mirrored() } else { record };
                     let gate = self.gates.as_mut().map(|gates| &mut gates.tracker);

@@ -180,3 +180,30 @@ impl JointsReader {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use softgrasp_grasp::hand::Handedness;
+
+    use super::*;
+    use crate::joints::record_of_hand;
+
+    #[test]
+    fn who_speaks_is_told_once_with_hand_unit_rate_and_fit() {
+        for (side, name) in [(Handedness::Right, "right"), (Handedness::Left, "left")] {
+            let hand = HandDimensions::default().with_handedness(side);
+            let mut reader = JointsReader::new(HandDimensions::default(), None);
+            let mut told = Vec::new();
+            for i in 0..300 {
+                let closed = 0.5 - 0.5 * (0.2 * f64::from(i)).cos();
+                let angles = JointAngles::flat().lerp(&JointAngles::fist(), closed);
+                let palm = Isometry3::translation(0.1, 0.2, 1e-3 * f64::from(i));
+                let line = format!("{}\n", record_of_hand(&hand, &angles, &palm).to_line());
+                told.extend(reader.feed(line.as_bytes(), true, f64::from(i) / 30.0));
+            }
+            let [said] = &told[..] else { panic!("{told:?}") };
+            let words = format!("joints of a {name} hand, metres, 30 a second, fitted to ");
+            assert!(said.starts_with(&words) && said.ends_with(" mm"), "{said}");
+        }
+    }
+}

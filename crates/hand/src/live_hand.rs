@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use crate::arrival::{Arrival, Device};
 use crate::joints::JointsListener;
+use crate::notice::Notice;
 use crate::serial::{DeviceState, SerialDevices};
 
 /// Devices that are open, and whose bytes come by themselves.
@@ -72,8 +73,8 @@ impl LiveHand {
         }
     }
 
-    /// What is wrong with its devices, a sentence each; none while all talk.
-    pub fn complaints(&self) -> Vec<String> {
+    /// What is wrong with its devices, or what they wait for, a sentence each; none while all talk.
+    pub fn complaints(&self) -> Vec<Notice> {
         match &self.source {
             Source::Serial(devices) => {
                 let states = devices.states().into_iter();
@@ -81,30 +82,31 @@ impl LiveHand {
                 let states = named.filter_map(|(state, device)| complaint(device, &state));
                 let disobeys = devices.tracker_facts().disobeys;
                 let told = disobeys.map(|why| format!("the tracker is set up wrongly: {why}"));
-                states.chain(told).collect()
+                states.chain(told.map(Notice::refused)).collect()
             }
             Source::Joints(listener) if listener.senders() == 0 => {
-                vec![format!("nobody sends joints to {}", listener.local_addr())]
+                let address = listener.local_addr();
+                vec![Notice::waits(format!("nobody sends joints to {address}"))]
             }
-            Source::Joints(listener) if listener.senders() > 1 => vec![format!(
+            Source::Joints(listener) if listener.senders() > 1 => vec![Notice::refused(format!(
                 "{} senders send joints to {}: one hand is followed, end the others",
                 listener.senders(),
                 listener.local_addr()
-            )],
+            ))],
             Source::Joints(_) => Vec::new(),
         }
     }
 }
 
 /// What a person has to know of a device.
-fn complaint(device: Device, state: &DeviceState) -> Option<String> {
+fn complaint(device: Device, state: &DeviceState) -> Option<Notice> {
     let name = device.name();
     Some(match state {
         // A device that falls silent is told by its samples.
         DeviceState::NotUsed | DeviceState::Talking | DeviceState::Silent { .. } => return None,
-        DeviceState::Absent { why } => format!("the {name} is not there: {why}"),
-        DeviceState::SettingUp => format!("the {name} is being set up"),
-        DeviceState::Lost { why } => format!("the {name} is lost: {why}"),
+        DeviceState::Absent { why } => Notice::refused(format!("the {name} is not there: {why}")),
+        DeviceState::SettingUp => Notice::waits(format!("the {name} is being set up")),
+        DeviceState::Lost { why } => Notice::refused(format!("the {name} is lost: {why}")),
     })
 }
 
@@ -119,7 +121,7 @@ mod tests {
         let listener = JointsListener::bind("127.0.0.1:0".parse().unwrap()).unwrap();
         let address = listener.local_addr();
         let mut hand = LiveHand::joints(listener, "joints".to_owned());
-        assert!(hand.complaints()[0].contains("nobody sends joints"));
+        assert!(hand.complaints()[0].text.contains("nobody sends joints"));
         let senders = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
         let told = (0..500).any(|_| {
             for sender in &senders {
@@ -127,7 +129,7 @@ mod tests {
             }
             std::thread::sleep(Duration::from_millis(10));
             hand.take(0.0);
-            hand.complaints().iter().any(|text| text.starts_with("2 senders send joints"))
+            hand.complaints().iter().any(|told| told.text.starts_with("2 senders send joints"))
         });
         assert!(told, "{:?}", hand.complaints());
     }

@@ -31,4 +31,6 @@ pub struct RecordedAnswers {
     pub taken: Vec<u64>,
     /// Whether it takes a rest shape that was made beside the ticks.
     pub took_work: bool,
+    /// Whether it waits no longer for the step of a free object that an earlier tick asked for.
+    pub gives_up_step: bool,
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use fea_server::RunningServer;
 use glove_client::ask::link::Link;
 use glove_client::ask::solve_settings::SolveSettings;
+use glove_client::ask::unanswered::Unanswered;
 use glove_client::pace::Pace;
 use glove_client::pace::tick_budget::Priority;
 use glove_client::run::contact_grasp::ContactScene;
@@ -23,20 +24,20 @@ use crate::settings::{linear_settings, sized};
 use crate::start::server;
 
 /// A run in lockstep whose hand pinches, lifts and puts down.
-struct Lift {
-    grasp_loop: GraspLoop,
-    hand: ScriptedHand,
+pub struct Lift {
+    pub grasp_loop: GraspLoop,
+    pub hand: ScriptedHand,
     seen: Seen,
-    tick: u64,
-    _server: RunningServer,
+    pub tick: u64,
+    server: Option<RunningServer>,
 }
 
-fn object(shape: BuiltIn, nodes: usize, size_m: f64) -> TetMesh {
+pub fn object(shape: BuiltIn, nodes: usize, size_m: f64) -> TetMesh {
     lying(&sized(shape, nodes, size_m)).unwrap().0
 }
 
 impl Lift {
-    fn of(mesh: TetMesh, scene: ContactScene) -> Self {
+    pub fn of(mesh: TetMesh, scene: ContactScene) -> Self {
         let server = server(1);
         let object = SoftObject::try_new(mesh).unwrap();
         let setup = HandSetup::default();
@@ -52,11 +53,11 @@ impl Lift {
         let mut grasp_loop =
             GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();
         grasp_loop.grasp_with_friction(ContactScene { table_y, ..scene });
-        Self { grasp_loop, hand, seen: Seen::default(), tick: 0, _server: server }
+        Self { grasp_loop, hand, seen: Seen::default(), tick: 0, server: Some(server) }
     }
 
     /// One tick; `None` when the script is over.
-    fn tick(&mut self) -> Option<TickOutcome> {
+    pub fn tick(&mut self) -> Option<TickOutcome> {
         let sent = self.hand.next(&self.seen, self.grasp_loop.object());
         (!sent.over).then(|| self.send(&sent))
     }
@@ -177,4 +178,24 @@ fn kept_shape_stays_in_the_hand_and_the_object_returns_home_when_asked() {
     let home = lift.send(&Sent { command: Some(Command::ReturnHome), ..sent });
     assert!(home.events.iter().any(|event| event.kind_and_words().1 == "returned home"));
     assert!(lift.height().abs() < 1e-3);
+}
+
+/// An asked step stayed asked for when the server went, so that every later tick waited for its answer.
+#[test]
+fn lost_server_is_not_said_to_answer_late_when_the_hand_grasps_by_contact() {
+    let mut lift = Lift::of(object(BuiltIn::Sphere, 300, 0.07), ContactScene::default());
+    while lift.height() < 0.02 {
+        assert!(lift.tick().is_some(), "never lifted");
+    }
+    drop(lift.server.take());
+    let mut lost = 0;
+    for _ in 0..20 {
+        let outcome = lift.tick().expect("it is in the air");
+        assert_eq!(outcome.state, Some(StateName::Deforming));
+        for (tick, why) in outcome.unanswered {
+            assert_eq!(why, Unanswered::ServerLost, "tick {tick}");
+            lost += 1;
+        }
+    }
+    assert!(lost >= 15, "{lost} of 20 ticks");
 }

@@ -7,6 +7,7 @@
 )]
 
 mod access;
+mod awaited_model;
 mod bad_requests;
 mod bad_streams;
 mod contact_frames;
@@ -14,6 +15,7 @@ mod control;
 mod controlled;
 mod crowd;
 mod dent;
+mod directed;
 mod disturbed_links;
 mod engine;
 mod forces;

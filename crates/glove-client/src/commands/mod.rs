@@ -7,6 +7,7 @@ pub mod calibrate;
 mod collecting;
 pub mod command_line;
 mod contact_arguments;
+mod device_sentences;
 pub mod devices;
 mod display_arguments;
 mod elasticity_arguments;

@@ -3,9 +3,10 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use anyhow::bail;
+use anyhow::{Context as _, bail};
 use clap::Args;
 
+use super::device_sentences::DeviceSentences;
 use super::key_frames::KeyFrames;
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_pictures::RunPictures;
@@ -104,6 +105,8 @@ impl RunCommand {
             session.wait_idle(START_WAIT_MAX);
         }
         let mut status = StatusLine::start();
+        let mut sentences = DeviceSentences::start(status.speaker())
+            .context("cannot start a thread beside the ticks")?;
         let timing = Timing { period: plan.period, ticks_max: self.arguments.frames };
         // Without a window nobody asks for anything and nobody is told.
         let (_controls, to_obey) = channel();
@@ -111,6 +114,7 @@ impl RunCommand {
         let ticks = TickLoop::new(&mut session, timing, &to_obey, &to_tell);
         let interrupted = ticks.play(interruption::asked, |session, outcome, due, now_s| {
             status.show(due.tick, outcome);
+            sentences.hear(outcome);
             if let Some(pictures) = &mut pictures {
                 pictures.add(due, now_s, outcome, session)?;
             }
@@ -119,6 +123,7 @@ impl RunCommand {
                 None => Ok(()),
             }
         })?;
+        drop(sentences);
         drop(status);
         if let Some(key_frames) = key_frames {
             key_frames.finish()?;

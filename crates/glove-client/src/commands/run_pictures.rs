@@ -1,14 +1,13 @@
 //! Pictures of a run without a window: one moment, every tick, or a moving picture.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use anyhow::Context;
 use softgrasp_grasp::grasp::StateName;
 use softgrasp_window::view::camera::ViewCamera;
+use softgrasp_window::view::directed_eye::DirectedEye;
 use softgrasp_window::view::display::{Display, Level};
-use softgrasp_window::view::eye_search::eye_on_squeeze;
-use softgrasp_window::view::frame::{HandView, ViewFrame};
+use softgrasp_window::view::frame::ViewFrame;
 use softgrasp_window::view::moment::{Moment, Watch};
 use softgrasp_window::view::object_skin::Look;
 use softgrasp_window::view::shading::Shading;
@@ -28,10 +27,7 @@ pub(super) struct RunPictures {
     display: Display,
     /// `None` until the first hand places the eye.
     camera: Option<ViewCamera>,
-    eye_is_chosen: bool,
-    /// The squeeze that the eye is placed for, and the eye that it goes to.
-    placed_for: Option<Arc<HandView>>,
-    aimed: Option<ViewCamera>,
+    eye: DirectedEye,
     foresight: Foresight,
     /// A moving picture shows strain while the hand squeezes.
     directs_colours: bool,
@@ -53,8 +49,6 @@ struct Snapshot {
     moment: Option<Moment>,
 }
 
-/// Part of its way that an eye goes in a tick.
-const EYE_SHARE: f64 = 0.06;
 /// Ticks from one picture of an animation to the next: 15 a second where there are 60 ticks.
 const ANIMATED_TICKS: u64 = 4;
 
@@ -88,9 +82,7 @@ impl RunPictures {
             display: Display { level: level(shown, &pictures), ..shown.display() },
             pictures,
             camera: shown.eye.map(|_| shown.camera()),
-            eye_is_chosen: shown.eye.is_some(),
-            placed_for: None,
-            aimed: None,
+            eye: DirectedEye::new(shown.eye.is_some()),
             foresight: Foresight::default(),
             directs_colours: shown.shading.is_none(),
             observer: Observer::default(),
@@ -159,25 +151,10 @@ impl RunPictures {
     /// Where the eye is: where it was asked to be, where it sees most of the squeeze, or beside the
     /// first hand that has no plan.
     fn camera(&mut self, frame: &ViewFrame) -> ViewCamera {
-        if self.eye_is_chosen {
-            return self.camera.unwrap_or_default();
-        }
-        if let Some(squeezing) = &frame.acts.squeezing {
-            if self.placed_for.as_ref().is_none_or(|before| !Arc::ptr_eq(before, squeezing)) {
-                self.placed_for = Some(Arc::clone(squeezing));
-                let object = &frame.object;
-                let to = eye_on_squeeze(&object.rest, &object.world_from_object, squeezing);
-                self.aimed = Some(to);
-            }
-            // An eye that has to go elsewhere goes there in about a second.
-            self.camera = match (self.camera, self.aimed) {
-                (Some(now), Some(to)) => Some(now.toward(&to, EYE_SHARE)),
-                (None, aimed) => aimed,
-                (now, None) => now,
-            };
-        }
-        self.camera = self.camera.or_else(|| frame.eye_beside_hand());
-        self.camera.unwrap_or_default()
+        let directed = self.eye.eye(frame, self.camera.unwrap_or_default(), frame.at_s);
+        let camera = directed.or(self.camera).or_else(|| frame.eye_beside_hand());
+        self.camera = camera;
+        camera.unwrap_or_default()
     }
 
     /// Draws and writes the moment that was kept.

@@ -17,6 +17,7 @@ use softgrasp_window::window::{
     About, App, End, Opening, SQUEEZE_TIMES, Start, Started, Ticks, WhenLost,
 };
 
+use super::device_sentences::DeviceSentences;
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 use super::tell_report::tell;
@@ -164,10 +165,13 @@ fn start(
         };
         let (mut out, inlet) = outlet(FRAMES_EVERY);
         let (mut observer, mut foresight) = (Observer::default(), Foresight::default());
+        let mut sentences = DeviceSentences::start(|text| eprintln!("glove-client: {text}"))
+            .context("cannot start a thread beside the ticks")?;
         let sink = move |session: &crate::run::session::Session, outcome: &_, due, now_s| {
             // The server lives as long as the ticks.
             let _ = &host;
             observer.note(due, outcome);
+            sentences.hear(outcome);
             if out.is_due() {
                 let mut frame = observer.frame(due, now_s, outcome, session.grasp_loop());
                 frame.acts = foresight.acts(session.hand(), session.grasp_loop());

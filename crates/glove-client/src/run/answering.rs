@@ -116,7 +116,7 @@ impl GraspLoop {
                 Err(_) if tick == UNCOUNTED => self.refuse_to_save_unanswered(outcome),
                 Err(why) => {
                     if let Some(contact) = &mut self.contact {
-                        contact.give_up(tick);
+                        outcome.gave_up_step |= contact.give_up(tick);
                     }
                     outcome.unanswered.push((tick, why));
                 }

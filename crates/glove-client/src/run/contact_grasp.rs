@@ -346,9 +346,14 @@ impl ContactGrasp {
         TakenStep::Taken
     }
 
-    /// The step of a tick is not answered; the next tick asks again.
-    pub fn give_up(&mut self, tick: u64) {
-        self.asked.take_if(|asked| asked.tick == tick);
+    /// The step of a tick is not answered; the next tick asks again. Whether it was waited for.
+    pub fn give_up(&mut self, tick: u64) -> bool {
+        self.asked.take_if(|asked| asked.tick == tick).is_some()
+    }
+
+    /// Whatever step was asked for is not waited for any more; whether one was.
+    pub fn give_up_any(&mut self) -> bool {
+        self.asked.take().is_some()
     }
 
     /// Whether each finger presses on the object, thumb first.

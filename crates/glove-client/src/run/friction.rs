@@ -83,15 +83,26 @@ impl GraspLoop {
             _ => NodeChoice::All,
         };
         let bodies = hand_bodies(&self.reader.setup().dimensions, hand);
+        let is_given_up = match &self.recorded {
+            Some(recorded) => recorded.gives_up_step,
+            None => !self.link.is_connected(),
+        };
         let Some(contact) = &mut self.contact else { return Ok(Err(Unanswered::AnswerLate)) };
+        // A server that is gone answers nothing any more: of what it was asked the newest waits for the next.
+        if is_given_up {
+            outcome.gave_up_step |= contact.give_up_any();
+        }
         let frame = contact.step(tick, now_s, &bodies, &self.object, nodes);
-        let Some(frame) = frame else { return Ok(Err(Unanswered::AnswerLate)) };
+        let Some(frame) = frame else {
+            let is_lost = self.recorded.is_none() && is_given_up;
+            let why = if is_lost { Unanswered::ServerLost } else { Unanswered::AnswerLate };
+            return Ok(Err(why));
+        };
         if self.digests {
             outcome.request_digest = Some(step_digest(&frame));
         }
         // A tick that is played again asks what was answered, and nothing else.
         if self.recorded.as_ref().is_some_and(|recorded| recorded.answered_by.is_none()) {
-            contact.give_up(tick);
             return Ok(Err(Unanswered::AnswerLate));
         }
         let grip = self.deforming_since.unwrap_or(tick);
@@ -192,7 +203,7 @@ impl GraspLoop {
         outcome.seen.state = Some(state);
         outcome.seen.world_from_object = self.world_from_object;
         outcome.seen.is_still = contact.is_still();
-        outcome.seen.is_late = contact.is_late(tick);
+        outcome.seen.is_late = contact.is_late(tick) || !self.link.is_connected();
         outcome.shown_tick = self.shown_tick;
     }
 

@@ -12,6 +12,7 @@ use softgrasp_grasp::hand::{HandColliders, HandPose};
 use softgrasp_grasp::object::{ObjectError, SoftObject};
 use softgrasp_hand::arrival::Device;
 use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::notice::Notice;
 use softgrasp_hand::sent::{RecordedAnswers, Sent};
 use softgrasp_protocol::{NodeChoice, Precision, Question, Want};
 
@@ -270,11 +271,12 @@ impl GraspLoop {
         let silent = &outcome.silent;
         let fallen = silent.iter().filter(|device| !self.silent.contains(device));
         let tell = |device: &Device| {
-            format!("the {} is silent: the hand is held where it was", device.name())
+            let name = device.name();
+            Notice::refused(format!("the {name} is silent: the hand is held where it was"))
         };
         outcome.events.extend(fallen.map(tell).map(LoopEvent::Device));
         let back = self.silent.iter().filter(|device| !silent.contains(device));
-        let tell = |device: &Device| format!("the {} speaks again", device.name());
+        let tell = |device: &Device| Notice::done(format!("the {} speaks again", device.name()));
         outcome.events.extend(back.map(tell).map(LoopEvent::Device));
         self.silent.clone_from(&outcome.silent);
         outcome.events.extend(self.reader.take_news().into_iter().map(LoopEvent::Device));

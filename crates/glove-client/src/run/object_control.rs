@@ -50,7 +50,7 @@ impl GraspLoop {
 
     /// Whether the object is what was asked for, and the server there and prepared for it.
     pub fn is_object_ready(&self) -> bool {
-        self.is_connected() && self.is_model_prepared() && !self.changes.are_under_way()
+        self.link.has_model() && !self.changes.are_under_way()
     }
 
     /// Puts another object in the place of this one; it will be at home and free. The news come

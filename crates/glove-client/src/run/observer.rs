@@ -142,7 +142,7 @@ fn news(tick: u64, event: &LoopEvent) -> News {
     let (text, kind) = match event {
         LoopEvent::Grasp(event) => (event.to_string(), NewsKind::Grasp),
         LoopEvent::KeepRefused(text) => (text.clone(), NewsKind::Refusal),
-        LoopEvent::Device(text) => (text.clone(), NewsKind::Information),
+        LoopEvent::Device(notice) => (notice.text.clone(), NewsKind::Information),
         LoopEvent::Server(text) if text.starts_with("lost") => {
             let said = "the server is gone; the window looks for it again (F2 tells what happened)";
             (said.to_owned(), NewsKind::Refusal)
@@ -153,4 +153,30 @@ fn news(tick: u64, event: &LoopEvent) -> News {
         LoopEvent::Server(text) | LoopEvent::Shape(text) => (text.clone(), NewsKind::Information),
     };
     News { tick, text, kind }
+}
+
+#[cfg(test)]
+mod tests {
+    use softgrasp_hand::notice::Notice;
+
+    use super::*;
+
+    #[test]
+    fn lost_server_is_told_in_words_for_people_and_not_by_the_numbers_of_the_system() {
+        let what = "lost: the connection broke: reset by peer (os error 104)";
+        let told = news(3, &LoopEvent::Server(what.to_owned()));
+        assert_eq!(told.kind, NewsKind::Refusal);
+        assert!(told.text.contains("the server is gone") && !told.text.contains("os error"));
+        // Who wants to know all finds it on F2.
+        let mut observer = Observer::default();
+        let events = vec![LoopEvent::Server(what.to_owned())];
+        observer.note(Due { tick: 3, skipped: 0 }, &TickOutcome { events, ..Default::default() });
+        assert_eq!(observer.said.as_deref(), Some(what));
+    }
+
+    #[test]
+    fn device_that_speaks_again_is_no_refusal_in_the_news() {
+        let told = news(3, &LoopEvent::Device(Notice::done("the glove speaks again")));
+        assert_eq!(told.kind, NewsKind::Information);
+    }
 }

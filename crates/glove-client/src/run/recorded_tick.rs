@@ -64,6 +64,7 @@ pub fn news(outcome: &TickOutcome) -> TickNews {
         events: events.collect(),
         answers: of_ticks.chain(springback).collect(),
         took_work: outcome.took_work,
+        gave_up_step: outcome.gave_up_step,
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Session {
     recorder: Option<Recorder>,
     latency: LatencyLedger,
     /// What was wrong with devices when they were looked at last.
-    complaints: Vec<String>,
+    complaints: Vec<Notice>,
     /// A script does not reach for an object that the server is still preparing.
     awaits_model: bool,
 }
@@ -157,14 +157,14 @@ impl Session {
             return;
         }
         let complaints = self.complaints_of(hand);
-        let new = complaints.iter().filter(|text| !self.complaints.contains(text));
+        let new = complaints.iter().filter(|told| !self.complaints.contains(told));
         outcome.events.extend(new.cloned().map(LoopEvent::Device));
         self.complaints = complaints;
     }
 
     /// What is wrong with devices, and with what they send.
-    fn complaints_of(&self, hand: &LiveHand) -> Vec<String> {
-        let of_reader = self.grasp_loop.reader().complaints();
+    fn complaints_of(&self, hand: &LiveHand) -> Vec<Notice> {
+        let of_reader = self.grasp_loop.reader().complaints().into_iter().map(Notice::refused);
         hand.complaints().into_iter().chain(of_reader).collect()
     }
 
@@ -339,7 +339,8 @@ impl Session {
         if let HandSource::Live(hand) = &self.hand {
             self.report.summary.pieces_dropped = hand.dropped();
             if self.grasp_loop.hand().is_none() {
-                self.report.no_hand = Some(self.complaints_of(hand));
+                let why = self.complaints_of(hand).into_iter().map(|told| told.text);
+                self.report.no_hand = Some(why.collect());
             }
         }
         if let HandSource::Replay(hand) = self.hand {
@@ -455,7 +456,7 @@ fn notice_of(event: &LoopEvent) -> Option<Notice> {
             Notice::refused(format!("{command}: the hand holds nothing"))
         }
         LoopEvent::KeepRefused(text) => Notice::refused(text.clone()),
-        LoopEvent::Device(text) => Notice::refused(text.clone()),
+        LoopEvent::Device(notice) => notice.clone(),
         LoopEvent::Grasp(_) | LoopEvent::Shape(_) | LoopEvent::Server(_) => return None,
     })
 }

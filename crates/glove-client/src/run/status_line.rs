@@ -1,4 +1,5 @@
-//! Shows tick, grasp state and the last solve on one line of the terminal during a run.
+//! Shows tick, grasp state and the last solve on one line of the terminal during a run, and sentences
+//! above it.
 
 use std::time::{Duration, Instant};
 
@@ -25,6 +26,12 @@ impl StatusLine {
             bar.set_style(style);
         }
         Self { bar, drawn: None, last_solve: None }
+    }
+
+    /// Says sentences above the line.
+    pub fn speaker(&self) -> impl Fn(&str) + Send + 'static {
+        let bar = self.bar.clone();
+        move |text| bar.suspend(|| eprintln!("glove-client: {text}"))
     }
 
     /// Shows a tick.

@@ -20,8 +20,8 @@ pub enum LoopEvent {
     Shape(String),
     /// The server came, went, or refused.
     Server(String),
-    /// A device fell silent, or speaks again.
-    Device(String),
+    /// What speaks, or is wrong with a device: it fell silent, speaks again, sends what it should not.
+    Device(Notice),
 }
 
 impl LoopEvent {
@@ -35,7 +35,7 @@ impl LoopEvent {
             Self::KeepRefused(text) => ("shape", format!("keep shape refused: {text}")),
             Self::Shape(text) => ("shape", text.clone()),
             Self::Server(text) => ("server", text.clone()),
-            Self::Device(text) => ("device", text.clone()),
+            Self::Device(notice) => ("device", notice.text.clone()),
         }
     }
 }
@@ -69,6 +69,8 @@ pub struct TickOutcome {
     pub springback_refused: bool,
     /// Whether a rest shape that was made beside the ticks was taken.
     pub took_work: bool,
+    /// Whether the step of a free object that had been asked for was given up.
+    pub gave_up_step: bool,
     /// Digest of what the server is asked, where that is recorded or held against a recording.
     pub request_digest: Option<String>,
     /// What the person sees next.

@@ -17,6 +17,8 @@ mod emulator;
 mod fill;
 mod full_disk;
 mod interruption;
+mod joint_runs;
+mod killed_server;
 mod numbers;
 mod press;
 mod recordings;

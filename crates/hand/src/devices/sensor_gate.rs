@@ -3,6 +3,7 @@
 
 use super::calibration::sensor_name;
 use super::cyberglove::{RawSensors, Sensor, is_rail};
+use crate::notice::Notice;
 
 /// Compares each reading of a sensor with the one before. A jump waits for the next reading: two that
 /// agree are a finger that moved. One to an end of the range is not taken as long as it stays there:
@@ -12,7 +13,7 @@ pub struct SensorGate {
     sensors: [Watched; 22],
     last_s: Option<f64>,
     refused: u64,
-    news: Vec<String>,
+    news: Vec<Notice>,
 }
 
 /// What is known of one sensor.
@@ -60,7 +61,7 @@ impl SensorGate {
     }
 
     /// What is to be told of sensors since the last call, a sentence each.
-    pub fn take_news(&mut self) -> Vec<String> {
+    pub fn take_news(&mut self) -> Vec<Notice> {
         std::mem::take(&mut self.news)
     }
 }
@@ -90,25 +91,25 @@ impl Watched {
     }
 
     /// What there is to tell of it now.
-    fn news(&mut self, sensor: Sensor, value: u8) -> Option<String> {
+    fn news(&mut self, sensor: Sensor, value: u8) -> Option<Notice> {
         let name = sensor_name(sensor);
         if self.broken >= TOLD_AFTER && !self.is_told_broken {
             self.is_told_broken = true;
-            return Some(format!(
+            return Some(Notice::refused(format!(
                 "the glove's sensor {name} went to {value} at once and stays there, as a broken one \
                  does: its joint is held where it was"
-            ));
+            )));
         }
         if self.broken == 0 && self.is_told_broken && self.waiting.is_none() {
             self.is_told_broken = false;
-            return Some(format!("the glove's sensor {name} reads again"));
+            return Some(Notice::done(format!("the glove's sensor {name} reads again")));
         }
         if self.clipped >= TOLD_AFTER && !self.is_told_clipped {
             self.is_told_clipped = true;
-            return Some(format!(
+            return Some(Notice::refused(format!(
                 "the glove's sensor {name} is at an end of its range ({value}): its joint is not \
                  measured beyond; set the glove's gains anew, or the sensor is dead"
-            ));
+            )));
         }
         None
     }
@@ -127,7 +128,7 @@ mod tests {
     }
 
     /// Feeds readings of one sensor, 100 a second; what it gives, and what is told.
-    fn feed(readings: impl IntoIterator<Item = u8>) -> (Vec<u8>, Vec<String>, u64) {
+    fn feed(readings: impl IntoIterator<Item = u8>) -> (Vec<u8>, Vec<Notice>, u64) {
         let mut gate = SensorGate::default();
         let given = readings.into_iter().enumerate().map(|(at, value)| {
             gate.take(&reading(value), 0.01 * at as f64).get(Sensor::IndexMcp).unwrap()
@@ -158,8 +159,8 @@ mod tests {
         assert_eq!(&given[..305], &[90; 305][..], "the hand does not jump");
         assert_eq!(given[307], 92);
         assert_eq!(told.len(), 2, "{told:?}");
-        assert!(told[0].contains("index MPJ went to 254 at once"), "{told:?}");
-        assert!(told[1].contains("reads again"), "{told:?}");
+        assert!(told[0].text.contains("index MPJ went to 254 at once"), "{told:?}");
+        assert!(told[1].text.contains("reads again"), "{told:?}");
     }
 
     #[test]
@@ -168,6 +169,6 @@ mod tests {
         let (given, told, refused) = feed(clips.chain([254; 100]).chain([240; 9]).chain([254; 99]));
         assert_eq!((given[130], refused), (254, 0));
         assert_eq!(told.len(), 1, "{told:?}");
-        assert!(told[0].contains("at an end of its range (254)"), "{told:?}");
+        assert!(told[0].text.contains("at an end of its range (254)"), "{told:?}");
     }
 }

@@ -205,6 +205,26 @@ mod tests {
     }
 
     #[test]
+    fn joints_that_are_not_finite_are_told_and_give_no_hand() {
+        let hand = HandDimensions::default();
+        let record = record_of_hand(&hand, &JointAngles::flat(), &Isometry3::identity());
+        let line = record.to_line();
+        let first = line.find("[[").expect("places of joints") + 2;
+        let end = first + line[first..].find(',').expect("three coordinates");
+        for number in ["NaN", "Infinity", "-inf"] {
+            let mut reader = JointsReader::new(hand, None);
+            let spoilt = format!("{}{number}{}\n", &line[..first], &line[end..]);
+            for i in 0..60 {
+                let told = reader.feed(spoilt.as_bytes(), false, f64::from(i) / 30.0);
+                assert!(told.is_none(), "{number}: {told:?}");
+            }
+            let said = reader.doubt().unwrap_or_else(|| panic!("{number}: nothing was said"));
+            assert!(said.contains("no records of joints") && said.contains("not finite"), "{said}");
+            assert!(reader.measured().is_none(), "{number} moves a hand");
+        }
+    }
+
+    #[test]
     fn lines_that_are_no_records_are_told_by_their_fault() {
         let mut doubts = Doubts::default();
         (0..100).for_each(|_| doubts.fault(&JointsFaultKind::JointCount { got: 21 }));

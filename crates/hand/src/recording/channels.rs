@@ -132,7 +132,7 @@ impl Channel {
             Self::Tick => json!({
                 "tick": integer, "skipped": integer, "now_s": number,
                 "command": {"type": ["string", "null"]}, "interventions": list(&json!({})),
-                "answers": list(&integer), "took_work": flag,
+                "answers": list(&integer), "took_work": flag, "gave_up_step": flag,
                 "state": {"type": ["string", "null"]},
                 "contacts": list(&json!({"type": ["integer", "null"]})),
                 "stages": {"type": "object", "properties": {

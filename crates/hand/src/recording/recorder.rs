@@ -62,6 +62,8 @@ pub struct TickNews {
     pub answers: Vec<AnswerSeen>,
     /// Whether a rest shape was taken that was made beside the ticks.
     pub took_work: bool,
+    /// Whether the step that had been asked for was given up.
+    pub gave_up_step: bool,
 }
 
 /// What is written at once.
@@ -133,12 +135,13 @@ impl Recorder {
     pub fn tick(&mut self, sent: &Sent, news: TickNews, scene: Option<SceneSeen>, made: TickSeen) {
         let Between { interventions, news: mut all } = std::mem::take(&mut self.between);
         all.add(news);
-        let TickNews { events, answers, took_work } = all;
+        let TickNews { events, answers, took_work, gave_up_step } = all;
         let seen = TickSeen {
             command: sent.command.map(|command| command.to_string()),
             interventions,
             answers: answers.iter().map(|answer| answer.tick).collect(),
             took_work,
+            gave_up_step,
             ..made
         };
         let message = TickMessage { arrivals: sent.arrivals.clone(), scene, events, answers, seen };
@@ -253,5 +256,6 @@ impl TickNews {
         self.events.extend(later.events);
         self.answers.extend(later.answers);
         self.took_work |= later.took_work;
+        self.gave_up_step |= later.gave_up_step;
     }
 }

@@ -60,6 +60,8 @@ impl ReplayHand {
             springback_refused: *springback_refused,
             taken: seen.answers.clone(),
             took_work: seen.took_work,
+            // Who asks for a step waits for no other.
+            gives_up_step: seen.gave_up_step || !seen.stages.request.is_empty(),
         };
         let sent = Sent {
             arrivals: arrivals.clone(),

@@ -116,6 +116,10 @@ pub struct TickSeen {
     pub answers: Vec<u64>,
     /// Whether it took a rest shape that was made beside the ticks.
     pub took_work: bool,
+    /// Whether it gave up the step of a free object that an earlier tick had asked for: the server was
+    /// lost, or refused it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub gave_up_step: bool,
     /// State of the grasp after it.
     pub state: Option<String>,
     /// Node that each fingertip holds, thumb first.

@@ -115,3 +115,23 @@ impl Colouring {
         &self.remark
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::frame::samples::frame;
+
+    #[test]
+    fn legend_of_strain_does_not_end_at_a_third_of_the_highest() {
+        let mut colouring = Colouring::new(Material::try_new(2.0e4, 0.4).unwrap());
+        let mut object = frame(1).object;
+        // One corner is pulled out: a few nodes are strained much, the others not.
+        object.displacement[0] = object.rest.mesh().vertices()[0].coords.map(|x| 0.2 * x).into();
+        for shading in [Shading::Strain, Shading::VonMises] {
+            colouring.follow(&object, shading, 0.0);
+            let most = colouring.shares().iter().copied().fold(0.0, f64::max);
+            assert!(most > 0.3 && most <= 1.0 / COLOURED_PART + 1e-9, "{shading}: {most}");
+            assert_eq!(most > 1.0, colouring.remark().starts_with("highest: "), "{shading}");
+        }
+    }
+}

@@ -6,6 +6,7 @@ pub mod camera;
 pub mod colour_map;
 pub mod colouring;
 pub mod control;
+pub mod directed_eye;
 pub mod display;
 pub mod eye_place;
 pub mod eye_search;

@@ -290,7 +290,7 @@ impl App {
         if frame.acts.squeezing.is_some() {
             self.eye_place = EyePlace::Taken;
         }
-        let placed = self.director.eye(frame, self.camera, Instant::now());
+        let placed = self.director.eye(frame, self.camera);
         if let Some(eye) = placed.or_else(|| self.eye_place.eye(frame)) {
             self.camera = eye;
         }

@@ -1,6 +1,6 @@
 //! Marks of the contacts: where each fingertip holds, what it covers, and how hard it presses.
 
-use kiss3d::prelude::{Color, SceneNode3d, Vec3};
+use kiss3d::prelude::{Color, SceneNode3d};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::units::{UNITS_PER_M, drawn_point, rotation_from_y};
@@ -29,9 +29,11 @@ const PATCH: Color = Color::new(1.0, 0.80, 0.1, 0.35);
 const FORCE: Color = Color::new(0.10, 0.35, 0.95, 1.0);
 const NODE_RADIUS_M: f32 = 0.0010;
 const SHAFT_RADIUS_M: f32 = 0.0011;
-const HEAD_LENGTH_M: f32 = 0.006;
+const HEAD_LENGTH_M: f64 = 0.006;
 /// Length of the longest arrow, m.
 const ARROW_M: f64 = 0.05;
+/// An arrow ends so many radii of the fingertip before the place: outside the finger.
+const OUTSIDE: f64 = 2.2;
 /// Forces that are all smaller have short arrows, N.
 const LEAST_NEWTONS: f64 = 0.05;
 
@@ -76,23 +78,29 @@ impl DrawnMarks {
         }
         let scale = self.newtons.most();
         for (finger, mark) in self.marks.iter_mut().enumerate() {
+            let radius = frame.hand.as_ref().map_or(0.006, |hand| tip_radius(hand, finger));
             let contact = frame.grasp.contacts[finger];
-            let place = contact.and_then(|contact| shape.get(contact.node as usize));
+            let held = contact.and_then(|contact| shape.get(contact.node as usize));
+            let held = held.map(|place| world_from_object * place);
             mark.hide();
-            let Some(place) = place else { continue };
-            let place = world_from_object * place;
-            if contacts {
-                let radius = frame.hand.as_ref().map_or(0.006, |hand| tip_radius(hand, finger));
-                let normal = contact.map_or(Vector3::y(), |c| c.normal_in_object);
-                mark.show_contact(&place, &(world_from_object * normal), radius);
+            if let (true, Some(place), Some(contact)) = (contacts, &held, contact) {
+                mark.show_contact(place, &(world_from_object * contact.normal_in_object), radius);
             }
             if let (true, Some(all)) = (forces, &frame.grasp.forces) {
-                let radius = frame.hand.as_ref().map_or(0.006, |hand| tip_radius(hand, finger));
                 let arrow = arrow(&all[finger], scale, world_from_object);
-                mark.show_force(&place, &arrow, 2.2 * radius);
+                if let Some(place) = held.or_else(|| pressed_place(frame, finger, &arrow)) {
+                    mark.show_force(&place, &arrow, OUTSIDE * radius);
+                }
             }
         }
     }
+}
+
+/// Where a fingertip presses that is glued to no node: the foremost of it in the direction of its force.
+fn pressed_place(frame: &ViewFrame, finger: usize, arrow: &Vector3<f64>) -> Option<Point3<f64>> {
+    let towards = arrow.try_normalize(1e-9)?;
+    let tip = frame.hand.as_ref()?.colliders().fingers[finger].tip;
+    Some(tip.centre + tip.radius * towards)
 }
 
 fn tip_radius(hand: &HandView, finger: usize) -> f64 {
@@ -128,22 +136,33 @@ impl Mark {
     ///
     /// Units: `before` m.
     fn show_force(&mut self, place: &Point3<f64>, arrow: &Vector3<f64>, before: f64) {
-        let length = arrow.norm() as f32;
-        if length < 1e-4 {
-            return;
-        }
+        let Some([tail, neck, tip]) = arrow_places(place, arrow, before) else { return };
         let rotation = rotation_from_y(arrow);
-        let towards = rotation * Vec3::Y;
-        let at = drawn_point(place) - towards * (before as f32 * UNITS_PER_M);
-        let head = HEAD_LENGTH_M.min(0.6 * length);
-        let shaft = length - head;
-        self.head.set_visible(true).set_rotation(rotation);
-        self.head.set_position(at - towards * (0.5 * head * UNITS_PER_M));
-        set_size(&mut self.head, 2.6 * SHAFT_RADIUS_M, head);
-        self.shaft.set_visible(true).set_rotation(rotation);
-        self.shaft.set_position(at - towards * ((head + 0.5 * shaft) * UNITS_PER_M));
-        set_size(&mut self.shaft, SHAFT_RADIUS_M, shaft);
+        let middle = |a: &Point3<f64>, b: &Point3<f64>| drawn_point(&nalgebra::center(a, b));
+        self.head.set_visible(true).set_rotation(rotation).set_position(middle(&neck, &tip));
+        set_size(&mut self.head, 2.6 * SHAFT_RADIUS_M, (tip - neck).norm() as f32);
+        self.shaft.set_visible(true).set_rotation(rotation).set_position(middle(&tail, &neck));
+        set_size(&mut self.shaft, SHAFT_RADIUS_M, (neck - tail).norm() as f32);
     }
+}
+
+/// Tail, neck and tip of an arrow that points at a place and ends so far before it; `None` for a force that
+/// is not to be seen.
+///
+/// Units: m.
+fn arrow_places(
+    place: &Point3<f64>,
+    arrow: &Vector3<f64>,
+    before: f64,
+) -> Option<[Point3<f64>; 3]> {
+    let length = arrow.norm();
+    if length < 1e-4 {
+        return None;
+    }
+    let towards = arrow / length;
+    let tip = place - towards * before;
+    let head = HEAD_LENGTH_M.min(0.6 * length);
+    Some([tip - arrow, tip - towards * head, tip])
 }
 
 /// Sizes a round body along Y; the renderer's own have the diameter 1 and the height 1.
@@ -152,4 +171,45 @@ impl Mark {
 fn set_size(node: &mut SceneNode3d, radius: f32, height: f32) {
     let (wide, high) = (2.0 * radius * UNITS_PER_M, height * UNITS_PER_M);
     node.set_local_scale(wide, high, wide);
+}
+
+#[cfg(test)]
+mod tests {
+    use softgrasp_grasp::hand::{HandDimensions, JointAngles, pose};
+
+    use super::*;
+    use crate::view::frame::samples::frame;
+
+    #[test]
+    fn arrow_of_a_force_is_no_stub_behind_the_nail_but_lies_outside_the_finger() {
+        // A fingertip that presses down on a place: all of the finger is within two radii of it.
+        let (radius, place) = (0.008, Point3::new(0.01, 0.02, 0.03));
+        for newtons in [0.02, 0.5, 2.0] {
+            let force = Vector3::new(0.0, -newtons, 0.0);
+            let arrow = arrow(&force, 2.0, &Isometry3::identity());
+            let [tail, neck, tip] = arrow_places(&place, &arrow, OUTSIDE * radius).unwrap();
+            for end in [tail, neck, tip] {
+                assert!(end.y - place.y > 2.0 * radius, "{newtons} N: {end} is in the finger");
+            }
+            let length = (tip - tail).norm();
+            assert!((length - ARROW_M * newtons / 2.0).abs() < 1e-12, "{newtons} N: {length} m");
+            assert!(tail.y > neck.y && neck.y > tip.y, "it points at the place");
+        }
+        assert_eq!(arrow_places(&place, &Vector3::zeros(), 0.01), None);
+    }
+
+    #[test]
+    fn finger_that_presses_with_friction_has_an_arrow_though_it_is_glued_to_no_node() {
+        let mut frame = frame(1);
+        let (dimensions, palm) = (HandDimensions::default(), Isometry3::translation(0.0, 0.1, 0.2));
+        let hand = pose(&dimensions, &JointAngles::flat(), palm);
+        frame.hand = Some(HandView::of_pose(dimensions, &hand));
+        let (arrow, tip) = (Vector3::new(0.0, -0.02, 0.0), hand.fingers[1].tip());
+        let place = pressed_place(&frame, 1, &arrow).unwrap();
+        let radius = dimensions.tip_radii()[1];
+        assert!((place - tip).norm() < 2.5 * radius, "{place} is not at the fingertip {tip}");
+        assert_eq!(pressed_place(&frame, 1, &Vector3::zeros()), None, "it does not press");
+        frame.hand = None;
+        assert_eq!(pressed_place(&frame, 1, &arrow), None);
+    }
 }

@@ -24,6 +24,8 @@ mod panels;
 mod panels_tests;
 mod picture;
 mod plain_material;
+#[cfg(test)]
+mod read_words_tests;
 mod recorder;
 mod running;
 mod scene;

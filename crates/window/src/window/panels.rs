@@ -50,7 +50,7 @@ pub struct Panels {
     hint_gone: bool,
     is_set_up: bool,
     /// Since when the server has been preparing the object.
-    prepares_since: Option<Instant>,
+    pub(super) prepares_since: Option<Instant>,
 }
 
 /// What was asked for.

@@ -16,6 +16,7 @@ use super::panels::{Panels, Seen};
 use super::running::{About, Running, Ticks};
 use crate::view::colouring::Colouring;
 use crate::view::display::Display;
+use crate::view::frame::ViewFrame;
 use crate::view::frame::samples::frame;
 use crate::view::outlet::outlet;
 use crate::view::shading::Shading;
@@ -26,7 +27,12 @@ const CARDS: [&str; 6] = ["bar", "status", "time line", "left", "right", "top"];
 const SIZES: [[f32; 2]; 4] = [[800.0, 600.0], [1000.0, 700.0], [1280.0, 800.0], [1920.0, 1080.0]];
 
 /// A run in the worst of states: everything is late, silent and squeezed.
-fn running(hand: HandChoice) -> Running {
+pub(super) fn running(hand: HandChoice) -> Running {
+    running_with(hand, |_| {})
+}
+
+/// The same, with a frame that is changed.
+pub(super) fn running_with(hand: HandChoice, change: impl FnOnce(&mut ViewFrame)) -> Running {
     let (controls, _obeyed) = channel();
     let (_told, notices) = channel();
     let ticks = Ticks { controls, notices, is_over: Box::new(|| false), when_lost: None };
@@ -37,6 +43,7 @@ fn running(hand: HandChoice) -> Running {
     frame.grasp.silent = vec![Device::Glove, Device::Tracker];
     frame.server.shown_tick = Some(1);
     frame.server.said = Some("lost: the connection broke: reset by peer (os error 104)".to_owned());
+    change(&mut frame);
     out.publish(Box::new(frame));
     let about = About {
         object: "strawberry".to_owned(),

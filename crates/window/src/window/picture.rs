@@ -86,6 +86,7 @@ impl Pictures {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::display::Level;
     use crate::view::frame::samples::frame;
     use crate::view::shading::Shading;
 
@@ -117,6 +118,33 @@ mod tests {
             let coloured = seen(shading);
             assert_eq!(coloured == plain, shading == Shading::Plain, "{shading}");
             assert!(seen(Shading::Plain) == plain, "{shading} leaves something behind");
+        }
+    }
+
+    /// Share of the pixels of two pictures that differ as far as everybody sees.
+    fn share_that_differs(a: &RgbImage, b: &RgbImage) -> f64 {
+        let differs = |(a, b): &(&image::Rgb<u8>, &image::Rgb<u8>)| {
+            a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 24)
+        };
+        a.pixels().zip(b.pixels()).filter(differs).count() as f64 / a.pixels().len() as f64
+    }
+
+    #[test]
+    fn ghost_of_the_shape_at_rest_is_seen_where_the_shape_is_not() {
+        let Some(mut pictures) = pictures() else { return };
+        let mut frame = frame(3);
+        // Pressed flat to two thirds: the ghost stands out above it.
+        let press = |p: &nalgebra::Point3<f64>| [0.0, -p.y / 3.0, 0.0];
+        frame.object.displacement = frame.object.rest.mesh().vertices().iter().map(press).collect();
+        let mut camera = ViewCamera::default();
+        camera.frame(frame.object.rest.centre(), 0.7 * frame.object.rest.mesh().size());
+        for level in Level::ALL {
+            let mut seen = |ghost| {
+                let display = Display { ghost, level, ..Display::default() };
+                pictures.draw(&frame, &display, &camera)
+            };
+            let share = share_that_differs(&seen(false), &seen(true));
+            assert!(share > 0.03, "{level}: the ghost changes {share} of the picture");
         }
     }
 }

@@ -66,6 +66,8 @@ impl App {
 
     /// Does one thing that a person asked for.
     pub(super) fn act(&mut self, action: Action) {
+        // For those who drive the window by a program: this was heard.
+        tracing::debug!(target: "softgrasp_window::places", wish = action.label());
         match action {
             Action::Exit => self.ends = true,
             Action::ReadFile => self.panels.dialog = Dialog::read(),

@@ -96,6 +96,11 @@ impl Link {
         self.shared.lock().activity == Activity::Uploading
     }
 
+    /// Whether the server is there and has been given the model, or has refused it.
+    pub fn has_model(&self) -> bool {
+        self.shared.lock().has_model()
+    }
+
     /// Whether the server is there.
     pub fn is_connected(&self) -> bool {
         self.shared.lock().connected

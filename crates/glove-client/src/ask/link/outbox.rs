@@ -132,6 +132,17 @@ impl LinkState {
         (self.events.drain(..).collect(), std::mem::take(&mut self.ended))
     }
 
+    /// Whether the server is there and nothing is to be done about the newest model any more.
+    pub fn has_model(&self) -> bool {
+        let is_done = match self.activity {
+            // A job that has just been begun may be that of the model.
+            Activity::Waiting => !self.busy,
+            Activity::FirstAnswer | Activity::LaterAnswer => true,
+            Activity::Connecting | Activity::Uploading => false,
+        };
+        self.connected && !self.outbox.model_is_new && is_done
+    }
+
     /// Whether nothing waits and nothing is in flight.
     pub fn is_idle(&self) -> bool {
         self.outbox.request.is_none() && !self.busy && !self.outbox.model_is_new

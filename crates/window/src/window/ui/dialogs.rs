@@ -146,7 +146,8 @@ impl FileQuestion {
     fn content(&mut self, ui: &mut Ui, is_save: bool) -> Step {
         let mut chosen = self.name_field(ui, is_save);
         if let Some(refusal) = &self.refusal {
-            ui.label(RichText::new(refusal).color(theme::BAD));
+            let response = ui.label(RichText::new(refusal).color(theme::BAD));
+            places::tell(ui.ctx(), "why not", &response);
         }
         if is_save {
             self.formats(ui);
@@ -269,4 +270,42 @@ fn free_name(object: &str) -> String {
         .map(|n| format!("{stem}-{n}.msh"))
         .find(|name| !Path::new(name).exists())
         .unwrap_or_else(|| format!("{stem}.msh"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::window::read_words_tests::words_read;
+
+    /// A dialog whose own dialog of the system has just ended without a choice, by itself.
+    fn browsed() -> FileQuestion {
+        let mut question = FileQuestion::new("typed.msh".to_owned());
+        let (_, ended) = channel();
+        // However long this test is stopped here, no person was there.
+        question.native = Some((ended, Instant::now() + Duration::from_secs(3600)));
+        question
+    }
+
+    #[test]
+    fn browse_without_a_file_dialog_of_the_system_says_so_and_keeps_what_was_typed() {
+        for (mut dialog, verb) in
+            [(Dialog::Read(browsed()), "Read"), (Dialog::Save(browsed()), "Save")]
+        {
+            let mut answer = None;
+            let read = words_read(|ui| answer = dialog.show(ui.ctx()));
+            assert!(read.contains("no file dialog of its own"), "{read}");
+            assert!(read.contains("typed.msh") && read.contains(verb), "{read}");
+            assert!(answer.is_none() && !dialog.is_closed());
+        }
+    }
+
+    #[test]
+    fn refused_file_keeps_the_dialog_with_the_name_and_the_reason() {
+        let why = "no/such.msh is not there".to_owned();
+        let mut dialog = Dialog::read_again(Path::new("no/such.msh"), why.clone());
+        let mut answer = None;
+        let read = words_read(|ui| answer = dialog.show(ui.ctx()));
+        assert!(read.contains(&why) && read.lines().any(|line| line == "no/such.msh"), "{read}");
+        assert!(answer.is_none() && !dialog.is_closed());
+    }
 }

@@ -192,7 +192,8 @@ fn hands(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     chosen
 }
 
-fn methods(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
+/// Method and accepted error.
+pub fn methods(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     let mut chosen = None;
     ui.label(theme::quiet("Method"));
     // One that was named when the program was started may be none of the usual ones.
@@ -225,7 +226,8 @@ fn views(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
         let mut on = display.shows(toggle);
         let text = format!("{}   ({})", toggle.label(), toggle.key());
         let response = ui.checkbox(&mut on, text);
-        places::tell(ui.ctx(), toggle.label(), &response);
+        // A menu has the name of a part, too.
+        places::tell(ui.ctx(), &format!("show {}", toggle.label()), &response);
         if response.clicked() {
             chosen = Some(Action::Toggle(toggle));
         }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use egui::Ui;
 
-use super::theme;
+use super::{places, theme};
 
 /// What a card of a server that prepares says.
 pub struct Preparing<'a> {
@@ -29,7 +29,9 @@ pub fn show(ui: &mut Ui, preparing: &Preparing<'_>) {
     theme::sheet(ui, |ui| {
         ui.horizontal(|ui| {
             ui.spinner();
-            ui.strong(format!("Preparing the {object} ({nodes} nodes): {} s", since.as_secs()));
+            let text = format!("Preparing the {object} ({nodes} nodes): {} s", since.as_secs());
+            let response = ui.strong(text);
+            places::tell(ui.ctx(), "preparing", &response);
         });
         if !stage.is_empty() {
             ui.label(theme::quiet(format!("The server is {stage}.")));

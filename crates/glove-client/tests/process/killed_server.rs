@@ -1,0 +1,104 @@
+//! Runs whose server is killed in the middle: what is said of the ticks after that, and that a replay of
+//! their recordings finds the same.
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+
+use fea_server::{RunningServer, ServerConfig};
+use serde_json::Value;
+
+use crate::start::{Folder, succeed};
+
+/// A server behind a way that is cut, for good, when so many bytes have gone to it.
+struct Mortal {
+    address: SocketAddr,
+    left: Arc<AtomicI64>,
+    _server: RunningServer,
+}
+
+impl Mortal {
+    fn dies_after(bytes: i64) -> Self {
+        let listen = SocketAddr::from(([127, 0, 0, 1], 0));
+        let config = ServerConfig { listen, threads: 2, ..ServerConfig::default() };
+        let server = fea_server::start(config).unwrap();
+        let (behind, way) = (server.address(), TcpListener::bind(listen).unwrap());
+        let address = way.local_addr().unwrap();
+        let left = Arc::new(AtomicI64::new(bytes));
+        let counted = Arc::clone(&left);
+        std::thread::spawn(move || {
+            for client in way.incoming().map_while(Result::ok) {
+                if counted.load(Ordering::SeqCst) <= 0 {
+                    return;
+                }
+                let server = TcpStream::connect(behind).unwrap();
+                let (to, from) = (client.try_clone().unwrap(), server.try_clone().unwrap());
+                let counted = Arc::clone(&counted);
+                std::thread::spawn(move || {
+                    pass_on(client, server, |bytes| {
+                        counted.fetch_sub(bytes, Ordering::SeqCst) > bytes
+                    })
+                });
+                std::thread::spawn(move || pass_on(from, to, |_| true));
+            }
+        });
+        Self { address, left, _server: server }
+    }
+}
+
+/// Passes on what comes as long as `goes_on`, then closes both.
+fn pass_on(mut from: TcpStream, mut to: TcpStream, goes_on: impl Fn(i64) -> bool) {
+    let mut buffer = [0; 1 << 16];
+    while let Ok(count) = from.read(&mut buffer) {
+        if count == 0 || !goes_on(count as i64) || to.write_all(&buffer[..count]).is_err() {
+            break;
+        }
+    }
+    let _ = (from.shutdown(Shutdown::Both), to.shutdown(Shutdown::Both));
+}
+
+/// A run in real time of a small strawberry, recorded; its report.
+fn run(folder: &Folder, server: &Mortal, more: &[&str]) -> Value {
+    let (path, report) = (folder.path("run.mcap"), folder.path("run.json"));
+    let address = server.address.to_string();
+    let usual = ["run", "--headless", "--nodes", "300", "--rate", "60"];
+    let files = ["--server", &address, "--record", &path, "--report", &report];
+    succeed(&[&usual[..], &files, more].concat());
+    serde_json::from_str(&folder.read("run.json")).unwrap()
+}
+
+/// Kills the server when these shares of all bytes have gone to it; checks each run and its replay.
+fn check_runs(shares: &[f64], more: &[&str]) {
+    let folder = Folder::new();
+    let whole = Mortal::dies_after(i64::MAX);
+    run(&folder, &whole, more);
+    let all = i64::MAX - whole.left.load(Ordering::SeqCst);
+    let mut after_it_was_killed = 0;
+    for share in shares {
+        let mortal = Mortal::dies_after((share * all as f64) as i64);
+        let report = run(&folder, &mortal, more);
+        let events = report["events"].as_array().unwrap();
+        let lost = events.iter().find(|e| e["what"].as_str().unwrap().starts_with("lost: "));
+        let lost = lost.unwrap_or_else(|| panic!("{share}: it was never killed"))["tick"].as_u64();
+        for tick in
+            report["frames"].as_array().unwrap().iter().filter(|t| t["tick"].as_u64() > lost)
+        {
+            let why = &tick["unanswered"];
+            assert_ne!(why, "answer_late", "{share}: tick {} of {lost:?}", tick["tick"]);
+            after_it_was_killed += u32::from(why == "server_lost");
+        }
+        succeed(&["replay", &folder.path("run.mcap"), "--check"]);
+    }
+    assert!(after_it_was_killed > 20, "{after_it_was_killed} ticks are said to have had no server");
+}
+
+#[test]
+fn ticks_after_a_killed_server_are_not_said_to_wait_for_a_late_answer_when_grasped_by_contact() {
+    check_runs(&[0.4, 0.6, 0.8], &[]);
+}
+
+#[test]
+fn recording_of_a_run_whose_server_was_killed_is_repeated_by_the_rules_of_the_thesis() {
+    check_runs(&[0.4, 0.6, 0.8], &["--grasp", "thesis", "--hand", "scripted:release"]);
+}
