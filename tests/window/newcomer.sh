@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# A curious newcomer: presses every key and chooses every entry of every menu, in every state of the
-# story and of the hand, in windows of three sizes; draws the sliders of softness, takes the hand, waits
-# for the story to begin anew, and looks what it costs. Ends as tests/window/run.sh does.
+# A curious newcomer: presses every key in every state of the story and of the hand, in windows of three
+# sizes, and chooses every entry of every menu in each of the sizes and each of the states; draws the sliders
+# of softness, takes the hand, waits for the story to begin anew, and looks what it costs. Ends as
+# tests/window/run.sh does.
 #
 #   BIN_DIR=target/debug tests/window/newcomer.sh [FOLDER]     keeps a picture of each state in FOLDER
 #   SIZES="800x600 1280x800" …                                 windows of these sizes only
@@ -109,9 +110,14 @@ choose() {
     alive
 }
 
-# choose_all: every entry of every menu, in the state that is there.
+# choose_all STATE: every entry of every menu, in the state that is there. That takes most of a minute, so
+# each window tries one or two states, and all together every one.
 choose_all() {
     local entry
+    case "$size $1" in
+        "800x600 squeezed" | "800x600 own" | "1280x800 kept" | "1280x800 turn" | "1920x1080 approach") ;;
+        *) return 0 ;;
+    esac
     for entry in "${entries[@]}"; do
         choose "$entry"
     done
@@ -133,7 +139,7 @@ heard_all() {
 
 # -- What it costs
 
-drawn() { grep -c 'places: picture=' "$log"; }
+drawn() { grep -c 'places: picture=' "$log" || true; }
 
 memory_mb() {
     awk '/VmRSS/ { printf "%d", $2 / 1024 }' "/proc/$client_pid/status"
@@ -203,17 +209,17 @@ for size in ${SIZES:-800x600 1280x800 1920x1080}; do
     press "${keys[@]}"
     xdotool key comma
     settle
-    choose_all
+    choose_all approach
     step "$size: … while it is squeezed"
     story_until 'news .*entered Deforming'
     seen squeezed
-    choose_all
+    choose_all squeezed
     xdotool key Return
     press "${keys[@]}"
     step "$size: … with a kept shape"
     story_until 'news .*shape kept'
     seen kept
-    choose_all
+    choose_all kept
     xdotool key Return
     press "${keys[@]}"
     step "$size: the story ends with the person's turn, costs little, and begins anew"
@@ -223,7 +229,7 @@ for size in ${SIZES:-800x600 1280x800 1920x1080}; do
     settle
     seen turn
     costs_little
-    choose_all
+    choose_all turn
     await 'the script begins anew' 60
     step "$size: who holds Space squeezes; every key and every entry with the own hand"
     mark
@@ -233,7 +239,7 @@ for size in ${SIZES:-800x600 1280x800 1920x1080}; do
     seen own-squeeze
     xdotool keyup space
     press "${keys[@]}" "${hand_keys[@]}"
-    choose_all
+    choose_all own
     step "$size: every hand, and every object"
     for script in "${scripts[@]}"; do
         mark
