@@ -197,9 +197,8 @@ impl Path {
             self.secants.keep(step.iter().map(|d| share * d).collect(), change);
             self.q = moved.q;
             (evaluated, balance) = (after, after_balance);
-            error = if share == 1.0 { contraction.left_after(largest) } else { largest };
-            error = SAFETY * (error + self.left_along_soft(&balance.residual));
-            error = error.max(ERROR_OF_RESIDUAL * balance.residual_rel * self.size());
+            let expected = if share == 1.0 { contraction.left_after(largest) } else { largest };
+            error = self.told_error(expected, &balance);
             energy_error = contraction.left_after(size);
             let is_good = |tolerance: f64| error <= tolerance * self.size();
             if wish.error_rel.is_some_and(is_good) {
@@ -218,6 +217,12 @@ impl Path {
             };
         let is_balanced = is_converged || (wish.is_late)();
         Ok(Settled { evaluated, balance, error, energy_error, is_balanced, is_converged })
+    }
+
+    /// The error that is told, m, of a shape whose last correction lets so much be expected.
+    fn told_error(&self, expected: f64, balance: &Balance) -> f64 {
+        let of_corrections = SAFETY * (expected + self.left_along_soft(&balance.residual));
+        of_corrections.max(ERROR_OF_RESIDUAL * balance.residual_rel * self.size())
     }
 
     /// A correction and the slope of the energy along it; without what was learnt where that leads
