@@ -225,8 +225,8 @@ notice() {
     await "notice text=\"[^\"]*$1"
 }
 
-# ended: waits for the end of the program; fails where it is not in order.
-ended() {
+# ends_with CODE: waits for the end of the program; fails where it ends otherwise.
+ends_with() {
     local end=$((SECONDS + patience)) code=0
     while kill -0 "$client_pid" 2>/dev/null; do
         [ $SECONDS -lt $end ] || fail "the program does not end within $patience s"
@@ -234,7 +234,12 @@ ended() {
     done
     wait "$client_pid" || code=$?
     client_pid=""
-    [ "$code" = 0 ] || fail "the program ended with $code"
+    [ "$code" = "$1" ] || fail "the program ended with $code, not with $1"
+}
+
+# ended: the program ends, and all was in order.
+ended() {
+    ends_with 0
     no_panic
 }
 

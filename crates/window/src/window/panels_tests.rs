@@ -63,6 +63,25 @@ pub(super) fn running_with(hand: HandChoice, change: impl FnOnce(&mut ViewFrame)
     running
 }
 
+/// A run as the window sees it that draws it.
+pub(super) fn seen<'a>(
+    running: &'a Running,
+    display: &'a Display,
+    colouring: &'a Colouring,
+) -> Seen<'a> {
+    Seen {
+        running: Some(running),
+        display,
+        colouring,
+        change: &Change::None,
+        starting: None,
+        graphics: ("a graphics card with a long name (Vulkan)", 15.0),
+        is_recording: false,
+        newtons_per_m: 20.0,
+        story_begins_in: None,
+    }
+}
+
 /// Where the cards are in the fifth picture: the first ones measure them.
 fn cards(
     size: [f32; 2],
@@ -76,17 +95,8 @@ fn cards(
     panels.notices.add("shape kept", false);
     let display = Display { shading, ..Display::default() };
     let colouring = Colouring::new(running.about.material);
-    let seen = Seen {
-        running: Some(running),
-        display: &display,
-        colouring: &colouring,
-        change: &Change::None,
-        starting: None,
-        graphics: ("a graphics card with a long name (Vulkan)", 15.0),
-        is_recording: false,
-        newtons_per_m: 20.0,
-        story_begins_in: running.about.hand.is_played().then_some(Duration::from_secs(5)),
-    };
+    let begins_in = running.about.hand.is_played().then_some(Duration::from_secs(5));
+    let seen = Seen { story_begins_in: begins_in, ..seen(running, &display, &colouring) };
     let screen = Rect::from_min_size(Pos2::ZERO, Vec2::from(size));
     for _ in 0..5 {
         let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };

@@ -8,9 +8,8 @@ use softgrasp_grasp::grasp::StateName;
 use softgrasp_hand::hand_choice::HandChoice;
 use softgrasp_hand::scripted::ScriptName;
 
-use super::changes::Change;
-use super::panels::{Panels, Seen};
-use super::panels_tests::{running, running_with};
+use super::panels::Panels;
+use super::panels_tests::{running, running_with, seen};
 use super::running::Running;
 use super::ui::menu::{self, MenuFacts};
 use crate::view::colouring::Colouring;
@@ -54,17 +53,7 @@ fn read_panels(running: &Running, panels: &mut Panels, pages: &[Page], shading: 
     pages.iter().for_each(|page| panels.toggle(*page));
     let display = Display { shading, ..Display::default() };
     let colouring = Colouring::new(running.about.material);
-    let seen = Seen {
-        running: Some(running),
-        display: &display,
-        colouring: &colouring,
-        change: &Change::None,
-        starting: None,
-        graphics: ("a graphics card", 15.0),
-        is_recording: false,
-        newtons_per_m: 20.0,
-        story_begins_in: None,
-    };
+    let seen = seen(running, &display, &colouring);
     words_read(|ui| {
         panels.show(ui.ctx(), &seen);
     })
