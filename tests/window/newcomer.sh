@@ -157,6 +157,26 @@ settle
 xdotool key ctrl+q
 ended
 
+step "a slider of softness that is drawn makes another object, without a restart"
+begin softness run --hand mouse --object cube
+await 'model ready'
+xdotool key F4
+await 'places: name="stiffness"'
+settle 4
+# The slider lies at the left of its number.
+at=$(place stiffness) || exit 1
+read -r x y width <<<"$at"
+mark
+xdotool mousemove $((x - width / 5)) "$y" mousedown 1
+for n in 1 2 3 4; do
+    xdotool mousemove $((x - width / 5 + 8 * n)) "$y"
+    settle 1
+done
+xdotool mouseup 1
+await 'model ready'
+xdotool key ctrl+q
+ended
+
 step "spheres and colliders do not cost memory for each picture"
 begin memory run --object cube --hand scripted:approach
 xdotool key l t t t

@@ -138,6 +138,30 @@ fn frames_go_to_single_precision_where_no_base_fits_and_keep_that_factor() {
     assert!(answer(&mut connection, &request).report.factor_reused);
 }
 
+/// `auto` may take another method where memory is short; the answer says so, and the method that it
+/// names gives those very bits on a server with more memory.
+#[test]
+fn a_method_that_is_named_gives_the_same_bits_whatever_memory_the_server_has() {
+    let mesh = object(BuiltIn::Sphere, 1500);
+    let [double, single] = counted(&mesh, Element::Tet4).map(|need| need.bytes());
+    let [small, large] = [(double + single) / 2, 8 << 30].map(|limit| {
+        let server = fea_server::start(within(limit)).unwrap();
+        let mut connection = client(&server);
+        connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
+        (server, connection)
+    });
+    let (_small_server, mut small) = small;
+    let (_large_server, mut large) = large;
+    let by_auto = Request::Frame(frame(&mesh, 1.0, "auto"));
+    let tight = answer(&mut small, &by_auto);
+    let roomy = answer(&mut large, &by_auto);
+    assert_eq!((&*tight.report.method, &*roomy.report.method), ("front-mixed", "condensed"));
+    assert_ne!(tight.report.chosen_because, roomy.report.chosen_because);
+    assert_ne!(tight.displacements, roomy.displacements, "rounding differs, as the page says");
+    let named = answer(&mut large, &Request::Frame(frame(&mesh, 1.0, &tight.report.method)));
+    assert_eq!(named.displacements, tight.displacements);
+}
+
 #[test]
 fn kept_models_make_room_for_a_request_that_needs_it() {
     let (kept, large) = (cube(343), object(BuiltIn::Sphere, 1500));

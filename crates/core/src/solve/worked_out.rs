@@ -22,6 +22,16 @@ impl<T> WorkedOut<T> {
         self.0.get()
     }
 
+    /// The same as [`WorkedOut::get_or`], without a copy.
+    pub fn get_ref_or(&self, work: impl FnOnce() -> T) -> &T {
+        if let Some(kept) = self.get_ref() {
+            return kept;
+        }
+        let value = work();
+        // Somebody else may have been first; their number is the same. Nobody waits for a move.
+        self.0.get_or_init(|| value)
+    }
+
     /// Keeps what has been worked out; what somebody else has kept before stays.
     pub fn keep(&self, value: T) {
         let _ = self.0.set(value);
@@ -36,13 +46,7 @@ impl<T: Clone> WorkedOut<T> {
 
     /// The number, worked out now by `work` if nobody has; the first result is the one that stays.
     pub fn get_or(&self, work: impl FnOnce() -> T) -> T {
-        if let Some(kept) = self.get() {
-            return kept;
-        }
-        let value = work();
-        // Somebody else may have been first; their number is the same.
-        self.keep(value.clone());
-        self.get().unwrap_or(value)
+        self.get_ref_or(work).clone()
     }
 }
 

@@ -221,10 +221,11 @@ impl TickTiming {
 
 impl ViewFrame {
     /// How hard the hand grips, N: the force of the fingers against that of the thumb, half of what
-    /// all fingertips exert together. `None` where no force is known.
+    /// all fingertips exert together. `None` where no force is known, or none is felt.
     pub fn grip_newtons(&self) -> Option<f64> {
         let forces = self.grasp.forces.as_ref()?;
-        Some(0.5 * forces.iter().map(Vector3::norm).sum::<f64>())
+        let newtons = 0.5 * forces.iter().map(Vector3::norm).sum::<f64>();
+        (newtons >= GRIP_LEAST_N).then_some(newtons)
     }
 
     /// Every vertex as it is shown.
@@ -282,6 +283,8 @@ impl ViewFrame {
 
 /// News that wait to be seen; the oldest go.
 const NEWS_MAX: usize = 256;
+/// A grip that would be told as 0.00 N is none, N.
+const GRIP_LEAST_N: f64 = 0.005;
 /// Timings that wait to be seen; the oldest go.
 const TIMINGS_MAX: usize = 1024;
 
@@ -339,6 +342,15 @@ mod tests {
         for (shown, old) in [(9, false), (8, false), (7, true)] {
             frame.server.shown_tick = Some(shown);
             assert_eq!(frame.answer_is_old(), old, "{shown}");
+        }
+    }
+
+    #[test]
+    fn hand_that_touches_nothing_is_not_said_to_grip_with_0_00_newtons() {
+        let mut frame = frame(9);
+        for (each, told) in [(0.0, None), (1e-3, None), (0.4, Some(1.0))] {
+            frame.grasp.forces = Some([Vector3::new(0.0, each, 0.0); 5]);
+            assert_eq!(frame.grip_newtons(), told, "{each} N at each finger");
         }
     }
 

@@ -214,7 +214,7 @@ impl Panels {
         self.hint_gone |= asked.mouse.iter().any(closes);
     }
 
-    /// Times, legend and information, at the right.
+    /// Softness, legend, times and information, at the right.
     fn show_right(
         &mut self,
         context: &Context,
@@ -232,11 +232,12 @@ impl Panels {
         let is_wide = self.shows_timings || self.information || self.shows_softness;
         let width = if is_wide { RIGHT_WIDTH } else { LEGEND_WIDTH };
         theme::column(context, RIGHT, Align2::RIGHT_TOP, offset, [width, height], |ui| {
-            if is_coloured {
-                legend_card::show(ui, seen.colouring.map(), &legend_text(seen.colouring));
-            }
+            // Sliders come first: the legend comes and goes, and must not move them under the hand.
             if let (true, Some(frame)) = (self.shows_softness, running.newest()) {
                 asked.softness = self.softness.show(ui, &softness_of(running, frame));
+            }
+            if is_coloured {
+                legend_card::show(ui, seen.colouring.map(), &legend_text(seen.colouring));
             }
             if self.shows_timings {
                 self.timings.show(ui, seen.graphics.1);

@@ -3,7 +3,7 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use egui::{Context, Id, Pos2, RawInput, Rect, Vec2};
+use egui::{Context, Event, Id, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2};
 use nalgebra::Vector3;
 use softgrasp_core::fem::Material;
 use softgrasp_grasp::grasp::StateName;
@@ -14,6 +14,8 @@ use softgrasp_hand::scripted::ScriptName;
 use super::changes::Change;
 use super::panels::{Panels, Seen};
 use super::running::{About, Running, Ticks};
+use super::ui::places;
+use super::ui::softness_card::SoftnessWish;
 use crate::view::colouring::Colouring;
 use crate::view::display::Display;
 use crate::view::frame::ViewFrame;
@@ -144,5 +146,86 @@ fn panels_do_not_overlap_in_windows_of_any_size() {
                 }
             }
         }
+    }
+}
+
+/// A window with the sliders of softness open, and what was wished for in it.
+struct Softened {
+    context: Context,
+    panels: Panels,
+    running: Running,
+    display: Display,
+    wishes: Vec<SoftnessWish>,
+}
+
+impl Softened {
+    fn new() -> Self {
+        let running = running(HandChoice::Mouse);
+        let (context, mut panels) = (Context::default(), Panels::default());
+        panels.toggle(Page::Softness);
+        let display = Display { shading: Shading::Plain, ..Display::default() };
+        let mut softened = Self { context, panels, running, display, wishes: Vec::new() };
+        (0..3).for_each(|_| softened.picture(Vec::new()));
+        softened
+    }
+
+    fn picture(&mut self, events: Vec<Event>) {
+        let colouring = Colouring::new(self.running.about.material);
+        let seen = seen(&self.running, &self.display, &colouring);
+        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 800.0));
+        let input = RawInput { screen_rect: Some(screen), events, ..RawInput::default() };
+        let mut wish = None;
+        let output = self.context.run_ui(input, |ui| {
+            wish = wish.or(self.panels.show(ui.ctx(), &seen).softness);
+        });
+        output.drop_without_applying_deltas();
+        self.wishes.extend(wish);
+    }
+
+    fn slider(&self, name: &str) -> [i32; 4] {
+        places::of(&self.context, name).unwrap_or_else(|| panic!("no slider '{name}'"))
+    }
+
+    /// Takes a slider in its middle, draws it along in steps, and lets go.
+    fn draw(&mut self, name: &str, along: f32) {
+        let [x, y, ..] = self.slider(name).map(|v| v as f32);
+        let button = |pos, pressed| {
+            let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+            Event::PointerButton { pos, button, pressed, modifiers }
+        };
+        // The slider lies at the left of its number.
+        let from = Pos2::new(x - 0.2 * self.slider(name)[2] as f32, y);
+        self.picture(vec![Event::PointerMoved(from)]);
+        self.picture(vec![button(from, true)]);
+        for step in 1..=5 {
+            let to = from + Vec2::new(along * step as f32 / 5.0, 0.0);
+            self.picture(vec![Event::PointerMoved(to)]);
+        }
+        assert_eq!(self.wishes, [], "nothing is asked for while it is drawn");
+        let to = from + Vec2::new(along, 0.0);
+        self.picture(vec![button(to, false)]);
+        self.picture(Vec::new());
+    }
+}
+
+#[test]
+fn sliders_of_softness_stay_in_place_when_the_legend_of_strain_comes() {
+    let mut window = Softened::new();
+    let names = ["stiffness", "Poisson's ratio", "size", "nodes"];
+    let before = names.map(|name| window.slider(name));
+    window.display.shading = Shading::Strain;
+    (0..3).for_each(|_| window.picture(Vec::new()));
+    assert_eq!(names.map(|name| window.slider(name)), before);
+}
+
+#[test]
+fn slider_of_stiffness_that_is_drawn_wishes_for_one_other_material_once_it_is_let_go() {
+    for (along, is_stiffer) in [(30.0, true), (-30.0, false)] {
+        let mut window = Softened::new();
+        window.draw("stiffness", along);
+        let [SoftnessWish::Material { young, poisson }] = window.wishes[..] else {
+            panic!("{:?}", window.wishes)
+        };
+        assert_eq!((young > 2.0e4, poisson), (is_stiffer, 0.4), "{young}");
     }
 }

@@ -31,6 +31,8 @@ pub struct Stage {
 pub const GROUND_M: f64 = -0.085;
 /// Radius of the ground, m: far beyond what is seen sharply.
 const GROUND_RADIUS_M: f32 = 3.0;
+/// Cascades of the key light, the only one that casts shadows; the renderer would keep room for sixteen.
+const KEY_CASCADES: u32 = 4;
 
 impl Stage {
     /// Sets up lights and ground.
@@ -72,7 +74,12 @@ impl Stage {
         self.level = Some(level);
         window.set_shadows_enabled(level != Level::Plain);
         window.set_shadow_distance(0.9 * UNITS_PER_M);
-        window.set_shadow_resolution(if level == Level::Full { 4096 } else { 2048 });
+        window.set_shadow_atlas_layers(KEY_CASCADES);
+        window.set_shadow_resolution(match level {
+            Level::Plain => 64,
+            Level::Fair => 2048,
+            Level::Full => 4096,
+        });
         window.set_shadow_softness(if level == Level::Full { 2.5 } else { 1.5 });
         window.set_ssao_enabled(level == Level::Full);
         window.set_samples(if level == Level::Plain { NumSamples::One } else { NumSamples::Four });

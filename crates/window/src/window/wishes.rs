@@ -17,6 +17,7 @@ use super::ui::dialogs::{Dialog, FileAnswer};
 use super::ui::softness_card::SoftnessWish;
 use crate::view::action::Action;
 use crate::view::control::Control;
+use crate::view::display::Level;
 use crate::view::frame::ViewFrame;
 use crate::view::loading::ObjectWish;
 
@@ -85,7 +86,7 @@ impl App {
             }
             Action::Page(page) => self.panels.toggle(page),
             Action::Toggle(toggle) => self.display.toggle(toggle),
-            Action::Light(level) => self.display.level = level,
+            Action::Light(level) => self.set_light(level),
             Action::Shade(shading) => {
                 self.display.shading = shading;
                 self.director.shading_is_chosen();
@@ -114,6 +115,15 @@ impl App {
         running.about.material = material;
         self.colouring.set_material(material);
         running.ask(Control::SetMaterial(Material { young, poisson }));
+    }
+
+    fn set_light(&mut self, level: Level) {
+        self.display.level = level;
+        if self.graphics.is_software && level != Level::Plain {
+            let text = "The processor draws here: this light is slow, and takes memory with every \
+                        picture. View, plain light goes back.";
+            self.panels.notices.add(text, false);
+        }
     }
 
     fn sphere_levels(&self) -> usize {

@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 use super::base::{Base, CondensedError};
 use super::rounding::{rounding_of_product, settled};
-use super::surface_columns::Block;
+use super::surface_columns::{Block, SurfaceNodes};
 use super::touched::Contact;
 use crate::solve::vectors::norm;
+use crate::solve::worked_out::WorkedOut;
 
 /// Responses of the held shape to unit forces at one contact: on one node, or spread by a mask.
 ///
@@ -19,13 +20,22 @@ pub struct ContactColumns {
     pub contact: Contact,
     /// Displacement of every degree of freedom under a unit force along x, y, z; 3 × 3N.
     pub(super) fields: [Vec<f64>; 3],
-    /// The same at the nodes of the surface, of a contact on one node; none of a mask.
-    pub(super) surface: Vec<Block>,
+    /// The same at the nodes of the surface, once a step of contact has asked for it.
+    surface: WorkedOut<Vec<Block>>,
     pub(super) norms: [f64; 3],
     /// Norms of `e − K_B g` over the free degrees of freedom, as computed.
     pub(super) residuals: [f64; 3],
     /// Bounds on the same norms, rounding of the computation included.
     pub(super) residual_bounds: [f64; 3],
+}
+
+impl ContactColumns {
+    /// Displacements at the nodes of the surface, node by node; put together for the first who asks.
+    ///
+    /// Units: m/N.
+    pub(super) fn surface(&self, nodes: &SurfaceNodes) -> &[Block] {
+        self.surface.get_ref_or(|| nodes.blocks(self.fields.each_ref().map(Vec::as_slice)))
+    }
 }
 
 /// Cache of columns under a memory bound, least recently used out first.
@@ -184,14 +194,9 @@ fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
         .iter()
         .filter_map(|contact| {
             let [x, y, z] = [fields.next()?, fields.next()?, fields.next()?];
-            let fields = [&x, &y, &z].map(|column| column.field.as_slice());
-            let surface = match contact {
-                Contact::Node(_) => base.surface.blocks(fields),
-                Contact::Mask(_) => Vec::new(),
-            };
             Some(ContactColumns {
                 contact: contact.clone(),
-                surface,
+                surface: WorkedOut::default(),
                 norms: [x.norm, y.norm, z.norm],
                 residuals: [x.residual, y.residual, z.residual],
                 residual_bounds: [x.residual_bound, y.residual_bound, z.residual_bound],

@@ -79,9 +79,10 @@ impl<'a> Response<'a> {
     /// If the node was not named to [`Response::need`].
     pub fn held(&self, node: u32) -> HeldCompliance<'_> {
         let columns = &self.kept[&node];
+        let nodes = &self.elasticity.base.surface;
         HeldCompliance {
-            nodes: &self.elasticity.base.surface,
-            surface: &columns.surface,
+            nodes,
+            surface: columns.surface(nodes),
             fields: columns.fields.each_ref().map(Vec::as_slice),
         }
     }

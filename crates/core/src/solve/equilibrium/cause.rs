@@ -42,3 +42,50 @@ pub(super) fn of(path: &mut Path, goal: &Goal<'_>, lost: Lost) -> NoEquilibrium 
         None => NoEquilibrium::InsideOut { share },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::fem::hyperelastic::Law;
+    use crate::fem::{Element, Material};
+    use crate::mesh::{BuiltIn, generate};
+    use crate::model::Model;
+
+    /// The cause that a cube is told which was stretched so far, along z and along x and y.
+    fn told(poisson: f64, stretches: [f64; 2], force: f64, lost: Lost) -> NoEquilibrium {
+        let mesh = generate(BuiltIn::Cube, 27).unwrap();
+        let material = Material::try_new(2.0e4, poisson).unwrap();
+        let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
+        let [along, across] = stretches.map(|stretch| stretch - 1.0);
+        let places = model.mesh().vertices().iter();
+        let q = places.flat_map(|p| [across * p.x, across * p.y, along * p.z]).collect();
+        let held: Vec<u32> = (0..12).collect();
+        let hold = model.hold(&held, vec![], None).unwrap();
+        let elements = Arc::new(model.hyperelastic(Law::NeoHookean).unwrap());
+        let mut path = Path::new(elements, model.stiffness(), Arc::new(hold), q, false);
+        let forces = vec![force; 3 * model.system_node_count()];
+        of(&mut path, &Goal { q_known: &[0.0; 12], mask_q: &[], forces: &forces }, lost)
+    }
+
+    #[test]
+    fn each_cause_has_a_sentence_of_its_own() {
+        let spent = Lost::Spent { share: 0.5, residual_rel: 0.1 };
+        let flat = Lost::Flattened { share: 0.5 };
+        let pulled = [4.0, 0.5];
+        for (poisson, stretches, force, lost, sentence) in [
+            (0.3, [0.9, 1.0], 0.0, spent, "the branch of equilibria ends"),
+            (0.3, pulled, 0.0, spent, "the branch of equilibria ends"),
+            (0.3, pulled, 1.0, spent, "the forces draw the body to 4.0 times"),
+            (0.3, [0.9, 1.0], 0.0, flat, "an element would turn inside out"),
+            (0.3, [0.5, 1.0], 0.0, flat, "surfaces crease from about 60 % on"),
+            (0.49, [0.5, 1.0], 0.0, flat, "a Poisson's ratio of 0.49 hardly allows"),
+            (0.3, [1.0, 1.0], 0.0, Lost::Singular, "the tangent stiffness is singular"),
+            (0.3, [1.0, 1.0], 0.0, Lost::OutOfMemory { bytes: 1 << 40 }, "memory"),
+        ] {
+            let said = told(poisson, stretches, force, lost).to_string();
+            assert!(said.contains(sentence), "{poisson} {stretches:?} {force} {lost:?}: {said}");
+        }
+    }
+}

@@ -210,3 +210,43 @@ fn faces_pressed_through_each_other_are_refused_as_a_crease() {
     assert!(matches!(refused, NoEquilibrium::Creased { .. }), "{refused}");
     assert!(refused.to_string().contains("surfaces crease from about 60 % on"), "{refused}");
 }
+
+#[test]
+fn forces_that_draw_a_body_out_without_end_are_refused_as_an_overload() {
+    let mut case = Case::faces(cube(27, 2.0e4, 0.3, Element::Tet4), |place, _| *place);
+    // The upper face is let go and drawn up with a hundred times what the section bears.
+    let (low, high) = case.model.mesh().bounds();
+    let is_lower = |dof: u32| case.model.mesh().vertices()[dof as usize / 3].z < low.z + 1e-9;
+    let held = case.known.dofs.iter().copied().filter(|dof| is_lower(*dof)).map(|dof| (dof, 0.0));
+    let known = case.model.known(held.collect()).unwrap();
+    let section = (high.x - low.x) * (high.y - low.y);
+    let upper: Vec<usize> = (0..case.model.mesh().vertices().len())
+        .filter(|n| case.model.mesh().vertices()[*n].z > high.z - 1e-9)
+        .collect();
+    for node in &upper {
+        case.forces[3 * node + 2] = 100.0 * 2.0e4 * section / upper.len() as f64;
+    }
+    case.known = known;
+    let refused = case.refused();
+    assert!(matches!(refused, NoEquilibrium::Overloaded { .. }), "{refused}");
+    assert!(refused.to_string().contains("use smaller forces, or a stiffer material"), "{refused}");
+}
+
+/// Before any factor: two nodes of one edge are a hinge.
+#[test]
+fn a_body_that_forces_can_turn_about_its_holds_is_refused_with_that_motion() {
+    let case = Case::faces(cube(27, 2.0e4, 0.3, Element::Tet4), |place, _| *place);
+    let mesh = case.model.mesh();
+    let low = mesh.bounds().0;
+    let is_on_edge = |n: u32| {
+        let place = mesh.vertices()[n as usize];
+        place.z < low.z + 1e-9 && place.y < low.y + 1e-9
+    };
+    let hinge = case.known.dofs.iter().copied().filter(|dof| is_on_edge(*dof / 3));
+    let Err(refused) = case.model.hold(&hinge.collect::<Vec<_>>(), vec![], None) else {
+        panic!("a hinge holds nothing")
+    };
+    let said = refused.to_string();
+    assert!(said.contains("can still turn about the axis"), "{said}");
+    assert!(said.contains("prescribe all three axes of at least three nodes"), "{said}");
+}

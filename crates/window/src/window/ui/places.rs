@@ -11,7 +11,9 @@ struct Places(BTreeMap<String, [i32; 4]>);
 
 /// Tells where a thing is, when it has moved: `RUST_LOG=softgrasp_window::places=debug`.
 pub fn tell(context: &Context, name: &str, response: &Response) {
-    if !tracing::enabled!(target: "softgrasp_window::places", tracing::Level::DEBUG) {
+    // Tests have no subscriber, and ask `of`.
+    if !cfg!(test) && !tracing::enabled!(target: "softgrasp_window::places", tracing::Level::DEBUG)
+    {
         return;
     }
     let pixels = context.pixels_per_point();
@@ -25,4 +27,10 @@ pub fn tell(context: &Context, name: &str, response: &Response) {
         let [x, y, width, height] = place;
         tracing::debug!(target: "softgrasp_window::places", name, x, y, width, height);
     }
+}
+
+/// Where a thing was last: its centre, width and height, pixels.
+#[cfg(test)]
+pub fn of(context: &Context, name: &str) -> Option<[i32; 4]> {
+    context.data(|data| data.get_temp::<Places>(Id::new("places"))?.0.get(name).copied())
 }
