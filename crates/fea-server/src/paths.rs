@@ -8,10 +8,40 @@ use softgrasp_protocol::ModelHash;
 
 use crate::budget::Reservation;
 use crate::lock::Lock;
+use crate::refusal::Refusal;
 
 /// Where a session keeps the path of one model; empty before the first frame and while a frame is
 /// worked on.
-pub(crate) type Seat = Arc<Lock<Option<Box<ModelPath>>>>;
+pub(crate) type Seat = Arc<Lock<Option<Seated>>>;
+
+/// What a session keeps of a path between two frames.
+pub(crate) enum Seated {
+    /// The path.
+    Path(Box<ModelPath>),
+    /// A path that is being made beside the frames, which linear elasticity answers meanwhile.
+    Coming(Coming),
+}
+
+/// Where a path will lie that is being made; its clones are the same place.
+#[derive(Clone, Default)]
+pub(crate) struct Coming(Arc<Lock<Option<Result<Box<ModelPath>, Refusal>>>>);
+
+impl Coming {
+    /// The path is there, or it is refused.
+    pub fn arrive(&self, made: Result<Box<ModelPath>, Refusal>) {
+        self.0.with(|place| *place = Some(made));
+    }
+
+    /// The path, once it is there.
+    pub fn take(&self) -> Option<Result<Box<ModelPath>, Refusal>> {
+        self.0.with(Option::take)
+    }
+
+    /// Whether nobody else holds the place: it is made no more, or waited for no more.
+    pub fn is_alone(&self) -> bool {
+        Arc::strong_count(&self.0) == 1
+    }
+}
 
 /// A path with all that belongs to it between two frames.
 pub(crate) struct ModelPath {

@@ -8,6 +8,7 @@ use softgrasp_protocol::{
     Answer, ContactAnswer, ContactFrame, Frame, FrameRequest, Hello, LargeAnswer, LargeFrame,
     Limits, ModelHash, ModelReady, Reply, Request, UploadModel, Welcome,
 };
+use tokio::task::JoinHandle;
 
 use crate::answer::{
     PosedContact, PosedFrame, Readiness, answer_large_frame, is_finite, prefetch, prove, readiness,
@@ -41,6 +42,8 @@ pub(crate) struct RequestHandler {
     held: HeldModels,
     /// The equilibria that this session follows.
     paths: Paths,
+    /// A path that is made beside the frames of this session.
+    making: Option<JoinHandle<()>>,
     /// Counts this session from its first frame on.
     grasping: Option<Grasping>,
 }
@@ -64,6 +67,7 @@ impl RequestHandler {
             is_introduced: false,
             held: HeldModels::new(Arc::clone(resources)),
             paths: Paths::default(),
+            making: None,
             grasping: None,
             server,
         }
@@ -247,11 +251,21 @@ impl RequestHandler {
         let stored = resources.models.find(request.model);
         let cost_ms = stored
             .map_or(0.0, |stored| large_frame_ms(&stored.model, goes_on, &resources.rates.known()));
-        let work = move || answer_large_frame(&resources, &seat, request, clock());
-        match goes_on && cost_ms <= FRAME_MS_MAX {
-            true => workers.run_frame(work).await?,
-            false => workers.run(self.turn(cost_ms), work).await?,
+        // One path at a time is made beside the frames of a session.
+        let may_make = self.making.as_ref().is_none_or(JoinHandle::is_finished);
+        let work = move || answer_large_frame(&resources, &seat, request, clock(), may_make);
+        let answered = match goes_on && cost_ms <= FRAME_MS_MAX {
+            true => workers.run_frame(work).await??,
+            false => workers.run(self.turn(cost_ms), work).await??,
+        };
+        if let Some(making) = answered.making {
+            let (workers, turn) = (workers.clone(), self.turn(cost_ms));
+            self.making = Some(tokio::spawn(async move {
+                // What ends abnormally is in the log; the next frame begins anew.
+                let _ = workers.run(turn, making).await;
+            }));
         }
+        Ok(answered.answer)
     }
 
     /// Answers a contact frame: among the frames where its columns are there, else by what computing

@@ -21,6 +21,7 @@ mod engine;
 mod forces;
 mod keep_shape;
 mod lift;
+mod live_grip;
 mod many_clients;
 mod masks;
 mod memory;

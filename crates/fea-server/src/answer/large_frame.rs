@@ -7,47 +7,77 @@ use softgrasp_core::fem::hyperelastic::LargeSummary;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::equilibrium::{Hold, Path};
 use softgrasp_protocol::{
-    DeformationChoice, FrameRequest, LargeAnswer, LargeAsk, LargeFrame, ModelHash, NodeChoice,
-    Pace, PathChoice, Question as QuestionMessage, Want,
+    Answer, DeformationChoice, Displacements, FrameRequest, LargeAnswer, LargeAsk, LargeFrame,
+    ModelHash, NodeChoice, Pace, PathChoice, Question as QuestionMessage, Want, WarningLevel,
 };
 
 use super::frame::answer_frame;
 use super::large::{Found, FramePace, LINEAR_ERROR_REL, LargeQuestion, law_of};
 use super::large_once::{admit_path, linear_answer, promised_error};
-use crate::clock::{StageClock, ms_since};
+use crate::awaited::Awaited;
+use crate::clock::{StageClock, StageWatch, ms_since};
 use crate::lock::Lock;
-use crate::paths::{ModelPath, Seat, UnderWay};
+use crate::paths::{Coming, ModelPath, Seat, Seated, UnderWay};
 use crate::plan::Subject;
 use crate::refusal::Refusal;
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
-/// One frame on a kept model, from the shape of the session's last one.
+/// The answer to a frame, and what is to be made beside the frames for those that follow.
+pub(crate) struct Answered {
+    /// The answer.
+    pub answer: LargeAnswer,
+    /// Makes the session's path, where linear elasticity has answered because there was none yet.
+    pub making: Option<Box<dyn FnOnce() + Send>>,
+}
+
+/// One frame on a kept model, from the shape of the session's last one. The first frames of a live grip
+/// are answered by linear elasticity while the path is made beside them, if `may_make` allows it.
 ///
 /// # Errors
 /// [`Refusal`]; the path stays where it was, then.
 pub(crate) fn answer_large_frame(
-    resources: &Resources,
+    resources: &Arc<Resources>,
     seat: &Seat,
     request: LargeFrame,
     clock: StageClock,
-) -> Result<LargeAnswer, Refusal> {
+    may_make: bool,
+) -> Result<Answered, Refusal> {
     let LargeFrame { model: hash, large: ask, question: message } = request;
+    let resources = Arc::clone(resources);
     let stored = resources.models.find(hash).ok_or(Refusal::UnknownModel(hash))?;
     let question = LargeQuestion::new(&stored.model, &ask, &message)?;
-    let kept = seat.with(Option::take);
-    let goes_on = |kept: &ModelPath| {
-        ask.path == PathChoice::Continue
-            && kept.law == law_of(ask.law)
-            && kept.yield_stress == ask.yield_stress
+    let frame = Arc::new(Frame { resources, hash, stored, ask, message, question });
+    let (kept, coming) = match seat.with(Option::take) {
+        None => (None, None),
+        Some(Seated::Path(path)) => (Some(path), None),
+        Some(Seated::Coming(coming)) => match coming.take() {
+            Some(made) => (Some(made?), None),
+            None => (None, Some(coming).filter(|coming| !coming.is_alone())),
+        },
     };
-    let kept = kept.filter(|kept| goes_on(kept));
-    let frame = Frame { resources, hash, stored, ask, message, question };
+    let kept = kept.filter(|kept| frame.goes_on(kept));
     if frame.ask.deformation == DeformationChoice::Auto
         && kept.is_none()
-        && let Some(answer) = frame.linear(&clock)?
+        && let Some((answer, promised)) = frame.linear(&clock)?
     {
-        return Ok(answer);
+        let is_exact = promised <= frame.allowed();
+        if is_exact {
+            seat.with(|seat| *seat = coming.map(Seated::Coming));
+            return Ok(Answered { answer: linear_answer(answer, promised), making: None });
+        }
+        if frame.is_live() && (may_make || coming.is_some()) {
+            let (coming, making) = match coming {
+                Some(coming) => (coming, None),
+                None => {
+                    let coming = Coming::default();
+                    let making = frame.making(coming.clone());
+                    (coming, Some(making))
+                }
+            };
+            seat.with(|seat| *seat = Some(Seated::Coming(coming)));
+            return Ok(Answered { answer: frame.meanwhile(answer, promised), making });
+        }
     }
     let mut clock = clock;
     let mut path = match kept {
@@ -56,14 +86,14 @@ pub(crate) fn answer_large_frame(
     };
     let answered = frame.advance(&mut path, clock);
     // A path that found no equilibrium is where it was.
-    seat.with(|seat| *seat = Some(path));
-    resources.models.trim();
-    answered
+    seat.with(|seat| *seat = Some(Seated::Path(path)));
+    frame.resources.models.trim();
+    answered.map(|answer| Answered { answer, making: None })
 }
 
 /// A frame with all that it needs.
-struct Frame<'a> {
-    resources: &'a Resources,
+struct Frame {
+    resources: Arc<Resources>,
     hash: ModelHash,
     stored: Arc<StoredModel>,
     ask: LargeAsk,
@@ -71,46 +101,91 @@ struct Frame<'a> {
     question: LargeQuestion,
 }
 
-impl Frame<'_> {
-    /// The linear answer, if rotation and strain of the whole body promise an error within what is
-    /// allowed.
-    fn linear(&self, clock: &StageClock) -> Result<Option<LargeAnswer>, Refusal> {
+impl Frame {
+    /// Whether a kept path is one that this frame goes on along.
+    fn goes_on(&self, kept: &ModelPath) -> bool {
+        self.ask.path == PathChoice::Continue
+            && kept.law == law_of(self.ask.law)
+            && kept.yield_stress == self.ask.yield_stress
+    }
+
+    /// Whether an answer in time is worth more than an exact one.
+    fn is_live(&self) -> bool {
+        self.ask.path == PathChoice::Continue
+            && self.ask.pace == Pace::Timely
+            && self.question.deadline_ms.is_some()
+    }
+
+    /// Error that a linear answer may have.
+    fn allowed(&self) -> f64 {
+        self.question.max_error.unwrap_or(LINEAR_ERROR_REL)
+    }
+
+    /// The linear answer, and what rotation and strain of the whole body promise its error to be at most;
+    /// none where linear elasticity cannot say.
+    fn linear(&self, clock: &StageClock) -> Result<Option<(Answer, f64)>, Refusal> {
         if self.ask.yield_stress.is_some() {
             return Ok(None);
         }
-        let allowed = self.question.max_error.unwrap_or(LINEAR_ERROR_REL);
         let node_count = self.stored.model.mesh().node_count();
         let mut question = self.message.clone();
         question.max_error = None;
         question.want =
             Want { nodes: NodeChoice::All, precision: Default::default(), ..question.want };
         let request = FrameRequest { model: self.hash, question };
-        let mut answer = answer_frame(self.resources, request, clock.clone())?;
-        let all = std::mem::replace(
-            &mut answer.displacements,
-            softgrasp_protocol::Displacements::F64(Vec::new()),
-        );
+        let mut answer = answer_frame(&self.resources, request, clock.clone())?;
+        let all = std::mem::replace(&mut answer.displacements, Displacements::F64(Vec::new()));
         let all = all.into_f64();
         if self.stored.model.system_node_count() != node_count {
             // Mid-edge nodes stay with the server: their strain is that of the report.
             return Ok(None);
         }
         let strain = self.stored.model.strain(all.as_flattened());
-        let promised = promised_error(strain.rotation_max, strain.strain_max);
-        if promised > allowed {
-            return Ok(None);
-        }
         let rows = match &self.message.want.nodes {
             NodeChoice::All => all,
             NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| all[n as usize]).collect(),
         };
         answer.nodes = self.message.want.nodes.clone();
-        answer.displacements =
-            softgrasp_protocol::Displacements::of(rows, self.message.want.precision);
+        answer.displacements = Displacements::of(rows, self.message.want.precision);
         answer.report.max_rotation_deg = strain.rotation_max.to_degrees();
         answer.report.max_strain = strain.strain_max;
         answer.report.warnings.clear();
-        Ok(Some(linear_answer(answer, promised)))
+        Ok(Some((answer, promised_error(strain.rotation_max, strain.strain_max))))
+    }
+
+    /// The linear answer while the path is being made: it says that it is not what was wanted.
+    fn meanwhile(&self, answer: Answer, promised: f64) -> LargeAnswer {
+        let mut answer = linear_answer(answer, promised);
+        let report = &mut answer.answer.report;
+        report.chosen_because += "; the equilibrium is being prepared";
+        report.warning_level = WarningLevel::Caution;
+        report.warnings.push(format!(
+            "linear elasticity answers while the equilibrium at large deformation is prepared: it may be \
+             off by {promised:.1e} of the largest displacement; wanted was {:.1e}",
+            self.allowed()
+        ));
+        answer.large.settled = false;
+        answer
+    }
+
+    /// Makes the path, and goes to where this frame wants it, for the frames that follow.
+    fn making(self: &Arc<Self>, coming: Coming) -> Box<dyn FnOnce() + Send> {
+        let frame = Arc::clone(self);
+        Box::new(move || {
+            if coming.is_alone() {
+                return;
+            }
+            let clock = || {
+                let (now, watch) = (Instant::now(), StageWatch::default());
+                StageClock::new(0.0, now, watch, Awaited::default())
+            };
+            coming.arrive(frame.path_at_rest(&mut clock()).map(|mut kept| {
+                let pace = FramePace { factor_ms: None, part_will_do: true };
+                // Where it is not found, the next frame goes on from rest.
+                let _ = frame.question.advance(&mut kept.path, &clock(), pace);
+                kept
+            }));
+        })
     }
 
     fn hold(&self, before: Option<&Hold>, clock: &mut StageClock) -> Result<Arc<Hold>, Refusal> {
@@ -128,7 +203,7 @@ impl Frame<'_> {
         let reservation = self.resources.budget.reservation();
         let is_single = self.question.is_single;
         let subject = Subject::about(model, self.question.known.dofs.len(), Some(self.hash));
-        admit_path(self.resources, &reservation, model, (&hold, is_single), &subject)?;
+        admit_path(&self.resources, &reservation, model, (&hold, is_single), &subject)?;
         let rest = vec![0.0; 3 * model.system_node_count()];
         let path = Path::new(elements, model.stiffness(), hold, rest, is_single);
         Ok(Box::new(ModelPath {
