@@ -6,9 +6,10 @@ use std::cmp::Ordering;
 use std::fmt;
 
 use super::Method;
-use super::rates::{ERROR_EXACT, ERROR_REFINED, Rates};
+use super::memory::hierarchy_bytes;
+use super::rates::{ERROR_EXACT, ERROR_ITERATED, ERROR_REFINED, Rates};
 use super::work::{MeshSize, Work};
-use crate::fem::Element;
+use crate::fem::{AXES, Element};
 
 /// What is asked, apart from the numbers: what is named, and what is left open.
 ///
@@ -115,6 +116,7 @@ impl Question {
         match method {
             Method::Pcg => self.max_error.unwrap_or(ERROR_IN_A_HURRY).max(ERROR_REFINED),
             Method::FrontMixed => ERROR_REFINED,
+            Method::Multigrid => self.max_error.unwrap_or(ERROR_ITERATED).max(ERROR_ITERATED),
             _ => ERROR_EXACT,
         }
     }
@@ -139,6 +141,9 @@ impl Question {
             _ => size_of::<f64>(),
         };
         let bytes = match method.dense_bytes(work.unknown_dofs as usize) {
+            _ if method == Method::Multigrid => {
+                hierarchy_bytes(work.unknown_dofs as usize / AXES, work.blocks as usize) as f64
+            }
             Some(bytes) => bytes as f64,
             None => bytes_per_entry as f64 * work.peak_entries,
         };

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// How displacements are found: by a factor or inverse of `K11`, or from kept columns of the compliance.
+/// How displacements are found: by a factor or inverse of `K11`, without one, or from kept columns of
+/// the compliance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Method {
     /// Gauss–Jordan elimination of Appendix A pivot by pivot, rows in parallel: the thesis's own
@@ -23,6 +24,9 @@ pub enum Method {
     FrontMixed,
     /// Conjugate gradients preconditioned by the single-precision factor, to a stated residual.
     Pcg,
+    /// Conjugate gradients preconditioned by a hierarchy of coarser systems, without a factor of
+    /// `K11`, to a stated residual.
+    Multigrid,
     /// Kept columns of the compliance and a small dense system ([`super::condensed`]).
     Condensed,
 }
@@ -40,8 +44,9 @@ pub struct UnknownMethod {
 }
 
 impl Method {
-    /// The methods that factor or invert `K11`, slowest first.
-    pub const DIRECT: [Self; 8] = [
+    /// The methods that answer with `K11` of one partition: those that factor or invert it, slowest
+    /// first, then the one that does without.
+    pub const DIRECT: [Self; 9] = [
         Self::GaussJordanPlain,
         Self::GaussJordan,
         Self::DenseInverse,
@@ -50,6 +55,7 @@ impl Method {
         Self::Front,
         Self::FrontMixed,
         Self::Pcg,
+        Self::Multigrid,
     ];
 
     /// Name on the command line, on the wire and in reports.
@@ -63,6 +69,7 @@ impl Method {
             Self::Front => "front",
             Self::FrontMixed => "front-mixed",
             Self::Pcg => "pcg",
+            Self::Multigrid => "multigrid",
             Self::Condensed => "condensed",
         }
     }
@@ -78,16 +85,22 @@ impl Method {
         }
     }
 
+    /// Whether it stops at a residual and an estimated error, so that a larger error is sooner found.
+    pub const fn stops_early(self) -> bool {
+        matches!(self, Self::Pcg | Self::Multigrid)
+    }
+
     /// Whether its factor is in single precision.
     pub const fn is_single(self) -> bool {
         matches!(self, Self::FrontMixed | Self::Pcg)
     }
 
-    /// Precision of the factor or inverse.
+    /// Precision of the factor, inverse or hierarchy.
     pub const fn precision(self) -> &'static str {
-        match self.is_single() {
-            true => "f32 factor, f64 residual",
-            false => "f64",
+        match self {
+            Self::Multigrid => "f32 hierarchy, f64 residual",
+            _ if self.is_single() => "f32 factor, f64 residual",
+            _ => "f64",
         }
     }
 
@@ -111,9 +124,12 @@ impl Method {
         match self {
             Self::GaussJordanPlain | Self::GaussJordan | Self::DenseInverse => Some(square),
             Self::DenseCholesky => Some(square / 2),
-            Self::SparseCholesky | Self::Front | Self::FrontMixed | Self::Pcg | Self::Condensed => {
-                None
-            }
+            Self::SparseCholesky
+            | Self::Front
+            | Self::FrontMixed
+            | Self::Pcg
+            | Self::Multigrid
+            | Self::Condensed => None,
         }
     }
 }

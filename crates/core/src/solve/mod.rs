@@ -14,6 +14,7 @@ mod k11;
 pub mod memory;
 mod method;
 mod mobility;
+mod multigrid;
 mod ordering;
 mod partition;
 mod pcg;

@@ -46,10 +46,18 @@ pub struct FactorSample {
 
 /// Digits that one step with a single-precision factor gains; four to seven are usual.
 const DIGITS_PER_STEP: f64 = 4.0;
+/// What a hierarchy costs, and one step by it, in products with the stiffness; its steps for each digit
+/// and besides. Measured by `examples/multigrid_times.rs`.
+const HIERARCHY_PRODUCTS: f64 = 60.0;
+const CYCLE_PRODUCTS: f64 = 5.0;
+const STEPS_PER_DIGIT: f64 = 2.0;
+const STEPS_BEFORE: f64 = 3.0;
 /// What direct methods in double precision reach.
 pub const ERROR_EXACT: f64 = 1e-13;
 /// What a single-precision factor reaches when it is refined.
 pub const ERROR_REFINED: f64 = 1e-12;
+/// What conjugate gradients without a factor are asked for where nothing else is said.
+pub const ERROR_ITERATED: f64 = 1e-10;
 
 impl FactorRates {
     /// Rates that give both samples back, or, where no positive ones do, the larger sample.
@@ -112,6 +120,11 @@ impl Rates {
                 let digits = -error_rel.clamp(ERROR_REFINED, 0.1).log10();
                 let steps = (digits / DIGITS_PER_STEP).ceil() + 1.0;
                 self.single.factor_s(work) + steps * single_solve
+            }
+            Method::Multigrid => {
+                let digits = -error_rel.clamp(ERROR_ITERATED, 0.1).log10();
+                let steps = STEPS_BEFORE + STEPS_PER_DIGIT * digits;
+                product * (HIERARCHY_PRODUCTS + steps * CYCLE_PRODUCTS)
             }
             Method::DenseCholesky => self.dense_flop_s * n.powi(3) / 3.0 + 2.0 * dense_solve,
             Method::DenseInverse => self.dense_flop_s * n.powi(3) + 4.0 * dense_solve,

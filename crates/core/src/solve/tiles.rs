@@ -68,6 +68,11 @@ impl Tiles {
         }
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.tiles.iter().map(|tile| size_of::<f64>() * tile.nrows() * tile.ncols()).sum()
+    }
+
     fn count(&self) -> usize {
         self.n.div_ceil(self.side)
     }

@@ -87,6 +87,9 @@ impl Factored {
         loads: Loads<'_>,
     ) -> Result<(Solution, bool), SolveError> {
         let (partition, method) = (self.partition(), self.method());
+        if let Kernel::Multigrid(hierarchy) = kernel {
+            return Ok((self.solve_by_cycles(hierarchy, stiffness, loads)?, true));
+        }
         let is_single = kernel.is_single();
         let stops_early = is_single && method == Method::Pcg;
         let goal = RESIDUAL_GOOD.max(loads.residual_rel);

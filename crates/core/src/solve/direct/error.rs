@@ -47,6 +47,25 @@ pub enum SolveError {
         /// Bytes it may take.
         limit: u64,
     },
+    /// Conjugate gradients came to a halt, or used up their steps, before there was an answer.
+    #[error(
+        "{method}: after {steps} steps the residual is {residual_rel:.1e} of the load and the \
+         estimated error {error_estimate_rel:.1e} of the displacement, and {error_rel:.1e} is to be \
+         reached; nearly incompressible materials, very flat elements and very different stiffnesses \
+         are hard without a factor: use front or front-mixed, or allow a larger error"
+    )]
+    NotConverged {
+        /// Method used.
+        method: Method,
+        /// Steps taken.
+        steps: u32,
+        /// `‖b − K11 x‖ / ‖b‖` reached.
+        residual_rel: f64,
+        /// Estimate of `‖error‖ / ‖x‖` reached.
+        error_estimate_rel: f64,
+        /// Estimate that would do.
+        error_rel: f64,
+    },
     /// The answer holds NaN or infinity.
     #[error(
         "{method}: the answer is not finite; the numbers of the mesh, the material or the known \

@@ -11,6 +11,8 @@ use crate::fem::Stiffness;
 use crate::solve::certainty::{Certainty, inverse_norm, row_sums};
 use crate::solve::front::FrontFactor;
 use crate::solve::k11::{SparseK11, visit_k11};
+use crate::solve::memory::hierarchy_bytes;
+use crate::solve::multigrid::Hierarchy;
 use crate::solve::pivot::NotPositive;
 use crate::solve::sparse::Analysis;
 use crate::solve::tiles::Tiles;
@@ -120,6 +122,12 @@ impl Factored {
                 on_stage(Stage::Factor);
                 Kernel::Sparse(Box::new(analysis.factor().map_err(not_positive)?))
             }
+            Method::Multigrid => {
+                let blocks = stiffness.pattern().block_count();
+                check(hierarchy_bytes(stiffness.node_count(), blocks) as u64)?;
+                on_stage(Stage::Factor);
+                Kernel::Multigrid(Box::new(Hierarchy::new(stiffness, &partition)))
+            }
             Method::Front | Method::FrontMixed | Method::Pcg | Method::Condensed => {
                 let analysed = Analysed::new(stiffness, partition, on_stage);
                 return analysed.factor_within(stiffness, method, limit, on_stage);
@@ -215,6 +223,10 @@ impl Factored {
         let weights = row_sums(stiffness, self.partition());
         let n = weights.len();
         self.with_kernel(|kernel| {
+            if let Kernel::Multigrid(hierarchy) = kernel {
+                let solve = |b: Vec<f64>, _| self.inverse_by_cycles(hierarchy, stiffness, &b);
+                return inverse_norm(&weights, &solve);
+            }
             inverse_norm(&weights, &|b, columns| {
                 refinement::apply_inverse_for_certain(kernel, &apply, b, n, columns)
             })

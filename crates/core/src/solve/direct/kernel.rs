@@ -1,14 +1,15 @@
-//! What a direct method makes of `K11`: an explicit inverse or a factor, and products with it.
+//! What a method makes of `K11`: an explicit inverse, a factor or a hierarchy, and products with it.
 
 use crate::solve::Partition;
 use crate::solve::columns::norms;
 use crate::solve::front::FrontFactor;
 use crate::solve::gauss_jordan;
+use crate::solve::multigrid::Hierarchy;
 use crate::solve::sparse::SparseFactor;
 use crate::solve::tiles::Tiles;
 use crate::solve::vectors::norm;
 
-/// An inverse of `K11`, or a factor of it.
+/// An inverse of `K11`, a factor of it, or what stands in for one.
 pub(super) enum Kernel {
     /// Explicit inverse, row-major n × n.
     Inverse(Vec<f64>),
@@ -22,6 +23,8 @@ pub(super) enum Kernel {
     Front(FrontFactor<f64>),
     /// The same in single precision.
     FrontSingle(FrontFactor<f32>),
+    /// No inverse, but a hierarchy that conjugate gradients go by.
+    Multigrid(Box<Hierarchy>),
 }
 
 impl Kernel {
@@ -33,6 +36,7 @@ impl Kernel {
             Self::Sparse(factor) => factor.bytes(),
             Self::Front(factor) => factor.bytes(),
             Self::FrontSingle(factor) => factor.bytes(),
+            Self::Multigrid(hierarchy) => hierarchy.bytes(),
         }
     }
 
@@ -86,7 +90,7 @@ impl Kernel {
         }
     }
 
-    /// `K11⁻¹ b`.
+    /// `K11⁻¹ b`; nearly so by one cycle through a hierarchy.
     pub fn apply(&self, mut b: Vec<f64>) -> Vec<f64> {
         match self {
             Self::Inverse(inverse) => gauss_jordan::mul(inverse, &b),
@@ -113,6 +117,7 @@ impl Kernel {
                 }
                 b
             }
+            Self::Multigrid(hierarchy) => hierarchy.apply_to_unknown(&b),
         }
     }
 }

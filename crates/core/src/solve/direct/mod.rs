@@ -7,6 +7,7 @@ mod direction;
 mod error;
 mod factored;
 mod fallback;
+mod iterated;
 mod kernel;
 mod refinement;
 mod several;

@@ -1,0 +1,100 @@
+//! Iterations, times and memory of `multigrid` on bodies of growing size, each answer compared with
+//! that of a factor where one is asked for.
+//!
+//! `multigrid_times SHAPE NODES [POISSON] [ELEMENT] [METHOD]…`, SHAPE a built-in object, METHOD those
+//! to run, `multigrid` alone by default. Peak memory is that of the process, so one method a run.
+#![allow(clippy::print_stdout, reason = "a table on standard output is what it is for")]
+
+use std::time::Instant;
+
+use softgrasp_core::fem::{Element, Material};
+use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
+use softgrasp_core::model::Model;
+use softgrasp_core::solve::{Loads, Method};
+
+/// The lowest fiftieth of the height is held, the ten highest nodes are moved.
+fn known(mesh: &TetMesh) -> Vec<(u32, f64)> {
+    let (low, high) = mesh.bounds();
+    let limit = low.y + 0.02 * (high.y - low.y);
+    let mut by_height: Vec<u32> = (0..mesh.node_count() as u32).collect();
+    by_height
+        .sort_by(|a, b| mesh.vertices()[*b as usize].y.total_cmp(&mesh.vertices()[*a as usize].y));
+    let held = by_height.iter().filter(|n| mesh.vertices()[**n as usize].y <= limit);
+    let moved = by_height.iter().take(10);
+    let all = |nodes: Vec<u32>, u: [f64; 3]| -> Vec<(u32, f64)> {
+        nodes.iter().flat_map(|n| (0..3).map(move |a| (3 * n + a, u[a as usize]))).collect()
+    };
+    let down = -0.05 * (high.y - low.y);
+    let mut pairs = all(held.copied().collect(), [0.0; 3]);
+    pairs.extend(all(moved.copied().collect(), [0.2 * down, down, 0.0]));
+    pairs
+}
+
+/// Peak resident memory of the process, GiB.
+fn peak_gib() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<f64>().ok());
+    kib.unwrap_or(f64::NAN) / (1 << 20) as f64
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let of = |k: usize, default: &str| arguments.get(k).map_or(default.to_owned(), Clone::clone);
+    let shape: BuiltIn = of(0, "cube").parse().expect("a built-in object");
+    let nodes: usize = of(1, "4000").parse().expect("a number of nodes");
+    let poisson: f64 = of(2, "0.3").parse().expect("Poisson's ratio");
+    let name = of(3, "t4");
+    let element = Element::ALL.into_iter().find(|e| e.name() == name).expect("an element");
+    let methods: Vec<Method> = match arguments.get(4..) {
+        None | Some([]) => vec![Method::Multigrid],
+        Some(names) => names.iter().map(|name| name.parse().expect("a method")).collect(),
+    };
+    let start = Instant::now();
+    let mesh = generate(shape, nodes).expect("a mesh");
+    let mesh_s = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let material = Material::try_new(1e5, poisson).expect("a material");
+    let model = Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).expect("a model");
+    let assemble_s = start.elapsed().as_secs_f64();
+    let known = model.known(known(model.mesh())).expect("known displacements");
+    println!(
+        "{shape:?} {} nodes {} poisson {poisson}: mesh {mesh_s:.2} s, assembly {assemble_s:.2} s, \
+         peak {:.2} GiB",
+        model.system_node_count(),
+        element.name(),
+        peak_gib()
+    );
+    let mut first: Option<Vec<f64>> = None;
+    for method in methods {
+        let start = Instant::now();
+        let factored = model.factor(&known.dofs, method, &mut |_| {}).expect("a factor");
+        let setup_s = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let loads = Loads { q_known: &known.q_known, ..Loads::default() };
+        let solution = match factored.solve(model.stiffness(), loads, &mut |_| {}) {
+            Ok(solution) => solution,
+            Err(error) => {
+                println!("{method}: set-up {setup_s:.2} s, {error}");
+                continue;
+            }
+        };
+        let solve_s = start.elapsed().as_secs_f64();
+        let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let error = first.as_ref().map_or(f64::NAN, |first| {
+            let off: Vec<f64> =
+                first.iter().zip(&solution.displacement).map(|(a, b)| a - b).collect();
+            size(&off) / size(first)
+        });
+        println!(
+            "{method}: set-up {setup_s:.2} s, solve {solve_s:.2} s, {} steps, residual {:.1e}, \
+             estimate {:.1e}, off the first method by {error:.1e}, held {:.2} GiB, peak {:.2} GiB",
+            solution.refinement_steps,
+            solution.residual_rel,
+            solution.error_estimate_rel.unwrap_or(f64::NAN),
+            factored.bytes() as f64 / (1u64 << 30) as f64,
+            peak_gib()
+        );
+        first.get_or_insert(solution.displacement);
+    }
+}

@@ -1,0 +1,203 @@
+//! Smoothing by Chebyshev's polynomials in `D⁻¹ A`, `D` the blocks on the diagonal.
+
+use super::block_rows::{BlockRows, Rows, TASK_ROWS};
+use super::ritz::Ritz;
+use super::small::{inverse, times};
+use super::sums::dot_blocks;
+use rayon::prelude::*;
+
+/// A smoother that takes out the upper part of the spectrum.
+///
+/// Source: Adams, Brezina, Hu, Tuminaro 2003.
+pub(super) struct Chebyshev<const B: usize> {
+    inverse_diagonal: Vec<[[f32; B]; B]>,
+    /// Largest eigenvalue of `D⁻¹ A`, as estimated.
+    largest: f64,
+}
+
+/// What is smoothed goes from the largest eigenvalue down to it over this.
+const SMOOTHED_DOWN_TO: f64 = 12.0;
+/// The largest eigenvalue is estimated from below, by so much at most.
+const ESTIMATE_SAFETY: f64 = 1.08;
+/// Steps of the estimate.
+const ESTIMATE_STEPS: usize = 14;
+/// Degree of the polynomial.
+const DEGREE: usize = 2;
+
+/// What a smoother works on.
+pub(super) struct Vectors<const B: usize> {
+    /// The correction.
+    pub x: Vec<[f32; B]>,
+    /// What is left of the right-hand side.
+    pub r: Vec<[f32; B]>,
+    /// The last step, and room for the next one.
+    d: [Vec<[f32; B]>; 2],
+}
+
+impl<const B: usize> Vectors<B> {
+    pub fn new(rows: usize) -> Self {
+        let zeros = || vec![[0.0; B]; rows];
+        Self { x: zeros(), r: zeros(), d: [zeros(), zeros()] }
+    }
+
+    /// Makes a step by tasks of rows (`fill(first row, steps)`) and adds it to the correction.
+    pub fn take_correction(&mut self, fill: impl Fn(usize, &mut [[f32; B]]) + Sync) {
+        let Self { x, d: [d, _], .. } = self;
+        let tasks = d.par_chunks_mut(TASK_ROWS).zip(x.par_chunks_mut(TASK_ROWS));
+        tasks.enumerate().for_each(|(task, (d, x))| {
+            fill(task * TASK_ROWS, d);
+            for (x, d) in x.iter_mut().zip(d) {
+                (0..B).for_each(|k| x[k] += d[k]);
+            }
+        });
+    }
+
+    /// The last step, and the residual that it leaves out of account.
+    pub fn step_and_residual(&mut self) -> (&[[f32; B]], &mut [[f32; B]]) {
+        (&self.d[0], &mut self.r)
+    }
+}
+
+impl<const B: usize> Chebyshev<B> {
+    /// Inverts the diagonal of a matrix and estimates the largest eigenvalue.
+    pub fn new(a: &BlockRows<B, B>) -> Self {
+        let rows = a.row_count();
+        let of_row = |row: usize| {
+            let mut own = [[0.0; B]; B];
+            a.visit(row, &mut |column, block| {
+                if column == row {
+                    own = *block;
+                }
+            });
+            inverse(&own).map(|line| line.map(|x| x as f32))
+        };
+        let inverse_diagonal =
+            (0..rows).into_par_iter().with_min_len(TASK_ROWS).map(of_row).collect();
+        let mut this = Self { inverse_diagonal, largest: 1.0 };
+        this.largest = ESTIMATE_SAFETY * this.estimate(a);
+        this
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        std::mem::size_of_val(self.inverse_diagonal.as_slice())
+    }
+
+    /// Largest eigenvalue of `D⁻¹ A`, nearly from above.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// Largest eigenvalue of `D⁻¹ A` that a few steps of conjugate gradients see.
+    fn estimate(&self, a: &BlockRows<B, B>) -> f64 {
+        let rows = a.row_count();
+        // Without pattern, so that no mesh is orthogonal to it.
+        let mixed = |i: usize| (7.3 * (i + 1) as f64).sin() as f32;
+        let mut r: Vec<[f32; B]> = (0..rows)
+            .into_par_iter()
+            .map(|row| std::array::from_fn(|k| mixed(B * row + k)))
+            .collect();
+        let mut p = vec![[0.0; B]; rows];
+        let (mut rho, mut beta) = (0.0, 0.0);
+        let mut ritz = Ritz::default();
+        let mut alpha = 0.0;
+        for step in 0..=ESTIMATE_STEPS {
+            let z = self.divide(&r);
+            let rho_next = dot_blocks(&r, &z);
+            if !(rho_next > 0.0 && rho_next.is_finite()) {
+                break;
+            }
+            if step > 0 {
+                beta = rho_next / rho;
+                ritz.step(alpha, beta);
+            }
+            rho = rho_next;
+            let of_last = beta as f32;
+            p.par_iter_mut().with_min_len(TASK_ROWS).zip(&z).for_each(|(p, z)| {
+                (0..B).for_each(|k| p[k] = z[k] + of_last * p[k]);
+            });
+            let mut ap = vec![[0.0; B]; rows];
+            ap.par_chunks_mut(TASK_ROWS).enumerate().for_each(|(task, ap)| {
+                a.products((task * TASK_ROWS, ap.len()), &p, |k, product| ap[k] = product);
+            });
+            let curvature = dot_blocks(&p, &ap);
+            alpha = rho / curvature;
+            if !(curvature > 0.0 && alpha.is_finite()) {
+                break;
+            }
+            let length = alpha as f32;
+            r.par_iter_mut().with_min_len(TASK_ROWS).zip(&ap).for_each(|(r, ap)| {
+                (0..B).for_each(|k| r[k] -= length * ap[k]);
+            });
+        }
+        ritz.largest().filter(|largest| *largest > 0.0).unwrap_or(1.0)
+    }
+
+    fn divide(&self, r: &[[f32; B]]) -> Vec<[f32; B]> {
+        let pairs = self.inverse_diagonal.par_iter().with_min_len(TASK_ROWS).zip(r);
+        pairs.map(|(inverse, r)| times(inverse, r)).collect()
+    }
+
+    /// Improves `x`, whose residual is `r`, which follows only if `finish`.
+    pub fn smooth(&self, a: &BlockRows<B, B>, v: &mut Vectors<B>, finish: bool) {
+        let smallest = self.largest / SMOOTHED_DOWN_TO;
+        let middle = 0.5 * (self.largest + smallest);
+        let half = 0.5 * (self.largest - smallest);
+        let sigma = middle / half;
+        let mut rho = 1.0 / sigma;
+        let Vectors { x, r, d: [d, next] } = v;
+        let by = (1.0 / middle) as f32;
+        let steps = d.par_iter_mut().with_min_len(TASK_ROWS).zip(x.par_iter_mut());
+        steps.zip(self.inverse_diagonal.par_iter().zip(r.par_iter())).for_each(
+            |((d, x), (inverse, r))| {
+                *d = times(inverse, r).map(|step| by * step);
+                (0..B).for_each(|k| x[k] += d[k]);
+            },
+        );
+        for _ in 1..DEGREE {
+            let rho_next = 1.0 / (2.0 * sigma - rho);
+            let (of_last, of_force) = ((rho * rho_next) as f32, (2.0 * rho_next / half) as f32);
+            rho = rho_next;
+            self.turn(a, (&d[..], &mut next[..]), (&mut x[..], &mut r[..]), (of_last, of_force));
+            std::mem::swap(d, next);
+        }
+        if finish {
+            subtract_product(a, d, r);
+        }
+    }
+
+    /// One more step: `r − A d`, then `next = of_last d + of_force D⁻¹ r`, then `x + next`.
+    fn turn(
+        &self,
+        a: &BlockRows<B, B>,
+        (d, next): (&[[f32; B]], &mut [[f32; B]]),
+        (x, r): (&mut [[f32; B]], &mut [[f32; B]]),
+        (of_last, of_force): (f32, f32),
+    ) {
+        let out = next.par_chunks_mut(TASK_ROWS).zip(x.par_chunks_mut(TASK_ROWS));
+        out.zip(r.par_chunks_mut(TASK_ROWS)).enumerate().for_each(|(task, ((next, x), r))| {
+            let first = task * TASK_ROWS;
+            a.products((first, next.len()), d, |row, product| {
+                (0..B).for_each(|k| r[row][k] -= product[k]);
+                let force = times(&self.inverse_diagonal[first + row], &r[row]);
+                for k in 0..B {
+                    next[row][k] = of_last * d[first + row][k] + of_force * force[k];
+                    x[row][k] += next[row][k];
+                }
+            });
+        });
+    }
+}
+
+/// `r − A d` in the place of `r`.
+pub(super) fn subtract_product<const R: usize, const C: usize>(
+    a: &BlockRows<R, C>,
+    d: &[[f32; C]],
+    r: &mut [[f32; R]],
+) {
+    r.par_chunks_mut(TASK_ROWS).enumerate().for_each(|(task, r)| {
+        a.products((task * TASK_ROWS, r.len()), d, |row, product| {
+            (0..R).for_each(|k| r[row][k] -= product[k]);
+        });
+    });
+}

@@ -1,0 +1,114 @@
+//! The matrix of the next coarser level, `Pᵀ A P`.
+
+use super::block_rows::{BlockRows, Rows};
+use super::motions::MOTIONS;
+use super::small::{add_product, add_transposed_product, exact};
+
+/// Where the blocks of each column of a matrix stand.
+pub(super) struct ByColumn {
+    start: Vec<usize>,
+    /// Row and place of each block.
+    blocks: Vec<(u32, u32)>,
+}
+
+impl ByColumn {
+    /// Blocks by columns, rows ascending (counting sort).
+    ///
+    /// # Panics
+    /// If there are 2³² blocks.
+    pub fn new<const R: usize, const C: usize>(
+        matrix: &BlockRows<R, C>,
+        rows: usize,
+        columns: usize,
+    ) -> Self {
+        assert!(matrix.block_count() < u32::MAX as usize, "places of blocks fit 32 bits");
+        let mut start = vec![0usize; columns + 1];
+        for row in 0..rows {
+            matrix.columns(row).iter().for_each(|&column| start[column as usize + 1] += 1);
+        }
+        for column in 0..columns {
+            start[column + 1] += start[column];
+        }
+        let mut next = start.clone();
+        let mut blocks = vec![(0, 0); matrix.block_count()];
+        for row in 0..rows {
+            for (&column, at) in matrix.columns(row).iter().zip(matrix.range(row)) {
+                blocks[next[column as usize]] = (row as u32, at as u32);
+                next[column as usize] += 1;
+            }
+        }
+        Self { start, blocks }
+    }
+
+    /// Rows and places of the blocks of a column.
+    pub fn of(&self, column: usize) -> &[(u32, u32)] {
+        &self.blocks[self.start[column]..self.start[column + 1]]
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        std::mem::size_of_val(self.start.as_slice()) + std::mem::size_of_val(self.blocks.as_slice())
+    }
+}
+
+/// `Pᵀ A P` by rows, summed in double precision. Motions that an aggregate does not have get a one on
+/// the diagonal, so that the matrix stays positive definite.
+///
+/// Shapes: `p` and `by_column` nodes × aggregates; result aggregates × aggregates.
+pub(super) fn product<const B: usize>(
+    rows: &impl Rows<B, B>,
+    p: &BlockRows<B, MOTIONS>,
+    by_column: &ByColumn,
+    aggregates: usize,
+) -> BlockRows<MOTIONS, MOTIONS> {
+    let ap = times_prolongator(rows, p);
+    let columns_of = |aggregate: usize, columns: &mut Vec<u32>| {
+        for &(row, _) in by_column.of(aggregate) {
+            columns.extend_from_slice(ap.columns(row as usize));
+        }
+    };
+    let fill = |aggregate: usize, columns: &[u32], blocks: &mut [[[f64; MOTIONS]; MOTIONS]]| {
+        for &(row, at) in by_column.of(aggregate) {
+            let of_p = exact(p.block(at as usize));
+            for (column, force) in ap.columns(row as usize).iter().zip(ap.blocks(row as usize)) {
+                let at = columns.partition_point(|c| c < column);
+                add_transposed_product(&mut blocks[at], &of_p, &exact(force));
+            }
+        }
+        let own = columns.partition_point(|&c| (c as usize) < aggregate);
+        if let Some(block) = blocks.get_mut(own) {
+            fill_missing(block);
+        }
+    };
+    BlockRows::build(aggregates, columns_of, fill)
+}
+
+/// `A P`.
+fn times_prolongator<const B: usize>(
+    rows: &impl Rows<B, B>,
+    p: &BlockRows<B, MOTIONS>,
+) -> BlockRows<B, MOTIONS> {
+    let columns_of = |row: usize, columns: &mut Vec<u32>| {
+        rows.visit(row, &mut |node, _| columns.extend_from_slice(p.columns(node)));
+    };
+    let fill = |row: usize, columns: &[u32], blocks: &mut [[[f64; MOTIONS]; B]]| {
+        rows.visit(row, &mut |node, block| {
+            for (column, of_p) in p.columns(node).iter().zip(p.blocks(node)) {
+                let at = columns.partition_point(|c| c < column);
+                add_product(&mut blocks[at], block, &exact(of_p));
+            }
+        });
+    };
+    BlockRows::build(rows.row_count(), columns_of, fill)
+}
+
+/// A one, in the unit of the block, for motions without stiffness.
+fn fill_missing(block: &mut [[f64; MOTIONS]; MOTIONS]) {
+    let largest = (0..MOTIONS).map(|k| block[k][k]).fold(0.0, f64::max);
+    let one = if largest > 0.0 { largest } else { 1.0 };
+    for k in 0..MOTIONS {
+        if block[k][k] <= 0.0 {
+            block[k][k] = one;
+        }
+    }
+}
