@@ -1,16 +1,42 @@
 //! Iterations, times and memory of `multigrid` on bodies of growing size, each answer compared with
 //! that of a factor where one is asked for.
 //!
-//! `multigrid_times SHAPE NODES [POISSON] [ELEMENT] [METHOD]…`, SHAPE a built-in object, METHOD those
-//! to run, `multigrid` alone by default. Peak memory is that of the process, so one method a run.
+//! `multigrid_times SHAPE NODES [POISSON] [ELEMENT] [METHOD]…`, SHAPE a built-in object or `lattice`, a
+//! cube of boxes of six tetrahedra of any size; METHOD those to run, `multigrid` alone by default. Peak memory is that of the process, so one method a run.
 #![allow(clippy::print_stdout, reason = "a table on standard output is what it is for")]
 
 use std::time::Instant;
 
+use nalgebra::Point3;
 use softgrasp_core::fem::{Element, Material};
-use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
+use softgrasp_core::mesh::{BuiltIn, TetMesh, generate, signed_volume};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{Loads, Method};
+
+/// A cube of `n`³ nodes, six tetrahedra a box.
+fn lattice(n: usize) -> TetMesh {
+    let at = |[i, j, k]: [usize; 3]| (i + n * (j + n * k)) as u32;
+    let of_index = |index: usize, n: usize| [index % n, index / n % n, index / (n * n)];
+    let vertices: Vec<Point3<f64>> = (0..n * n * n)
+        .map(|index| Point3::from(of_index(index, n).map(|i| i as f64 / (n - 1) as f64)))
+        .collect();
+    let mut tets = Vec::new();
+    for index in 0..(n - 1).pow(3) {
+        for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let mut corner = of_index(index, n - 1);
+            let mut tet = [at(corner); 4];
+            for (position, axis) in axes.into_iter().enumerate() {
+                corner[axis] += 1;
+                tet[position + 1] = at(corner);
+            }
+            if signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
+                tet.swap(0, 1);
+            }
+            tets.push(tet);
+        }
+    }
+    TetMesh::try_new(vertices, tets, vec![]).expect("every box is divided into positive volumes")
+}
 
 /// The lowest fiftieth of the height is held, the ten highest nodes are moved.
 fn known(mesh: &TetMesh) -> Vec<(u32, f64)> {
@@ -41,7 +67,7 @@ fn peak_gib() -> f64 {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let of = |k: usize, default: &str| arguments.get(k).map_or(default.to_owned(), Clone::clone);
-    let shape: BuiltIn = of(0, "cube").parse().expect("a built-in object");
+    let shape = of(0, "cube");
     let nodes: usize = of(1, "4000").parse().expect("a number of nodes");
     let poisson: f64 = of(2, "0.3").parse().expect("Poisson's ratio");
     let name = of(3, "t4");
@@ -51,7 +77,13 @@ fn main() {
         Some(names) => names.iter().map(|name| name.parse().expect("a method")).collect(),
     };
     let start = Instant::now();
-    let mesh = generate(shape, nodes).expect("a mesh");
+    let mesh = match shape.as_str() {
+        "lattice" => lattice((nodes as f64).cbrt().round() as usize),
+        name => {
+            let built_in: BuiltIn = name.parse().expect("a built-in object");
+            generate(built_in, nodes).expect("a mesh")
+        }
+    };
     let mesh_s = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let material = Material::try_new(1e5, poisson).expect("a material");
@@ -59,7 +91,7 @@ fn main() {
     let assemble_s = start.elapsed().as_secs_f64();
     let known = model.known(known(model.mesh())).expect("known displacements");
     println!(
-        "{shape:?} {} nodes {} poisson {poisson}: mesh {mesh_s:.2} s, assembly {assemble_s:.2} s, \
+        "{shape} {} nodes {} poisson {poisson}: mesh {mesh_s:.2} s, assembly {assemble_s:.2} s, \
          peak {:.2} GiB",
         model.system_node_count(),
         element.name(),

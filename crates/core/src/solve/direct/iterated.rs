@@ -10,9 +10,9 @@ use crate::solve::multigrid::{self, Goal, Hierarchy};
 use crate::solve::rates::ERROR_ITERATED;
 
 /// Relative residual to reach where nothing else is asked for.
-const RESIDUAL_ITERATED: f64 = 1e-11;
+const RESIDUAL_ITERATED: f64 = 1e-12;
 /// Conjugate gradients stop after this many steps in any case.
-const STEPS_MAX: u32 = 500;
+const STEPS_MAX: u32 = 1000;
 /// Where rounding ends the steps, an answer with an estimated error this far above the goal is given,
 /// and says so.
 const SHORT_OF_GOAL: f64 = 100.0;

@@ -1,1 +1,300 @@
-//! Tests.
+//! Tests of the hierarchy and of answers by it, against dense factors.
+
+use proptest::prelude::*;
+
+use super::block_rows::Rows;
+use super::fine_rows::FineRows;
+use super::galerkin::{self, ByColumn};
+use super::level::Level;
+use super::motions::{self, MOTIONS};
+use super::{Goal, Hierarchy, solve};
+use crate::fem::{AXES, Element, Material};
+use crate::mesh::{BuiltIn, TetMesh, generate};
+use crate::model::Model;
+use crate::solve::{Loads, Method, Solution, SolveError};
+
+fn model_of(mesh: TetMesh, element: Element, poisson: f64) -> Model {
+    let material = Material::try_new(1e5, poisson).unwrap();
+    Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).unwrap()
+}
+
+fn model(shape: BuiltIn, nodes: usize, element: Element, poisson: f64) -> Model {
+    model_of(generate(shape, nodes).unwrap(), element, poisson)
+}
+
+/// Degrees of freedom with displacements: all of three far-apart nodes, and one axis of a fourth.
+fn held_at_few(model: &Model) -> Vec<(u32, f64)> {
+    let last = model.mesh().node_count() as u32 - 1;
+    let nodes = [0, last / 2 + 2, last];
+    let all = nodes.into_iter().flat_map(|n| (0..3).map(move |axis| (3 * n + axis, 0.0)));
+    let mut pairs: Vec<(u32, f64)> = all.collect();
+    (pairs[4].1, pairs[8].1) = (0.01, -0.02);
+    pairs.push((3 * (last / 3) + 1, 0.03));
+    pairs
+}
+
+fn answer(model: &Model, pairs: &[(u32, f64)], method: Method) -> Result<Solution, SolveError> {
+    let known = model.known(pairs.to_vec()).unwrap();
+    let factored = model.factor(&known.dofs, method, &mut |_| {}).unwrap();
+    let loads = Loads { q_known: &known.q_known, ..Loads::default() };
+    factored.solve(model.stiffness(), loads, &mut |_| {})
+}
+
+fn off(a: &[f64], b: &[f64]) -> f64 {
+    let size = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+    size(&mut a.iter().zip(b).map(|(a, b)| a - b)) / size(&mut b.iter().copied())
+}
+
+/// Same answer as a dense factor, an estimate that covers the error, and how many steps it took.
+fn check_against_dense(model: &Model, pairs: &[(u32, f64)]) -> u32 {
+    let dense = answer(model, pairs, Method::DenseCholesky).unwrap();
+    let found = answer(model, pairs, Method::Multigrid).unwrap();
+    let error = off(&found.displacement, &dense.displacement);
+    let estimate = found.error_estimate_rel.unwrap();
+    assert!(error <= estimate + 1e-13 && error <= 1e-9, "{error:e}, estimated {estimate:e}");
+    let forces = off(&found.reaction, &dense.reaction);
+    assert!(forces <= 1e-7, "reactions off by {forces:e}");
+    found.refinement_steps
+}
+
+#[test]
+fn all_elements_answer_as_a_dense_factor_does() {
+    for element in Element::ALL {
+        let nodes = if element == Element::Tet10 { 120 } else { 400 };
+        for shape in [BuiltIn::Cube, BuiltIn::Strawberry] {
+            let model = model(shape, nodes, element, 0.3);
+            let steps = check_against_dense(&model, &held_at_few(&model));
+            assert!(steps <= 35, "{shape:?} {element:?}: {steps} steps");
+        }
+    }
+}
+
+#[test]
+fn several_bodies_and_bodies_of_one_free_axis_are_answered() {
+    let one = generate(BuiltIn::Cube, 125).unwrap();
+    let n = one.node_count() as u32;
+    let moved = one.vertices().iter().map(|p| p + nalgebra::Vector3::new(3.0, 0.5, 0.0));
+    let vertices = one.vertices().iter().copied().chain(moved).collect();
+    let tets = one.tets().iter().copied().chain(one.tets().iter().map(|t| t.map(|v| v + n)));
+    let two = TetMesh::try_new(vertices, tets.collect(), vec![]).unwrap();
+    let model = model_of(two, Element::Tet4, 0.3);
+    let few = held_at_few(&self::model(BuiltIn::Cube, 125, Element::Tet4, 0.3));
+    let on_both: Vec<(u32, f64)> =
+        few.iter().copied().chain(few.iter().map(|(dof, q)| (dof + 3 * n, -q))).collect();
+    check_against_dense(&model, &on_both);
+    // Of the second body one axis is left free.
+    let all_but_one = (3 * n + 1..6 * n).map(|dof| (dof, 1e-3 * f64::from(dof % 5)));
+    check_against_dense(&model, &few.into_iter().chain(all_but_one).collect::<Vec<_>>());
+}
+
+#[test]
+fn nothing_unknown_is_answered_by_what_is_known() {
+    let model = model(BuiltIn::Cube, 27, Element::Tet4, 0.3);
+    let all: Vec<(u32, f64)> = (0..81).map(|dof| (dof, f64::from(dof))).collect();
+    let found = answer(&model, &all, Method::Multigrid).unwrap();
+    assert_eq!(found.displacement[5], 5.0);
+    assert_eq!(found.refinement_steps, 0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// Whatever is known, single axes too.
+    #[test]
+    fn any_known_degrees_of_freedom_are_answered(
+        shape in prop::sample::select(vec![BuiltIn::Cube, BuiltIn::Sphere, BuiltIn::Toothpaste]),
+        nodes in prop::sample::select(vec![64usize, 216, 343]),
+        poisson in 0.0..0.4f64,
+        dofs in prop::collection::btree_map(0usize..3 * 64, -0.1..0.1f64, 0..40),
+    ) {
+        let Ok(mesh) = generate(shape, nodes) else { return Ok(()) };
+        let model = model_of(mesh, Element::Tet4, poisson);
+        let mut pairs = held_at_few(&model);
+        let limit = model.modelled_dofs();
+        pairs.retain(|(dof, _)| !dofs.contains_key(&(*dof as usize)));
+        pairs.extend(
+            dofs.into_iter().filter(|(d, _)| *d < limit).map(|(d, q)| (d as u32, q)),
+        );
+        check_against_dense(&model, &pairs);
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let model = model(BuiltIn::Strawberry, 3000, Element::Tet4, 0.3);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| answer(&model, &held_at_few(&model), Method::Multigrid).unwrap())
+    };
+    let one = with(1);
+    for threads in [2, 4, 7] {
+        assert_eq!(with(threads), one, "{threads} threads");
+    }
+}
+
+/// The lowest tenth is held, the highest node is pushed.
+fn pushed(model: &Model) -> Vec<(u32, f64)> {
+    let (low, high) = model.mesh().bounds();
+    let part = |y: f64| (y - low.y) / (high.y - low.y);
+    let mut pairs = Vec::new();
+    for (node, place) in model.mesh().vertices().iter().enumerate() {
+        let q = match part(place.y) {
+            p if p <= 0.1 => 0.0,
+            p if p >= 0.999 => -0.1,
+            _ => continue,
+        };
+        pairs.extend((0..3).map(|axis| (3 * node as u32 + axis, q)));
+    }
+    pairs
+}
+
+#[test]
+fn steps_hardly_grow_with_the_number_of_nodes() {
+    for (shape, poisson) in [(BuiltIn::Cube, 0.4), (BuiltIn::Strawberry, 0.3)] {
+        for nodes in [500, 4000, 12_000] {
+            let model = model(shape, nodes, Element::Tet4, poisson);
+            let found = answer(&model, &pushed(&model), Method::Multigrid).unwrap();
+            let steps = found.refinement_steps;
+            assert!(steps <= 30, "{shape:?} of {nodes}: {steps} steps");
+            assert!(found.residual_rel <= 1e-11);
+        }
+    }
+}
+
+#[test]
+fn levels_shrink_to_one_that_is_factored() {
+    let model = model(BuiltIn::Cube, 8000, Element::Tet4, 0.3);
+    let known = model.known(held_at_few(&model)).unwrap();
+    let partition = model.held_partition(&known.dofs).unwrap();
+    let rows = Hierarchy::new(model.stiffness(), &partition).level_rows();
+    assert!(rows.windows(2).all(|w| 4 * w[1] < w[0]), "{rows:?}");
+    assert!(*rows.last().unwrap() <= 120, "{rows:?}");
+}
+
+/// Far from known nodes the prolongator gives every rigid motion back, and what it makes of the
+/// matrix is `Pᵀ A P`.
+#[test]
+fn prolongator_holds_the_rigid_motions_and_the_coarse_matrix_is_its_product() {
+    let model = model(BuiltIn::Sphere, 600, Element::Tet4, 0.3);
+    let known = model.known(held_at_few(&model)).unwrap();
+    let partition = model.held_partition(&known.dofs).unwrap();
+    let rows = FineRows::new(model.stiffness(), &partition);
+    let of_nodes = motions::of_fine(&rows, rows.row_count());
+    let (level, coarser) = Level::of_fine(&rows, &of_nodes);
+    let p = level.prolongator();
+    let is_near = |row: usize| {
+        let mut near =
+            model.mesh().node_count() != rows.row_count() && rows.unknown_axes(row) != [true; AXES];
+        let columns = model.stiffness().pattern().columns(rows.nodes()[row] as usize);
+        near |= columns
+            .iter()
+            .any(|n| (0..3).any(|a| partition.row_of((3 * n + a) as usize).is_none()));
+        near
+    };
+    let mut far = 0;
+    for row in (0..rows.row_count()).filter(|row| !is_near(*row)) {
+        far += 1;
+        for motion in 0..MOTIONS {
+            for axis in 0..AXES {
+                let parts = p.columns(row).iter().zip(p.blocks(row));
+                let sum: f64 = parts
+                    .map(|(&column, block)| {
+                        let coarse = &coarser.motions[column as usize];
+                        (0..MOTIONS)
+                            .map(|k| f64::from(block[axis][k]) * coarse[k][motion])
+                            .sum::<f64>()
+                    })
+                    .sum();
+                let expected = of_nodes[row][axis][motion];
+                assert!((sum - expected).abs() < 1e-5, "row {row}: {sum} for {expected}");
+            }
+        }
+    }
+    assert!(far > 300, "{far} nodes are far from known ones");
+    let aggregates = coarser.a.row_count();
+    let again =
+        galerkin::product(&rows, p, &ByColumn::new(p, rows.row_count(), aggregates), aggregates);
+    // xᵀ (Pᵀ A P) x = (P x)ᵀ A (P x), for an x without pattern.
+    let x: Vec<[f64; MOTIONS]> = (0..aggregates)
+        .map(|i| std::array::from_fn(|k| (7.3 * (MOTIONS * i + k) as f64).sin()))
+        .collect();
+    let px: Vec<[f64; AXES]> = (0..rows.row_count())
+        .map(|row| {
+            std::array::from_fn(|axis| {
+                let parts = p.columns(row).iter().zip(p.blocks(row));
+                parts
+                    .map(|(&c, block)| {
+                        (0..MOTIONS)
+                            .map(|k| f64::from(block[axis][k]) * x[c as usize][k])
+                            .sum::<f64>()
+                    })
+                    .sum()
+            })
+        })
+        .collect();
+    let energy = |count: usize, visit: &dyn Fn(usize, &mut f64)| {
+        let mut sum = 0.0;
+        (0..count).for_each(|row| visit(row, &mut sum));
+        sum
+    };
+    let coarse = energy(aggregates, &|row, sum| {
+        again.visit(row, &mut |column, block| *sum += form(&x[row], block, &x[column]));
+    });
+    let fine = energy(rows.row_count(), &|row, sum| {
+        rows.visit(row, &mut |column, block| *sum += form(&px[row], block, &px[column]));
+    });
+    assert!((coarse / fine - 1.0).abs() < 1e-4, "{coarse} for {fine}");
+}
+
+/// `aᵀ block b`.
+fn form<const B: usize>(a: &[f64; B], block: &[[f64; B]; B], b: &[f64; B]) -> f64 {
+    a.iter()
+        .zip(block)
+        .map(|(a, line)| a * line.iter().zip(b).map(|(x, b)| x * b).sum::<f64>())
+        .sum()
+}
+
+#[test]
+fn estimate_of_an_unfinished_answer_covers_its_error() {
+    let model = model(BuiltIn::Strawberry, 1500, Element::Tet4, 0.45);
+    let known = model.known(held_at_few(&model)).unwrap();
+    let partition = model.held_partition(&known.dofs).unwrap();
+    let hierarchy = Hierarchy::new(model.stiffness(), &partition);
+    let mut b = vec![0.0; partition.dof_count()];
+    for (k, &dof) in partition.unknown().iter().enumerate() {
+        b[dof as usize] = (0.3 * k as f64).cos();
+    }
+    let to = |residual_rel: f64, steps_max: u32| {
+        let goal = Goal { residual_rel, error_rel: 1.0, steps_max };
+        solve(model.stiffness(), &partition, &hierarchy, &b, goal)
+    };
+    let truth = to(1e-12, 500);
+    for steps_max in [6, 10, 15, 20] {
+        let found = to(1e-12, steps_max);
+        let error = off(&found.x, &truth.x);
+        let estimate = found.error_estimate_rel;
+        assert!(found.steps == steps_max && error <= estimate, "{error:e} above {estimate:e}");
+        assert!(estimate <= 300.0 * error, "{error:e} far below {estimate:e}");
+    }
+}
+
+/// So nearly incompressible that steps run out, or so many that rounding ends them: an answer within
+/// its estimate, or a refusal with its steps.
+#[test]
+fn nearly_incompressible_bodies_are_answered_within_the_estimate_or_refused() {
+    for poisson in [0.49, 0.4999, 0.499_999_9] {
+        let model = model(BuiltIn::Cube, 1000, Element::Tet4, poisson);
+        match answer(&model, &pushed(&model), Method::Multigrid) {
+            Ok(found) => {
+                let front = answer(&model, &pushed(&model), Method::Front).unwrap();
+                let error = off(&found.displacement, &front.displacement);
+                let estimate = found.error_estimate_rel.unwrap();
+                assert!(error <= estimate + 1e-11, "{poisson}: {error:e}, estimated {estimate:e}");
+            }
+            Err(SolveError::NotConverged { steps, error_estimate_rel, .. }) => {
+                assert!(steps > 0 && error_estimate_rel > 0.0);
+            }
+            Err(other) => panic!("{poisson}: {other}"),
+        }
+    }
+}
