@@ -7,7 +7,7 @@ use softgrasp_protocol::{
 };
 
 /// Names of all methods, slowest first.
-pub const METHODS: [&str; 9] = [
+pub const METHODS: [&str; 10] = [
     "gauss-jordan-plain",
     "gauss-jordan",
     "dense-inverse",
@@ -16,6 +16,7 @@ pub const METHODS: [&str; 9] = [
     "front",
     "front-mixed",
     "pcg",
+    "multigrid",
     "condensed",
 ];
 

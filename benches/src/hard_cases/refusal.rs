@@ -64,7 +64,9 @@ impl From<ModelError> for Refusal {
             ModelError::Known(_) | ModelError::Partition(_) => Reason::Question,
             ModelError::Free(_) => Reason::Free,
             ModelError::Solve(error) => match error {
-                SolveError::NotPositiveDefinite { .. } => Reason::Weak,
+                SolveError::NotPositiveDefinite { .. } | SolveError::NotConverged { .. } => {
+                    Reason::Weak
+                }
                 SolveError::NotFinite { .. } => Reason::Range,
                 SolveError::LoadCount { .. } | SolveError::NoSuchFactor { .. } => Reason::Question,
                 SolveError::OutOfMemory { .. } | SolveError::OverLimit { .. } => Reason::Other,

@@ -39,7 +39,10 @@ impl Way {
         let all = Element::ALL.into_iter().flat_map(all);
         let is_of_each_kind = |way: &Self| match way {
             Self::Direct(_, method) => {
-                matches!(method, Method::GaussJordan | Method::Front | Method::FrontMixed)
+                matches!(
+                    method,
+                    Method::GaussJordan | Method::Front | Method::FrontMixed | Method::Multigrid
+                )
             }
             Self::Condensed(_) | Self::Masks(_) | Self::Server(_) => true,
             // Two hundred models, each proven in the background, are another question.
@@ -102,6 +105,9 @@ impl Way {
                 _,
                 Method::GaussJordanPlain | Method::GaussJordan | Method::DenseInverse,
             ) => Some("an explicit inverse loses digits that a factor keeps"),
+            Self::Direct(_, Method::Multigrid) => Some(
+                "steps without a factor come to a halt on nearly incompressible or flat elements",
+            ),
             Self::Condensed(_) | Self::Masks(_) => {
                 Some("a compliance between contacts loses digits that a factor of K11 keeps")
             }

@@ -23,7 +23,7 @@ def test_uniform_strain_of_a_pulled_bar_is_exact(server: Server, bar: Bar) -> No
 
 
 @pytest.mark.parametrize(
-    "method", ["front", "front-mixed", "pcg", "sparse-cholesky", "gauss-jordan"]
+    "method", ["front", "front-mixed", "pcg", "multigrid", "sparse-cholesky", "gauss-jordan"]
 )
 def test_methods_agree(server: Server, bar: Bar, method: str) -> None:
     answer = server.solve(bar.model, bar.case, method=method)

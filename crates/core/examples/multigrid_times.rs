@@ -1,26 +1,31 @@
 //! Iterations, times and memory of `multigrid` on bodies of growing size, each answer compared with
 //! that of a factor where one is asked for.
 //!
-//! `multigrid_times SHAPE NODES [POISSON] [ELEMENT] [METHOD]…`, SHAPE a built-in object or `lattice`, a
-//! cube of boxes of six tetrahedra of any size; METHOD those to run, `multigrid` alone by default. Peak memory is that of the process, so one method a run.
+//! `multigrid_times SHAPE NODES [POISSON] [ELEMENT] [METHOD]…`, SHAPE a built-in object; or
+//! `lattice`, a cube of boxes of six tetrahedra of any size; `flat:H`, the same of height H; `slivers:H`,
+//! the same with every eighth inner node pushed up to that share of its box below the next;
+//! `contrast:C`, the same of two materials in boxes of four nodes' breadth. METHOD those to run, `multigrid` alone by default. Peak memory is that of the process, so one method a run.
 #![allow(clippy::print_stdout, reason = "a table on standard output is what it is for")]
 
 use std::time::Instant;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::{Element, Material};
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate, signed_volume};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{Loads, Method};
 
 /// A cube of `n`³ nodes, six tetrahedra a box.
-fn lattice(n: usize) -> TetMesh {
+fn lattice(n: usize, place_of: impl Fn([usize; 3], Point3<f64>) -> Point3<f64>) -> TetMesh {
     let at = |[i, j, k]: [usize; 3]| (i + n * (j + n * k)) as u32;
     let of_index = |index: usize, n: usize| [index % n, index / n % n, index / (n * n)];
     let vertices: Vec<Point3<f64>> = (0..n * n * n)
-        .map(|index| Point3::from(of_index(index, n).map(|i| i as f64 / (n - 1) as f64)))
+        .map(|index| {
+            let index = of_index(index, n);
+            place_of(index, Point3::from(index.map(|i| i as f64 / (n - 1) as f64)))
+        })
         .collect();
-    let mut tets = Vec::new();
+    let (mut tets, mut regions) = (Vec::new(), Vec::new());
     for index in 0..(n - 1).pow(3) {
         for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
             let mut corner = of_index(index, n - 1);
@@ -33,9 +38,10 @@ fn lattice(n: usize) -> TetMesh {
                 tet.swap(0, 1);
             }
             tets.push(tet);
+            regions.push(of_index(index, n - 1).iter().map(|i| i / 4).sum::<usize>() as u32 % 2);
         }
     }
-    TetMesh::try_new(vertices, tets, vec![]).expect("every box is divided into positive volumes")
+    TetMesh::try_new(vertices, tets, regions).expect("every box is divided into positive volumes")
 }
 
 /// The lowest fiftieth of the height is held, the ten highest nodes are moved.
@@ -77,8 +83,19 @@ fn main() {
         Some(names) => names.iter().map(|name| name.parse().expect("a method")).collect(),
     };
     let start = Instant::now();
-    let mesh = match shape.as_str() {
-        "lattice" => lattice((nodes as f64).cbrt().round() as usize),
+    let (shape, hardness) = shape.split_once(':').unwrap_or((&shape, "1"));
+    let hardness: f64 = hardness.parse().expect("a number behind the colon");
+    let edge = (nodes as f64).cbrt().round() as usize;
+    let mesh = match shape {
+        "lattice" => lattice(edge, |_, place| place),
+        "contrast" => lattice(edge, |_, place| place),
+        "flat" => lattice(edge, |_, place| Point3::new(place.x, hardness * place.y, place.z)),
+        "slivers" => lattice(edge, |[i, j, k], place| {
+            let is_inner = [i, j, k].iter().all(|i| (1..edge - 1).contains(i));
+            let up = (1.0 - hardness) / (edge - 1) as f64;
+            let is_pushed = is_inner && (i + 2 * j + 4 * k) % 8 == 0;
+            if is_pushed { place + Vector3::new(0.0, up, 0.0) } else { place }
+        }),
         name => {
             let built_in: BuiltIn = name.parse().expect("a built-in object");
             generate(built_in, nodes).expect("a mesh")
@@ -86,8 +103,10 @@ fn main() {
     };
     let mesh_s = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let material = Material::try_new(1e5, poisson).expect("a material");
-    let model = Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).expect("a model");
+    let stiffer = if shape == "contrast" { hardness } else { 1.0 };
+    let materials =
+        [1e5, 1e5 * stiffer].map(|young| Material::try_new(young, poisson).expect("a material"));
+    let model = Model::try_new(mesh, element, &materials, vec![], &mut |_| {}).expect("a model");
     let assemble_s = start.elapsed().as_secs_f64();
     let known = model.known(known(model.mesh())).expect("known displacements");
     println!(

@@ -176,6 +176,7 @@ fn code_of_model(error: &ModelError) -> RejectCode {
         ModelError::Free(_) => RejectCode::RigidMotionFree,
         ModelError::Solve(error) => match error {
             SolveError::NotPositiveDefinite { .. } => RejectCode::NotPositiveDefinite,
+            SolveError::NotConverged { .. } => RejectCode::Uncertain,
             SolveError::OutOfMemory { .. } | SolveError::OverLimit { .. } => {
                 RejectCode::MemoryLimit
             }

@@ -78,7 +78,7 @@ fn hopeless_mesh_is_refused_from_its_size_before_it_is_looked_at() {
     let tets = (0..900_000).map(|t| [0, 1, 2, 3].map(|c| (t + c) % nodes)).collect();
     let vertices = (0..nodes).map(|n| [f64::from(n), 0.0, 0.0]).collect();
     let mesh = MeshData { vertices, tets, regions: Vec::new() };
-    let server = fea_server::start(within(1 << 30)).unwrap();
+    let server = fea_server::start(within(1 << 29)).unwrap();
     let mut connection = client(&server);
     let mut request = once(&cube(27), "auto");
     request.mesh = mesh;

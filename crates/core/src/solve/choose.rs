@@ -38,8 +38,9 @@ pub struct Plan {
     pub element: Element,
     /// Method.
     pub method: Method,
-    /// Method that is taken in its place where its factor needs more memory than there is.
-    pub instead: Option<Method>,
+    /// Methods that are taken in its place, the first that fits, where its factor needs more memory than
+    /// there is.
+    pub instead: &'static [Method],
     /// What it is predicted to cost; `None` where nothing had to be weighed.
     pub cost: Option<Cost>,
     /// Error it leaves, as far as rounding and its stopping rule decide.
@@ -93,13 +94,24 @@ const PREDICTION_MARGIN: f64 = 1.25;
 /// Where an iterative method stops if only a deadline was named.
 const ERROR_IN_A_HURRY: f64 = 1e-6;
 /// The methods that are compared where none was asked for; the others are slower at any size.
-const COMPARED: [Method; 4] =
-    [Method::Front, Method::FrontMixed, Method::Pcg, Method::DenseCholesky];
+const COMPARED: [Method; 5] =
+    [Method::Front, Method::FrontMixed, Method::Pcg, Method::DenseCholesky, Method::Multigrid];
+/// Below so many unknowns a factor is found so fast that nobody waits for it, and it fails on nothing.
+const WITHOUT_FACTOR_MIN: f64 = 1e5;
+/// What takes the place of the exact parallel factor where memory is short, the more exact first.
+pub const SMALLER_THAN_FRONT: &[Method] = &[Method::FrontMixed, Method::Multigrid];
 
 impl Question {
     /// Methods that may answer.
     fn methods(&self) -> &[Method] {
         self.method.as_ref().map_or(&COMPARED, std::slice::from_ref)
+    }
+
+    /// Whether a method is worth its weighing.
+    fn weighs(&self, method: Method, work: &Work) -> bool {
+        self.method.is_some()
+            || method != Method::Multigrid
+            || work.unknown_dofs >= WITHOUT_FACTOR_MIN
     }
 
     /// Elements that may answer.
@@ -126,7 +138,7 @@ impl Question {
         Plan {
             element,
             method,
-            instead: None,
+            instead: &[],
             cost: None,
             error_rel: self.error_of(method),
             gave_up: None,
@@ -168,7 +180,8 @@ pub fn candidates(question: &Question, size: MeshSize, rates: &Rates) -> Vec<Pla
     let mut plans = Vec::new();
     for &element in question.elements() {
         let work = Work::estimate(size, element);
-        plans.extend(question.methods().iter().map(|&method| {
+        let methods = question.methods().iter().filter(|m| question.weighs(**m, &work));
+        plans.extend(methods.map(|&method| {
             let error_rel = question.error_of(method);
             let ms = rates.preparation_ms(&work, method)
                 + rates.factor_and_solve_ms(&work, method, error_rel);

@@ -48,7 +48,7 @@ pub struct FactorSample {
 const DIGITS_PER_STEP: f64 = 4.0;
 /// What a hierarchy costs, and one step by it, in products with the stiffness; its steps for each digit
 /// and besides. Measured by `examples/multigrid_times.rs`.
-const HIERARCHY_PRODUCTS: f64 = 60.0;
+const HIERARCHY_PRODUCTS: f64 = 110.0;
 const CYCLE_PRODUCTS: f64 = 5.0;
 const STEPS_PER_DIGIT: f64 = 2.0;
 const STEPS_BEFORE: f64 = 3.0;

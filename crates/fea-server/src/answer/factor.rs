@@ -1,7 +1,7 @@
 //! Makes a factor or inverse of `K11` within the memory there is.
 
 use softgrasp_core::model::{Model, ModelError};
-use softgrasp_core::solve::memory::Need;
+use softgrasp_core::solve::memory::{Need, hierarchy_bytes};
 use softgrasp_core::solve::{Analysed, Factored, Method, SolveError};
 
 use crate::budget::Reservation;
@@ -27,18 +27,43 @@ pub(super) struct FactorRequest<'a> {
 }
 
 impl FactorRequest<'_> {
-    /// Factors `K11` by the first of some methods whose factor fits.
+    /// Factors `K11` by the first of some methods whose factor fits, those over fronts first.
     ///
     /// # Errors
     /// [`PlanError::Memory`] where none fits; [`Refusal::Model`] where there is no factor.
     pub fn factor(&self, methods: &[Method], clock: &mut StageClock) -> Result<Factored, Refusal> {
-        match *methods {
-            [method] if !method.has_fronts() => self.factor_without_fronts(method, clock),
-            _ => {
-                let analysed = self.analyse(clock)?;
-                self.factor_analysed(analysed, methods, clock)
-            }
+        if let [method] = *methods
+            && !method.has_fronts()
+        {
+            return self.factor_without_fronts(method, clock);
         }
+        let (fronts, others): (Vec<_>, Vec<_>) = methods.iter().partition(|m| m.has_fronts());
+        let by_fronts = match self.is_hopeless(&fronts) && !others.is_empty() {
+            // Ordering would take time and memory for nothing.
+            true => Err(self.short_of(&self.subject.predict(self.model.element(), methods))),
+            false => self
+                .analyse(clock)
+                .and_then(|analysed| self.factor_analysed(analysed, &fronts, clock)),
+        };
+        match (by_fronts, others.first()) {
+            (Err(Refusal::Plan(PlanError::Memory(short))), Some(&method)) => {
+                let made = self.factor_without_fronts(method, clock);
+                let is_short = matches!(&made, Err(Refusal::Plan(PlanError::Memory(_))));
+                // What is short is told of the more exact methods.
+                if is_short {
+                    return Err(Refusal::Plan(PlanError::Memory(short)));
+                }
+                made
+            }
+            (by_fronts, _) => by_fronts,
+        }
+    }
+
+    /// Whether the least that the factor of each of some methods can take is more than there is.
+    fn is_hopeless(&self, methods: &[Method]) -> bool {
+        let needs = self.subject.predict(self.model.element(), methods);
+        let free = self.reservation.free().saturating_sub(self.held);
+        needs.iter().all(|need| need.factor_bytes_min > free)
     }
 
     /// Orders and analyses `K11`: what a factor over fronts needs is known then.
@@ -108,14 +133,22 @@ impl FactorRequest<'_> {
             .map_err(|shortage| PlanError::Memory(shortage).into())
     }
 
-    /// The same for a dense method, or for the sparse one whose count is its own.
+    /// The same for a dense method, for the one without a factor, or for the sparse one whose count is
+    /// its own.
     fn factor_without_fronts(
         &self,
         method: Method,
         clock: &mut StageClock,
     ) -> Result<Factored, Refusal> {
         let exact = |bytes| Need::exact(self.model.element(), method, self.held, bytes);
-        let limit = match method.dense_bytes(self.subject.unknown_dofs) {
+        let blocks = self.model.stiffness().pattern().block_count();
+        let bytes = match method {
+            Method::Multigrid => {
+                Some(hierarchy_bytes(self.model.system_node_count(), blocks) as u64)
+            }
+            _ => method.dense_bytes(self.subject.unknown_dofs),
+        };
+        let limit = match bytes {
             Some(bytes) => {
                 self.model.check_held(self.dofs, &[])?;
                 self.admit(&[exact(bytes)])?.factor_bytes

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use softgrasp_core::model::{Known, ModelError};
-use softgrasp_core::solve::choose::{Plan, Question};
+use softgrasp_core::solve::choose::{Plan, Question, SMALLER_THAN_FRONT};
 use softgrasp_core::solve::{Factored, Method};
 use softgrasp_protocol::{
     Answer, FrameRequest, ModelHash, NodeChoice, Question as QuestionMessage,
@@ -167,7 +167,7 @@ impl PosedFrame {
                 {
                     let why = format!("not condensed: {error}");
                     let plan = self.question.plan(self.plan.element, Method::Front, why);
-                    self.plan = Plan { instead: Some(Method::FrontMixed), ..plan };
+                    self.plan = Plan { instead: SMALLER_THAN_FRONT, ..plan };
                 }
                 // A factor of its own works with smaller numbers than columns of the inverse.
                 Ok(answer)
@@ -177,7 +177,7 @@ impl PosedFrame {
                 {
                     let why = "not condensed: its answer is not finite";
                     let plan = self.question.plan(self.plan.element, Method::Front, why);
-                    self.plan = Plan { instead: Some(Method::FrontMixed), ..plan };
+                    self.plan = Plan { instead: SMALLER_THAN_FRONT, ..plan };
                 }
                 answered => return answered,
             }
@@ -217,8 +217,11 @@ impl PosedFrame {
     fn kept_factor(&self) -> Option<Arc<Factored>> {
         let Self { stored, known, plan, .. } = self;
         let kept = |method| stored.factor_for(&known.dofs, method);
-        let instead = plan.instead.filter(|_| stored.single_only.load(Relaxed));
-        kept(plan.method).or_else(|| instead.and_then(kept))
+        let instead = match stored.single_only.load(Relaxed) {
+            true => plan.instead,
+            false => &[],
+        };
+        kept(plan.method).or_else(|| instead.iter().copied().find_map(kept))
     }
 
     fn made_factor(
@@ -236,7 +239,7 @@ impl PosedFrame {
             subject: &Subject::about(&stored.model, known.dofs.len(), Some(*hash)),
             held: stored.lasting_bytes(),
         };
-        let methods: Vec<Method> = [plan.method].into_iter().chain(plan.instead).collect();
+        let methods: Vec<Method> = [&[plan.method], plan.instead].concat();
         let made = Arc::new(request.factor(&methods, clock)?);
         if made.method() != plan.method {
             stored.single_only.store(true, Relaxed);

@@ -109,7 +109,7 @@ impl Work<'_> {
         let (factored, plan) = match self.request.is_method_open() && plan.method.has_fronts() {
             true => self.factor_planned_again(&factor, plan, clock)?,
             false => {
-                let methods: Vec<Method> = [plan.method].into_iter().chain(plan.instead).collect();
+                let methods: Vec<Method> = [&[plan.method], plan.instead].concat();
                 (factor.factor(&methods, clock)?, plan)
             }
         };

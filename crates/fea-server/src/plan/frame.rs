@@ -2,7 +2,7 @@
 
 use softgrasp_core::model::Known;
 use softgrasp_core::solve::Method;
-use softgrasp_core::solve::choose::{Plan, Question};
+use softgrasp_core::solve::choose::{Plan, Question, SMALLER_THAN_FRONT};
 
 use super::error::PlanError;
 use super::once::{ASKED, plan_for_masks};
@@ -35,7 +35,7 @@ pub(crate) fn plan_frame(
         return plan_for_masks(question, element, obstacle);
     }
     let by_factor = |why: String| Plan {
-        instead: Some(Method::FrontMixed),
+        instead: SMALLER_THAN_FRONT,
         ..question.plan(element, Method::Front, format!("not condensed: {why}"))
     };
     let touched = known.dofs.len() - stored.model.fixed().len().min(known.dofs.len());

@@ -3,7 +3,8 @@
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::choose::{
-    Cost, Plan, Question, candidates, candidates_after_order, cheapest_element, choose,
+    Cost, Plan, Question, SMALLER_THAN_FRONT, candidates, candidates_after_order, cheapest_element,
+    choose,
 };
 use softgrasp_core::solve::memory::Need;
 use softgrasp_core::solve::rates::Rates;
@@ -65,7 +66,7 @@ pub(crate) fn plan_once(
         }
         false => plan_as_asked(request)?,
     };
-    let methods: Vec<Method> = [plan.method].into_iter().chain(plan.instead).collect();
+    let methods: Vec<Method> = [&[plan.method], plan.instead].concat();
     let needs = request.subject.predict(plan.element, &methods);
     admit(models, reservation, &needs, &request.subject).map_err(PlanError::Memory)?;
     Ok(plan)
@@ -85,7 +86,7 @@ fn plan_as_asked(request: &OnceRequest) -> Result<Plan, PlanError> {
         (None, _) => {
             let why = "one request: the parallel exact factor is the fastest";
             let plan = question.plan(element, Method::Front, why);
-            Ok(Plan { instead: Some(Method::FrontMixed), ..plan })
+            Ok(Plan { instead: SMALLER_THAN_FRONT, ..plan })
         }
     }
 }
@@ -132,7 +133,13 @@ fn weigh(
         is_weighed || need(plan).bytes_min() <= reservation.free()
     };
     let fitting: Vec<Plan> = all.iter().filter(fits).cloned().collect();
-    match choose(&question, &fitting, reservation.free()) {
+    let without_factor = || {
+        let question = Question { method: Some(Method::Multigrid), ..question };
+        let mut plans = candidates(&question, subject.problem.size, rates);
+        plans.retain(|plan| need(plan).bytes_min() <= reservation.free());
+        choose(&question, &plans, reservation.free()).filter(|_| request.question.method.is_none())
+    };
+    match choose(&question, &fitting, reservation.free()).or_else(without_factor) {
         Some(plan) => Ok(plan),
         None => {
             let needs: Vec<Need> = all.iter().map(need).collect();

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use softgrasp_core::fem::Element;
+use softgrasp_core::solve::Method;
 use softgrasp_core::solve::memory::{Bytes, Need, Problem, SENSIBLE, nodes_that_fit};
 
 /// A need that does not fit, with all the numbers.
@@ -99,11 +100,12 @@ impl fmt::Display for InWords<'_> {
         let verb = if need.is_predicted() { "is predicted to need" } else { "needs" };
         write!(
             f,
-            "{} on {element} {verb} {} ({} for mesh and stiffness, {} for the factor",
+            "{} on {element} {verb} {} ({} for mesh and stiffness, {} for the {}",
             need.method,
             Bytes(need.bytes()),
             Bytes(need.model_bytes),
-            Bytes(need.factor_bytes)
+            Bytes(need.factor_bytes),
+            if need.method == Method::Multigrid { "hierarchy" } else { "factor" }
         )?;
         match need.is_predicted() {
             true => write!(f, "; {} at the least)", Bytes(need.bytes_min())),

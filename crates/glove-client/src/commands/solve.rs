@@ -59,7 +59,7 @@ pub struct SolveCommand {
     #[arg(long, value_name = "BYTES", allow_hyphen_values = true)]
     memory_limit: Option<Bytes>,
     /// gauss-jordan-plain, gauss-jordan, dense-inverse, dense-cholesky, sparse-cholesky, front,
-    /// front-mixed, pcg, condensed or auto.
+    /// front-mixed, pcg, multigrid, condensed or auto.
     #[arg(long, default_value = "auto", value_name = "NAME|auto")]
     method: MethodName,
     /// Finite element; auto takes t4 below a Poisson's ratio of 0.45, from where on it locks, else

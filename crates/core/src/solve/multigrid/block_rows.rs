@@ -51,6 +51,23 @@ impl<const R: usize, const C: usize> BlockRows<R, C> {
         Self { start, columns, blocks }
     }
 
+    /// The rows of several matrices, one below the other; each is given back as soon as it is copied.
+    pub fn stacked(parts: Vec<Self>) -> Self {
+        let count: usize = parts.iter().map(Self::block_count).sum();
+        let mut stacked = Self {
+            start: vec![0],
+            columns: Vec::with_capacity(count),
+            blocks: Vec::with_capacity(count),
+        };
+        for part in parts {
+            let before = stacked.blocks.len();
+            stacked.start.extend(part.start[1..].iter().map(|start| before + start));
+            stacked.columns.extend_from_slice(&part.columns);
+            stacked.blocks.extend_from_slice(&part.blocks);
+        }
+        stacked
+    }
+
     /// Number of stored blocks.
     pub fn block_count(&self) -> usize {
         self.blocks.len()

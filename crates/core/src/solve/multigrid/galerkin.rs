@@ -1,5 +1,7 @@
 //! The matrix of the next coarser level, `Pᵀ A P`.
 
+use std::ops::Range;
+
 use super::block_rows::{BlockRows, Rows};
 use super::motions::MOTIONS;
 use super::small::{add_product, add_transposed_product, exact};
@@ -51,6 +53,9 @@ impl ByColumn {
     }
 }
 
+/// Aggregates whose rows are made at once: what they are made of is held for so many only.
+const TOGETHER: usize = 4096;
+
 /// `Pᵀ A P` by rows, summed in double precision. Motions that an aggregate does not have get a one on
 /// the diagonal, so that the matrix stays positive definite.
 ///
@@ -61,16 +66,37 @@ pub(super) fn product<const B: usize>(
     by_column: &ByColumn,
     aggregates: usize,
 ) -> BlockRows<MOTIONS, MOTIONS> {
-    let ap = times_prolongator(rows, p);
-    let columns_of = |aggregate: usize, columns: &mut Vec<u32>| {
-        for &(row, _) in by_column.of(aggregate) {
-            columns.extend_from_slice(ap.columns(row as usize));
+    let parts = (0..aggregates.div_ceil(TOGETHER)).map(|part| {
+        let first = part * TOGETHER;
+        some_rows(rows, p, by_column, first..aggregates.min(first + TOGETHER))
+    });
+    BlockRows::stacked(parts.collect())
+}
+
+/// The rows of some aggregates.
+fn some_rows<const B: usize>(
+    rows: &impl Rows<B, B>,
+    p: &BlockRows<B, MOTIONS>,
+    by_column: &ByColumn,
+    aggregates: Range<usize>,
+) -> BlockRows<MOTIONS, MOTIONS> {
+    let mut nodes: Vec<u32> =
+        aggregates.clone().flat_map(|a| by_column.of(a)).map(|&(row, _)| row).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let ap = times_prolongator(rows, p, &nodes);
+    let place = |row: u32| nodes.partition_point(|&node| node < row);
+    let columns_of = |k: usize, columns: &mut Vec<u32>| {
+        for &(row, _) in by_column.of(aggregates.start + k) {
+            columns.extend_from_slice(ap.columns(place(row)));
         }
     };
-    let fill = |aggregate: usize, columns: &[u32], blocks: &mut [[[f64; MOTIONS]; MOTIONS]]| {
+    let fill = |k: usize, columns: &[u32], blocks: &mut [[[f64; MOTIONS]; MOTIONS]]| {
+        let aggregate = aggregates.start + k;
         for &(row, at) in by_column.of(aggregate) {
             let of_p = exact(p.block(at as usize));
-            for (column, force) in ap.columns(row as usize).iter().zip(ap.blocks(row as usize)) {
+            let row = place(row);
+            for (column, force) in ap.columns(row).iter().zip(ap.blocks(row)) {
                 let at = columns.partition_point(|c| c < column);
                 add_transposed_product(&mut blocks[at], &of_p, &exact(force));
             }
@@ -80,26 +106,27 @@ pub(super) fn product<const B: usize>(
             fill_missing(block);
         }
     };
-    BlockRows::build(aggregates, columns_of, fill)
+    BlockRows::build(aggregates.len(), columns_of, fill)
 }
 
-/// `A P`.
+/// The rows of some nodes of `A P`.
 fn times_prolongator<const B: usize>(
     rows: &impl Rows<B, B>,
     p: &BlockRows<B, MOTIONS>,
+    nodes: &[u32],
 ) -> BlockRows<B, MOTIONS> {
-    let columns_of = |row: usize, columns: &mut Vec<u32>| {
-        rows.visit(row, &mut |node, _| columns.extend_from_slice(p.columns(node)));
+    let columns_of = |k: usize, columns: &mut Vec<u32>| {
+        rows.visit(nodes[k] as usize, &mut |node, _| columns.extend_from_slice(p.columns(node)));
     };
-    let fill = |row: usize, columns: &[u32], blocks: &mut [[[f64; MOTIONS]; B]]| {
-        rows.visit(row, &mut |node, block| {
+    let fill = |k: usize, columns: &[u32], blocks: &mut [[[f64; MOTIONS]; B]]| {
+        rows.visit(nodes[k] as usize, &mut |node, block| {
             for (column, of_p) in p.columns(node).iter().zip(p.blocks(node)) {
                 let at = columns.partition_point(|c| c < column);
                 add_product(&mut blocks[at], block, &exact(of_p));
             }
         });
     };
-    BlockRows::build(rows.row_count(), columns_of, fill)
+    BlockRows::build(nodes.len(), columns_of, fill)
 }
 
 /// A one, in the unit of the block, for motions without stiffness.

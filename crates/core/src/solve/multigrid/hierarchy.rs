@@ -47,8 +47,7 @@ impl Hierarchy {
     pub fn new(stiffness: &Stiffness, partition: &Partition) -> Self {
         let rows = FineRows::new(stiffness, partition);
         let motions = motions::of_fine(&rows, rows.row_count());
-        let (fine, mut coarser) = Level::of_fine(&rows, &motions);
-        drop(motions);
+        let (fine, mut coarser) = Level::of_fine(&rows, motions);
         let mut coarse: Vec<Level<MOTIONS>> = Vec::new();
         let mut finer_rows = rows.row_count();
         while coarser.a.row_count() > COARSEST_NODES
@@ -56,7 +55,7 @@ impl Hierarchy {
             && coarse.len() + 2 < LEVELS_MAX
         {
             finer_rows = coarser.a.row_count();
-            let (level, next) = Level::of_coarse(coarser.a, &coarser.motions, coarse.len() + 1);
+            let (level, next) = Level::of_coarse(coarser.a, coarser.motions, coarse.len() + 1);
             coarse.push(level);
             coarser = next;
         }

@@ -34,11 +34,12 @@ type Coarsened<const B: usize> = (BlockRows<B, MOTIONS>, ByColumn, Coarser);
 fn coarsen<const B: usize>(
     rows: &impl Rows<B, B>,
     smoother: &Chebyshev<B>,
-    motions: &[OfNode<B>],
+    motions: Vec<OfNode<B>>,
     number: usize,
 ) -> Coarsened<B> {
     let aggregates = Aggregates::gather(&Strong::new(rows, number));
-    let (tentative, coarse_motions) = orthonormal(motions, &aggregates);
+    let (tentative, coarse_motions) = orthonormal(&motions, &aggregates);
+    drop(motions);
     let p = prolongator::smoothed(rows, &aggregates, &tentative, OMEGA / smoother.largest());
     drop(tentative);
     let by_column = ByColumn::new(&p, rows.row_count(), aggregates.count());
@@ -51,7 +52,7 @@ impl<const B: usize> Level<B> {
     /// one.
     ///
     /// Shapes: `motions` one per node.
-    pub fn of_fine(rows: &impl Rows<B, B>, motions: &[OfNode<B>]) -> (Self, Coarser) {
+    pub fn of_fine(rows: &impl Rows<B, B>, motions: Vec<OfNode<B>>) -> (Self, Coarser) {
         let columns_of = |row: usize, columns: &mut Vec<u32>| {
             rows.visit(row, &mut |column, _| columns.push(column as u32));
         };
@@ -70,7 +71,11 @@ impl<const B: usize> Level<B> {
     }
 
     /// The same for a matrix in single precision; `number` counts from 0, the finest.
-    pub fn of_coarse(a: BlockRows<B, B>, motions: &[OfNode<B>], number: usize) -> (Self, Coarser) {
+    pub fn of_coarse(
+        a: BlockRows<B, B>,
+        motions: Vec<OfNode<B>>,
+        number: usize,
+    ) -> (Self, Coarser) {
         let smoother = Chebyshev::new(&a);
         let (p, by_column, coarser) = coarsen(&a, &smoother, motions, number);
         (Self { a, smoother, p, by_column }, coarser)

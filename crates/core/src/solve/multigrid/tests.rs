@@ -180,7 +180,7 @@ fn prolongator_holds_the_rigid_motions_and_the_coarse_matrix_is_its_product() {
     let partition = model.held_partition(&known.dofs).unwrap();
     let rows = FineRows::new(model.stiffness(), &partition);
     let of_nodes = motions::of_fine(&rows, rows.row_count());
-    let (level, coarser) = Level::of_fine(&rows, &of_nodes);
+    let (level, coarser) = Level::of_fine(&rows, of_nodes.clone());
     let p = level.prolongator();
     let is_near = |row: usize| {
         let mut near =
