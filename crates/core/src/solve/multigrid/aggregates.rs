@@ -17,15 +17,21 @@ pub(super) struct Aggregates {
 /// Source: Vaněk, Mandel, Brezina 1996, section 5.1, with norms of blocks.
 const STRONG: f64 = 0.08;
 
+/// Fewer nodes than this in an aggregate, on average, make a coarse system that is hardly smaller: in
+/// flat boxes the strong neighbours of a node are two. Weaker ones are then taken for strong.
+const GATHERED_MIN: usize = 6;
+/// The shares that are tried, over the first one, before all neighbours are taken.
+const WEAKER: [f64; 3] = [1.0, 0.25, 0.0625];
+
 /// For each node those that it belongs together with.
-pub(super) struct Strong {
+struct Strong {
     start: Vec<usize>,
     nodes: Vec<u32>,
 }
 
 impl Strong {
-    /// Neighbours by the norms of blocks; `level` counts from 0, the finest.
-    pub fn new<const B: usize>(rows: &impl Rows<B, B>, level: usize) -> Self {
+    /// Neighbours by the norms of blocks, at least a share of the mean of a pair's own blocks.
+    fn new<const B: usize>(rows: &impl Rows<B, B>, share: f64) -> Self {
         let count = rows.row_count();
         let own: Vec<f64> = (0..count)
             .into_par_iter()
@@ -40,7 +46,7 @@ impl Strong {
                 own
             })
             .collect();
-        let share = (STRONG * 0.5f64.powi(level as i32)).powi(2);
+        let share = share * share;
         let tasks: Vec<(Vec<usize>, Vec<u32>)> = (0..count.div_ceil(TASK_ROWS))
             .into_par_iter()
             .map(|task| {
@@ -78,11 +84,23 @@ impl Aggregates {
     /// A node without neighbours is in no aggregate: smoothing alone finds its answer.
     pub const NONE: u32 = u32::MAX;
 
+    /// Aggregates of the nodes of a matrix; `level` counts from 0, the finest.
+    pub fn new<const B: usize>(rows: &impl Rows<B, B>, level: usize) -> Self {
+        let share = STRONG * 0.5f64.powi(level as i32);
+        for weaker in WEAKER {
+            let this = Self::gather(&Strong::new(rows, weaker * share));
+            if GATHERED_MIN * this.count <= this.of_node.len() {
+                return this;
+            }
+        }
+        Self::gather(&Strong::new(rows, 0.0))
+    }
+
     /// First nodes none of whose neighbours is taken, with all their neighbours; then each node left
     /// joins the aggregate of most of its neighbours; what is left then gathers by itself.
     ///
     /// Source: Vaněk, Mandel, Brezina 1996, algorithm 5.1.
-    pub fn gather(strong: &Strong) -> Self {
+    fn gather(strong: &Strong) -> Self {
         let mut this = Self { of_node: vec![Self::NONE; strong.node_count()], count: 0 };
         for node in 0..strong.node_count() {
             let around = strong.of(node);

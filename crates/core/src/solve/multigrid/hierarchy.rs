@@ -82,12 +82,6 @@ impl Hierarchy {
         [self.fine.row_count()].into_iter().chain(coarse).chain([self.coarsest_rows]).collect()
     }
 
-    /// The finest level.
-    #[cfg(test)]
-    pub fn fine(&self) -> &Level<AXES> {
-        &self.fine
-    }
-
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let coarse: usize = self.coarse.iter().map(Level::bytes).sum();

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::aggregates::{Aggregates, Strong};
+use super::aggregates::Aggregates;
 use super::block_rows::{BlockRows, Rows, TASK_ROWS};
 use super::chebyshev::{Chebyshev, Vectors, subtract_product};
 use super::galerkin::{self, ByColumn};
@@ -37,7 +37,7 @@ fn coarsen<const B: usize>(
     motions: Vec<OfNode<B>>,
     number: usize,
 ) -> Coarsened<B> {
-    let aggregates = Aggregates::gather(&Strong::new(rows, number));
+    let aggregates = Aggregates::new(rows, number);
     let (tentative, coarse_motions) = orthonormal(&motions, &aggregates);
     drop(motions);
     let p = prolongator::smoothed(rows, &aggregates, &tentative, OMEGA / smoother.largest());

@@ -47,7 +47,12 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
 
 /// Same answer as a dense factor, an estimate that covers the error, and how many steps it took.
 fn check_against_dense(model: &Model, pairs: &[(u32, f64)]) -> u32 {
-    let dense = answer(model, pairs, Method::DenseCholesky).unwrap();
+    check_against(model, pairs, Method::DenseCholesky)
+}
+
+/// The same against another factor.
+fn check_against(model: &Model, pairs: &[(u32, f64)], method: Method) -> u32 {
+    let dense = answer(model, pairs, method).unwrap();
     let found = answer(model, pairs, Method::Multigrid).unwrap();
     let error = off(&found.displacement, &dense.displacement);
     let estimate = found.error_estimate_rel.unwrap();
@@ -169,6 +174,28 @@ fn levels_shrink_to_one_that_is_factored() {
     let rows = Hierarchy::new(model.stiffness(), &partition).level_rows();
     assert!(rows.windows(2).all(|w| 4 * w[1] < w[0]), "{rows:?}");
     assert!(*rows.last().unwrap() <= 120, "{rows:?}");
+}
+
+/// A flattened body's strong neighbours lie in lines, of which no small coarse system can be made: its
+/// hierarchy stays small all the same, and its steps few enough.
+#[test]
+fn flat_bodies_have_small_hierarchies_and_answers() {
+    for height in [0.3, 0.1, 0.03] {
+        let even = generate(BuiltIn::Cube, 2197).unwrap();
+        let flat = even.vertices().iter().map(|p| nalgebra::Point3::new(p.x, height * p.y, p.z));
+        let mesh = TetMesh::try_new(flat.collect(), even.tets().to_vec(), vec![]).unwrap();
+        let (even, flat) = (model_of(even, Element::Tet4, 0.3), model_of(mesh, Element::Tet4, 0.3));
+        let bytes = |model: &Model| {
+            let known = model.known(pushed(model)).unwrap();
+            let partition = model.held_partition(&known.dofs).unwrap();
+            Hierarchy::new(model.stiffness(), &partition).bytes()
+        };
+        let (of_even, of_flat) = (bytes(&even), bytes(&flat));
+        assert!(of_flat <= 3 * of_even, "{height}: {of_flat} and {of_even} bytes");
+        let steps = check_against(&flat, &pushed(&flat), Method::Front);
+        println!("{height}: {steps} steps, {of_flat} and {of_even} bytes");
+        assert!(steps <= 200, "{height}: {steps} steps");
+    }
 }
 
 /// Far from known nodes the prolongator gives every rigid motion back, and what it makes of the
