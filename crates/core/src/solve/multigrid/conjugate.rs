@@ -37,7 +37,9 @@ pub(crate) struct Outcome {
 /// `M K11` covers it in the preconditioner's norm. The eigenvalue is seen from above, and the norm is
 /// Euclid's: a factor that is meant to cover both.
 const ESTIMATE_SAFETY: f64 = 2.0;
-/// Checks of the true residual without halving it before the end is taken for reached.
+/// A true residual this far above the one that was carried along has come to its end in rounding, if it
+/// is found so a few times running.
+const DRIFTED: f64 = 2.0;
 const STALE_MAX: u32 = 3;
 /// The true residual is looked at least this often.
 const TRUE_EVERY: u32 = 20;
@@ -97,17 +99,16 @@ pub(crate) fn solve(
         if !course.step() {
             break;
         }
-        let size = norm(&course.r);
+        let carried = norm(&course.r);
+        let is_near = carried <= goal.residual_rel && course.error_estimate_rel() <= goal.error_rel;
         let is_last = course.steps == goal.steps_max;
-        if size <= goal.residual_rel.max(0.1 * best.size)
-            || course.steps % TRUE_EVERY == 0
-            || is_last
-        {
+        let is_due = carried <= 0.1 * best.size || course.steps.is_multiple_of(TRUE_EVERY);
+        if is_near || is_due || is_last {
             // The recurrence drifts from the true residual; only the true one may end the loop.
             let size = course.find_residual();
             let error = course.error_estimate_rel();
-            stale = if size < 0.5 * best.size { 0 } else { stale + 1 };
-            if size < best.size {
+            stale = if size <= DRIFTED * carried { 0 } else { stale + 1 };
+            if size < best.size || (size <= goal.residual_rel && error < best.error) {
                 best.x.copy_from_slice(&course.x);
                 (best.size, best.error) = (size, error);
             }
