@@ -12,7 +12,7 @@ use std::time::Instant;
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::{Element, Material};
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate, signed_volume};
-use softgrasp_core::model::Model;
+use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Loads, Method};
 
 /// A cube of `n`³ nodes, six tetrahedra a box.
@@ -116,6 +116,11 @@ fn main() {
         element.name(),
         peak_gib()
     );
+    run(&model, &known, methods);
+}
+
+/// Runs the methods one after the other, and compares each with the first.
+fn run(model: &Model, known: &Known, methods: Vec<Method>) {
     let mut first: Option<Vec<f64>> = None;
     for method in methods {
         let start = Instant::now();
