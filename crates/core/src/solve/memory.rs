@@ -73,7 +73,7 @@ pub const SENSIBLE: [Method; 4] =
 /// and what is held while the next coarser matrix is made. Measured by `examples/multigrid_times.rs`.
 const HIERARCHY_PER_BLOCK: usize = 130;
 /// Bytes of a hierarchy and of the vectors of conjugate gradients for each node.
-const HIERARCHY_PER_NODE: usize = 900;
+const HIERARCHY_PER_NODE: usize = 2200;
 
 /// Bytes of a hierarchy of [`Method::Multigrid`] with all that is held while it is made and worked
 /// with, roughly.
