@@ -44,10 +44,12 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
         source,
     })?;
     let (objects, left_out) = objects(options);
-    let mut ages = Table::new("session", "Age of the shown answer, and first answers", &COLUMNS);
+    let [mut ages, mut lifts] =
+        [("session", AGE_TITLE), ("session-picked-up", "An object that is picked up by friction")]
+            .map(|(name, title)| Table::new(name, title, &COLUMNS));
     let mut kept = Table::new("session-keep", "Keeping a shape", &KEEP_COLUMNS);
     let mut why = Table::new("session-unanswered", "Deforming ticks without answer", &WHY_COLUMNS);
-    for object in &objects {
+    for object in objects.iter().chain([&picked_up()]) {
         for (arrangement, times) in arrangements {
             progress("session", &format!("{}, {}", object.name, arrangement.name()));
             let record = play(&programs, object, arrangement, times, threads, folder.path())?;
@@ -56,7 +58,8 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
             if !record.adds_up() {
                 report.fault(format!("{what}: a deforming tick has neither answer nor reason"));
             }
-            ages.push(age_row(object, arrangement, &record));
+            let table = if object.arguments.is_empty() { &mut lifts } else { &mut ages };
+            table.push(age_row(object, arrangement, &record));
             kept.push(keep_row(object, arrangement, &record));
             why_rows(&mut why, object, arrangement, &record);
         }
@@ -64,6 +67,8 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     report.text(INTRODUCTION.replace("{rate}", &RATE_HZ.to_string()));
     left_out.into_iter().for_each(|line| report.text(line));
     report.table(ages);
+    report.text(PICKED_UP);
+    report.table(lifts);
     report.table(kept);
     report.table(why);
     let nodes = if options.is_quick { 1000 } else { LARGE };
@@ -76,18 +81,14 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     Ok(report)
 }
 
-/// The default object, and files of others; a line for each file that is not there.
+/// A built-in object, and files of others; a line for each file that is not there.
 fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
     let named = |name: &str, path: &Path| Object {
         name: name.to_owned(),
         arguments: vec!["--object".into(), path.as_os_str().to_owned()],
         deformation: "linear",
     };
-    let mut objects = vec![Object {
-        name: "strawberry".to_owned(),
-        arguments: Vec::new(),
-        deformation: "linear",
-    }];
+    let mut objects = vec![named("strawberry", Path::new("strawberry"))];
     let mut left_out = Vec::new();
     let files = if options.is_quick { &FILES[..0] } else { &FILES[..] };
     for file in files {
@@ -100,6 +101,12 @@ fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
         }
     }
     (objects, left_out)
+}
+
+/// What `run` does by itself: the strawberry is picked up from a table and put down again.
+fn picked_up() -> Object {
+    let name = "strawberry, picked up".to_owned();
+    Object { name, arguments: Vec::new(), deformation: "linear" }
 }
 
 fn age_row(object: &Object, arrangement: Arrangement, record: &Record) -> [Cell; 21] {
@@ -227,6 +234,12 @@ session had brought it). Both are seen by ticks, so they come in steps of one.
 Every answer carries its residual, and a proven bound of its error where it has one; the largest of \
 all are in the tables, and a residual above 1e-9 ends the report. The displacements of the same \
 server are compared with direct solves in the reports `frame`, `onset`, `hold` and `contact`.";
+
+const AGE_TITLE: &str = "Age of the shown answer, and first answers";
+
+const PICKED_UP: &str = "\
+The same of `run` without an object, which picks the strawberry up from a table by contact with \
+friction: every tick is a step of the object's motion.";
 
 const LIVE: &str = "\
 The same runs with the equations that `run` takes by itself (`--deformation auto`): a live frame asks \

@@ -8,14 +8,21 @@
 //! no clock, no threads of its own: bytes come in as slices, time as an argument, and parallel loops
 //! run on the rayon pool of whoever calls.
 //!
+//! The short way is [`SoftBody`]: a mesh and a material, what is prescribed, and back come displacements
+//! and how wrong they are; [`Frames`] answers the same again and again in less than a millisecond.
+//!
 //! ```
-//! use softgrasp_core::fem::Material;
-//! use softgrasp_core::mesh::{BuiltIn, Quality, generate};
+//! use nalgebra::Vector3;
+//! use softgrasp_core::mesh::{BuiltIn, generate};
+//! use softgrasp_core::{LoadCase, Material, SoftBody};
 //!
 //! let mesh = generate(BuiltIn::Cube, 64)?;
-//! assert_eq!(mesh.node_count(), 64);
-//! let rubber = Material::try_new(1e5, 0.45)?;
-//! assert_eq!(rubber.poisson(), 0.45);
+//! let body = SoftBody::try_new(mesh, Material::try_new(2.0e4, 0.3)?)?;
+//! let mut pinch = LoadCase::new();
+//! pinch.hold([0, 1, 4]).prescribe(63, Vector3::new(-1e-3, -1e-3, 0.0));
+//! let answer = body.solve(&pinch)?;
+//! assert_eq!(answer.displacements[63].x, -1e-3);
+//! assert!(answer.inexactness.relative() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -27,6 +34,14 @@ pub mod mesh;
 pub mod mesh_io;
 pub mod model;
 pub mod rigid_body;
+pub mod soft_body;
 pub mod solve;
 mod stuffing;
 pub mod surface;
+
+pub use fem::hyperelastic::Law;
+pub use fem::{Element, Material};
+pub use mesh::TetMesh;
+pub use soft_body::{
+    Answer, Axis, Frames, Inexactness, LargeAnswer, LoadCase, SoftBody, SoftBodyError,
+};

@@ -24,16 +24,19 @@ pub(crate) enum Seated {
 
 /// Where a path will lie that is being made; its clones are the same place.
 #[derive(Clone, Default)]
-pub(crate) struct Coming(Arc<Lock<Option<Result<Box<ModelPath>, Refusal>>>>);
+pub(crate) struct Coming(Arc<Lock<Option<MadePath>>>);
+
+/// A path that was made, or why there is none.
+type MadePath = Result<Box<ModelPath>, Refusal>;
 
 impl Coming {
     /// The path is there, or it is refused.
-    pub fn arrive(&self, made: Result<Box<ModelPath>, Refusal>) {
+    pub fn arrive(&self, made: MadePath) {
         self.0.with(|place| *place = Some(made));
     }
 
     /// The path, once it is there.
-    pub fn take(&self) -> Option<Result<Box<ModelPath>, Refusal>> {
+    pub fn take(&self) -> Option<MadePath> {
         self.0.with(Option::take)
     }
 

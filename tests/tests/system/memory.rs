@@ -118,6 +118,21 @@ fn auto_takes_single_precision_where_only_that_fits() {
 }
 
 #[test]
+fn auto_answers_without_a_factor_where_no_factor_fits() {
+    let mesh = object(BuiltIn::Sphere, 20_000);
+    let [_, single] = counted(&mesh, Element::Tet4).map(|need| need.bytes());
+    let server = fea_server::start(within(single - single / 8)).unwrap();
+    let mut connection = client(&server);
+    let found = ask(&mut connection, once(&mesh, "auto")).report;
+    assert_eq!(found.method, "multigrid", "{}", found.chosen_because);
+    let told = found.error_estimate_rel.expect("an estimate");
+    assert!(found.residual_rel < 1e-9 && told < 1e-6, "{found:?}");
+    // Asked for by name a factor is refused as ever.
+    let single = Request::SolveOnce(Box::new(once(&mesh, "front-mixed")));
+    assert_eq!(refusal(&mut connection, &single).0, MemoryLimit);
+}
+
+#[test]
 fn frames_go_to_single_precision_where_no_base_fits_and_keep_that_factor() {
     let mesh = object(BuiltIn::Sphere, 1500);
     let [double, single] = counted(&mesh, Element::Tet4).map(|need| need.bytes());

@@ -1,0 +1,166 @@
+//! A soft body in a few lines: a mesh and a material, what is prescribed and what pulls on it; back come
+//! displacements, reactions, and how wrong they are.
+//!
+//! This is the short way through [`crate::model`] and [`crate::solve`]. Who has budgets of memory,
+//! stages to report, masks or contact goes there.
+
+mod answer;
+mod frames;
+mod load_case;
+
+use std::sync::Arc;
+
+pub use answer::{Answer, Inexactness, LargeAnswer, SoftBodyError};
+pub use frames::Frames;
+pub use load_case::{Axis, LoadCase};
+
+use crate::fem::hyperelastic::Law;
+use crate::fem::{Element, Material};
+use crate::mesh::TetMesh;
+use crate::model::{Model, ModelError};
+use crate::solve::choose::cheapest_element;
+use crate::solve::equilibrium::{Goal, Path, Wish};
+use crate::solve::{Loads, Method};
+
+/// A soft body: mesh, material, elements and their stiffness.
+///
+/// Shapes: N nodes. Units: m, Pa, N. Frame: that of the mesh.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use softgrasp_core::mesh::{BuiltIn, generate};
+/// use softgrasp_core::{LoadCase, Material, SoftBody};
+///
+/// let cube = generate(BuiltIn::Cube, 125)?;
+/// let (low, high) = cube.bounds();
+/// let nodes_at = |z: f64| {
+///     let on = cube.vertices().iter().zip(0u32..).filter(move |(p, _)| (p.z - z).abs() < 1e-9);
+///     on.map(|(_, node)| node).collect::<Vec<_>>()
+/// };
+/// // The bottom is held, the top is pressed down by a millimetre (Dirichlet values).
+/// let mut press = LoadCase::new();
+/// press.hold(nodes_at(low.z));
+/// for node in nodes_at(high.z) {
+///     press.prescribe(node, Vector3::new(0.0, 0.0, -1e-3));
+/// }
+/// let body = SoftBody::try_new(cube.clone(), Material::try_new(2.0e4, 0.3)?)?;
+/// let answer = body.solve(&press)?;
+/// assert_eq!(answer.displacements.len(), 125);
+/// assert!(answer.residual_rel < 1e-12 && answer.inexactness.relative() < 1e-9);
+/// // What the top needs to be pressed with, the bottom holds.
+/// let force: f64 = nodes_at(high.z).iter().map(|node| answer.reactions[node].z).sum();
+/// let held: f64 = nodes_at(low.z).iter().map(|node| answer.reactions[node].z).sum();
+/// assert!(force < 0.0 && (force + held).abs() < 1e-9 * held);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct SoftBody {
+    model: Model,
+}
+
+impl SoftBody {
+    /// A body of one material, of linear tetrahedra; of those that do not lock from a Poisson's ratio of
+    /// 0.45 on.
+    ///
+    /// # Errors
+    /// [`ModelError`] where mesh and material make no stiffness.
+    pub fn try_new(mesh: TetMesh, material: Material) -> Result<Self, ModelError> {
+        Self::with_element(mesh, &[material], cheapest_element(material.poisson()))
+    }
+
+    /// A body of an element that was chosen, with one material or one for each region of the mesh.
+    ///
+    /// # Errors
+    /// [`ModelError`] for regions without a material, and for too many mid-edge nodes.
+    pub fn with_element(
+        mesh: TetMesh,
+        materials: &[Material],
+        element: Element,
+    ) -> Result<Self, ModelError> {
+        Ok(Self { model: Model::try_new(mesh, element, materials, Vec::new(), &mut |_| {})? })
+    }
+
+    /// The finite element model of it.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Static displacements under a load case by linear elasticity: K₁₁ is factored over fronts, solved
+    /// and refined.
+    ///
+    /// # Errors
+    /// [`SoftBodyError`]: nodes that are not there, a body that can still move, no memory.
+    ///
+    /// Source: thesis (3.43).
+    pub fn solve(&self, case: &LoadCase) -> Result<Answer, SoftBodyError> {
+        let (known, forces) = case.of(&self.model)?;
+        let factored = self.model.factor(&known.dofs, Method::Front, &mut |_| {})?;
+        let loads = Loads { q_known: &known.q_known, forces: &forces, residual_rel: 0.0 };
+        let found = factored.solve_for_certain(self.model.stiffness(), loads, &mut |_| {});
+        let (solution, certainty) = found.map_err(ModelError::from)?;
+        Ok(Answer {
+            displacements: answer::by_node(&self.model, &solution.displacement),
+            reactions: answer::reactions(&known.dofs, &solution.reaction),
+            residual_rel: solution.residual_rel,
+            inexactness: Inexactness::Estimated(certainty.error_rel),
+        })
+    }
+
+    /// Prepares frames: one factor, then answers for other prescribed displacements in a fraction of a
+    /// millisecond.
+    ///
+    /// # Errors
+    /// [`SoftBodyError`]: ten-node elements, no memory.
+    pub fn frames(&self) -> Result<Frames<'_>, SoftBodyError> {
+        Frames::try_new(&self.model)
+    }
+
+    /// Equilibrium at large deformation under a load case: forces keep their directions, the residual
+    /// is that of the deformed body.
+    ///
+    /// ```
+    /// use nalgebra::{Rotation3, Vector3};
+    /// use softgrasp_core::mesh::{BuiltIn, generate};
+    /// use softgrasp_core::{Law, LoadCase, Material, SoftBody};
+    ///
+    /// // The bottom of a cube is held, the top is turned by 40 degrees.
+    /// let cube = generate(BuiltIn::Cube, 64)?;
+    /// let (low, high) = cube.bounds();
+    /// let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 40f64.to_radians());
+    /// let mut twist = LoadCase::new();
+    /// for (place, node) in cube.vertices().iter().zip(0..) {
+    ///     if place.z > high.z - 1e-9 {
+    ///         twist.prescribe(node, turn * place.coords - place.coords);
+    ///     } else if place.z < low.z + 1e-9 {
+    ///         twist.hold([node]);
+    ///     }
+    /// }
+    /// let body = SoftBody::try_new(cube, Material::try_new(2.0e4, 0.3)?)?;
+    /// let twisted = body.equilibrium(&twist, Law::NeoHookean)?;
+    /// assert!(twisted.answer.residual_rel < 1e-8 && twisted.volume_ratio_min > 0.5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SoftBodyError`]: those of [`SoftBody::solve`], and where no stable equilibrium is found, with
+    /// the cause.
+    pub fn equilibrium(&self, case: &LoadCase, law: Law) -> Result<LargeAnswer, SoftBodyError> {
+        let (known, forces) = case.of(&self.model)?;
+        let hold = Arc::new(self.model.hold(&known.dofs, Vec::new(), None)?);
+        let elements = Arc::new(self.model.hyperelastic(law)?);
+        let rest = vec![0.0; 3 * self.model.system_node_count()];
+        let mut path = Path::new(elements, self.model.stiffness(), hold, rest, false);
+        let goal = Goal { q_known: &known.q_known, mask_q: &[], forces: &forces };
+        let found = path.find(&goal, &Wish::EXACT)?;
+        Ok(LargeAnswer {
+            answer: Answer {
+                displacements: answer::by_node(&self.model, path.displacement()),
+                reactions: answer::reactions(&known.dofs, &found.reactions),
+                residual_rel: found.residual_rel,
+                inexactness: Inexactness::Estimated(found.error_estimate_rel),
+            },
+            energy: found.energy,
+            volume_ratio_min: found.jacobian_min,
+            jumped: found.jumped,
+        })
+    }
+}
