@@ -283,8 +283,9 @@ fn a_session_of_the_real_programs_is_read_from_its_reports() {
         .iter()
         .zip(of("deforming").into_iter().zip(of("answered")))
     {
-        let rows = why("server").into_iter().zip(why("ticks"));
-        let of_server = rows.filter(|(of, _)| of == server).map(|(_, n)| n.parse::<f64>().unwrap());
+        let rows = why("object").into_iter().zip(why("server")).zip(why("ticks"));
+        let rows = rows.filter(|((object, of), _)| object == "strawberry" && of == server);
+        let of_server = rows.map(|(_, n)| n.parse::<f64>().unwrap());
         assert_eq!(deforming, answered + of_server.sum::<f64>(), "{server}");
     }
     assert!(of("residual_rel").iter().all(|&e| e < 1e-9));

@@ -84,7 +84,8 @@ pub(super) fn walk(way: Way, case: &Case, compare: bool, host: &Host) -> Walk {
             let truth = Truth::of(&question, way.element(), None);
             let errors = truth.errors_of(&answer.displacement, way.is_single());
             let Answer { stated_rel, bound_rel, .. } = answer;
-            let judged = Judged { errors, stated_rel, bound_rel };
+            let promised_rel = way.promised_rel();
+            let judged = Judged { errors, stated_rel, bound_rel, promised_rel };
             if let (Outcome::Failed, text) = Outcome::of_answer(&judged, Allowed::ANY) {
                 return Walk::Failed(format!("time {}: {text}", time + 1));
             }

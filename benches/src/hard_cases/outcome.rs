@@ -9,7 +9,7 @@ use super::truth::Errors;
 /// Of one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// The error is at most a hundred times the expected one.
+    /// The error is at most a hundred times the expected one, or what the way goes down to.
     Exact,
     /// The error is larger, at most what the answer states, and what it states is warned of.
     Degraded,
@@ -25,6 +25,8 @@ pub(super) struct Judged {
     pub errors: Option<Errors>,
     pub stated_rel: f64,
     pub bound_rel: Option<f64>,
+    /// Error that the way goes down to, where rounding is not what ends it.
+    pub promised_rel: f64,
 }
 
 impl Outcome {
@@ -60,10 +62,10 @@ impl Outcome {
     /// Outcome of an answer, and what is to be said about it.
     pub fn of_answer(judged: &Judged, allowed: Allowed) -> (Self, String) {
         let failed = |text: String| (Self::Failed, text);
-        let Judged { errors: Some(errors), stated_rel, bound_rel } = *judged else {
+        let Judged { errors: Some(errors), stated_rel, bound_rel, promised_rel } = *judged else {
             return failed("there is no right answer to compare with".to_owned());
         };
-        let (error, threshold) = (errors.largest_rel, errors.threshold_rel);
+        let (error, threshold) = (errors.largest_rel, errors.threshold_rel.max(promised_rel));
         if !error.is_finite() {
             return failed("the answer is not finite".to_owned());
         }
@@ -96,7 +98,8 @@ mod tests {
     fn outcome(error: f64, stated_rel: f64, bound_rel: Option<f64>, allowed: Allowed) -> Outcome {
         let errors =
             Some(Errors { largest_rel: error, norm_rel: Some(error), threshold_rel: 1e-11 });
-        Outcome::of_answer(&Judged { errors, stated_rel, bound_rel }, allowed).0
+        let judged = Judged { errors, stated_rel, bound_rel, promised_rel: 0.0 };
+        Outcome::of_answer(&judged, allowed).0
     }
 
     #[test]
@@ -112,7 +115,7 @@ mod tests {
         assert_eq!(outcome(1e-12, 1e-14, Some(1e-13), any), Outcome::Failed);
         assert_eq!(outcome(f64::INFINITY, f64::INFINITY, None, any), Outcome::Failed);
         assert_eq!(outcome(1e-12, f64::NAN, None, any), Outcome::Exact);
-        let nothing = Judged { errors: None, stated_rel: 1.0, bound_rel: None };
+        let nothing = Judged { errors: None, stated_rel: 1.0, bound_rel: None, promised_rel: 0.0 };
         assert_eq!(Outcome::of_answer(&nothing, any).0, Outcome::Failed);
     }
 

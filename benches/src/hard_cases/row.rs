@@ -188,17 +188,18 @@ fn judged(
     against: &'static str,
     (found, hash): (Found, u64),
 ) -> Row {
-    let allowed = if way.is_single() { case.single } else { case.double };
+    let allowed = way.allowed(case);
     let (outcome, note) = match &found {
         Found::Answer(answer, errors) => {
             let Answer { stated_rel, bound_rel, .. } = **answer;
-            let judged = Judged { errors: *errors, stated_rel, bound_rel };
+            let promised_rel = way.promised_rel();
+            let judged = Judged { errors: *errors, stated_rel, bound_rel, promised_rel };
             let (outcome, note) = Outcome::of_answer(&judged, allowed);
             let parts = [note.as_str(), answer.remark.as_str()];
             let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
             (outcome, parts.join("; "))
         }
-        Found::Refusal(refusal) => Outcome::of_refusal(refusal, case.reason, allowed),
+        Found::Refusal(refusal) => Outcome::of_refusal(refusal, way.reason(case), allowed),
         Found::Fault(text) => (Outcome::Failed, text.clone()),
     };
     let numbers = match found {

@@ -3,10 +3,11 @@
 use glove_client::ask::connection::Host;
 use softgrasp_core::model::Element;
 use softgrasp_core::solve::Method;
+use softgrasp_core::solve::rates::ERROR_ITERATED;
 
 use super::answer::Answer;
-use super::case::{Question, Reach};
-use super::refusal::Refusal;
+use super::case::{Allowed, Case, Question, Reach};
+use super::refusal::{Reason, Refusal};
 use super::{in_process, over_socket};
 
 /// One way.
@@ -95,6 +96,32 @@ impl Way {
     /// Whether its factor is in single precision.
     pub fn is_single(self) -> bool {
         matches!(self, Self::Direct(_, method) if method.is_single())
+    }
+
+    /// What a case allows this way: one without a factor may also refuse what is weakly held, and say more
+    /// of its error than a factor has.
+    pub fn allowed(self, case: &Case) -> Allowed {
+        match self {
+            Self::Direct(_, Method::Multigrid) => {
+                Allowed { degraded: true, refused: true, ..case.double }
+            }
+            _ if self.is_single() => case.single,
+            _ => case.double,
+        }
+    }
+
+    /// The right reason of a refusal: that of the case, and weakness where only this way may refuse.
+    pub fn reason(self, case: &Case) -> Reason {
+        let is_own = self.allowed(case).refused && !case.double.refused && !self.is_single();
+        if is_own { Reason::Weak } else { case.reason }
+    }
+
+    /// Error that this way goes down to; rounding alone decides for the others.
+    pub fn promised_rel(self) -> f64 {
+        match self {
+            Self::Direct(_, Method::Multigrid) => ERROR_ITERATED,
+            _ => 0.0,
+        }
     }
 
     /// Why this way may refuse a question, for the weakness of what holds the body, that another way
