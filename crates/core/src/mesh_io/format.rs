@@ -23,6 +23,8 @@ pub enum Format {
     TetGen,
     /// MEDIT `.mesh`, text.
     Medit,
+    /// Abaqus or CalculiX deck `.inp`, text.
+    Deck,
     /// Vega FEM `.veg`, text.
     Vega,
     /// Lines `v x y z` and `t a b c d` (Isaac Gym, FleX).
@@ -43,6 +45,7 @@ impl fmt::Display for Format {
             Self::Vtu => "VTK XML (VTU)",
             Self::TetGen => "TetGen .node/.ele",
             Self::Medit => "MEDIT .mesh",
+            Self::Deck => "Abaqus or CalculiX deck",
             Self::Vega => "Vega .veg",
             Self::Tet => ".tet",
             Self::ThesisLists => "thesis lists (Table 3.1)",
@@ -65,8 +68,6 @@ pub enum Foreign {
     GmshOther,
     /// Binary MEDIT `.meshb`.
     MeditBinary,
-    /// Abaqus or CalculiX `.inp`.
-    Abaqus,
     /// FEBio `.feb`.
     Febio,
     /// Universal Scene Description, text or crate.
@@ -85,7 +86,7 @@ pub enum Foreign {
     Xdmf,
     /// HDF5 container (Exodus, MED, VTKHDF).
     Hdf5,
-    /// gzip stream.
+    /// gzip file inside another one.
     Gzip,
     /// zip archive (also `.usdz`).
     Zip,
@@ -116,7 +117,6 @@ impl fmt::Display for Foreign {
             Self::Fluent => "an ANSYS Fluent mesh",
             Self::GmshOther => "a Gmsh MSH file of a version other than 1, 2 and 4",
             Self::MeditBinary => "a binary MEDIT mesh (.meshb)",
-            Self::Abaqus => "an Abaqus or CalculiX input deck",
             Self::Febio => "a FEBio model",
             Self::Usd => "a USD scene",
             Self::Stl => "an STL surface",
@@ -126,7 +126,7 @@ impl fmt::Display for Foreign {
             Self::Gltf => "a glTF scene",
             Self::Xdmf => "an XDMF or DOLFIN XML mesh",
             Self::Hdf5 => "an HDF5 file (Exodus, MED, VTKHDF)",
-            Self::Gzip => "a gzip file",
+            Self::Gzip => "a gzip file inside another one",
             Self::Zip => "a zip archive",
             Self::OtherCompression => "a compressed file (xz, bzip2 or zstd)",
         })

@@ -3,12 +3,15 @@
 use super::companion::{Companion, FindCompanion};
 use super::cursor::{Cursor, quote};
 use super::error::{Fault, MeshFileError};
-use super::sniff::{Sniffed, sniff, without_mark};
-use super::{Format, MeshFile, gmsh, medit, tet, tetgen, thesis_lists, vega, vtk_legacy, vtu};
+use super::gzip::{Unpacker, is_gzip};
+use super::sniff::{Sniffed, sniff_unpacked, without_mark};
+use super::{
+    Format, MeshFile, deck, gmsh, medit, tet, tetgen, thesis_lists, vega, vtk_legacy, vtu,
+};
 
 /// Reads a mesh file of any known format.
 ///
-/// `name` is for errors only; the format is found by content. `companion` is asked for the other
+/// `name` is for errors only; the format is found by content, and gzip is unpacked. `companion` is asked for the other
 /// files that some formats need, and returns their bytes or `None`.
 ///
 /// # Errors
@@ -19,15 +22,39 @@ pub fn parse(
     bytes: &[u8],
     companion: &mut dyn FnMut(&Companion) -> Option<Vec<u8>>,
 ) -> Result<MeshFile, MeshFileError> {
+    let mut unpacker = Unpacker::default();
+    if !is_gzip(bytes) {
+        return parse_unpacked(name, bytes, &mut unpacker, companion);
+    }
+    let unpacked = unpacker.unpack(name, bytes)?;
+    let mut file = parse_unpacked(name, &unpacked, &mut unpacker, companion)?;
+    file.findings.note("unpacked from gzip");
+    Ok(file)
+}
+
+fn parse_unpacked(
+    name: &str,
+    bytes: &[u8],
+    unpacker: &mut Unpacker,
+    companion: &mut FindCompanion,
+) -> Result<MeshFile, MeshFileError> {
     let bytes = without_mark(bytes);
     let refuse = |fault| MeshFileError { file: name.to_owned(), fault };
     let start = bytes.trim_ascii_start();
     if start.is_empty() {
         return Err(refuse(Fault::Empty));
     }
-    match sniff(bytes) {
+    match sniff_unpacked(bytes) {
         Some(Sniffed::Readable(format)) => {
-            read(name, bytes, format, companion)?.finish(name, format)
+            let mut find = |wanted: &Companion| {
+                companion(wanted).and_then(|bytes| unpacker.companion(wanted, bytes))
+            };
+            let raw = read(name, bytes, format, &mut find);
+            // A companion that cannot be unpacked is not one that is missing.
+            match unpacker.fault.take() {
+                Some(fault) => Err(fault),
+                None => raw?.finish(name, format),
+            }
         }
         Some(Sniffed::Foreign(what)) => Err(refuse(Fault::Foreign { what })),
         None => Err(refuse(Fault::Unknown { start: quote(start) })),
@@ -52,6 +79,7 @@ fn read(
         Format::Vtu => vtu::read(plain),
         Format::TetGen => tetgen::read(name, bytes, companion),
         Format::Medit => medit::read(commented),
+        Format::Deck => deck::read(name, bytes, companion),
         Format::Vega => vega::read(name, bytes, companion),
         Format::Tet => tet::read(commented),
         Format::ThesisLists => thesis_lists::read(commented),

@@ -95,7 +95,7 @@ impl RawMesh {
             [] => NodeLabels::sequence(self.first_label, self.points.len()),
             given => NodeLabels::try_new(given).map_err(refuse)?,
         };
-        self.findings.labels_mapped = labels.mapped();
+        self.findings.labels_mapped |= labels.mapped();
         let all = self.corner_indices(&labels).map_err(|fault| MeshFileError {
             file: self.tets_file.clone().unwrap_or_else(|| name.to_owned()),
             fault,

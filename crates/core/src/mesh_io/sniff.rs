@@ -2,7 +2,7 @@
 
 use super::cursor::{Cursor, find, words};
 use super::number::parse_integer;
-use super::{Foreign, Format, tetgen, thesis_lists};
+use super::{Foreign, Format, gzip, tetgen, thesis_lists};
 
 /// A format known by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,8 +13,16 @@ pub enum Sniffed {
     Foreign(Foreign),
 }
 
-/// Format of the bytes; `None` if nothing known begins like this.
+/// Format of the bytes, or of what gzip packed in them; `None` if nothing known begins like this.
 pub fn sniff(bytes: &[u8]) -> Option<Sniffed> {
+    match gzip::is_gzip(bytes) {
+        true => sniff_unpacked(&gzip::beginning(bytes)),
+        false => sniff_unpacked(bytes),
+    }
+}
+
+/// Format of bytes that are not packed, or not any more.
+pub(super) fn sniff_unpacked(bytes: &[u8]) -> Option<Sniffed> {
     let bytes = without_mark(bytes);
     if let Some(foreign) = by_magic(bytes) {
         return Some(Sniffed::Foreign(foreign));
@@ -166,9 +174,8 @@ fn star_keywords(text: &[u8]) -> Option<Sniffed> {
                 return Some(Sniffed::Readable(Format::Vega));
             }
             b"*INCLUDE" if !has_comma => return Some(Sniffed::Readable(Format::Vega)),
-            b"*NODE" | b"*ELEMENT" | b"*HEADING" | b"*PART" => {
-                return Some(Sniffed::Foreign(Foreign::Abaqus));
-            }
+            b"*INCLUDE" | b"*NODE" | b"*ELEMENT" | b"*HEADING" | b"*PART" | b"*NSET"
+            | b"*ELSET" | b"*ASSEMBLY" => return Some(Sniffed::Readable(Format::Deck)),
             _ => {}
         }
     }

@@ -5,7 +5,8 @@ use std::fmt;
 use super::{gltf, obj, off, ply, stl};
 use crate::mesh_io::cursor::Cursor;
 use crate::mesh_io::error::{Fault, MeshFileError};
-use crate::mesh_io::sniff::{Sniffed, sniff, without_mark};
+use crate::mesh_io::gzip::{Unpacker, is_gzip};
+use crate::mesh_io::sniff::{Sniffed, sniff_unpacked, without_mark};
 use crate::mesh_io::{Companion, Foreign};
 use crate::surface::TriangleSurface;
 
@@ -47,9 +48,16 @@ pub struct SurfaceFile {
     pub notes: Vec<String>,
 }
 
-/// Format of the bytes, if it is one of a surface.
+/// Format of the bytes, or of what gzip packed in them, if it is one of a surface.
 pub fn surface_format(bytes: &[u8]) -> Option<SurfaceFormat> {
-    match sniff(bytes)? {
+    if is_gzip(bytes) {
+        return unpacked_format(&Unpacker::default().unpack("", bytes).ok()?);
+    }
+    unpacked_format(bytes)
+}
+
+fn unpacked_format(bytes: &[u8]) -> Option<SurfaceFormat> {
+    match sniff_unpacked(bytes)? {
         Sniffed::Foreign(Foreign::Stl) => Some(SurfaceFormat::Stl),
         Sniffed::Foreign(Foreign::Obj) => Some(SurfaceFormat::Obj),
         Sniffed::Foreign(Foreign::Ply) => Some(SurfaceFormat::Ply),
@@ -61,7 +69,7 @@ pub fn surface_format(bytes: &[u8]) -> Option<SurfaceFormat> {
 
 /// Reads a surface file of any format known here.
 ///
-/// `name` is for errors only; the format is found by content. `companion` is asked for the buffers
+/// `name` is for errors only; the format is found by content, and gzip is unpacked. `companion` is asked for the buffers
 /// that a `.gltf` file has beside it.
 ///
 /// # Errors
@@ -73,8 +81,16 @@ pub fn parse_surface(
     companion: &mut dyn FnMut(&Companion) -> Option<Vec<u8>>,
 ) -> Result<SurfaceFile, MeshFileError> {
     let refuse = |fault| MeshFileError { file: name.to_owned(), fault };
+    let unpacked;
+    let bytes = match is_gzip(bytes) {
+        true => {
+            unpacked = Unpacker::default().unpack(name, bytes)?;
+            unpacked.as_slice()
+        }
+        false => bytes,
+    };
     let bytes = without_mark(bytes);
-    let Some(format) = surface_format(bytes) else {
+    let Some(format) = unpacked_format(bytes) else {
         return Err(refuse(Fault::NoSurface));
     };
     let commented = Cursor::with_comments(name, bytes, b'#');

@@ -10,7 +10,7 @@ fn q1_foreign_formats_are_recognised_by_content() {
     stl.extend([0; 100]);
     let mut mujoco: Vec<u8> = [3_u32, 0, 0, 1].iter().flat_map(|v| v.to_le_bytes()).collect();
     mujoco.extend([7; 48]);
-    let files: [(&[u8], Foreign); 24] = [
+    let files: [(&[u8], Foreign); 21] = [
         (b"MFEM mesh v1.0\n\n#\n# MFEM Geometry Types\n", Foreign::Mfem),
         (&mujoco, Foreign::MujocoLegacy),
         (b"# header\n# ndim npoint ncell\n3 8 5\n\n# points\n", Foreign::Gemlab),
@@ -18,8 +18,6 @@ fn q1_foreign_formats_are_recognised_by_content() {
         (b"(2 3)\n(10 (0 1 8 0 3))\n", Foreign::Fluent),
         (b"$MeshFormat\n3 0 8\n$EndMeshFormat\n", Foreign::GmshOther),
         (b"\x01\0\0\0\x02\0\0\0\x03\0\0\0", Foreign::MeditBinary),
-        (b"*Heading\n** Job name: x\n*Node\n1, 0., 0., 0.\n", Foreign::Abaqus),
-        (b"** x\n*NODE, NSET=N\n1,0,0,-3.5e-001\n*Element, TYPE=C3D10\n", Foreign::Abaqus),
         (
             b"<?xml encoding=\"ISO-8859-1\"?>\n<!-- \xe9 --><febio_spec version=\"3.0\">",
             Foreign::Febio,
@@ -35,7 +33,6 @@ fn q1_foreign_formats_are_recognised_by_content() {
         (b"<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<Xdmf>", Foreign::Xdmf),
         (b"<dolfin xmlns:dolfin=\"http://fenicsproject.org\">", Foreign::Xdmf),
         (b"\x89HDF\r\n\x1a\n", Foreign::Hdf5),
-        (b"\x1f\x8b\x08\0", Foreign::Gzip),
         (b"PK\x03\x04\x14", Foreign::Zip),
         (b"\xfd7zXZ\0", Foreign::OtherCompression),
     ];
@@ -53,7 +50,7 @@ fn refusals_are_one_line_with_advice() {
                  convert it with Gmsh or meshio to MSH 4.1";
     assert_eq!(error, known);
     assert!(refusal("ply\n").contains("it has no tetrahedra; `glove-client fill`"));
-    assert!(refusal([0x1f, 0x8b]).contains("unpack it first"));
+    assert!(refusal(b"PK\x03\x04\x14").contains("unpack it first"));
 }
 
 #[test]

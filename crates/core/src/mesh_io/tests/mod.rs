@@ -1,7 +1,9 @@
 //! Tests of whole files: real ones, the quirks of each format, round trips, hostile bytes.
 
+mod deck_quirks;
 mod foreign_files;
 mod gmsh_quirks;
+mod gzip_quirks;
 mod hostile_bytes;
 mod mending;
 mod other_quirks;

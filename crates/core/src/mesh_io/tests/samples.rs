@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use nalgebra::Point3;
 
+use super::deck_quirks::deck;
 use super::vtu_samples::vtu_samples;
 use crate::mesh_io::{Format, MeshFile, MeshFileError, parse};
 
@@ -271,6 +272,7 @@ pub(super) fn samples() -> Vec<Sample> {
         },
         Sample { companion: Some(node.into()), ..Sample::new("a.ele", Format::TetGen, ele) },
         Sample::new("MEDIT", Format::Medit, medit),
+        Sample::new("deck", Format::Deck, deck("")),
         Sample::new("Vega", Format::Vega, vega),
         Sample::new(".tet", Format::Tet, tet),
         Sample::new("lists", Format::ThesisLists, lists),
