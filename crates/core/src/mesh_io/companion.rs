@@ -7,8 +7,8 @@ use std::fmt;
 pub enum Companion {
     /// The same name with another extension (without the dot): TetGen's other half.
     Extension(&'static str),
-    /// A file name out of the file (Vega's `*INCLUDE`); it comes from outside, so the caller
-    /// decides which folders it may reach.
+    /// A file name out of the file (`*INCLUDE` of decks and of Vega); it comes from outside, so the
+    /// caller decides which folders it may reach.
     FileName(String),
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::cell_kind::CellKind;
+use super::cell_kind::{CellKind, Shape};
 use super::companion::{Companion, FindCompanion};
 use super::cursor::{Cursor, quote};
 use super::deck_assembly::{Instance, assemble};
@@ -330,7 +330,8 @@ impl ElementBlock {
         }
         match self.pending.len() {
             n if n <= kind.nodes => Ok(()),
-            n if n == kind.nodes + 1 => {
+            // Some decks name more nodes for a brick than it has; CalculiX passes them over.
+            n if n == kind.nodes + 1 || kind.shape != Shape::Tetrahedron => {
                 let (label, nodes) = (self.pending[0], &self.pending[1..]);
                 part.add_element(kind, label, nodes, self.set);
                 self.pending.clear();

@@ -23,6 +23,14 @@ pub enum Format {
     TetGen,
     /// MEDIT `.mesh`, text.
     Medit,
+    /// MEDIT `.meshb`, binary.
+    MeditBinary,
+    /// Netgen `.vol`, text.
+    Netgen,
+    /// FEBio `.feb`.
+    Febio,
+    /// XDMF with numbers in the text or in raw files beside it.
+    Xdmf,
     /// Abaqus or CalculiX deck `.inp`, text.
     Deck,
     /// Vega FEM `.veg`, text.
@@ -45,6 +53,10 @@ impl fmt::Display for Format {
             Self::Vtu => "VTK XML (VTU)",
             Self::TetGen => "TetGen .node/.ele",
             Self::Medit => "MEDIT .mesh",
+            Self::MeditBinary => "MEDIT .meshb (binary)",
+            Self::Netgen => "Netgen .vol",
+            Self::Febio => "FEBio .feb",
+            Self::Xdmf => "XDMF",
             Self::Deck => "Abaqus or CalculiX deck",
             Self::Vega => "Vega .veg",
             Self::Tet => ".tet",
@@ -66,10 +78,6 @@ pub enum Foreign {
     Fluent,
     /// Gmsh MSH of a version other than 1, 2 and 4.
     GmshOther,
-    /// Binary MEDIT `.meshb`.
-    MeditBinary,
-    /// FEBio `.feb`.
-    Febio,
     /// Universal Scene Description, text or crate.
     Usd,
     /// STL surface, text or binary.
@@ -82,8 +90,10 @@ pub enum Foreign {
     Off,
     /// glTF surface, text or binary.
     Gltf,
-    /// XDMF or DOLFIN XML.
-    Xdmf,
+    /// DOLFIN XML.
+    DolfinXml,
+    /// netCDF in its classic form (Exodus).
+    NetCdf,
     /// HDF5 container (Exodus, MED, VTKHDF).
     Hdf5,
     /// gzip file inside another one.
@@ -116,15 +126,14 @@ impl fmt::Display for Foreign {
             Self::Gemlab => "a gemlab mesh",
             Self::Fluent => "an ANSYS Fluent mesh",
             Self::GmshOther => "a Gmsh MSH file of a version other than 1, 2 and 4",
-            Self::MeditBinary => "a binary MEDIT mesh (.meshb)",
-            Self::Febio => "a FEBio model",
             Self::Usd => "a USD scene",
             Self::Stl => "an STL surface",
             Self::Obj => "a Wavefront OBJ surface",
             Self::Ply => "a PLY surface",
             Self::Off => "an OFF surface",
             Self::Gltf => "a glTF scene",
-            Self::Xdmf => "an XDMF or DOLFIN XML mesh",
+            Self::DolfinXml => "a DOLFIN XML mesh",
+            Self::NetCdf => "a netCDF file (Exodus)",
             Self::Hdf5 => "an HDF5 file (Exodus, MED, VTKHDF)",
             Self::Gzip => "a gzip file inside another one",
             Self::Zip => "a zip archive",

@@ -10,16 +10,19 @@ mod deck_assembly;
 mod deck_keyword;
 mod deck_part;
 mod error;
+mod febio;
 mod findings;
 mod format;
 mod gmsh;
 mod gmsh_header;
 mod gzip;
 mod medit;
+mod medit_binary;
 mod mending;
 mod msh1;
 mod msh2;
 mod msh4;
+mod netgen;
 mod node_labels;
 mod number;
 mod parse;
@@ -39,6 +42,8 @@ mod vtu_array;
 mod write_error;
 mod write_msh41;
 mod write_vtu;
+mod xdmf;
+mod xdmf_item;
 mod xml;
 
 #[cfg(test)]

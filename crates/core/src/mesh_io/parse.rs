@@ -6,13 +6,14 @@ use super::error::{Fault, MeshFileError};
 use super::gzip::{Unpacker, is_gzip};
 use super::sniff::{Sniffed, sniff_unpacked, without_mark};
 use super::{
-    Format, MeshFile, deck, gmsh, medit, tet, tetgen, thesis_lists, vega, vtk_legacy, vtu,
+    Format, MeshFile, deck, febio, gmsh, medit, medit_binary, netgen, tet, tetgen, thesis_lists,
+    vega, vtk_legacy, vtu, xdmf,
 };
 
 /// Reads a mesh file of any known format.
 ///
-/// `name` is for errors only; the format is found by content, and gzip is unpacked. `companion` is asked for the other
-/// files that some formats need, and returns their bytes or `None`.
+/// `name` is for errors only; the format is found by content, and gzip is unpacked. `companion` is
+/// asked for the other files that some formats need, and returns their bytes or `None`.
 ///
 /// # Errors
 /// [`MeshFileError`]: one line that names the file, the place, what was expected and what was
@@ -79,6 +80,10 @@ fn read(
         Format::Vtu => vtu::read(plain),
         Format::TetGen => tetgen::read(name, bytes, companion),
         Format::Medit => medit::read(commented),
+        Format::MeditBinary => medit_binary::read(plain),
+        Format::Netgen => netgen::read(commented),
+        Format::Febio => febio::read(name, bytes, companion),
+        Format::Xdmf => xdmf::read(name, bytes, companion),
         Format::Deck => deck::read(name, bytes, companion),
         Format::Vega => vega::read(name, bytes, companion),
         Format::Tet => tet::read(commented),

@@ -24,6 +24,10 @@ pub fn sniff(bytes: &[u8]) -> Option<Sniffed> {
 /// Format of bytes that are not packed, or not any more.
 pub(super) fn sniff_unpacked(bytes: &[u8]) -> Option<Sniffed> {
     let bytes = without_mark(bytes);
+    // The number one, then version 1 to 4, in either byte order.
+    if let [1, 0, 0, 0, 1..=4, 0, 0, 0, ..] | [0, 0, 0, 1, 0, 0, 0, 1..=4, ..] = bytes {
+        return Some(Sniffed::Readable(Format::MeditBinary));
+    }
     if let Some(foreign) = by_magic(bytes) {
         return Some(Sniffed::Foreign(foreign));
     }
@@ -64,7 +68,7 @@ fn is_off(start: &[u8]) -> bool {
 }
 
 fn by_magic(bytes: &[u8]) -> Option<Foreign> {
-    const MAGICS: [(&[u8], Foreign); 9] = [
+    const MAGICS: [(&[u8], Foreign); 12] = [
         (b"glTF", Foreign::Gltf),
         (b"\x1f\x8b", Foreign::Gzip),
         (b"PK\x03\x04", Foreign::Zip),
@@ -74,11 +78,10 @@ fn by_magic(bytes: &[u8]) -> Option<Foreign> {
         (b"\x28\xb5\x2f\xfd", Foreign::OtherCompression),
         (b"PXR-USDC", Foreign::Usd),
         (b"\x89HDF", Foreign::Hdf5),
+        (b"CDF\x01", Foreign::NetCdf),
+        (b"CDF\x02", Foreign::NetCdf),
+        (b"CDF\x05", Foreign::NetCdf),
     ];
-    // The number one, then version 1 to 4, in either byte order.
-    if let [1, 0, 0, 0, 1..=4, 0, 0, 0, ..] | [0, 0, 0, 1, 0, 0, 0, 1..=4, ..] = bytes {
-        return Some(Foreign::MeditBinary);
-    }
     MAGICS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, foreign)| foreign)
 }
 
@@ -128,8 +131,9 @@ fn by_xml(text: &[u8]) -> Option<Sniffed> {
     };
     Some(match root.to_ascii_lowercase().as_slice() {
         b"vtkfile" => Sniffed::Readable(Format::Vtu),
-        b"febio_spec" => Sniffed::Foreign(Foreign::Febio),
-        b"xdmf" | b"dolfin" => Sniffed::Foreign(Foreign::Xdmf),
+        b"febio_spec" => Sniffed::Readable(Format::Febio),
+        b"xdmf" => Sniffed::Readable(Format::Xdmf),
+        b"dolfin" => Sniffed::Foreign(Foreign::DolfinXml),
         _ => return None,
     })
 }
@@ -144,6 +148,9 @@ fn by_first_line(text: &[u8]) -> Option<Sniffed> {
     let first = words(line).next()?;
     if first.eq_ignore_ascii_case(b"MeshVersionFormatted") {
         return Some(Sniffed::Readable(Format::Medit));
+    }
+    if first == b"mesh3d" {
+        return Some(Sniffed::Readable(Format::Netgen));
     }
     if first.starts_with(b"*") {
         return star_keywords(text);

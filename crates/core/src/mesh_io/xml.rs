@@ -1,4 +1,4 @@
-//! Reads the part of XML that VTU uses: tags with attributes, and the text between them.
+//! Reads the part of XML that VTU, FEBio and XDMF use: tags with attributes, and the text between them.
 
 use super::cursor::{Cursor, find, is_space};
 use super::error::MeshFileError;

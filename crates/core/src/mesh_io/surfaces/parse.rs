@@ -69,8 +69,8 @@ fn unpacked_format(bytes: &[u8]) -> Option<SurfaceFormat> {
 
 /// Reads a surface file of any format known here.
 ///
-/// `name` is for errors only; the format is found by content, and gzip is unpacked. `companion` is asked for the buffers
-/// that a `.gltf` file has beside it.
+/// `name` is for errors only; the format is found by content, and gzip is unpacked. `companion` is
+/// asked for the buffers that a `.gltf` file has beside it.
 ///
 /// # Errors
 /// [`MeshFileError`]: one line that names the file, the place, what was expected and what was

@@ -94,7 +94,7 @@ fn without_sections_sets_that_hold_each_tetrahedron_once_are_regions() {
 #[test]
 fn other_elements_are_counted_by_kind_or_name() {
     let tail = "*ELEMENT, TYPE=S3\n21, 1, 2, 3\n*ELEMENT, TYPE=SPRINGA\n22, 1, 2\n23, 1,\n 3\n\
-                *ELEMENT, TYPE=C3D8R\n31,1,2,3,4,5,1,2,3\n*STEP\n*STATIC\n0.1, 1.\n*END STEP\n";
+                *ELEMENT, TYPE=C3D8R\n31,1,2,3,4,5,1,2,3,4,5,\n*STEP\n*STATIC\n0.1, 1.\n*END STEP\n";
     let file = read(deck(tail)).unwrap();
     assert_is_sample(&file, "others");
     let counts: Vec<_> = file.findings.other_cells.iter().map(|(k, &n)| (k.as_str(), n)).collect();

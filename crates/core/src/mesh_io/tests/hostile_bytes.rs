@@ -106,7 +106,9 @@ proptest! {
         start in prop::sample::select(vec![
             "", "$MeshFormat\n2.2 1 8\n\u{1}\0\0\0$EndMeshFormat\n", "$NOD\n", "v 0 0 0\n",
             "# vtk DataFile Version 5.1\n\nBINARY\nDATASET UNSTRUCTURED_GRID\n", "<VTKFile ",
-            "MeshVersionFormatted 1\n", "*VERTICES\n", "4 3 0 0\n", "softgrasp-lists 1\n",
+            "MeshVersionFormatted 1\n", "*VERTICES\n", "4 3 0 0\n", "softgrasp-lists 1\n", "mesh3d\nvolumeelements\n",
+            "<febio_spec><Nodes>", "\u{1}\0\0\0\u{3}\0\0\0",
+            "<Xdmf><Grid><Geometry><DataItem Format=\"Binary\">a</DataItem></Geometry><Topology>",
             "*NODE\n1,0,0,0\n*ELEMENT,TYPE=C3D4,ELSET=a\n1,1,1,1,1\n*ELSET,ELSET=b,GENERATE\n",
         ]),
         noise in prop::collection::vec(any::<u8>(), 0..200),

@@ -4,8 +4,12 @@ use std::fmt::Write;
 
 use nalgebra::Point3;
 
+use super::binary_medit::meshb;
 use super::deck_quirks::deck;
+use super::febio_quirks::febio;
+use super::netgen_quirks::netgen_sample;
 use super::vtu_samples::vtu_samples;
+use super::xdmf_quirks::xdmf;
 use crate::mesh_io::{Format, MeshFile, MeshFileError, parse};
 
 /// Coordinates of the sample; no number needs more than single precision.
@@ -272,6 +276,11 @@ pub(super) fn samples() -> Vec<Sample> {
         },
         Sample { companion: Some(node.into()), ..Sample::new("a.ele", Format::TetGen, ele) },
         Sample::new("MEDIT", Format::Medit, medit),
+        Sample::new("meshb 1", Format::MeditBinary, meshb(1, Order::Little, false)),
+        Sample::new("meshb 4", Format::MeditBinary, meshb(4, Order::Big, false)),
+        Sample::new("Netgen", Format::Netgen, netgen_sample()),
+        Sample::new("FEBio", Format::Febio, febio()),
+        Sample::new("XDMF", Format::Xdmf, xdmf()),
         Sample::new("deck", Format::Deck, deck("")),
         Sample::new("Vega", Format::Vega, vega),
         Sample::new(".tet", Format::Tet, tet),
