@@ -92,8 +92,13 @@ impl Reader<'_, '_> {
             match line {
                 [b'*', b'*', ..] => {}
                 [b'*', ..] => {
-                    self.end_section(cursor)?;
                     let keyword = Keyword::read(line, cursor);
+                    // The text of another file: data lines in it belong to what stands before.
+                    if keyword.name == "INCLUDE" {
+                        self.include(cursor, keyword.parameter("INPUT"))?;
+                        continue;
+                    }
+                    self.end_section(cursor)?;
                     self.read_keyword(cursor, &keyword)?;
                 }
                 _ => self.read_line(cursor, line)?,
@@ -119,13 +124,6 @@ impl Reader<'_, '_> {
                 self.scope = 0;
                 Section::Ignored
             }
-            "INCLUDE" => {
-                let Some(file) = keyword.parameter("INPUT") else {
-                    return Err(cursor.expected_instead("INPUT=file", b"*INCLUDE"));
-                };
-                self.section = Section::Ignored;
-                return self.include(cursor, file);
-            }
             _ if GENERATORS.contains(&name) => {
                 return Err(cursor.unsupported(&format!("a mesh made by *{name}")));
             }
@@ -136,7 +134,9 @@ impl Reader<'_, '_> {
         };
         // The data lines of some keywords may stand in a file of their own.
         match keyword.parameter("INPUT") {
-            Some(file) if !matches!(self.section, Section::Ignored) => self.include(cursor, file),
+            file @ Some(_) if !matches!(self.section, Section::Ignored) => {
+                self.include(cursor, file)
+            }
             _ => Ok(()),
         }
     }
@@ -206,7 +206,10 @@ impl Reader<'_, '_> {
     }
 
     /// An included file goes on where the line stands.
-    fn include(&mut self, cursor: &Cursor, file: &str) -> Result<(), MeshFileError> {
+    fn include(&mut self, cursor: &Cursor, file: Option<&str>) -> Result<(), MeshFileError> {
+        let Some(file) = file else {
+            return Err(cursor.expected_instead("INPUT=file", b"*INCLUDE"));
+        };
         self.includes += 1;
         if self.includes > MAX_INCLUDES {
             let expected = format!("at most {MAX_INCLUDES}");

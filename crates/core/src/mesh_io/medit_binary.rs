@@ -111,7 +111,7 @@ fn read_keyword(
         33 => CellKind::new(Shape::Hexahedron, 27),
         49 => CellKind::new(Shape::Pyramid, 5),
         _ => {
-            raw.findings.skip(format!("keyword {keyword}").as_bytes());
+            raw.findings.skip(keyword_name(keyword).as_bytes());
             return Ok(());
         }
     };
@@ -119,6 +119,23 @@ fn read_keyword(
     let count = announced(data, numbers, record, "cells")?;
     raw.count_cells(kind, count);
     Ok(())
+}
+
+/// What the text form calls a keyword that is passed over.
+fn keyword_name(keyword: i64) -> String {
+    let name = match keyword {
+        13 => "Corners",
+        14 => "Ridges",
+        15 => "RequiredVertices",
+        16 => "RequiredEdges",
+        17 => "RequiredTriangles",
+        20 => "NormalAtVertices",
+        59 => "Tangents",
+        60 => "Normals",
+        61 => "TangentAtVertices",
+        _ => return format!("keyword {keyword}"),
+    };
+    name.to_owned()
 }
 
 /// A count whose records the data has.

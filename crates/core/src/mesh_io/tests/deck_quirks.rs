@@ -118,6 +118,11 @@ fn included_files_are_asked_for_by_name() {
     assert_is_sample(&file.unwrap(), "included");
     let error = refusal(outer);
     assert!(error.contains("the included file \"parts\\\\mesh.inp\" is needed"), "{error}");
+    let data =
+        format!("*NODE\n*INCLUDE, INPUT=n.txt\n*ELEMENT, TYPE=C3D4\n{}", element_lines(1, 1));
+    let file = parse("f", data.as_bytes(), &mut |_| Some(node_lines(1, 1).into()));
+    assert_is_sample(&file.unwrap(), "included data lines");
+    assert!(refusal("*NODE\n*INCLUDE, FILE=a\n").contains("expected INPUT=file"));
     let own = "*INCLUDE, INPUT=me.inp\n";
     let error = parse("f", own.as_bytes(), &mut |_| Some(own.into())).unwrap_err().to_string();
     assert!(error.contains("included files: expected at most 64, found more"), "{error}");
