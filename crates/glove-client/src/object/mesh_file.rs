@@ -1,7 +1,7 @@
 //! Reads a mesh file, and the files beside it that belong to it, from disk.
 
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use softgrasp_core::fill::FillError;
 use softgrasp_core::mesh_io::{self, Companion, MeshFile, MeshFileError};
@@ -47,7 +47,7 @@ pub enum MeshFileReadError {
 /// [`MeshFileReadError`] in one line that names file and place.
 pub fn read_mesh_file(path: &Path) -> Result<MeshFile, MeshFileReadError> {
     let bytes = read_bytes(path)?;
-    let mut companion = |wanted: &Companion| std::fs::read(companion_path(path, wanted)).ok();
+    let mut companion = |wanted: &Companion| read_companion(path, wanted);
     Ok(mesh_io::parse(&path.display().to_string(), &bytes, &mut companion)?)
 }
 
@@ -56,13 +56,63 @@ pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshFileReadError> {
     std::fs::read(path).map_err(|source| MeshFileReadError::Read { path: path.to_owned(), source })
 }
 
-/// Where a file that another one names is looked for.
-pub(super) fn companion_path(path: &Path, wanted: &Companion) -> PathBuf {
+/// Bytes of a file that another one names, from the first place where there is one.
+pub(super) fn read_companion(path: &Path, wanted: &Companion) -> Option<Vec<u8>> {
+    companion_paths(path, wanted).into_iter().find_map(|path| std::fs::read(path).ok())
+}
+
+/// Where a file that another one names is looked for, the first place first.
+fn companion_paths(path: &Path, wanted: &Companion) -> Vec<PathBuf> {
     match wanted {
-        Companion::Extension(extension) => path.with_extension(extension),
-        // Only files beside the mesh: a name from inside a file must not reach other folders.
-        Companion::FileName(name) => {
-            path.with_file_name(Path::new(name).file_name().unwrap_or(OsStr::new("")))
+        Companion::Extension(extension) => {
+            // The other half of `a.node.gz` is `a.ele.gz` or `a.ele`.
+            let is_packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+            let unpacked = if is_packed { path.with_extension("") } else { path.to_owned() };
+            let other = unpacked.with_extension(extension);
+            let mut packed = other.clone().into_os_string();
+            packed.push(".gz");
+            vec![other, packed.into()]
         }
+        // Only files below the folder of the mesh: a name from inside a file must not reach others.
+        Companion::FileName(name) => {
+            let name = name.replace('\\', "/");
+            let named = Path::new(&name);
+            let beside = path.with_file_name(named.file_name().unwrap_or(OsStr::new("")));
+            let is_below =
+                |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
+            match named.components().all(is_below) {
+                true => vec![path.with_file_name(named), beside],
+                false => vec![beside],
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(path: &str, wanted: &Companion, known: &[&str]) {
+        let paths = companion_paths(Path::new(path), wanted);
+        assert_eq!(paths, known.iter().map(PathBuf::from).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn names_out_of_a_file_reach_no_other_folder_than_those_below() {
+        let name = |name: &str| Companion::FileName(name.to_owned());
+        check("a/deck.inp", &name("mesh.inp"), &["a/mesh.inp", "a/mesh.inp"]);
+        check("a/deck.inp", &name("b\\mesh.inp"), &["a/b/mesh.inp", "a/mesh.inp"]);
+        for outside in ["../b/mesh.inp", "/etc/mesh.inp", "b/../../mesh.inp"] {
+            check("a/deck.inp", &name(outside), &["a/mesh.inp"]);
+        }
+        check("a/deck.inp", &name(".."), &["a/"]);
+    }
+
+    #[test]
+    fn the_other_half_may_be_packed() {
+        let ele = Companion::Extension("ele");
+        check("a/m.node", &ele, &["a/m.ele", "a/m.ele.gz"]);
+        check("a/m.1.node.gz", &ele, &["a/m.1.ele", "a/m.1.ele.gz"]);
     }
 }

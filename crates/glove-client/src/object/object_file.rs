@@ -9,7 +9,7 @@ use softgrasp_core::mesh_io::{
 };
 use softgrasp_core::surface::TriangleSurface;
 
-use crate::object::mesh_file::{MeshFileReadError, companion_path, read_bytes, read_mesh_file};
+use crate::object::mesh_file::{MeshFileReadError, read_bytes, read_companion, read_mesh_file};
 
 /// What an object's file gave.
 #[derive(Debug)]
@@ -65,7 +65,7 @@ pub fn holds_surface(path: &Path) -> Result<bool, MeshFileReadError> {
 pub fn read_surface_file(path: &Path) -> Result<SurfaceFile, MeshFileReadError> {
     let bytes = read_bytes(path)?;
     let name = path.display().to_string();
-    let mut companion = |wanted: &_| std::fs::read(companion_path(path, wanted)).ok();
+    let mut companion = |wanted: &_| read_companion(path, wanted);
     Ok(parse_surface(&name, &bytes, &mut companion)?)
 }
 

@@ -47,7 +47,10 @@ pub enum FileAnswer {
 /// Formats that are written, by extension.
 pub const WRITTEN: [&str; 3] = ["msh", "vtu", "txt"];
 /// Extensions of what is read, for the system's own dialog.
-const READ: [&str; 9] = ["msh", "vtu", "vtk", "mesh", "txt", "node", "ele", "veg", "tet"];
+const READ: [&str; 16] = [
+    "msh", "vtu", "vtk", "mesh", "meshb", "txt", "node", "ele", "veg", "tet", "inp", "vol", "feb",
+    "xdmf", "xmf", "gz",
+];
 /// A system without a dialog of its own says so within this time; no person chooses so fast.
 const NO_PERSON: Duration = Duration::from_millis(400);
 
