@@ -1,5 +1,7 @@
 //! A position in a file from which words, lines and bytes are read; errors name the place.
 
+use nalgebra::Point3;
+
 use super::error::{Fault, MeshFileError, Place};
 use super::number::{parse_integer, parse_real};
 
@@ -95,6 +97,30 @@ impl<'a> Cursor<'a> {
     /// The next word, which must be a finite number.
     pub(super) fn real(&mut self, what: &str) -> Result<f64, MeshFileError> {
         self.value(what, parse_real)
+    }
+
+    /// The next three words, which must be the coordinates of a point.
+    pub(super) fn point(&mut self) -> Result<Point3<f64>, MeshFileError> {
+        let x = self.real("a coordinate")?;
+        let y = self.real("a coordinate")?;
+        let z = self.real("a coordinate")?;
+        Ok(Point3::new(x, y, z))
+    }
+
+    /// All words of the next so many bytes, each read by `next`.
+    pub(super) fn words<T>(
+        &self,
+        length: usize,
+        next: impl Fn(&mut Self) -> Result<T, MeshFileError>,
+    ) -> Result<Vec<T>, MeshFileError> {
+        let mut cursor = self.limited(length);
+        let mut values = Vec::new();
+        cursor.skip_space();
+        while !cursor.rest().is_empty() {
+            values.push(next(&mut cursor)?);
+            cursor.skip_space();
+        }
+        Ok(values)
     }
 
     fn value<T>(

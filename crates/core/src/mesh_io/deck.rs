@@ -3,17 +3,15 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cell_kind::{CellKind, Shape};
-use super::companion::{Companion, FindCompanion};
+use super::companion::FindCompanion;
 use super::cursor::{Cursor, quote};
 use super::deck_assembly::{Instance, assemble};
 use super::deck_keyword::{Keyword, deck_cell, fields};
 use super::deck_part::{DeckPart, Member};
-use super::error::{Fault, MeshFileError};
+use super::error::MeshFileError;
+use super::included::Included;
 use super::number::{parse_integer, parse_real};
 use super::raw_mesh::RawMesh;
-
-/// Included files, all together; a file that includes itself ends here.
-const MAX_INCLUDES: usize = 64;
 
 /// Keywords that make nodes or elements out of others, or move them.
 const GENERATORS: [&str; 9] =
@@ -54,8 +52,7 @@ struct Reader<'f, 'g> {
     scope: usize,
     section: Section,
     raw: RawMesh,
-    includes: usize,
-    find: &'f mut FindCompanion<'g>,
+    included: Included<'f, 'g>,
 }
 
 /// Reads a deck; what stands in steps, materials and the like is skipped and named.
@@ -77,8 +74,7 @@ pub(super) fn read(
         scope: 0,
         section: Section::Ignored,
         raw: RawMesh::default(),
-        includes: 0,
-        find,
+        included: Included::new(find),
     };
     let mut cursor = Cursor::new(name, bytes);
     reader.read_file(&mut cursor)?;
@@ -210,16 +206,8 @@ impl Reader<'_, '_> {
         let Some(file) = file else {
             return Err(cursor.expected_instead("INPUT=file", b"*INCLUDE"));
         };
-        self.includes += 1;
-        if self.includes > MAX_INCLUDES {
-            let expected = format!("at most {MAX_INCLUDES}");
-            return Err(cursor.count_fault("included files", &expected, "more"));
-        }
-        let companion = Companion::FileName(file.to_owned());
-        let Some(bytes) = (self.find)(&companion) else {
-            return Err(cursor.fault(Fault::MissingCompanion { companion }));
-        };
-        self.raw.findings.note(format!("includes {}", file.escape_debug()));
+        let findings = &mut self.raw.findings;
+        let bytes = self.included.bytes(file, "included files", cursor, findings)?;
         self.read_file(&mut Cursor::new(file, &bytes))
     }
 

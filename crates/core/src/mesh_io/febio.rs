@@ -5,15 +5,13 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 
 use super::cell_kind::{CellKind, Shape};
-use super::companion::{Companion, FindCompanion};
+use super::companion::FindCompanion;
 use super::cursor::{Cursor, quote, words};
-use super::error::{Fault, MeshFileError};
+use super::error::MeshFileError;
+use super::included::Included;
 use super::number::{parse_integer, parse_real};
 use super::raw_mesh::RawMesh;
 use super::xml::{Event, attribute, next_event};
-
-/// Files that sections are read from, all together; a file that names itself ends here.
-const MAX_FILES: usize = 64;
 
 /// The section whose children count.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,8 +47,7 @@ struct Reader<'f, 'g> {
     /// Material of a domain (version 3 and 4), name of a material by its number.
     domain_materials: BTreeMap<String, String>,
     material_names: BTreeMap<String, String>,
-    files: usize,
-    find: &'f mut FindCompanion<'g>,
+    included: Included<'f, 'g>,
 }
 
 /// Reads a FEBio model of version 1.2 to 4; parts are regions.
@@ -73,8 +70,7 @@ pub(super) fn read(
         regions: BTreeMap::new(),
         domain_materials: BTreeMap::new(),
         material_names: BTreeMap::new(),
-        files: 0,
-        find,
+        included: Included::new(find),
     };
     reader.read_file(&mut Cursor::new(name, bytes))?;
     reader.name_regions();
@@ -172,16 +168,8 @@ impl Reader<'_, '_> {
 
     /// A section may stand in a file of its own.
     fn read_from(&mut self, cursor: &Cursor, file: &str) -> Result<(), MeshFileError> {
-        self.files += 1;
-        if self.files > MAX_FILES {
-            let expected = format!("at most {MAX_FILES}");
-            return Err(cursor.count_fault("files of sections", &expected, "more"));
-        }
-        let companion = Companion::FileName(file.to_owned());
-        let Some(bytes) = (self.find)(&companion) else {
-            return Err(cursor.fault(Fault::MissingCompanion { companion }));
-        };
-        self.raw.findings.note(format!("includes {}", file.escape_debug()));
+        let findings = &mut self.raw.findings;
+        let bytes = self.included.bytes(file, "files of sections", cursor, findings)?;
         self.read_file(&mut Cursor::new(file, &bytes))
     }
 

@@ -1,7 +1,5 @@
 //! MEDIT text `.mesh`: keywords with counts, comments after `#`.
 
-use nalgebra::Point3;
-
 use super::cell_kind::{CellKind, Shape};
 use super::cursor::Cursor;
 use super::error::{Fault, MeshFileError};
@@ -45,12 +43,10 @@ fn read_vertices(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<(), MeshFileE
     cursor.check_count(count, 8, "Vertices")?;
     raw.points.reserve(count);
     for _ in 0..count {
-        let x = cursor.real("a coordinate")?;
-        let y = cursor.real("a coordinate")?;
-        let z = cursor.real("a coordinate")?;
+        let point = cursor.point()?;
         // References are whole, but some writers print them as real numbers.
         cursor.real("the reference of a vertex")?;
-        raw.points.push(Point3::new(x, y, z));
+        raw.points.push(point);
     }
     Ok(())
 }

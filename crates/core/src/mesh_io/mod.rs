@@ -16,6 +16,7 @@ mod format;
 mod gmsh;
 mod gmsh_header;
 mod gzip;
+mod included;
 mod medit;
 mod medit_binary;
 mod mending;

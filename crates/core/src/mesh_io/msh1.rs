@@ -1,7 +1,5 @@
 //! Gmsh MSH 1: `$NOD` with `id x y z`, `$ELM` with `id type physical elementary count nodes…`.
 
-use nalgebra::Point3;
-
 use super::cell_kind::{CellKind, Shape, gmsh_cell};
 use super::cursor::{Cursor, words};
 use super::error::MeshFileError;
@@ -26,10 +24,7 @@ pub(super) fn read_labelled_points(
     raw.node_labels.reserve(count);
     for _ in 0..count {
         raw.node_labels.push(cursor.integer("a node label")?);
-        let x = cursor.real("a coordinate")?;
-        let y = cursor.real("a coordinate")?;
-        let z = cursor.real("a coordinate")?;
-        raw.points.push(Point3::new(x, y, z));
+        raw.points.push(cursor.point()?);
     }
     Ok(())
 }

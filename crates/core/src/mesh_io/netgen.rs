@@ -1,7 +1,5 @@
 //! Netgen `.vol`: keywords with counts, domains with names, comments after `#`.
 
-use nalgebra::Point3;
-
 use super::cell_kind::{CellKind, Shape};
 use super::cursor::{Cursor, words};
 use super::error::{Fault, MeshFileError};
@@ -54,10 +52,7 @@ fn read_points(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<(), MeshFileErr
     cursor.check_count(count, 6, "points")?;
     raw.points.reserve(count);
     for _ in 0..count {
-        let x = cursor.real("a coordinate")?;
-        let y = cursor.real("a coordinate")?;
-        let z = cursor.real("a coordinate")?;
-        raw.points.push(Point3::new(x, y, z));
+        raw.points.push(cursor.point()?);
     }
     Ok(())
 }

@@ -2,8 +2,6 @@
 
 use std::io::Write;
 
-use nalgebra::Point3;
-
 use super::cell_kind::{CellKind, Shape};
 use super::cursor::Cursor;
 use super::error::MeshFileError;
@@ -116,10 +114,7 @@ fn read_vertices(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<(), MeshFileE
     cursor.check_count(count, 6, "vertices")?;
     raw.points.reserve(count);
     for _ in 0..count {
-        let x = cursor.real("a coordinate")?;
-        let y = cursor.real("a coordinate")?;
-        let z = cursor.real("a coordinate")?;
-        raw.points.push(Point3::new(x, y, z));
+        raw.points.push(cursor.point()?);
     }
     Ok(())
 }

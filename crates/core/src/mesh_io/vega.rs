@@ -5,14 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Point3;
 
 use super::cell_kind::{CellKind, Shape};
-use super::companion::{Companion, FindCompanion};
+use super::companion::FindCompanion;
 use super::cursor::{Cursor, words};
-use super::error::{Fault, MeshFileError};
+use super::error::MeshFileError;
+use super::included::Included;
 use super::number::{parse_integer, parse_real};
 use super::raw_mesh::RawMesh;
-
-/// Included files, all together; a file that includes itself ends here.
-const MAX_INCLUDES: usize = 64;
 
 /// What the lines after a `*` line are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,8 +39,7 @@ struct Reader<'f, 'g> {
     /// Announced numbers of vertices and elements.
     announced: [Option<usize>; 2],
     found: [usize; 2],
-    includes: usize,
-    find: &'f mut FindCompanion<'g>,
+    included: Included<'f, 'g>,
 }
 
 /// Reads a Vega mesh; materials are ignored, regions become labels.
@@ -65,8 +62,7 @@ pub(super) fn read(
         regions: Vec::new(),
         announced: [None; 2],
         found: [0; 2],
-        includes: 0,
-        find,
+        included: Included::new(find),
     };
     let mut cursor = Cursor::with_comments(name, bytes, b'#');
     reader.read_file(&mut cursor)?;
@@ -112,17 +108,9 @@ impl Reader<'_, '_> {
 
     /// An included file goes on where the line stands, and its sections with it.
     fn include(&mut self, cursor: &Cursor, file_name: &[u8]) -> Result<(), MeshFileError> {
-        self.includes += 1;
-        if self.includes > MAX_INCLUDES {
-            let (expected, found) = (format!("at most {MAX_INCLUDES}"), "more".to_owned());
-            return Err(cursor.count_fault("included files", &expected, &found));
-        }
-        let file_name = String::from_utf8_lossy(file_name).into_owned();
-        let companion = Companion::FileName(file_name.clone());
-        let Some(bytes) = (self.find)(&companion) else {
-            return Err(cursor.fault(Fault::MissingCompanion { companion }));
-        };
-        self.raw.findings.note(format!("includes {}", file_name.escape_debug()));
+        let file_name = String::from_utf8_lossy(file_name);
+        let findings = &mut self.raw.findings;
+        let bytes = self.included.bytes(&file_name, "included files", cursor, findings)?;
         self.read_file(&mut Cursor::with_comments(&file_name, &bytes, b'#'))
     }
 

@@ -79,7 +79,8 @@ impl<'a> DataArray<'a> {
                 let scalar =
                     Scalar::from_xml(attribute(self.attributes, "type").unwrap_or_default());
                 let scalar = scalar.unwrap_or(Scalar::F64);
-                self.words(|cursor| Ok(scalar.of_text(cursor.real("a number")?)))
+                self.cursor
+                    .words(self.text.len(), |cursor| Ok(scalar.of_text(cursor.real("a number")?)))
             }
         }
     }
@@ -93,23 +94,8 @@ impl<'a> DataArray<'a> {
     ) -> Result<Vec<i64>, MeshFileError> {
         match self.bytes(rules, appended, budget)? {
             Some((scalar, bytes)) => Ok(scalar.integers(&bytes, rules.order)),
-            None => self.words(|cursor| cursor.integer("an integer")),
+            None => self.cursor.words(self.text.len(), |cursor| cursor.integer("an integer")),
         }
-    }
-
-    /// The words of a text array; errors name the line in the file.
-    fn words<T>(
-        &self,
-        next: impl Fn(&mut Cursor) -> Result<T, MeshFileError>,
-    ) -> Result<Vec<T>, MeshFileError> {
-        let mut cursor = self.cursor.limited(self.text.len());
-        let mut values = Vec::new();
-        cursor.skip_space();
-        while !cursor.rest().is_empty() {
-            values.push(next(&mut cursor)?);
-            cursor.skip_space();
-        }
-        Ok(values)
     }
 
     /// Number type and bytes of a binary array; `None` for a text array.

@@ -37,7 +37,9 @@ impl<'f, 'g> ItemReader<'f, 'g> {
         let scalar = item.scalar()?;
         let values = match self.bytes(item, scalar)? {
             Some((bytes, order)) => scalar.reals(&bytes, order),
-            None => item.words(|cursor| Ok(scalar.of_text(cursor.real("a number")?)))?,
+            None => item
+                .cursor
+                .words(item.text.len(), |cursor| Ok(scalar.of_text(cursor.real("a number")?)))?,
         };
         item.check_length(values.len())?;
         Ok(values)
@@ -48,7 +50,7 @@ impl<'f, 'g> ItemReader<'f, 'g> {
         let scalar = item.scalar()?;
         let values = match self.bytes(item, scalar)? {
             Some((bytes, order)) => scalar.integers(&bytes, order),
-            None => item.words(|cursor| cursor.integer("an integer"))?,
+            None => item.cursor.words(item.text.len(), |cursor| cursor.integer("an integer"))?,
         };
         item.check_length(values.len())?;
         Ok(values)
@@ -154,20 +156,5 @@ impl DataItem<'_> {
             }
             _ => Ok(()),
         }
-    }
-
-    /// The words of the text; errors name the line in the file.
-    fn words<T>(
-        &self,
-        next: impl Fn(&mut Cursor) -> Result<T, MeshFileError>,
-    ) -> Result<Vec<T>, MeshFileError> {
-        let mut cursor = self.cursor.limited(self.text.len());
-        let mut values = Vec::new();
-        cursor.skip_space();
-        while !cursor.rest().is_empty() {
-            values.push(next(&mut cursor)?);
-            cursor.skip_space();
-        }
-        Ok(values)
     }
 }
