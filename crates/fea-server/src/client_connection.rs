@@ -1,14 +1,17 @@
 //! A client's connection: frames may come with any pause between them, but not with a long one inside.
 
+use std::collections::VecDeque;
 use std::io;
 use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
 use softgrasp_protocol::asynchronous::Connection;
-use softgrasp_protocol::{ConnectionError, Frame, HEADER_LEN, Header, Limits};
+use softgrasp_protocol::{
+    Ask, ConnectionError, Frame, HEADER_LEN, Header, Kind, Limits, ModelHash, Request,
+};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::time::{Instant, sleep, timeout, timeout_at};
+use tokio::time::{Instant, sleep, sleep_until, timeout, timeout_at};
 
 use crate::budget::Reservation;
 use crate::config::ServerConfig;
@@ -25,6 +28,22 @@ pub(crate) struct ClientConnection<S> {
     stranger_until: Option<Instant>,
     /// Whether it is known only after it has shown a token.
     wants_token: bool,
+    /// Requests that came while another one was worked on, oldest first.
+    ahead: VecDeque<Ahead>,
+    /// Bytes of what came while the present request is worked on.
+    ahead_bytes: usize,
+    /// Since when the next request is waited for.
+    waiting_since: Option<Instant>,
+    /// How long the server may be silent towards this client.
+    alive_every: Option<Duration>,
+    last_sent: Instant,
+}
+
+/// A request that waits for its turn.
+struct Ahead {
+    frame: Frame,
+    received: Reservation,
+    is_cancelled: bool,
 }
 
 /// What comes from a client.
@@ -34,10 +53,25 @@ pub(crate) enum Incoming {
     Request { frame: Frame, received: Reservation },
     /// A request for which there is no memory; the rest of its bytes is passed over as they come.
     NoRoom { header: Header, why: NoRoom },
+    /// A request that its client has cancelled before its turn came.
+    Cancelled { header: Header },
+    /// The server has said nothing for as long as the client wants to wait.
+    Silent,
     /// A frame longer than it may be has begun; it is read on when it may.
     Longer,
     /// The client has closed between two frames.
     End,
+}
+
+/// What a client does while its request is worked on.
+#[derive(Debug)]
+pub(crate) enum Watched {
+    /// It does not want the answer any more.
+    Cancelled,
+    /// The server has said nothing for as long as the client wants to wait.
+    Silent,
+    /// It has gone.
+    Gone(SessionError),
 }
 
 /// How long a client is waited for.
@@ -105,7 +139,27 @@ impl<S> ClientConnection<S> {
         let stream = TimedStream { stream, first_read: None, last_read: now, since_rest: 0 };
         let stranger_until = Some(now + patience.greeting);
         let connection = Connection::new(stream, limits);
-        Self { connection, room, patience, stranger_until, wants_token }
+        Self {
+            connection,
+            room,
+            patience,
+            stranger_until,
+            wants_token,
+            ahead: VecDeque::new(),
+            ahead_bytes: 0,
+            waiting_since: None,
+            alive_every: None,
+            last_sent: now,
+        }
+    }
+
+    /// How long the server may be silent towards this client; `None`: for ever.
+    pub fn set_alive(&mut self, every: Option<Duration>) {
+        self.alive_every = every;
+    }
+
+    fn alive_at(&self) -> Option<Instant> {
+        self.alive_every.map(|every| self.last_sent + every)
     }
 
     /// The client has introduced itself: it may rest as long as it likes, and send what `limits` allow.
@@ -119,7 +173,38 @@ impl<S> ClientConnection<S> {
 impl<S> ClientConnection<S> {
     /// Whether bytes of the next request are there already.
     pub fn is_inside_frame(&self) -> bool {
-        self.connection.is_inside_frame()
+        !self.ahead.is_empty() || self.connection.is_inside_frame()
+    }
+
+    /// Takes the whole requests that have come; whether they cancel the one that is worked on.
+    fn collect(&mut self, current: Option<u64>) -> bool {
+        let mut is_cancelled = false;
+        while self.ahead_bytes < READ_AHEAD_MAX {
+            // What is wrong with the stream is told when its turn comes.
+            let Ok(Some(frame)) = self.connection.frame_received() else { break };
+            let received = self.room.hand_over();
+            self.ahead_bytes += frame.header.frame_len();
+            match cancelled_id(&frame) {
+                None => self.ahead.push_back(Ahead { frame, received, is_cancelled: false }),
+                id if id == current => is_cancelled = true,
+                Some(id) => {
+                    let waiting = self.ahead.iter_mut().filter(|one| one.frame.request_id() == id);
+                    waiting.for_each(|one| one.is_cancelled = true);
+                }
+            }
+        }
+        is_cancelled
+    }
+}
+
+/// The request that a frame cancels.
+fn cancelled_id(frame: &Frame) -> Option<u64> {
+    if frame.kind() != Some(Kind::Cancel) {
+        return None;
+    }
+    match Request::decode(frame, &Limits::default()) {
+        Ok(Request::Cancel { request_id }) => Some(request_id),
+        _ => None,
     }
 }
 
@@ -142,9 +227,36 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
     /// # Errors
     /// As [`Self::next_frame`].
     pub async fn next_frame_up_to(&mut self, len_max: usize) -> Result<Incoming, SessionError> {
-        let start = Instant::now();
-        self.connection.stream_mut().first_read =
-            self.connection.is_inside_frame().then_some(start);
+        if let Some(Ahead { frame, received, is_cancelled }) = self.ahead.pop_front() {
+            self.ahead_bytes = self.ahead.iter().map(|one| one.frame.header.frame_len()).sum();
+            return Ok(match is_cancelled {
+                true => Incoming::Cancelled { header: frame.header },
+                false => Incoming::Request { frame, received },
+            });
+        }
+        self.ahead_bytes = 0;
+        let start = match self.waiting_since {
+            Some(start) => start,
+            None => {
+                let start = Instant::now();
+                let is_inside = self.connection.is_inside_frame();
+                self.connection.stream_mut().first_read = is_inside.then_some(start);
+                self.waiting_since = Some(start);
+                start
+            }
+        };
+        let next = self.frame_since(start, len_max).await;
+        if !matches!(next, Ok(Incoming::Silent)) {
+            self.waiting_since = None;
+        }
+        next
+    }
+
+    async fn frame_since(
+        &mut self,
+        start: Instant,
+        len_max: usize,
+    ) -> Result<Incoming, SessionError> {
         loop {
             if let Some(frame) = self.connection.frame_received().map_err(ConnectionError::from)? {
                 return Ok(Incoming::Request { frame, received: self.room.hand_over() });
@@ -158,12 +270,18 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
                 return Ok(Incoming::NoRoom { header, why });
             }
             let (until, too_slow) = self.deadline(start);
-            if until <= Instant::now() {
+            let now = Instant::now();
+            if until <= now {
                 return match too_slow {
                     Some(error) => Err(error),
                     None => continue,
                 };
             }
+            let alive_at = self.alive_at();
+            if alive_at.is_some_and(|at| at <= now) {
+                return Ok(Incoming::Silent);
+            }
+            let until = alive_at.map_or(until, |at| at.min(until));
             // Bytes may come meanwhile: then the time begins anew from the last of them.
             match timeout_at(until, self.connection.read_ahead()).await {
                 Ok(Ok(true)) | Err(_) => {}
@@ -192,23 +310,50 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         made.map_err(|why| (header, why))
     }
 
-    /// Ends when the client has gone, while its request is worked on: its connection is broken, or it has
-    /// sent nothing more for so long after it has closed its side. Takes a little of what it sends
-    /// meanwhile.
+    /// Ends when the client has cancelled the request that is worked on, or has gone: its connection is
+    /// broken, or it has sent nothing more for so long after it has closed its side. Takes a little of
+    /// what it sends meanwhile.
     ///
     /// May be dropped at any await: bytes that have come stay.
-    pub async fn gone(&mut self) -> SessionError {
-        while self.connection.received() < READ_AHEAD_MAX {
-            match self.connection.read_ahead().await {
-                Ok(true) => {}
-                Ok(false) => {
-                    sleep(HALF_CLOSED_MAX).await;
-                    return SessionError::Gone;
+    pub async fn watch(&mut self, request_id: u64) -> Watched {
+        loop {
+            if self.collect(Some(request_id)) {
+                return Watched::Cancelled;
+            }
+            let alive_at = self.alive_at();
+            let silent = async {
+                match alive_at {
+                    Some(at) => sleep_until(at).await,
+                    None => std::future::pending().await,
                 }
-                Err(_) => return SessionError::Gone,
+            };
+            let may_read = self.connection.received() + self.ahead_bytes < READ_AHEAD_MAX;
+            tokio::select! {
+                read = self.connection.read_ahead(), if may_read => match read {
+                    Ok(true) => {}
+                    Ok(false) => {
+                        sleep(HALF_CLOSED_MAX).await;
+                        return Watched::Gone(SessionError::Gone);
+                    }
+                    Err(_) => return Watched::Gone(SessionError::Gone),
+                },
+                () = silent => return Watched::Silent,
             }
         }
-        std::future::pending().await
+    }
+
+    /// Whether a request has come that makes one about this model needless.
+    pub async fn has_newer(&mut self, model: ModelHash) -> bool {
+        if self.connection.received() < READ_AHEAD_MAX {
+            // What lies in the socket, without waiting for more.
+            tokio::select! {
+                biased;
+                _ = self.connection.read_ahead() => {}
+                () = std::future::ready(()) => {}
+            }
+        }
+        self.collect(None);
+        self.ahead.iter().any(|one| !one.is_cancelled && Ask::supersedes(&one.frame) == Some(model))
     }
 
     /// When to look at the client again, and what it is if it has not gone on by then; `None` for one
@@ -247,6 +392,7 @@ impl<S: AsyncWrite + Unpin> ClientConnection<S> {
     pub async fn write_bytes(&mut self, bytes: &[u8]) -> Result<(), SessionError> {
         let for_size = Duration::from_secs(bytes.len() as u64 / REPLY_BYTES_PER_S);
         let limit = self.patience.reply + for_size;
+        self.last_sent = Instant::now();
         match timeout(limit, self.connection.write_bytes(bytes)).await {
             Ok(written) => Ok(written?),
             Err(_) => Err(SessionError::NotTaken(limit)),

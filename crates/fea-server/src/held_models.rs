@@ -34,12 +34,12 @@ impl HeldModels {
         }
     }
 
-    /// Releases a model; it is forgotten unless another session holds it.
+    /// Releases a model that this session holds; it is forgotten unless another session holds it.
     pub fn drop_model(&mut self, model: ModelHash) {
         if self.held.remove(&model) {
             self.resources.models.release(model);
+            self.resources.models.forget(model);
         }
-        self.resources.models.forget(model);
     }
 }
 

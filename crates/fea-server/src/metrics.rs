@@ -22,6 +22,8 @@ pub(crate) struct Metrics {
     bytes_sent: AtomicU64,
     /// By kind, in the order of [`Kind::ALL`].
     requests: [Durations; Kind::ALL.len()],
+    /// Requests about kept models, which are not among those of [`Kind::Ask`].
+    frames: Durations,
     /// By code, in the order of [`RejectCode::ALL`].
     refused: [AtomicU64; RejectCode::ALL.len()],
 }
@@ -100,10 +102,16 @@ impl Metrics {
         self.bytes_sent.fetch_add(bytes as u64, Relaxed);
     }
 
-    /// A request has been answered, or refused for a reason.
-    pub fn answered(&self, kind: Option<Kind>, took: Duration, refused: Option<RejectCode>) {
+    /// A request has been answered, or refused for a reason; `is_frame` if it is about a kept model.
+    pub fn answered(
+        &self,
+        (kind, is_frame): (Option<Kind>, bool),
+        took: Duration,
+        refused: Option<RejectCode>,
+    ) {
         let place = kind.and_then(|kind| Kind::ALL.iter().position(|known| *known == kind));
-        if let Some(durations) = place.and_then(|place| self.requests.get(place)) {
+        let of_kind = place.and_then(|place| self.requests.get(place));
+        if let Some(durations) = if is_frame { Some(&self.frames) } else { of_kind } {
             durations.add(took);
         }
         let code = refused.and_then(|code| RejectCode::ALL.iter().position(|c| *c == code));
@@ -155,6 +163,7 @@ impl Metrics {
                 durations.write(page, name, &kind.to_string());
             }
         }
+        self.frames.write(page, name, "Frame");
     }
 }
 
@@ -299,16 +308,17 @@ mod tests {
     #[test]
     fn requests_are_counted_by_kind_in_ranges_that_add_up() {
         let metrics = Metrics::default();
-        metrics.answered(Some(Kind::Frame), Duration::from_micros(100), None);
-        metrics.answered(Some(Kind::Frame), Duration::from_micros(101), None);
-        metrics.answered(Some(Kind::Frame), Duration::from_secs(60), Some(RejectCode::Busy));
-        metrics.answered(None, Duration::ZERO, Some(RejectCode::BadRequest));
+        metrics.answered((Some(Kind::Ask), true), Duration::from_micros(100), None);
+        metrics.answered((Some(Kind::Ask), true), Duration::from_micros(101), None);
+        metrics.answered((Some(Kind::Ask), true), Duration::from_secs(60), Some(RejectCode::Busy));
+        metrics.answered((None, false), Duration::ZERO, Some(RejectCode::BadRequest));
         let text = metrics.text(&GAUGES);
         let of = |le| {
             value(&text, &format!("softgrasp_request_seconds_bucket{{kind=\"Frame\",le=\"{le}\"}}"))
         };
         assert_eq!((of("0.0001"), of("0.00025"), of("10"), of("+Inf")), (1.0, 2.0, 2.0, 3.0));
         assert_eq!(value(&text, "softgrasp_request_seconds_count{kind=\"Frame\"}"), 3.0);
+        assert_eq!(value(&text, "softgrasp_request_seconds_count{kind=\"Ask\"}"), 0.0);
         assert_eq!(value(&text, "softgrasp_request_seconds_count{kind=\"Ping\"}"), 0.0);
         let sum = value(&text, "softgrasp_request_seconds_sum{kind=\"Frame\"}");
         assert!((sum - 60.000201).abs() < 1e-9);

@@ -7,7 +7,7 @@ use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::equilibrium::NoEquilibrium;
 use softgrasp_core::solve::{Method, SolveError, UnknownMethod};
-use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected};
+use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected, VERSION};
 
 use crate::no_room::NoRoom;
 use crate::plan::PlanError;
@@ -40,6 +40,22 @@ pub(crate) enum Refusal {
          for fewer at a time"
     )]
     TooManyCases { cases: usize, bytes: u64, free: u64 },
+    #[error(
+        "several cases are answered by linear elasticity; ask for one case at a time at large \
+         deformation"
+    )]
+    SeveralLarge,
+    #[error("a question about large deformation asks for linear elasticity: leave `large` out")]
+    LargeLinear,
+    #[error("the request was cancelled by its client")]
+    Cancelled,
+    #[error("a newer request for the same model came before this one was begun")]
+    Superseded,
+    #[error(
+        "the client speaks versions {lowest} to {highest} of the wire, this server speaks \
+         {VERSION}; bring the older one up to date"
+    )]
+    NoCommonVersion { lowest: u16, highest: u16 },
     #[error("no material was given")]
     NoMaterial,
     #[error(
@@ -108,6 +124,9 @@ pub(crate) enum Refusal {
     Internal,
 }
 
+/// When to ask again where memory was missing at the moment.
+const NO_ROOM_MS: u32 = 1000;
+
 impl From<DecodeError> for Refusal {
     fn from(error: DecodeError) -> Self {
         match error {
@@ -146,6 +165,9 @@ impl Refusal {
             Self::Token | Self::Barred { .. } => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,
             Self::Limit(_) => RejectCode::TooLarge,
+            Self::Cancelled => RejectCode::Cancelled,
+            Self::Superseded => RejectCode::Superseded,
+            Self::NoCommonVersion { .. } => RejectCode::UnsupportedVersion,
             _ => RejectCode::BadRequest,
         }
     }
@@ -156,7 +178,12 @@ impl Refusal {
             Self::Plan(PlanError::Memory(shortage)) => shortage.detail(),
             _ => String::new(),
         };
-        Rejected { code: self.code(), text: self.to_string(), detail }
+        let retry_after_ms = match self {
+            Self::Barred { seconds } => u32::try_from(1000 * seconds).unwrap_or(u32::MAX),
+            Self::NoRoom(NoRoom::Now { .. }) => NO_ROOM_MS,
+            _ => 0,
+        };
+        Rejected { code: self.code(), text: self.to_string(), detail, retry_after_ms }
     }
 }
 

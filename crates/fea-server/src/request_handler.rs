@@ -2,17 +2,17 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
-    Answer, ContactAnswer, ContactFrame, Frame, FrameRequest, Hello, LargeAnswer, LargeFrame,
-    Limits, ModelHash, ModelReady, Reply, Request, UploadModel, Welcome,
+    Answer, Ask, Body, ContactAnswer, ContactFrame, Frame, Hello, LargeAsk, Limits, ModelHash,
+    ModelReady, Question, Reply, ReportLevel, Request, Subject, UploadModel, VERSIONS, Welcome,
 };
 use tokio::task::JoinHandle;
 
 use crate::answer::{
-    PosedContact, PosedFrame, Readiness, answer_large_frame, is_finite, prefetch, prove, readiness,
-    solve_large, solve_once, solve_several, upload,
+    PosedContact, PosedFrame, Readiness, answer_cases, answer_large_frame, is_finite, prefetch,
+    prove, readiness, solve_large, solve_once, solve_several, upload,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;
@@ -46,7 +46,15 @@ pub(crate) struct RequestHandler {
     making: Option<JoinHandle<()>>,
     /// Counts this session from its first frame on.
     grasping: Option<Grasping>,
+    /// How often the client wants to hear that the server is there.
+    alive_every: Option<Duration>,
 }
+
+/// What this server can do, for `Welcome`.
+const CAPABILITIES: [&str; 6] =
+    ["large", "cases", "contact", "cancel", "newest-wins", "report-levels"];
+/// `Alive` is not sent more often.
+const ALIVE_MIN: Duration = Duration::from_millis(100);
 
 /// Predicted cost above which a frame at large deformation is not one among the frames: others would
 /// wait for it.
@@ -69,6 +77,7 @@ impl RequestHandler {
             paths: Paths::default(),
             making: None,
             grasping: None,
+            alive_every: None,
             server,
         }
     }
@@ -76,6 +85,11 @@ impl RequestHandler {
     /// What is read from a client that is known.
     pub fn limits(&self) -> Limits {
         self.limits
+    }
+
+    /// How long the server may be silent, where the client wants to hear that it is there.
+    pub fn alive_every(&self) -> Option<Duration> {
+        self.alive_every
     }
 
     /// Whether the client has shown the token, or none is wanted.
@@ -111,6 +125,10 @@ impl RequestHandler {
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
         let turn = self.turn(request_ms(&request, &resources.rates.known()));
+        let level = match &request {
+            Request::Ask(ask) => ask.report,
+            _ => ReportLevel::Full,
+        };
         let reply = match request {
             Request::Hello(hello) => self.welcome(&hello)?,
             Request::Ping { nonce } => Reply::Pong { nonce },
@@ -124,33 +142,82 @@ impl RequestHandler {
                 workers.in_background(move || prefetch(&resources, &hint));
                 return Ok(None);
             }
-            Request::SolveOnce(once) => {
-                let work = move || solve_once(&resources, *once, received, clock());
-                Reply::Answer(Box::new(workers.run(turn, work).await??))
-            }
-            Request::SolveLarge(once) => {
-                let work = move || solve_large(&resources, *once, received, clock());
-                Reply::LargeAnswer(Box::new(workers.run(turn, work).await??))
-            }
-            Request::SolveSeveral(several) => {
-                let work = move || solve_several(&resources, *several, received, clock());
-                Reply::SeveralAnswers(Box::new(workers.run(turn, work).await??))
+            // What is under way is cancelled by the session; anything else has been answered.
+            Request::Cancel { .. } => return Ok(None),
+            Request::Ask(ask) => {
+                Reply::Answer(Box::new(self.ask(*ask, turn, received, clock).await?))
             }
             Request::UploadModel(model) => {
                 Reply::ModelReady(self.upload(turn, model, received, clock).await?)
-            }
-            Request::Frame(request) => Reply::Answer(Box::new(self.frame(request, clock).await?)),
-            Request::LargeFrame(request) => {
-                Reply::LargeAnswer(Box::new(self.large_frame(*request, clock).await?))
             }
             Request::ContactFrame(frame) => {
                 Reply::ContactAnswer(Box::new(self.contact_frame(*frame, clock).await?))
             }
         };
-        match is_finite(&reply) {
-            true => Ok(Some(reply)),
-            false => Err(Refusal::NotFinite),
+        if !is_finite(&reply) {
+            return Err(Refusal::NotFinite);
         }
+        Ok(Some(match reply {
+            Reply::Answer(answer) if level != ReportLevel::Full => {
+                let report = answer.report.clone().at_level(level);
+                Reply::Answer(Box::new(Answer { report, ..*answer }))
+            }
+            reply => reply,
+        }))
+    }
+
+    /// Answers a question about a mesh that came along or a kept model, linear or large.
+    async fn ask(
+        &mut self,
+        ask: Ask,
+        turn: Turn,
+        received: Reservation,
+        clock: impl FnOnce() -> StageClock + Send + 'static,
+    ) -> Result<Answer, Refusal> {
+        let Ask { subject, question, large, cases, without_estimate, .. } = ask;
+        if large.is_some() && !cases.is_empty() {
+            return Err(Refusal::SeveralLarge);
+        }
+        match (subject, large) {
+            (Subject::Mesh(body), large) => {
+                let how = (large, cases, !without_estimate);
+                self.once((*body, question), how, (turn, received), clock).await
+            }
+            (Subject::Model(model), Some(large)) => {
+                self.large_frame((model, large, question), clock).await
+            }
+            (Subject::Model(model), None) if cases.is_empty() => {
+                self.frame(model, question, clock).await
+            }
+            (Subject::Model(model), None) => {
+                self.held.hold(model);
+                let resources = Arc::clone(&self.server.resources);
+                let workers = &self.server.resources.workers;
+                let work = move || answer_cases(&resources, model, (question, cases), &clock());
+                workers.run(turn, work).await?
+            }
+        }
+    }
+
+    /// Answers a question about a mesh that came along.
+    async fn once(
+        &self,
+        asked: (Body, Question),
+        (large, cases, estimate): (Option<LargeAsk>, Vec<Vec<f64>>, bool),
+        (turn, received): (Turn, Reservation),
+        clock: impl FnOnce() -> StageClock + Send + 'static,
+    ) -> Result<Answer, Refusal> {
+        let resources = Arc::clone(&self.server.resources);
+        let workers = &self.server.resources.workers;
+        let work = move || match large {
+            Some(large) => solve_large(&resources, asked, large, received, clock()),
+            None if cases.is_empty() && estimate => {
+                let (body, question) = asked;
+                solve_once(&resources, body, question, received, clock())
+            }
+            None => solve_several(&resources, asked, (cases, estimate), received, clock()),
+        };
+        workers.run(turn, work).await?
     }
 
     /// The turn of work that is predicted to cost so much.
@@ -207,24 +274,25 @@ impl RequestHandler {
     /// sessions share the server; else among the frames, unless something has to be made first.
     async fn frame(
         &mut self,
-        request: FrameRequest,
+        model: ModelHash,
+        question: Question,
         clock: impl FnOnce() -> StageClock + Send + 'static,
     ) -> Result<Answer, Refusal> {
-        self.held.hold(request.model);
+        self.held.hold(model);
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
         self.grasping.get_or_insert_with(|| self.server.grasping());
-        let request = match self.server.has_few_frames() {
-            true => match readiness(&resources, request) {
+        let question = match self.server.has_few_frames() {
+            true => match readiness(&resources, model, question) {
                 Readiness::Ready(kept) => {
                     return Workers::run_here(|| kept.answer(&resources, clock()))?;
                 }
-                Readiness::NotReady(request) => *request,
+                Readiness::NotReady(question) => *question,
             },
-            false => request,
+            false => question,
         };
         let shared = Arc::clone(&resources);
-        let among_frames = move || match PosedFrame::new(&shared, request) {
+        let among_frames = move || match PosedFrame::new(&shared, model, question) {
             Err(refusal) => Ok(Err(refusal)),
             Ok(frame) if frame.is_prepared() => Ok(frame.answer(&shared, clock())),
             Ok(frame) => Err((Box::new(frame), clock)),
@@ -240,20 +308,21 @@ impl RequestHandler {
 
     async fn large_frame(
         &mut self,
-        request: LargeFrame,
+        (model, large, question): (ModelHash, LargeAsk, Question),
         clock: impl FnOnce() -> StageClock + Send + 'static,
-    ) -> Result<LargeAnswer, Refusal> {
-        self.held.hold(request.model);
-        let seat = self.paths.seat(request.model);
+    ) -> Result<Answer, Refusal> {
+        self.held.hold(model);
+        let seat = self.paths.seat(model);
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
         let goes_on = seat.with(|kept| kept.is_some());
-        let stored = resources.models.find(request.model);
+        let stored = resources.models.find(model);
         let cost_ms = stored
             .map_or(0.0, |stored| large_frame_ms(&stored.model, goes_on, &resources.rates.known()));
         // One path at a time is made beside the frames of a session.
         let may_make = self.making.as_ref().is_none_or(JoinHandle::is_finished);
-        let work = move || answer_large_frame(&resources, &seat, request, clock(), may_make);
+        let asked = (model, large, question);
+        let work = move || answer_large_frame(&resources, &seat, asked, clock(), may_make);
         let answered = match goes_on && cost_ms <= FRAME_MS_MAX {
             true => workers.run_frame(work).await??,
             false => workers.run(self.turn(cost_ms), work).await??,
@@ -305,12 +374,24 @@ impl RequestHandler {
 
     fn welcome(&mut self, hello: &Hello) -> Result<Reply, Refusal> {
         self.check_token(hello)?;
+        let wire = VERSIONS.common(hello.versions).ok_or(Refusal::NoCommonVersion {
+            lowest: hello.versions.lowest,
+            highest: hello.versions.highest,
+        })?;
         self.log_introduction(&hello.client);
+        self.alive_every = match hello.alive_every_ms {
+            0 => None,
+            ms => Some(Duration::from_millis(u64::from(ms)).max(ALIVE_MIN)),
+        };
+        let idle = self.server.resources.config.idle_limit;
         Ok(Reply::Welcome(Welcome {
             server: "fea-server".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             threads: self.server.resources.workers.threads() as u32,
             limits: self.limits,
+            wire,
+            capabilities: CAPABILITIES.map(str::to_owned).to_vec(),
+            idle_ms: idle.map_or(0, |limit| limit.as_millis() as u64),
         }))
     }
 

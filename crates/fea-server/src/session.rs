@@ -2,17 +2,18 @@
 
 use std::io::ErrorKind;
 use std::net::SocketAddr;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_protocol::{
-    ConnectionError, Frame, FrameError, HEADER_LEN, Header, Kind, Limits, RejectCode, Rejected,
-    Reply,
+    Ask, ConnectionError, Frame, FrameError, HEADER_LEN, Header, Kind, Limits, RejectCode,
+    Rejected, Reply,
 };
 use tokio::io::{AsyncRead, AsyncWrite};
 
 use crate::budget::Reservation;
-use crate::client_connection::{ClientConnection, Incoming, Patience, SessionError};
+use crate::client_connection::{ClientConnection, Incoming, Patience, SessionError, Watched};
 use crate::config::STRANGER_PAYLOAD_MAX;
 use crate::log_line::foreign_sentence;
 use crate::manners::Manners;
@@ -78,6 +79,9 @@ struct Session<S> {
 /// disk.
 const REFUSALS_LOGGED: usize = 20;
 
+/// When to come again to a server that is full or stopping.
+const AGAIN_AFTER_MS: u32 = 1000;
+
 /// Memory for replies that a session keeps while it rests, bytes.
 const OUT_KEPT: usize = 1 << 20;
 
@@ -102,6 +106,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
                     self.refuse(&Refusal::NoRoom(why), &header).await?;
                     self.give_way().await;
                 }
+                Ok(Incoming::Cancelled { header }) => {
+                    self.refuse(&Refusal::Cancelled, &header).await?;
+                }
+                Ok(Incoming::Silent) => say_alive(&mut self.connection).await?,
                 // It takes its time to come, which a stranger has not.
                 Ok(Incoming::Longer) => self.introduced().await?,
                 Ok(Incoming::End) => return Ok(()),
@@ -179,7 +187,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     /// Last words to a client whose bytes make no sense; whether they arrive is of no matter.
     async fn answer_bad_stream(&mut self, error: &FrameError) {
         let code = match error {
-            FrameError::Version { .. } => RejectCode::UnsupportedVersion,
+            FrameError::Version { found } => {
+                let rejected = Rejected::new(RejectCode::UnsupportedVersion, error.to_string());
+                let bytes = rejected.encode_for_version(*found);
+                let _ = self.connection.write_bytes(&bytes).await;
+                return;
+            }
             FrameError::PayloadTooLong { .. } => RejectCode::TooLarge,
             _ => RejectCode::BadRequest,
         };
@@ -192,8 +205,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         code: RejectCode,
         text: String,
     ) -> Result<(), SessionError> {
-        self.write(request_id, &Reply::Rejected(Rejected { code, text, detail: String::new() }))
-            .await
+        let retry_after_ms = match code {
+            RejectCode::Busy | RejectCode::ShuttingDown => AGAIN_AFTER_MS,
+            _ => 0,
+        };
+        let rejected = Rejected { retry_after_ms, ..Rejected::new(code, text) };
+        self.write(request_id, &Reply::Rejected(rejected)).await
     }
 
     async fn write(&mut self, request_id: u64, reply: &Reply) -> Result<(), SessionError> {
@@ -251,6 +268,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     /// client that goes is not worked for any longer.
     async fn handle(&mut self, frame: Frame, received: Reservation) -> Result<(), SessionError> {
         let (header, kind) = (frame.header, frame.kind());
+        let is_frame = Ask::is_about_model(&frame);
         let is_request = kind.is_some_and(|kind| !kind.is_reply());
         let start = Instant::now();
         // Without a token any request introduces a client, before it is worked for.
@@ -259,19 +277,18 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         }
         let metrics = &self.server.resources.metrics;
         metrics.received(HEADER_LEN + frame.payload.len());
-        let replied = tokio::select! {
-            biased;
-            replied = self.handler.reply_to(frame, received) => replied,
-            gone = self.connection.gone() => {
-                metrics.abandoned();
-                return Err(gone);
-            }
+        let replied = match Ask::supersedes(&frame) {
+            Some(model) if self.connection.has_newer(model).await => Err(Refusal::Superseded),
+            _ => work(&mut self.handler, &mut self.connection, frame, received)
+                .await
+                .inspect_err(|_| metrics.abandoned())?,
         };
         let refused = replied.as_ref().err().map(Refusal::code);
-        metrics.answered(kind, start.elapsed(), refused);
+        metrics.answered((kind, is_frame), start.elapsed(), refused);
         if self.handler.is_authorised() && is_request {
             self.introduced().await?;
             self.connection.make_known(self.handler.limits());
+            self.connection.set_alive(self.handler.alive_every());
         }
         if let Some(bearer) = self.handler.bearer() {
             bearer.count(refused.is_some());
@@ -285,13 +302,57 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
 
     /// Tells a client why its request is refused; hints have no reply.
     async fn refuse(&mut self, refusal: &Refusal, header: &Header) -> Result<(), SessionError> {
-        self.log(refusal);
+        // What the client has wanted itself is no news.
+        if !matches!(refusal, Refusal::Cancelled | Refusal::Superseded) {
+            self.log(refusal);
+        }
         match Kind::from_number(header.kind) {
-            Some(Kind::Prefetch | Kind::Drop) => Ok(()),
+            Some(Kind::Prefetch | Kind::Drop | Kind::Cancel) => Ok(()),
             _ => {
                 let reply = Reply::Rejected(refusal.to_message());
                 self.write(header.request_id, &reply).await
             }
+        }
+    }
+}
+
+/// The reply to a request, while the client is watched: it may cancel, and a client that goes is not
+/// worked for any longer.
+///
+/// # Errors
+/// [`SessionError`]: the client has gone, or takes nothing.
+async fn work<S: AsyncRead + AsyncWrite + Unpin>(
+    handler: &mut RequestHandler,
+    connection: &mut ClientConnection<S>,
+    frame: Frame,
+    received: Reservation,
+) -> Result<Result<Option<Reply>, Refusal>, SessionError> {
+    let request_id = frame.request_id();
+    let mut reply = pin!(handler.reply_to(frame, received));
+    loop {
+        let watched = tokio::select! {
+            biased;
+            replied = &mut reply => return Ok(replied),
+            watched = connection.watch(request_id) => watched,
+        };
+        match watched {
+            Watched::Cancelled => return Ok(Err(Refusal::Cancelled)),
+            Watched::Silent => say_alive(connection).await?,
+            Watched::Gone(gone) => return Err(gone),
+        }
+    }
+}
+
+/// Tells a client that the server is there.
+async fn say_alive<S: AsyncWrite + Unpin>(
+    connection: &mut ClientConnection<S>,
+) -> Result<(), SessionError> {
+    let mut bytes = Vec::new();
+    match Reply::Alive.encode_into(0, &Limits::default(), &mut bytes) {
+        Ok(()) => connection.write_bytes(&bytes).await,
+        Err(error) => {
+            tracing::error!(%error, "a reply cannot be encoded");
+            Ok(())
         }
     }
 }

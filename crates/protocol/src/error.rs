@@ -15,7 +15,7 @@ pub enum FrameError {
         found: Vec<u8>,
     },
     /// The peer speaks another version of this protocol.
-    #[error("the peer speaks protocol version {found}, this side speaks {VERSION}")]
+    #[error("the peer speaks protocol version {found}, this side speaks {VERSION}; bring the older one up to date")]
     Version {
         /// The peer's version.
         found: u16,
@@ -82,12 +82,17 @@ pub enum DecodeError {
         /// What came.
         kind: Kind,
     },
-    /// The bincode part is cut, over [`PART_LEN_MAX`](crate::PART_LEN_MAX), or holds a value that
-    /// does not exist (enum tag, boolean, text that is not UTF-8).
+    /// The part holds a value that does not exist (enum tag, boolean, text that is not UTF-8).
     #[error("the small part of the payload cannot be read: {source}")]
     Part {
         /// The decoder's own words.
         source: wincode::ReadError,
+    },
+    /// The part is over [`PART_LEN_MAX`](crate::PART_LEN_MAX).
+    #[error("the small part of the payload has {len} bytes, the limit is {}", crate::PART_LEN_MAX)]
+    PartTooLong {
+        /// Its bytes.
+        len: u64,
     },
     /// A text is longer than allowed.
     #[error("{what} has {len} bytes, the limit is {len_max}")]

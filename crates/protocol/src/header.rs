@@ -32,9 +32,20 @@ impl Header {
         payload_len: u32,
         payload: &[u8],
     ) -> [u8; HEADER_LEN] {
+        Self::encode_as(VERSION, kind, request_id, payload_len, payload)
+    }
+
+    /// Header bytes of a payload in another version, whose header is the same.
+    pub(crate) fn encode_as(
+        version: u16,
+        kind: u16,
+        request_id: u64,
+        payload_len: u32,
+        payload: &[u8],
+    ) -> [u8; HEADER_LEN] {
         let mut raw = [0; HEADER_LEN];
         raw[0..4].copy_from_slice(&MAGIC);
-        raw[4..6].copy_from_slice(&VERSION.to_le_bytes());
+        raw[4..6].copy_from_slice(&version.to_le_bytes());
         raw[6..8].copy_from_slice(&kind.to_le_bytes());
         raw[12..16].copy_from_slice(&payload_len.to_le_bytes());
         raw[16..24].copy_from_slice(&request_id.to_le_bytes());

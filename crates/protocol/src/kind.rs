@@ -8,28 +8,22 @@ use std::fmt;
 pub enum Kind {
     /// Client introduces itself.
     Hello = 0x0001,
-    /// Mesh, material, partition and question in one request.
-    SolveOnce = 0x0002,
+    /// A question about a mesh that comes along, or about a kept model.
+    Ask = 0x0002,
     /// Is this model known?
     HaveModel = 0x0003,
     /// Mesh, material and fixed degrees of freedom to keep.
     UploadModel = 0x0004,
-    /// New known displacements and forces for a kept model.
-    Frame = 0x0005,
+    /// A request is not wanted any more; never answered itself.
+    Cancel = 0x0005,
     /// Hint which nodes will be asked about soon; never answered.
     Prefetch = 0x0006,
     /// The model is not needed any more; never answered.
     Drop = 0x0007,
     /// Are you there?
     Ping = 0x0008,
-    /// As `SolveOnce`, for large deformation.
-    SolveLarge = 0x0009,
-    /// As `Frame`, for large deformation; goes on from the session's last shape.
-    LargeFrame = 0x000a,
-    /// As `SolveOnce`, for several sets of displacements of one partition.
-    SolveSeveral = 0x000b,
     /// One step of a free object among rigid bodies, with contact and friction.
-    ContactFrame = 0x000c,
+    ContactFrame = 0x0009,
     /// Server introduces itself.
     Welcome = 0x8001,
     /// Displacements and what they cost.
@@ -40,39 +34,33 @@ pub enum Kind {
     ModelReady = 0x8004,
     /// The request was understood but not granted, or not understood.
     Rejected = 0x8005,
+    /// The server works, or rests, and is there.
+    Alive = 0x8006,
     /// I am here.
     Pong = 0x8008,
-    /// As `Answer`, for large deformation.
-    LargeAnswer = 0x8009,
-    /// As `Answer`, for several sets of displacements.
-    SeveralAnswers = 0x800b,
     /// State, contacts and displacements at the end of a step.
-    ContactAnswer = 0x800c,
+    ContactAnswer = 0x8009,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 17] = [
         Self::Hello,
-        Self::SolveOnce,
+        Self::Ask,
         Self::HaveModel,
         Self::UploadModel,
-        Self::Frame,
+        Self::Cancel,
         Self::Prefetch,
         Self::Drop,
         Self::Ping,
-        Self::SolveLarge,
-        Self::LargeFrame,
-        Self::SolveSeveral,
         Self::ContactFrame,
         Self::Welcome,
         Self::Answer,
         Self::ModelState,
         Self::ModelReady,
         Self::Rejected,
+        Self::Alive,
         Self::Pong,
-        Self::LargeAnswer,
-        Self::SeveralAnswers,
         Self::ContactAnswer,
     ];
 

@@ -1,8 +1,8 @@
 //! Turns bytes into messages of the Softgrasp wire and back, without I/O.
 //!
 //! A stream is a sequence of frames; a frame is a 32-byte header and a payload; a payload is one
-//! small part in bincode's format followed by raw little-endian arrays. `docs/wire.md` describes
-//! every byte. The layers, bottom up:
+//! small part in bincode's format, which may grow (unknown fields at its end are skipped), and raw
+//! little-endian arrays. `docs/wire.md` describes every byte. The layers, bottom up:
 //!
 //! * [`Header`], [`Kind`], [`Limits`]: what a frame says about itself and how large it may be.
 //! * [`FrameBuffer`]: bytes in any pieces → [`Frame`]s; "not yet" is `Ok(None)`, "wrong" is `Err`.
@@ -31,6 +31,7 @@
 //! ```
 
 pub mod asynchronous;
+mod block;
 pub mod blocking;
 mod error;
 mod format;
@@ -43,7 +44,7 @@ mod payload;
 pub mod solve_report;
 
 pub use error::{ConnectionError, DecodeError, EncodeError, FrameError};
-pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION};
+pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION, VERSIONS};
 pub use frame_buffer::{Frame, FrameBuffer};
 pub use header::Header;
 pub use kind::Kind;

@@ -1,14 +1,17 @@
-//! The payload of a frame: one bincode part, then little-endian arrays on eight-byte borders.
+//! The payload of a frame: one part, then little-endian arrays on eight-byte borders.
 
 use wincode::config::{Configuration, Serialize};
-use wincode::io::Reader;
 use wincode::{SchemaRead, SchemaWrite};
 
+use crate::block::read_fields;
 use crate::{DecodeError, DofValue, EncodeError, HEADER_LEN, Header, Kind, Limits, PART_LEN_MAX};
 
 /// bincode's default format (fixed integers, u64 lengths, u32 tags); no list inside the part may
 /// take more memory than the part may have bytes.
 pub(crate) type PartFormat = Configuration<true, PART_LEN_MAX>;
+
+/// Bytes of the length before a part.
+const LENGTH_LEN: usize = 8;
 
 /// An array element: scalars of one width, one behind the other.
 pub(crate) trait Flat: bytemuck::Pod {
@@ -89,7 +92,7 @@ pub(crate) struct PayloadWriter<'a> {
 }
 
 impl PayloadWriter<'_> {
-    /// The bincode part; comes first.
+    /// The part behind its length, as a block; comes first.
     ///
     /// # Errors
     /// [`EncodeError::Part`] or [`EncodeError::PartTooLong`].
@@ -97,11 +100,16 @@ impl PayloadWriter<'_> {
     where
         T: SchemaWrite<PartFormat, Src = T>,
     {
+        let start = self.out.len();
+        self.out.extend_from_slice(&[0; LENGTH_LEN]);
         T::serialize_into(&mut *self.out, part, PartFormat::new())
             .map_err(|source| EncodeError::Part { source })?;
-        let len = self.out.len() - self.start;
+        let len = self.out.len() - start - LENGTH_LEN;
         if len > PART_LEN_MAX {
             return Err(EncodeError::PartTooLong { len });
+        }
+        if let Some(length) = self.out.get_mut(start..start + LENGTH_LEN) {
+            length.copy_from_slice(&(len as u64).to_le_bytes());
         }
         self.pad();
         Ok(())
@@ -156,18 +164,21 @@ impl<'a> PayloadReader<'a> {
         Self { payload, position: 0 }
     }
 
-    /// The bincode part; comes first.
+    /// The part; comes first. Fields behind those that are known are skipped, missing ones are zero.
     ///
     /// # Errors
-    /// [`DecodeError::Part`] if it is cut, too long or holds a value that does not exist.
+    /// [`DecodeError::ArrayCut`] if bytes are missing, [`DecodeError::PartTooLong`], and
+    /// [`DecodeError::Part`] for a value that does not exist.
     pub(crate) fn part<T>(&mut self) -> Result<T, DecodeError>
     where
-        T: SchemaRead<'a, PartFormat, Dst = T>,
+        T: for<'de> SchemaRead<'de, PartFormat, Dst = T>,
     {
-        let window_len = self.payload.len().min(PART_LEN_MAX);
-        let mut window = self.payload.get(..window_len).unwrap_or_default();
-        let part = T::get(window.by_ref()).map_err(|source| DecodeError::Part { source })?;
-        self.position = window_len - window.len();
+        let length = self.take("the length of the part", LENGTH_LEN, 1)?;
+        let length = length.iter().rev().fold(0, |sum: u64, byte| (sum << 8) | u64::from(*byte));
+        let len = usize::try_from(length).ok().filter(|len| *len <= PART_LEN_MAX);
+        let len = len.ok_or(DecodeError::PartTooLong { len: length })?;
+        let fields = self.take("the part", len, 1)?;
+        let part = read_fields(fields)?;
         self.skip_padding()?;
         Ok(part)
     }

@@ -1,6 +1,6 @@
 //! What an object that has flowed looks like when the hand lets go.
 
-use glove_client::ask::deformation::{Deformation, Elasticity};
+use glove_client::ask::deformation::Elasticity;
 use glove_client::ask::link::Link;
 use glove_client::ask::solve_settings::SolveSettings;
 use glove_client::pace::Pace;
@@ -12,7 +12,7 @@ use softgrasp_grasp::grasp::{Grasp, StateName};
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
-use softgrasp_protocol::LawName;
+use softgrasp_protocol::{Deformation, LawName};
 
 use crate::settings::{linear_settings, sized};
 use crate::start::server;

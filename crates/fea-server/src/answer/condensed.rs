@@ -10,7 +10,8 @@ use softgrasp_core::solve::condensed::{
 };
 use softgrasp_core::solve::{Method, Stage};
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, NodeChoice, Precision, Question, SolveReport,
+    Answer, Displacements, DofValue, NodeChoice, Precision, Question, SolveReport, Warning,
+    WarningCode,
 };
 
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
@@ -187,7 +188,8 @@ impl Contacts {
             }
         }
         let nodes = question.want.nodes.clone();
-        Ok(Answer { report, nodes, displacements, reactions, mask_forces })
+        let cases = Vec::new();
+        Ok(Answer { report, large: None, nodes, displacements, reactions, mask_forces, cases })
     }
 
     fn report(
@@ -198,22 +200,23 @@ impl Contacts {
     ) -> SolveReport {
         let mut warnings = strain.map(strain_warnings).unwrap_or_default();
         if set.condition() > CONDITION_WARNING {
-            warnings.push(format!(
+            let text = format!(
                 "the touched nodes hold the body weakly (condition {:.0e}); spread them",
                 set.condition()
-            ));
+            );
+            warnings.push(Warning::new(WarningCode::HOLD, text));
         }
         // The average under a mask is one equation along each axis, as a known degree of freedom is.
         let known_dofs = self.known.dofs.len() + 3 * set.touched().masks.len();
         let model = &self.stored.model;
         SolveReport {
             method: Method::Condensed.to_string(),
-            element: name_of(model.element()),
+            element: name_of(model.element()).into(),
             unknown_dofs: (model.modelled_dofs() - known_dofs) as u64,
             known_dofs: known_dofs as u64,
             residual_rel: certificate.residual_rel,
             error_bound_rel: certificate.error_bound_rel.ok(),
-            error_bound_why: certificate.error_bound_rel.err().unwrap_or_default().to_owned(),
+            error_bound_why: certificate.error_bound_rel.err().map(str::to_owned),
             max_rotation_deg: strain.map_or(f64::NAN, |strain| strain.rotation_max.to_degrees()),
             max_strain: strain.map_or(f64::NAN, |strain| strain.strain_max),
             precision: "f64".to_owned(),

@@ -153,12 +153,13 @@ impl PosedContact {
         let known = 3 * outcome.contacts.len() as u64;
         let report = SolveReport {
             method: "condensed".to_owned(),
-            element: name_of(model.element()),
+            element: name_of(model.element()).into(),
             unknown_dofs: model.modelled_dofs() as u64 - known.min(model.modelled_dofs() as u64),
             known_dofs: known,
             residual_rel: outcome.residual_rel,
-            error_bound_why: "a contact frame has the residuals of both parts and no proven bound"
-                .to_owned(),
+            error_bound_why: Some(
+                "a contact frame has the residuals of both parts and no proven bound".to_owned(),
+            ),
             max_rotation_deg: f64::NAN,
             max_strain: f64::NAN,
             precision: "f64".to_owned(),
@@ -180,9 +181,16 @@ impl PosedContact {
             columns_computed: u32::try_from(computed).unwrap_or(u32::MAX),
         };
         let displacements = Displacements::of(outcome.displacements, self.precision);
-        let (reactions, mask_forces) = (Vec::new(), Vec::new());
         ContactAnswer {
-            answer: Answer { report, nodes: self.nodes, displacements, reactions, mask_forces },
+            answer: Answer {
+                report,
+                large: None,
+                nodes: self.nodes,
+                displacements,
+                reactions: Vec::new(),
+                mask_forces: Vec::new(),
+                cases: Vec::new(),
+            },
             contact,
             state: state_message(&outcome.state),
             points: outcome.contacts.iter().map(point_message).collect(),

@@ -6,8 +6,7 @@ use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Certainty, Factored, Loads, Method, Solution};
 use softgrasp_protocol::{
-    Answer, CaseAnswer, Displacements, DofValue, ElementName, NodeChoice, Question, SeveralAnswers,
-    SolveReport, Want,
+    Answer, CaseAnswer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
 };
 
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
@@ -64,7 +63,7 @@ pub(super) fn answer_several(
     cases: &[Known],
     estimate: bool,
     mut clock: StageClock,
-) -> Result<SeveralAnswers, Refusal> {
+) -> Result<Answer, Refusal> {
     let residual_rel = posed.question.max_error.unwrap_or(0.0);
     let loads: Vec<Loads<'_>> = [&posed.known]
         .into_iter()
@@ -99,7 +98,8 @@ pub(super) fn answer_several(
     let mut answer = gather(model, factored, &posed, first, (certainty, strain), clock)?;
     answer.report.residual_rel = residual_rel;
     answer.report.refinement_steps = steps.unwrap_or(0);
-    Ok(SeveralAnswers { answer, cases: further })
+    answer.cases = further;
+    Ok(answer)
 }
 
 /// What was asked for, out of a solution, and what it cost.
@@ -126,13 +126,13 @@ fn gather(
     };
     let mut report = SolveReport {
         method: factored.method().to_string(),
-        element: *element,
+        element: (*element).into(),
         unknown_dofs: factored.partition().unknown().len() as u64,
         known_dofs: known.dofs.len() as u64,
         stage_ms,
         residual_rel: solution.residual_rel,
         error_bound_rel: None,
-        error_bound_why: no_bound(solution.error_estimate_rel),
+        error_bound_why: Some(no_bound(solution.error_estimate_rel)),
         refinement_steps: solution.refinement_steps,
         // No number where nobody wanted to know.
         max_rotation_deg: strain.map_or(f64::NAN, |strain| strain.rotation_max.to_degrees()),
@@ -148,8 +148,16 @@ fn gather(
         add_certainty(certainty, question, &mut report)?;
     }
     add_unmet_wishes(question, &mut report);
-    let (nodes, mask_forces) = (question.want.nodes.clone(), Vec::new());
-    Ok(Answer { report, nodes, displacements, reactions, mask_forces })
+    let nodes = question.want.nodes.clone();
+    Ok(Answer {
+        report,
+        large: None,
+        nodes,
+        displacements,
+        reactions,
+        mask_forces: Vec::new(),
+        cases: Vec::new(),
+    })
 }
 
 fn no_bound(error_estimate_rel: Option<f64>) -> String {

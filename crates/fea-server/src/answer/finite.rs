@@ -7,13 +7,6 @@ use softgrasp_protocol::{Answer, Displacements, Reply, SolveReport};
 pub(crate) fn is_finite(reply: &Reply) -> bool {
     match reply {
         Reply::Answer(answer) => answer_is_finite(answer),
-        Reply::LargeAnswer(large) => answer_is_finite(&large.answer),
-        Reply::SeveralAnswers(several) => {
-            let is_case_finite = |case: &softgrasp_protocol::CaseAnswer| {
-                all(case.displacements.iter().flatten()) && all(&case.reactions)
-            };
-            answer_is_finite(&several.answer) && several.cases.iter().all(is_case_finite)
-        }
         Reply::ContactAnswer(contact) => {
             let vectors = |point: &softgrasp_protocol::ContactPoint| {
                 all(point.place.iter().chain(&point.normal).chain(&point.force).chain(&point.slip))
@@ -30,7 +23,7 @@ pub(crate) fn is_finite(reply: &Reply) -> bool {
 
 /// The same for one answer.
 pub(super) fn answer_is_finite(answer: &Answer) -> bool {
-    let Answer { report, displacements, reactions, mask_forces, .. } = answer;
+    let Answer { report, displacements, reactions, mask_forces, cases, .. } = answer;
     let are_displacements = match displacements {
         Displacements::F64(values) => all(values.iter().flatten()),
         Displacements::F32Quantised { scale, values } => {
@@ -43,6 +36,9 @@ pub(super) fn answer_is_finite(answer: &Answer) -> bool {
         && all(reactions.iter().map(|reaction| &reaction.value))
         && all(mask_forces.iter().flatten())
         && all(errors.iter().flatten())
+        && cases.iter().all(|case| {
+            all(case.displacements.iter().flatten()) && all(&case.reactions)
+        })
 }
 
 fn all<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
@@ -52,21 +48,25 @@ fn all<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use softgrasp_protocol::CaseAnswer;
+
     use super::*;
 
     #[test]
     fn one_number_that_is_none_is_found_wherever_it_stands() {
         let sound = Answer {
             report: SolveReport { max_strain: f64::NAN, ..SolveReport::default() },
+            large: None,
             nodes: softgrasp_protocol::NodeChoice::All,
             displacements: Displacements::F64(vec![[1.0; 3]; 40]),
             reactions: vec![softgrasp_protocol::DofValue { dof: 0, value: -1e308 }; 3],
             mask_forces: vec![[0.0; 3]; 2],
+            cases: vec![CaseAnswer { displacements: vec![[2.0; 3]; 40], reactions: vec![0.5; 3] }],
         };
         let is_sound = |answer: &Answer| is_finite(&Reply::Answer(Box::new(answer.clone())));
         assert!(is_sound(&sound));
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            let damages: [fn(&mut Answer, f64); 7] = [
+            let damages: [fn(&mut Answer, f64); 9] = [
                 |answer, value| {
                     answer.displacements = Displacements::F64(vec![[0.0, 0.0, value]]);
                 },
@@ -76,6 +76,8 @@ mod tests {
                 },
                 |answer, value| answer.reactions[2].value = value,
                 |answer, value| answer.mask_forces[1][1] = value,
+                |answer, value| answer.cases[0].displacements[39][2] = value,
+                |answer, value| answer.cases[0].reactions[1] = value,
                 |answer, value| answer.report.residual_rel = value,
                 |answer, value| answer.report.error_bound_rel = Some(value),
                 |answer, value| answer.report.error_estimate_rel = Some(value),

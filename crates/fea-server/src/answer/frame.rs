@@ -7,7 +7,7 @@ use softgrasp_core::model::{Known, ModelError};
 use softgrasp_core::solve::choose::{Plan, Question, SMALLER_THAN_FRONT};
 use softgrasp_core::solve::{Factored, Method};
 use softgrasp_protocol::{
-    Answer, FrameRequest, ModelHash, NodeChoice, Question as QuestionMessage,
+    Answer, CaseAnswer, ModelHash, NodeChoice, Question as QuestionMessage,
 };
 
 use super::condensed::{Contacts, PreparedSet, StrainOf};
@@ -50,26 +50,34 @@ pub(crate) enum Readiness {
     /// A small product with what is kept.
     Ready(Box<KeptFrame>),
     /// Anything else.
-    NotReady(Box<FrameRequest>),
+    NotReady(Box<QuestionMessage>),
 }
 
 /// Looks whether a frame is a small product with what is kept, and holds on to what was found.
-pub(crate) fn readiness(resources: &Resources, request: FrameRequest) -> Readiness {
-    match kept_frame(resources, &request) {
+pub(crate) fn readiness(
+    resources: &Resources,
+    model: ModelHash,
+    message: QuestionMessage,
+) -> Readiness {
+    match kept_frame(resources, model, &message) {
         Some(kept) => Readiness::Ready(Box::new(kept)),
-        None => Readiness::NotReady(Box::new(request)),
+        None => Readiness::NotReady(Box::new(message)),
     }
 }
 
-fn kept_frame(resources: &Resources, request: &FrameRequest) -> Option<KeptFrame> {
-    let QuestionMessage { known, masks, want, .. } = &request.question;
+fn kept_frame(
+    resources: &Resources,
+    model: ModelHash,
+    message: &QuestionMessage,
+) -> Option<KeptFrame> {
+    let QuestionMessage { known, masks, want, .. } = message;
     let NodeChoice::Nodes(nodes) = &want.nodes else { return None };
     // What cannot be small is not even copied for a look, on the thread that all sockets share.
     let forces = known.len() + 3 * masks.len();
     if forces > TOUCHED_MAX || 3 * nodes.len() * forces > SMALL_PRODUCTS {
         return None;
     }
-    let frame = PosedFrame::new(resources, request.clone()).ok()?;
+    let frame = PosedFrame::new(resources, model, message.clone()).ok()?;
     if frame.plan.method != Method::Condensed {
         return None;
     }
@@ -99,10 +107,48 @@ impl KeptFrame {
 /// [`Refusal`].
 pub(crate) fn answer_frame(
     resources: &Resources,
-    request: FrameRequest,
+    model: ModelHash,
+    message: QuestionMessage,
     clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    PosedFrame::new(resources, request)?.answer(resources, clock)
+    PosedFrame::new(resources, model, message)?.answer(resources, clock)
+}
+
+/// Several cases of one frame: other values of the same known displacements. The report is that of
+/// the first with the largest residual and estimate of all.
+///
+/// # Errors
+/// [`Refusal`].
+pub(crate) fn answer_cases(
+    resources: &Resources,
+    model: ModelHash,
+    (message, cases): (QuestionMessage, Vec<Vec<f64>>),
+    clock: &StageClock,
+) -> Result<Answer, Refusal> {
+    let mut answer = answer_frame(resources, model, message.clone(), clock.clone())?;
+    for values in cases {
+        let mut message = message.clone();
+        for (known, value) in message.known.iter_mut().zip(values) {
+            known.value = value;
+        }
+        let case = answer_frame(resources, model, message, clock.clone())?;
+        let report = &mut answer.report;
+        report.residual_rel = report.residual_rel.max(case.report.residual_rel);
+        report.error_bound_rel = larger(report.error_bound_rel, case.report.error_bound_rel);
+        report.error_bound_why = report.error_bound_why.take().or(case.report.error_bound_why);
+        report.error_estimate_rel =
+            larger(report.error_estimate_rel, case.report.error_estimate_rel);
+        answer.cases.push(CaseAnswer {
+            displacements: case.displacements.into_f64(),
+            reactions: case.reactions.iter().map(|reaction| reaction.value).collect(),
+        });
+    }
+    Ok(answer)
+}
+
+/// The larger of two errors; none where one of them is not known.
+fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    Some(a?.max(b?))
 }
 
 impl PosedFrame {
@@ -110,8 +156,11 @@ impl PosedFrame {
     ///
     /// # Errors
     /// [`Refusal`].
-    pub fn new(resources: &Resources, request: FrameRequest) -> Result<Self, Refusal> {
-        let FrameRequest { model: hash, question: message } = request;
+    pub fn new(
+        resources: &Resources,
+        hash: ModelHash,
+        message: QuestionMessage,
+    ) -> Result<Self, Refusal> {
         let stored = resources.models.find(hash).ok_or(Refusal::UnknownModel(hash))?;
         let model = &stored.model;
         let question = question_of(&message, Some(model.element()), 0.0)?;

@@ -8,10 +8,11 @@ use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::equilibrium::{Equilibrium, Goal, NoEquilibrium, Path, Wish};
 use softgrasp_protocol::{
-    Answer, DeformationName, Displacements, DofValue, LargeAnswer, LargeAsk, LargeReport, LawName,
-    NodeChoice, Question as QuestionMessage, SolveReport, WarningLevel,
+    Answer, Deformation, Displacements, DofValue, LargeAsk, LargeReport, LawName, NodeChoice,
+    Question as QuestionMessage, SolveReport, Warning, WarningCode, WarningLevel,
 };
 
+use super::warnings::add_late;
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::last_peak_rss_bytes;
 use crate::refusal::Refusal;
@@ -44,6 +45,9 @@ impl LargeQuestion {
     /// # Errors
     /// [`Refusal`] naming the node, the mask or the number.
     pub fn new(model: &Model, ask: &LargeAsk, message: &QuestionMessage) -> Result<Self, Refusal> {
+        if ask.deformation == Deformation::Linear {
+            return Err(Refusal::LargeLinear);
+        }
         if let Some(value) = ask.yield_stress.filter(|v| !(*v > 0.0 && v.is_finite())) {
             return Err(Refusal::Yield { value });
         }
@@ -137,7 +141,7 @@ impl Found<'_> {
         question: &LargeQuestion,
         message: &QuestionMessage,
         clock: StageClock,
-    ) -> LargeAnswer {
+    ) -> Answer {
         let Self { model, path, equilibrium, summary, .. } = self;
         let mut stage_ms = clock.finish();
         let start = Instant::now();
@@ -161,15 +165,16 @@ impl Found<'_> {
         let known_dofs = question.known.dofs.len() + question.mask_q.len();
         let mut report = SolveReport {
             method: METHOD.to_owned(),
-            element: name_of(model.element()),
+            element: name_of(model.element()).into(),
             unknown_dofs: (model.modelled_dofs() - known_dofs) as u64,
             known_dofs: known_dofs as u64,
             stage_ms,
             residual_rel: equilibrium.residual_rel,
             error_bound_rel: None,
-            error_bound_why: "no bound is proven at large deformation; estimated is the error of \
-                              the equilibrium"
-                .to_owned(),
+            error_bound_why: Some(
+                "no bound is proven at large deformation; estimated is the error of the equilibrium"
+                    .to_owned(),
+            ),
             max_rotation_deg: summary.rotation_max.to_degrees(),
             max_strain: summary.strain_max,
             precision: if self.is_single { "f32+f64" } else { "f64" }.to_owned(),
@@ -181,14 +186,14 @@ impl Found<'_> {
         };
         add_warnings(equilibrium, summary, question, &mut report);
         let nodes = message.want.nodes.clone();
-        let answer = Answer { report, nodes, displacements, reactions, mask_forces };
-        LargeAnswer { answer, large: self.large_report() }
+        let (large, cases) = (Some(self.large_report()), Vec::new());
+        Answer { report, large, nodes, displacements, reactions, mask_forces, cases }
     }
 
     fn large_report(&self) -> LargeReport {
         let Self { equilibrium, summary, .. } = self;
         LargeReport {
-            deformation: DeformationName::Large,
+            is_linear: false,
             newton_steps: equilibrium.newton_steps,
             linear_solves: equilibrium.linear_solves,
             factor_age: equilibrium.factor_age,
@@ -211,27 +216,24 @@ fn add_warnings(
 ) {
     let error = equilibrium.error_estimate_rel;
     if let Some(wanted) = question.max_error.filter(|wanted| error > *wanted) {
-        report.warning_level = WarningLevel::Caution;
-        report.warnings.push(format!(
+        report.warning_level = WarningLevel::CAUTION;
+        let text = format!(
             "the equilibrium is estimated to be off by {error:.1e} of the largest displacement; \
              wanted was {wanted:.1e}"
-        ));
+        );
+        report.warnings.push(Warning::new(WarningCode::ERROR, text));
     }
-    let ms = &report.stage_ms;
-    let took = ms.queue + ms.decode + ms.assemble + ms.order + ms.factor + ms.solve + ms.encode;
-    if let Some(deadline) = question.deadline_ms.filter(|deadline| took > *deadline) {
-        report.warnings.push(format!("it took {took:.2} ms; wanted within {deadline} ms"));
-    }
+    add_late(question.deadline_ms, report);
     if equilibrium.jumped {
-        report
-            .warnings
-            .push("the equilibrium jumped: the shape snapped to another one on the way".to_owned());
+        let text = "the equilibrium jumped: the shape snapped to another one on the way";
+        report.warnings.push(Warning::new(WarningCode::SNAP, text));
     }
     if summary.stretch_min < CREASE_STRETCH {
-        report.warnings.push(format!(
+        let text = format!(
             "an element is pressed to {:.0} % of its length; surfaces crease from about 60 % on, \
              and no mesh gives a smooth answer there",
             100.0 * summary.stretch_min
-        ));
+        );
+        report.warnings.push(Warning::new(WarningCode::CREASE, text));
     }
 }

@@ -7,8 +7,8 @@ use softgrasp_core::fem::hyperelastic::LargeSummary;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::equilibrium::{Hold, Path};
 use softgrasp_protocol::{
-    Answer, DeformationChoice, Displacements, FrameRequest, LargeAnswer, LargeAsk, LargeFrame,
-    ModelHash, NodeChoice, Pace, PathChoice, Question as QuestionMessage, Want, WarningLevel,
+    Answer, Deformation, Displacements, LargeAsk, ModelHash, NodeChoice, Pace, PathChoice,
+    Question as QuestionMessage, Want, Warning, WarningCode, WarningLevel,
 };
 
 use super::frame::answer_frame;
@@ -26,7 +26,7 @@ use crate::store::StoredModel;
 /// The answer to a frame, and what is to be made beside the frames for those that follow.
 pub(crate) struct Answered {
     /// The answer.
-    pub answer: LargeAnswer,
+    pub answer: Answer,
     /// Makes the session's path, where linear elasticity has answered because there was none yet.
     pub making: Option<Box<dyn FnOnce() + Send>>,
 }
@@ -39,11 +39,10 @@ pub(crate) struct Answered {
 pub(crate) fn answer_large_frame(
     resources: &Arc<Resources>,
     seat: &Seat,
-    request: LargeFrame,
+    (hash, ask, message): (ModelHash, LargeAsk, QuestionMessage),
     clock: StageClock,
     may_make: bool,
 ) -> Result<Answered, Refusal> {
-    let LargeFrame { model: hash, large: ask, question: message } = request;
     let resources = Arc::clone(resources);
     let stored = resources.models.find(hash).ok_or(Refusal::UnknownModel(hash))?;
     let question = LargeQuestion::new(&stored.model, &ask, &message)?;
@@ -57,7 +56,7 @@ pub(crate) fn answer_large_frame(
         },
     };
     let kept = kept.filter(|kept| frame.goes_on(kept));
-    if frame.ask.deformation == DeformationChoice::Auto
+    if frame.ask.deformation == Deformation::Auto
         && kept.is_none()
         && let Some((answer, promised)) = frame.linear(&clock)?
     {
@@ -132,8 +131,7 @@ impl Frame {
         question.max_error = None;
         question.want =
             Want { nodes: NodeChoice::All, precision: Default::default(), ..question.want };
-        let request = FrameRequest { model: self.hash, question };
-        let mut answer = answer_frame(&self.resources, request, clock.clone())?;
+        let mut answer = answer_frame(&self.resources, self.hash, question, clock.clone())?;
         let all = std::mem::replace(&mut answer.displacements, Displacements::F64(Vec::new()));
         let all = all.into_f64();
         if self.stored.model.system_node_count() != node_count {
@@ -154,17 +152,20 @@ impl Frame {
     }
 
     /// The linear answer while the path is being made: it says that it is not what was wanted.
-    fn meanwhile(&self, answer: Answer, promised: f64) -> LargeAnswer {
+    fn meanwhile(&self, answer: Answer, promised: f64) -> Answer {
         let mut answer = linear_answer(answer, promised);
-        let report = &mut answer.answer.report;
+        let report = &mut answer.report;
         report.chosen_because += "; the equilibrium is being prepared";
-        report.warning_level = WarningLevel::Caution;
-        report.warnings.push(format!(
+        report.warning_level = WarningLevel::CAUTION;
+        let text = format!(
             "linear elasticity answers while the equilibrium at large deformation is prepared: it may be \
              off by {promised:.1e} of the largest displacement; wanted was {:.1e}",
             self.allowed()
-        ));
-        answer.large.settled = false;
+        );
+        report.warnings.push(Warning::new(WarningCode::PREPARING, text));
+        if let Some(large) = &mut answer.large {
+            large.settled = false;
+        }
         answer
     }
 
@@ -218,7 +219,7 @@ impl Frame {
     }
 
     /// Goes on to what is asked for.
-    fn advance(&self, kept: &mut ModelPath, mut clock: StageClock) -> Result<LargeAnswer, Refusal> {
+    fn advance(&self, kept: &mut ModelPath, mut clock: StageClock) -> Result<Answer, Refusal> {
         let Self { question, message, stored, .. } = self;
         if !kept.path.hold().is_by(&question.known.dofs, &question.masks) {
             let LargeQuestion { known, masks, .. } = question;
@@ -247,8 +248,8 @@ impl Frame {
             summary,
             is_single: question.is_single,
             chosen_because: match self.ask.deformation {
-                DeformationChoice::Large => "asked for".to_owned(),
-                DeformationChoice::Auto => {
+                Deformation::Large | Deformation::Linear => "asked for".to_owned(),
+                Deformation::Auto => {
                     "large: linear elasticity promises no error within what is allowed".to_owned()
                 }
             },

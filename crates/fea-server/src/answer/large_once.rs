@@ -8,9 +8,7 @@ use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_core::solve::equilibrium::{Hold, Path};
 use softgrasp_core::solve::memory::Need;
 use softgrasp_core::solve::{Method, Stage};
-use softgrasp_protocol::{
-    DeformationChoice, DeformationName, LargeAnswer, LargeReport, SolveLarge, SolveOnce,
-};
+use softgrasp_protocol::{Answer, Body, Deformation, LargeAsk, LargeReport, Question};
 
 use super::large::{Found, LINEAR_ERROR_REL, LargeQuestion, law_of};
 use super::once::solve_once;
@@ -29,20 +27,22 @@ use crate::resources::Resources;
 /// [`Refusal`].
 pub(crate) fn solve_large(
     resources: &Resources,
-    once: SolveLarge,
+    (body, message): (Body, Question),
+    large: LargeAsk,
     reservation: Reservation,
     mut clock: StageClock,
-) -> Result<LargeAnswer, Refusal> {
-    let why = match once.large.deformation {
-        DeformationChoice::Large => "asked for".to_owned(),
-        DeformationChoice::Auto => match linear_within(resources, &once, clock.clone())? {
+) -> Result<Answer, Refusal> {
+    let why = match large.deformation {
+        Deformation::Linear => return Err(Refusal::LargeLinear),
+        Deformation::Large => "asked for".to_owned(),
+        Deformation::Auto => match linear_within(resources, (&body, &message), large, &clock)? {
             Linear::Within(answer) => return Ok(*answer),
             Linear::TooFar { promised } => {
                 format!("linear elasticity promises an error of {promised:.1e} only")
             }
         },
     };
-    let SolveLarge { mesh, materials, element, large, question: message } = once;
+    let Body { mesh, materials, element } = body;
     let element = element_given(element).unwrap_or_else(|| cheapest(poisson_max(&materials)));
     check_node_count(&mesh, resources.config.max_nodes)?;
     let subject = Subject::once(&mesh, message.known.len());
@@ -71,7 +71,7 @@ pub(crate) fn solve_large(
     };
     let mut answered = found.answer(&question, &message, clock);
     let locks = locking_warning(model.element(), model.poisson_max());
-    answered.answer.report.warnings.extend(locks);
+    answered.report.warnings.extend(locks);
     Ok(answered)
 }
 
@@ -85,23 +85,24 @@ fn cheapest(poisson_max: f64) -> Element {
 
 /// A linear answer that is good enough, or how far from it it may be.
 enum Linear {
-    Within(Box<LargeAnswer>),
+    Within(Box<Answer>),
     TooFar { promised: f64 },
 }
 
 /// The linear answer, if its rotation and strain promise an error within what is allowed.
 fn linear_within(
     resources: &Resources,
-    once: &SolveLarge,
-    clock: StageClock,
+    (body, question): (&Body, &Question),
+    large: LargeAsk,
+    clock: &StageClock,
 ) -> Result<Linear, Refusal> {
-    let SolveLarge { mesh, materials, element, question, large } = once.clone();
     if large.yield_stress.is_some() {
         return Ok(Linear::TooFar { promised: f64::INFINITY });
     }
     let allowed = question.max_error.unwrap_or(LINEAR_ERROR_REL);
-    let linear = SolveOnce { mesh, materials, element, question };
-    let answer = solve_once(resources, linear, resources.budget.reservation(), clock)?;
+    let reservation = resources.budget.reservation();
+    let (body, question) = (body.clone(), question.clone());
+    let answer = solve_once(resources, body, question, reservation, clock.clone())?;
     let report = &answer.report;
     let promised = promised_error(report.max_rotation_deg.to_radians(), report.max_strain);
     // Without a number nothing is promised.
@@ -120,7 +121,7 @@ pub(super) fn promised_error(rotation_max: f64, strain_max: f64) -> f64 {
 }
 
 /// A linear answer as an answer to a question about large deformation.
-pub(super) fn linear_answer(mut answer: softgrasp_protocol::Answer, promised: f64) -> LargeAnswer {
+pub(super) fn linear_answer(mut answer: Answer, promised: f64) -> Answer {
     let report = &mut answer.report;
     let of_digits = report.error_estimate_rel.unwrap_or(0.0);
     report.error_estimate_rel = Some(promised.max(of_digits));
@@ -128,15 +129,15 @@ pub(super) fn linear_answer(mut answer: softgrasp_protocol::Answer, promised: f6
         "{}; linear: rotation and strain promise an error below {promised:.1e}",
         report.chosen_because
     );
-    let large = LargeReport {
-        deformation: DeformationName::Linear,
+    answer.large = Some(LargeReport {
+        is_linear: true,
         linear_solves: 1,
         min_jacobian: 1.0 - 3.0 * report.max_strain,
         max_stretch: 1.0 + report.max_strain,
         settled: true,
         ..LargeReport::default()
-    };
-    LargeAnswer { answer, large }
+    });
+    answer
 }
 
 /// Reserves what a path takes once its factor is counted.

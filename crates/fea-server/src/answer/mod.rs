@@ -16,7 +16,7 @@ mod warnings;
 
 pub(crate) use contact_frame::PosedContact;
 pub(crate) use finite::is_finite;
-pub(crate) use frame::{PosedFrame, Readiness, readiness};
+pub(crate) use frame::{PosedFrame, Readiness, answer_cases, readiness};
 pub(crate) use large_frame::answer_large_frame;
 pub(crate) use large_once::solve_large;
 pub(crate) use once::solve_once;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::choose::Plan;
 use softgrasp_core::solve::{Factored, Method};
-use softgrasp_protocol::{Answer, Question as QuestionMessage, SolveOnce};
+use softgrasp_protocol::{Answer, Body, Question as QuestionMessage};
 
 use super::condensed::{Contacts, StrainOf};
 use super::direct::{self, Posed};
@@ -36,11 +36,12 @@ pub(super) struct Work<'a> {
 /// [`Refusal`].
 pub(crate) fn solve_once(
     resources: &Resources,
-    once: SolveOnce,
+    body: Body,
+    message: QuestionMessage,
     reservation: Reservation,
     mut clock: StageClock,
 ) -> Result<Answer, Refusal> {
-    let SolveOnce { mesh, materials, element, question: message } = once;
+    let Body { mesh, materials, element } = body;
     let asked_element = element_given(element);
     let poisson_max = poisson_max(&materials);
     let question = question_of(&message, asked_element, poisson_max)?;

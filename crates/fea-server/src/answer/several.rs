@@ -3,7 +3,7 @@
 
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::Method;
-use softgrasp_protocol::{SeveralAnswers, SolveSeveral};
+use softgrasp_protocol::{Answer, Body, DofValue, Question};
 
 use super::direct;
 use super::once::Work;
@@ -21,17 +21,19 @@ use crate::resources::Resources;
 /// and unknown displacements, forces, products, residual, correction, answer.
 const VECTORS_PER_CASE: usize = 12;
 
-/// Mesh, partition and several sets of known displacements in one request.
+/// Mesh, partition and several sets of known displacements in one request: those of `message` and
+/// `cases` more; `estimate` whether to work out what only informs.
 ///
 /// # Errors
 /// [`Refusal`].
 pub(crate) fn solve_several(
     resources: &Resources,
-    several: SolveSeveral,
+    (body, message): (Body, Question),
+    (cases, estimate): (Vec<Vec<f64>>, bool),
     reservation: Reservation,
     mut clock: StageClock,
-) -> Result<SeveralAnswers, Refusal> {
-    let SolveSeveral { mesh, materials, element, question: message, cases, estimate } = several;
+) -> Result<Answer, Refusal> {
+    let Body { mesh, materials, element } = body;
     let asked_element = element_given(element);
     let poisson_max = poisson_max(&materials);
     let question = question_of(&message, asked_element, poisson_max)?;
@@ -62,15 +64,15 @@ pub(crate) fn solve_several(
         return Err(Refusal::TooManyCases { cases: cases.len() + 1, bytes, free });
     }
     let posed = work.posed(&model, known, forces, why);
-    let mut answers = direct::answer_several(&model, &factored, posed, &further, estimate, clock)?;
-    add_plan_warnings(&plan, asked_element, poisson_max, &mut answers.answer.report);
-    Ok(answers)
+    let mut answer = direct::answer_several(&model, &factored, posed, &further, estimate, clock)?;
+    add_plan_warnings(&plan, asked_element, poisson_max, &mut answer.report);
+    Ok(answer)
 }
 
 /// The known displacements of the further cases.
 fn further(
     model: &Model,
-    first: &[softgrasp_protocol::DofValue],
+    first: &[DofValue],
     cases: &[Vec<f64>],
 ) -> Result<Vec<Known>, Refusal> {
     let known = |values: &Vec<f64>| {

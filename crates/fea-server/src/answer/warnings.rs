@@ -5,7 +5,7 @@ use softgrasp_core::fem::Element;
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::solve::choose::{LOCKING_POISSON, Plan};
 use softgrasp_core::solve::{Certainty, ERROR_SERIOUS, ERROR_UNREMARKABLE};
-use softgrasp_protocol::{Question, SolveReport, WarningLevel};
+use softgrasp_protocol::{Question, SolveReport, Warning, WarningCode, WarningLevel};
 
 use crate::refusal::Refusal;
 
@@ -15,21 +15,23 @@ const ROTATION_WARNING_DEG: f64 = 10.0;
 const STRAIN_WARNING: f64 = 0.1;
 
 /// Sentences for answers that leave the range of small rotations and strains.
-pub(super) fn strain_warnings(summary: StrainSummary) -> Vec<String> {
+pub(super) fn strain_warnings(summary: StrainSummary) -> Vec<Warning> {
     let (rotation_deg, strain) = (summary.rotation_max.to_degrees(), summary.strain_max);
     let mut warnings = Vec::new();
     if rotation_deg > ROTATION_WARNING_DEG {
-        warnings.push(format!(
+        let text = format!(
             "an element turns by {rotation_deg:.1} degrees; linear elasticity is off by about \
              {:.0} % there",
             50.0 * rotation_deg.to_radians().powi(2)
-        ));
+        );
+        warnings.push(Warning::new(WarningCode::ROTATION, text));
     }
     if strain > STRAIN_WARNING {
-        warnings.push(format!(
+        let text = format!(
             "an element is strained by {:.0} %; linear elasticity is meant for small strains",
             100.0 * strain
-        ));
+        );
+        warnings.push(Warning::new(WarningCode::STRAIN, text));
     }
     warnings
 }
@@ -52,36 +54,44 @@ pub(super) fn add_certainty(
         return Ok(());
     }
     let (level, few) = match error_rel > ERROR_SERIOUS {
-        true => (WarningLevel::Serious, "few digits are certain"),
-        false => (WarningLevel::Caution, "digits are lost"),
+        true => (WarningLevel::SERIOUS, "few digits are certain"),
+        false => (WarningLevel::CAUTION, "digits are lost"),
     };
     report.warning_level = level;
-    report.warnings.push(format!(
+    let text = format!(
         "{few}: the displacements are estimated to be off by up to {error_rel:.0e} of the largest \
          (condition {condition:.0e}); hold nodes further apart, or use a material less near to \
          incompressible"
-    ));
+    );
+    report.warnings.push(Warning::new(WarningCode::DIGITS, text));
     Ok(())
+}
+
+/// Adds a sentence where an answer took longer than it should.
+pub(super) fn add_late(deadline_ms: Option<f64>, report: &mut SolveReport) {
+    let ms = &report.stage_ms;
+    let took = ms.queue + ms.decode + ms.assemble + ms.order + ms.factor + ms.solve + ms.encode;
+    if let Some(deadline) = deadline_ms.filter(|deadline| took > *deadline) {
+        let text = format!("it took {took:.2} ms; wanted within {deadline} ms");
+        report.warnings.push(Warning::new(WarningCode::LATE, text));
+    }
 }
 
 /// Adds a sentence for each wish of the question that the answer does not meet.
 pub(super) fn add_unmet_wishes(question: &Question, report: &mut SolveReport) {
-    let ms = &report.stage_ms;
-    let took = ms.queue + ms.decode + ms.assemble + ms.order + ms.factor + ms.solve + ms.encode;
-    if let Some(deadline) = question.deadline_ms.filter(|deadline| took > *deadline) {
-        report.warnings.push(format!("it took {took:.2} ms; wanted within {deadline} ms"));
-    }
+    add_late(question.deadline_ms, report);
     let Some(wanted) = question.max_error else { return };
-    match report.error_bound_rel {
-        Some(bound) if bound > wanted => report.warnings.push(format!(
-            "the error is proven to be below {bound:.1e} only; wanted below {wanted:.1e}"
-        )),
-        None if report.residual_rel > wanted => report.warnings.push(format!(
-            "the residual is {:.1e}; wanted an error below {wanted:.1e}",
-            report.residual_rel
-        )),
-        _ => {}
-    }
+    let text = match report.error_bound_rel {
+        Some(bound) if bound > wanted => {
+            format!("the error is proven to be below {bound:.1e} only; wanted below {wanted:.1e}")
+        }
+        None if report.residual_rel > wanted => {
+            let residual = report.residual_rel;
+            format!("the residual is {residual:.1e}; wanted an error below {wanted:.1e}")
+        }
+        _ => return,
+    };
+    report.warnings.push(Warning::new(WarningCode::ERROR, text));
 }
 
 /// Warns of linear elements that were asked for on a material on which they lock, and of what a plan
@@ -92,20 +102,22 @@ pub(super) fn add_plan_warnings(
     poisson_max: f64,
     report: &mut SolveReport,
 ) {
-    report.warnings.extend(plan.gave_up.map(|gave_up| gave_up.to_string()));
-    report.warnings.extend(plan.locks.map(|locks| locks.to_string()));
+    let gave_up = plan.gave_up.map(|text| Warning::new(WarningCode::CHOICE, text.to_string()));
+    let locks = plan.locks.map(|text| Warning::new(WarningCode::LOCKING, text.to_string()));
+    report.warnings.extend(gave_up.into_iter().chain(locks));
     if asked == Some(Element::Tet4) {
         report.warnings.extend(locking_warning(Element::Tet4, poisson_max));
     }
 }
 
 /// A sentence for elements that lock on a material.
-pub(super) fn locking_warning(element: Element, poisson_max: f64) -> Option<String> {
+pub(super) fn locking_warning(element: Element, poisson_max: f64) -> Option<Warning> {
     let locks = element == Element::Tet4 && poisson_max >= LOCKING_POISSON;
     locks.then(|| {
-        format!(
+        let text = format!(
             "linear elements lock at a Poisson's ratio of {poisson_max}: the object seems stiffer \
              than it is; ask for elements that do not (t4-anp, t10, auto)"
-        )
+        );
+        Warning::new(WarningCode::LOCKING, text)
     })
 }

@@ -220,14 +220,14 @@ async fn client_that_goes_during_its_request_is_noticed_and_one_that_waits_is_no
         sleep(Duration::from_secs(3)).await;
         drop(client);
     };
-    let (gone, ()) = tokio::join!(connection.gone(), goes);
-    assert!(matches!(gone, SessionError::Gone));
+    let (gone, ()) = tokio::join!(connection.watch(1), goes);
+    assert!(matches!(gone, Watched::Gone(SessionError::Gone)), "{gone:?}");
     assert!(start.elapsed() >= Duration::from_secs(3) + HALF_CLOSED_MAX);
     // It waits, and has sent its next request meanwhile.
     let (mut connection, mut client, bytes) = connected();
     client.write_all(&bytes).await.unwrap();
-    let waits = timeout(Duration::from_secs(3600), connection.gone()).await;
-    assert!(waits.is_err(), "{:?}", waits.map(|gone| gone.to_string()));
+    let waits = timeout(Duration::from_secs(3600), connection.watch(7)).await;
+    assert!(waits.is_err(), "{:?}", waits);
     assert!(
         matches!(connection.next_frame().await.unwrap(), Incoming::Request { .. }),
         "nothing is lost"
@@ -241,7 +241,7 @@ async fn client_that_goes_during_its_request_is_noticed_and_one_that_waits_is_no
         }
         sent
     };
-    let gone = timeout(Duration::from_secs(60), connection.gone());
+    let gone = timeout(Duration::from_secs(60), connection.watch(7));
     let (gone, sent) = tokio::join!(gone, sends);
     assert!(gone.is_err() && sent <= 4 * READ_AHEAD_MAX, "{sent}");
 }
@@ -270,4 +270,65 @@ async fn request_without_room_is_passed_over_and_the_session_lives() {
         assert_eq!(request_id(connection.next_frame().await), 1);
     };
     tokio::join!(sender, receiver);
+}
+
+/// Bytes of a request.
+fn bytes_of(request: &Request, request_id: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    request.encode_into(request_id, &Limits::default(), &mut bytes).unwrap();
+    bytes
+}
+
+#[tokio::test(start_paused = true)]
+async fn request_that_is_worked_on_or_waits_is_cancelled_by_its_number() {
+    let (mut connection, mut client, _) = connected();
+    let ping = Request::Ping { nonce: 1 };
+    let sent = [
+        bytes_of(&ping, 5),
+        bytes_of(&ping, 6),
+        bytes_of(&Request::Cancel { request_id: 6 }, 7),
+        bytes_of(&Request::Cancel { request_id: 99 }, 8),
+        bytes_of(&Request::Cancel { request_id: 4 }, 9),
+    ];
+    client.write_all(&sent.concat()).await.unwrap();
+    assert!(matches!(connection.watch(4).await, Watched::Cancelled));
+    assert_eq!(request_id(connection.next_frame().await), 5);
+    match connection.next_frame().await {
+        Ok(Incoming::Cancelled { header }) => assert_eq!(header.request_id, 6),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn newer_request_for_the_same_model_is_seen_before_it_is_waited_for() {
+    let (mut connection, mut client, _) = connected();
+    let ask = |model, newest_wins| {
+        let question = softgrasp_protocol::Question::default();
+        Request::Ask(Box::new(Ask { newest_wins, ..Ask::new(ModelHash(model), question) }))
+    };
+    client.write_all(&bytes_of(&ask([1; 32], true), 2)).await.unwrap();
+    client.write_all(&bytes_of(&ask([2; 32], false), 3)).await.unwrap();
+    assert!(connection.has_newer(ModelHash([1; 32])).await);
+    assert!(!connection.has_newer(ModelHash([2; 32])).await, "it lets others be");
+    assert_eq!(request_id(connection.next_frame().await), 2);
+    assert_eq!(request_id(connection.next_frame().await), 3);
+}
+
+#[tokio::test(start_paused = true)]
+async fn client_that_wants_to_hear_of_the_server_is_told_and_its_idle_time_goes_on() {
+    let (mut connection, _client, _) = connected();
+    connection.patience.idle = Some(Duration::from_secs(50));
+    connection.set_alive(Some(Duration::from_secs(20)));
+    let start = Instant::now();
+    let mut told = 0;
+    let ended = loop {
+        match connection.next_frame().await {
+            Ok(Incoming::Silent) => told += 1,
+            ended => break ended,
+        }
+        connection.write_bytes(&[0; 8]).await.unwrap();
+    };
+    assert!(matches!(ended, Err(SessionError::Idle(_))), "{ended:?}");
+    assert_eq!((told, start.elapsed().as_secs()), (2, 50));
+    assert!(matches!(connection.watch(1).await, Watched::Silent));
 }

@@ -8,9 +8,7 @@ use softgrasp_core::solve::Method;
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_core::solve::rates::Rates;
 use softgrasp_core::solve::work::{MeshSize, Work};
-use softgrasp_protocol::{
-    ElementChoice, MeshData, Request, SolveLarge, SolveOnce, SolveSeveral, UploadModel,
-};
+use softgrasp_protocol::{Ask, Body, ElementChoice, MeshData, Request, Subject, UploadModel};
 
 use crate::request::{element_given, element_of, poisson_max};
 
@@ -30,28 +28,24 @@ const SOLVES_PER_CASE: f64 = 1.0;
 /// Units: ms.
 pub(crate) fn request_ms(request: &Request, rates: &Rates) -> f64 {
     match request {
-        Request::SolveOnce(once) => {
-            let SolveOnce { mesh, materials, element, question } = &**once;
-            let element = element_chosen(*element, poisson_max(materials));
-            made_ms(rates, &work_of(mesh, element), method_of(question.method.as_str()))
-        }
-        Request::SolveSeveral(several) => {
-            let SolveSeveral { mesh, materials, element, question, cases, .. } = &**several;
-            let work = work_of(mesh, element_chosen(*element, poisson_max(materials)));
-            let solve_ms = 1e3 * rates.double.solve_entry_s * work.factor_entries;
-            let method = method_of(question.method.as_str());
-            made_ms(rates, &work, method) + SOLVES_PER_CASE * cases.len() as f64 * solve_ms
-        }
-        Request::SolveLarge(large) => {
-            let SolveLarge { mesh, materials, element, .. } = &**large;
-            let work = work_of(mesh, element_chosen(*element, poisson_max(materials)));
-            TANGENTS_OF_A_MOTION * made_ms(rates, &work, Method::FrontMixed)
-        }
+        Request::Ask(ask) => ask_ms(ask, rates),
         Request::UploadModel(UploadModel { mesh, element, .. }) => {
             made_ms(rates, &work_of(mesh, element_of(*element)), Method::Condensed)
         }
         _ => 0.0,
     }
+}
+
+fn ask_ms(ask: &Ask, rates: &Rates) -> f64 {
+    let Ask { subject: Subject::Mesh(body), question, large, cases, .. } = ask else { return 0.0 };
+    let Body { mesh, materials, element } = &**body;
+    let work = work_of(mesh, element_chosen(*element, poisson_max(materials)));
+    if large.is_some() {
+        return TANGENTS_OF_A_MOTION * made_ms(rates, &work, Method::FrontMixed);
+    }
+    let solve_ms = 1e3 * rates.double.solve_entry_s * work.factor_entries;
+    let method = method_of(question.method.as_str());
+    made_ms(rates, &work, method) + SOLVES_PER_CASE * cases.len() as f64 * solve_ms
 }
 
 /// Time until a factor of a kept model is there and has answered.

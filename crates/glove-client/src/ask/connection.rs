@@ -9,8 +9,8 @@ use fea_server::{RunningServer, ServerConfig, StageWatch, StartError};
 use softgrasp_core::solve::rates::Rates;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
-    ConnectionError, DecodeError, EncodeError, Frame, FrameError, HEADER_LEN, Hello, Limits,
-    Rejected, Reply, Request, Welcome,
+    Answer, Ask, ConnectionError, DecodeError, EncodeError, Frame, FrameError, HEADER_LEN, Hello,
+    Limits, Rejected, Reply, Request, VERSION, Welcome,
 };
 
 use crate::ask::endpoint::{Endpoint, TrustError};
@@ -221,15 +221,16 @@ impl ServerConnection {
                 version: String::new(),
                 threads: 0,
                 limits: Limits::default(),
+                wire: VERSION,
+                capabilities: Vec::new(),
+                idle_ms: 0,
             },
             request_id: 0,
             out: Vec::new(),
             reply_bytes: 0,
         };
-        let hello = Hello {
-            client: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
-            token: endpoint.token,
-        };
+        let client = concat!("glove-client ", env!("CARGO_PKG_VERSION"));
+        let hello = Hello::new(client, endpoint.token);
         match this.ask(&Request::Hello(hello)) {
             Ok(Reply::Welcome(welcome)) => this.welcome = welcome,
             Ok(other) => return Err(unexpected("Hello", &other)),
@@ -269,7 +270,18 @@ impl ServerConnection {
         self.ask_by(request, |this| this.connection.read_frame())
     }
 
-    /// The same for what is answered within a tick: looks for the reply without sleeping for a
+    /// Asks for displacements and waits for the answer.
+    ///
+    /// # Errors
+    /// As [`Self::ask`].
+    pub fn answer(&mut self, ask: Ask) -> Result<Box<Answer>, LinkError> {
+        match self.ask(&Request::Ask(Box::new(ask)))? {
+            Reply::Answer(answer) => Ok(answer),
+            other => Err(unexpected("Ask", &other)),
+        }
+    }
+
+    /// [`Self::ask`] for what is answered within a tick: looks for the reply without sleeping for a
     /// moment, because waking a thread takes as long as solving a frame.
     ///
     /// # Errors
@@ -293,6 +305,7 @@ impl ServerConnection {
             self.reply_bytes = HEADER_LEN + frame.payload.len();
             return match Reply::decode(&frame, &Limits::default())? {
                 Reply::Rejected(rejected) => Err(LinkError::Rejected(rejected)),
+                Reply::Alive => continue,
                 reply => Ok(reply),
             };
         }

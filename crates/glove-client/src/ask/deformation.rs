@@ -1,56 +1,6 @@
 //! How far a deformation may go: linear elasticity, large deformation, or what the scene needs.
 
-use std::fmt;
-use std::str::FromStr;
-
-use softgrasp_protocol::{DeformationChoice, LargeAsk, LawName, Pace, PathChoice};
-
-/// Which equations are solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Deformation {
-    /// Those of small deformation (thesis 3.43).
-    Linear,
-    /// Those of large deformation.
-    Large,
-    /// The linear ones where they promise an error within what is allowed, else the others.
-    Auto,
-}
-
-/// A name that is none of the three.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{name:?} is no kind of deformation; there are linear, large and auto")]
-pub struct DeformationError {
-    /// The name given.
-    pub name: String,
-}
-
-impl Deformation {
-    /// Name on the command line and in reports.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Linear => "linear",
-            Self::Large => "large",
-            Self::Auto => "auto",
-        }
-    }
-}
-
-impl FromStr for Deformation {
-    type Err = DeformationError;
-
-    fn from_str(name: &str) -> Result<Self, DeformationError> {
-        [Self::Linear, Self::Large, Self::Auto]
-            .into_iter()
-            .find(|deformation| deformation.as_str() == name)
-            .ok_or_else(|| DeformationError { name: name.to_owned() })
-    }
-}
-
-impl fmt::Display for Deformation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
-}
+use softgrasp_protocol::{Deformation, LargeAsk, LawName, Pace, PathChoice};
 
 /// Deformation, law and yield stress of an object.
 ///
@@ -72,13 +22,9 @@ impl Elasticity {
 
     /// What a server is asked; `None` where a question of the linear kind is asked.
     pub fn ask(&self, path: PathChoice, pace: Pace) -> Option<LargeAsk> {
-        let deformation = match self.deformation {
-            Deformation::Linear => return None,
-            Deformation::Large => DeformationChoice::Large,
-            Deformation::Auto => DeformationChoice::Auto,
-        };
-        let Self { law, yield_stress, .. } = *self;
-        Some(LargeAsk { deformation, law, yield_stress, path, pace })
+        let Self { deformation, law, yield_stress } = *self;
+        (deformation != Deformation::Linear)
+            .then_some(LargeAsk { deformation, law, yield_stress, path, pace })
     }
 }
 
@@ -87,19 +33,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_read_back_and_others_are_told_what_there_is() {
-        for deformation in [Deformation::Linear, Deformation::Large, Deformation::Auto] {
-            assert_eq!(deformation.as_str().parse(), Ok(deformation));
-        }
-        let error = "huge".parse::<Deformation>().unwrap_err().to_string();
-        assert!(error.contains("linear, large and auto"), "{error}");
-    }
-
-    #[test]
     fn linear_questions_ask_nothing_of_large_deformation() {
         assert_eq!(Elasticity::LINEAR.ask(PathChoice::Continue, Pace::Timely), None);
         let auto = Elasticity { deformation: Deformation::Auto, ..Elasticity::LINEAR };
         let ask = auto.ask(PathChoice::FromRest, Pace::Repeatable).unwrap();
-        assert_eq!(ask.deformation, DeformationChoice::Auto);
+        assert_eq!(ask.deformation, Deformation::Auto);
     }
 }

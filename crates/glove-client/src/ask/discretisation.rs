@@ -1,11 +1,11 @@
 //! Estimates the error that the mesh brings, by solving once more with the other element.
 
 use softgrasp_protocol::{
-    Answer, ElementChoice, ElementName, MethodName, NodeChoice, Precision, Reply, Request,
-    SolveOnce, Want,
+    Answer, Ask, Body, ElementChoice, ElementName, MethodName, NodeChoice, Precision, Question,
+    Want,
 };
 
-use crate::ask::connection::{LinkError, ServerConnection, unexpected};
+use crate::ask::connection::ServerConnection;
 
 /// Estimate of the error that the mesh brings.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,32 +34,29 @@ impl DiscretisationEstimate {
     /// stays what it is.
     pub fn of(
         connection: &mut ServerConnection,
-        request: &SolveOnce,
+        (body, question): (&Body, &Question),
         answer: &Answer,
         displacements: &[[f64; 3]],
     ) -> Self {
-        let first = answer.report.element;
-        let other = match first {
-            ElementName::T4 | ElementName::T4Anp => ElementChoice::T10,
-            ElementName::T10 => ElementChoice::T4,
+        let is_quadratic = answer.report.element == ElementName::T10;
+        let element = if is_quadratic { ElementChoice::T4 } else { ElementChoice::T10 };
+        let question = Question {
+            method: MethodName::auto(),
+            max_error: Some(SECOND_ERROR_MAX),
+            deadline_ms: None,
+            want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+            ..question.clone()
         };
-        let mut second = request.clone();
-        second.element = other;
-        second.question.method = MethodName::auto();
-        second.question.max_error = Some(SECOND_ERROR_MAX);
-        second.question.deadline_ms = None;
-        second.question.want =
-            Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 };
-        let second = match ask(connection, second) {
-            Ok(second) => second,
+        let second = match connection.answer(Ask::new(Body { element, ..body.clone() }, question)) {
+            Ok(second) => second.displacements.into_f64(),
             Err(error) => {
                 let why = format!("the second solve, by the other element, failed: {error}");
                 return Self { rel: None, why };
             }
         };
-        let (linear, quadratic) = match first {
-            ElementName::T4 | ElementName::T4Anp => (displacements, second.as_slice()),
-            ElementName::T10 => (second.as_slice(), displacements),
+        let (linear, quadratic) = match is_quadratic {
+            false => (displacements, second.as_slice()),
+            true => (second.as_slice(), displacements),
         };
         match difference_rel(linear, quadratic) {
             Some(rel) => Self {
@@ -70,13 +67,6 @@ impl DiscretisationEstimate {
             },
             None => Self { rel: None, why: "nothing moves".to_owned() },
         }
-    }
-}
-
-fn ask(connection: &mut ServerConnection, request: SolveOnce) -> Result<Vec<[f64; 3]>, LinkError> {
-    match connection.ask(&Request::SolveOnce(Box::new(request)))? {
-        Reply::Answer(answer) => Ok(answer.displacements.into_f64()),
-        other => Err(unexpected("SolveOnce", &other)),
     }
 }
 

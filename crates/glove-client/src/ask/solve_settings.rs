@@ -3,9 +3,9 @@
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_grasp::object::ContactModel;
-use softgrasp_protocol::{ElementName, Material, MethodName};
+use softgrasp_protocol::{Deformation, ElementName, Material, MethodName};
 
-use crate::ask::deformation::{Deformation, Elasticity};
+use crate::ask::deformation::Elasticity;
 
 /// What the object is made of and how it is to be solved.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,10 +2,10 @@
 
 use anyhow::{Context, bail};
 use clap::Args;
-use softgrasp_protocol::{LawName, MethodName};
+use softgrasp_protocol::{Deformation, LawName, MethodName};
 
 use super::numbers::positive;
-use crate::ask::deformation::{Deformation, Elasticity};
+use crate::ask::deformation::Elasticity;
 use crate::object::scene::SceneFile;
 
 /// How the object deforms.

@@ -12,9 +12,8 @@ use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::solve_report::{SCHEMA, SolveSummary};
 use softgrasp_protocol::{
-    Answer, CaseAnswer, Displacements, DofValue, ElementChoice, LargeAnswer, LargeAsk, LargeReport,
-    Material, MethodName, NodeChoice, Pace, PathChoice, Precision, Question, Reply, Request,
-    SolveLarge, SolveOnce, SolveSeveral, Want,
+    Ask, Body, CaseAnswer, Deformation, Displacements, DofValue, ElementChoice, Material,
+    MethodName, NodeChoice, Pace, PathChoice, Precision, Question, Want, Warning, WarningCode,
 };
 
 use super::access_arguments::AccessArguments;
@@ -23,8 +22,8 @@ use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
 use super::solve_cases::{CaseFiles, read_values};
 use crate::ask::calculix_deck::CalculixDeck;
-use crate::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
-use crate::ask::deformation::{Deformation, Elasticity};
+use crate::ask::connection::{Host, ServerChoice};
+use crate::ask::deformation::Elasticity;
 use crate::ask::discretisation::DiscretisationEstimate;
 use crate::ask::displacement_table::{DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError};
 use crate::ask::model_upload::mesh_data;
@@ -134,16 +133,6 @@ struct MeshSummary {
     orphans: usize,
 }
 
-/// What the server said.
-struct Asked {
-    /// The first case's answer.
-    answer: Box<Answer>,
-    /// What is known of its large deformation, where that was asked for.
-    large: Option<LargeReport>,
-    /// The cases after the first.
-    further: Vec<CaseAnswer>,
-}
-
 fn parse_out(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|e| e.to_str()) {
@@ -176,39 +165,47 @@ impl SolveCommand {
             ServerChoice::At(address) => format!("solving for {nodes} nodes at {address}"),
         });
         progress.watch(host.stage());
-        let request = SolveOnce {
+        let body = Body {
             mesh: mesh_data(&file.mesh),
             materials: vec![Material { young: self.young, poisson: self.poisson }],
             element: self.element,
-            question,
         };
+        // A second solve asks about the same body.
+        let again = self.estimate_discretisation.then(|| (body.clone(), question.clone()));
         let start = Instant::now();
-        let large = elasticity.ask(PathChoice::FromRest, Pace::Repeatable);
-        let Asked { mut answer, large, further } =
-            self.ask_all(&mut connection, &request, large, cases)?;
+        let ask = Ask {
+            large: elasticity.ask(PathChoice::FromRest, Pace::Repeatable),
+            cases,
+            without_estimate: self.no_estimate,
+            ..Ask::new(body, question)
+        };
+        let mut answer = connection.answer(ask)?;
         let round_trip_ms = start.elapsed().as_secs_f64() * 1e3;
         progress.now("writing");
-        let summary = SolveSummary::new(&answer.report, round_trip_ms)
-            .with_large(large.as_ref())
-            .with_first_warning(Folds::from_mesh(&file.mesh).map(|folds| folds.to_string()))
+        let folds = Folds::from_mesh(&file.mesh);
+        let folds = folds.map(|folds| Warning::new(WarningCode::MESH, folds.to_string()));
+        let summary = SolveSummary::new(answer.report.clone(), answer.large, round_trip_ms)
+            .with_first_warning(folds)
             .with_bytes(connection.bytes_of_exchange());
         let displacements =
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
         let displacements = displacements.into_f64();
         self.cases().write(0, &file.mesh, &displacements, &answer.reactions)?;
+        let further = std::mem::take(&mut answer.cases);
         self.write_further(&file.mesh, &answer.reactions, further)?;
-        let discretisation = match self.estimate_discretisation {
-            true => {
+        let discretisation = match again {
+            Some((body, question)) => {
                 progress.now("solving again with the other element");
-                DiscretisationEstimate::of(&mut connection, &request, &answer, &displacements)
+                let again = (&body, &question);
+                DiscretisationEstimate::of(&mut connection, again, &answer, &displacements)
             }
-            false => DiscretisationEstimate::not_asked(),
+            None => DiscretisationEstimate::not_asked(),
         };
         if let Some(path) = &self.report {
             write_json(path, &self.report(&file, &host, summary.clone(), discretisation.clone()))?;
         }
         drop(progress);
-        for warning in &summary.warnings {
+        for warning in &summary.report.warnings {
             eprintln!("glove-client: warning: {warning}");
         }
         let mut told = describe(&file, &summary, &self.out);
@@ -231,22 +228,6 @@ impl SolveCommand {
             Some(endpoint) => Host::at(endpoint),
             None => Host::open_within(&self.server, self.threads, limit)?,
         })
-    }
-
-    /// Asks for all cases.
-    fn ask_all(
-        &self,
-        connection: &mut ServerConnection,
-        request: &SolveOnce,
-        large: Option<LargeAsk>,
-        cases: Vec<Vec<f64>>,
-    ) -> Result<Asked, LinkError> {
-        if self.is_several() {
-            let (answer, further) = ask_several(connection, request, cases, !self.no_estimate)?;
-            return Ok(Asked { answer, large: None, further });
-        }
-        let (answer, large) = ask(connection, request, large)?;
-        Ok(Asked { answer, large, further: Vec::new() })
     }
 
     /// Files of the cases after the first; reactions come in the order of the first's.
@@ -293,7 +274,7 @@ impl SolveCommand {
         })
     }
 
-    /// Whether this is a `SolveSeveral`.
+    /// Whether this is more than one question about linear elasticity, or less.
     fn is_several(&self) -> bool {
         self.known.len() > 1 || self.no_estimate
     }
@@ -383,44 +364,6 @@ impl SolveCommand {
     }
 }
 
-/// The answer, and what is reported of large deformation if that was asked for.
-fn ask(
-    connection: &mut ServerConnection,
-    request: &SolveOnce,
-    large: Option<LargeAsk>,
-) -> Result<(Box<Answer>, Option<LargeReport>), LinkError> {
-    let Some(large) = large else {
-        return match connection.ask(&Request::SolveOnce(Box::new(request.clone())))? {
-            Reply::Answer(answer) => Ok((answer, None)),
-            other => Err(unexpected("SolveOnce", &other)),
-        };
-    };
-    let SolveOnce { mesh, materials, element, question } = request.clone();
-    let request = SolveLarge { mesh, materials, element, large, question };
-    match connection.ask(&Request::SolveLarge(Box::new(request)))? {
-        Reply::LargeAnswer(answered) => {
-            let LargeAnswer { answer, large } = *answered;
-            Ok((Box::new(answer), Some(large)))
-        }
-        other => Err(unexpected("SolveLarge", &other)),
-    }
-}
-
-/// The answers to all cases.
-fn ask_several(
-    connection: &mut ServerConnection,
-    request: &SolveOnce,
-    cases: Vec<Vec<f64>>,
-    estimate: bool,
-) -> Result<(Box<Answer>, Vec<CaseAnswer>), LinkError> {
-    let SolveOnce { mesh, materials, element, question } = request.clone();
-    let several = SolveSeveral { mesh, materials, element, question, cases, estimate };
-    match connection.ask(&Request::SolveSeveral(Box::new(several)))? {
-        Reply::SeveralAnswers(answers) => Ok((Box::new(answers.answer), answers.cases)),
-        other => Err(unexpected("SolveSeveral", &other)),
-    }
-}
-
 fn describe_discretisation(estimate: &DiscretisationEstimate) -> String {
     match estimate.rel {
         Some(rel) => format!(
@@ -439,18 +382,18 @@ fn describe(file: &MeshFile, summary: &SolveSummary, outs: &[PathBuf]) -> String
         file.format,
         file.mesh.node_count(),
         file.mesh.tets().len(),
-        summary.method,
-        summary.element,
-        summary.unknown_dofs,
-        summary.known_dofs,
+        summary.report.method,
+        summary.report.element,
+        summary.report.unknown_dofs,
+        summary.report.known_dofs,
         summary.round_trip_ms,
-        summary.residual_rel,
+        summary.report.residual_rel,
     );
-    if summary.max_rotation_deg.is_finite() {
+    if summary.report.max_rotation_deg.is_finite() {
         text.push_str(&format!(
             "largest element rotation {:.2} degrees, strain {:.2} %\n",
-            summary.max_rotation_deg,
-            100.0 * summary.max_strain,
+            summary.report.max_rotation_deg,
+            100.0 * summary.report.max_strain,
         ));
     }
     text.push_str(&describe_large(summary));
@@ -475,7 +418,7 @@ fn describe(file: &MeshFile, summary: &SolveSummary, outs: &[PathBuf]) -> String
 fn describe_large(summary: &SolveSummary) -> String {
     let Some(large) = &summary.large else { return String::new() };
     if summary.deformation == Deformation::Linear.as_str() {
-        return format!("linear, because {}\n", summary.chosen_because);
+        return format!("linear, because {}\n", summary.report.chosen_because);
     }
     format!(
         "large deformation: {} pieces, {} steps, {} solves; estimated error {:.1e}; stretch up to \
@@ -483,7 +426,7 @@ fn describe_large(summary: &SolveSummary) -> String {
         large.substeps,
         large.newton_steps,
         large.linear_solves,
-        summary.error_estimate_rel.unwrap_or(0.0),
+        summary.report.error_estimate_rel.unwrap_or(0.0),
         large.max_stretch,
         large.min_jacobian,
     )

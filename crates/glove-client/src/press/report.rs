@@ -136,7 +136,7 @@ impl StepReport {
             converged: contact.is_converged,
             residual_rel: report.residual_rel,
             error_bound_rel: report.error_bound_rel,
-            why: report.error_bound_why.clone(),
+            why: report.error_bound_why.clone().unwrap_or_default(),
             rounds: contact.rounds,
             newton_steps: contact.newton_steps,
             columns_computed: contact.columns_computed,

@@ -41,15 +41,15 @@ impl AnswerTally {
     /// Counts an answer.
     pub fn add(&mut self, solve: &SolveSummary) {
         self.solves += 1;
-        self.residual_rel_max = self.residual_rel_max.max(solve.residual_rel);
+        self.residual_rel_max = self.residual_rel_max.max(solve.report.residual_rel);
         self.round_trips.add(solve.round_trip_ms);
         self.bytes_sent += solve.request_bytes;
         self.bytes_received += solve.answer_bytes;
         // An answer that has no time to work a number out has none.
         let told = |number: f64| number.is_finite().then_some(number);
-        self.max_rotation_deg = larger(self.max_rotation_deg, told(solve.max_rotation_deg));
-        self.max_strain = larger(self.max_strain, told(solve.max_strain));
-        self.error_estimate_rel_max = larger(self.error_estimate_rel_max, solve.error_estimate_rel);
+        self.max_rotation_deg = larger(self.max_rotation_deg, told(solve.report.max_rotation_deg));
+        self.max_strain = larger(self.max_strain, told(solve.report.max_strain));
+        self.error_estimate_rel_max = larger(self.error_estimate_rel_max, solve.report.error_estimate_rel);
         let large = solve.large.as_ref().filter(|_| solve.deformation == "large");
         if let Some(large) = large {
             self.large_solves += 1;
@@ -57,7 +57,7 @@ impl AnswerTally {
             let least = self.min_jacobian.into_iter().chain([large.min_jacobian]);
             self.min_jacobian = least.min_by(f64::total_cmp);
         }
-        self.peak_rss_bytes = self.peak_rss_bytes.max(solve.peak_rss_bytes);
+        self.peak_rss_bytes = self.peak_rss_bytes.max(solve.report.peak_rss_bytes);
         self.last = Some(solve.clone());
     }
 }

@@ -2,9 +2,10 @@
 
 use softgrasp_grasp::object::ObjectError;
 use softgrasp_protocol::solve_report::SolveSummary;
-use softgrasp_protocol::{LargeAsk, NodeChoice, Pace as FramePace, PathChoice, Question};
+use softgrasp_protocol::{
+    Deformation, LargeAsk, NodeChoice, Pace as FramePace, PathChoice, Question,
+};
 
-use crate::ask::deformation::Deformation;
 use crate::ask::link::{LinkEvent, Reached, RequestEnd};
 use crate::ask::unanswered::Unanswered;
 use crate::object::object_changes::UNCOUNTED;
@@ -147,7 +148,7 @@ impl GraspLoop {
         } = reached;
         let ms = round_trip.as_secs_f64() * 1e3;
         if tick != UNCOUNTED {
-            let summary = SolveSummary::new(&report, ms).with_large(large.as_ref());
+            let summary = SolveSummary::new((*report).clone(), large, ms);
             outcome.answers.push((tick, summary.with_bytes(bytes)));
             outcome.from_rest.extend(from_rest.then_some(tick));
         }

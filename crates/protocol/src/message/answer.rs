@@ -1,10 +1,12 @@
-//! The displacements and forces of an answer, in double or quantised single precision.
+//! The answer to a request: displacements and forces of one case or several, and their report.
 
 use wincode::{SchemaRead, SchemaWrite};
 
 use super::dof_value::DofValue;
+use super::large::LargeReport;
 use super::question::{NodeChoice, Precision};
 use super::report::SolveReport;
+use crate::block::Block;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
@@ -23,11 +25,13 @@ pub enum Displacements {
     },
 }
 
-/// Answer to `SolveOnce` and `Frame`.
+/// Answer to an `Ask`: the first case, the report of all, and the further cases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// What it cost and how wrong it can be.
+    /// What it cost and how wrong it can be; of several cases the worst errors.
     pub report: SolveReport,
+    /// What only large deformation has; `None` where linear elasticity was asked for.
+    pub large: Option<LargeReport>,
     /// Nodes that `displacements` belong to, in this order.
     pub nodes: NodeChoice,
     /// Displacements.
@@ -36,18 +40,31 @@ pub struct Answer {
     pub reactions: Vec<DofValue>,
     /// Force of each mask, N, in the order of the question; empty if not asked for.
     pub mask_forces: Vec<[f64; 3]>,
+    /// The further cases, in the order of the request.
+    pub cases: Vec<CaseAnswer>,
+}
+
+/// Displacements and forces of one further case, always in double precision.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CaseAnswer {
+    /// Displacements of the same nodes as the first case's, m.
+    pub displacements: Vec<[f64; 3]>,
+    /// Forces at the same degrees of freedom as the first case's, N.
+    pub reactions: Vec<f64>,
 }
 
 /// Announces the arrays of an [`Answer`].
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 pub(super) struct AnswerPart {
-    report: SolveReport,
+    report: Block,
+    large: Option<Block>,
     listed: bool,
     precision: Precision,
     scale: f64,
     node_count: u32,
     reaction_count: u32,
     mask_force_count: u32,
+    case_count: u32,
 }
 
 impl Displacements {
@@ -105,19 +122,26 @@ impl Answer {
             Displacements::F64(_) => (Precision::F64, 1.0),
             Displacements::F32Quantised { scale, .. } => (Precision::F32Quantised, scale),
         };
+        let of_first = (expected, self.reactions.len());
+        if let Some((what, count, expected)) =
+            self.cases.iter().find_map(|case| case.mismatch(of_first))
+        {
+            return Err(EncodeError::CountMismatch { what, count, expected });
+        }
         Ok(AnswerPart {
-            // A few hundred bytes; the arrays are not copied.
-            report: self.report.clone(),
+            report: self.report.block()?,
+            large: self.large.as_ref().map(Block::of).transpose()?,
             listed,
             precision,
             scale,
             node_count: count_of("displacements", expected)?,
             reaction_count: count_of(REACTIONS, self.reactions.len())?,
             mask_force_count: count_of(MASK_FORCES, self.mask_forces.len())?,
+            case_count: count_of(CASES, self.cases.len())?,
         })
     }
 
-    /// Arrays: nodes if listed, displacements, reactions, forces of masks.
+    /// Arrays: nodes if listed, displacements, reactions, forces of masks, the cases one by one.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         if let NodeChoice::Nodes(nodes) = &self.nodes {
             writer.array(nodes);
@@ -128,13 +152,20 @@ impl Answer {
         }
         writer.dof_values(&self.reactions);
         writer.array(&self.mask_forces);
+        for case in &self.cases {
+            writer.array(&case.displacements);
+            writer.array(&case.reactions);
+        }
     }
 
     /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
     pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
         part: AnswerPart,
+        limits: &Limits,
     ) -> Result<Self, DecodeError> {
+        let report = SolveReport::read(&part.report, limits)?;
+        let large = part.large.map(|block| block.read()).transpose()?;
         let count = part.node_count as usize;
         let nodes = if part.listed {
             NodeChoice::Nodes(reader.array("answered nodes", count)?)
@@ -150,7 +181,20 @@ impl Answer {
         };
         let reactions = reader.dof_values(REACTIONS, part.reaction_count as usize)?;
         let mask_forces = reader.array(MASK_FORCES, part.mask_force_count as usize)?;
-        Ok(Self { report: part.report, nodes, displacements, reactions, mask_forces })
+        let numbers_per_case = count + reactions.len();
+        if part.case_count > 0 && numbers_per_case == 0 {
+            // Cases without a number take no bytes, so that any count of them would pass.
+            let count = part.case_count;
+            return Err(DecodeError::TooMany { what: CASES, count, count_max: 0 });
+        }
+        let mut cases = Vec::new();
+        for _ in 0..part.case_count {
+            cases.push(CaseAnswer {
+                displacements: reader.array("displacements of a case", count)?,
+                reactions: reader.array("reactions of a case", reactions.len())?,
+            });
+        }
+        Ok(Self { report, large, nodes, displacements, reactions, mask_forces, cases })
     }
 
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
@@ -165,20 +209,32 @@ impl Answer {
     ) -> Result<Self, DecodeError> {
         let part: AnswerPart = reader.part()?;
         part.check(limits)?;
-        Self::read_arrays(reader, part)
+        Self::read_arrays(reader, part, limits)
     }
 }
 
 impl AnswerPart {
     pub(super) fn check(&self, limits: &Limits) -> Result<(), DecodeError> {
-        self.report.check(limits)?;
         check_count("displacements", self.node_count, limits.node_count_max)?;
         check_count(REACTIONS, self.reaction_count, limits.dof_count_max)?;
         check_count(MASK_FORCES, self.mask_force_count, limits.dof_count_max)?;
+        check_count(CASES, self.case_count, limits.dof_count_max)?;
         Ok(())
     }
 }
 
+impl CaseAnswer {
+    /// The list whose length is not that of the first case, its length and the one it should have.
+    fn mismatch(&self, (nodes, reactions): (usize, usize)) -> Option<(&'static str, usize, usize)> {
+        let lists = [
+            ("displacements of a case", self.displacements.len(), nodes),
+            ("reactions of a case", self.reactions.len(), reactions),
+        ];
+        lists.into_iter().find(|(_, count, expected)| count != expected)
+    }
+}
+
+const CASES: &str = "cases";
 const REACTIONS: &str = "reaction forces";
 const MASK_FORCES: &str = "forces of masks";
 

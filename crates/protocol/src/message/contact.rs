@@ -7,6 +7,7 @@ use super::model::ModelHash;
 use super::object_state::{ObjectState, ObjectStatePart};
 use super::question::{NodeChoice, Precision};
 use super::rigid_body::{BodyMotion, check_bodies, count_of_bodies, read_bodies, write_bodies};
+use crate::block::Block;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
@@ -129,8 +130,8 @@ pub struct BodyLoad {
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 struct ContactFramePart {
     model: ModelHash,
-    ask: ContactAsk,
-    state: ObjectStatePart,
+    ask: Block,
+    state: Block,
     body_count: u32,
     triangle_count: u32,
     /// Whether nodes are listed.
@@ -141,9 +142,9 @@ struct ContactFramePart {
 
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 struct ContactAnswerPart {
-    answer: AnswerPart,
-    contact: ContactReport,
-    state: ObjectStatePart,
+    answer: Block,
+    contact: Block,
+    state: Block,
     point_count: u32,
     load_count: u32,
 }
@@ -169,8 +170,8 @@ impl ContactFrame {
         };
         writer.part(&ContactFramePart {
             model: self.model,
-            ask: self.ask,
-            state: self.state.part()?,
+            ask: Block::of(&self.ask)?,
+            state: Block::of(&self.state.part()?)?,
             body_count: count_of_bodies(&self.bodies)?,
             triangle_count: count_of(TRIANGLES, expected)?,
             listed: matches!(self.nodes, NodeChoice::Nodes(_)),
@@ -190,18 +191,19 @@ impl ContactFrame {
         limits: &Limits,
     ) -> Result<Self, DecodeError> {
         let part: ContactFramePart = reader.part()?;
-        part.state.check(limits)?;
+        let state: ObjectStatePart = part.state.read()?;
+        state.check(limits)?;
         check_bodies(part.body_count, limits)?;
         let triangle_count = check_count(TRIANGLES, part.triangle_count, limits.dof_count_max)?;
         let node_count = check_count(NODES, part.node_count, limits.node_count_max)?;
-        let state = ObjectState::read_arrays(reader, part.state)?;
+        let state = ObjectState::read_arrays(reader, state)?;
         let bodies = read_bodies(reader, part.body_count as usize, limits)?;
         let corners: Vec<u32> = reader.array(TRIANGLES, 3 * triangle_count)?;
         let triangle_bodies = reader.array("bodies of candidate triangles", triangle_count)?;
         let nodes = reader.array(NODES, node_count)?;
         Ok(Self {
             model: part.model,
-            ask: part.ask,
+            ask: part.ask.read()?,
             state,
             bodies,
             triangles: corners.as_chunks::<3>().0.to_vec(),
@@ -215,9 +217,9 @@ impl ContactFrame {
 impl ContactAnswer {
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
         writer.part(&ContactAnswerPart {
-            answer: self.answer.part()?,
-            contact: self.contact,
-            state: self.state.part()?,
+            answer: Block::of(&self.answer.part()?)?,
+            contact: Block::of(&self.contact)?,
+            state: Block::of(&self.state.part()?)?,
             point_count: count_of(POINTS, self.points.len())?,
             load_count: count_of(LOADS, self.loads.len())?,
         })?;
@@ -245,12 +247,14 @@ impl ContactAnswer {
         limits: &Limits,
     ) -> Result<Self, DecodeError> {
         let part: ContactAnswerPart = reader.part()?;
-        part.answer.check(limits)?;
-        part.state.check(limits)?;
+        let answer: AnswerPart = part.answer.read()?;
+        answer.check(limits)?;
+        let state: ObjectStatePart = part.state.read()?;
+        state.check(limits)?;
         let point_count = check_count(POINTS, part.point_count, limits.dof_count_max)?;
         let load_count = check_count(LOADS, part.load_count, limits.node_count_max)?;
-        let answer = Answer::read_arrays(reader, part.answer)?;
-        let state = ObjectState::read_arrays(reader, part.state)?;
+        let answer = Answer::read_arrays(reader, answer, limits)?;
+        let state = ObjectState::read_arrays(reader, state)?;
         let names: Vec<u32> = reader.array(POINTS, 2 * point_count)?;
         let numbers: Vec<f64> = reader.array(POINTS, POINT_NUMBERS * point_count)?;
         let contacts: Vec<u32> = reader.array(LOADS, load_count)?;
@@ -275,6 +279,6 @@ impl ContactAnswer {
             contacts,
         });
         let (points, loads) = (points.collect(), loads.collect());
-        Ok(Self { answer, contact: part.contact, state, points, loads })
+        Ok(Self { answer, contact: part.contact.read()?, state, points, loads })
     }
 }

@@ -1,74 +1,97 @@
-//! The messages for large deformation, and what an answer reports about it.
+//! Large deformation: what a client asks (law, yield stress, path, pace) and what an answer reports.
 
 use std::fmt;
+use std::str::FromStr;
 
+use serde::Serialize;
 use wincode::{SchemaRead, SchemaWrite};
 
-use super::answer::{Answer, AnswerPart};
-use super::large_ask::LargeAsk;
-use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
-use super::model::ModelHash;
-use super::names::ElementChoice;
-use super::question::{Question, QuestionPart};
-use crate::payload::{PayloadReader, PayloadWriter};
-use crate::{DecodeError, EncodeError, Limits};
-
-/// Mesh, material, partition and question in one request, for large deformation.
+/// What an `Ask` about large deformation says beside its question.
 ///
-/// All known displacements move in proportion, from rest to their values.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SolveLarge {
-    /// Nodes and elements.
-    pub mesh: MeshData,
-    /// One material, or one for each region.
-    pub materials: Vec<Material>,
-    /// Which element, or the server's choice.
-    pub element: ElementChoice,
-    /// Law, yield stress, and whether a linear answer may do.
-    pub large: LargeAsk,
-    /// What is known and asked.
-    pub question: Question,
+/// Units: `yield_stress` Pa.
+#[derive(Clone, Copy, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
+pub struct LargeAsk {
+    /// Whether the server may answer linearly where that is good enough.
+    pub deformation: Deformation,
+    /// Energy of the material.
+    pub law: LawName,
+    /// Above it the material flows and stays deformed; `None` for a material that never flows.
+    pub yield_stress: Option<f64>,
+    /// Where the path begins; of no effect for a mesh that comes along.
+    pub path: PathChoice,
+    /// Whether the clock may decide what is done.
+    pub pace: Pace,
 }
 
-/// Question about a kept model, for large deformation.
-///
-/// A session follows one path per model: each frame goes on from the shape of the last one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LargeFrame {
-    /// Which model.
-    pub model: ModelHash,
-    /// Law, yield stress, path and pace.
-    pub large: LargeAsk,
-    /// What is known and asked.
-    pub question: Question,
-}
-
-/// Answer to `SolveLarge` and `LargeFrame`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LargeAnswer {
-    /// Displacements, forces and the report of every answer.
-    pub answer: Answer,
-    /// What only large deformation has.
-    pub large: LargeReport,
-}
-
-/// Deformation that an answer is of.
+/// Which equations are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
-pub enum DeformationName {
-    /// Linear elasticity.
-    #[default]
-    Linear,
+pub enum Deformation {
     /// Equilibrium of the deformed body.
+    #[default]
     Large,
+    /// Linear elasticity where rotation and strain promise an error within the budget, large
+    /// deformation elsewhere.
+    Auto,
+    /// Linear elasticity (thesis 3.43). A server is asked for it by leaving [`LargeAsk`] out.
+    Linear,
+}
+
+/// Energy W of the material per volume at rest, F being the deformation gradient and J = det F.
+///
+/// The constants μ, κ and λ follow from Young's modulus and Poisson's ratio.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub enum LawName {
+    /// W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/2 (J − 1)².
+    #[default]
+    NeoHookean,
+    /// W = μ/2 (tr FᵀF − 3) − μ ln J + λ/2 ln² J.
+    NeoHookeanLog,
+}
+
+/// Where the path of a frame at large deformation begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub enum PathChoice {
+    /// At the shape of this session's last such frame on this model; at rest if there is none.
+    #[default]
+    Continue,
+    /// At rest.
+    FromRest,
+}
+
+/// Whether the clock may decide what is done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub enum Pace {
+    /// What is done does not depend on the clock: the same frames give the same bits.
+    #[default]
+    Repeatable,
+    /// Work made beside the frames is used as soon as it is there.
+    Timely,
+}
+
+/// A text that names no deformation.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{name:?} is no kind of deformation; there are linear, large and auto")]
+pub struct DeformationError {
+    /// The text.
+    pub name: String,
+}
+
+/// A text that names no law.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no law is called {name:?}; there are neo-hookean and neo-hookean-log")]
+pub struct LawNameError {
+    /// The text.
+    pub name: String,
 }
 
 /// Report of one solve for large deformation, beside the `SolveReport`.
 ///
 /// Units: none; `…_rel` relative.
-#[derive(Clone, Copy, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, SchemaRead, SchemaWrite)]
 pub struct LargeReport {
-    /// Deformation that was used.
-    pub deformation: DeformationName,
+    /// Whether linear elasticity was good enough and gave the answer.
+    #[serde(skip)]
+    pub is_linear: bool,
     /// Steps of Newton's method.
     pub newton_steps: u32,
     /// Linear systems that were solved.
@@ -92,100 +115,67 @@ pub struct LargeReport {
     pub plastic_strain: f64,
 }
 
-#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
-struct SolveLargePart {
-    mesh: MeshPart,
-    element: ElementChoice,
-    large: LargeAsk,
-    question: QuestionPart,
-}
-
-#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
-struct LargeFramePart {
-    model: ModelHash,
-    large: LargeAsk,
-    question: QuestionPart,
-}
-
-#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
-struct LargeAnswerPart {
-    answer: AnswerPart,
-    large: LargeReport,
-}
-
-impl SolveLarge {
-    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
-        writer.part(&SolveLargePart {
-            mesh: MeshPart::of(&self.mesh, &self.materials)?,
-            element: self.element,
-            large: self.large,
-            question: self.question.part()?,
-        })?;
-        write_mesh(writer, &self.mesh, &self.materials);
-        self.question.write_arrays(writer);
-        Ok(())
-    }
-
-    pub(super) fn read(
-        reader: &mut PayloadReader<'_>,
-        limits: &Limits,
-    ) -> Result<Self, DecodeError> {
-        let part: SolveLargePart = reader.part()?;
-        part.mesh.check(limits)?;
-        part.question.check(limits)?;
-        let (mesh, materials) = read_mesh(reader, &part.mesh)?;
-        let question = Question::read_arrays(reader, part.question)?;
-        Ok(Self { mesh, materials, element: part.element, large: part.large, question })
-    }
-}
-
-impl LargeFrame {
-    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
-        let question = self.question.part()?;
-        writer.part(&LargeFramePart { model: self.model, large: self.large, question })?;
-        self.question.write_arrays(writer);
-        Ok(())
-    }
-
-    pub(super) fn read(
-        reader: &mut PayloadReader<'_>,
-        limits: &Limits,
-    ) -> Result<Self, DecodeError> {
-        let part: LargeFramePart = reader.part()?;
-        part.question.check(limits)?;
-        let question = Question::read_arrays(reader, part.question)?;
-        Ok(Self { model: part.model, large: part.large, question })
-    }
-}
-
-impl LargeAnswer {
-    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
-        writer.part(&LargeAnswerPart { answer: self.answer.part()?, large: self.large })?;
-        self.answer.write_arrays(writer);
-        Ok(())
-    }
-
-    pub(super) fn read(
-        reader: &mut PayloadReader<'_>,
-        limits: &Limits,
-    ) -> Result<Self, DecodeError> {
-        let part: LargeAnswerPart = reader.part()?;
-        part.answer.check(limits)?;
-        Ok(Self { answer: Answer::read_arrays(reader, part.answer)?, large: part.large })
-    }
-}
-
-impl DeformationName {
-    /// Name used in reports.
+impl Deformation {
+    /// Name used in commands and reports.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Linear => "linear",
             Self::Large => "large",
+            Self::Auto => "auto",
         }
     }
 }
 
-impl fmt::Display for DeformationName {
+impl FromStr for Deformation {
+    type Err = DeformationError;
+
+    fn from_str(name: &str) -> Result<Self, DeformationError> {
+        [Self::Linear, Self::Large, Self::Auto]
+            .into_iter()
+            .find(|deformation| deformation.as_str() == name)
+            .ok_or_else(|| DeformationError { name: name.to_owned() })
+    }
+}
+
+impl fmt::Display for Deformation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+impl LargeReport {
+    /// Deformation that the answer is of.
+    pub const fn deformation(&self) -> Deformation {
+        match self.is_linear {
+            true => Deformation::Linear,
+            false => Deformation::Large,
+        }
+    }
+}
+
+impl LawName {
+    /// Name used in commands and reports.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::NeoHookean => "neo-hookean",
+            Self::NeoHookeanLog => "neo-hookean-log",
+        }
+    }
+}
+
+impl FromStr for LawName {
+    type Err = LawNameError;
+
+    fn from_str(name: &str) -> Result<Self, LawNameError> {
+        match name {
+            "neo-hookean" => Ok(Self::NeoHookean),
+            "neo-hookean-log" => Ok(Self::NeoHookeanLog),
+            _ => Err(LawNameError { name: name.to_owned() }),
+        }
+    }
+}
+
+impl fmt::Display for LawName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.as_str())
     }
@@ -196,15 +186,60 @@ mod tests {
     use super::*;
 
     #[test]
-    fn deformations_are_shown_by_their_names() {
-        assert_eq!(DeformationName::Linear.to_string(), "linear");
-        assert_eq!(format!("{:>6}", DeformationName::Large), " large");
+    fn deformations_read_back_and_others_are_told_what_there_is() {
+        for deformation in [Deformation::Linear, Deformation::Large, Deformation::Auto] {
+            assert_eq!(deformation.as_str().parse(), Ok(deformation));
+            assert_eq!(format!("{deformation:>7}"), format!("{:>7}", deformation.as_str()));
+        }
+        let error = "huge".parse::<Deformation>().unwrap_err();
+        assert_eq!(error.name, "huge");
+        assert!(error.to_string().contains("linear, large and auto"), "{error}");
+    }
+
+    #[test]
+    fn laws_read_back_from_their_names() {
+        for law in [LawName::NeoHookean, LawName::NeoHookeanLog] {
+            assert_eq!(law.as_str().parse(), Ok(law));
+            assert_eq!(law.to_string(), law.as_str());
+        }
+        let error = "hooke".parse::<LawName>().unwrap_err();
+        assert_eq!(error.name, "hooke");
+        let told = [LawName::NeoHookean, LawName::NeoHookeanLog].map(LawName::as_str).join(" and ");
+        assert!(error.to_string().ends_with(&told), "{error}");
+    }
+
+    #[test]
+    fn an_ask_is_its_fields_one_behind_the_other() {
+        let ask = LargeAsk {
+            deformation: Deformation::Auto,
+            law: LawName::NeoHookeanLog,
+            yield_stress: Some(1500.0),
+            path: PathChoice::FromRest,
+            pace: Pace::Timely,
+        };
+        let mut bytes = vec![1, 0, 0, 0, 1, 0, 0, 0, 1];
+        bytes.extend(1500.0_f64.to_le_bytes());
+        bytes.extend([1, 0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!(wincode::serialize(&ask).unwrap(), bytes);
+        assert_eq!(wincode::serialize(&LargeAsk::default()).unwrap(), [0; 17]);
+    }
+
+    #[test]
+    fn a_variant_that_does_not_exist_is_no_ask() {
+        for (at, count) in [(0, 3), (4, 2), (9, 2), (13, 2)] {
+            let mut bytes = [0; 17];
+            bytes[at] = 1;
+            assert!(wincode::deserialize::<LargeAsk>(&bytes).is_ok());
+            bytes[at] = count;
+            let error = wincode::deserialize::<LargeAsk>(&bytes).unwrap_err();
+            assert!(matches!(error, wincode::ReadError::InvalidTagEncoding(_)), "{error}");
+        }
     }
 
     #[test]
     fn a_report_is_its_fields_one_behind_the_other() {
         let report = LargeReport {
-            deformation: DeformationName::Large,
+            is_linear: true,
             newton_steps: 2,
             linear_solves: 3,
             factor_age: 4,
@@ -216,7 +251,8 @@ mod tests {
             settled: false,
             plastic_strain: 0.25,
         };
-        let mut bytes: Vec<u8> = (1..=5_u32).flat_map(u32::to_le_bytes).collect();
+        let mut bytes = vec![1];
+        bytes.extend((2..=5_u32).flat_map(u32::to_le_bytes));
         bytes.extend(0.5_f64.to_le_bytes());
         bytes.push(1);
         bytes.extend(1e-4_f64.to_le_bytes());
@@ -226,6 +262,6 @@ mod tests {
         assert_eq!(wincode::serialize(&report).unwrap(), bytes);
         assert_eq!(wincode::deserialize::<LargeReport>(&bytes).unwrap(), report);
         bytes[0] = 2;
-        assert!(wincode::deserialize::<LargeReport>(&bytes).is_err(), "no third deformation");
+        assert!(wincode::deserialize::<LargeReport>(&bytes).is_err(), "neither yes nor no");
     }
 }

@@ -1,4 +1,4 @@
-//! Models that the server keeps, and requests that name them.
+//! Models that the server keeps: upload, name, hint of what will be touched.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,6 @@ use wincode::{SchemaRead, SchemaWrite};
 use super::masks::{Masks, MasksPart};
 use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
 use super::names::ElementName;
-use super::question::{Question, QuestionPart};
 use super::report::StageMs;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
@@ -52,15 +51,6 @@ pub struct ModelReady {
     pub reused: bool,
     /// What it took.
     pub stage_ms: StageMs,
-}
-
-/// Question about a kept model.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FrameRequest {
-    /// Which model.
-    pub model: ModelHash,
-    /// What is known and asked.
-    pub question: Question,
 }
 
 impl ModelHash {
@@ -122,12 +112,6 @@ struct UploadModelPart {
 }
 
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
-struct FramePart {
-    model: ModelHash,
-    question: QuestionPart,
-}
-
-#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 struct PrefetchPart {
     model: ModelHash,
     node_count: u32,
@@ -157,24 +141,6 @@ impl UploadModel {
         let (mesh, materials) = read_mesh(reader, &part.mesh)?;
         let fixed = reader.array(what, fixed_count)?;
         Ok(Self { mesh, materials, element: part.element, fixed })
-    }
-}
-
-impl FrameRequest {
-    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
-        writer.part(&FramePart { model: self.model, question: self.question.part()? })?;
-        self.question.write_arrays(writer);
-        Ok(())
-    }
-
-    pub(super) fn read(
-        reader: &mut PayloadReader<'_>,
-        limits: &Limits,
-    ) -> Result<Self, DecodeError> {
-        let part: FramePart = reader.part()?;
-        part.question.check(limits)?;
-        let question = Question::read_arrays(reader, part.question)?;
-        Ok(Self { model: part.model, question })
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Serialize, Serializer};
 use wincode::{SchemaRead, SchemaWrite};
 
 /// Name of a solution method: 1 to 32 characters of `a-z 0-9 - _`.
@@ -90,6 +91,10 @@ impl ElementName {
     }
 }
 
+/// Element in a report, by its number: a server may use one that this version does not know.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
+pub struct ElementUsed(u32);
+
 /// Element wanted for one self-contained request; the answer tells which was used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub enum ElementChoice {
@@ -102,6 +107,42 @@ pub enum ElementChoice {
     T4Anp,
     /// The server chooses by material, deadline and memory.
     Auto,
+}
+
+impl ElementUsed {
+    /// The element, if this version knows it.
+    pub fn name(self) -> Option<ElementName> {
+        [ElementName::T4, ElementName::T10, ElementName::T4Anp]
+            .into_iter()
+            .find(|name| Self::from(*name) == self)
+    }
+}
+
+impl From<ElementName> for ElementUsed {
+    fn from(name: ElementName) -> Self {
+        Self(name as u32)
+    }
+}
+
+impl PartialEq<ElementName> for ElementUsed {
+    fn eq(&self, name: &ElementName) -> bool {
+        *self == Self::from(*name)
+    }
+}
+
+impl fmt::Display for ElementUsed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.name() {
+            Some(name) => name.fmt(f),
+            None => write!(f, "element {}", self.0),
+        }
+    }
+}
+
+impl Serialize for ElementUsed {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
 }
 
 impl From<ElementName> for ElementChoice {
@@ -154,7 +195,11 @@ mod tests {
             let choice: ElementChoice = name.as_str().parse().unwrap();
             assert_eq!(choice, name.into());
             assert_eq!(wincode::serialize(&choice).unwrap(), wincode::serialize(&name).unwrap());
+            let used = ElementUsed::from(name);
+            assert_eq!(wincode::serialize(&used).unwrap(), wincode::serialize(&name).unwrap());
+            assert_eq!((used.name(), used.to_string()), (Some(name), name.to_string()));
         }
+        assert_eq!((ElementUsed(7).name(), ElementUsed(7).to_string()), (None, "element 7".into()));
         assert_eq!("auto".parse(), Ok(ElementChoice::Auto));
         assert!("T4".parse::<ElementChoice>().unwrap_err().to_string().contains("t10 and auto"));
     }

@@ -4,8 +4,7 @@ use wincode::{SchemaRead, SchemaWrite};
 
 use super::dof_value::DofValue;
 use super::masks::{Masks, MasksPart};
-use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
-use super::names::{ElementChoice, MethodName};
+use super::names::MethodName;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
@@ -67,19 +66,6 @@ pub struct Question {
     pub deadline_ms: Option<f64>,
 }
 
-/// Mesh, material, partition and question in one request, as in the thesis (5.1.1).
-#[derive(Clone, Debug, PartialEq)]
-pub struct SolveOnce {
-    /// Nodes and elements.
-    pub mesh: MeshData,
-    /// One material, or one for each region.
-    pub materials: Vec<Material>,
-    /// Which element, or the server's choice.
-    pub element: ElementChoice,
-    /// What is known and asked.
-    pub question: Question,
-}
-
 /// Announces the arrays of a [`Question`].
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 pub(super) struct QuestionPart {
@@ -98,13 +84,6 @@ pub(super) struct QuestionPart {
 enum NodeChoicePart {
     All,
     Nodes { count: u32 },
-}
-
-#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
-struct SolveOncePart {
-    mesh: MeshPart,
-    element: ElementChoice,
-    question: QuestionPart,
 }
 
 impl Question {
@@ -176,30 +155,5 @@ impl QuestionPart {
             check_count("wanted nodes", count, limits.node_count_max)?;
         }
         Ok(())
-    }
-}
-
-impl SolveOnce {
-    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
-        writer.part(&SolveOncePart {
-            mesh: MeshPart::of(&self.mesh, &self.materials)?,
-            element: self.element,
-            question: self.question.part()?,
-        })?;
-        write_mesh(writer, &self.mesh, &self.materials);
-        self.question.write_arrays(writer);
-        Ok(())
-    }
-
-    pub(super) fn read(
-        reader: &mut PayloadReader<'_>,
-        limits: &Limits,
-    ) -> Result<Self, DecodeError> {
-        let part: SolveOncePart = reader.part()?;
-        part.mesh.check(limits)?;
-        part.question.check(limits)?;
-        let (mesh, materials) = read_mesh(reader, &part.mesh)?;
-        let question = Question::read_arrays(reader, part.question)?;
-        Ok(Self { mesh, materials, element: part.element, question })
     }
 }

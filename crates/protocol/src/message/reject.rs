@@ -4,61 +4,53 @@ use std::fmt;
 
 use wincode::{SchemaRead, SchemaWrite};
 
-use crate::{DecodeError, Limits};
+use crate::header::Header;
+use crate::payload::{PayloadReader, PayloadWriter};
+use crate::{DecodeError, EncodeError, Kind, Limits};
 
 /// Reason of a refusal; the numbers are part of the format and never change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
-#[wincode(tag_encoding = "u16")]
-#[repr(u16)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RejectCode {
     /// The message does not decode, or its content makes no sense (index out of range, NaN, …).
-    #[wincode(tag = 1)]
-    BadRequest = 1,
+    BadRequest,
     /// No model has this hash here; upload it.
-    #[wincode(tag = 2)]
-    UnknownModel = 2,
+    UnknownModel,
     /// The known displacements leave the body, or a part of it, free to move rigidly.
-    #[wincode(tag = 3)]
-    RigidMotionFree = 3,
+    RigidMotionFree,
     /// Mesh or request over a limit of the server.
-    #[wincode(tag = 4)]
-    TooLarge = 4,
+    TooLarge,
     /// Too many sessions or requests; try again later.
-    #[wincode(tag = 5)]
-    Busy = 5,
+    Busy,
     /// Token missing or wrong.
-    #[wincode(tag = 6)]
-    NotAuthorised = 6,
+    NotAuthorised,
     /// No method has this name.
-    #[wincode(tag = 7)]
-    UnknownMethod = 7,
+    UnknownMethod,
     /// The stiffness matrix of the free degrees of freedom is not positive definite.
-    #[wincode(tag = 8)]
-    NotPositiveDefinite = 8,
+    NotPositiveDefinite,
     /// The solve would need more memory than the server may use.
-    #[wincode(tag = 9)]
-    MemoryLimit = 9,
+    MemoryLimit,
     /// The answer could not be had in time.
-    #[wincode(tag = 10)]
-    Deadline = 10,
+    Deadline,
     /// The server is about to end.
-    #[wincode(tag = 11)]
-    ShuttingDown = 11,
+    ShuttingDown,
     /// The server is at fault.
-    #[wincode(tag = 12)]
-    Internal = 12,
+    Internal,
     /// The server does not speak the client's protocol version.
-    #[wincode(tag = 13)]
-    UnsupportedVersion = 13,
+    UnsupportedVersion,
     /// The answer would have no certain digit: what is known holds the body too weakly, or, with
     /// large deformation, no equilibrium was found.
-    #[wincode(tag = 14)]
-    Uncertain = 14,
+    Uncertain,
+    /// The client has cancelled the request.
+    Cancelled,
+    /// A newer request of the client has made this one needless.
+    Superseded,
+    /// A reason that this version of the crate does not know, by its number.
+    Other(u16),
 }
 
 impl RejectCode {
-    /// All codes, in the order of their numbers.
-    pub const ALL: [Self; 14] = [
+    /// All codes that are known, in the order of their numbers, which count from 1.
+    pub const ALL: [Self; 16] = [
         Self::BadRequest,
         Self::UnknownModel,
         Self::RigidMotionFree,
@@ -73,11 +65,22 @@ impl RejectCode {
         Self::Internal,
         Self::UnsupportedVersion,
         Self::Uncertain,
+        Self::Cancelled,
+        Self::Superseded,
     ];
 
     /// Number on the wire.
-    pub const fn number(self) -> u16 {
-        self as u16
+    pub fn number(self) -> u16 {
+        match self {
+            Self::Other(number) => number,
+            known => Self::ALL.iter().take_while(|code| **code != known).count() as u16 + 1,
+        }
+    }
+
+    /// Code with this number.
+    pub fn from_number(number: u16) -> Self {
+        let known = usize::from(number).checked_sub(1).and_then(|at| Self::ALL.get(at));
+        known.copied().unwrap_or(Self::Other(number))
     }
 }
 
@@ -88,7 +91,7 @@ impl fmt::Display for RejectCode {
 }
 
 /// The request is not granted; the session goes on.
-#[derive(Clone, Debug, PartialEq, Eq, SchemaRead, SchemaWrite)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rejected {
     /// Why, for the program.
     pub code: RejectCode,
@@ -96,34 +99,101 @@ pub struct Rejected {
     pub text: String,
     /// Anything more, for the log; may be empty.
     pub detail: String,
+    /// When to ask again; 0 where the server does not know, or where it is of no use.
+    ///
+    /// Units: ms.
+    pub retry_after_ms: u32,
 }
 
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct RejectedPart {
+    code: u16,
+    text: String,
+    detail: String,
+    retry_after_ms: u32,
+}
+
+/// Versions before parts had a length: code, text and detail stand at the payload's beginning.
+const VERSIONS_WITHOUT_LENGTH: std::ops::RangeInclusive<u16> = 1..=3;
+
 impl Rejected {
-    pub(super) fn check(&self, limits: &Limits) -> Result<(), DecodeError> {
-        limits.check_text("text of the refusal", &self.text)?;
-        limits.check_text("detail of the refusal", &self.detail)
+    /// A refusal without detail.
+    pub fn new(code: RejectCode, text: impl Into<String>) -> Self {
+        Self { code, text: text.into(), detail: String::new(), retry_after_ms: 0 }
+    }
+
+    /// Frame with request id 0 that a peer of another version of the wire can read, as far as that
+    /// version is known; else in this version's form.
+    pub fn encode_for_version(&self, version: u16) -> Vec<u8> {
+        let mut fields = self.code.number().to_le_bytes().to_vec();
+        for text in [&self.text, &self.detail] {
+            fields.extend((text.len() as u64).to_le_bytes());
+            fields.extend(text.as_bytes());
+        }
+        let mut payload = Vec::new();
+        let has_length = !VERSIONS_WITHOUT_LENGTH.contains(&version);
+        if has_length {
+            fields.extend(self.retry_after_ms.to_le_bytes());
+            payload.extend((fields.len() as u64).to_le_bytes());
+        }
+        payload.extend(fields);
+        payload.resize(payload.len().next_multiple_of(8), 0);
+        let version = if has_length { crate::VERSION } else { version };
+        let kind = Kind::Rejected.number();
+        let header = Header::encode_as(version, kind, 0, payload.len() as u32, &payload);
+        [&header[..], &payload].concat()
+    }
+
+    pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        writer.part(&RejectedPart {
+            code: self.code.number(),
+            text: self.text.clone(),
+            detail: self.detail.clone(),
+            retry_after_ms: self.retry_after_ms,
+        })
+    }
+
+    pub(super) fn read(
+        reader: &mut PayloadReader<'_>,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
+        let RejectedPart { code, text, detail, retry_after_ms } = reader.part()?;
+        limits.check_text("text of the refusal", &text)?;
+        limits.check_text("detail of the refusal", &detail)?;
+        Ok(Self { code: RejectCode::from_number(code), text, detail, retry_after_ms })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{FrameBuffer, Reply};
 
     #[test]
-    fn numbers_on_the_wire_are_the_numbers_of_the_enum() {
-        for code in RejectCode::ALL {
-            assert_eq!(wincode::serialize(&code).unwrap(), code.number().to_le_bytes());
+    fn every_number_is_a_code_and_comes_back() {
+        for (at, code) in RejectCode::ALL.into_iter().enumerate() {
+            assert_eq!(usize::from(code.number()), at + 1);
         }
-        let mut known = 0;
         for number in 0..=u16::MAX {
-            match wincode::deserialize::<RejectCode>(&number.to_le_bytes()) {
-                Ok(code) => {
-                    assert_eq!(code.number(), number);
-                    known += 1;
-                }
-                Err(error) => assert!(matches!(error, wincode::ReadError::InvalidTagEncoding(_))),
-            }
+            assert_eq!(RejectCode::from_number(number).number(), number);
         }
-        assert_eq!(known, RejectCode::ALL.len());
+        assert_eq!(RejectCode::from_number(14), RejectCode::Uncertain);
+        assert_eq!(RejectCode::from_number(900), RejectCode::Other(900));
+    }
+
+    #[test]
+    fn refusal_for_another_version_is_in_the_form_of_that_version() {
+        let rejected = Rejected::new(RejectCode::UnsupportedVersion, "too old");
+        let bytes = rejected.encode_for_version(3);
+        assert_eq!(u16::from_le_bytes([bytes[4], bytes[5]]), 3);
+        let mut payload = vec![13, 0, 7, 0, 0, 0, 0, 0, 0, 0];
+        payload.extend(b"too old");
+        payload.extend([0; 8]);
+        payload.resize(payload.len().next_multiple_of(8), 0);
+        assert_eq!(&bytes[crate::HEADER_LEN..], payload);
+        let mut buffer = FrameBuffer::new(Limits::default());
+        buffer.feed(&rejected.encode_for_version(99));
+        let frame = buffer.next_frame().unwrap().unwrap();
+        assert_eq!(Reply::decode(&frame, &Limits::default()).unwrap(), Reply::Rejected(rejected));
     }
 }

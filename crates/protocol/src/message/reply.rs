@@ -2,11 +2,9 @@
 
 use super::answer::Answer;
 use super::contact::ContactAnswer;
-use super::large::LargeAnswer;
 use super::model::ModelReady;
 use super::reject::Rejected;
 use super::session::Welcome;
-use super::several::SeveralAnswers;
 use crate::payload::{PayloadReader, encode_frame};
 use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 
@@ -15,7 +13,7 @@ use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 pub enum Reply {
     /// Answer to `Hello`.
     Welcome(Welcome),
-    /// Answer to `SolveOnce` and `Frame`.
+    /// Answer to `Ask`.
     Answer(Box<Answer>),
     /// Answer to `HaveModel`.
     ModelState {
@@ -26,15 +24,13 @@ pub enum Reply {
     ModelReady(ModelReady),
     /// Refusal of any request.
     Rejected(Rejected),
+    /// Says that the server is there, to a client whose `Hello` asked for it; request id 0.
+    Alive,
     /// Answer to `Ping`.
     Pong {
         /// The number of the `Ping`.
         nonce: u64,
     },
-    /// Answer to `SolveLarge` and `LargeFrame`.
-    LargeAnswer(Box<LargeAnswer>),
-    /// Answer to `SolveSeveral`.
-    SeveralAnswers(Box<SeveralAnswers>),
     /// Answer to `ContactFrame`.
     ContactAnswer(Box<ContactAnswer>),
 }
@@ -48,9 +44,8 @@ impl Reply {
             Self::ModelState { .. } => Kind::ModelState,
             Self::ModelReady(_) => Kind::ModelReady,
             Self::Rejected(_) => Kind::Rejected,
+            Self::Alive => Kind::Alive,
             Self::Pong { .. } => Kind::Pong,
-            Self::LargeAnswer(_) => Kind::LargeAnswer,
-            Self::SeveralAnswers(_) => Kind::SeveralAnswers,
             Self::ContactAnswer(_) => Kind::ContactAnswer,
         }
     }
@@ -67,14 +62,13 @@ impl Reply {
         out: &mut Vec<u8>,
     ) -> Result<(), EncodeError> {
         encode_frame(self.kind(), request_id, limits, out, |writer| match self {
-            Self::Welcome(welcome) => writer.part(welcome),
+            Self::Welcome(welcome) => welcome.write(writer),
             Self::Answer(answer) => answer.write(writer),
             Self::ModelState { known } => writer.part(known),
             Self::ModelReady(ready) => writer.part(ready),
-            Self::Rejected(rejected) => writer.part(rejected),
+            Self::Rejected(rejected) => rejected.write(writer),
+            Self::Alive => writer.part(&()),
             Self::Pong { nonce } => writer.part(nonce),
-            Self::LargeAnswer(answer) => answer.write(writer),
-            Self::SeveralAnswers(answers) => answers.write(writer),
             Self::ContactAnswer(answer) => answer.write(writer),
         })
     }
@@ -87,40 +81,27 @@ impl Reply {
         let kind = frame.kind().ok_or(DecodeError::UnknownKind { kind: frame.header.kind })?;
         let mut reader = PayloadReader::new(&frame.payload);
         let reply = match kind {
-            Kind::Welcome => {
-                let welcome: Welcome = reader.part()?;
-                welcome.check(limits)?;
-                Self::Welcome(welcome)
-            }
+            Kind::Welcome => Self::Welcome(Welcome::read(&mut reader, limits)?),
             Kind::Answer => Self::Answer(Box::new(Answer::read(&mut reader, limits)?)),
             Kind::ModelState => Self::ModelState { known: reader.part()? },
             Kind::ModelReady => Self::ModelReady(reader.part()?),
-            Kind::Rejected => {
-                let rejected: Rejected = reader.part()?;
-                rejected.check(limits)?;
-                Self::Rejected(rejected)
+            Kind::Rejected => Self::Rejected(Rejected::read(&mut reader, limits)?),
+            Kind::Alive => {
+                reader.part::<()>()?;
+                Self::Alive
             }
             Kind::Pong => Self::Pong { nonce: reader.part()? },
-            Kind::LargeAnswer => {
-                Self::LargeAnswer(Box::new(LargeAnswer::read(&mut reader, limits)?))
-            }
-            Kind::SeveralAnswers => {
-                Self::SeveralAnswers(Box::new(SeveralAnswers::read(&mut reader, limits)?))
-            }
             Kind::ContactAnswer => {
                 Self::ContactAnswer(Box::new(ContactAnswer::read(&mut reader, limits)?))
             }
             Kind::Hello
-            | Kind::SolveOnce
+            | Kind::Ask
             | Kind::HaveModel
             | Kind::UploadModel
-            | Kind::Frame
+            | Kind::Cancel
             | Kind::Prefetch
             | Kind::Drop
             | Kind::Ping
-            | Kind::SolveLarge
-            | Kind::LargeFrame
-            | Kind::SolveSeveral
             | Kind::ContactFrame => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;

@@ -1,12 +1,16 @@
-//! The report of an answer: times, residual, error bound, warnings.
+//! The report of an answer: times, residual, error bound, warnings. Its fields are those of the JSON
+//! reports.
 
+use serde::{Serialize, Serializer};
 use wincode::{SchemaRead, SchemaWrite};
 
-use super::names::ElementName;
-use crate::{DecodeError, Limits};
+use super::ask::ReportLevel;
+use super::names::ElementUsed;
+use crate::block::Block;
+use crate::{DecodeError, EncodeError, Limits};
 
 /// Wall time by stage, ms; a stage that was not needed is 0.
-#[derive(Clone, Copy, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, SchemaRead, SchemaWrite)]
 pub struct StageMs {
     /// Payload to arrays.
     pub decode: f64,
@@ -24,50 +28,49 @@ pub struct StageMs {
     pub queue: f64,
 }
 
-/// How much of an answer rounding has left, by the estimate of its error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
-pub enum WarningLevel {
-    /// Nothing is known to be amiss.
-    #[default]
-    None,
-    /// Digits are lost: the estimate is above 1e-9, or above the error that was asked for.
-    Caution,
-    /// Few digits are left: the estimate is above 1e-3.
-    Serious,
-}
+/// How much of an answer rounding has left, by the estimate of its error; a number, since a later
+/// version may have more levels.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite,
+)]
+pub struct WarningLevel(u32);
 
-impl WarningLevel {
-    /// Name used in reports.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Caution => "caution",
-            Self::Serious => "serious",
-        }
-    }
+/// What a warning is about, for programs; a number, since a later version may have more of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
+pub struct WarningCode(pub u16);
+
+/// Something that the user should know.
+#[derive(Clone, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
+pub struct Warning {
+    /// What it is about.
+    pub code: WarningCode,
+    /// The sentence for people.
+    pub text: String,
 }
 
 /// Report of one solve.
 ///
 /// Units: `…_ms` ms, `…_rel` relative, `…_deg` degrees, `…_bytes` bytes.
-#[derive(Clone, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, SchemaRead, SchemaWrite)]
 pub struct SolveReport {
     /// Method that was used.
     pub method: String,
     /// Element that was used.
-    pub element: ElementName,
+    pub element: ElementUsed,
     /// Degrees of freedom solved for.
     pub unknown_dofs: u64,
     /// Degrees of freedom given.
     pub known_dofs: u64,
     /// Wall time by stage.
+    #[serde(rename = "ms")]
     pub stage_ms: StageMs,
     /// Residual over right-hand side, on the free rows.
     pub residual_rel: f64,
-    /// Bound of the relative error, if one could be had.
+    /// Proven bound of the relative error, if one could be had.
     pub error_bound_rel: Option<f64>,
-    /// Where the bound comes from, or why there is none.
-    pub error_bound_why: String,
+    /// Why there is no bound.
+    #[serde(rename = "why")]
+    pub error_bound_why: Option<String>,
     /// Steps of iterative refinement.
     pub refinement_steps: u32,
     /// Largest rotation of an element; linear elasticity is wrong where this is large. NaN where it
@@ -84,7 +87,7 @@ pub struct SolveReport {
     /// What the estimate means.
     pub warning_level: WarningLevel,
     /// What the user should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Largest resident memory of the server so far.
     pub peak_rss_bytes: u64,
     /// Whether a kept factor was used.
@@ -93,12 +96,129 @@ pub struct SolveReport {
     pub chosen_because: String,
 }
 
+impl WarningLevel {
+    /// Nothing is known to be amiss.
+    pub const NONE: Self = Self(0);
+    /// Digits are lost: the estimate is above 1e-9, or above the error that was asked for.
+    pub const CAUTION: Self = Self(1);
+    /// Few digits are left: the estimate is above 1e-3.
+    pub const SERIOUS: Self = Self(2);
+
+    /// Name used in reports; a level that is not known is at least serious.
+    pub const fn as_str(self) -> &'static str {
+        match self.0 {
+            0 => "none",
+            1 => "caution",
+            _ => "serious",
+        }
+    }
+}
+
+impl Serialize for WarningLevel {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.as_str())
+    }
+}
+
+impl WarningCode {
+    /// An element turns so far that linear elasticity is off there.
+    pub const ROTATION: Self = Self(1);
+    /// An element is strained more than linear elasticity is meant for.
+    pub const STRAIN: Self = Self(2);
+    /// Rounding has taken digits.
+    pub const DIGITS: Self = Self(3);
+    /// The answer is later than the deadline of the question.
+    pub const LATE: Self = Self(4);
+    /// The error may be larger than the question asked for.
+    pub const ERROR: Self = Self(5);
+    /// Deadline, error and memory did not go together: the choice of method gave up one of them.
+    pub const CHOICE: Self = Self(6);
+    /// Elements lock: the object seems stiffer than it is.
+    pub const LOCKING: Self = Self(7);
+    /// The touched nodes hold the body weakly.
+    pub const HOLD: Self = Self(8);
+    /// The equilibrium snapped to another shape.
+    pub const SNAP: Self = Self(9);
+    /// An element is pressed so far that surfaces crease.
+    pub const CREASE: Self = Self(10);
+    /// Linear elasticity answers while the equilibrium at large deformation is prepared.
+    pub const PREPARING: Self = Self(11);
+    /// The mesh itself: parts of it lie in one another.
+    pub const MESH: Self = Self(12);
+}
+
+impl Warning {
+    /// A warning with its sentence.
+    pub fn new(code: WarningCode, text: impl Into<String>) -> Self {
+        Self { code, text: text.into() }
+    }
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(&self.text)
+    }
+}
+
+impl Serialize for Warning {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.text)
+    }
+}
+
 impl SolveReport {
-    pub(super) fn check(&self, limits: &Limits) -> Result<(), DecodeError> {
-        limits.check_text("method", &self.method)?;
-        limits.check_text("reason of the error bound", &self.error_bound_why)?;
-        limits.check_text("precision", &self.precision)?;
-        limits.check_text("reason of the choice", &self.chosen_because)?;
-        self.warnings.iter().try_for_each(|warning| limits.check_text("warning", warning))
+    /// As much of it as was asked for.
+    #[must_use]
+    pub fn at_level(self, level: ReportLevel) -> Self {
+        match level {
+            ReportLevel::Full => self,
+            ReportLevel::Short => Self {
+                method: String::new(),
+                error_bound_why: None,
+                precision: String::new(),
+                warnings: Vec::new(),
+                chosen_because: String::new(),
+                ..self
+            },
+            ReportLevel::None => Self::untold(),
+        }
+    }
+
+    /// A report that tells nothing: what must be a number is NaN.
+    pub fn untold() -> Self {
+        Self {
+            residual_rel: f64::NAN,
+            max_rotation_deg: f64::NAN,
+            max_strain: f64::NAN,
+            ..Self::default()
+        }
+    }
+
+    /// Whether it is [`untold`](Self::untold).
+    pub fn is_untold(&self) -> bool {
+        self.residual_rel.is_nan()
+    }
+
+    /// A report that tells nothing takes no bytes.
+    pub(super) fn block(&self) -> Result<Block, EncodeError> {
+        match self.is_untold() {
+            true => Ok(Block::default()),
+            false => Block::of(self),
+        }
+    }
+
+    pub(super) fn read(block: &Block, limits: &Limits) -> Result<Self, DecodeError> {
+        if block.is_empty() {
+            return Ok(Self::untold());
+        }
+        let report: Self = block.read()?;
+        limits.check_text("method", &report.method)?;
+        let why = report.error_bound_why.iter();
+        why.into_iter()
+            .try_for_each(|why| limits.check_text("reason of the error bound", why))?;
+        limits.check_text("precision", &report.precision)?;
+        limits.check_text("reason of the choice", &report.chosen_because)?;
+        report.warnings.iter().try_for_each(|warning| limits.check_text("warning", &warning.text))?;
+        Ok(report)
     }
 }

@@ -1,11 +1,9 @@
 //! All messages of a client as one type.
 
+use super::ask::Ask;
 use super::contact::ContactFrame;
-use super::large::{LargeFrame, SolveLarge};
-use super::model::{FrameRequest, ModelHash, Prefetch, UploadModel};
-use super::question::SolveOnce;
+use super::model::{ModelHash, Prefetch, UploadModel};
 use super::session::Hello;
-use super::several::SolveSeveral;
 use crate::payload::{PayloadReader, encode_frame};
 use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 
@@ -14,14 +12,18 @@ use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 pub enum Request {
     /// Introduces the client; answered by `Welcome`.
     Hello(Hello),
-    /// One self-contained solve; answered by `Answer`.
-    SolveOnce(Box<SolveOnce>),
+    /// Question about a mesh or a kept model; answered by `Answer`.
+    Ask(Box<Ask>),
     /// Is this model known? Answered by `ModelState`.
     HaveModel(ModelHash),
     /// Model to keep; answered by `ModelReady`.
     UploadModel(UploadModel),
-    /// Solve on a kept model; answered by `Answer`.
-    Frame(FrameRequest),
+    /// The request with this id is not wanted any more: it is refused with `Cancelled` unless it has
+    /// been answered. Not answered itself.
+    Cancel {
+        /// Id of the request.
+        request_id: u64,
+    },
     /// Hint, not answered.
     Prefetch(Prefetch),
     /// The model is not needed any more; not answered.
@@ -31,12 +33,6 @@ pub enum Request {
         /// Any number.
         nonce: u64,
     },
-    /// One self-contained solve for large deformation; answered by `LargeAnswer`.
-    SolveLarge(Box<SolveLarge>),
-    /// Large deformation of a kept model; answered by `LargeAnswer`.
-    LargeFrame(Box<LargeFrame>),
-    /// One self-contained solve for several sets of displacements; answered by `SeveralAnswers`.
-    SolveSeveral(Box<SolveSeveral>),
     /// One step of a free object among rigid bodies; answered by `ContactAnswer`.
     ContactFrame(Box<ContactFrame>),
 }
@@ -46,16 +42,13 @@ impl Request {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Hello(_) => Kind::Hello,
-            Self::SolveOnce(_) => Kind::SolveOnce,
+            Self::Ask(_) => Kind::Ask,
             Self::HaveModel(_) => Kind::HaveModel,
             Self::UploadModel(_) => Kind::UploadModel,
-            Self::Frame(_) => Kind::Frame,
+            Self::Cancel { .. } => Kind::Cancel,
             Self::Prefetch(_) => Kind::Prefetch,
             Self::Drop(_) => Kind::Drop,
             Self::Ping { .. } => Kind::Ping,
-            Self::SolveLarge(_) => Kind::SolveLarge,
-            Self::LargeFrame(_) => Kind::LargeFrame,
-            Self::SolveSeveral(_) => Kind::SolveSeveral,
             Self::ContactFrame(_) => Kind::ContactFrame,
         }
     }
@@ -75,15 +68,12 @@ impl Request {
     ) -> Result<(), EncodeError> {
         encode_frame(self.kind(), request_id, limits, out, |writer| match self {
             Self::Hello(hello) => writer.part(hello),
-            Self::SolveOnce(solve) => solve.write(writer),
+            Self::Ask(ask) => ask.write(writer),
             Self::HaveModel(model) | Self::Drop(model) => writer.part(model),
             Self::UploadModel(upload) => upload.write(writer),
-            Self::Frame(frame) => frame.write(writer),
+            Self::Cancel { request_id } => writer.part(request_id),
             Self::Prefetch(prefetch) => prefetch.write(writer),
             Self::Ping { nonce } => writer.part(nonce),
-            Self::SolveLarge(solve) => solve.write(writer),
-            Self::LargeFrame(frame) => frame.write(writer),
-            Self::SolveSeveral(solve) => solve.write(writer),
             Self::ContactFrame(frame) => frame.write(writer),
         })
     }
@@ -101,18 +91,13 @@ impl Request {
                 hello.check(limits)?;
                 Self::Hello(hello)
             }
-            Kind::SolveOnce => Self::SolveOnce(Box::new(SolveOnce::read(&mut reader, limits)?)),
+            Kind::Ask => Self::Ask(Box::new(Ask::read(&mut reader, limits)?)),
             Kind::HaveModel => Self::HaveModel(reader.part()?),
             Kind::UploadModel => Self::UploadModel(UploadModel::read(&mut reader, limits)?),
-            Kind::Frame => Self::Frame(FrameRequest::read(&mut reader, limits)?),
+            Kind::Cancel => Self::Cancel { request_id: reader.part()? },
             Kind::Prefetch => Self::Prefetch(Prefetch::read(&mut reader, limits)?),
             Kind::Drop => Self::Drop(reader.part()?),
             Kind::Ping => Self::Ping { nonce: reader.part()? },
-            Kind::SolveLarge => Self::SolveLarge(Box::new(SolveLarge::read(&mut reader, limits)?)),
-            Kind::LargeFrame => Self::LargeFrame(Box::new(LargeFrame::read(&mut reader, limits)?)),
-            Kind::SolveSeveral => {
-                Self::SolveSeveral(Box::new(SolveSeveral::read(&mut reader, limits)?))
-            }
             Kind::ContactFrame => {
                 Self::ContactFrame(Box::new(ContactFrame::read(&mut reader, limits)?))
             }
@@ -121,9 +106,8 @@ impl Request {
             | Kind::ModelState
             | Kind::ModelReady
             | Kind::Rejected
+            | Kind::Alive
             | Kind::Pong
-            | Kind::LargeAnswer
-            | Kind::SeveralAnswers
             | Kind::ContactAnswer => return Err(DecodeError::WrongDirection { kind }),
         };
         reader.finish()?;

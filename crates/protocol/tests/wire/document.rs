@@ -3,7 +3,7 @@
 use softgrasp_protocol::*;
 
 use crate::golden::{bytes_of_hex, hex};
-use crate::samples::{Message, conversation};
+use crate::samples::{Message, sample, variants};
 
 const DOCUMENT: &str = include_str!("../../../../docs/wire.md");
 
@@ -24,7 +24,7 @@ fn table(title: &str) -> Vec<Vec<String>> {
 fn the_document_is_about_this_version() {
     assert!(DOCUMENT.contains(&format!("| 4 | u16 | protocol version, {VERSION} |")));
     assert!(DOCUMENT.contains(&format!("\nVERSION = {VERSION}\n")), "the Python example");
-    assert!(!DOCUMENT.contains("magic, version 2"), "notes of the examples");
+    assert!(!DOCUMENT.contains("magic, version 3"), "notes of the examples");
 }
 
 /// Names of a structure's fields, from its `{:#?}`, which has them in the order of the wire.
@@ -67,10 +67,6 @@ fn the_document_lists_every_field_of_ask_and_report_of_contact() {
     assert_eq!(first_cells("ContactReport"), report);
 }
 
-fn sample(kind: Kind) -> Message {
-    conversation().into_iter().find(|message| message.kind() == kind).unwrap()
-}
-
 /// Variants as the document writes them: number on the wire and name, separated by commas.
 fn numbered<T>(variants: &[T]) -> String
 where
@@ -86,11 +82,10 @@ where
 #[test]
 fn the_document_numbers_the_choices_of_large_deformation() {
     let known = [
-        ("LargeAsk", 0, numbered(&[DeformationChoice::Large, DeformationChoice::Auto])),
+        ("LargeAsk", 0, numbered(&[Deformation::Large, Deformation::Auto, Deformation::Linear])),
         ("LargeAsk", 1, numbered(&[LawName::NeoHookean, LawName::NeoHookeanLog])),
         ("LargeAsk", 3, numbered(&[PathChoice::Continue, PathChoice::FromRest])),
         ("LargeAsk", 4, numbered(&[Pace::Repeatable, Pace::Timely])),
-        ("LargeReport", 0, numbered(&[DeformationName::Linear, DeformationName::Large])),
     ];
     for (title, row, variants) in known {
         assert_eq!(table(title)[row][1], format!("enum: {variants}"));
@@ -112,6 +107,28 @@ fn the_document_lists_every_reject_code() {
         table("Reject codes").iter().map(|row| format!("{} {}", row[0], row[1])).collect();
     let known: Vec<String> =
         RejectCode::ALL.iter().map(|code| format!("{} `{code}`", code.number())).collect();
+    assert_eq!(written, known);
+}
+
+#[test]
+fn the_document_numbers_the_warnings() {
+    let known = [
+        ("ROTATION", WarningCode::ROTATION),
+        ("STRAIN", WarningCode::STRAIN),
+        ("DIGITS", WarningCode::DIGITS),
+        ("LATE", WarningCode::LATE),
+        ("ERROR", WarningCode::ERROR),
+        ("CHOICE", WarningCode::CHOICE),
+        ("LOCKING", WarningCode::LOCKING),
+        ("HOLD", WarningCode::HOLD),
+        ("SNAP", WarningCode::SNAP),
+        ("CREASE", WarningCode::CREASE),
+        ("PREPARING", WarningCode::PREPARING),
+    ];
+    let known: Vec<String> =
+        known.iter().map(|(name, WarningCode(n))| format!("{n} {name}")).collect();
+    let written: Vec<String> =
+        table("Warnings").iter().map(|row| format!("{} {}", row[0], row[1])).collect();
     assert_eq!(written, known);
 }
 
@@ -138,12 +155,15 @@ fn the_examples_of_the_document_are_real_frames() {
     let blocks = DOCUMENT.split("```hex\n").skip(1).map(|rest| rest.split("```").next().unwrap());
     let shown: Vec<String> =
         blocks.map(|block| hex(&bytes_of_hex(&without_notes(block)))).collect();
-    let frames = |kind: Kind| {
-        let message = conversation().into_iter().find(|message| message.kind() == kind).unwrap();
-        hex(&message.encode())
-    };
-    let kinds = [Kind::Ping, Kind::SolveOnce, Kind::LargeFrame, Kind::LargeAnswer, Kind::Answer];
-    assert_eq!(shown, kinds.map(frames));
+    let variant = |name| variants().into_iter().find(|(known, _)| *known == name).unwrap().1;
+    let messages = [
+        sample(Kind::Ping),
+        sample(Kind::Ask),
+        variant("Ask-large"),
+        variant("Answer-large"),
+        sample(Kind::Answer),
+    ];
+    assert_eq!(shown, messages.map(|message| hex(&message.encode())));
 }
 
 /// The bytes of a block whose lines may end in `; a note`.

@@ -16,61 +16,49 @@ pub fn any_message() -> impl Strategy<Value = Message> {
 }
 
 fn any_request() -> impl Strategy<Value = Request> {
-    let hello = (text(), option::of(text())).prop_map(|(client, token)| Hello { client, token });
+    let hello = (text(), option::of(text()), vec(text(), 0..3), any::<u32>()).prop_map(
+        |(client, token, capabilities, alive_every_ms)| Hello {
+            capabilities,
+            alive_every_ms,
+            ..Hello::new(client, token)
+        },
+    );
     let model = || any::<[u8; 32]>().prop_map(ModelHash);
     let materials = || {
         let one = (number(), number()).prop_map(|(young, poisson)| Material { young, poisson });
         vec(one, 0..4)
     };
-    let large_frame = (model(), large_ask(), question()).prop_map(|(model, large, question)| {
-        Request::LargeFrame(Box::new(LargeFrame { model, large, question }))
-    });
-    let solve_large = (mesh(), materials(), element_choice(), large_ask(), question()).prop_map(
-        |(mesh, materials, element, large, question)| {
-            Box::new(SolveLarge { mesh, materials, element, large, question })
-        },
-    );
-    let solve = (mesh(), materials(), element_choice(), question()).prop_map(
-        |(mesh, materials, element, question)| {
-            Box::new(SolveOnce { mesh, materials, element, question })
+    let body = (mesh(), materials(), element_choice())
+        .prop_map(|(mesh, materials, element)| Body { mesh, materials, element }.into());
+    let subject = prop_oneof![body, model().prop_map(Subject::Model)];
+    let level =
+        prop::sample::select(vec![ReportLevel::Full, ReportLevel::Short, ReportLevel::None]);
+    let choices = (any::<[bool; 2]>(), level);
+    let ask = (subject, question(), option::of(large_ask()), 0..4_usize, choices).prop_map(
+        |(subject, question, large, count, ([without_estimate, newest_wins], report))| {
+            let count = if question.known.is_empty() { 0 } else { count };
+            let case = |k: usize| {
+                let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+                question.known.iter().map(|known| sign * known.value).collect()
+            };
+            let cases = (0..count).map(case).collect();
+            Box::new(Ask { subject, question, large, cases, without_estimate, newest_wins, report })
         },
     );
     let upload = (mesh(), materials(), element(), vec(any::<u32>(), 0..9)).prop_map(
         |(mesh, materials, element, fixed)| UploadModel { mesh, materials, element, fixed },
     );
-    let frame =
-        (model(), question()).prop_map(|(model, question)| FrameRequest { model, question });
     let prefetch = (model(), vec(any::<u32>(), 0..9), masks())
         .prop_map(|(model, nodes, masks)| Request::Prefetch(Prefetch { model, nodes, masks }));
-    let solve_several = (mesh(), materials(), element_choice(), question(), 0..4_usize).prop_map(
-        |(mesh, materials, element, question, count)| {
-            let count = if question.known.is_empty() { 0 } else { count };
-            let cases = (0..count)
-                .map(|case| {
-                    question
-                        .known
-                        .iter()
-                        .map(|k| if case % 2 == 0 { k.value } else { -k.value })
-                        .collect()
-                })
-                .collect();
-            let estimate = count % 2 == 0;
-            let several = SolveSeveral { mesh, materials, element, question, cases, estimate };
-            Request::SolveSeveral(Box::new(several))
-        },
-    );
     prop_oneof![
         hello.prop_map(Request::Hello),
-        solve.prop_map(Request::SolveOnce),
+        ask.prop_map(Request::Ask),
         model().prop_map(Request::HaveModel),
         upload.prop_map(Request::UploadModel),
-        frame.prop_map(Request::Frame),
+        any::<u64>().prop_map(|request_id| Request::Cancel { request_id }),
         prefetch,
         model().prop_map(Request::Drop),
         any::<u64>().prop_map(|nonce| Request::Ping { nonce }),
-        solve_large.prop_map(Request::SolveLarge),
-        large_frame,
-        solve_several,
         contact_frame().prop_map(|frame| Request::ContactFrame(Box::new(frame))),
     ]
 }
@@ -84,10 +72,18 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         material_count_max: n[4],
         text_len_max: n[5],
     });
-    let welcome =
-        (text(), text(), any::<u32>(), limits).prop_map(|(server, version, threads, limits)| {
-            Welcome { server, version, threads, limits }
-        });
+    let numbers = (any::<u32>(), any::<u16>(), any::<u64>());
+    let welcome = (text(), text(), numbers, limits, vec(text(), 0..4)).prop_map(
+        |(server, version, (threads, wire, idle_ms), limits, capabilities)| Welcome {
+            server,
+            version,
+            threads,
+            limits,
+            wire,
+            capabilities,
+            idle_ms,
+        },
+    );
     let ready = (any::<[u8; 32]>(), any::<[u64; 2]>(), any::<bool>(), stage_ms()).prop_map(
         |(model, [unknown_dofs, fixed_dofs], reused, stage_ms)| ModelReady {
             model: ModelHash(model),
@@ -97,21 +93,12 @@ fn any_reply() -> impl Strategy<Value = Reply> {
             stage_ms,
         },
     );
-    let code = prop::sample::select(RejectCode::ALL.to_vec());
-    let rejected =
-        (code, text(), text()).prop_map(|(code, text, detail)| Rejected { code, text, detail });
-    let large_answer = (answer(), large_report())
-        .prop_map(|(answer, large)| Reply::LargeAnswer(Box::new(LargeAnswer { answer, large })));
-    let several = (answer(), 0..4_usize).prop_map(|(answer, count)| {
-        let (nodes, reactions) = (answer.displacements.node_count(), answer.reactions.len());
-        let case = |k: usize| CaseAnswer {
-            displacements: vec![[k as f64, -0.5, 0.0]; nodes],
-            reactions: vec![0.25 * k as f64; reactions],
-        };
-        let count = if nodes + reactions == 0 { 0 } else { count };
-        let cases = (0..count).map(case).collect();
-        Reply::SeveralAnswers(Box::new(SeveralAnswers { answer, cases }))
-    });
+    let rejected = (any::<u16>(), text(), text(), any::<u32>()).prop_map(
+        |(number, text, detail, retry_after_ms)| {
+            let code = RejectCode::from_number(number);
+            Rejected { code, text, detail, retry_after_ms }
+        },
+    );
     prop_oneof![
         welcome.prop_map(Reply::Welcome),
         answer().prop_map(|answer| Reply::Answer(Box::new(answer))),
@@ -119,9 +106,8 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         ready.prop_map(Reply::ModelReady),
         rejected.prop_map(Reply::Rejected),
         any::<u64>().prop_map(|nonce| Reply::Pong { nonce }),
-        large_answer,
+        Just(Reply::Alive),
         contact_answer().prop_map(|answer| Reply::ContactAnswer(Box::new(answer))),
-        several,
     ]
 }
 
@@ -133,20 +119,28 @@ pub fn answer() -> impl Strategy<Value = Answer> {
             Displacements::F32Quantised { scale, values }
         });
     let displacements = prop_oneof![double, single];
-    let parts = (report(), displacements, any::<bool>(), dof_values(), vec(point(), 0..4));
-    parts.prop_map(|(report, displacements, all, reactions, mask_forces)| {
+    let forces = (dof_values(), vec(point(), 0..4));
+    let reports = (report(), option::of(large_report()));
+    let parts = (reports, displacements, any::<bool>(), forces, 0..4_usize);
+    parts.prop_map(|((report, large), displacements, all, (reactions, mask_forces), cases)| {
         let count = u32::try_from(displacements.node_count()).unwrap();
         let nodes = if all {
             NodeChoice::All
         } else {
             NodeChoice::Nodes((0..count).map(|node| node.wrapping_mul(0x9e37_79b9)).collect())
         };
-        Answer { report, nodes, displacements, reactions, mask_forces }
+        let case = |k: usize| CaseAnswer {
+            displacements: vec![[k as f64, -0.5, 0.0]; displacements.node_count()],
+            reactions: vec![0.25 * k as f64; reactions.len()],
+        };
+        let cases = if displacements.node_count() + reactions.len() == 0 { 0 } else { cases };
+        let cases = (0..cases).map(case).collect();
+        Answer { report, large, nodes, displacements, reactions, mask_forces, cases }
     })
 }
 
 fn report() -> impl Strategy<Value = SolveReport> {
-    let texts = (text(), text(), text(), text(), vec(text(), 0..4));
+    let texts = (text(), option::of(text()), text(), text(), vec((any::<u16>(), text()), 0..4));
     let numbers = (prop::array::uniform3(number()), option::of(number()), option::of(number()));
     let counts = (any::<[u64; 3]>(), any::<u32>(), any::<bool>());
     (texts, numbers, counts, element(), stage_ms()).prop_map(
@@ -154,9 +148,12 @@ fn report() -> impl Strategy<Value = SolveReport> {
             let (method, error_bound_why, precision, chosen_because, warnings) = texts;
             let ([residual_rel, max_rotation_deg, max_strain], bound, condition) = numbers;
             let ([unknown_dofs, known_dofs, peak_rss_bytes], steps, factor_reused) = counts;
+            let warnings = warnings.into_iter();
+            let warnings = warnings.map(|(code, text)| Warning::new(WarningCode(code), text));
+            let warnings = warnings.collect();
             SolveReport {
                 method,
-                element,
+                element: element.into(),
                 unknown_dofs,
                 known_dofs,
                 stage_ms,
@@ -169,7 +166,7 @@ fn report() -> impl Strategy<Value = SolveReport> {
                 precision,
                 condition_estimate: condition,
                 error_estimate_rel: condition.map(|c| 1e-16 * c),
-                warning_level: [WarningLevel::None, WarningLevel::Serious][steps as usize % 2],
+                warning_level: [WarningLevel::NONE, WarningLevel::SERIOUS][steps as usize % 2],
                 warnings,
                 peak_rss_bytes,
                 factor_reused,
@@ -180,7 +177,7 @@ fn report() -> impl Strategy<Value = SolveReport> {
 }
 
 fn large_ask() -> impl Strategy<Value = LargeAsk> {
-    let deformation = prop::sample::select(vec![DeformationChoice::Large, DeformationChoice::Auto]);
+    let deformation = prop::sample::select(vec![Deformation::Large, Deformation::Auto]);
     let law = prop::sample::select(vec![LawName::NeoHookean, LawName::NeoHookeanLog]);
     let path = prop::sample::select(vec![PathChoice::Continue, PathChoice::FromRest]);
     let pace = prop::sample::select(vec![Pace::Repeatable, Pace::Timely]);
@@ -196,15 +193,14 @@ fn large_ask() -> impl Strategy<Value = LargeAsk> {
 }
 
 fn large_report() -> impl Strategy<Value = LargeReport> {
-    let deformation = prop::sample::select(vec![DeformationName::Linear, DeformationName::Large]);
     let counts = any::<[u32; 4]>();
     let numbers = (prop::array::uniform3(number()), option::of(number()));
-    (deformation, counts, numbers, any::<[bool; 2]>()).prop_map(
-        |(deformation, counts, numbers, [jumped, settled])| {
+    (counts, numbers, any::<[bool; 3]>()).prop_map(
+        |(counts, numbers, [jumped, settled, is_linear])| {
             let [newton_steps, linear_solves, factor_age, substeps] = counts;
             let ([min_jacobian, max_stretch, plastic_strain], energy_error_rel) = numbers;
             LargeReport {
-                deformation,
+                is_linear,
                 newton_steps,
                 linear_solves,
                 factor_age,

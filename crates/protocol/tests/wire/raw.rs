@@ -5,7 +5,7 @@ use softgrasp_protocol::{Frame, FrameBuffer, Limits};
 /// A sound frame around any payload, written without the crate's own encoder.
 pub fn raw_frame(kind: u16, request_id: u64, payload: &[u8]) -> Vec<u8> {
     let mut bytes = b"SGRP".to_vec();
-    bytes.extend(3_u16.to_le_bytes());
+    bytes.extend(4_u16.to_le_bytes());
     bytes.extend(kind.to_le_bytes());
     bytes.extend(0_u32.to_le_bytes());
     bytes.extend(u32::try_from(payload.len()).unwrap().to_le_bytes());
@@ -16,6 +16,14 @@ pub fn raw_frame(kind: u16, request_id: u64, payload: &[u8]) -> Vec<u8> {
     bytes.extend(frame_crc.to_le_bytes());
     bytes.extend(payload);
     bytes
+}
+
+/// A payload that is only a part with these fields.
+pub fn part_of(fields: &[u8]) -> Vec<u8> {
+    let mut payload = (fields.len() as u64).to_le_bytes().to_vec();
+    payload.extend(fields);
+    payload.resize(payload.len().next_multiple_of(8), 0);
+    payload
 }
 
 /// The one frame in `bytes`.

@@ -5,7 +5,7 @@ use softgrasp_protocol::*;
 
 use crate::random_messages::any_message;
 use crate::raw::{only_frame, raw_frame};
-use crate::samples::{Message, conversation};
+use crate::samples::{Message, conversation, sample, variants};
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
@@ -45,18 +45,18 @@ fn numbers_that_are_not_finite_keep_their_bits() {
         ..Question::default()
     };
     let mesh = MeshData { vertices: odd.map(|x| [x; 3]).to_vec(), ..MeshData::default() };
-    let (materials, element) = (vec![], ElementChoice::T4);
-    let solve = SolveOnce { mesh, materials, element, question };
+    let body = Body { mesh, materials: vec![], element: ElementChoice::T4 };
     let mut bytes = Vec::new();
-    let request = Request::SolveOnce(Box::new(solve));
+    let request = Request::Ask(Box::new(Ask::new(body, question)));
     request.encode_into(1, &Limits::default(), &mut bytes).unwrap();
     let back = Request::decode(&only_frame(&bytes), &Limits::default()).unwrap();
-    let Request::SolveOnce(solve) = back else { panic!("another kind: {back:?}") };
-    let known: Vec<u64> = solve.question.known.iter().map(|k| k.value.to_bits()).collect();
+    let Request::Ask(ask) = back else { panic!("another kind: {back:?}") };
+    let Subject::Mesh(body) = ask.subject else { panic!("another subject") };
+    let known: Vec<u64> = ask.question.known.iter().map(|k| k.value.to_bits()).collect();
     assert_eq!(known, odd.map(f64::to_bits));
-    let x: Vec<u64> = solve.mesh.vertices.iter().map(|v| v[2].to_bits()).collect();
+    let x: Vec<u64> = body.mesh.vertices.iter().map(|v| v[2].to_bits()).collect();
     assert_eq!(x, odd.map(f64::to_bits));
-    assert!(solve.question.max_error.is_some_and(f64::is_nan));
+    assert!(ask.question.max_error.is_some_and(f64::is_nan));
 }
 
 #[test]
@@ -96,15 +96,25 @@ fn lists_that_do_not_fit_together_are_not_sent() {
 }
 
 #[test]
-fn a_large_answer_that_does_not_fit_together_is_not_sent() {
-    let answer = conversation().into_iter().find_map(|message| match message {
-        Message::Reply(_, Reply::LargeAnswer(answer)) => Some(answer),
-        _ => None,
-    });
-    let mut answer = answer.unwrap();
-    answer.answer.nodes = NodeChoice::Nodes(vec![]);
+fn cases_that_do_not_fit_the_first_are_not_sent() {
+    let Message::Request(_, Request::Ask(mut ask)) = sample(Kind::Ask) else { unreachable!() };
+    ask.cases = vec![vec![0.5]];
     let mut out = vec![];
-    let error = Reply::LargeAnswer(answer).encode_into(1, &Limits::default(), &mut out);
+    let error = Request::Ask(ask).encode_into(1, &Limits::default(), &mut out);
+    assert!(matches!(error, Err(EncodeError::CountMismatch { count: 1, expected: 2, .. })));
+    let Message::Reply(_, Reply::Answer(mut answer)) = sample(Kind::Answer) else { unreachable!() };
+    answer.cases = vec![CaseAnswer { displacements: vec![[0.0; 3]; 3], reactions: vec![] }];
+    let error = Reply::Answer(answer).encode_into(1, &Limits::default(), &mut out);
     assert!(matches!(error, Err(EncodeError::CountMismatch { count: 0, expected: 1, .. })));
     assert!(out.is_empty(), "nothing is appended");
+}
+
+#[test]
+fn newest_wins_is_seen_without_the_arrays() {
+    let variant = |name| variants().into_iter().find(|(known, _)| *known == name).unwrap().1;
+    let supersedes = |message: Message| Ask::supersedes(&only_frame(&message.encode()));
+    assert!(supersedes(variant("Ask-model")).is_some());
+    assert_eq!(supersedes(variant("Ask-large")), None, "older ones stay wanted");
+    assert_eq!(supersedes(sample(Kind::Ask)), None, "a mesh has no newer one");
+    assert_eq!(supersedes(sample(Kind::Ping)), None);
 }

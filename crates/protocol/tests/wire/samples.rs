@@ -45,14 +45,57 @@ pub fn conversation() -> Vec<Message> {
     messages
 }
 
-fn requests() -> Vec<Message> {
-    let mesh = MeshData {
-        vertices: vec![[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01], [0.0; 3]],
-        tets: vec![[0, 1, 2, 3]],
-        regions: vec![7],
+/// Further messages of kinds that have more than one form, by the names of their golden files.
+pub fn variants() -> Vec<(&'static str, Message)> {
+    let Message::Request(_, Request::Ask(ask)) = sample(Kind::Ask) else { unreachable!() };
+    let Message::Reply(_, Reply::Answer(answer)) = sample(Kind::Answer) else { unreachable!() };
+    let held = Question { mask_displacements: vec![], masks: Masks::default(), ..question() };
+    let of_model = Ask {
+        newest_wins: true,
+        report: ReportLevel::Short,
+        ..Ask::new(hash(), question())
     };
-    let materials = vec![Material { young: 20_000.0, poisson: 0.45 }];
-    let question = Question {
+    let large = LargeAsk {
+        deformation: Deformation::Auto,
+        law: LawName::NeoHookeanLog,
+        yield_stress: Some(1500.0),
+        path: PathChoice::FromRest,
+        pace: Pace::Timely,
+    };
+    let of_large = Ask { large: Some(large), ..Ask::new(hash(), held) };
+    let values = |factor: f64| ask.question.known.iter().map(|k| factor * k.value).collect();
+    let of_cases = Ask {
+        cases: vec![values(2.0), values(-1.0)],
+        without_estimate: true,
+        ..*ask.clone()
+    };
+    let case = CaseAnswer { displacements: vec![[1.0, -2.0, 0.25]; 3], reactions: vec![4.5] };
+    let of_several = Answer {
+        displacements: Displacements::F64(vec![[0.5, 0.0, 0.0]; 3]),
+        mask_forces: vec![],
+        cases: vec![case],
+        ..*answer.clone()
+    };
+    let untold = Answer { report: SolveReport::untold(), ..*answer };
+    let request = |ask| Message::Request(1, Request::Ask(Box::new(ask)));
+    let reply = |answer| Message::Reply(1, Reply::Answer(Box::new(answer)));
+    vec![
+        ("Ask-model", request(of_model)),
+        ("Ask-large", request(of_large)),
+        ("Ask-cases", request(of_cases)),
+        ("Answer-large", reply(large_answer())),
+        ("Answer-cases", reply(of_several)),
+        ("Answer-untold", reply(untold)),
+    ]
+}
+
+/// The message of a kind in the conversation.
+pub fn sample(kind: Kind) -> Message {
+    conversation().into_iter().find(|message| message.kind() == kind).unwrap()
+}
+
+fn question() -> Question {
+    Question {
         known: vec![DofValue { dof: 9, value: 0.0 }, DofValue { dof: 2, value: -0.001 }],
         forces: vec![DofValue { dof: 4, value: 0.5 }],
         masks: masks_of(&[&[(0, 0.25), (2, 0.75)], &[(1, 1.0)]]),
@@ -65,7 +108,16 @@ fn requests() -> Vec<Message> {
         },
         max_error: Some(0.01),
         deadline_ms: None,
+    }
+}
+
+fn requests() -> Vec<Message> {
+    let mesh = MeshData {
+        vertices: vec![[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01], [0.0; 3]],
+        tets: vec![[0, 1, 2, 3]],
+        regions: vec![7],
     };
+    let materials = vec![Material { young: 20_000.0, poisson: 0.45 }];
     let everything = Question {
         masks: Masks::default(),
         mask_displacements: vec![],
@@ -73,18 +125,16 @@ fn requests() -> Vec<Message> {
         want: Want::default(),
         max_error: None,
         deadline_ms: Some(16.5),
-        ..question.clone()
+        ..question()
     };
-    let element = ElementChoice::T4;
-    let large = large_requests(&mesh, &materials, &question);
+    let body = Body { mesh: mesh.clone(), materials: materials.clone(), element: ElementChoice::T4 };
     [
-        Request::Hello(Hello { client: "sample 1".to_owned(), token: Some("secret".to_owned()) }),
-        Request::SolveOnce(Box::new(SolveOnce {
-            mesh: mesh.clone(),
-            materials: materials.clone(),
-            element,
-            question: everything,
-        })),
+        Request::Hello(Hello {
+            capabilities: vec!["haptics".to_owned()],
+            alive_every_ms: 2000,
+            ..Hello::new("sample 1", Some("secret".to_owned()))
+        }),
+        Request::Ask(Box::new(Ask::new(body, everything))),
         Request::HaveModel(hash()),
         Request::UploadModel(UploadModel {
             mesh: MeshData { regions: vec![], ..mesh },
@@ -92,7 +142,7 @@ fn requests() -> Vec<Message> {
             element: ElementName::T10,
             fixed: vec![9, 10, 11],
         }),
-        Request::Frame(FrameRequest { model: hash(), question }),
+        Request::Cancel { request_id: 2 },
         Request::Prefetch(Prefetch {
             model: hash(),
             nodes: vec![1, 3],
@@ -100,69 +150,33 @@ fn requests() -> Vec<Message> {
         }),
         Request::Drop(hash()),
         Request::Ping { nonce: 0x0123_4567_89ab_cdef },
+        Request::ContactFrame(Box::new(contact_frame())),
     ]
     .into_iter()
-    .chain(large)
-    .chain([Request::ContactFrame(Box::new(contact_frame()))])
     .zip(1..)
     .map(|(request, id)| Message::Request(id, request))
     .collect()
-}
-
-/// The same for large deformation, with forces and without masks.
-fn large_requests(mesh: &MeshData, materials: &[Material], question: &Question) -> [Request; 3] {
-    let question =
-        Question { mask_displacements: vec![], masks: Masks::default(), ..question.clone() };
-    let large = LargeAsk {
-        deformation: DeformationChoice::Auto,
-        law: LawName::NeoHookeanLog,
-        yield_stress: Some(1500.0),
-        path: PathChoice::FromRest,
-        pace: Pace::Timely,
-    };
-    let solve = SolveLarge {
-        mesh: mesh.clone(),
-        materials: materials.to_vec(),
-        element: ElementChoice::Auto,
-        large: LargeAsk::default(),
-        question: Question { want: Want::default(), ..question.clone() },
-    };
-    let several = SolveSeveral {
-        mesh: mesh.clone(),
-        materials: materials.to_vec(),
-        element: ElementChoice::T4,
-        question: solve.question.clone(),
-        cases: [2.0, -1.0]
-            .map(|factor| question.known.iter().map(|known| factor * known.value).collect())
-            .to_vec(),
-        estimate: false,
-    };
-    [
-        Request::SolveLarge(Box::new(solve)),
-        Request::LargeFrame(Box::new(LargeFrame { model: hash(), large, question })),
-        Request::SolveSeveral(Box::new(several)),
-    ]
 }
 
 fn replies() -> Vec<Message> {
     let stage_ms = StageMs { decode: 0.125, assemble: 1.5, factor: 2.25, ..StageMs::default() };
     let report = SolveReport {
         method: "sparse".to_owned(),
-        element: ElementName::T4,
+        element: ElementName::T4.into(),
         unknown_dofs: 10,
         known_dofs: 2,
         stage_ms,
         residual_rel: 1e-15,
         error_bound_rel: Some(1e-12),
-        error_bound_why: "residual and condition estimate".to_owned(),
+        error_bound_why: None,
         refinement_steps: 1,
         max_rotation_deg: 3.5,
         max_strain: 0.0625,
         precision: "f64".to_owned(),
         condition_estimate: None,
         error_estimate_rel: Some(1e-13),
-        warning_level: WarningLevel::Caution,
-        warnings: vec!["large rotation".to_owned(), String::new()],
+        warning_level: WarningLevel::CAUTION,
+        warnings: vec![Warning::new(WarningCode::ROTATION, "large rotation"), Warning::default()],
         peak_rss_bytes: 1 << 24,
         factor_reused: false,
         chosen_because: "smallest predicted time".to_owned(),
@@ -170,18 +184,13 @@ fn replies() -> Vec<Message> {
     let displacements = vec![[0.0, -0.001, 0.0005], [0.0; 3], [0.00025, 0.0, 0.0]];
     let answer = Answer {
         report,
+        large: None,
         nodes: NodeChoice::Nodes(vec![0, 2, 3]),
         displacements: Displacements::of(displacements, Precision::F32Quantised),
         reactions: vec![DofValue { dof: 2, value: -1.25 }],
         mask_forces: vec![[0.0, -0.75, 0.125], [0.5, 0.0, 0.0]],
+        cases: vec![],
     };
-    let first = Answer {
-        displacements: Displacements::F64(vec![[0.5, 0.0, 0.0]; 3]),
-        mask_forces: vec![],
-        ..answer.clone()
-    };
-    let case = CaseAnswer { displacements: vec![[1.0, -2.0, 0.25]; 3], reactions: vec![4.5] };
-    let several = SeveralAnswers { answer: first, cases: vec![case] };
     let ready =
         ModelReady { model: hash(), unknown_dofs: 9, fixed_dofs: 3, reused: false, stage_ms };
     let welcome = Welcome {
@@ -189,11 +198,15 @@ fn replies() -> Vec<Message> {
         version: "0.1.0".to_owned(),
         threads: 4,
         limits: Limits::default(),
+        wire: VERSION,
+        capabilities: vec!["cancel".to_owned(), "contact".to_owned()],
+        idle_ms: 600_000,
     };
     let rejected = Rejected {
         code: RejectCode::RigidMotionFree,
         text: "the body can turn about the z axis".to_owned(),
         detail: String::new(),
+        retry_after_ms: 250,
     };
     vec![
         Message::Reply(1, Reply::Welcome(welcome)),
@@ -201,23 +214,22 @@ fn replies() -> Vec<Message> {
         Message::Reply(3, Reply::ModelState { known: true }),
         Message::Reply(4, Reply::ModelReady(ready)),
         Message::Reply(5, Reply::Rejected(rejected)),
+        Message::Reply(0, Reply::Alive),
         Message::Reply(8, Reply::Pong { nonce: 0x0123_4567_89ab_cdef }),
-        Message::Reply(10, Reply::LargeAnswer(Box::new(large_answer()))),
-        Message::Reply(11, Reply::SeveralAnswers(Box::new(several))),
-        Message::Reply(12, Reply::ContactAnswer(Box::new(contact_answer()))),
+        Message::Reply(9, Reply::ContactAnswer(Box::new(contact_answer()))),
     ]
 }
 
-fn large_answer() -> LargeAnswer {
+fn large_answer() -> Answer {
     let stage_ms = StageMs { decode: 0.125, factor: 2.5, solve: 4.0, ..StageMs::default() };
     let report = SolveReport {
         method: "newton".to_owned(),
-        element: ElementName::T4Anp,
+        element: ElementName::T4Anp.into(),
         unknown_dofs: 10,
         known_dofs: 2,
         stage_ms,
         residual_rel: 1e-12,
-        error_bound_why: "large deformation".to_owned(),
+        error_bound_why: Some("large deformation".to_owned()),
         max_rotation_deg: 40.0,
         max_strain: 0.5,
         precision: "f64".to_owned(),
@@ -227,15 +239,8 @@ fn large_answer() -> LargeAnswer {
         chosen_because: "asked for".to_owned(),
         ..SolveReport::default()
     };
-    let answer = Answer {
-        report,
-        nodes: NodeChoice::Nodes(vec![1]),
-        displacements: Displacements::F64(vec![[0.0, -0.005, 0.0005]]),
-        reactions: vec![],
-        mask_forces: vec![],
-    };
     let large = LargeReport {
-        deformation: DeformationName::Large,
+        is_linear: false,
         newton_steps: 2,
         linear_solves: 3,
         factor_age: 7,
@@ -247,7 +252,15 @@ fn large_answer() -> LargeAnswer {
         settled: true,
         plastic_strain: 0.125,
     };
-    LargeAnswer { answer, large }
+    Answer {
+        report,
+        large: Some(large),
+        nodes: NodeChoice::Nodes(vec![1]),
+        displacements: Displacements::F64(vec![[0.0, -0.005, 0.0005]]),
+        reactions: vec![],
+        mask_forces: vec![],
+        cases: vec![],
+    }
 }
 
 /// Masks with these nodes and weights.
@@ -311,7 +324,7 @@ fn contact_frame() -> ContactFrame {
 }
 
 fn contact_answer() -> ContactAnswer {
-    let LargeAnswer { answer, .. } = large_answer();
+    let answer = Answer { large: None, ..large_answer() };
     let point = ContactPoint {
         body: 1,
         slips: true,

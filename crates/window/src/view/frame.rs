@@ -200,7 +200,7 @@ pub struct TickTiming {
 impl TickTiming {
     /// From an answer.
     pub fn new(tick: u64, solve: &SolveSummary) -> Self {
-        let ms = &solve.ms;
+        let ms = &solve.report.stage_ms;
         Self {
             tick,
             round_trip: solve.round_trip_ms,
@@ -368,7 +368,7 @@ mod tests {
             },
             ..Default::default()
         };
-        let t = TickTiming::new(3, &SolveSummary::new(&report, 5.0));
+        let t = TickTiming::new(3, &SolveSummary::new(report, None, 5.0));
         let sum = t.way() + t.queue + t.prepare + t.factor + t.solve + t.codec;
         assert!((sum - 5.0).abs() < 1e-12 && (t.way() - 2.2).abs() < 1e-12);
     }

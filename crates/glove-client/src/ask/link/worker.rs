@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
-    Answer, ContactAnswer, ContactFrame, FrameRequest, LargeAsk, LargeFrame, LargeReport,
+    Answer, Ask, ContactAnswer, ContactFrame, LargeAsk,
     ModelHash, PathChoice, Prefetch, RejectCode, Rejected, Reply, Request, UploadModel,
 };
 
@@ -283,33 +283,31 @@ impl Session {
         let asked = self.message_of(model, request);
         let from_rest = matches!(
             &asked,
-            Request::LargeFrame(frame) if frame.large.path == PathChoice::FromRest
+            Request::Ask(ask) if ask.large.is_some_and(|large| large.path == PathChoice::FromRest)
         );
         let reply = self.connection.ask_awake(&asked);
         let round_trip = start.elapsed();
         let bytes = self.connection.bytes_of_exchange();
-        let reached =
-            |answer: Answer, large: Option<LargeReport>, step: Option<ReachedStep>| Reached {
-                rest_shape: model.rest_shape,
-                from_rest,
-                round_trip,
-                bytes,
-                nodes: answer.nodes,
-                displacement: answer.displacements.into_f64(),
-                reactions: answer.reactions,
-                mask_forces: answer.mask_forces,
-                report: Box::new(answer.report),
-                large,
-                step,
-            };
+        let reached = |answer: Answer, step: Option<ReachedStep>| Reached {
+            rest_shape: model.rest_shape,
+            from_rest,
+            round_trip,
+            bytes,
+            nodes: answer.nodes,
+            displacement: answer.displacements.into_f64(),
+            reactions: answer.reactions,
+            mask_forces: answer.mask_forces,
+            report: Box::new(answer.report),
+            large: answer.large,
+            step,
+        };
         let reached = match reply? {
-            Reply::Answer(answer) => reached(*answer, None, None),
-            Reply::LargeAnswer(answered) => reached(answered.answer, Some(answered.large), None),
+            Reply::Answer(answer) => reached(*answer, None),
             Reply::ContactAnswer(answered) => {
                 let ContactAnswer { answer, contact, state, points: _, loads } = *answered;
-                reached(answer, None, Some(ReachedStep { contact, state, loads }))
+                reached(answer, Some(ReachedStep { contact, state, loads }))
             }
-            other => return Err(unexpected("Frame", &other)),
+            other => return Err(unexpected("Ask", &other)),
         };
         budget.end();
         Ok(reached)
@@ -318,15 +316,12 @@ impl Session {
     /// What is sent for a request.
     fn message_of(&self, model: &ModelUpload, request: &TickRequest) -> Request {
         match &request.asked {
-            TickQuestion::Held { question, large: None } => {
-                Request::Frame(FrameRequest { model: model.hash, question: (**question).clone() })
-            }
-            TickQuestion::Held { question, large: Some(large) } => {
+            TickQuestion::Held { question, large } => {
                 let is_first = self.answered_grip != Some(request.grip);
-                let path = if is_first { PathChoice::FromRest } else { large.path };
-                let large = LargeAsk { path, ..*large };
-                let question = (**question).clone();
-                Request::LargeFrame(Box::new(LargeFrame { model: model.hash, large, question }))
+                let from_rest = |large: LargeAsk| LargeAsk { path: PathChoice::FromRest, ..large };
+                let large = if is_first { large.map(from_rest) } else { *large };
+                let ask = Ask { large, ..Ask::new(model.hash, (**question).clone()) };
+                Request::Ask(Box::new(ask))
             }
             TickQuestion::Step(frame) => {
                 let frame = ContactFrame { model: model.hash, ..(**frame).clone() };

@@ -26,7 +26,7 @@ fn every_deforming_tick_is_answered_or_has_one_reason() {
     // Missed while nothing is deformed: no answer is missing.
     tick(&mut report, 4, 3, deforming());
     // Missed while something is.
-    let solve = SolveSummary::new(&softgrasp_protocol::SolveReport::default(), 0.5);
+    let solve = SolveSummary::new(softgrasp_protocol::SolveReport::default(), None, 0.5);
     let answered = TickOutcome { answers: vec![(4, solve)], ..deforming() };
     tick(&mut report, 7, 2, answered);
     let late = (7, Unanswered::AnswerLate);
@@ -49,7 +49,7 @@ fn every_deforming_tick_is_answered_or_has_one_reason() {
 fn tick_that_was_lost_in_mid_run_is_not_said_to_have_waited_for_its_end() {
     let mut report = report();
     let lost = LoopEvent::Server("lost: the connection was closed".to_owned());
-    let solve = SolveSummary::new(&softgrasp_protocol::SolveReport::default(), 0.5);
+    let solve = SolveSummary::new(softgrasp_protocol::SolveReport::default(), None, 0.5);
     tick(&mut report, 0, 0, deforming());
     tick(&mut report, 1, 0, TickOutcome { events: vec![lost], ..deforming() });
     tick(&mut report, 2, 0, deforming());

@@ -1,0 +1,93 @@
+//! Either side may learn a field, a warning, a refusal or a capability without the other.
+
+use softgrasp_protocol::*;
+
+use crate::raw::{only_frame, part_of, raw_frame};
+use crate::samples::{Message, conversation, sample, variants};
+
+fn decode(kind: Kind, payload: &[u8]) -> Result<Message, DecodeError> {
+    Message::decode(&only_frame(&raw_frame(kind.number(), 1, payload)), &Limits::default())
+}
+
+/// The payload with `more` behind the fields of its part.
+fn with_more_fields(payload: &[u8], more: &[u8]) -> Vec<u8> {
+    let len = u64::from_le_bytes(payload[..8].try_into().unwrap()) as usize;
+    let longer = part_of(&[&payload[8..8 + len], more].concat());
+    [&longer, &payload[(8 + len).next_multiple_of(8)..]].concat()
+}
+
+#[test]
+fn fields_that_a_later_version_adds_are_skipped_in_every_message() {
+    let all = conversation().into_iter().chain(variants().into_iter().map(|(_, message)| message));
+    for message in all {
+        let payload = only_frame(&message.encode()).payload;
+        for more in [&[7][..], &[1; 8], &[0xff; 100]] {
+            let read = decode(message.kind(), &with_more_fields(&payload, more)).unwrap();
+            let (read, sent) = match (read, &message) {
+                (Message::Request(_, read), Message::Request(_, sent)) => {
+                    (format!("{read:?}"), format!("{sent:?}"))
+                }
+                (Message::Reply(_, read), Message::Reply(_, sent)) => {
+                    (format!("{read:?}"), format!("{sent:?}"))
+                }
+                other => panic!("another direction: {other:?}"),
+            };
+            assert_eq!(read, sent);
+        }
+    }
+}
+
+#[test]
+fn fields_that_an_earlier_version_does_not_send_are_zero() {
+    let Message::Reply(_, Reply::Welcome(welcome)) = sample(Kind::Welcome) else { unreachable!() };
+    let payload = only_frame(&sample(Kind::Welcome).encode()).payload;
+    // Up to the limits, which are a block of six u32: nothing of what follows them.
+    let at = payload.len() - 8 - 2 - 8 - (8 + 6) - (8 + 7);
+    let fields: Vec<u8> = payload[8..].iter().copied().take(at).collect();
+    let shorter = (0..fields.len()).rev().find_map(|len| {
+        match decode(Kind::Welcome, &part_of(&fields[..len])) {
+            Ok(Message::Reply(_, Reply::Welcome(read))) if read.wire == 0 => Some(read),
+            _ => None,
+        }
+    });
+    let shorter = shorter.unwrap();
+    let bare = Welcome { wire: 0, capabilities: vec![], idle_ms: 0, ..welcome };
+    assert_eq!(shorter, bare);
+    // A client that says only its name.
+    let mut name = 2_u64.to_le_bytes().to_vec();
+    name.extend(b"me");
+    let read = decode(Kind::Hello, &part_of(&name)).unwrap();
+    let Message::Request(_, Request::Hello(hello)) = read else { unreachable!() };
+    assert_eq!((hello.client.as_str(), hello.token, hello.alive_every_ms), ("me", None, 0));
+}
+
+#[test]
+fn refusals_warnings_and_elements_of_a_later_version_are_read() {
+    let mut fields = 900_u16.to_le_bytes().to_vec();
+    fields.extend([0; 20]);
+    let read = decode(Kind::Rejected, &part_of(&fields)).unwrap();
+    let Message::Reply(_, Reply::Rejected(rejected)) = read else { unreachable!() };
+    assert_eq!(rejected.code, RejectCode::Other(900));
+    let Message::Reply(_, Reply::Answer(mut answer)) = sample(Kind::Answer) else { unreachable!() };
+    answer.report.warnings = vec![Warning::new(WarningCode(4711), "from the future")];
+    let bytes = Message::Reply(1, Reply::Answer(answer.clone())).encode();
+    let read = Reply::decode(&only_frame(&bytes), &Limits::default()).unwrap();
+    assert_eq!(read, Reply::Answer(answer));
+}
+
+#[test]
+fn report_of_another_level_is_shorter_and_says_what_it_leaves_out() {
+    let Message::Reply(_, Reply::Answer(answer)) = sample(Kind::Answer) else { unreachable!() };
+    let len = |level: ReportLevel| {
+        let report = answer.report.clone().at_level(level);
+        let answer = Answer { report, ..*answer.clone() };
+        Message::Reply(1, Reply::Answer(Box::new(answer))).encode().len()
+    };
+    assert!(len(ReportLevel::None) < len(ReportLevel::Short));
+    assert!(len(ReportLevel::Short) < len(ReportLevel::Full));
+    let short = answer.report.clone().at_level(ReportLevel::Short);
+    assert_eq!(short.residual_rel, answer.report.residual_rel);
+    assert!(short.method.is_empty() && short.warnings.is_empty());
+    let none = answer.report.clone().at_level(ReportLevel::None);
+    assert!(none.is_untold() && none.max_strain.is_nan() && none.error_bound_rel.is_none());
+}
