@@ -14,7 +14,7 @@ use softgrasp_hand::devices::fastrak::{
 use softgrasp_hand::devices::recordings::{LeapRecording, Trajectory};
 use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::joints::JointsParser;
-use softgrasp_protocol::{Frame, FrameBuffer, Kind, Limits, Reply, Request};
+use softgrasp_protocol::{EncodeError, Frame, FrameBuffer, Kind, Limits, Reply, Request};
 
 use crate::raw_session::raw_frame;
 
@@ -154,7 +154,11 @@ fn request(bytes: &[u8]) {
     let Some(frame) = sound_frame(bytes, false) else { return };
     let Ok(request) = Request::decode(&frame, &Limits::default()) else { return };
     let mut written = Vec::new();
-    request.encode_into(7, &Limits::default(), &mut written).expect("what was read can be written");
+    match request.encode_into(7, &Limits::default(), &mut written) {
+        // Fields that were not sent take bytes now.
+        Err(EncodeError::PartTooLong { .. }) => return,
+        written => written.expect("what was read can be written"),
+    }
     let mut again = Vec::new();
     let mut buffer = FrameBuffer::new(Limits::default());
     buffer.feed(&written);
@@ -168,7 +172,11 @@ fn reply(bytes: &[u8]) {
     let Some(frame) = sound_frame(bytes, true) else { return };
     let Ok(reply) = Reply::decode(&frame, &Limits::default()) else { return };
     let mut written = Vec::new();
-    reply.encode_into(7, &Limits::default(), &mut written).expect("what was read can be written");
+    match reply.encode_into(7, &Limits::default(), &mut written) {
+        // As above.
+        Err(EncodeError::PartTooLong { .. }) => return,
+        written => written.expect("what was read can be written"),
+    }
     let mut buffer = FrameBuffer::new(Limits::default());
     buffer.feed(&written);
     let frame = buffer.next_frame().expect("sound").expect("whole");
