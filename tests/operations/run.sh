@@ -198,8 +198,8 @@ has_strangers() { [ "$(strangers "$1")" = "$2" ]; }
 
 # introduce DESCRIPTOR: sends the example Ping of docs/wire.md, which makes a connection a session.
 introduce() {
-    printf 'SGRP\3\0\x08\0\0\0\0\0\x08\0\0\0\x08\0\0\0\0\0\0\0\x61\x05\x02\xd7\xf4\xdf\xf8\xc2' >&"$1"
-    printf '\xef\xcd\xab\x89\x67\x45\x23\x01' >&"$1"
+    printf 'SGRP\4\0\x08\0\0\0\0\0\x10\0\0\0\x08\0\0\0\0\0\0\0\x30\xcc\x82\xc4\xb0\x13\xb8\xdc' >&"$1"
+    printf '\x08\0\0\0\0\0\0\0\xef\xcd\xab\x89\x67\x45\x23\x01' >&"$1"
 }
 
 status_of() { python3 "$here/metrics.py" "${metrics[$1]}" status "$2"; }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::BuiltIn;
-use softgrasp_protocol::{Limits, Request};
+use softgrasp_protocol::{Limits, Request, VERSION};
 
 use super::bars::{Amounts, bar, server};
 use super::malformed::malformed;
@@ -189,7 +189,8 @@ fn act(
     match number % 6 {
         // Part of a header, and then nothing until the server gives up.
         0 => {
-            let _ = stream.write_all(b"SGRP\x03\x00");
+            let _ =
+                stream.write_all(b"SGRP").and_then(|()| stream.write_all(&VERSION.to_le_bytes()));
             while !is_over.load(Ordering::Relaxed) && is_open(stream.read(&mut replies)) {}
         }
         // Bytes without sense.

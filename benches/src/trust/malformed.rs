@@ -131,7 +131,13 @@ pub(super) fn malformed(random: &mut Random) -> Vec<u8> {
         Kind::ALL.into_iter().filter(|kind| *kind as u16 & 0x8000 == 0).collect();
     let kind = requests[random.below(requests.len())] as u16;
     let len = 1 + random.below(64);
-    let payload = random_bytes(random, len);
+    let mut payload = random_bytes(random, len);
+    if random.below(2) == 0 {
+        // The length of the part is right, so that its fields are read.
+        payload.splice(0..0, (len as u64).to_le_bytes());
+        payload.resize(payload.len().next_multiple_of(8), 0);
+    }
+    let len = payload.len();
     let mut raw = vec![0; HEADER_LEN];
     raw[0..4].copy_from_slice(b"SGRP");
     raw[4..6].copy_from_slice(&VERSION.to_le_bytes());

@@ -29,7 +29,7 @@ use crate::solve::{
 pub struct Model {
     mesh: TetMesh,
     element: Element,
-    /// The same elements with mid-edge nodes behind the corners, for ten-node elements.
+    /// Mesh with mid-edge nodes behind the corners, for ten-node elements.
     quadratic: Option<QuadraticMesh>,
     materials: Vec<Material>,
     bodies: Bodies,
@@ -164,7 +164,7 @@ impl Model {
         self.strain_with_pauses(displacement, &mut || {})
     }
 
-    /// The same, with a call of `pause` every 50 µs or so.
+    /// Largest rotation and strain of an element, with a call of `pause` every 50 µs or so.
     pub fn strain_with_pauses(
         &self,
         displacement: &[f64],
@@ -279,7 +279,7 @@ impl Model {
         }
     }
 
-    /// The same for known degrees of freedom alone, and their partition.
+    /// Partition by Dirichlet values alone, once they are seen to hold every body against rigid motions.
     ///
     /// # Errors
     /// As [`Model::check_held`].
@@ -296,7 +296,7 @@ impl Model {
         self.condense_within(u64::MAX, on_stage)
     }
 
-    /// The same where the base's factor may take so much memory only.
+    /// Base of condensed columns whose factor may take so much memory only.
     ///
     /// Units: `limit` bytes.
     ///
@@ -345,7 +345,7 @@ impl Model {
         self.factor_within(dofs, method, u64::MAX, on_stage)
     }
 
-    /// The same where the factor or inverse may take so much memory only.
+    /// Factor or inverse of `K11` that may take so much memory only.
     ///
     /// Units: `limit` bytes.
     ///

@@ -221,8 +221,8 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         self.next_frame_up_to(usize::MAX).await
     }
 
-    /// The same for frames of at most `len_max` bytes, header included; a longer one is told when its
-    /// header is there.
+    /// Waits for the next frame of at most `len_max` bytes, header included; a longer one is told when
+    /// its header is there.
     ///
     /// # Errors
     /// As [`Self::next_frame`].

@@ -59,7 +59,7 @@ pub(crate) fn peak_rss_bytes() -> u64 {
     bytes
 }
 
-/// The same as last read: good enough for a frame that allocates next to nothing.
+/// Largest resident memory as it was last read: good enough for a frame that allocates next to nothing.
 pub(crate) fn last_peak_rss_bytes() -> u64 {
     PEAK_RSS.load(Ordering::Relaxed)
 }

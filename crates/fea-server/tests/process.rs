@@ -20,7 +20,7 @@ use softgrasp_core::solve::memory::Need;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
     Answer, Ask, Body, DofValue, ElementChoice, Hello, Kind, Limits, Material, MeshData,
-    MethodName, Question, RejectCode, Reply, Request, Subject,
+    MethodName, Question, RejectCode, Reply, Request, Subject, VERSION,
 };
 
 const MIB: u64 = 1 << 20;
@@ -322,7 +322,8 @@ fn announced_sizes_take_no_memory() {
     };
     // Headers that announce the largest payload, each followed by a little of it.
     let header = |len: u32| {
-        let mut raw = b"SGRP\x01\x00".to_vec();
+        let mut raw = b"SGRP".to_vec();
+        raw.extend(VERSION.to_le_bytes());
         raw.extend(Kind::UploadModel.number().to_le_bytes());
         raw.extend(0_u32.to_le_bytes());
         raw.extend(len.to_le_bytes());
@@ -342,22 +343,27 @@ fn announced_sizes_take_no_memory() {
     let mut mesh = 400_000_u32.to_le_bytes().to_vec();
     mesh.extend(2_400_000_u32.to_le_bytes());
     mesh.extend([1, 0, 0, 1, 0]);
-    mesh.resize(24, 0);
-    for kind in [Kind::UploadModel, Kind::Ask] {
+    // The number of an Ask's subject stands before its mesh.
+    for (kind, before) in [(Kind::UploadModel, &[][..]), (Kind::Ask, &[0; 4])] {
+        let fields = [before, &mesh].concat();
+        let mut payload = (fields.len() as u64).to_le_bytes().to_vec();
+        payload.extend(fields);
+        payload.resize(payload.len().next_multiple_of(8), 0);
         let mut frame = header(0);
         frame.truncate(6);
         frame.extend(kind.number().to_le_bytes());
         frame.extend(0_u32.to_le_bytes());
-        frame.extend((mesh.len() as u32).to_le_bytes());
+        frame.extend((payload.len() as u32).to_le_bytes());
         frame.extend(1_u64.to_le_bytes());
         frame.extend(crc32c::crc32c(&frame).to_le_bytes());
-        frame.extend(crc32c::crc32c_append(crc32c::crc32c(&frame), &mesh).to_le_bytes());
-        frame.extend(&mesh);
+        frame.extend(crc32c::crc32c_append(crc32c::crc32c(&frame), &payload).to_le_bytes());
+        frame.extend(&payload);
         let mut stream = TcpStream::connect(server.address).unwrap();
         stream.write_all(&frame).unwrap();
         let refused = Connection::new(stream, Limits::default()).read_frame().unwrap().unwrap();
         let reply = Reply::decode(&refused, &Limits::default()).unwrap();
-        assert!(matches!(reply, Reply::Rejected(_)), "{reply:?}");
+        let Reply::Rejected(rejected) = reply else { panic!("{reply:?}") };
+        assert!(rejected.text.contains("vertices need"), "{}", rejected.text);
     }
     assert!(matches!(client.ask(&sound()), Reply::Answer(_)));
     let grown = server.peak_bytes().unwrap() - before;

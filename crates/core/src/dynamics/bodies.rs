@@ -69,7 +69,8 @@ impl MovingBody {
         self.way_between(&Isometry3::identity(), &Isometry3::identity())
     }
 
-    /// The same as it is seen from a frame that moves too, from one pose in the world to another.
+    /// Longest way of a point of the body, seen from a frame that moves too, from one pose in the world to
+    /// another.
     pub fn way_between(&self, before: &Isometry3<f64>, after: &Isometry3<f64>) -> f64 {
         let start = before.inverse() * self.world_from_body_start;
         let end = after.inverse() * self.world_from_body_end;

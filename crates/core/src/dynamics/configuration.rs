@@ -110,7 +110,7 @@ impl Scene<'_> {
         self.bodies.iter().zip(at.body_forces).map(pushed).collect()
     }
 
-    /// The same in the object's frame.
+    /// Poses of the rigid bodies in the object's frame.
     pub fn object_from_bodies(&self, at: &Configured<'_>) -> Vec<Isometry3<f64>> {
         let object_from_world = at.world_from_object.inverse();
         self.world_from_bodies(at).iter().map(|body| object_from_world * body).collect()

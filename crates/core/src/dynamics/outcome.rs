@@ -22,7 +22,7 @@ pub struct StepOutcome {
     pub slip_max: f64,
     /// Largest residual of the natural map at the end, N.
     pub contact_residual: f64,
-    /// The same over the largest force of a point; 0 without forces.
+    /// Residual of the natural map over the largest force of a point; 0 without forces.
     pub contact_residual_rel: f64,
     /// Largest part of a force that lies outside its cone, N.
     pub cone_violation: f64,

@@ -35,7 +35,7 @@ impl Bodies {
         Self::from_tets(mesh.node_count(), mesh.tets())
     }
 
-    /// The same for elements that are no mesh yet, some of them perhaps flat or repeated.
+    /// Connected bodies of tetrahedra that are no mesh yet, some of them perhaps flat or repeated.
     ///
     /// Shapes: `tets` corner indices below `node_count`.
     pub(crate) fn from_tets(node_count: usize, tets: &[[u32; 4]]) -> Self {

@@ -24,7 +24,7 @@ impl Faces {
         Self::from_tets(mesh.node_count(), mesh.tets())
     }
 
-    /// The same for elements that are no mesh yet.
+    /// Faces of tetrahedra that are no mesh yet.
     pub(super) fn from_tets(node_count: usize, tets: &[[u32; 4]]) -> Self {
         let mut starts = vec![0; node_count + 1];
         for corners in tets {

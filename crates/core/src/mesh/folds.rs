@@ -16,7 +16,7 @@ pub struct Folds {
     pub first: Vec<usize>,
     /// Sum over these faces of the smaller element's volume: so much counts twice at most.
     pub volume: f64,
-    /// The same over the volume of the mesh.
+    /// Overlapping volume over the volume of the mesh.
     pub volume_rel: f64,
 }
 

@@ -26,7 +26,7 @@ impl<'a> Cursor<'a> {
         Self { name, bytes, position: 0, comment: None, binary: false }
     }
 
-    /// The same, where `mark` starts a comment that ends with the line.
+    /// A cursor for a text in which `mark` starts a comment that ends with the line.
     pub(super) fn with_comments(name: &'a str, bytes: &'a [u8], mark: u8) -> Self {
         Self { comment: Some(mark), ..Self::new(name, bytes) }
     }

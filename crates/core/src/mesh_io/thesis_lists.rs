@@ -41,7 +41,7 @@ pub fn write_thesis_lists_labelled(
     Ok(out)
 }
 
-/// The same with regions numbered from 0.
+/// Mesh as the lists of the thesis (Table 3.1), with regions numbered from 0.
 ///
 /// # Errors
 /// As [`write_thesis_lists_labelled`].

@@ -21,7 +21,7 @@ pub fn write_msh41_labelled(mesh: &TetMesh, labels: &[String]) -> Vec<u8> {
     out
 }
 
-/// The same with regions numbered from 1.
+/// Mesh as Gmsh MSH 4.1 in binary form, with regions numbered from 1.
 pub fn write_msh41(mesh: &TetMesh) -> Vec<u8> {
     write_msh41_labelled(mesh, &[])
 }

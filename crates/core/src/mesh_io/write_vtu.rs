@@ -47,7 +47,7 @@ pub fn write_vtu_labelled(
     Ok(out)
 }
 
-/// The same with regions numbered from 0.
+/// Mesh and fields as VTK's XML (VTU), with regions numbered from 0.
 ///
 /// # Errors
 /// As [`write_vtu_labelled`].

@@ -17,7 +17,7 @@ impl Model {
         Ok(Elements::try_new(&self.mesh, self.element, quadratic, law, &self.materials)?)
     }
 
-    /// The same with a yield stress above which they flow and stay deformed, if there is one.
+    /// Hyperelastic elements with a yield stress above which they flow and stay deformed, if there is one.
     ///
     /// Units: Pa.
     ///

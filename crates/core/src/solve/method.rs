@@ -10,7 +10,7 @@ pub enum Method {
     /// Gauss–Jordan elimination of Appendix A pivot by pivot, rows in parallel: the thesis's own
     /// loop.
     GaussJordanPlain,
-    /// The same elimination by panels of pivots, as products of matrices.
+    /// Gauss–Jordan elimination by panels of pivots, as products of matrices.
     GaussJordan,
     /// Explicit inverse in tiles, by symmetric sweeps.
     DenseInverse,

@@ -14,7 +14,7 @@ pub struct Rates {
     pub product_block_s: f64,
     /// Factor over fronts in double precision.
     pub double: FactorRates,
-    /// The same in single precision.
+    /// Factor over fronts in single precision.
     pub single: FactorRates,
     /// Tiled dense Cholesky factor, s per operation.
     pub dense_flop_s: f64,

@@ -77,7 +77,7 @@ impl Work {
         }
     }
 
-    /// The same with what the analysis of the pattern has counted.
+    /// Work with the operations and entries that the analysis of the pattern has counted.
     pub fn counted(self, analysis: &FrontAnalysis) -> Self {
         Self {
             unknown_dofs: analysis.row_count() as f64,

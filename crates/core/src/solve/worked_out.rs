@@ -22,7 +22,7 @@ impl<T> WorkedOut<T> {
         self.0.get()
     }
 
-    /// The same as [`WorkedOut::get_or`], without a copy.
+    /// What was worked out, or is worked out now by `work`, without a copy.
     pub fn get_ref_or(&self, work: impl FnOnce() -> T) -> &T {
         if let Some(kept) = self.get_ref() {
             return kept;

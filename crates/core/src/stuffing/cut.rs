@@ -50,5 +50,5 @@ pub(crate) fn warp(cuts: &[Cut], points: &mut [Point3<f64>], sides: &mut [Side])
 /// table 1, the thresholds for the best smallest angle).
 const WARP_LONG: f64 = 0.24999;
 
-/// The same for short edges.
+/// Nearness to a lattice point, over the edge, below which a cut of a short edge is warped away.
 const WARP_SHORT: f64 = 0.41189;

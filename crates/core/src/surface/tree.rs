@@ -128,7 +128,7 @@ impl SurfaceTree {
         sum
     }
 
-    /// The same as a sum over all triangles.
+    /// Winding number as a sum over all triangles, the oracle of the tree.
     pub fn winding_by_sum(&self, point: &Point3<f64>) -> f64 {
         self.corners.iter().map(|t| winding_of_triangle(t, point)).sum()
     }

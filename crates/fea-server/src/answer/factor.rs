@@ -133,8 +133,8 @@ impl FactorRequest<'_> {
             .map_err(|shortage| PlanError::Memory(shortage).into())
     }
 
-    /// The same for a dense method, for the one without a factor, or for the sparse one whose count is
-    /// its own.
+    /// Factors by a dense method, by the one without a factor, or by the sparse one whose memory is
+    /// counted by itself.
     fn factor_without_fronts(
         &self,
         method: Method,

@@ -21,7 +21,7 @@ pub(crate) fn is_finite(reply: &Reply) -> bool {
     }
 }
 
-/// The same for one answer.
+/// Whether displacements, forces and errors of one answer, and of its cases, are finite.
 pub(super) fn answer_is_finite(answer: &Answer) -> bool {
     let Answer { report, displacements, reactions, mask_forces, cases, .. } = answer;
     let are_displacements = match displacements {

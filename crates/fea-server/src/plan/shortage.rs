@@ -115,7 +115,7 @@ impl fmt::Display for InWords<'_> {
 }
 
 impl Shortage {
-    /// The same in bare numbers, for the log and for programs.
+    /// Missing memory in bare numbers, for the log and for programs.
     pub fn detail(&self) -> String {
         let limit = format!("limit_bytes={} reserved_bytes={}", self.limit, self.reserved);
         self.asked.iter().fold(limit, |detail, need| {

@@ -131,7 +131,7 @@ impl ModelStore {
         });
     }
 
-    /// The same after a reservation: nothing stays for certain but the model `keep`.
+    /// Forgets what a new reservation needs room for; nothing stays for certain but the model `keep`.
     pub fn make_room(&self, keep: Option<ModelHash>) {
         self.kept.with(|kept| kept.trim_to(self.budget.left_for_kept(), keep));
     }

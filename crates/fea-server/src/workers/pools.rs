@@ -144,7 +144,7 @@ impl Workers {
         lane.run(turn, work).await
     }
 
-    /// The same for a frame on what is prepared, which has threads that no other work uses.
+    /// Runs a frame on what is prepared, which has threads that no other work uses.
     ///
     /// # Errors
     /// As [`Workers::run`].

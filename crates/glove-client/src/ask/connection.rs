@@ -147,7 +147,7 @@ impl Host {
         Self::open_within(choice, threads, None)
     }
 
-    /// The same with a memory limit for the embedded server; another server has its own.
+    /// Opens a host whose embedded server has a memory limit; another server has its own.
     ///
     /// Units: `memory_limit` bytes.
     ///

@@ -44,7 +44,7 @@ impl From<&Self> for Endpoint {
 }
 
 impl Endpoint {
-    /// The same server, shown a token.
+    /// This server, to which a token is shown.
     #[must_use]
     pub fn with_token(self, token: Option<&str>) -> Self {
         Self { token: token.map(str::to_owned), ..self }

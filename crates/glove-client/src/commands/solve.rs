@@ -300,7 +300,7 @@ impl SolveCommand {
         CaseFiles { known: &self.known, out: &self.out, reactions: &self.reactions }
     }
 
-    /// The same question for another program.
+    /// The request as an input deck of CalculiX.
     fn deck(
         &self,
         mesh: &TetMesh,

@@ -37,7 +37,7 @@ struct BadTetSummary {
 
 /// Bad elements and lost nodes in the JSON; their number is told in any case.
 const LISTED_JSON: usize = 1000;
-/// The same for a person.
+/// Bad elements and lost nodes in the text for a person.
 const LISTED_TEXT: usize = 10;
 
 impl MendingSummary {

@@ -34,7 +34,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), FileWriteError> {
     write_file_by(path, |file| file.write_all(bytes))
 }
 
-/// The same for a file that need not be in memory as a whole: `write` writes it piece by piece.
+/// Writes a file that need not be in memory as a whole: `write` writes it piece by piece.
 ///
 /// # Errors
 /// As [`write_file`].

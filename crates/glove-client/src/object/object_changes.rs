@@ -24,7 +24,7 @@ pub enum Replacement {
     EarlierShape,
     /// Its rest shape before the first one was kept.
     FirstShape,
-    /// The same rest shape of another material.
+    /// Another material for the rest shape that is there.
     OtherMaterial,
     /// Another object, by name.
     Other(String),

@@ -21,7 +21,7 @@ pub struct PressBody {
     pub name: String,
     /// Its shape.
     pub shape: RigidShape,
-    /// The same as it travels.
+    /// Its shape as it travels on the wire.
     pub on_the_wire: BodyShape,
     /// Friction of this body; `None` takes that of all.
     pub friction: Option<f64>,

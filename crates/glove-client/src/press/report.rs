@@ -64,7 +64,7 @@ pub struct StepReport {
     pub slip_max: f64,
     /// Largest residual of the law of contact, N.
     pub contact_residual: f64,
-    /// The same over the largest force of a point.
+    /// Residual of the law of contact over the largest force of a point.
     pub contact_residual_rel: f64,
     /// Largest part of a force outside its cone of friction, N.
     pub cone_violation: f64,

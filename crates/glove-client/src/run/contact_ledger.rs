@@ -23,7 +23,7 @@ pub struct StepRecord {
     pub slip_max_m: f64,
     /// Largest residual of the law of Signorini and Coulomb, N.
     pub residual_n: f64,
-    /// The same over the largest force of a point.
+    /// Residual of the law of contact over the largest force of a point.
     pub residual_rel: f64,
     /// Largest part of a force outside its cone of friction, N.
     pub cone_violation_n: f64,

@@ -146,7 +146,7 @@ impl PlayedTicks {
         self.newest.get(at)
     }
 
-    /// The same, to be changed.
+    /// Record of a tick, to be changed.
     pub fn get_mut(&mut self, tick: u64) -> Option<&mut TickRecord> {
         let at = self.newest.binary_search_by_key(&tick, |record| record.tick).ok()?;
         self.newest.get_mut(at)

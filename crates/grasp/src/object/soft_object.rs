@@ -55,7 +55,7 @@ impl SoftObject {
         self.rest.mesh()
     }
 
-    /// The same with all that is worked out from it, to be read by other threads too.
+    /// Rest shape with surface, sphere tree and normals, to be read by other threads too.
     pub fn rest_shape(&self) -> &Arc<RestShape> {
         &self.rest
     }
@@ -107,8 +107,8 @@ impl SoftObject {
         Ok(())
     }
 
-    /// The same for the surface alone, which is all that is seen and touched; the nodes inside stay
-    /// where they are until [`SoftObject::apply`] comes.
+    /// Moves the surface alone, which is all that is seen and touched; the nodes inside stay where they
+    /// are until [`SoftObject::apply`] comes.
     ///
     /// Shapes: `displacement` one per node of [`Surface::nodes`], in their order.
     ///

@@ -85,7 +85,7 @@ impl HandFit {
         Self { dimensions, limits: AngleLimits::default(), last: None }
     }
 
-    /// The same with other limits of the joint angles.
+    /// A fit with other limits of the joint angles.
     #[must_use]
     pub fn with_limits(self, limits: AngleLimits) -> Self {
         Self { limits, ..self }

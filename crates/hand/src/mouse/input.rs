@@ -28,7 +28,7 @@ pub enum MouseInput {
     CloseTo(Digits, f64),
     /// Open, and go where this object is grasped well, but a little way off.
     Aim,
-    /// The same from another side than the last time.
+    /// Open, and go near the object from another side than the last time.
     AimElsewhere,
     /// Open, and go where this object is grasped well; closing the fingers then grasps it.
     Reach,

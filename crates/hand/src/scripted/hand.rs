@@ -214,7 +214,7 @@ impl ScriptedHand {
         Sent { arrivals, command, over, recorded: None }
     }
 
-    /// The same before anything is sent.
+    /// Plays ticks of the script without sending their device records.
     pub(super) fn play(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Played {
         let mut command = None;
         let mut step = None;

@@ -76,7 +76,7 @@ impl PlanRequest {
         planned.map(|plan| plan.about(shift))
     }
 
-    /// The same with the reason where the object cannot be grasped.
+    /// Plan of a grasp, or the reason why the object cannot be grasped.
     ///
     /// # Errors
     /// [`NoGrasp`].
@@ -119,7 +119,7 @@ impl Planner {
         Self::beside_by(|request: PlanRequest| request.plan())
     }
 
-    /// The same with another way to plan.
+    /// A planner on a thread of its own that plans by `plan`.
     ///
     /// # Errors
     /// The system's, when it gives no thread.

@@ -81,7 +81,7 @@ pub struct ContactReport {
     pub slip_max: f64,
     /// Largest residual of the natural map of Signorini's and Coulomb's law, N.
     pub residual: f64,
-    /// The same over the largest force of a point.
+    /// Residual of the natural map over the largest force of a point.
     pub residual_rel: f64,
     /// Largest part of a force outside its cone of friction, N.
     pub cone_violation: f64,

@@ -321,7 +321,7 @@ pub(crate) mod samples {
         }
     }
 
-    /// The same with a piece of news.
+    /// A picture's data with a piece of news.
     pub fn frame_with_news(tick: u64, text: &str) -> ViewFrame {
         let news = vec![News { tick, text: text.to_owned(), kind: NewsKind::Grasp }];
         ViewFrame { news, ..frame(tick) }

@@ -33,7 +33,7 @@ pub(super) fn running(hand: HandChoice) -> Running {
     running_with(hand, |_| {})
 }
 
-/// The same, with a frame that is changed.
+/// A running window's state whose newest picture is changed.
 pub(super) fn running_with(hand: HandChoice, change: impl FnOnce(&mut ViewFrame)) -> Running {
     let (controls, _obeyed) = channel();
     let (_told, notices) = channel();

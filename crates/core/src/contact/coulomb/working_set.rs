@@ -54,7 +54,7 @@ impl ContactProblem {
         Solution { sweeps, newton_steps, ..whole }
     }
 
-    /// The same problem of some points alone.
+    /// Contact problem of some points alone.
     fn of_points(&self, points: &[usize]) -> Self {
         let row = |k: usize| 3 * points[k / 3] + k % 3;
         let rows = 3 * points.len();

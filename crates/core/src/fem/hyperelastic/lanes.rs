@@ -56,7 +56,7 @@ impl<S: Simd> Lanes<S> {
         self.simd
     }
 
-    /// The same number everywhere.
+    /// One number in every lane.
     #[inline(always)]
     pub fn like(self, x: f64) -> Self {
         Self::all(self.simd, x)

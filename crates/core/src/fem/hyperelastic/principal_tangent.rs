@@ -58,7 +58,7 @@ impl PrincipalTangent {
         }
     }
 
-    /// The same as a 9 × 9 matrix over `dF` column by column.
+    /// Material tangent `dP/dF` as a 9 × 9 matrix over `dF` column by column.
     pub fn matrix(&self) -> Tangent9 {
         let mut matrix = Tangent9::zeros();
         for column in 0..9 {

@@ -19,7 +19,7 @@ pub(super) fn shrink(j_minus_one: f64) -> f64 {
     }
 }
 
-/// The same for a group of elements, with the same bits.
+/// `J^(−2/3)` and its kin for a group of elements, with the bits of one element at a time.
 #[inline(always)]
 pub(super) fn shrink_lanes<S: Simd>(j_minus_one: Lanes<S>) -> Lanes<S> {
     let changes = j_minus_one.numbers();

@@ -163,8 +163,7 @@ impl Base {
         Self::try_within(mesh, bodies, rigid, stiffness, fixed, u64::MAX, on_stage)
     }
 
-    /// The same where the factor may take so much memory only, which is looked at before it is
-    /// allocated.
+    /// Base whose factor may take so much memory only, which is looked at before it is allocated.
     ///
     /// Units: `limit` bytes.
     ///

@@ -20,7 +20,7 @@ pub struct ContactColumns {
     pub contact: Contact,
     /// Displacement of every degree of freedom under a unit force along x, y, z; 3 × 3N.
     pub(super) fields: [Vec<f64>; 3],
-    /// The same at the nodes of the surface, once a step of contact has asked for it.
+    /// Displacements at the nodes of the surface, once a step of contact has asked for them.
     surface: WorkedOut<Vec<Block>>,
     pub(super) norms: [f64; 3],
     /// Norms of `e − K_B g` over the free degrees of freedom, as computed.

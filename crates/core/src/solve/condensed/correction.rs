@@ -18,7 +18,7 @@ use crate::solve::vectors::norm;
 pub(super) struct Correction {
     /// `‖T x‖`, where `−T x` is what a refined answer adds.
     pub error: Form,
-    /// The same where rounding is replaced by fixed disturbances of the stiffness.
+    /// `‖T x‖` where rounding is replaced by fixed disturbances of the stiffness.
     pub expected: Form,
     /// `‖M x‖`.
     pub size: Form,

@@ -36,7 +36,7 @@ impl Shape {
         (set.full_displacement(&self.base, &answer), answer.lambda, certificate)
     }
 
-    /// The same by a direct factor of K11.
+    /// Displacements and forces by a direct factor of K11, the oracle.
     fn direct(&self, dofs: &[u32], q: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let fixed = self.base.fixed().iter().map(|&d| (d, 0.0));
         let mut known: Vec<(u32, f64)> =

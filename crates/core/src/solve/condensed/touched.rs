@@ -69,7 +69,7 @@ impl Touched {
         }
     }
 
-    /// The same of the absolute values of the field: what rounding in it is measured by.
+    /// Weighted mean of the field's absolute values: what rounding in the mean is measured by.
     pub(super) fn mean_of_sizes(&self, i: usize, field: &[f64]) -> f64 {
         match self.dofs.get(i) {
             Some(&dof) => field[dof as usize].abs(),

@@ -45,7 +45,7 @@ impl Factored {
         self.with_kernel(|kernel| self.solve_by(kernel, stiffness, loads)).map(|found| found.0)
     }
 
-    /// The same, and how certain the answer is. Where no digit of an answer by single precision is
+    /// Solution of one load case, and how certain it is. Where no digit of an answer by single precision is
     /// certain, double precision answers, as far as memory goes.
     ///
     /// # Errors

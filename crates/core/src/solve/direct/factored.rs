@@ -54,8 +54,8 @@ impl Factored {
         Self::try_within(stiffness, partition, method, u64::MAX, on_stage)
     }
 
-    /// The same where the factor or inverse may take so much memory only, which is looked at before
-    /// it is allocated.
+    /// Factor or inverse of `K11` that may take so much memory only, which is looked at before it is
+    /// allocated.
     ///
     /// Units: `limit` bytes.
     ///
@@ -253,7 +253,7 @@ impl Analysed {
         Ok(Factored::of(method, self.into_partition(), kernel, 0))
     }
 
-    /// The same, but where a factor in single precision fails, now or in refinement later, double
+    /// Factors by this method; where a factor in single precision fails, now or in refinement later, double
     /// precision is taken as far as memory goes, and [`Factored::fallback`] says so.
     ///
     /// Units: `limit` bytes, for all that is held at once.

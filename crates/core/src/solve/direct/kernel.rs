@@ -21,7 +21,7 @@ pub(super) enum Kernel {
     Sparse(Box<SparseFactor>),
     /// Factor over the tree of fronts.
     Front(FrontFactor<f64>),
-    /// The same in single precision.
+    /// Factor over the tree of fronts in single precision.
     FrontSingle(FrontFactor<f32>),
     /// No inverse, but a hierarchy that conjugate gradients go by.
     Multigrid(Box<Hierarchy>),

@@ -5,7 +5,7 @@ use crate::solve::vectors::{norm, subtract};
 
 /// Refinement stops after this many steps in any case.
 const REFINEMENT_STEPS_MAX: u32 = 3;
-/// The same with a single-precision factor, which gains four to seven digits a step.
+/// Most steps of refinement with a single-precision factor, which gains four to seven digits a step.
 const REFINEMENT_STEPS_SINGLE_MAX: u32 = 8;
 /// Refinement and conjugate gradients stop at this relative residual.
 pub(super) const RESIDUAL_GOOD: f64 = 1e-13;

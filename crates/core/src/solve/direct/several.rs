@@ -46,7 +46,7 @@ impl Factored {
         Ok(solutions)
     }
 
-    /// The same, and how certain the least certain answer is. Where no digit of one by single
+    /// Solutions of several load cases, and how certain the least certain one is. Where no digit of one by single
     /// precision is certain, double precision answers, as far as memory goes.
     ///
     /// # Errors

@@ -51,7 +51,8 @@ struct Tangent {
 
 /// Largest change of an element's deformation gradient in one piece.
 const GRADIENT_STEP: f64 = 0.35;
-/// The same times the root of a material's first Lamé constant over its second.
+/// Largest change of a deformation gradient in one piece, times the root of a material's first Lamé
+/// constant over its second.
 const GRADIENT_STEP_OF_STIFF_VOLUME: f64 = 5.0;
 /// Smallest piece of a motion.
 const PIECE_MIN: f64 = 1.0 / 4096.0;

@@ -14,7 +14,8 @@ use crate::solve::vectors::{largest, node_max};
 
 /// Largest change of an element's deformation gradient in one piece of a motion.
 const GRADIENT_STEP_MAX: f64 = 0.4;
-/// The same below which a piece is not cut further because its equilibrium lies elsewhere.
+/// Change of a deformation gradient below which a piece is not cut further because its equilibrium lies
+/// elsewhere.
 const GRADIENT_STEP_SMALL: f64 = 0.02;
 /// Share of the largest displacement that corrections may differ by from where the tangent led.
 const STRAYED_MIN: f64 = 1e-2;

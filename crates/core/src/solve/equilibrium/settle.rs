@@ -27,7 +27,7 @@ pub(super) struct Contraction {
 
 /// A ratio of corrections that is taken to be at least so much: slow motions hide behind quick ones.
 const THETA_MIN: f64 = 0.8;
-/// The same before two corrections of a frame were seen.
+/// Ratio of corrections that is assumed before two of a frame were seen.
 const THETA_UNSEEN: f64 = 0.8;
 /// A ratio above which nothing is promised.
 const THETA_MAX: f64 = 0.93;

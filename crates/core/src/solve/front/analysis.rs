@@ -323,7 +323,7 @@ impl FrontAnalysis {
         self.peak::<T>() * size_of::<T>()
     }
 
-    /// The same in the precision of a method.
+    /// Largest memory while the factor is made, in the precision of a method.
     pub fn peak_bytes_of(&self, method: Method) -> usize {
         match method.is_single() {
             false => self.peak_bytes::<f64>(),

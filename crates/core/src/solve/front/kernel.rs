@@ -88,7 +88,7 @@ pub(super) fn subtract_deep<S: Simd, T: Real>(
 }
 
 impl<'a, T: Real> Factors<'a, T> {
-    /// The same from a later column on.
+    /// The factors from a later column on.
     #[inline(always)]
     fn from(self, column: usize) -> Self {
         match self {

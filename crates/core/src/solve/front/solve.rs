@@ -144,7 +144,7 @@ impl<T: Real> FrontFactor<T> {
         wanted
     }
 
-    /// The same for a few right-hand sides.
+    /// Wanted rows of the solutions for a few sparse right-hand sides.
     fn solve_partial_some(
         &self,
         right_hand_sides: &[Vec<(usize, f64)>],

@@ -119,7 +119,7 @@ impl Hierarchy {
         });
     }
 
-    /// The same for the rows of `K11` alone.
+    /// Preconditioner applied to the rows of `K11` alone.
     ///
     /// Shapes: `r` and result n.
     pub fn apply_to_unknown(&self, r: &[f64]) -> Vec<f64> {

@@ -70,7 +70,7 @@ impl<const B: usize> Level<B> {
         (Self { a, smoother, p, by_column }, coarser)
     }
 
-    /// The same for a matrix in single precision; `number` counts from 0, the finest.
+    /// Level of a matrix in single precision; `number` counts from 0, the finest.
     pub fn of_coarse(
         a: BlockRows<B, B>,
         motions: Vec<OfNode<B>>,

@@ -50,7 +50,7 @@ fn check_against_dense(model: &Model, pairs: &[(u32, f64)]) -> u32 {
     check_against(model, pairs, Method::DenseCholesky)
 }
 
-/// The same against another factor.
+/// Steps of multigrid, whose answer is compared with that of another factor.
 fn check_against(model: &Model, pairs: &[(u32, f64)], method: Method) -> u32 {
     let dense = answer(model, pairs, method).unwrap();
     let found = answer(model, pairs, Method::Multigrid).unwrap();

@@ -17,7 +17,7 @@ struct Band {
     index: Vec<u32>,
     /// Whether a vertex has a neighbour in the rest of the one side, the source of the flow.
     is_source: Vec<bool>,
-    /// The same for the other side, where the flow ends.
+    /// Whether a vertex has a neighbour in the rest of the other side, the sink of the flow.
     is_sink: Vec<bool>,
 }
 

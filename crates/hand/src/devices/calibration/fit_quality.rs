@@ -13,7 +13,7 @@ const MIN_SHARE: f64 = 0.25;
 pub struct SensorQuality {
     /// Mean reading in the fist less that of the flat hand; 0 without readings.
     pub span_counts: f64,
-    /// The same of an average glove; `None` where the gestures hardly differ at this joint.
+    /// Span of an average glove's sensor; `None` where the gestures hardly differ at this joint.
     pub expected_counts: Option<f64>,
     /// Standard deviation of the readings while a gesture was held, the larger of both.
     pub noise_counts: f64,

@@ -203,7 +203,7 @@ pub fn encode_record(record: &GloveRecord) -> Vec<u8> {
     bytes
 }
 
-/// The same as a line of decimal numbers; time stamp and status are left out.
+/// A record as a line of decimal numbers; time stamp and status are left out.
 pub fn encode_line(record: &GloveRecord) -> Vec<u8> {
     let mut bytes = vec![record.kind.letter().to_ascii_lowercase()];
     for value in record.sensors.as_slice() {
