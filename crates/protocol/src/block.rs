@@ -4,11 +4,14 @@
 //! read as zero bytes: 0, false, none, empty, the first variant. So either side may learn a field
 //! without a new version of the format.
 
-use wincode::config::Serialize;
+use wincode::config::{Configuration, Serialize};
 use wincode::{SchemaRead, SchemaReadOwned, SchemaWrite};
 
-use crate::payload::PartFormat;
-use crate::{DecodeError, EncodeError};
+use crate::{DecodeError, EncodeError, PART_LEN_MAX};
+
+/// bincode's default format (fixed integers, u64 lengths, u32 tags); no list inside the part may
+/// take more memory than the part may have bytes.
+pub(crate) type PartFormat = Configuration<true, PART_LEN_MAX>;
 
 /// A structure inside a part, in bytes: `u64` length, then its fields.
 #[derive(Clone, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]

@@ -1,6 +1,15 @@
 //! Constants of the format, on which every reader and writer must agree.
 
-use crate::VersionRange;
+use wincode::{SchemaRead, SchemaWrite};
+
+/// Versions of the wire that one side reads and writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, SchemaRead, SchemaWrite)]
+pub struct VersionRange {
+    /// The oldest.
+    pub lowest: u16,
+    /// The newest.
+    pub highest: u16,
+}
 
 /// First bytes of every frame.
 pub const MAGIC: [u8; 4] = *b"SGRP";
@@ -13,3 +22,26 @@ pub const VERSIONS: VersionRange = VersionRange { lowest: VERSION, highest: VERS
 pub const HEADER_LEN: usize = 32;
 /// Most bytes the part of a payload may take; part of the format.
 pub const PART_LEN_MAX: usize = 64 * 1024;
+
+impl VersionRange {
+    /// The highest version that both sides speak.
+    pub fn common(self, other: Self) -> Option<u16> {
+        let highest = self.highest.min(other.highest);
+        (highest >= self.lowest.max(other.lowest)).then_some(highest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_highest_version_of_both_is_taken() {
+        let range = |lowest, highest| VersionRange { lowest, highest };
+        assert_eq!(range(4, 6).common(range(5, 9)), Some(6));
+        assert_eq!(range(4, 4).common(range(4, 5)), Some(4));
+        assert_eq!(range(4, 5).common(range(6, 7)), None);
+        assert_eq!(range(6, 7).common(range(4, 5)), None);
+        assert_eq!(range(5, 4).common(range(4, 5)), None, "nothing lies in an empty range");
+    }
+}

@@ -44,7 +44,7 @@ mod payload;
 pub mod solve_report;
 
 pub use error::{ConnectionError, DecodeError, EncodeError, FrameError};
-pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION, VERSIONS};
+pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION, VERSIONS, VersionRange};
 pub use frame_buffer::{Frame, FrameBuffer};
 pub use header::Header;
 pub use kind::Kind;

@@ -1,14 +1,10 @@
 //! The payload of a frame: one part, then little-endian arrays on eight-byte borders.
 
-use wincode::config::{Configuration, Serialize};
+use wincode::config::Serialize;
 use wincode::{SchemaRead, SchemaWrite};
 
-use crate::block::read_fields;
+use crate::block::{PartFormat, read_fields};
 use crate::{DecodeError, DofValue, EncodeError, HEADER_LEN, Header, Kind, Limits, PART_LEN_MAX};
-
-/// bincode's default format (fixed integers, u64 lengths, u32 tags); no list inside the part may
-/// take more memory than the part may have bytes.
-pub(crate) type PartFormat = Configuration<true, PART_LEN_MAX>;
 
 /// Bytes of the length before a part.
 const LENGTH_LEN: usize = 8;

@@ -7,6 +7,7 @@ use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
 use super::model::ModelHash;
 use super::names::ElementChoice;
 use super::question::{Question, QuestionPart};
+use super::report::ReportLevel;
 use crate::block::Block;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
@@ -56,18 +57,6 @@ pub struct Body {
     pub materials: Vec<Material>,
     /// Which element, or the server's choice.
     pub element: ElementChoice,
-}
-
-/// How much a report tells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
-pub enum ReportLevel {
-    /// Numbers and texts.
-    #[default]
-    Full,
-    /// Numbers; texts are empty.
-    Short,
-    /// Nothing: numbers are none (NaN where there must be one).
-    None,
 }
 
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]

@@ -19,7 +19,7 @@ mod rigid_body;
 mod session;
 
 pub use answer::{Answer, CaseAnswer, Displacements};
-pub use ask::{Ask, Body, ReportLevel, Subject};
+pub use ask::{Ask, Body, Subject};
 pub use contact::{BodyLoad, ContactAnswer, ContactAsk, ContactFrame, ContactPoint, ContactReport};
 pub use dof_value::DofValue;
 pub use large::{
@@ -35,7 +35,7 @@ pub use object_state::{HeldContact, ObjectState};
 pub use question::{NodeChoice, Precision, Question, Want};
 pub use reject::{RejectCode, Rejected};
 pub use reply::Reply;
-pub use report::{SolveReport, StageMs, Warning, WarningCode, WarningLevel};
+pub use report::{ReportLevel, SolveReport, StageMs, Warning, WarningCode, WarningLevel};
 pub use request::Request;
 pub use rigid_body::{BodyMotion, BodyShape, Pose};
-pub use session::{Hello, VersionRange, Welcome};
+pub use session::{Hello, Welcome};

@@ -4,7 +4,6 @@
 use serde::{Serialize, Serializer};
 use wincode::{SchemaRead, SchemaWrite};
 
-use super::ask::ReportLevel;
 use super::names::ElementUsed;
 use crate::block::Block;
 use crate::{DecodeError, EncodeError, Limits};
@@ -26,6 +25,18 @@ pub struct StageMs {
     pub encode: f64,
     /// Waiting for a worker.
     pub queue: f64,
+}
+
+/// How much a report tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
+pub enum ReportLevel {
+    /// Numbers and texts.
+    #[default]
+    Full,
+    /// Numbers; texts are empty.
+    Short,
+    /// Nothing: numbers are none (NaN where there must be one).
+    None,
 }
 
 /// How much of an answer rounding has left, by the estimate of its error; a number, since a later

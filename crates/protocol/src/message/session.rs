@@ -6,16 +6,7 @@ use wincode::{SchemaRead, SchemaWrite};
 
 use crate::block::Block;
 use crate::payload::{PayloadReader, PayloadWriter};
-use crate::{DecodeError, EncodeError, Limits};
-
-/// Versions of the wire that one side reads and writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, SchemaRead, SchemaWrite)]
-pub struct VersionRange {
-    /// The oldest.
-    pub lowest: u16,
-    /// The newest.
-    pub highest: u16,
-}
+use crate::{DecodeError, EncodeError, Limits, VersionRange};
 
 /// First message of a client.
 #[derive(Clone, PartialEq, Eq, SchemaRead, SchemaWrite)]
@@ -79,14 +70,6 @@ impl Default for Welcome {
             capabilities: Vec::new(),
             idle_ms: 0,
         }
-    }
-}
-
-impl VersionRange {
-    /// The highest version that both sides speak.
-    pub fn common(self, other: Self) -> Option<u16> {
-        let highest = self.highest.min(other.highest);
-        (highest >= self.lowest.max(other.lowest)).then_some(highest)
     }
 }
 
@@ -158,15 +141,5 @@ mod tests {
         let hello = Hello::new("me", Some("hush".to_owned()));
         let shown = format!("{hello:?}");
         assert!(shown.contains("me") && !shown.contains("hush"), "{shown}");
-    }
-
-    #[test]
-    fn the_highest_version_of_both_is_taken() {
-        let range = |lowest, highest| VersionRange { lowest, highest };
-        assert_eq!(range(4, 6).common(range(5, 9)), Some(6));
-        assert_eq!(range(4, 4).common(range(4, 5)), Some(4));
-        assert_eq!(range(4, 5).common(range(6, 7)), None);
-        assert_eq!(range(6, 7).common(range(4, 5)), None);
-        assert_eq!(range(5, 4).common(range(4, 5)), None, "nothing lies in an empty range");
     }
 }
