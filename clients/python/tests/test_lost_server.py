@@ -13,6 +13,7 @@ from recorded import stand_in
 
 import softgrasp
 from softgrasp import Mesh, Model, Server
+from softgrasp.framing import Kind, encode_frame
 
 AT_ONCE = 1.0
 """Seconds within which a lost server is noticed."""
@@ -57,7 +58,7 @@ def test_server_killed_while_it_works_is_noticed_at_once(spawn: Spawn) -> None:
 
 
 def stop(pid: int) -> None:
-    """Stops a process and waits until all its threads stand: a signal takes its time on a busy machine."""
+    """Stops a process and waits until all its threads stand, which takes its time."""
     os.kill(pid, signal.SIGSTOP)
     given_up = time.monotonic() + 10.0
     while any(
@@ -94,9 +95,7 @@ def test_server_that_is_asked_to_end_says_so_or_closes(spawn: Spawn) -> None:
 
 def test_trickle_of_bytes_does_not_outlast_the_timeout() -> None:
     def trickle(stream, header) -> None:
-        from softgrasp.framing import Kind, encode_frame
-
-        for byte in encode_frame(Kind.PONG, header.request_id, bytes(8)):
+        for byte in encode_frame(Kind.PONG, header.request_id, bytes(16)):
             stream.sendall(bytes([byte]))
             time.sleep(0.1)
 
