@@ -1,16 +1,19 @@
 """Requests that are under way: cancelled, several at once, and a server that says it is there."""
 
 import asyncio
+import contextlib
 import socket
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
+from conftest import Bar
 from recorded import rejected_payload, stand_in
 
 import softgrasp
-from softgrasp import AsyncServer, Limits, Server, calls
+from softgrasp import AsyncServer, Limits, LoadCase, Material, Mesh, Model, Server, calls
 from softgrasp.conversation import AHEAD_MAX, Conversation
 from softgrasp.fields import Part
 from softgrasp.framing import Kind, encode_frame
@@ -236,3 +239,60 @@ def test_time_of_an_answer_counts_from_the_answer_before() -> None:
         with Server(address, timeout=0.8) as server, ThreadPoolExecutor(4) as pool:
             list(pool.map(lambda _: server.ping(), range(4)))
         asyncio.run(ask(address))
+
+
+def slow_request() -> tuple[Model, LoadCase]:
+    """What the loop of 1998 takes seconds for, on any machine."""
+    mesh = Mesh.block((0.1, 0.1, 0.1), (9, 9, 9))
+    held = LoadCase().prescribe(mesh.nodes_at(x=0.0), (0.0, 0.0, 0.0))
+    case = held.prescribe(mesh.nodes_at(x=0.1), (0.001, 0.0, 0.0))
+    return Model(mesh, Material(1e4, 0.3), "t4"), case
+
+
+def test_real_server_gives_up_what_is_cancelled(server: Server, bar: Bar) -> None:
+    model, case = slow_request()
+    with ThreadPoolExecutor(1) as pool:
+        work = pool.submit(server.solve, model, case, method="gauss-jordan-plain")
+        while not server._connection.conversation.under_way:
+            time.sleep(0.01)
+        start = time.monotonic()
+        server.cancel()
+        with pytest.raises(softgrasp.Cancelled) as caught:
+            work.result(timeout=60.0)
+        assert caught.value.code == 15 and time.monotonic() - start < 2.0
+    assert np.abs(server.solve(bar.model, bar.case).displacements - bar.exact).max() < 1e-12
+
+
+def test_real_server_answers_the_newest_of_frames(server: Server, bar: Bar) -> None:
+    async def ask() -> None:
+        async with await AsyncServer.connect(server.address, timeout=60.0) as session:
+            kept = await session.keep(bar.model)
+            model, case = slow_request()
+            slow = asyncio.create_task(session.solve(model, case, method="gauss-jordan-plain"))
+            await asyncio.sleep(0.2)
+            frames = [kept.frame(bar.case.scaled(k), newest_wins=True) for k in range(1, 5)]
+            older = kept.frame(bar.case.scaled(9))
+            tasks = [asyncio.create_task(frame) for frame in (older, *frames)]
+            while len(session._connection.conversation.under_way) < 6:
+                await asyncio.sleep(0.01)
+            slow.cancel()
+            first, *others, last = await asyncio.gather(*tasks, return_exceptions=True)
+            assert all(isinstance(each, softgrasp.Superseded) for each in others), others
+            assert np.abs(first.displacements - 9 * bar.exact).max() < 1e-11
+            assert np.abs(last.displacements - 4 * bar.exact).max() < 1e-11
+
+    asyncio.run(ask())
+
+
+def test_real_server_says_that_it_is_there_while_it_works_and_rests(server: Server) -> None:
+    model, case = slow_request()
+    with Server(server.address, alive_every=0.5) as session, ThreadPoolExecutor(1) as pool:
+        work = pool.submit(session.solve, model, case, method="gauss-jordan-plain")
+        # Longer than the silence after which it would be given up.
+        time.sleep(2.0)
+        session.cancel()
+        with contextlib.suppress(softgrasp.Cancelled):
+            work.result(timeout=60.0)
+        time.sleep(2.0)
+        assert session.is_open
+        session.ping()
