@@ -1,9 +1,7 @@
 //! The requests of all reports to a server: to keep a model and to answer frames.
 
 use glove_client::ask::connection::{LinkError, ServerConnection, unexpected};
-use softgrasp_protocol::{
-    Answer, FrameRequest, Limits, ModelHash, Question, Reply, Request, UploadModel,
-};
+use softgrasp_protocol::{Answer, Ask, Limits, ModelHash, Question, Reply, Request, UploadModel};
 
 use crate::report_error::ReportError;
 
@@ -28,7 +26,7 @@ pub fn upload(
 pub fn answer(reply: Result<Reply, LinkError>) -> Result<Answer, ReportError> {
     match reply? {
         Reply::Answer(answer) => Ok(*answer),
-        other => Err(unexpected("Frame", &other).into()),
+        other => Err(unexpected("Ask", &other).into()),
     }
 }
 
@@ -38,7 +36,7 @@ pub fn answer(reply: Result<Reply, LinkError>) -> Result<Answer, ReportError> {
 /// [`ReportError::Link`] for what cannot be sent.
 pub fn encode_request(model: ModelHash, question: Question) -> Result<Vec<u8>, ReportError> {
     let mut bytes = Vec::new();
-    Request::Frame(FrameRequest { model, question })
+    Request::from(Ask::new(model, question))
         .encode_into(1, &Limits::default(), &mut bytes)
         .map_err(LinkError::from)?;
     Ok(bytes)

@@ -6,8 +6,8 @@ use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_core::model::{Element, Known, Model};
 use softgrasp_core::solve::{Loads, Method, Solution};
 use softgrasp_protocol::{
-    DofValue, ElementChoice, ElementName, MeshData, MethodName, NodeChoice, Precision, Question,
-    SolveOnce, UploadModel, Want,
+    Ask, Body, DofValue, ElementChoice, ElementName, MeshData, MethodName, NodeChoice, Precision,
+    Question, UploadModel, Want,
 };
 
 use crate::report::ReportError;
@@ -102,10 +102,10 @@ impl Pressed {
 
     /// The same question for a server: mesh, material, partition and known displacements in one
     /// (thesis 5.1.1).
-    pub fn solve_once(&self, method: Method) -> SolveOnce {
+    pub fn whole_request(&self, method: Method) -> Ask {
         let (mesh, materials) = self.on_the_wire();
         let question = self.question(method.name(), 1.0, NodeChoice::All);
-        SolveOnce { mesh, materials, element: ElementChoice::T4, question }
+        Ask::new(Body { mesh, materials, element: ElementChoice::T4 }, question)
     }
 
     /// The model for a server to keep.

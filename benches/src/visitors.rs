@@ -5,8 +5,7 @@ use std::time::{Duration, Instant};
 
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_protocol::{
-    DeformationChoice, FrameRequest, LargeAsk, LargeFrame, LawName, ModelHash, NodeChoice, Pace,
-    PathChoice, Reply, Request,
+    Ask, Deformation, LargeAsk, LawName, ModelHash, NodeChoice, Pace, PathChoice, Reply, Request,
 };
 
 use crate::report_error::ReportError;
@@ -50,11 +49,11 @@ impl Subject {
         };
         let question = |i: usize| scene.question("auto", pressed(i), surface.clone());
         let requests = (0..PRESSES).map(|i| match kind {
-            Kind::Linear => Request::Frame(FrameRequest { model, question: question(i) }),
+            Kind::Linear => Request::from(Ask::new(model, question(i))),
             Kind::Large => {
                 let path = if i == 0 { PathChoice::FromRest } else { PathChoice::Continue };
                 let large = LargeAsk {
-                    deformation: DeformationChoice::Large,
+                    deformation: Deformation::Large,
                     law: LawName::NeoHookean,
                     yield_stress: None,
                     path,
@@ -62,7 +61,7 @@ impl Subject {
                 };
                 let mut question = question(i);
                 question.max_error = Some(2e-3);
-                Request::LargeFrame(Box::new(LargeFrame { model, large, question }))
+                Request::from(Ask { large: Some(large), ..Ask::new(model, question) })
             }
         });
         let requests = requests.collect();
@@ -105,14 +104,14 @@ impl Subject {
             (_, n) => n % PRESSES,
         };
         match connection.ask(&self.requests[at])? {
-            Reply::Answer(answer) => {
+            Reply::Answer(answer) if self.kind == Kind::Linear => {
                 Ok(self.expected.get(at) == Some(&hash(answer.displacements.into_f64())))
             }
-            Reply::LargeAnswer(answered) => {
-                let error = answered.answer.report.error_estimate_rel;
+            Reply::Answer(answer) => {
+                let error = answer.report.error_estimate_rel;
                 Ok(error.is_some_and(|error| error <= 2e-3))
             }
-            other => Err(glove_client::ask::connection::unexpected("Frame", &other).into()),
+            other => Err(glove_client::ask::connection::unexpected("Ask", &other).into()),
         }
     }
 }

@@ -41,9 +41,9 @@ impl Conversation {
             requests: vec![
                 Request::HaveModel(ModelHash::of(&upload)),
                 Request::UploadModel(upload),
-                Request::Frame(frame(&mesh, 1.0, "sparse-cholesky")),
-                Request::Frame(listed),
-                Request::SolveOnce(Box::new(once(&mesh, "dense-cholesky"))),
+                Request::from(frame(&mesh, 1.0, "sparse-cholesky")),
+                Request::from(listed),
+                Request::from(once(&mesh, "dense-cholesky")),
                 Request::Ping { nonce: 7 },
             ],
         }
@@ -64,7 +64,7 @@ impl Conversation {
     /// # Panics
     /// If one is too large to be sent.
     pub fn frames(&self) -> Vec<Vec<u8>> {
-        let hello = Hello { client: "a conversation".to_owned(), token: None };
+        let hello = Hello::new("a conversation", None);
         let all = [Request::Hello(hello)].into_iter().chain(self.requests.iter().cloned());
         (1..).zip(all).map(|(id, request)| request_frame(id, &request)).collect()
     }

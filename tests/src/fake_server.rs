@@ -48,11 +48,11 @@ fn reply_to(request: &Request, displacements: &[[f64; 3]]) -> Option<Reply> {
             server: "fake".to_owned(),
             version: "0".to_owned(),
             threads: 1,
-            limits: Limits::default(),
+            ..Welcome::default()
         })),
         Request::HaveModel(_) => Some(Reply::ModelState { known: true }),
-        Request::Frame(frame) => {
-            let nodes = frame.question.want.nodes.clone();
+        Request::Ask(ask) => {
+            let nodes = ask.question.want.nodes.clone();
             let wanted = match &nodes {
                 NodeChoice::All => displacements.to_vec(),
                 NodeChoice::Nodes(nodes) => {
@@ -61,10 +61,12 @@ fn reply_to(request: &Request, displacements: &[[f64; 3]]) -> Option<Reply> {
             };
             Some(Reply::Answer(Box::new(Answer {
                 report: SolveReport::default(),
+                large: None,
                 nodes,
                 displacements: Displacements::F64(wanted),
                 reactions: Vec::new(),
                 mask_forces: Vec::new(),
+                cases: Vec::new(),
             })))
         }
         Request::Ping { nonce } => Some(Reply::Pong { nonce: *nonce }),

@@ -24,6 +24,8 @@ pub enum Heard {
     },
     /// A refusal.
     Rejected(RejectCode, String),
+    /// The server is there.
+    Alive,
     /// The number of the `Ping`.
     Pong(u64),
 }
@@ -88,8 +90,6 @@ impl Heard {
         match reply {
             Reply::Welcome(_) => Self::Welcome,
             Reply::Answer(answer) => Self::Answer(AnswerBits::of(answer)),
-            Reply::LargeAnswer(answered) => Self::Answer(AnswerBits::of(&answered.answer)),
-            Reply::SeveralAnswers(answers) => Self::Answer(AnswerBits::of(&answers.answer)),
             Reply::ContactAnswer(answered) => Self::Answer(AnswerBits::of(&answered.answer)),
             Reply::ModelState { .. } => Self::ModelState,
             Reply::ModelReady(ready) => Self::ModelReady {
@@ -98,6 +98,7 @@ impl Heard {
                 fixed_dofs: ready.fixed_dofs,
             },
             Reply::Rejected(rejected) => Self::Rejected(rejected.code, rejected.text.clone()),
+            Reply::Alive => Self::Alive,
             Reply::Pong { nonce } => Self::Pong(*nonce),
         }
     }

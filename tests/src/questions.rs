@@ -2,8 +2,8 @@
 
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_protocol::{
-    DofValue, ElementChoice, ElementName, FrameRequest, Material, MeshData, MethodName, ModelHash,
-    NodeChoice, Precision, Question, SolveOnce, UploadModel, Want,
+    Ask, Body, DofValue, ElementChoice, ElementName, Material, MeshData, MethodName, ModelHash,
+    NodeChoice, Precision, Question, Request, UploadModel, Want,
 };
 
 /// Names of all methods, slowest first.
@@ -83,9 +83,35 @@ pub fn question(known: Vec<DofValue>, method: &str) -> Question {
     }
 }
 
+/// A linear question about a mesh that comes along.
+#[derive(Clone, Debug)]
+pub struct Once {
+    /// Nodes and elements.
+    pub mesh: MeshData,
+    /// One material, or one for each region.
+    pub materials: Vec<Material>,
+    /// Which element.
+    pub element: ElementChoice,
+    /// What is known and asked.
+    pub question: Question,
+}
+
+impl From<Once> for Ask {
+    fn from(once: Once) -> Self {
+        let Once { mesh, materials, element, question } = once;
+        Self::new(Body { mesh, materials, element }, question)
+    }
+}
+
+impl From<Once> for Request {
+    fn from(once: Once) -> Self {
+        Ask::from(once).into()
+    }
+}
+
 /// One self-contained request: a squeezed object.
-pub fn once(mesh: &TetMesh, method: &str) -> SolveOnce {
-    SolveOnce {
+pub fn once(mesh: &TetMesh, method: &str) -> Once {
+    Once {
         mesh: mesh_data(mesh),
         materials: vec![MATERIAL],
         element: ElementChoice::T4,
@@ -104,9 +130,6 @@ pub fn upload(mesh: &TetMesh) -> UploadModel {
 }
 
 /// One frame on a kept model: the object squeezed by `push`.
-pub fn frame(mesh: &TetMesh, push: f64, method: &str) -> FrameRequest {
-    FrameRequest {
-        model: ModelHash::of(&upload(mesh)),
-        question: question(squeeze(mesh, push), method),
-    }
+pub fn frame(mesh: &TetMesh, push: f64, method: &str) -> Ask {
+    Ask::new(ModelHash::of(&upload(mesh)), question(squeeze(mesh, push), method))
 }

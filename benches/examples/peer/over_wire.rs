@@ -4,8 +4,8 @@
 use glove_client::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
 use softgrasp_bench::sample::timed_ms;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementName, FrameRequest, Material, MeshData, MethodName, ModelHash,
-    NodeChoice, Precision, Question, Reply, Request, UploadModel, Want,
+    Answer, Ask, DofValue, ElementName, Material, MeshData, MethodName, ModelHash, NodeChoice,
+    Precision, Question, Reply, Request, UploadModel, Want,
 };
 
 use crate::problem::{POISSON, Problem, YOUNG};
@@ -64,7 +64,7 @@ pub fn run(problem: &Problem, method: &str, threads: usize) -> anyhow::Result<se
 }
 
 fn frame(model: ModelHash, question: Question) -> Request {
-    Request::Frame(FrameRequest { model, question })
+    Request::from(Ask::new(model, question))
 }
 
 fn ask(connection: &mut ServerConnection, request: &Request) -> anyhow::Result<Answer> {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use glove_client::ask::connection::{Host, ServerChoice, ServerConnection};
 use softgrasp_grasp::object::ContactModel;
-use softgrasp_protocol::{Answer, FrameRequest, ModelHash, Question, Request, SolveReport};
+use softgrasp_protocol::{Answer, Ask, ModelHash, Question, Request, SolveReport};
 
 use super::tips::{DEPTH, RADIUS, Tips, WANT_ALL};
 use super::verify::verify;
@@ -91,7 +91,7 @@ impl<'a> Asker<'a> {
     }
 
     fn ask(&mut self, question: Question) -> Result<(f64, Answer), ReportError> {
-        let request = Request::Frame(FrameRequest { model: self.model, question });
+        let request = Request::from(Ask::new(self.model, question));
         let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
         Ok((ms, answer(reply)?))
     }

@@ -3,8 +3,7 @@
 use glove_client::ask::connection::{Host, ServerConnection};
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{
-    Answer, FrameRequest, MethodName, ModelHash, NodeChoice, Question, Request, StageMs,
-    UploadModel,
+    Answer, Ask, MethodName, ModelHash, NodeChoice, Question, Request, StageMs, UploadModel,
 };
 
 use crate::contact::{Tips, WANT_ALL, verify};
@@ -143,7 +142,7 @@ impl Asker {
     /// An answer, and the time from asking to having it, ms.
     fn ask(&mut self, scale: f64, waiting: Waiting) -> Result<(f64, Answer), ReportError> {
         let question = self.asked.scaled(scale);
-        let request = Request::Frame(FrameRequest { model: self.model, question });
+        let request = Request::from(Ask::new(self.model, question));
         let (ms, reply) = timed_ms(|| match waiting {
             Waiting::Asleep => self.connection.ask(&request),
             Waiting::Awake => self.connection.ask_awake(&request),

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use glove_client::ask::connection::{Host, LinkError, ServerConnection};
 use softgrasp_core::model::Element;
 use softgrasp_protocol::{
-    DofValue, ElementChoice, ElementName, FrameRequest, Masks, Material, MeshData, MethodName,
-    NodeChoice, Precision, Question as Asked, Reply, Request, SolveOnce, UploadModel, Want,
+    Ask, Body, DofValue, ElementChoice, ElementName, Masks, Material, MeshData, MethodName,
+    NodeChoice, Precision, Question as Asked, Reply, Request, UploadModel, Want,
 };
 
 use super::answer::{Answer, since};
@@ -37,7 +37,7 @@ pub(super) fn solve(question: &Question, element: Element, host: &Host) -> Resul
     let begin = Instant::now();
     let mut connection = host.connect().map_err(broken)?;
     let question = asked(&known, false)?;
-    let request = Request::SolveOnce(Box::new(SolveOnce { mesh, materials, element, question }));
+    let request = Request::from(Ask::new(Body { mesh, materials, element }, question));
     read(ask(&mut connection, &request)?, begin)?.if_certain()
 }
 
@@ -66,8 +66,8 @@ pub(super) fn frame(
         Reply::ModelReady(ready) => ready.model,
         other => return Err(unexpected(&other)),
     };
-    let request = FrameRequest { model, question: asked(&question.pairs, by_masks)? };
-    let request = Request::Frame(request);
+    let request = Ask::new(model, asked(&question.pairs, by_masks)?);
+    let request = Request::from(request);
     let mut answer = read(ask(&mut connection, &request)?, begin)?;
     let ms = answer.ms;
     while answer.stated_rel.is_nan() && begin.elapsed() < ESTIMATE_WAIT {

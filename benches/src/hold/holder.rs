@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use fea_server::{RunningServer, ServerConfig};
 use glove_client::ask::connection::{Host, LinkError, ServerChoice, ServerConnection};
-use softgrasp_protocol::{Answer, FrameRequest, ModelHash, NodeChoice, Request};
+use softgrasp_protocol::{Answer, Ask, ModelHash, NodeChoice, Request};
 
 use super::kept::{Kept, Solved, keep};
 use crate::reference::{Reference, error_rel};
@@ -116,7 +116,7 @@ fn scale(number: u32) -> f64 {
 fn request(scene: &Pressed, model: ModelHash, scale: f64) -> Request {
     let nodes = NodeChoice::Nodes(scene.surface.nodes.clone());
     let question = scene.question("condensed", scale, nodes);
-    Request::Frame(FrameRequest { model, question })
+    Request::from(Ask::new(model, question))
 }
 
 /// An answer that carries its error bound: the proof is made beside the frames after an upload, and

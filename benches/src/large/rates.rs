@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use glove_client::ask::connection::{Host, ServerChoice, ServerConnection, unexpected};
+use glove_client::ask::connection::{Host, ServerChoice, ServerConnection};
 use softgrasp_core::mesh::{BuiltIn, Surface};
 use softgrasp_protocol::{
-    ElementName, LargeAnswer, LargeAsk, LargeFrame, Masks, Material, MeshData, ModelHash,
-    NodeChoice, Pace, PathChoice, Precision, Question, Reply, Request, UploadModel, Want,
+    Answer, Ask, ElementName, LargeAsk, LargeReport, Masks, Material, MeshData, ModelHash,
+    NodeChoice, Pace, PathChoice, Precision, Question, Request, UploadModel, Want,
 };
 
 use super::squeeze::Squeeze;
@@ -64,10 +64,10 @@ pub(super) fn hold_rate(
             continue;
         }
         ms.push(took);
-        solves.push(f64::from(answered.large.linear_solves));
-        let estimate = answered.answer.report.error_estimate_rel.unwrap_or(f64::INFINITY);
+        solves.push(f64::from(of_large(&answered).linear_solves));
+        let estimate = answered.report.error_estimate_rel.unwrap_or(f64::INFINITY);
         estimate_max = estimate_max.max(estimate);
-        factor_age_max = factor_age_max.max(answered.large.factor_age);
+        factor_age_max = factor_age_max.max(of_large(&answered).factor_age);
     }
     let mut sorted = ms.clone();
     sorted.sort_by(f64::total_cmp);
@@ -118,15 +118,13 @@ fn question_of(squeeze: &Squeeze, surface: &[u32], share: f64) -> Question {
 
 fn frame_of(model: ModelHash, question: Question, path: PathChoice) -> Request {
     let large = LargeAsk { path, pace: Pace::Timely, ..LargeAsk::default() };
-    Request::LargeFrame(Box::new(LargeFrame { model, large, question }))
+    Request::from(Ask { large: Some(large), ..Ask::new(model, question) })
 }
 
-fn answer(
-    connection: &mut ServerConnection,
-    asked: Request,
-) -> Result<Box<LargeAnswer>, ReportError> {
-    match connection.ask(&asked)? {
-        Reply::LargeAnswer(answered) => Ok(answered),
-        other => Err(ReportError::Link(unexpected("LargeFrame", &other))),
-    }
+fn of_large(answer: &Answer) -> LargeReport {
+    answer.large.unwrap_or_default()
+}
+
+fn answer(connection: &mut ServerConnection, asked: Request) -> Result<Answer, ReportError> {
+    crate::requests::answer(connection.ask(&asked))
 }

@@ -8,8 +8,8 @@ use glove_client::ask::connection::{Host, ServerConnection};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{FrontAnalysis, FrontFactor, Loads, Method};
 use softgrasp_protocol::{
-    Answer, FrameRequest, MethodName, ModelHash, NodeChoice, Precision, Prefetch, Question, Reply,
-    Request, StageMs, Want,
+    Answer, Ask, MethodName, ModelHash, NodeChoice, Precision, Prefetch, Question, Reply, Request,
+    StageMs, Want,
 };
 
 use super::grips::Grip;
@@ -105,8 +105,7 @@ impl<'a> Toucher<'a> {
     }
 
     fn ask(&mut self, grip: &Grip) -> Result<(f64, Answer), ReportError> {
-        let request =
-            Request::Frame(FrameRequest { model: self.model, question: self.question(grip) });
+        let request = Request::from(Ask::new(self.model, self.question(grip)));
         let (ms, reply) = timed_ms(|| self.connection.ask_awake(&request));
         Ok((ms, answer(reply)?))
     }

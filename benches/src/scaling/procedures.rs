@@ -76,7 +76,7 @@ fn rounds(scene: &Pressed, method: Method, threads: usize) -> Result<Vec<Round>,
     let reference = Reference::of(&model, &known)?;
     let host = Host::open(&ServerChoice::Embedded, Some(threads))?;
     let mut connection = host.connect()?;
-    let request = Request::SolveOnce(Box::new(scene.solve_once(method)));
+    let request = Request::from(scene.whole_request(method));
     let rest = scene.mesh.vertices();
     let mut tree = SphereTree::try_build(rest, &scene.surface.nodes)?;
     let (mut normals, mut found) = (Vec::new(), Vec::new());
@@ -98,7 +98,7 @@ fn rounds(scene: &Pressed, method: Method, threads: usize) -> Result<Vec<Round>,
         let (round_trip, reply) = timed_ms(|| connection.ask(&request));
         let answer = match reply? {
             Reply::Answer(answer) => answer,
-            other => return Err(unexpected("SolveOnce", &other).into()),
+            other => return Err(unexpected("Ask", &other).into()),
         };
         let stages = answer.report.stage_ms;
         let analysis = stages.assemble + stages.order + stages.factor + stages.solve;

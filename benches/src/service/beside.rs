@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_core::solve::Method;
-use softgrasp_protocol::{NodeChoice, Request, SolveOnce};
+use softgrasp_protocol::{Ask, NodeChoice, Request};
 
 use super::bars::Bars;
 use super::probe::{Probes, Times};
@@ -122,7 +122,7 @@ fn beside(
     let scene = Pressed::try_new(BuiltIn::Cube, nodes)?;
     let what = format!("{sessions} × {} nodes", scene.mesh.node_count());
     progress("service", &what);
-    let mut request = scene.solve_once(Method::Front);
+    let mut request = scene.whole_request(Method::Front);
     let few: Vec<u32> = scene.surface.nodes.iter().copied().take(100).collect();
     request.question = scene.question("auto", 1.0, NodeChoice::Nodes(few));
     let work = LongWork { address, request: &request, sessions, solves_min };
@@ -180,7 +180,7 @@ fn rows(table: &mut Table, beside: &str, times: &Times, quiet: &Times) -> [f64; 
 /// Sessions that solve the same request again and again.
 struct LongWork<'a> {
     address: &'a str,
-    request: &'a SolveOnce,
+    request: &'a Ask,
     sessions: usize,
     solves_min: usize,
 }
@@ -228,7 +228,7 @@ impl LongWork<'_> {
     /// One session; the time that it solved, s.
     fn solve_on(&self, done: &AtomicUsize, is_failed: &AtomicBool) -> Result<f64, ReportError> {
         let mut connection = ServerConnection::connect(self.address)?;
-        let request = Request::SolveOnce(Box::new(self.request.clone()));
+        let request = Request::from(self.request.clone());
         let begun = Instant::now();
         let mut first = None;
         while done.load(Ordering::Relaxed) < self.solves_min && !is_failed.load(Ordering::Relaxed) {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_protocol::{
-    DofValue, FrameRequest, MethodName, ModelHash, NodeChoice, Reply, Request, UploadModel,
+    Ask, DofValue, MethodName, ModelHash, NodeChoice, Reply, Request, UploadModel,
 };
 
 use crate::random::Random;
@@ -58,7 +58,7 @@ impl Probes {
         let model = upload(&mut connection, scene.upload())?;
         let question = scene.question("condensed", 1.0, NodeChoice::All);
         loop {
-            let request = Request::Frame(FrameRequest { model, question: question.clone() });
+            let request = Request::from(Ask::new(model, question.clone()));
             let answer = answer(connection.ask(&request))?;
             if answer.report.error_bound_rel.is_some() {
                 break;
@@ -148,7 +148,7 @@ fn ask(
     let mut question = scene.question(method, 1.0, surface);
     question.known = known.to_vec();
     question.method = MethodName::try_new(method).expect("the names of all methods can be sent");
-    let request = Request::Frame(FrameRequest { model, question });
+    let request = Request::from(Ask::new(model, question));
     let reply: Result<Reply, _> = connection.ask(&request);
     Ok(answer(reply)?.displacements.into_f64())
 }

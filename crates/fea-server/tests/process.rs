@@ -19,8 +19,8 @@ use softgrasp_core::solve::Method;
 use softgrasp_core::solve::memory::Need;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementChoice, Hello, Kind, Limits, Material, MeshData, MethodName, Question,
-    RejectCode, Reply, Request, SolveOnce, Want,
+    Answer, Ask, Body, DofValue, ElementChoice, Hello, Kind, Limits, Material, MeshData,
+    MethodName, Question, RejectCode, Reply, Request, Subject,
 };
 
 const MIB: u64 = 1 << 20;
@@ -67,7 +67,7 @@ impl ServerProcess {
         let stream = TcpStream::connect(self.address).unwrap();
         stream.set_nodelay(true).unwrap();
         let mut client = Client { connection: Connection::new(stream, Limits::default()), id: 0 };
-        let hello = Hello { client: "a test".to_owned(), token: None };
+        let hello = Hello::new("a test", None);
         assert!(matches!(client.ask(&Request::Hello(hello)), Reply::Welcome(_)));
         client
     }
@@ -128,8 +128,8 @@ impl Client {
         Reply::decode(&frame, &Limits::default()).unwrap()
     }
 
-    fn solve(&mut self, request: SolveOnce) -> Answer {
-        match self.ask(&Request::SolveOnce(Box::new(request))) {
+    fn solve(&mut self, request: Ask) -> Answer {
+        match self.ask(&Request::from(request)) {
             Reply::Answer(answer) => *answer,
             other => panic!("{other:?}"),
         }
@@ -137,9 +137,10 @@ impl Client {
 }
 
 /// What the server counts for a request before it makes the factor.
-fn counted(request: &SolveOnce, method: Method) -> Need {
-    let vertices = request.mesh.vertices.iter().copied().map(Into::into).collect();
-    let mesh = TetMesh::try_new(vertices, request.mesh.tets.clone(), vec![]).unwrap();
+fn counted(request: &Ask, method: Method) -> Need {
+    let Subject::Mesh(body) = &request.subject else { panic!("a mesh comes along") };
+    let vertices = body.mesh.vertices.iter().copied().map(Into::into).collect();
+    let mesh = TetMesh::try_new(vertices, body.mesh.tets.clone(), vec![]).unwrap();
     let material = CoreMaterial::try_new(1.0e5, 0.3).unwrap();
     let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
     let mut dofs: Vec<u32> = request.question.known.iter().map(|known| known.dof).collect();
@@ -150,12 +151,12 @@ fn counted(request: &SolveOnce, method: Method) -> Need {
 }
 
 /// A cube whose lowest layer is held and one of whose upper corners is pulled.
-fn pulled_cube(nodes: usize, method: &str) -> SolveOnce {
+fn pulled_cube(nodes: usize, method: &str) -> Ask {
     pulled(BuiltIn::Cube, nodes, method)
 }
 
 /// An object whose lowest tenth is held and whose highest node is pulled.
-fn pulled(shape: BuiltIn, nodes: usize, method: &str) -> SolveOnce {
+fn pulled(shape: BuiltIn, nodes: usize, method: &str) -> Ask {
     let mesh: TetMesh = generate(shape, nodes).unwrap();
     let (low, high) = mesh.bounds();
     let mut known = Vec::new();
@@ -168,7 +169,7 @@ fn pulled(shape: BuiltIn, nodes: usize, method: &str) -> SolveOnce {
         };
         known.extend((0..3).map(|axis| DofValue { dof: 3 * node as u32 + axis, value }));
     }
-    SolveOnce {
+    let body = Body {
         mesh: MeshData {
             vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
             tets: mesh.tets().to_vec(),
@@ -176,13 +177,9 @@ fn pulled(shape: BuiltIn, nodes: usize, method: &str) -> SolveOnce {
         },
         materials: vec![Material { young: 1.0e5, poisson: 0.3 }],
         element: ElementChoice::T4,
-        question: Question {
-            known,
-            method: MethodName::try_new(method).unwrap(),
-            want: Want::default(),
-            ..Question::default()
-        },
-    }
+    };
+    let method = MethodName::try_new(method).unwrap();
+    Ask::new(body, Question { known, method, ..Question::default() })
 }
 
 #[test]
@@ -207,7 +204,7 @@ fn server_at_work_that_takes_minutes_ends_within_three_seconds() {
         let mut server = ServerProcess::start(&["--threads", "2"]);
         let mut clients: Vec<Client> = (0..4).map(|_| server.connect()).collect();
         for client in &mut clients {
-            client.send(&Request::SolveOnce(Box::new(pulled_cube(2000, "gauss-jordan-plain"))));
+            client.send(&Request::from(pulled_cube(2000, "gauss-jordan-plain")));
         }
         // By the time this is answered the others have been read.
         let mut last = server.connect();
@@ -235,7 +232,7 @@ fn a_stop_while_equations_are_ordered_does_not_crash() {
     // One long ordering, with a session that waits for it.
     let mut server = ServerProcess::start(&["--threads", "1"]);
     let mut client = server.connect();
-    client.send(&Request::SolveOnce(Box::new(pulled_cube(8000, "front"))));
+    client.send(&Request::from(pulled_cube(8000, "front")));
     std::thread::sleep(Duration::from_millis(150));
     server.signal("TERM");
     assert_eq!(server.end(), (Some(0), String::new()));
@@ -305,9 +302,7 @@ fn token_of_the_file_is_wanted() {
     let server = ServerProcess::start(&["--token-file", file.to_str().unwrap()]);
     let stream = TcpStream::connect(server.address).unwrap();
     let mut client = Client { connection: Connection::new(stream, Limits::default()), id: 0 };
-    let hello = |token: &str| {
-        Request::Hello(Hello { client: "a test".to_owned(), token: Some(token.to_owned()) })
-    };
+    let hello = |token: &str| Request::Hello(Hello::new("a test", Some(token.to_owned())));
     match client.ask(&hello("not this line")) {
         Reply::Rejected(rejected) => assert_eq!(rejected.code, RejectCode::NotAuthorised),
         other => panic!("{other:?}"),
@@ -319,7 +314,7 @@ fn token_of_the_file_is_wanted() {
 fn announced_sizes_take_no_memory() {
     let server = ServerProcess::start(&["--threads", "1"]);
     let mut client = server.connect();
-    let sound = || Request::SolveOnce(Box::new(pulled_cube(64, "auto")));
+    let sound = || Request::from(pulled_cube(64, "auto"));
     assert!(matches!(client.ask(&sound()), Reply::Answer(_)));
     let Some(before) = server.peak_bytes() else {
         println!("skipped: this system does not tell a process's memory");
@@ -348,7 +343,7 @@ fn announced_sizes_take_no_memory() {
     mesh.extend(2_400_000_u32.to_le_bytes());
     mesh.extend([1, 0, 0, 1, 0]);
     mesh.resize(24, 0);
-    for kind in [Kind::UploadModel, Kind::SolveOnce] {
+    for kind in [Kind::UploadModel, Kind::Ask] {
         let mut frame = header(0);
         frame.truncate(6);
         frame.extend(kind.number().to_le_bytes());

@@ -108,7 +108,8 @@ mod tests {
 
     #[test]
     fn value_that_does_not_exist_is_refused_though_zeros_would_follow() {
-        let flag = New { count: 1, name: String::new(), is_flagged: true, share: None, notes: vec![] };
+        let flag =
+            New { count: 1, name: String::new(), is_flagged: true, share: None, notes: vec![] };
         let Block(mut bytes) = Block::of(&flag).unwrap();
         bytes[12] = 2;
         assert!(matches!(read_fields::<New>(&bytes), Err(DecodeError::Part { .. })));

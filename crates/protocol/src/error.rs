@@ -15,7 +15,9 @@ pub enum FrameError {
         found: Vec<u8>,
     },
     /// The peer speaks another version of this protocol.
-    #[error("the peer speaks protocol version {found}, this side speaks {VERSION}; bring the older one up to date")]
+    #[error(
+        "the peer speaks protocol version {found}, this side speaks {VERSION}; bring the older one up to date"
+    )]
     Version {
         /// The peer's version.
         found: u16,

@@ -11,7 +11,7 @@ use softgrasp_core::fem::{Element, Material};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{Loads, Method};
 use softgrasp_protocol::{
-    DofValue, ElementChoice, MethodName, NodeChoice, Precision, Reply, Request, SolveOnce, Want,
+    Ask, Body, DofValue, ElementChoice, MethodName, NodeChoice, Precision, Reply, Request, Want,
 };
 use softgrasp_tests::questions::mesh_data;
 
@@ -81,19 +81,19 @@ impl Asked {
             _ => (ElementChoice::T10, "front"),
         };
         let (young, poisson) = (question.young, question.poisson);
-        let request = SolveOnce {
+        let body = Body {
             mesh: mesh_data(&object.mesh),
             materials: vec![softgrasp_protocol::Material { young, poisson }],
             element,
-            question: softgrasp_protocol::Question {
-                known: question.known.iter().map(value).collect(),
-                forces: question.forces.iter().map(value).collect(),
-                method: MethodName::try_new(method).unwrap(),
-                want: Want { nodes: NodeChoice::All, reactions: true, precision: Precision::F64 },
-                ..softgrasp_protocol::Question::default()
-            },
         };
-        let reply = connection.ask(&Request::SolveOnce(Box::new(request)));
+        let asked = softgrasp_protocol::Question {
+            known: question.known.iter().map(value).collect(),
+            forces: question.forces.iter().map(value).collect(),
+            method: MethodName::try_new(method).unwrap(),
+            want: Want { nodes: NodeChoice::All, reactions: true, precision: Precision::F64 },
+            ..softgrasp_protocol::Question::default()
+        };
+        let reply = connection.ask(&Request::from(Ask::new(body, asked)));
         let Ok(Reply::Answer(answer)) = reply else { panic!("{}: {reply:?}", object.name) };
         assert!(answer.reactions.iter().map(|r| r.dof).eq(question.known.iter().map(|k| k.0)));
         assert_eq!(answer.report.method, method);

@@ -83,10 +83,10 @@ fn answers_over_tls_have_the_same_bits() {
         let mesh = cube(216);
         let requests = [
             Request::Ping { nonce: 4 },
-            Request::SolveOnce(Box::new(once(&mesh, "front"))),
+            Request::from(once(&mesh, "front")),
             Request::UploadModel(upload(&mesh)),
-            Request::Frame(frame(&mesh, 0.01, "condensed")),
-            Request::Frame(frame(&mesh, 0.02, "condensed")),
+            Request::from(frame(&mesh, 0.01, "condensed")),
+            Request::from(frame(&mesh, 0.02, "condensed")),
         ];
         let answers = |to: Endpoint| -> Vec<Heard> {
             let mut connection = ServerConnection::connect(to).unwrap();

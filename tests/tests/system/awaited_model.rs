@@ -44,7 +44,7 @@ fn serve(stream: TcpStream, is_prepared: &Receiver<()>) {
                 server: "slow".to_owned(),
                 version: "0".to_owned(),
                 threads: 1,
-                limits: Limits::default(),
+                ..Welcome::default()
             }),
             Request::HaveModel(_) => Reply::ModelState { known: false },
             Request::UploadModel(model) => {

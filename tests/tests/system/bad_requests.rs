@@ -7,10 +7,10 @@ use softgrasp_protocol::RejectCode::{
     BadRequest, MemoryLimit, RigidMotionFree, TooLarge, UnknownMethod, UnknownModel,
 };
 use softgrasp_protocol::{
-    DofValue, Material, MethodName, ModelHash, NodeChoice, RejectCode, Reply, Request, SolveOnce,
+    DofValue, Material, MethodName, ModelHash, NodeChoice, RejectCode, Reply, Request,
 };
 use softgrasp_tests::heard::AnswerBits;
-use softgrasp_tests::questions::{MATERIAL, cube, frame, once, question, upload};
+use softgrasp_tests::questions::{MATERIAL, Once, cube, frame, once, question, upload};
 
 use crate::start::{answer, client, config, refusal, server};
 
@@ -23,7 +23,7 @@ struct Bench {
 }
 
 fn good() -> Request {
-    Request::SolveOnce(Box::new(once(&cube(27), "sparse-cholesky")))
+    Request::from(once(&cube(27), "sparse-cholesky"))
 }
 
 impl Bench {
@@ -47,15 +47,10 @@ impl Bench {
     }
 
     /// The same for the good one-shot request after a change.
-    fn refuses_changed(
-        &mut self,
-        change: impl Fn(&mut SolveOnce),
-        code: RejectCode,
-        says: &[&str],
-    ) {
+    fn refuses_changed(&mut self, change: impl Fn(&mut Once), code: RejectCode, says: &[&str]) {
         let mut request = once(&cube(27), "sparse-cholesky");
         change(&mut request);
-        self.refuses(&Request::SolveOnce(Box::new(request)), code, says);
+        self.refuses(&Request::from(request), code, says);
     }
 }
 
@@ -128,7 +123,7 @@ fn materials_and_methods_that_do_not_exist_are_refused() {
 #[test]
 fn known_displacements_and_forces_that_make_no_sense_are_refused_by_node() {
     let mut bench = Bench::new(server(1));
-    let push = |dof, value| move |r: &mut SolveOnce| r.question.known.push(DofValue { dof, value });
+    let push = |dof, value| move |r: &mut Once| r.question.known.push(DofValue { dof, value });
     bench.refuses_changed(push(81, 0.0), BadRequest, &["node 27", "27 nodes"]);
     bench.refuses_changed(push(u32::MAX, 0.0), BadRequest, &["node 1431655765"]);
     bench.refuses_changed(push(40, f64::NAN), BadRequest, &["node 13", "axis y", "finite"]);
@@ -148,8 +143,7 @@ fn known_displacements_and_forces_that_make_no_sense_are_refused_by_node() {
         BadRequest,
         &["node 27", "no tetrahedron uses it"],
     );
-    let force =
-        |dof, value| move |r: &mut SolveOnce| r.question.forces.push(DofValue { dof, value });
+    let force = |dof, value| move |r: &mut Once| r.question.forces.push(DofValue { dof, value });
     bench.refuses_changed(force(39, f64::NAN), BadRequest, &["force", "node 13", "finite"]);
     bench.refuses_changed(force(39, f64::INFINITY), BadRequest, &["force", "node 13", "finite"]);
     bench.refuses_changed(force(81, 1.0), BadRequest, &["forces", "node 27", "27 nodes"]);
@@ -169,14 +163,14 @@ fn known_displacements_and_forces_that_make_no_sense_are_refused_by_node() {
 fn bodies_left_free_to_move_are_refused_with_their_motion() {
     let mut bench = Bench::new(server(1));
     let hold = |nodes: &'static [u32]| {
-        move |r: &mut SolveOnce| {
+        move |r: &mut Once| {
             let dofs = nodes.iter().flat_map(|n| 3 * n..3 * n + 3);
             r.question.known = dofs.map(|dof| DofValue { dof, value: 0.0 }).collect();
         }
     };
     for method in softgrasp_tests::questions::METHODS {
-        let with = |change: Box<dyn Fn(&mut SolveOnce)>| {
-            move |r: &mut SolveOnce| {
+        let with = |change: Box<dyn Fn(&mut Once)>| {
+            move |r: &mut Once| {
                 r.question.method = MethodName::try_new(method).unwrap();
                 change(r);
             }
@@ -212,9 +206,8 @@ fn inverted_elements_are_accepted_and_give_the_same_answer() {
     for tet in inverted.mesh.tets.iter_mut().step_by(3) {
         tet.swap(0, 1);
     }
-    let mut ask = |request: SolveOnce| {
-        answer(&mut connection, &Request::SolveOnce(Box::new(request))).displacements.into_f64()
-    };
+    let mut ask =
+        |request: Once| answer(&mut connection, &Request::from(request)).displacements.into_f64();
     let (expected, found) = (ask(upright), ask(inverted));
     let largest = expected.iter().flatten().fold(0.0, |most: f64, u| most.max(u.abs()));
     assert!(largest > 0.0);
@@ -227,9 +220,7 @@ fn inverted_elements_are_accepted_and_give_the_same_answer() {
 fn region_labels_of_any_size_take_no_memory_and_pair_with_materials_in_ascending_order() {
     let server = server(1);
     let mut connection = client(&server);
-    let mut ask = |request: SolveOnce| {
-        AnswerBits::of(&answer(&mut connection, &Request::SolveOnce(Box::new(request))))
-    };
+    let mut ask = |request: Once| AnswerBits::of(&answer(&mut connection, &Request::from(request)));
     let stiff = Material { young: 20.0 * MATERIAL.young, ..MATERIAL };
     let with = |labels: [u32; 2], materials: Vec<Material>| {
         let mut request = once(&cube(64), "sparse-cholesky");
@@ -250,16 +241,16 @@ fn region_labels_of_any_size_take_no_memory_and_pair_with_materials_in_ascending
 fn requests_above_the_servers_limits_are_refused_by_the_options_name() {
     let small = ServerConfig { max_nodes: 100, memory_limit: 135_000, ..config(1) };
     let mut bench = Bench::new(fea_server::start(small).unwrap());
-    let large = Request::SolveOnce(Box::new(once(&cube(125), "sparse-cholesky")));
+    let large = Request::from(once(&cube(125), "sparse-cholesky"));
     bench.refuses(&large, TooLarge, &["125", "100", "--max-nodes"]);
     bench.refuses(&Request::UploadModel(upload(&cube(125))), TooLarge, &["--max-nodes"]);
     // 64 nodes, 96 unknowns: 73 728 bytes as a square, half of that as a triangle; mesh and
     // stiffness take up to 86 000.
     for method in ["gauss-jordan", "dense-inverse"] {
-        let dense = Request::SolveOnce(Box::new(once(&cube(64), method)));
+        let dense = Request::from(once(&cube(64), method));
         bench.refuses(&dense, MemoryLimit, &[method, "96", "73728", "135000", "--memory-limit"]);
     }
-    let dense = Request::SolveOnce(Box::new(once(&cube(64), "dense-cholesky")));
+    let dense = Request::from(once(&cube(64), "dense-cholesky"));
     assert_eq!(answer(&mut bench.connection, &dense).report.method, "dense-cholesky");
 }
 
@@ -267,7 +258,7 @@ fn requests_above_the_servers_limits_are_refused_by_the_options_name() {
 fn frames_on_models_that_are_not_there_are_refused_and_an_upload_helps() {
     let mut bench = Bench::new(server(1));
     let mesh = cube(64);
-    let request = Request::Frame(frame(&mesh, 1.0, "auto"));
+    let request = Request::from(frame(&mesh, 1.0, "auto"));
     let hash = ModelHash::of(&upload(&mesh));
     let name = hash.to_string();
     bench.refuses(&request, UnknownModel, &[&name, "upload it"]);
@@ -292,7 +283,7 @@ fn frames_are_checked_like_whole_requests_and_cost_no_factor_when_they_are_bad()
     let changed = |change: &dyn Fn(&mut softgrasp_protocol::Question)| {
         let mut frame = sound.clone();
         change(&mut frame.question);
-        Request::Frame(frame)
+        Request::from(frame)
     };
     let free = question(Vec::new(), "sparse-cholesky");
     bench.refuses(&changed(&|q| *q = free.clone()), RigidMotionFree, &["0 known"]);
@@ -302,9 +293,9 @@ fn frames_are_checked_like_whole_requests_and_cost_no_factor_when_they_are_bad()
     bench.refuses(&force(100, f64::NAN), BadRequest, &["force", "node 33", "finite"]);
     let wanted = NodeChoice::Nodes(vec![64]);
     bench.refuses(&changed(&|q| q.want.nodes = wanted.clone()), BadRequest, &["node 64"]);
-    let first = answer(&mut bench.connection, &Request::Frame(sound.clone()));
+    let first = answer(&mut bench.connection, &Request::from(sound.clone()));
     assert!(!first.report.factor_reused, "a bad frame must not be factored first");
-    let second = answer(&mut bench.connection, &Request::Frame(sound));
+    let second = answer(&mut bench.connection, &Request::from(sound));
     assert!(second.report.factor_reused);
     assert_eq!(second.displacements.node_count(), 64);
 }

@@ -31,7 +31,7 @@ impl Bystander {
         let mesh = cube(64);
         let mut connection = client(server);
         connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
-        let request = Request::Frame(frame(&mesh, 1.0, "sparse-cholesky"));
+        let request = Request::from(frame(&mesh, 1.0, "sparse-cholesky"));
         let expected = Heard::Answer(AnswerBits::of(&answer(&mut connection, &request)));
         Self { connection, request, expected }
     }
@@ -44,7 +44,7 @@ impl Bystander {
 
 fn hello(token: Option<&str>) -> Request {
     let token = token.map(str::to_owned);
-    Request::Hello(softgrasp_protocol::Hello { client: "a test".to_owned(), token })
+    Request::Hello(softgrasp_protocol::Hello::new("a test", token))
 }
 
 fn ping(nonce: u64) -> Request {
@@ -98,7 +98,7 @@ fn truncated_frames_and_garbage_close_their_session_and_no_other() {
         let mut random = Random::from_environment("garbage");
         let server = server(1);
         let mut bystander = Bystander::new(&server);
-        let sound = request_frame(3, &Request::SolveOnce(Box::new(once(&cube(27), "auto"))));
+        let sound = request_frame(3, &Request::from(once(&cube(27), "auto")));
         for round in 0..150 {
             let mut bytes = match round % 3 {
                 0 => Vec::new(),
@@ -155,7 +155,7 @@ fn reason_reaches_a_client_that_is_still_sending_when_it_is_refused() {
 #[test]
 fn another_protocol_version_is_told_which_one_is_spoken() {
     let server = server(1);
-    for version in [0, 1, VERSION + 1, u16::MAX] {
+    for version in [0, VERSION + 1, u16::MAX] {
         let header = raw_header(version, Kind::Hello.number(), 1, 0, &[]);
         let (code, text) = last_words(server.address(), &header).expect("last words");
         assert_eq!(code, RejectCode::UnsupportedVersion);
@@ -185,9 +185,10 @@ fn sound_frames_without_a_sound_message_are_refused_and_the_session_lives() {
     for kind in Kind::ALL.into_iter().filter(|kind| kind.is_reply()) {
         expect(&mut session, kind.number(), &[], "other direction");
     }
-    let has_reply = [Kind::Hello, Kind::SolveOnce, Kind::HaveModel, Kind::UploadModel, Kind::Frame];
+    let has_reply =
+        [Kind::Hello, Kind::Ask, Kind::HaveModel, Kind::UploadModel, Kind::ContactFrame];
     for kind in has_reply {
-        expect(&mut session, kind.number(), &[], "cannot be read");
+        expect(&mut session, kind.number(), &[], "the length of the part");
         expect(&mut session, kind.number(), &[0xff; 64], "");
     }
     expect(&mut session, Kind::Ping.number(), &[0; 16], "left over");
@@ -197,9 +198,10 @@ fn sound_frames_without_a_sound_message_are_refused_and_the_session_lives() {
 fn hostile_counts_under_sound_checksums_are_refused() {
     let server = server(1);
     let mut session = RawSession::open(server.address());
-    let sound = request_frame(1, &Request::SolveOnce(Box::new(once(&cube(27), "auto"))));
+    let sound = request_frame(1, &Request::from(once(&cube(27), "auto")));
     let payload = &sound[softgrasp_protocol::HEADER_LEN..];
-    // node_count, tet_count and material_count stand at the payload's start (docs/wire.md).
+    // node_count, tet_count and material_count stand behind the length of the part and the number of
+    // the subject (docs/wire.md).
     for (at, count, code) in [
         (0, u32::MAX, RejectCode::TooLarge),
         (0, 400_000, RejectCode::BadRequest),
@@ -209,18 +211,16 @@ fn hostile_counts_under_sound_checksums_are_refused() {
         (9, 65_536, RejectCode::BadRequest),
     ] {
         let mut payload = payload.to_vec();
+        let at = 8 + 4 + at;
         payload[at..at + 4].copy_from_slice(&count.to_le_bytes());
-        session.send(&raw_frame(Kind::SolveOnce.number(), 2, &payload));
+        session.send(&raw_frame(Kind::Ask.number(), 2, &payload));
         let (id, reply) = session.reply().expect("the session lives");
         let (found, text) = rejected(reply);
         assert_eq!((id, found), (2, code), "{text}");
         let says = if code == RejectCode::TooLarge { "limit" } else { "there" };
         assert!(text.contains(says), "{text}");
     }
-    assert!(matches!(
-        session.ask(3, &Request::SolveOnce(Box::new(once(&cube(27), "auto")))),
-        Reply::Answer(_)
-    ));
+    assert!(matches!(session.ask(3, &Request::from(once(&cube(27), "auto"))), Reply::Answer(_)));
 }
 
 #[test]
@@ -315,7 +315,7 @@ fn client_that_takes_no_reply_delays_no_other_and_no_stop() {
         let mesh = cube(1000);
         assert!(matches!(deaf.ask(1, &Request::UploadModel(upload(&mesh))), Reply::ModelReady(_)));
         // Replies that are not read fill the buffers on the way; then no request is read any more.
-        deaf.send_until_full(&request_frame(2, &Request::Frame(frame(&mesh, 1.0, "auto"))));
+        deaf.send_until_full(&request_frame(2, &Request::from(frame(&mesh, 1.0, "auto"))));
         for _ in 0..50 {
             bystander.look();
         }

@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use fea_server::RunningServer;
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_protocol::{DofValue, FrameRequest, Masks, Prefetch, Reply, Request, SolveOnce};
+use softgrasp_protocol::{Ask, DofValue, Masks, Prefetch, Reply, Request};
 use softgrasp_tests::heard::displacement_hash;
-use softgrasp_tests::questions::{cube, once, question, upload};
+use softgrasp_tests::questions::{Once, cube, once, question, upload};
 use softgrasp_tests::watchdog::within;
 
 use crate::start::{answer, client, config};
@@ -44,13 +44,13 @@ fn hold_conversation(server: &RunningServer, mesh: &TetMesh) -> Vec<u64> {
     for push in [1.0, -0.5, 0.25] {
         for method in ["auto", "condensed", "front"] {
             let question = question(grip(push), method);
-            let request = Request::Frame(FrameRequest { model: ready.model, question });
+            let request = Request::from(Ask::new(ready.model, question));
             let answer = answer(&mut connection, &request);
             heard.push(displacement_hash(&answer.displacements));
         }
     }
-    let once = SolveOnce { question: question(grip(1.0), "condensed"), ..once(mesh, "auto") };
-    let answer = answer(&mut connection, &Request::SolveOnce(Box::new(once)));
+    let once = Once { question: question(grip(1.0), "condensed"), ..once(mesh, "auto") };
+    let answer = answer(&mut connection, &Request::from(once));
     heard.push(displacement_hash(&answer.displacements));
     heard
 }

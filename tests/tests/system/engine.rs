@@ -6,7 +6,7 @@ use fea_server::{RunningServer, ServerConfig};
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementName, FrameRequest, Masks, ModelHash, NodeChoice, Precision, Prefetch,
+    Answer, Ask, DofValue, ElementName, Masks, ModelHash, NodeChoice, Precision, Prefetch,
     Question, RejectCode, Reply, Request, UploadModel,
 };
 use softgrasp_tests::questions::{cube, once, question, upload};
@@ -25,7 +25,7 @@ fn contacts(mesh: &TetMesh, push: f64) -> Vec<DofValue> {
 
 /// A question about a kept model.
 fn asking(model: ModelHash, question: Question) -> Request {
-    Request::Frame(FrameRequest { model, question })
+    Request::from(Ask::new(model, question))
 }
 
 struct Scene {
@@ -180,7 +180,7 @@ fn ten_node_elements_answer_for_the_corners_and_are_softer() {
     let mut solve = |element: ElementName| {
         let mut request = once(&mesh, "front");
         request.element = element.into();
-        answer(&mut connection, &Request::SolveOnce(Box::new(request)))
+        answer(&mut connection, &Request::from(request))
     };
     let (linear, quadratic) = (solve(ElementName::T4), solve(ElementName::T10));
     assert_eq!(quadratic.report.element, ElementName::T10);
@@ -203,7 +203,7 @@ fn frame_that_touches_nothing_on_a_fixed_body_is_answered_with_zeros() {
     connection.ask(&Request::UploadModel(model)).unwrap();
     for method in ["auto", "condensed", "front"] {
         let question = question(Vec::new(), method);
-        let request = Request::Frame(FrameRequest { model: hash, question });
+        let request = Request::from(Ask::new(hash, question));
         let found = answer(&mut connection, &request);
         assert_eq!(found.reactions.len(), 48, "{method}");
         assert!(found.reactions.iter().all(|r| r.value == 0.0), "{method}");

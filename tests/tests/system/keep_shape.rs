@@ -38,7 +38,7 @@ fn old_model_answers_while_the_new_one_is_made_and_after() {
         let mut connection = client(&server);
         let (old, new) = (cube(343), kept(&cube(3375)));
         connection.ask(&Request::UploadModel(upload(&old))).unwrap();
-        let asked = Request::Frame(frame(&old, 1.0, "auto"));
+        let asked = Request::from(frame(&old, 1.0, "auto"));
         // Strain and bound come from beside the frames; the displacements may not depend on it.
         let mut shape = || answer(&mut connection, &asked).displacements;
         let expected = shape();
@@ -54,7 +54,7 @@ fn old_model_answers_while_the_new_one_is_made_and_after() {
         }
         // Both are kept: the client that goes on with the new shape takes nothing from the others.
         assert!(shape() == expected);
-        let asked_new = Request::Frame(frame(&new, 1.0, "auto"));
+        let asked_new = Request::from(frame(&new, 1.0, "auto"));
         assert_eq!(answer(&mut connection, &asked_new).displacements.node_count(), 3375);
     }
 }

@@ -34,4 +34,5 @@ mod settings;
 mod start;
 mod stopping;
 mod tracked_hands;
+mod wire_rules;
 mod wishes;

@@ -31,9 +31,9 @@ fn clients() -> Vec<Vec<Request>> {
         let method = METHODS[(i + usize::from(i >= 4)) % 4];
         vec![
             Request::UploadModel(upload(mesh)),
-            Request::Frame(frame(mesh, 1.0, method)),
-            Request::SolveOnce(Box::new(once(mesh, METHODS[(i + 1) % 4]))),
-            Request::Frame(frame(mesh, -0.5, method)),
+            Request::from(frame(mesh, 1.0, method)),
+            Request::from(once(mesh, METHODS[(i + 1) % 4])),
+            Request::from(frame(mesh, -0.5, method)),
             Request::Ping { nonce: i as u64 },
         ]
     };
@@ -87,7 +87,7 @@ fn two_clients_share_a_model_and_its_factor() {
     let again = ready(second.ask(&Request::UploadModel(upload(&mesh))));
     assert!(again.reused);
     assert_eq!((again.model, again.unknown_dofs), (made.model, made.unknown_dofs));
-    let request = Request::Frame(frame(&mesh, 1.0, "auto"));
+    let request = Request::from(frame(&mesh, 1.0, "auto"));
     let one = answer(&mut first, &request);
     let two = answer(&mut second, &request);
     assert!(!one.report.factor_reused && two.report.factor_reused);
@@ -108,10 +108,10 @@ fn model_dropped_by_one_client_stays_for_another_that_has_named_it() {
     first.send(&Request::Drop(hash)).unwrap();
     // In order: the drop has been heard before this is answered.
     first.ask(&Request::Ping { nonce: 1 }).unwrap();
-    answer(&mut second, &Request::Frame(frame(&mesh, 1.0, "auto")));
+    answer(&mut second, &Request::from(frame(&mesh, 1.0, "auto")));
     second.send(&Request::Drop(hash)).unwrap();
     second.ask(&Request::Ping { nonce: 2 }).unwrap();
-    let (code, _) = refusal(&mut second, &Request::Frame(frame(&mesh, 1.0, "auto")));
+    let (code, _) = refusal(&mut second, &Request::from(frame(&mesh, 1.0, "auto")));
     assert_eq!(code, RejectCode::UnknownModel);
 }
 
@@ -125,12 +125,12 @@ fn model_that_had_to_make_room_is_unknown_and_may_be_uploaded_again() {
     let bring = |connection: &mut ServerConnection, mesh: &TetMesh| {
         let uploaded = connection.ask(&Request::UploadModel(upload(mesh))).unwrap();
         assert!(matches!(uploaded, Reply::ModelReady(_)));
-        Heard::of(&connection.ask(&Request::Frame(frame(mesh, 1.0, "auto"))).unwrap())
+        Heard::of(&connection.ask(&Request::from(frame(mesh, 1.0, "auto"))).unwrap())
     };
     let heard: Vec<Heard> = meshes.iter().map(|mesh| bring(&mut connection, mesh)).collect();
     let gone = Request::HaveModel(ModelHash::of(&upload(&meshes[0])));
     assert_eq!(connection.ask(&gone).unwrap(), Reply::ModelState { known: false });
-    let request = Request::Frame(frame(&meshes[0], 1.0, "auto"));
+    let request = Request::from(frame(&meshes[0], 1.0, "auto"));
     let (code, text) = refusal(&mut connection, &request);
     assert_eq!(code, RejectCode::UnknownModel);
     assert!(text.contains("upload it"), "{text}");

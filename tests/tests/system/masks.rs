@@ -4,10 +4,10 @@ use fea_server::RunningServer;
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_protocol::RejectCode::{BadRequest, MemoryLimit, RigidMotionFree, UnknownMethod};
 use softgrasp_protocol::{
-    Answer, DofValue, ElementChoice, ElementName, FrameRequest, Masks, ModelHash, Prefetch,
-    Question, RejectCode, Reply, Request, SolveOnce, UploadModel,
+    Answer, Ask, DofValue, ElementChoice, ElementName, Masks, ModelHash, Prefetch, Question,
+    RejectCode, Reply, Request, UploadModel,
 };
-use softgrasp_tests::questions::{MATERIAL, cube, mesh_data, question, upload};
+use softgrasp_tests::questions::{MATERIAL, Once, cube, mesh_data, question, upload};
 
 use crate::start::{answer, client, config, refusal, server};
 
@@ -55,7 +55,7 @@ impl Scene {
     }
 
     fn frame(&self, question: Question) -> Request {
-        Request::Frame(FrameRequest { model: self.model, question })
+        Request::from(Ask::new(self.model, question))
     }
 
     /// The question is refused with words; then a good one is answered.
@@ -259,15 +259,15 @@ fn one_request_with_masks_is_condensed_and_carries_its_bound() {
     let server = server(1);
     let mut connection = client(&server);
     let mesh = cube(216);
-    let once = SolveOnce {
+    let once = Once {
         mesh: mesh_data(&mesh),
         materials: vec![MATERIAL],
         element: ElementName::T4.into(),
         question: holding(&FOUR, "auto"),
     };
     let asked = |question: Question| {
-        let once = SolveOnce { question, ..once.clone() };
-        Request::SolveOnce(Box::new(once))
+        let once = Once { question, ..once.clone() };
+        Request::from(once)
     };
     let found = answer(&mut connection, &asked(holding(&FOUR, "auto")));
     assert_eq!(found.report.method, "condensed");
@@ -282,17 +282,20 @@ fn masks_are_not_forgotten_where_the_element_is_left_open() {
     let server = server(2);
     let mut connection = client(&server);
     let mut by_element = |element| {
-        let request = SolveOnce {
+        let request = Once {
             mesh: mesh_data(&cube(216)),
             materials: vec![MATERIAL],
             element,
             question: holding(&FOUR, "auto"),
         };
-        answer(&mut connection, &Request::SolveOnce(Box::new(request)))
+        answer(&mut connection, &Request::from(request))
     };
     let given = by_element(ElementChoice::T4);
     let open = by_element(ElementChoice::Auto);
-    assert_eq!((open.report.method.as_str(), open.report.element), ("condensed", ElementName::T4));
+    assert_eq!(
+        (open.report.method.as_str(), open.report.element),
+        ("condensed", ElementName::T4.into())
+    );
     assert_eq!(open.displacements, given.displacements);
     assert_eq!(open.mask_forces.len(), FOUR.len());
 }

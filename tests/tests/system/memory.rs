@@ -8,9 +8,11 @@ use softgrasp_core::solve::memory::Need;
 use softgrasp_core::solve::{Analysed, Method};
 use softgrasp_protocol::RejectCode::MemoryLimit;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementChoice, MeshData, ModelHash, Rejected, Reply, Request, SolveOnce,
+    Answer, DofValue, ElementChoice, MeshData, ModelHash, Rejected, Reply, Request,
 };
-use softgrasp_tests::questions::{METHODS, cube, frame, object, once, question, squeeze, upload};
+use softgrasp_tests::questions::{
+    METHODS, Once, cube, frame, object, once, question, squeeze, upload,
+};
 
 use crate::start::{answer, client, config, refusal};
 
@@ -34,8 +36,8 @@ fn within(memory_limit: u64) -> ServerConfig {
     ServerConfig { memory_limit, ..config(2) }
 }
 
-fn ask(connection: &mut ServerConnection, request: SolveOnce) -> Answer {
-    answer(connection, &Request::SolveOnce(Box::new(request)))
+fn ask(connection: &mut ServerConnection, request: Once) -> Answer {
+    answer(connection, &Request::from(request))
 }
 
 fn refused(connection: &mut ServerConnection, request: &Request) -> Rejected {
@@ -52,8 +54,8 @@ fn every_method_is_held_against_the_limit_and_the_session_lives() {
     let server = fea_server::start(within(1 << 20)).unwrap();
     let mut connection = client(&server);
     for method in METHODS {
-        let request = Request::SolveOnce(Box::new(once(&mesh, method)));
-        let Rejected { code, text, detail } = refused(&mut connection, &request);
+        let request = Request::from(once(&mesh, method));
+        let Rejected { code, text, detail, .. } = refused(&mut connection, &request);
         assert_eq!(code, MemoryLimit, "{method}: {text}");
         for part in [method, "1.0 MiB", "1000 nodes", "--memory-limit", "fewer nodes", "allow"] {
             assert!(text.contains(part), "'{part}' is missing in: {text}");
@@ -64,7 +66,7 @@ fn every_method_is_held_against_the_limit_and_the_session_lives() {
     }
     let mut quadratic = once(&mesh, "auto");
     quadratic.element = ElementChoice::T10;
-    let (code, text) = refusal(&mut connection, &Request::SolveOnce(Box::new(quadratic)));
+    let (code, text) = refusal(&mut connection, &Request::from(quadratic));
     assert!(code == MemoryLimit && text.contains("front on t10"), "{text}");
     let (code, text) = refusal(&mut connection, &Request::UploadModel(upload(&mesh)));
     assert!(code == MemoryLimit && text.contains("condensed on t4"), "{text}");
@@ -82,7 +84,7 @@ fn hopeless_mesh_is_refused_from_its_size_before_it_is_looked_at() {
     let mut connection = client(&server);
     let mut request = once(&cube(27), "auto");
     request.mesh = mesh;
-    let (code, text) = refusal(&mut connection, &Request::SolveOnce(Box::new(request)));
+    let (code, text) = refusal(&mut connection, &Request::from(request));
     assert_eq!(code, MemoryLimit);
     for part in ["160000 nodes", "900000 tetrahedra", "front on t4", "front-mixed on t4", "GiB"] {
         assert!(text.contains(part), "'{part}' is missing in: {text}");
@@ -107,7 +109,7 @@ fn auto_takes_single_precision_where_only_that_fits() {
     let size = pairs().map(|(a, _)| a.abs()).fold(0.0, f64::max);
     assert!(size > 0.0 && off <= 1e-9 * size, "{off:e} of {size:e}");
     // Asked for by name it is refused, by its count, and told what would fit.
-    let front = Request::SolveOnce(Box::new(once(&mesh, "front")));
+    let front = Request::from(once(&mesh, "front"));
     let (code, text) = refusal(&mut connection, &front);
     assert_eq!(code, MemoryLimit);
     assert!(text.contains("front on t4 needs") && !text.contains("predicted"), "{text}");
@@ -128,7 +130,7 @@ fn auto_answers_without_a_factor_where_no_factor_fits() {
     let told = found.error_estimate_rel.expect("an estimate");
     assert!(found.residual_rel < 1e-9 && told < 1e-6, "{found:?}");
     // Asked for by name a factor is refused as ever.
-    let single = Request::SolveOnce(Box::new(once(&mesh, "front-mixed")));
+    let single = Request::from(once(&mesh, "front-mixed"));
     assert_eq!(refusal(&mut connection, &single).0, MemoryLimit);
 }
 
@@ -140,15 +142,15 @@ fn frames_go_to_single_precision_where_no_base_fits_and_keep_that_factor() {
     let mut connection = client(&server);
     let ready = connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
     assert!(matches!(ready, Reply::ModelReady(_)));
-    let request = Request::Frame(frame(&mesh, 1.0, "auto"));
+    let request = Request::from(frame(&mesh, 1.0, "auto"));
     let first = answer(&mut connection, &request).report;
     assert_eq!(first.method, "front-mixed");
     assert!(first.chosen_because.contains("not condensed"), "{}", first.chosen_because);
     let second = answer(&mut connection, &request).report;
     assert!(second.factor_reused && !first.factor_reused);
-    let (code, text) = refusal(&mut connection, &Request::Frame(frame(&mesh, 1.0, "condensed")));
+    let (code, text) = refusal(&mut connection, &Request::from(frame(&mesh, 1.0, "condensed")));
     assert!(code == MemoryLimit && text.contains("condensed: the base factor"), "{text}");
-    let (code, text) = refusal(&mut connection, &Request::Frame(frame(&mesh, 1.0, "front")));
+    let (code, text) = refusal(&mut connection, &Request::from(frame(&mesh, 1.0, "front")));
     assert!(code == MemoryLimit && text.contains("front on t4 needs"), "{text}");
     assert!(answer(&mut connection, &request).report.factor_reused);
 }
@@ -167,13 +169,13 @@ fn a_method_that_is_named_gives_the_same_bits_whatever_memory_the_server_has() {
     });
     let (_small_server, mut small) = small;
     let (_large_server, mut large) = large;
-    let by_auto = Request::Frame(frame(&mesh, 1.0, "auto"));
+    let by_auto = Request::from(frame(&mesh, 1.0, "auto"));
     let tight = answer(&mut small, &by_auto);
     let roomy = answer(&mut large, &by_auto);
     assert_eq!((&*tight.report.method, &*roomy.report.method), ("front-mixed", "condensed"));
     assert_ne!(tight.report.chosen_because, roomy.report.chosen_because);
     assert_ne!(tight.displacements, roomy.displacements, "rounding differs, as the page says");
-    let named = answer(&mut large, &Request::Frame(frame(&mesh, 1.0, &tight.report.method)));
+    let named = answer(&mut large, &Request::from(frame(&mesh, 1.0, &tight.report.method)));
     assert_eq!(named.displacements, tight.displacements);
 }
 

@@ -4,8 +4,8 @@
 use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{
-    Answer, DeformationChoice, DofValue, FrameRequest, LargeAsk, LargeFrame, LawName, Material,
-    ModelHash, Pace, PathChoice, Precision, RejectCode, Reply, Request, SolveLarge, SolveSeveral,
+    Answer, Ask, Deformation, DofValue, LargeAsk, LawName, Material, ModelHash, Pace, PathChoice,
+    Precision, Question, RejectCode, Reply, Request,
 };
 use softgrasp_tests::questions::{METHODS, cube, once, question, squeeze, upload};
 
@@ -25,6 +25,11 @@ fn scaled(mesh: &TetMesh, scale: f64) -> Vec<DofValue> {
 fn is_finite(answer: &Answer) -> bool {
     let displacements = answer.displacements.clone().into_f64();
     displacements.iter().flatten().all(|u| u.is_finite())
+        && answer
+            .cases
+            .iter()
+            .flat_map(|case| case.displacements.iter().flatten())
+            .all(|u| u.is_finite())
         && answer.reactions.iter().all(|reaction| reaction.value.is_finite())
         && answer.mask_forces.iter().flatten().all(|force| force.is_finite())
         && answer.report.residual_rel.is_finite()
@@ -36,12 +41,6 @@ fn is_finite(answer: &Answer) -> bool {
 fn is_answered(connection: &mut ServerConnection, request: &Request, what: &str) -> bool {
     let answer = match connection.ask(request) {
         Ok(Reply::Answer(answer)) => *answer,
-        Ok(Reply::LargeAnswer(answer)) => answer.answer,
-        Ok(Reply::SeveralAnswers(several)) => {
-            let cases = several.cases.iter().flat_map(|case| &case.displacements);
-            assert!(cases.flatten().all(|u| u.is_finite()), "{what}");
-            several.answer
-        }
         Err(LinkError::Rejected(rejected)) => {
             assert!(rejected.code != RejectCode::Internal, "{what}: {}", rejected.text);
             assert!(!rejected.text.is_empty());
@@ -67,8 +66,8 @@ fn a_frame_with_a_huge_displacement_is_refused_and_never_nan() {
         let known = dofs.map(|dof| DofValue { dof, value: scale * f64::from(dof).sin() });
         let mut asked = question(known.collect(), method);
         asked.want.precision = precision;
-        let request = FrameRequest { model: ready.model, question: asked };
-        is_answered(&mut connection, &Request::Frame(request), &format!("{method} {scale:e}"))
+        let request = Ask::new(ready.model, asked);
+        is_answered(&mut connection, &Request::from(request), &format!("{method} {scale:e}"))
     };
     for method in ["auto", "condensed", "front", "front-mixed", "pcg"] {
         for precision in [Precision::F64, Precision::F32Quantised] {
@@ -90,17 +89,17 @@ fn one_request_at_the_border_of_numbers_is_finite_or_refused_by_every_method() {
             let what = format!("{method} {scale:e}");
             let mut request = once(&mesh, method);
             request.question.known = scaled(&mesh, scale);
-            is_answered(&mut connection, &Request::SolveOnce(Box::new(request)), &what);
+            is_answered(&mut connection, &Request::from(request), &what);
             let mut request = once(&mesh, method);
             request.materials = vec![Material { young: scale, poisson: 0.3 }];
-            is_answered(&mut connection, &Request::SolveOnce(Box::new(request)), &what);
+            is_answered(&mut connection, &Request::from(request), &what);
             let mut request = once(&mesh, method);
             for vertex in &mut request.mesh.vertices {
                 *vertex = vertex.map(|x| x * scale);
             }
-            is_answered(&mut connection, &Request::SolveOnce(Box::new(request)), &what);
+            is_answered(&mut connection, &Request::from(request), &what);
         }
-        let request = Request::SolveOnce(Box::new(once(&mesh, method)));
+        let request = Request::from(once(&mesh, method));
         assert!(is_answered(&mut connection, &request, method));
     }
 }
@@ -112,43 +111,28 @@ fn several_cases_and_large_deformation_at_the_border_of_numbers_are_finite_or_re
     let model = ModelHash::of(&upload(&mesh));
     assert!(connection.ask(&Request::UploadModel(upload(&mesh))).is_ok());
     let ask = |law, path| LargeAsk {
-        deformation: DeformationChoice::Large,
+        deformation: Deformation::Large,
         law,
         yield_stress: None,
         path,
         pace: Pace::Repeatable,
     };
     for scale in SCALES.into_iter().chain([1e-3]) {
-        let softgrasp_protocol::SolveOnce { mesh: data, materials, element, question } =
-            once(&mesh, "auto");
+        let whole = Ask::from(once(&mesh, "auto"));
         let values: Vec<f64> = scaled(&mesh, scale).iter().map(|known| known.value).collect();
-        let several = SolveSeveral {
-            mesh: data.clone(),
-            materials: materials.clone(),
-            element,
-            question: question.clone(),
-            cases: vec![values.clone(), values],
-            estimate: true,
-        };
-        let request = Request::SolveSeveral(Box::new(several));
+        let several = Ask { cases: vec![values.clone(), values], ..whole.clone() };
+        let request = Request::from(several);
         is_answered(&mut connection, &request, &format!("several {scale:e}"));
         for law in [LawName::NeoHookean, LawName::NeoHookeanLog] {
             let large = ask(law, PathChoice::FromRest);
-            let mut known = question.clone();
-            known.known = scaled(&mesh, scale);
-            let once = SolveLarge {
-                mesh: data.clone(),
-                materials: materials.clone(),
-                element,
-                question: known.clone(),
-                large,
-            };
+            let known = Question { known: scaled(&mesh, scale), ..whole.question.clone() };
+            let once = Ask { large: Some(large), question: known.clone(), ..whole.clone() };
             let what = format!("large {scale:e}");
-            let request = Request::SolveLarge(Box::new(once));
+            let request = Request::from(once);
             let is_found = is_answered(&mut connection, &request, &what);
             assert!(is_found || scale != 1e-3, "{what}");
-            let frame = LargeFrame { model, large, question: known };
-            is_answered(&mut connection, &Request::LargeFrame(Box::new(frame)), &what);
+            let frame = Ask { large: Some(large), ..Ask::new(model, known) };
+            is_answered(&mut connection, &Request::from(frame), &what);
         }
     }
 }

@@ -4,9 +4,7 @@ use softgrasp_core::fem::Material;
 use softgrasp_core::fem::hyperelastic::Law;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::model::{Element, Model};
-use softgrasp_protocol::{
-    DofValue, FrameRequest, LargeAsk, LargeFrame, ModelHash, Pace, Reply, Request,
-};
+use softgrasp_protocol::{Ask, DofValue, LargeAsk, ModelHash, Pace, Reply, Request};
 use softgrasp_tests::questions::{cube, question, upload};
 
 use crate::start::{answer, client, server};
@@ -45,7 +43,7 @@ fn large(
     question.max_error = Some(2e-3);
     question.deadline_ms = deadline;
     let large = LargeAsk { pace, ..LargeAsk::default() };
-    Request::LargeFrame(Box::new(LargeFrame { model, large, question }))
+    Request::from(Ask { large: Some(large), ..Ask::new(model, question) })
 }
 
 #[test]
@@ -62,13 +60,13 @@ fn a_large_frame_never_tells_the_stretch_of_an_older_frame() {
     for (pace, deadline) in deadlines {
         for push in [0.02, 0.2, 0.05, 0.25, 0.01] {
             let asked = large(ready.model, &mesh, push * mesh.size(), pace, deadline);
-            let Ok(Reply::LargeAnswer(answer)) = connection.ask(&asked) else {
+            let Ok(Reply::Answer(answer)) = connection.ask(&asked) else {
                 panic!("a frame is refused");
             };
-            let own = elements.summary(answer.answer.displacements.into_f64().as_flattened());
-            let report = &answer.answer.report;
+            let own = elements.summary(answer.displacements.clone().into_f64().as_flattened());
+            let report = &answer.report;
             let pairs = [
-                (answer.large.max_stretch, own.stretch_max),
+                (answer.large.unwrap().max_stretch, own.stretch_max),
                 (report.max_rotation_deg, own.rotation_max.to_degrees()),
                 (report.max_strain, own.strain_max),
             ];
@@ -101,7 +99,7 @@ fn a_linear_frame_never_tells_the_strain_of_another_frame() {
         // Every push is asked for twice, so that a strain that is worked out beside may be told.
         let push = 1e-3 * mesh.size() * f64::from(1 + round / 2);
         let asked = question(pushed(&mesh, push), "condensed");
-        let asked = Request::Frame(FrameRequest { model: ready.model, question: asked });
+        let asked = Request::from(Ask::new(ready.model, asked));
         let answer = answer(&mut connection, &asked);
         let own = model.strain(answer.displacements.into_f64().as_flattened());
         let said = answer.report.max_strain;

@@ -234,18 +234,17 @@ fn start_refusing_server() -> (SocketAddr, Arc<AtomicUsize>, Arc<AtomicUsize>) {
                         server: "refusing".to_owned(),
                         version: "0".to_owned(),
                         threads: 1,
-                        limits,
+                        ..Welcome::default()
                     }),
                     Ok(Request::HaveModel(_)) => Reply::ModelState { known: false },
                     Ok(Request::UploadModel(_)) => {
                         uploads.fetch_add(1, Ordering::Relaxed);
-                        Reply::Rejected(Rejected {
-                            code: RejectCode::MemoryLimit,
-                            text: "it needs 9 bytes; take a smaller one, or wait".to_owned(),
-                            detail: String::new(),
-                        })
+                        Reply::Rejected(Rejected::new(
+                            RejectCode::MemoryLimit,
+                            "it needs 9 bytes; take a smaller one, or wait",
+                        ))
                     }
-                    Ok(Request::Frame(_)) => {
+                    Ok(Request::Ask(_)) => {
                         frames.fetch_add(1, Ordering::Relaxed);
                         return;
                     }

@@ -32,8 +32,8 @@ fn one_two_four_and_seven_threads_give_the_same_bits_for_every_method() {
         for (name, mesh, methods) in &cases {
             connection.ask(&Request::UploadModel(upload(mesh))).unwrap();
             for method in *methods {
-                let whole = Request::SolveOnce(Box::new(once(mesh, method)));
-                let kept = Request::Frame(frame(mesh, 1.0, method));
+                let whole = Request::from(once(mesh, method));
+                let kept = Request::from(frame(mesh, 1.0, method));
                 for (kind, request) in [("once", whole), ("frame", kept)] {
                     let answer = answer(&mut connection, &request);
                     assert!(answer.report.residual_rel < 1e-9, "{name}, {method}");
@@ -59,7 +59,7 @@ fn methods_agree_on_one_server() {
         let answers: Vec<Vec<[f64; 3]>> = METHODS
             .iter()
             .map(|method| {
-                let request = Request::SolveOnce(Box::new(once(&mesh, method)));
+                let request = Request::from(once(&mesh, method));
                 answer(&mut connection, &request).displacements.into_f64()
             })
             .collect();

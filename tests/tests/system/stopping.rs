@@ -31,7 +31,7 @@ fn clients_that_keep_asking_end_cleanly_when_the_server_stops() {
         let mesh = cube(125);
         let mut connection = client(&server);
         connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
-        let request = Request::Frame(frame(&mesh, 1.0, "sparse-cholesky"));
+        let request = Request::from(frame(&mesh, 1.0, "sparse-cholesky"));
         let expected = AnswerBits::of(&answer(&mut connection, &request));
         let (asked, is_asked) = channel();
         let clients: Vec<_> = (0..4)
@@ -84,7 +84,7 @@ fn stop_does_not_wait_for_long_work_beyond_its_grace_time() {
         let server = server(1);
         let mut connection = client(&server);
         // Longer on one thread than the grace time, on a fast machine too.
-        let long = Request::SolveOnce(Box::new(once(&cube(1000), "gauss-jordan-plain")));
+        let long = Request::from(once(&cube(1000), "gauss-jordan-plain"));
         connection.send(&long).unwrap();
         // By the time this one is answered the long one has been read.
         assert!(matches!(client(&server).ask(&Request::Ping { nonce: 2 }), Ok(Reply::Pong { .. })));

@@ -6,21 +6,17 @@ use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_protocol::RejectCode::BadRequest;
 use softgrasp_protocol::{
-    Answer, DofValue, ElementChoice, ElementName, LargeAsk, Material, Reply, Request, SolveLarge,
-    SolveOnce, UploadModel,
+    Answer, Ask, DofValue, ElementChoice, ElementName, LargeAsk, Material, Reply, Request,
+    UploadModel,
 };
-use softgrasp_tests::questions::{METHODS, cube, frame, object, once, upload};
+use softgrasp_tests::questions::{METHODS, Once, cube, frame, object, once, upload};
 
 use crate::start::{answer, client, config, refusal, server};
 
-fn ask(
-    connection: &mut ServerConnection,
-    change: impl Fn(&mut SolveOnce),
-    mesh: &TetMesh,
-) -> Answer {
+fn ask(connection: &mut ServerConnection, change: impl Fn(&mut Once), mesh: &TetMesh) -> Answer {
     let mut request = once(mesh, "auto");
     change(&mut request);
-    answer(connection, &Request::SolveOnce(Box::new(request)))
+    answer(connection, &Request::from(request))
 }
 
 fn norm(u: &[[f64; 3]]) -> f64 {
@@ -35,7 +31,7 @@ fn error_rel(found: Answer, exact: &[[f64; 3]]) -> f64 {
 }
 
 fn warned(answer: &Answer, text: &str) -> bool {
-    answer.report.warnings.iter().any(|warning| warning.contains(text))
+    answer.report.warnings.iter().any(|warning| warning.text.contains(text))
 }
 
 #[test]
@@ -65,7 +61,13 @@ fn deadline_that_is_far_gets_the_exact_answer() {
     let mesh = cube(216);
     let exact = ask(&mut connection, |_| {}, &mesh).displacements.into_f64();
     let found = ask(&mut connection, |r| r.question.deadline_ms = Some(1e7), &mesh);
-    assert!(found.report.warnings.iter().all(|w| !w.contains("given up") && !w.contains("wanted")));
+    assert!(
+        found
+            .report
+            .warnings
+            .iter()
+            .all(|w| !w.text.contains("given up") && !w.text.contains("wanted"))
+    );
     assert!(error_rel(found, &exact) <= 1e-12);
 }
 
@@ -82,7 +84,7 @@ fn deadline_and_budget_that_cannot_be_met_are_answered_and_told() {
     let rough = ask(&mut connection, |r| r.question.max_error = Some(1e-30), &mesh);
     assert!(warned(&rough, "the error budget was given up") && warned(&rough, "wanted"));
     assert!(error_rel(rough, &exact) <= 1e-11);
-    let wish = |r: &mut SolveOnce| {
+    let wish = |r: &mut Once| {
         (r.question.deadline_ms, r.question.max_error) = (Some(1e-3), Some(1e-30));
     };
     let neither = ask(&mut connection, wish, &mesh);
@@ -100,7 +102,7 @@ fn frames_tell_of_wishes_they_miss_and_stay_exact() {
     let mut asked = frame(&mesh, 1.0, "auto");
     asked.question.deadline_ms = Some(1e-6);
     asked.question.max_error = Some(1e-30);
-    let missed = answer(&mut connection, &Request::Frame(asked));
+    let missed = answer(&mut connection, &Request::from(asked));
     assert!(warned(&missed, "wanted within") && warned(&missed, "wanted"));
     assert!(missed.report.residual_rel < 1e-11);
 }
@@ -113,19 +115,19 @@ fn wishes_that_are_no_numbers_are_refused_and_the_session_lives() {
     for value in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
         let mut late = once(&mesh, "auto");
         late.question.deadline_ms = Some(value);
-        let request = Request::SolveOnce(Box::new(late));
+        let request = Request::from(late);
         let (code, text) = refusal(&mut connection, &request);
         assert!(code == BadRequest && text.contains("the deadline is"), "{text}");
         let mut rough = frame(&mesh, 1.0, "front");
         rough.question.max_error = Some(value);
         connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
-        let (code, text) = refusal(&mut connection, &Request::Frame(rough));
+        let (code, text) = refusal(&mut connection, &Request::from(rough));
         assert!(code == BadRequest && text.contains("the error budget is"), "{text}");
     }
     assert_eq!(ask(&mut connection, |_| {}, &mesh).report.method, "front");
 }
 
-fn of_poisson(poisson: f64) -> impl Fn(&mut SolveOnce) {
+fn of_poisson(poisson: f64) -> impl Fn(&mut Once) {
     move |request| {
         request.element = ElementChoice::Auto;
         request.materials = vec![Material { young: 1.0e5, poisson }];
@@ -141,7 +143,10 @@ fn auto_takes_ten_nodes_where_linear_elements_lock_and_says_so() {
     assert_eq!(soft.report.element, ElementName::T4);
     assert!(soft.report.chosen_because.contains("linear elements"));
     let rubber = ask(&mut connection, of_poisson(0.49), &mesh);
-    assert_eq!((rubber.report.element, rubber.report.method.as_str()), (ElementName::T10, "front"));
+    assert_eq!(
+        (rubber.report.element, rubber.report.method.as_str()),
+        (ElementName::T10.into(), "front")
+    );
     assert!(rubber.report.chosen_because.contains("lock"), "{}", rubber.report.chosen_because);
     assert!(!warned(&rubber, "lock"));
     // The same answer as when ten nodes are asked for.
@@ -158,8 +163,11 @@ fn auto_takes_ten_nodes_where_linear_elements_lock_and_says_so() {
     for method in METHODS.iter().filter(|m| **m != "condensed") {
         let mut request = once(&mesh, method);
         of_poisson(0.49)(&mut request);
-        let found = answer(&mut connection, &Request::SolveOnce(Box::new(request)));
-        assert_eq!((found.report.element, &*found.report.method), (ElementName::T10, *method));
+        let found = answer(&mut connection, &Request::from(request));
+        assert_eq!(
+            (found.report.element, &*found.report.method),
+            (ElementName::T10.into(), *method)
+        );
     }
 }
 
@@ -202,14 +210,13 @@ fn linear_elements_that_lock_are_warned_of_at_large_deformation_too() {
         (ElementChoice::T4, 0.4, false),
         (ElementChoice::T4Anp, 0.46, false),
     ] {
-        let SolveOnce { mesh, question, .. } = once(&cube(27), "auto");
         let materials = vec![Material { young: 1.0e5, poisson }];
-        let large = LargeAsk::default();
-        let request = SolveLarge { mesh, materials, element, large, question };
-        let reply = connection.ask(&Request::SolveLarge(Box::new(request))).unwrap();
-        let Reply::LargeAnswer(large) = reply else { panic!("an answer") };
-        let locks = warned(&large.answer, "linear elements lock at a Poisson's ratio of 0.46");
-        assert_eq!(locks, is_warned, "{element:?} {poisson}: {:?}", large.answer.report.warnings);
+        let once = Once { materials, element, ..once(&cube(27), "auto") };
+        let request = Ask { large: Some(LargeAsk::default()), ..once.into() };
+        let reply = connection.ask(&Request::from(request)).unwrap();
+        let Reply::Answer(large) = reply else { panic!("an answer") };
+        let locks = warned(&large, "linear elements lock at a Poisson's ratio of 0.46");
+        assert_eq!(locks, is_warned, "{element:?} {poisson}: {:?}", large.report.warnings);
     }
 }
 
@@ -223,7 +230,7 @@ fn averaged_nodal_pressure_is_one_answer_by_all_methods_and_softer_than_plain_el
         of_poisson(0.4999)(&mut request);
         request.element = element;
         request.question.want.reactions = true;
-        answer(&mut connection, &Request::SolveOnce(Box::new(request)))
+        answer(&mut connection, &Request::from(request))
     };
     let work = |answer: &Answer, known: &[DofValue]| -> f64 {
         answer.reactions.iter().zip(known).map(|(f, q)| f.value * q.value).sum()
@@ -236,7 +243,10 @@ fn averaged_nodal_pressure_is_one_answer_by_all_methods_and_softer_than_plain_el
     let largest = exact.iter().flatten().fold(0.0f64, |m, u| m.max(u.abs()));
     for method in METHODS {
         let found = by(method, ElementChoice::T4Anp);
-        assert_eq!((found.report.element, &*found.report.method), (ElementName::T4Anp, method));
+        assert_eq!(
+            (found.report.element, &*found.report.method),
+            (ElementName::T4Anp.into(), method)
+        );
         let estimate = found.report.error_estimate_rel.expect("no deadline, so it was estimated");
         let pairs = found.displacements.into_f64().into_iter().zip(&exact);
         let off = pairs.flat_map(|(a, b)| [0, 1, 2].map(|i| (a[i] - b[i]).abs()));
@@ -252,7 +262,7 @@ fn error_budget_holds_on_hard_materials() {
     let server = server(2);
     let mut connection = client(&server);
     let mesh = cube(343);
-    let hard = |r: &mut SolveOnce| {
+    let hard = |r: &mut Once| {
         r.mesh.regions = (0..r.mesh.tets.len() as u32).map(|t| t % 2).collect();
         r.materials = vec![
             Material { young: 1.0e9, poisson: 0.3 },
@@ -283,7 +293,7 @@ fn auto_goes_on_in_double_precision_where_single_leaves_no_digit() {
     let mut connection = client(&server);
     let mesh = cube(125);
     for poisson in [0.49999, 0.499_999_99, 0.499_999_999_9] {
-        let rubber = |r: &mut SolveOnce| {
+        let rubber = |r: &mut Once| {
             r.materials = vec![Material { young: 1.0e5, poisson }];
         };
         let exact = ask(&mut connection, rubber, &mesh);
@@ -310,9 +320,8 @@ fn kept_models_are_made_of_the_element_they_name() {
     let quadratic = UploadModel { element: ElementName::T10, ..upload(&cube(64)) };
     let hash = softgrasp_protocol::ModelHash::of(&quadratic);
     connection.ask(&Request::UploadModel(quadratic)).unwrap();
-    let mut asked = frame(&cube(64), 1.0, "auto");
-    asked.model = hash;
-    let found = answer(&mut connection, &Request::Frame(asked));
-    assert_eq!((found.report.element, &*found.report.method), (ElementName::T10, "front"));
+    let asked = Ask { subject: hash.into(), ..frame(&cube(64), 1.0, "auto") };
+    let found = answer(&mut connection, &Request::from(asked));
+    assert_eq!((found.report.element, &*found.report.method), (ElementName::T10.into(), "front"));
     assert!(found.report.chosen_because.contains("ten-node"));
 }

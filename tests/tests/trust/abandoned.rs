@@ -27,7 +27,7 @@ fn request_whose_client_has_gone_is_counted_and_gives_its_memory_back() {
             tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
         runtime.unwrap().block_on(async {
             let server = LocalServer::new(config(1)).unwrap();
-            let request = Request::SolveOnce(Box::new(once(&cube(216), "gauss-jordan-plain")));
+            let request = Request::from(once(&cube(216), "gauss-jordan-plain"));
             let bytes = request_frame(1, &request);
             for _ in 0..5 {
                 let (mut client, serves) = server.connect().unwrap();
@@ -54,7 +54,7 @@ fn client_that_has_closed_its_side_still_gets_its_reply() {
     use softgrasp_tests::raw_session::RawSession;
     let server = server(1);
     let mut session = RawSession::open(server.address());
-    let request = Request::SolveOnce(Box::new(once(&cube(343), "dense-cholesky")));
+    let request = Request::from(once(&cube(343), "dense-cholesky"));
     session.send(&request_frame(7, &request));
     session.finish();
     let (id, _) = session.reply().expect("a reply");
@@ -67,7 +67,7 @@ fn clients_that_reset_their_connections_during_long_work_leave_the_server_free()
     within(LIMIT, "resets", || {
         let metrics = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
         let server = fea_server::start(ServerConfig { metrics, ..config(1) }).unwrap();
-        let long = Request::SolveOnce(Box::new(once(&cube(729), "gauss-jordan-plain")));
+        let long = Request::from(once(&cube(729), "gauss-jordan-plain"));
         let bytes = request_frame(1, &long);
         for _ in 0..40 {
             let mut stream = TcpStream::connect(server.address()).unwrap();
@@ -77,7 +77,7 @@ fn clients_that_reset_their_connections_during_long_work_leave_the_server_free()
             reset(&stream);
         }
         // Each of them would take a second or more on one thread.
-        let small = Request::SolveOnce(Box::new(once(&cube(27), "dense-cholesky")));
+        let small = Request::from(once(&cube(27), "dense-cholesky"));
         let start = std::time::Instant::now();
         answer(&mut client(&server), &small);
         println!("answered {:.1} s after the last reset", start.elapsed().as_secs_f64());

@@ -47,7 +47,7 @@ fn draining_server_takes_nobody_and_serves_who_is_there_until_its_time_is_over()
         let refused = ServerConnection::connect(address.to_string()).err().unwrap();
         assert!(matches!(refused, LinkError::Connect { .. }), "{refused}");
         // Who is there goes on, until it is told to go.
-        answer(&mut there, &Request::Frame(frame(&mesh, 1.0, "sparse-cholesky")));
+        answer(&mut there, &Request::from(frame(&mesh, 1.0, "sparse-cholesky")));
         let told = loop {
             match there.ask(&Request::Ping { nonce: 1 }) {
                 Ok(Reply::Pong { .. }) => std::thread::sleep(Duration::from_millis(20)),
@@ -87,9 +87,9 @@ fn requests_are_counted_by_kind_and_refusals_by_code() {
     let mut connection = client(&server);
     connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
     for _ in 0..3 {
-        answer(&mut connection, &Request::Frame(frame(&mesh, 1.0, "sparse-cholesky")));
+        answer(&mut connection, &Request::from(frame(&mesh, 1.0, "sparse-cholesky")));
     }
-    connection.ask(&Request::Frame(frame(&cube(64), 1.0, "sparse-cholesky"))).unwrap_err();
+    connection.ask(&Request::from(frame(&cube(64), 1.0, "sparse-cholesky"))).unwrap_err();
     let (status, text) = page(pages, "/metrics");
     assert_eq!(status, "HTTP/1.1 200 OK");
     for line in [

@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use fea_server::{RunningServer, ServerConfig};
 use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_protocol::{ModelHash, RejectCode, Reply, Request, SolveOnce, UploadModel};
+use softgrasp_protocol::{ModelHash, RejectCode, Reply, Request, UploadModel};
 use softgrasp_tests::heard::displacement_hash;
-use softgrasp_tests::questions::{cube, frame, once, question, squeeze, upload};
+use softgrasp_tests::questions::{Once, cube, frame, once, question, squeeze, upload};
 use softgrasp_tests::random::Random;
 use softgrasp_tests::watchdog::within;
 
@@ -44,7 +44,7 @@ impl Subject {
         let mut expected = BTreeMap::new();
         for push in 0..PUSHES.len() {
             for method in 0..METHODS.len() {
-                let request = Request::Frame(frame(&mesh, PUSHES[push], METHODS[method]));
+                let request = Request::from(frame(&mesh, PUSHES[push], METHODS[method]));
                 let found = answer(&mut connection, &request);
                 expected.insert((push, method), displacement_hash(&found.displacements));
             }
@@ -54,7 +54,7 @@ impl Subject {
 
     fn once(&self, push: usize, method: usize) -> Request {
         let question = question(squeeze(&self.mesh, PUSHES[push]), METHODS[method]);
-        Request::SolveOnce(Box::new(SolveOnce { question, ..once(&self.mesh, "auto") }))
+        Request::from(Once { question, ..once(&self.mesh, "auto") })
     }
 }
 
@@ -110,7 +110,7 @@ impl Life<'_> {
             1 => self.check(connection, subject, &subject.once(push, method), (push, method)),
             2 => drop(connection.ask(&Request::HaveModel(subject.hash)).unwrap()),
             _ => {
-                let request = Request::Frame(frame(&subject.mesh, PUSHES[push], METHODS[method]));
+                let request = Request::from(frame(&subject.mesh, PUSHES[push], METHODS[method]));
                 self.check(connection, subject, &request, (push, method));
             }
         }

@@ -19,7 +19,7 @@ fn start(config: ServerConfig) -> RunningServer {
 }
 
 fn is_solved(server: &RunningServer, mesh: &TetMesh) -> Result<(), (RejectCode, String)> {
-    let request = Request::SolveOnce(Box::new(once(mesh, "sparse-cholesky")));
+    let request = Request::from(once(mesh, "sparse-cholesky"));
     match client(server).ask(&request) {
         Ok(_) => Ok(()),
         Err(LinkError::Rejected(rejected)) => Err((rejected.code, rejected.text)),
@@ -104,7 +104,7 @@ fn requests_in_the_queue_wait_and_are_all_answered() {
             std::thread::scope(|scope| {
                 for _ in 0..6 {
                     scope.spawn(|| {
-                        let request = Request::SolveOnce(Box::new(once(&mesh, "dense-cholesky")));
+                        let request = Request::from(once(&mesh, "dense-cholesky"));
                         answer(&mut client(&server), &request);
                     });
                 }
@@ -115,7 +115,7 @@ fn requests_in_the_queue_wait_and_are_all_answered() {
 
 #[test]
 fn memory_of_all_requests() {
-    let request = Request::SolveOnce(Box::new(once(&cube(1000), "dense-cholesky")));
+    let request = Request::from(once(&cube(1000), "dense-cholesky"));
     // The text of the refusal tells what is needed; at exactly that much it is answered.
     let tiny = start(ServerConfig { memory_limit: 1 << 20, ..config(1) });
     let (code, _) = refusal(&mut client(&tiny), &request);

@@ -66,7 +66,7 @@ fn crowd_that_sends_large_requests_stays_within_the_limit() {
                 }
                 // Whatever was passed over, what follows is whole. While the others send, there may be no
                 // memory left for it; that is said, and it is asked again.
-                let small = Request::SolveOnce(Box::new(once(&cube(27), "sparse-cholesky")));
+                let small = Request::from(once(&cube(27), "sparse-cholesky"));
                 for id in 2.. {
                     connection.write_bytes(&request_frame(id, &small)).await.unwrap();
                     let frame = connection.read_frame().await.unwrap().expect("an answer");

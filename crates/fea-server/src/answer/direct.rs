@@ -6,7 +6,8 @@ use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Certainty, Factored, Loads, Method, Solution};
 use softgrasp_protocol::{
-    Answer, CaseAnswer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport, Want,
+    Answer, CaseAnswer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport,
+    Want,
 };
 
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};

@@ -36,9 +36,7 @@ pub(super) fn answer_is_finite(answer: &Answer) -> bool {
         && all(reactions.iter().map(|reaction| &reaction.value))
         && all(mask_forces.iter().flatten())
         && all(errors.iter().flatten())
-        && cases.iter().all(|case| {
-            all(case.displacements.iter().flatten()) && all(&case.reactions)
-        })
+        && cases.iter().all(|case| all(case.displacements.iter().flatten()) && all(&case.reactions))
 }
 
 fn all<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {

@@ -6,9 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use softgrasp_core::model::{Known, ModelError};
 use softgrasp_core::solve::choose::{Plan, Question, SMALLER_THAN_FRONT};
 use softgrasp_core::solve::{Factored, Method};
-use softgrasp_protocol::{
-    Answer, CaseAnswer, ModelHash, NodeChoice, Question as QuestionMessage,
-};
+use softgrasp_protocol::{Answer, CaseAnswer, ModelHash, NodeChoice, Question as QuestionMessage};
 
 use super::condensed::{Contacts, PreparedSet, StrainOf};
 use super::direct::{self, Posed};

@@ -70,11 +70,7 @@ pub(crate) fn solve_several(
 }
 
 /// The known displacements of the further cases.
-fn further(
-    model: &Model,
-    first: &[DofValue],
-    cases: &[Vec<f64>],
-) -> Result<Vec<Known>, Refusal> {
+fn further(model: &Model, first: &[DofValue], cases: &[Vec<f64>]) -> Result<Vec<Known>, Refusal> {
     let known = |values: &Vec<f64>| {
         let pairs = first.iter().zip(values).map(|(known, &value)| (known.dof, value)).collect();
         Ok(model.known(pairs)?)

@@ -1,6 +1,6 @@
 //! What the log says of clients: who it was, in few and harmless words.
 
-use softgrasp_protocol::{ElementChoice, MeshData, MethodName, Question, Request, SolveOnce};
+use softgrasp_protocol::{Ask, Body, ElementChoice, MeshData, MethodName, Question, Request};
 
 use crate::running::Running;
 
@@ -33,13 +33,13 @@ fn every_line_of_a_session_bears_its_number_and_its_peer() {
         let mut client = server.client();
         assert_eq!(client.hello("a test", None), Ok(()));
         let method = MethodName::try_new("nosuch").unwrap();
-        let once = SolveOnce {
+        let body = Body {
             mesh: MeshData { vertices: Vec::new(), tets: Vec::new(), regions: Vec::new() },
             materials: Vec::new(),
             element: ElementChoice::T4,
-            question: Question { method, ..Question::default() },
         };
-        assert!(client.ask(&Request::SolveOnce(Box::new(once))).is_some());
+        let once = Ask::new(body, Question { method, ..Question::default() });
+        assert!(client.ask(&Request::from(once)).is_some());
         client.send(b"this is no frame");
         assert!(client.reply().is_some());
         let peer = client.peer().to_string();

@@ -169,7 +169,7 @@ impl Client {
 
     /// Says what it is, with a token or none: the code of a refusal.
     pub fn hello(&mut self, client: &str, token: Option<&str>) -> Result<(), RejectCode> {
-        let hello = Hello { client: client.to_owned(), token: token.map(str::to_owned) };
+        let hello = Hello::new(client, token.map(str::to_owned));
         match self.ask(&Request::Hello(hello)) {
             Some(Reply::Welcome(_)) => Ok(()),
             Some(Reply::Rejected(rejected)) => Err(rejected.code),

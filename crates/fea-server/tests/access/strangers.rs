@@ -93,7 +93,7 @@ fn client_that_introduces_itself_without_a_place_is_told_busy_and_a_guess_takes_
 fn stranger_is_closed_when_its_time_is_over_however_it_spends_it() {
     let server = Running::start(&["--greeting-limit", "0.3", "--stall-limit", "30"]);
     let mut bytes = Vec::new();
-    let hello = Hello { client: "late".to_owned(), token: None };
+    let hello = Hello::new("late", None);
     Request::Hello(hello).encode_into(1, &Limits::default(), &mut bytes).unwrap();
     for cut in [0, 1, 32, bytes.len() - 1] {
         let mut client = server.client();

@@ -10,7 +10,7 @@ use softgrasp_core::solve::rates::Rates;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
     Answer, Ask, ConnectionError, DecodeError, EncodeError, Frame, FrameError, HEADER_LEN, Hello,
-    Limits, Rejected, Reply, Request, VERSION, Welcome,
+    Limits, Rejected, Reply, Request, Welcome,
 };
 
 use crate::ask::endpoint::{Endpoint, TrustError};
@@ -216,15 +216,7 @@ impl ServerConnection {
         let mut this = Self {
             connection: Connection::new(stream, Limits::default()),
             limits: Limits::default(),
-            welcome: Welcome {
-                server: String::new(),
-                version: String::new(),
-                threads: 0,
-                limits: Limits::default(),
-                wire: VERSION,
-                capabilities: Vec::new(),
-                idle_ms: 0,
-            },
+            welcome: Welcome::default(),
             request_id: 0,
             out: Vec::new(),
             reply_bytes: 0,

@@ -23,8 +23,13 @@ impl Elasticity {
     /// What a server is asked; `None` where a question of the linear kind is asked.
     pub fn ask(&self, path: PathChoice, pace: Pace) -> Option<LargeAsk> {
         let Self { deformation, law, yield_stress } = *self;
-        (deformation != Deformation::Linear)
-            .then_some(LargeAsk { deformation, law, yield_stress, path, pace })
+        (deformation != Deformation::Linear).then_some(LargeAsk {
+            deformation,
+            law,
+            yield_stress,
+            path,
+            pace,
+        })
     }
 }
 

@@ -49,7 +49,8 @@ impl AnswerTally {
         let told = |number: f64| number.is_finite().then_some(number);
         self.max_rotation_deg = larger(self.max_rotation_deg, told(solve.report.max_rotation_deg));
         self.max_strain = larger(self.max_strain, told(solve.report.max_strain));
-        self.error_estimate_rel_max = larger(self.error_estimate_rel_max, solve.report.error_estimate_rel);
+        self.error_estimate_rel_max =
+            larger(self.error_estimate_rel_max, solve.report.error_estimate_rel);
         let large = solve.large.as_ref().filter(|_| solve.deformation == "large");
         if let Some(large) = large {
             self.large_solves += 1;

@@ -120,7 +120,8 @@ impl GraspLoop {
         outcome: &mut TickOutcome,
     ) -> Result<(), ObjectError> {
         let ms = reached.round_trip.as_secs_f64() * 1e3;
-        let summary = SolveSummary::new((*reached.report).clone(), None, ms).with_bytes(reached.bytes);
+        let summary =
+            SolveSummary::new((*reached.report).clone(), None, ms).with_bytes(reached.bytes);
         outcome.answers.push((tick, summary));
         let is_current = reached.rest_shape == self.object.rest_shapes() && !self.keep.freezes();
         let Some(contact) = &mut self.contact else { return Ok(()) };

@@ -39,9 +39,9 @@ pub fn tick_seen(
 pub fn news(outcome: &TickOutcome) -> TickNews {
     let of_ticks = outcome.answers.iter().map(|(tick, solve)| AnswerSeen {
         tick: *tick,
-        method: solve.method.clone(),
-        element: solve.element.to_owned(),
-        residual_rel: solve.residual_rel,
+        method: solve.report.method.clone(),
+        element: solve.report.element.to_string(),
+        residual_rel: solve.report.residual_rel,
         round_trip_ms: solve.round_trip_ms,
         from_rest: outcome.from_rest.contains(tick),
     });

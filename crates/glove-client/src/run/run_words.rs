@@ -94,9 +94,9 @@ impl RunReport {
             "  equations           {} unknown, {} prescribed, by {}\n  \
              answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
              residual            {:.1e} at most\n",
-            solve.unknown_dofs,
-            solve.known_dofs,
-            solve.method,
+            solve.report.unknown_dofs,
+            solve.report.known_dofs,
+            solve.report.method,
             ms(s.round_trip_ms_p50),
             ms(s.round_trip_ms_p99),
             ms(s.round_trip_ms_max),

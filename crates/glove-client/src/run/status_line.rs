@@ -49,7 +49,10 @@ impl StatusLine {
             "TIMRL".chars().zip(outcome.tips).map(|(c, on)| if on { c } else { '.' }).collect();
         let solver = self.last_solve.as_ref().map_or("no solve yet".to_owned(), |s| {
             let report = &s.report;
-            format!("{}  {:.2} ms  residual {:.1e}", report.method, s.round_trip_ms, report.residual_rel)
+            format!(
+                "{}  {:.2} ms  residual {:.1e}",
+                report.method, s.round_trip_ms, report.residual_rel
+            )
         });
         self.bar.set_message(format!("tick {tick:>5}  {state:<10} tips {tips}  {solver}"));
     }

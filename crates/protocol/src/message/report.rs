@@ -30,9 +30,7 @@ pub struct StageMs {
 
 /// How much of an answer rounding has left, by the estimate of its error; a number, since a later
 /// version may have more levels.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub struct WarningLevel(u32);
 
 /// What a warning is about, for programs; a number, since a later version may have more of them.
@@ -214,11 +212,13 @@ impl SolveReport {
         let report: Self = block.read()?;
         limits.check_text("method", &report.method)?;
         let why = report.error_bound_why.iter();
-        why.into_iter()
-            .try_for_each(|why| limits.check_text("reason of the error bound", why))?;
+        why.into_iter().try_for_each(|why| limits.check_text("reason of the error bound", why))?;
         limits.check_text("precision", &report.precision)?;
         limits.check_text("reason of the choice", &report.chosen_because)?;
-        report.warnings.iter().try_for_each(|warning| limits.check_text("warning", &warning.text))?;
+        report
+            .warnings
+            .iter()
+            .try_for_each(|warning| limits.check_text("warning", &warning.text))?;
         Ok(report)
     }
 }

@@ -37,6 +37,12 @@ pub enum Request {
     ContactFrame(Box<ContactFrame>),
 }
 
+impl From<Ask> for Request {
+    fn from(ask: Ask) -> Self {
+        Self::Ask(Box::new(ask))
+    }
+}
+
 impl Request {
     /// Its kind.
     pub fn kind(&self) -> Kind {

@@ -67,6 +67,21 @@ struct WelcomePart {
     idle_ms: u64,
 }
 
+impl Default for Welcome {
+    /// A server without a name that speaks this version of the wire.
+    fn default() -> Self {
+        Self {
+            server: String::new(),
+            version: String::new(),
+            threads: 0,
+            limits: Limits::default(),
+            wire: crate::VERSION,
+            capabilities: Vec::new(),
+            idle_ms: 0,
+        }
+    }
+}
+
 impl VersionRange {
     /// The highest version that both sides speak.
     pub fn common(self, other: Self) -> Option<u16> {

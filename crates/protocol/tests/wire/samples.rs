@@ -50,11 +50,8 @@ pub fn variants() -> Vec<(&'static str, Message)> {
     let Message::Request(_, Request::Ask(ask)) = sample(Kind::Ask) else { unreachable!() };
     let Message::Reply(_, Reply::Answer(answer)) = sample(Kind::Answer) else { unreachable!() };
     let held = Question { mask_displacements: vec![], masks: Masks::default(), ..question() };
-    let of_model = Ask {
-        newest_wins: true,
-        report: ReportLevel::Short,
-        ..Ask::new(hash(), question())
-    };
+    let of_model =
+        Ask { newest_wins: true, report: ReportLevel::Short, ..Ask::new(hash(), question()) };
     let large = LargeAsk {
         deformation: Deformation::Auto,
         law: LawName::NeoHookeanLog,
@@ -64,11 +61,8 @@ pub fn variants() -> Vec<(&'static str, Message)> {
     };
     let of_large = Ask { large: Some(large), ..Ask::new(hash(), held) };
     let values = |factor: f64| ask.question.known.iter().map(|k| factor * k.value).collect();
-    let of_cases = Ask {
-        cases: vec![values(2.0), values(-1.0)],
-        without_estimate: true,
-        ..*ask.clone()
-    };
+    let of_cases =
+        Ask { cases: vec![values(2.0), values(-1.0)], without_estimate: true, ..*ask.clone() };
     let case = CaseAnswer { displacements: vec![[1.0, -2.0, 0.25]; 3], reactions: vec![4.5] };
     let of_several = Answer {
         displacements: Displacements::F64(vec![[0.5, 0.0, 0.0]; 3]),
@@ -127,7 +121,8 @@ fn requests() -> Vec<Message> {
         deadline_ms: Some(16.5),
         ..question()
     };
-    let body = Body { mesh: mesh.clone(), materials: materials.clone(), element: ElementChoice::T4 };
+    let body =
+        Body { mesh: mesh.clone(), materials: materials.clone(), element: ElementChoice::T4 };
     [
         Request::Hello(Hello {
             capabilities: vec!["haptics".to_owned()],

@@ -333,7 +333,8 @@ fn menu_facts<'a>(seen: &Seen<'a>, running: &'a Running) -> MenuFacts<'a> {
         hand: about.hand,
         object: &about.object,
         method: &about.method,
-        solved_by: newest.and_then(|frame| Some(frame.server.solve.as_ref()?.method.as_str())),
+        solved_by: newest
+            .and_then(|frame| Some(frame.server.solve.as_ref()?.report.method.as_str())),
         max_error: about.max_error,
         can_undo: newest.is_some_and(|frame| frame.object.kept > 0),
         is_recording: seen.is_recording,

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
-    Answer, Ask, ContactAnswer, ContactFrame, LargeAsk,
-    ModelHash, PathChoice, Prefetch, RejectCode, Rejected, Reply, Request, UploadModel,
+    Answer, Ask, ContactAnswer, ContactFrame, LargeAsk, ModelHash, PathChoice, Prefetch,
+    RejectCode, Rejected, Reply, Request, UploadModel,
 };
 
 use super::event::{LinkEvent, Reached, ReachedStep, RequestEnd};

@@ -34,9 +34,9 @@ pub fn show(ui: &mut Ui, facts: &RunFacts, frame: Option<&ViewFrame>) {
             }
         });
         if let Some(solve) = frame.and_then(|frame| frame.server.solve.as_ref()) {
-            ui.label(theme::quiet(&solve.chosen_because));
-            for warning in &solve.warnings {
-                ui.colored_label(theme::CAUTION, warning);
+            ui.label(theme::quiet(&solve.report.chosen_because));
+            for warning in &solve.report.warnings {
+                ui.colored_label(theme::CAUTION, &warning.text);
             }
         }
     });
@@ -72,20 +72,25 @@ fn of_frame(ui: &mut Ui, frame: &ViewFrame) {
         row(ui, "last heard of the server", said.clone());
     }
     let Some(solve) = &frame.server.solve else { return };
-    let equations = format!("{} unknown, {} prescribed", solve.unknown_dofs, solve.known_dofs);
+    let equations =
+        format!("{} unknown, {} prescribed", solve.report.unknown_dofs, solve.report.known_dofs);
     row(ui, "equations", equations);
-    row(ui, "method", format!("{} on {}", solve.method, solve.element));
+    row(ui, "method", format!("{} on {}", solve.report.method, solve.report.element));
     row(ui, "question to answer", format!("{:.2} ms", solve.round_trip_ms));
-    row(ui, "residual", format!("{:.1e}", solve.residual_rel));
-    let bound = match (solve.error_bound_rel, &solve.why) {
+    row(ui, "residual", format!("{:.1e}", solve.report.residual_rel));
+    let bound = match (solve.report.error_bound_rel, &solve.report.error_bound_why) {
         (Some(bound), _) => format!("{bound:.1e}, proven"),
         (None, Some(why)) => format!("none: {why}"),
         (None, None) => "none for this answer".to_owned(),
     };
     row(ui, "bound of the error", bound);
-    row(ui, "precision", solve.precision.clone());
-    let turned = match solve.max_rotation_deg.is_finite() {
-        true => format!("{:.1}°, {:.0} %", solve.max_rotation_deg, 100.0 * solve.max_strain),
+    row(ui, "precision", solve.report.precision.clone());
+    let turned = match solve.report.max_rotation_deg.is_finite() {
+        true => format!(
+            "{:.1}°, {:.0} %",
+            solve.report.max_rotation_deg,
+            100.0 * solve.report.max_strain
+        ),
         false => "–".to_owned(),
     };
     row(ui, "largest turn, strain", turned);
