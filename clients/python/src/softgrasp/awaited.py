@@ -127,20 +127,35 @@ class AwaitedConnection:
                 self._waiting[request_id] = reply
             self._writer.write(data)
             try:
-                await asyncio.wait_for(self._writer.drain(), self._patience.answer)
+                await self._drained()
             except asyncio.CancelledError:
                 if reply is not None:
                     self._give_up(request_id)
                 raise
-            except asyncio.TimeoutError as error:
-                self.close("the server does not take a request in time")
-                raise NoAnswerInTime("the server does not take the request in time") from error
+            except NoAnswerInTime as error:
+                self._waiting.pop(request_id, None)
+                self.close(str(error))
+                raise
             except OSError as error:
                 # Of a server that closed while it was sent to, the last words may be there.
                 if reply is None:
                     self.close(str(error))
                     raise ConnectionLost(f"the connection broke: {error}") from error
             return request_id
+
+    async def _drained(self) -> None:
+        """Waits until what was written is on its way. Raises `NoAnswerInTime` and `OSError`."""
+        if self._writer.transport.get_write_buffer_size() == 0:
+            return
+        # Not by `wait_for`: up to Python 3.11 a task may be cancelled in it and go on all the same.
+        draining = asyncio.ensure_future(self._writer.drain())
+        try:
+            done, _ = await asyncio.wait([draining], timeout=self._patience.answer)
+        finally:
+            draining.cancel()
+        if not done:
+            raise NoAnswerInTime("the server does not take the request in time")
+        draining.result()
 
     async def _reply(self, reply: asyncio.Future[Received]) -> Received:
         sent_at = time.monotonic()
