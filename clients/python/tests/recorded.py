@@ -6,43 +6,56 @@ import contextlib
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from softgrasp import Limits, Server
 from softgrasp.calls import Call
-from softgrasp.framing import HEADER_LEN, Header, Kind, encode_frame
-from softgrasp.payload import Part
+from softgrasp.fields import Part
+from softgrasp.framing import HEADER_LEN, VERSION, Header, Kind, decode_header, encode_frame
+from softgrasp.payload import PayloadReader, payload_of
 
-Speak = Callable[[socket.socket, Header], None]
+
+@dataclass(frozen=True)
+class Heard(Header):
+    """The header of a request and its payload."""
+
+    payload: bytes
+
+
+Speak = Callable[[socket.socket, Heard], None]
 
 
 def welcome_payload(limits: Limits | None = None) -> bytes:
     """What a server says to `Hello`."""
     told = limits or Limits()
-    part = Part().text("stand-in").text("0").fields("I", 1)
     counts = (told.payload_len_max, told.node_count_max, told.tet_count_max)
-    part.fields("6I", *counts, told.dof_count_max, told.material_count_max, told.text_len_max)
-    return part.payload()
+    counts += (told.dof_count_max, told.material_count_max, told.text_len_max)
+    part = Part().text("stand-in").text("0").fields("I", 1).block(Part().fields("6I", *counts))
+    return payload_of(part.fields("H", VERSION).texts(["cancel"]).fields("Q", 0))
 
 
-def rejected_payload(code: int, text: str, detail: str = "") -> bytes:
+def rejected_payload(code: int, text: str, detail: str = "", retry_after_ms: int = 0) -> bytes:
     """A refusal."""
-    return Part().fields("H", code).text(text).text(detail).payload()
+    part = Part().fields("H", code).text(text).text(detail)
+    return payload_of(part.fields("I", retry_after_ms))
 
 
 def received(server: Server, call: Call) -> tuple[Header, bytes]:
     """Header and payload of a real server's reply, undecoded."""
-    connection = server._connection
-    connection._send(connection.conversation.begin(call), None)
-    header = connection.conversation.header(connection._receive_header(None))
-    return header, connection._receive(header.length, None).tobytes()
+    assert call.reply is not None
+
+    def undecoded(reader: PayloadReader) -> bytes:
+        return bytes(reader._bytes)
+
+    payload = server._ask(Call(call.kind, call.payload, call.reply, undecoded))
+    frame = encode_frame(call.reply, 1, payload)
+    return decode_header(frame[:HEADER_LEN], Limits()), payload
 
 
 def replayed(header: Header, payload: bytes) -> tuple[Header, np.ndarray]:
     """Header and payload as if a server had sent these bytes with right checksums."""
-    from softgrasp.framing import decode_header
-
     frame = encode_frame(header.kind, header.request_id, payload)
     return (
         decode_header(frame[:HEADER_LEN], Limits()),
@@ -54,7 +67,7 @@ def replayed(header: Header, payload: bytes) -> tuple[Header, np.ndarray]:
 def stand_in(speak: Speak, greet: bool = True) -> Iterator[str]:
     """The address of a server that greets, and speaks as the test says to each request.
 
-    `speak` gets the socket and the header of a request, whose payload has been read.
+    `speak` gets the socket and a request.
     """
     listener = socket.create_server(("127.0.0.1", 0))
     sockets: list[socket.socket] = []
@@ -67,12 +80,10 @@ def stand_in(speak: Speak, greet: bool = True) -> Iterator[str]:
                 threading.Thread(target=talk, args=(stream,), daemon=True).start()
 
     def talk(stream: socket.socket) -> None:
-        from softgrasp.framing import decode_header
-
         with contextlib.suppress(OSError, EOFError), stream:
             while True:
                 header = decode_header(exactly(stream, HEADER_LEN), Limits())
-                exactly(stream, header.length)
+                header = Heard(**vars(header), payload=exactly(stream, header.length))
                 if greet and header.kind == Kind.HELLO:
                     stream.sendall(encode_frame(Kind.WELCOME, header.request_id, welcome_payload()))
                 else:

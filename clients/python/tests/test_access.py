@@ -65,7 +65,7 @@ def test_encrypted_way_with_a_certificate_of_the_server(
             assert np.abs(answer.displacements - bar.exact).max() < 1e-12
             kept = server.keep(bar.model)
             assert np.abs(kept.frame(bar.case).displacements - bar.exact).max() < 1e-12
-            stream = server._connection._socket
+            stream = server._connection._stream._socket
             assert isinstance(stream, ssl.SSLSocket) and stream.version() == "TLSv1.3"
     with Server(address, token=TOKEN, tls=tls_context(pem), timeout=30.0) as server:
         server.ping()

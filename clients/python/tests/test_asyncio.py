@@ -29,6 +29,8 @@ def test_answers_are_those_of_blocking_calls(server: Server, bar: Bar) -> None:
             assert (await other.solve_large(bar.model, bar.case)).large.settled
             sets = [bar.case.known_displacements] * 2
             assert len((await other.solve_several(bar.model, bar.case, sets)).cases) == 2
+            assert len((await kept.solve_several(bar.case, sets)).cases) == 2
+            assert "cancel" in other.capabilities
             step = await kept.contact_frame(ObjectState(), [Body(Plane())], ContactStep(0.01))
             assert len(step.loads.contacts) == 1
             await kept.prefetch(nodes=bar.right)
@@ -54,21 +56,18 @@ def test_tasks_of_one_session_take_turns(server: Server, bar: Bar) -> None:
     asyncio.run(ask())
 
 
-def test_cancelled_request_closes_the_session_and_a_new_one_goes_on(spawn: Spawn, bar: Bar) -> None:
+def test_cancelled_task_leaves_the_session_as_it_was(spawn: Spawn, bar: Bar) -> None:
     async def ask() -> None:
         async with await AsyncServer.connect(spawn().address, timeout=60.0) as server:
             kept = await server.keep(bar.model)
-            task = asyncio.create_task(kept.frame(bar.case))
-            await asyncio.sleep(0)
-            task.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await task
-            if not server.is_open:
-                with pytest.raises(softgrasp.ConnectionLost):
-                    await server.ping()
-                await server.reconnect()
-            answer = await kept.frame(bar.case)
-            assert np.abs(answer.displacements - bar.exact).max() < 1e-12
+            for _ in range(20):
+                task = asyncio.create_task(kept.frame(bar.case))
+                await asyncio.sleep(0)
+                task.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+                answer = await kept.frame(bar.case)
+                assert np.abs(answer.displacements - bar.exact).max() < 1e-12
 
     asyncio.run(ask())
 

@@ -1,15 +1,17 @@
 """Bytes that are no answer: a clear error, no hang, and no memory for what is only announced."""
 
+import asyncio
 import random
 import struct
 import tracemalloc
 
 import pytest
 from conftest import Bar
-from recorded import received, replayed, stand_in
+from recorded import received, rejected_payload, replayed, stand_in
 
 import softgrasp
 from softgrasp import (
+    AsyncServer,
     BadStream,
     Body,
     ContactAnswer,
@@ -25,8 +27,9 @@ from softgrasp import (
 )
 from softgrasp.contact import read_contact_answer
 from softgrasp.conversation import Conversation
+from softgrasp.fields import Part
 from softgrasp.framing import VERSION, Header, Kind, crc32c, encode_frame
-from softgrasp.payload import Part, PayloadReader
+from softgrasp.payload import PayloadReader, payload_of
 
 SEED = 20261124
 
@@ -123,7 +126,6 @@ def test_announced_payload_takes_memory_only_as_it_comes() -> None:
     ("what", "words"),
     [
         ("magic", "no Softgrasp server"),
-        ("version", "version 9"),
         ("header", "header of a message is damaged"),
         ("flags", "flags"),
         ("length", "is announced"),
@@ -133,17 +135,17 @@ def test_announced_payload_takes_memory_only_as_it_comes() -> None:
         ("nonce", "came back"),
         ("padding", "padding"),
         ("left over", "left over"),
+        ("part", "ends inside its small fields"),
+        ("long part", "more than 65536 bytes"),
         ("echo", "of kind 0x0008"),
     ],
 )
 def test_each_fault_of_a_stream_has_its_words(what: str, words: str) -> None:
     def speak(stream, header) -> None:
-        nonce = Part().fields("Q", 0x736F6674).payload()
+        nonce = payload_of(Part().fields("Q", 0x736F6674))
         sound = bytearray(encode_frame(Kind.PONG, header.request_id, nonce))
         if what == "magic":
             sound = bytearray(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n")
-        elif what == "version":
-            sound[4] = 9
         elif what == "header":
             sound[16] ^= 1
         elif what == "payload":
@@ -155,15 +157,20 @@ def test_each_fault_of_a_stream_has_its_words(what: str, words: str) -> None:
         elif what == "id":
             sound = bytearray(encode_frame(Kind.PONG, 77, nonce))
         elif what == "kind":
-            sound = bytearray(encode_frame(Kind.MODEL_STATE, header.request_id, bytes(8)))
+            sound = bytearray(encode_frame(Kind.MODEL_STATE, header.request_id, bytes(16)))
         elif what == "nonce":
-            sound = bytearray(encode_frame(Kind.PONG, header.request_id, bytes(8)))
+            other = payload_of(Part().fields("Q", 7))
+            sound = bytearray(encode_frame(Kind.PONG, header.request_id, other))
         elif what == "padding":
-            refused = Part().fields("H", 1).text("").text("").payload()
+            refused = rejected_payload(1, "")
             refused = refused[:-1] + b"\1"
             sound = bytearray(encode_frame(Kind.REJECTED, header.request_id, refused))
         elif what == "left over":
             sound = bytearray(encode_frame(Kind.PONG, header.request_id, nonce + bytes(8)))
+        elif what == "part":
+            sound = bytearray(encode_frame(Kind.PONG, header.request_id, b"\x10" + nonce[1:]))
+        elif what == "long part":
+            sound = bytearray(encode_frame(Kind.PONG, header.request_id, b"\0\0\2" + nonce[3:]))
         elif what == "echo":
             sound = bytearray(encode_frame(Kind.PING, header.request_id, nonce))
         stream.sendall(sound)
@@ -184,13 +191,31 @@ def forged(kind: int, request_id: int, flags: int = 0, length: int = 8) -> bytes
 @pytest.mark.parametrize("length", [0, 1, 31, 32, 33, 39])
 def test_stream_that_ends_inside_a_message_is_a_lost_connection(length: int) -> None:
     def speak(stream, header) -> None:
-        nonce = Part().fields("Q", 0x736F6674).payload()
+        nonce = payload_of(Part().fields("Q", 0x736F6674))
         stream.sendall(encode_frame(Kind.PONG, header.request_id, nonce)[:length])
         stream.close()
 
     with stand_in(speak) as address, Server(address, timeout=10.0) as server:
         with pytest.raises(softgrasp.ConnectionLost):
             server.ping()
+
+
+@pytest.mark.parametrize("version", [3, 9])
+def test_server_of_another_version_is_told_with_both_versions(version: int) -> None:
+    def speak(stream, header) -> None:
+        # What a server of version 3 says: the part has no length.
+        words = b"another version"
+        payload = struct.pack("<HQ", 13, len(words)) + words + struct.pack("<Q", 0)
+        payload += bytes(-len(payload) % 8)
+        head = struct.pack("<4sHHIIQ", b"SGRP", version, Kind.REJECTED, 0, len(payload), 0)
+        head += struct.pack("<I", crc32c(head))
+        stream.sendall(head + struct.pack("<I", crc32c(payload, crc32c(head))) + payload)
+
+    with stand_in(speak, greet=False) as address:
+        with pytest.raises(softgrasp.UnsupportedVersion, match=f"version {version} .* {VERSION}:"):
+            Server(address, timeout=10.0)
+        with pytest.raises(softgrasp.UnsupportedVersion, match=f"version {version} .* {VERSION}:"):
+            asyncio.run(AsyncServer.connect(address, timeout=10.0))
 
 
 def test_program_that_is_no_server_is_told_apart() -> None:

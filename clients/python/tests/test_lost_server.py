@@ -1,18 +1,22 @@
 """A server that is killed, stopped, silent or forgetful: an error at once, and a way on."""
 
+import asyncio
 import os
 import pathlib
 import signal
+import socket
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from conftest import PROGRAM, Bar, Spawn
-from recorded import stand_in
+from recorded import exactly, stand_in, welcome_payload
 
 import softgrasp
-from softgrasp import Mesh, Model, Server
+from softgrasp import AsyncServer, Mesh, Model, Server, calls
+from softgrasp.framing import Kind, encode_frame
 
 AT_ONCE = 1.0
 """Seconds within which a lost server is noticed."""
@@ -57,7 +61,7 @@ def test_server_killed_while_it_works_is_noticed_at_once(spawn: Spawn) -> None:
 
 
 def stop(pid: int) -> None:
-    """Stops a process and waits until all its threads stand: a signal takes its time on a busy machine."""
+    """Stops a process and waits until all its threads stand, which takes its time."""
     os.kill(pid, signal.SIGSTOP)
     given_up = time.monotonic() + 10.0
     while any(
@@ -94,9 +98,7 @@ def test_server_that_is_asked_to_end_says_so_or_closes(spawn: Spawn) -> None:
 
 def test_trickle_of_bytes_does_not_outlast_the_timeout() -> None:
     def trickle(stream, header) -> None:
-        from softgrasp.framing import Kind, encode_frame
-
-        for byte in encode_frame(Kind.PONG, header.request_id, bytes(8)):
+        for byte in encode_frame(Kind.PONG, header.request_id, bytes(16)):
             stream.sendall(bytes([byte]))
             time.sleep(0.1)
 
@@ -105,6 +107,34 @@ def test_trickle_of_bytes_does_not_outlast_the_timeout() -> None:
         with pytest.raises(softgrasp.NoAnswerInTime):
             server.ping()
         assert time.monotonic() - start < 0.5 + AT_ONCE
+
+
+def test_request_that_is_not_taken_does_not_outlast_the_timeout() -> None:
+    # More than lies in buffers on the way.
+    large = calls.Call(Kind.PING, bytes(64_000_000), Kind.PONG, lambda reader: None)
+    greeting = encode_frame(Kind.WELCOME, 1, welcome_payload())
+
+    async def ask(address: str) -> None:
+        async with await AsyncServer.connect(address, timeout=0.5) as server:
+            with pytest.raises(softgrasp.NoAnswerInTime, match="take the request"):
+                await server._ask(large)
+            assert not server.is_open
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        address = f"127.0.0.1:{listener.getsockname()[1]}"
+        for connect in (lambda: Server(address, timeout=0.5), lambda: asyncio.run(ask(address))):
+            with ThreadPoolExecutor(1) as pool:
+                connected = pool.submit(connect)
+                stream, _ = listener.accept()
+                with stream:
+                    exactly(stream, 32)
+                    stream.sendall(greeting)
+                    server = connected.result(timeout=20.0)
+                    if server is None:
+                        continue
+                    with server, pytest.raises(softgrasp.NoAnswerInTime, match="take the request"):
+                        server._ask(large)
+                    assert not server.is_open
 
 
 def test_nobody_listens() -> None:

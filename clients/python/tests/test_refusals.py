@@ -13,11 +13,11 @@ from softgrasp.framing import Kind, encode_frame
 
 
 def test_every_number_has_its_exception() -> None:
-    assert sorted(softgrasp.REFUSALS) == list(range(1, 15))
+    assert sorted(softgrasp.REFUSALS) == list(range(1, 17))
     for code, kind in softgrasp.REFUSALS.items():
 
         def refuse(stream, header, code=code) -> None:
-            payload = rejected_payload(code, f"reason {code}", "more")
+            payload = rejected_payload(code, f"reason {code}", "more", 1500)
             stream.sendall(encode_frame(Kind.REJECTED, header.request_id, payload))
 
         with stand_in(refuse) as address, Server(address, timeout=10.0) as server:
@@ -26,9 +26,11 @@ def test_every_number_has_its_exception() -> None:
             error = caught.value
             assert type(error) is kind
             assert (error.code, error.text, error.detail) == (code, f"reason {code}", "more")
+            assert error.retry_after == 1.5
             assert server.is_open
             again = pickle.loads(pickle.dumps(error))
             assert type(again) is kind and str(again) == str(error)
+            assert again.retry_after == 1.5
 
 
 def test_a_number_that_is_not_known_is_a_refusal_too() -> None:
@@ -39,7 +41,7 @@ def test_a_number_that_is_not_known_is_a_refusal_too() -> None:
     with stand_in(refuse) as address, Server(address, timeout=10.0) as server:
         with pytest.raises(softgrasp.Refused, match="99") as caught:
             server.ping()
-        assert caught.value.code == 99
+        assert (caught.value.code, caught.value.retry_after) == (99, None)
 
 
 def test_refusal_without_having_been_asked_ends_the_session() -> None:
@@ -50,7 +52,7 @@ def test_refusal_without_having_been_asked_ends_the_session() -> None:
         with pytest.raises(softgrasp.ShuttingDown):
             server.ping()
         assert not server.is_open
-        with pytest.raises(softgrasp.ConnectionLost, match="closed"):
+        with pytest.raises(softgrasp.ConnectionLost, match=r"closed.*the server stops"):
             server.ping()
 
 
@@ -139,6 +141,12 @@ def test_arguments_that_no_server_takes_are_value_errors(bar: Bar) -> None:
         softgrasp.Question(deadline_ms=0.0)
     with pytest.raises(ValueError, match="precision"):
         softgrasp.Question(precision="f16")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="report"):
+        softgrasp.Question(report="long")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="newest_wins"):
+        calls.solve(bar.model, bar.case, softgrasp.Question(newest_wins=True))
+    with pytest.raises(ValueError, match="alive_every"):
+        Server("127.0.0.1:1", alive_every=0.0)
     with pytest.raises(ValueError, match="law"):
         softgrasp.LargeDeformation(law="hooke")  # type: ignore[arg-type]
     with pytest.raises(TypeError):

@@ -7,7 +7,7 @@ import pytest
 from conftest import Bar
 
 import softgrasp
-from softgrasp import LargeDeformation, LoadCase, Material, Mesh, Model, Server
+from softgrasp import LargeDeformation, LoadCase, Material, Mesh, Model, Server, WarningCode, calls
 
 
 def test_uniform_strain_of_a_pulled_bar_is_exact(server: Server, bar: Bar) -> None:
@@ -129,6 +129,36 @@ def test_several_cases_are_those_solved_one_by_one(server: Server, bar: Bar) -> 
     assert np.isnan(fast.report.max_strain) and len(fast.cases) == 1
 
 
+def test_several_cases_of_a_kept_model_are_its_frames(server: Server, bar: Bar) -> None:
+    kept = server.keep(bar.model)
+    factors = (1.0, -2.0, 0.5)
+    sets = [factor * bar.case.known_displacements for factor in factors]
+    several = kept.solve_several(bar.case, sets)
+    for factor, case in zip(factors, several.cases, strict=True):
+        frame = kept.frame(bar.case.scaled(factor))
+        assert np.array_equal(case.displacements, frame.displacements)
+        assert np.array_equal(case.reactions.forces, frame.reactions.forces)
+    wanted = kept.solve_several(bar.case, sets, nodes=bar.right, reactions=False, precision="f32")
+    assert wanted.nodes is not None and wanted.cases[2].displacements.shape == (len(bar.right), 3)
+    with pytest.raises(ValueError, match="no set"):
+        kept.solve_several(bar.case, np.zeros((0, len(bar.case.known_dofs))))
+
+
+def test_report_tells_as_much_as_was_asked_for(server: Server, bar: Bar) -> None:
+    kept = server.keep(bar.model)
+    bent = bar.held.prescribe(bar.right, (None, 0.01, None))
+    full = kept.frame(bent)
+    short, none = kept.frame(bent, report="short"), kept.frame(bent, report="none")
+    for answer in (short, none):
+        assert np.array_equal(answer.displacements, full.displacements)
+        assert (answer.report.method, answer.report.warnings) == ("", ())
+    assert short.report.is_told and short.residual_rel == full.residual_rel
+    assert short.report.unknown_dofs == full.report.unknown_dofs
+    assert not none.report.is_told and np.isnan(none.residual_rel)
+    law = LargeDeformation()
+    assert kept.large_frame(bar.case, law, report="none").large.settled
+
+
 def test_regions_have_their_materials(server: Server, bar: Bar) -> None:
     middle = bar.mesh.points[bar.mesh.tets].mean(axis=1)[:, 0]
     labels = np.where(middle < 0.02, 7, 3)
@@ -202,10 +232,23 @@ def test_yield_stays(server: Server, bar: Bar) -> None:
 
 def test_wishes_that_are_missed_are_warned_of(server: Server, bar: Bar) -> None:
     answer = server.solve(bar.model, bar.case, deadline_ms=1e-6)
-    assert any("deadline" in warning or "ms" in warning for warning in answer.report.warnings)
+    late = [each for each in answer.report.warnings if each.code == WarningCode.LATE]
+    assert len(late) == 1 and "ms" in late[0]
 
 
 def test_welcome_tells_the_limits(server: Server) -> None:
     assert server.welcome.server == "fea-server"
     assert server.welcome.threads == 2
     assert server.welcome.limits == softgrasp.Limits()
+    assert server.welcome.wire == 4 and server.welcome.idle is None
+    assert server.capabilities >= {"large", "cases", "contact", "cancel", "newest-wins"}
+
+
+def test_drop_leaves_the_models_of_others(program: softgrasp.ServerProgram, bar: Bar) -> None:
+    model = Model(bar.mesh, Material(12_345.0, 0.3), "t4")
+    with Server(program.address, timeout=60.0) as holder:
+        kept = holder.keep(model)
+        with Server(program.address, timeout=60.0) as other:
+            other._tell(calls.drop(kept.hash))
+            other.ping()
+        assert holder._ask(calls.have_model(kept.hash))

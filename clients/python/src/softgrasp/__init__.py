@@ -22,6 +22,7 @@ from .errors import (
     BadRequest,
     BadStream,
     Busy,
+    Cancelled,
     ConnectionLost,
     DeadlineMissed,
     InternalFault,
@@ -35,6 +36,7 @@ from .errors import (
     ServerNotStarted,
     ShuttingDown,
     SoftgraspError,
+    Superseded,
     TooLarge,
     Uncertain,
     UnknownMethod,
@@ -48,12 +50,14 @@ from .mesh import Mesh
 from .model import Element, Material, Model
 from .pose import Pose
 from .program import ServerProgram
-from .question import Precision, Question
+from .question import Precision, Question, Report
 from .report import ContactReport, LargeReport, SolveReport, StageTimes
 from .server import KeptModel, Server
+from .warning import AnswerWarning, WarningCode
 
 __all__ = [
     "Answer",
+    "AnswerWarning",
     "AsyncKeptModel",
     "AsyncServer",
     "BadRequest",
@@ -62,6 +66,7 @@ __all__ = [
     "BodyLoads",
     "Box",
     "Busy",
+    "Cancelled",
     "Capsule",
     "CaseAnswer",
     "ClosedSurface",
@@ -97,6 +102,7 @@ __all__ = [
     "REFUSALS",
     "Reactions",
     "Refused",
+    "Report",
     "RigidMotionFree",
     "Server",
     "ServerNotStarted",
@@ -108,12 +114,14 @@ __all__ = [
     "SolveReport",
     "Sphere",
     "StageTimes",
+    "Superseded",
     "Tls",
     "TooLarge",
     "Uncertain",
     "UnknownMethod",
     "UnknownModel",
     "UnsupportedVersion",
+    "WarningCode",
     "Welcome",
     "candidate_triangles",
 ]

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import F32, Floats, Numbers, numbers
+from .errors import BadStream
+from .fields import Fields
 from .payload import PayloadReader
 from .report import LargeReport, SolveReport, read_large_report, read_solve_report
 
@@ -114,81 +116,93 @@ class SeveralAnswers:
     """One report for all; what it says of errors is the worst of them."""
 
 
-class AnswerCounts(NamedTuple):
-    """The last fields of an answer's part, which announce its arrays."""
+class AnswerPart(NamedTuple):
+    """What an answer's part tells, with the counts that announce its arrays."""
 
+    report: SolveReport
+    large: LargeReport | None
     listed: bool
     quantised: bool
     scale: float
     node_count: int
     reaction_count: int
     mask_count: int
+    case_count: int
 
 
 def read_answer(reader: PayloadReader) -> Answer:
-    """Reads a whole `Answer`."""
-    report, counts = read_answer_part(reader)
-    reader.end_part()
-    answer = read_answer_arrays(reader, report, counts)
+    """Reads an answer to a linear question of one case."""
+    answer = read_answer_arrays(reader, read_answer_part(reader.part))
     reader.finish()
     return answer
 
 
 def read_large_answer(reader: PayloadReader) -> LargeAnswer:
-    """Reads a whole `LargeAnswer`."""
-    report, counts = read_answer_part(reader)
-    large = read_large_report(reader)
-    reader.end_part()
-    answer = read_answer_arrays(reader, report, counts)
+    """Reads an answer to a question about large deformation."""
+    part = read_answer_part(reader.part)
+    if part.large is None:
+        raise BadStream("an answer to a question about large deformation does not speak of it")
+    answer = read_answer_arrays(reader, part)
     reader.finish()
     return LargeAnswer(
-        answer.nodes, answer.displacements, answer.reactions, answer.mask_forces, report, large
+        answer.nodes,
+        answer.displacements,
+        answer.reactions,
+        answer.mask_forces,
+        part.report,
+        part.large,
     )
 
 
 def read_several_answers(reader: PayloadReader) -> SeveralAnswers:
-    """Reads a whole `SeveralAnswers`."""
-    report, counts = read_answer_part(reader)
-    case_count = reader.u32()
-    reader.end_part()
-    first = read_answer_arrays(reader, report, counts)
-    if case_count and not (counts.node_count or counts.reaction_count):
+    """Reads an answer of one case or several."""
+    part = read_answer_part(reader.part)
+    first = read_answer_arrays(reader, part)
+    case_count = part.case_count
+    if case_count and not (part.node_count or part.reaction_count):
         # Cases without a number take no bytes, so any count of them would pass.
         case_count = reader.claimed(case_count, 0, "cases without a number")
     cases = [CaseAnswer(first.displacements, first.reactions)]
     limits = reader.limits
     for _ in range(reader.claimed(case_count, limits.dof_count_max, "cases")):
-        displacements = reader.floats(counts.node_count, limits.node_count_max, "nodes", 3)
-        forces = reader.floats(counts.reaction_count, limits.dof_count_max, "reactions")
+        displacements = reader.floats(part.node_count, limits.node_count_max, "nodes", 3)
+        forces = reader.floats(part.reaction_count, limits.dof_count_max, "reactions")
         cases.append(CaseAnswer(displacements, Reactions(first.reactions.dofs, forces)))
     reader.finish()
-    return SeveralAnswers(first.nodes, tuple(cases), report)
+    return SeveralAnswers(first.nodes, tuple(cases), part.report)
 
 
-def read_answer_part(reader: PayloadReader) -> tuple[SolveReport, AnswerCounts]:
-    """Reads the fields that all answers begin with."""
-    report = read_solve_report(reader)
-    listed, precision, *rest = reader.fields(_COUNTS)
-    precision = reader.named(precision, ("f64", "f32"), "precision")
-    return report, AnswerCounts(reader.truth(listed), precision == "f32", *rest)
+def read_answer_part(fields: Fields) -> AnswerPart:
+    """Reads the fields of an answer."""
+    report = read_solve_report(fields.block())
+    large = fields.option_block()
+    listed, precision, *rest = fields.fields(_COUNTS)
+    precision = fields.named(precision, ("f64", "f32"), "precision")
+    return AnswerPart(
+        report,
+        None if large is None else read_large_report(large),
+        fields.truth(listed),
+        precision == "f32",
+        *rest,
+    )
 
 
-def read_answer_arrays(reader: PayloadReader, report: SolveReport, counts: AnswerCounts) -> Answer:
-    """Reads the arrays that all answers begin with."""
+def read_answer_arrays(reader: PayloadReader, part: AnswerPart) -> Answer:
+    """Reads the arrays of the first case."""
     limits = reader.limits
-    count = reader.claimed(counts.node_count, limits.node_count_max, "answered nodes")
-    nodes = reader.numbers(count, limits.node_count_max, "nodes") if counts.listed else None
-    if counts.quantised:
+    count = reader.claimed(part.node_count, limits.node_count_max, "answered nodes")
+    nodes = reader.numbers(count, limits.node_count_max, "nodes") if part.listed else None
+    if part.quantised:
         rounded = reader.array(F32, 3 * count, 3 * limits.node_count_max, "displacements")
         with np.errstate(all="ignore"):
-            scaled = np.multiply(rounded, counts.scale, dtype=np.float64)
+            scaled = np.multiply(rounded, part.scale, dtype=np.float64)
             displacements = scaled.reshape(count, 3)
     else:
         displacements = reader.floats(count, limits.node_count_max, "displacements", 3)
-    dofs = reader.numbers(counts.reaction_count, limits.dof_count_max, "reactions")
-    forces = reader.floats(counts.reaction_count, limits.dof_count_max, "reactions")
-    mask_forces = reader.floats(counts.mask_count, limits.dof_count_max, "forces of masks", 3)
-    return Answer(nodes, displacements, Reactions(dofs, forces), mask_forces, report)
+    dofs = reader.numbers(part.reaction_count, limits.dof_count_max, "reactions")
+    forces = reader.floats(part.reaction_count, limits.dof_count_max, "reactions")
+    mask_forces = reader.floats(part.mask_count, limits.dof_count_max, "forces of masks", 3)
+    return Answer(nodes, displacements, Reactions(dofs, forces), mask_forces, part.report)
 
 
-_COUNTS = struct.Struct("<BId3I")
+_COUNTS = struct.Struct("<BId4I")

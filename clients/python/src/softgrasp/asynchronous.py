@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import os
-import ssl
 from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import calls
-from .address import Tls, prepare_socket, split_address, tls_context
+from .address import Tls, split_address, tls_context
 from .answer import Answer, LargeAnswer, SeveralAnswers
+from .awaited import AwaitedConnection
 from .body import Body
 from .calls import Call, ModelReady
-from .connection import FIRST_PIECE
 from .contact import ContactAnswer, ContactStep, ObjectState
-from .conversation import Conversation
-from .errors import ConnectionLost, NoAnswerInTime, UnknownModel
-from .framing import HEADER_LEN, Header
+from .errors import UnknownModel
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
 from .model import Model
 from .program import ServerProgram
-from .question import Options, Precision, Question
-from .session import CLIENT, NamedModel, Session
+from .question import FrameOptions, Options, Precision, Question
+from .session import NamedModel, Session
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -37,25 +33,14 @@ T = TypeVar("T")
 
 
 class AsyncServer(Session):
-    """A session with a server, for asyncio; one request at a time, tasks take turns.
+    """A session with a server, for asyncio; tasks may ask at once and are answered in turn.
 
     Made by `await AsyncServer.connect(…)` or `await AsyncServer.spawn(…)`, used in `async with`.
-    Errors are those of `Server`. A request whose task is cancelled closes the connection, because
-    its reply would come in place of the next one.
+    Errors are those of `Server`. A task that is cancelled cancels its request on the server, and
+    the session goes on.
     """
 
-    def __init__(
-        self,
-        address: str,
-        token: str | None,
-        tls: Tls,
-        timeout: float | None,
-        limits: Limits | None,
-    ) -> None:
-        """Made by `connect`, which also connects."""
-        super().__init__(address, token, tls, timeout, limits)
-        self._turn = asyncio.Lock()
-        self._writer: asyncio.StreamWriter | None = None
+    _connection: AwaitedConnection
 
     @classmethod
     async def connect(
@@ -66,9 +51,10 @@ class AsyncServer(Session):
         tls: Tls = None,
         timeout: float | None = None,
         limits: Limits | None = None,
+        alive_every: float | None = None,
     ) -> AsyncServer:
         """Connects to `HOST:PORT` and introduces itself; arguments and errors as of `Server`."""
-        server = cls(address, token, tls, timeout, limits)
+        server = cls(address, token, tls, timeout, limits, alive_every)
         await server._connect()
         return server
 
@@ -94,7 +80,7 @@ class AsyncServer(Session):
     @property
     def is_open(self) -> bool:
         """Whether nothing has ended the session, as far as is known."""
-        return self._writer is not None
+        return self._connection.is_open
 
     async def solve(self, model: Model, case: LoadCase, **options: Unpack[Options]) -> Answer:
         """As `Server.solve`."""
@@ -134,14 +120,18 @@ class AsyncServer(Session):
         """As `Server.ping`."""
         await self._ask(calls.ping())
 
+    def cancel(self) -> None:
+        """As `Server.cancel`; does not wait for anything."""
+        self._connection.cancel()
+
     async def reconnect(self) -> None:
         """As `Server.reconnect`."""
-        self._hang_up()
+        self._connection.close()
         await self._connect()
 
     async def close(self) -> None:
         """Ends the session, and a server that was spawned; may be called again."""
-        self._hang_up()
+        self._connection.close()
         if self._program is not None:
             await asyncio.to_thread(self._program.end)
 
@@ -159,73 +149,22 @@ class AsyncServer(Session):
     async def _connect(self) -> None:
         host, port = split_address(self.address)
         context = tls_context(self._tls)
-        opening = asyncio.open_connection(host, port, ssl=context, limit=FIRST_PIECE)
+        connection = await AwaitedConnection.connect(
+            host, port, context, self._patience, self._limits
+        )
+        self._connection = connection
         try:
-            reader, writer = await asyncio.wait_for(opening, self._timeout)
-        except asyncio.TimeoutError as error:
-            raise NoAnswerInTime(f"{self.address} does not answer in {self._timeout} s") from error
-        except ssl.SSLCertVerificationError:
-            raise
-        except OSError as error:
-            raise ConnectionLost(f"{self.address} cannot be reached: {error}") from error
-        self._reader, self._writer = reader, writer
-        prepare_socket(writer.get_extra_info("socket"))
-        self._conversation = Conversation(self._limits)
-        try:
-            self._welcome = await self._ask(calls.hello(CLIENT, self._token))
+            self._welcome = await self._ask(self._hello())
         except BaseException:
-            self._hang_up()
+            connection.close()
             raise
-        self._conversation.server_limits = self._welcome.limits
-
-    def _hang_up(self) -> None:
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
+        connection.conversation.server_limits = self._welcome.limits
 
     async def _ask(self, call: Call[T]) -> T:
-        async with self._turn:
-            if self._writer is None:
-                raise ConnectionLost("the connection is closed")
-            data = self._conversation.begin(call)
-            header: Header | None = None
-            try:
-                answered = await asyncio.wait_for(self._exchange(data), self._timeout)
-                header, payload = answered
-                return self._conversation.reply(call, header, payload)
-            except BaseException as error:
-                if header is None or self._conversation.ends_session(header, error):
-                    self._hang_up()
-                if isinstance(error, asyncio.TimeoutError):
-                    raise NoAnswerInTime(f"no answer came in {self._timeout} s") from error
-                if isinstance(error, asyncio.IncompleteReadError):
-                    raise ConnectionLost("the server closed the connection") from error
-                if isinstance(error, OSError) and not isinstance(error, ConnectionLost):
-                    raise ConnectionLost(f"the connection broke: {error}") from error
-                raise
-
-    async def _exchange(self, data: bytes) -> tuple[Header, NDArray[np.uint8]]:
-        assert self._writer is not None
-        self._writer.write(data)
-        try:
-            await self._writer.drain()
-        except OSError:
-            # Of a server that closed while it was sent to, the last words may be there.
-            pass
-        header = self._conversation.header(await self._reader.readexactly(HEADER_LEN))
-        payload = await self._reader.readexactly(header.length)
-        return header, np.frombuffer(payload, dtype=np.uint8)
+        return await self._connection.ask(call)
 
     async def _tell(self, call: Call[None]) -> None:
-        async with self._turn:
-            if self._writer is None:
-                raise ConnectionLost("the connection is closed")
-            self._writer.write(self._conversation.begin(call))
-            try:
-                await self._writer.drain()
-            except OSError as error:
-                self._hang_up()
-                raise ConnectionLost(f"the connection broke: {error}") from error
+        await self._connection.tell(call)
 
 
 class AsyncKeptModel(NamedModel):
@@ -239,7 +178,7 @@ class AsyncKeptModel(NamedModel):
         """As `KeptModel.upload`."""
         return await self._server._ask(calls.upload_model(self.model, self.fixed_dofs))
 
-    async def frame(self, case: LoadCase, **options: Unpack[Options]) -> Answer:
+    async def frame(self, case: LoadCase, **options: Unpack[FrameOptions]) -> Answer:
         """As `KeptModel.frame`."""
         return await self._ask(calls.frame(self.hash, case, Question(**options)))
 
@@ -247,10 +186,17 @@ class AsyncKeptModel(NamedModel):
         self,
         case: LoadCase,
         large: LargeDeformation = AT_LARGE,
-        **options: Unpack[Options],
+        **options: Unpack[FrameOptions],
     ) -> LargeAnswer:
         """As `KeptModel.large_frame`."""
         return await self._ask(calls.large_frame(self.hash, case, large, Question(**options)))
+
+    async def solve_several(
+        self, case: LoadCase, displacements: ArrayLike, **options: Unpack[FrameOptions]
+    ) -> SeveralAnswers:
+        """As `KeptModel.solve_several`."""
+        call = calls.solve_several(self.hash, case, displacements, True, Question(**options))
+        return await self._ask(call)
 
     async def contact_frame(
         self,

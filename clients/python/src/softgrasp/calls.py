@@ -6,11 +6,10 @@ The blocking and the asynchronous server share these; neither knows a byte of th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .answer import (
     Answer,
@@ -20,7 +19,7 @@ from .answer import (
     read_large_answer,
     read_several_answers,
 )
-from .arrays import Numbers, floats, numbers
+from .arrays import NO_FLOATS, Floats, Numbers, floats, numbers
 from .body import Body
 from .contact import (
     ContactAnswer,
@@ -30,14 +29,15 @@ from .contact import (
     read_contact_answer,
 )
 from .errors import BadStream
-from .framing import Kind
+from .fields import Fields, Part
+from .framing import VERSION, Kind
 from .large import LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask, mask_arrays
 from .mesh import Mesh
 from .model import ELEMENTS, Model
-from .payload import Part, PayloadReader
-from .question import Precision, Question
+from .payload import PayloadReader, payload_of
+from .question import REPORTS, Precision, Question
 
 T = TypeVar("T")
 
@@ -68,6 +68,12 @@ class Welcome:
     """Threads that solve a request."""
     limits: Limits
     """What it reads at most."""
+    wire: int
+    """Version of the wire that both sides speak from now on."""
+    capabilities: frozenset[str]
+    """What it can do, by name: `large`, `cases`, `contact`, `cancel`, `newest-wins`, …"""
+    idle: float | None
+    """A client that has sent nothing for so many seconds is given up; None: it may rest."""
 
 
 @dataclass(frozen=True)
@@ -84,78 +90,86 @@ class ModelReady:
     """Whether the server had the model already."""
 
 
-def hello(client: str, token: str | None) -> Call[Welcome]:
-    """Introduces the client, with the token where the server wants one."""
+def hello(
+    client: str,
+    token: str | None,
+    alive_every: float | None = None,
+    capabilities: Sequence[str] = (),
+) -> Call[Welcome]:
+    """Introduces the client, with the token where the server wants one.
+
+    The server is asked to say that it is there when it has said nothing for `alive_every` seconds.
+    """
     part = Part().text(client)
     if token is None:
         part.raw(b"\0")
     else:
         part.raw(b"\1").text(token)
-
-    def read(reader: PayloadReader) -> Welcome:
-        server, version = reader.text(), reader.text()
-        threads = reader.u32()
-        limits = Limits(*(reader.u32() for _ in range(6)))
-        reader.end_part()
-        reader.finish()
-        return Welcome(server, version, threads, limits)
-
-    return Call(Kind.HELLO, part.payload(), Kind.WELCOME, read)
+    alive_ms = 0 if alive_every is None else max(1, round(1e3 * alive_every))
+    part.fields("HH", VERSION, VERSION).texts(capabilities)
+    part.fields("I", min(alive_ms, 0xFFFF_FFFF))
+    return Call(Kind.HELLO, payload_of(part), Kind.WELCOME, _read_welcome)
 
 
 def ping(nonce: int = 0x736F6674) -> Call[int]:
     """Asks for a number back."""
 
     def read(reader: PayloadReader) -> int:
-        (back,) = np.frombuffer(reader.raw(8), dtype="<u8")
+        back = reader.part.u64()
         reader.finish()
-        if int(back) != nonce:
+        if back != nonce:
             raise BadStream(f"a ping of {nonce} came back as {back}")
         return nonce
 
-    return Call(Kind.PING, Part().fields("Q", nonce).payload(), Kind.PONG, read)
+    return Call(Kind.PING, payload_of(Part().fields("Q", nonce)), Kind.PONG, read)
+
+
+def cancel(request_id: int) -> Call[None]:
+    """Says that an earlier request is not wanted any more; has no reply."""
+    payload = payload_of(Part().fields("Q", request_id))
+    return Call(Kind.CANCEL, payload, None, _nothing)
 
 
 def solve(model: Model, case: LoadCase, question: Question) -> Call[Answer]:
     """One self-contained linear request."""
-    part = model.part().join(_element_choice(model)).join(question.part(case))
-    payload = part.payload(*model.arrays(), *question.arrays(case))
-    return Call(Kind.SOLVE_ONCE, payload, Kind.ANSWER, read_answer)
+    return _ask(_Asked(model, case, question), read_answer)
 
 
 def solve_large(
     model: Model, case: LoadCase, large: LargeDeformation, question: Question
 ) -> Call[LargeAnswer]:
     """One self-contained request at large deformation."""
-    part = model.part().join(_element_choice(model)).join(large.part()).join(question.part(case))
-    payload = part.payload(*model.arrays(), *question.arrays(case))
-    return Call(Kind.SOLVE_LARGE, payload, Kind.LARGE_ANSWER, read_large_answer)
+    return _ask(_Asked(model, case, question, large), read_large_answer)
 
 
 def solve_several(
-    model: Model, case: LoadCase, displacements: ArrayLike, estimate: bool, question: Question
+    subject: Model | bytes,
+    case: LoadCase,
+    displacements: ArrayLike,
+    estimate: bool,
+    question: Question,
 ) -> Call[SeveralAnswers]:
-    """One request with several sets of values of the same known displacements."""
+    """One request for several sets of displacements of the case's known degrees of freedom.
+
+    `subject` is a model that comes along, or the name of one that the server keeps.
+    """
     sets = floats(displacements, "sets of displacements", len(case.known_dofs))
     if len(sets) == 0:
         raise ValueError("there is no set of displacements to solve for")
     case = case.with_displacements(sets[0])
-    part = model.part().join(_element_choice(model))
-    part.fields("?I", estimate, len(sets) - 1).join(question.part(case))
-    payload = part.payload(*model.arrays(), *question.arrays(case), sets[1:])
-    return Call(Kind.SOLVE_SEVERAL, payload, Kind.SEVERAL_ANSWERS, read_several_answers)
+    asked = _Asked(subject, case, question, further=sets[1:], estimate=estimate)
+    return _ask(asked, read_several_answers)
 
 
 def have_model(model: bytes) -> Call[bool]:
     """Asks whether the server knows a model."""
 
     def read(reader: PayloadReader) -> bool:
-        known = reader.flag()
-        reader.end_part()
+        known = reader.part.flag()
         reader.finish()
         return known
 
-    return Call(Kind.HAVE_MODEL, Part().raw(model).payload(), Kind.MODEL_STATE, read)
+    return Call(Kind.HAVE_MODEL, payload_of(Part().raw(model)), Kind.MODEL_STATE, read)
 
 
 def upload_model(model: Model, fixed_dofs: Numbers) -> Call[ModelReady]:
@@ -163,32 +177,25 @@ def upload_model(model: Model, fixed_dofs: Numbers) -> Call[ModelReady]:
     part = model.part().fields("II", ELEMENTS.index(model.kept_element), len(fixed_dofs))
 
     def read(reader: PayloadReader) -> ModelReady:
-        name = reader.raw(32)
-        unknown, fixed = (int(count) for count in np.frombuffer(reader.raw(16), dtype="<u8"))
-        reused = reader.flag()
-        for _ in range(7):
-            reader.f64()
-        reader.end_part()
+        fields = reader.part
+        ready = ModelReady(fields.raw(32), fields.u64(), fields.u64(), fields.flag())
         reader.finish()
-        return ModelReady(name, unknown, fixed, reused)
+        return ready
 
-    payload = part.payload(*model.arrays(), fixed_dofs)
+    payload = payload_of(part, *model.arrays(), fixed_dofs)
     return Call(Kind.UPLOAD_MODEL, payload, Kind.MODEL_READY, read)
 
 
 def frame(model: bytes, case: LoadCase, question: Question) -> Call[Answer]:
     """A linear question about a kept model."""
-    payload = Part().raw(model).join(question.part(case)).payload(*question.arrays(case))
-    return Call(Kind.FRAME, payload, Kind.ANSWER, read_answer)
+    return _ask(_Asked(model, case, question), read_answer)
 
 
 def large_frame(
     model: bytes, case: LoadCase, large: LargeDeformation, question: Question
 ) -> Call[LargeAnswer]:
     """A question about a kept model at large deformation, on this session's path."""
-    part = Part().raw(model).join(large.part()).join(question.part(case))
-    payload = part.payload(*question.arrays(case))
-    return Call(Kind.LARGE_FRAME, payload, Kind.LARGE_ANSWER, read_large_answer)
+    return _ask(_Asked(model, case, question, large), read_large_answer)
 
 
 def contact_frame(
@@ -214,18 +221,66 @@ def prefetch(model: bytes, nodes: ArrayLike, masks: Sequence[Mask]) -> Call[None
     chosen = numbers(nodes, "nodes")
     lengths, of_masks, weights, _ = mask_arrays(masks)
     part = Part().raw(model).fields("III", len(chosen), len(lengths), len(of_masks))
-    payload = part.payload(chosen, lengths, of_masks, weights)
+    payload = payload_of(part, chosen, lengths, of_masks, weights)
     return Call(Kind.PREFETCH, payload, None, _nothing)
 
 
 def drop(model: bytes) -> Call[None]:
     """Gives a model up; has no reply."""
-    return Call(Kind.DROP, Part().raw(model).payload(), None, _nothing)
+    return Call(Kind.DROP, payload_of(Part().raw(model)), None, _nothing)
 
 
-def _element_choice(model: Model) -> Part:
-    return Part().fields("I", (*ELEMENTS, "auto").index(model.asked_element))
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """Everything that one request for displacements says."""
+
+    subject: Model | bytes
+    """A model that comes along, or the name of one that the server keeps."""
+    case: LoadCase
+    question: Question
+    large: LargeDeformation | None = None
+    further: Floats = field(default_factory=lambda: NO_FLOATS)
+    """Displacements of the further cases; shape (cases, known degrees of freedom)."""
+    estimate: bool = True
+
+
+def _ask(asked: _Asked, read: Callable[[PayloadReader], T]) -> Call[T]:
+    subject, case, question = asked.subject, asked.case, asked.question
+    mesh: tuple[NDArray[Any], ...] = ()
+    if isinstance(subject, Model):
+        if question.newest_wins:
+            raise ValueError("newest_wins is for frames of a model that the server keeps")
+        mesh = subject.arrays()
+        element = (*ELEMENTS, "auto").index(subject.asked_element)
+        part = Part().fields("I", _OF_MESH).join(subject.part()).fields("I", element)
+    else:
+        part = Part().fields("I", _OF_MODEL).raw(subject)
+    part.fields("?", question.newest_wins).block(question.part(case))
+    part.option_block(None if asked.large is None else asked.large.part())
+    level = REPORTS.index(question.report)
+    part.fields("I?I", len(asked.further), not asked.estimate, level)
+    payload = payload_of(part, *mesh, *question.arrays(case), asked.further)
+    return Call(Kind.ASK, payload, Kind.ANSWER, read)
+
+
+def _read_welcome(reader: PayloadReader) -> Welcome:
+    fields = reader.part
+    server, version = fields.text(), fields.text()
+    threads = fields.u32()
+    limits = _read_limits(fields.block())
+    wire, capabilities, idle_ms = fields.u16(), fields.texts(), fields.u64()
+    reader.finish()
+    idle = 1e-3 * idle_ms if idle_ms else None
+    return Welcome(server, version, threads, limits, wire, frozenset(capabilities), idle)
+
+
+def _read_limits(fields: Fields) -> Limits:
+    return Limits(*(fields.u32() for _ in range(6)))
 
 
 def _nothing(_reader: PayloadReader) -> None:
     return None
+
+
+_OF_MESH, _OF_MODEL = 0, 1
+"""What a request is about, on the wire."""

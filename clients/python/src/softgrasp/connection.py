@@ -1,4 +1,4 @@
-"""A blocking connection: one request, one reply."""
+"""A blocking connection: threads ask, one of those that wait reads the replies of all."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ import socket
 import ssl
 import threading
 import time
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import calls
 from .address import prepare_socket
 from .calls import Call
 from .conversation import Conversation
-from .errors import ConnectionLost, NoAnswerInTime
-from .framing import HEADER_LEN, Header
+from .errors import BadStream, ConnectionLost, NoAnswerInTime, UnsupportedVersion
+from .framing import HEADER_LEN, Header, Kind, check_payload
 from .limits import Limits
+from .patience import Patience
+from .stream import Stream, TlsStream
 
 T = TypeVar("T")
 
@@ -25,49 +28,49 @@ FIRST_PIECE = 1 << 20
 """Memory for a payload grows from so many bytes with the bytes that come."""
 
 
+class _Waiting:
+    """A thread that waits for the reply to a request."""
+
+    sent_at: float | None = None
+    reply: tuple[Header, NDArray[np.uint8]] | None = None
+
+
 class Connection:
-    """A socket on which one request at a time is asked; threads take turns."""
+    """A socket on which requests are asked; threads may ask at once."""
 
     def __init__(
         self,
         host: str,
         port: int,
         context: ssl.SSLContext | None,
-        timeout: float | None,
+        patience: Patience,
         limits: Limits,
     ) -> None:
         """Connects. Raises `ConnectionLost`, `NoAnswerInTime`, and `ssl.SSLError` for a
         certificate that is not trusted."""
         self.conversation = Conversation(limits)
-        self._lock = threading.Lock()
-        self._timeout = timeout
-        self._socket: socket.socket | ssl.SSLSocket | None = None
-        try:
-            plain = socket.create_connection((host, port), timeout=timeout)
-        except TimeoutError as error:
-            raise NoAnswerInTime(f"{host}:{port} does not answer in {timeout} s") from error
-        except OSError as error:
-            raise ConnectionLost(f"{host}:{port} cannot be reached: {error}") from error
-        prepare_socket(plain)
-        if context is None:
-            self._socket = plain
-            return
-        try:
-            self._socket = context.wrap_socket(plain, server_hostname=host)
-        except ssl.SSLCertVerificationError:
-            plain.close()
-            raise
-        except TimeoutError as error:
-            plain.close()
-            raise NoAnswerInTime(f"{host}:{port} agrees on no encryption in time") from error
-        except OSError as error:
-            plain.close()
-            raise ConnectionLost(f"{host}:{port} agrees on no encryption: {error}") from error
+        self._patience = patience
+        self._order = threading.Lock()
+        """Of the thread whose request is the next to be sent."""
+        self._sending = threading.Lock()
+        """Of the thread whose frame is on the way out."""
+        self._state = threading.Condition()
+        """Guards what follows, and the conversation."""
+        self._waiting: dict[int, _Waiting] = {}
+        self._is_read = False
+        self._why_ended: str | None = None
+        self._answered_at = time.monotonic()
+        self._stream = _connected(host, port, context, patience)
+        self._has_ended = threading.Event()
+        if patience.alive_every is not None:
+            listener = threading.Thread(target=self._listen, args=(patience.alive_every,))
+            listener.daemon = True
+            listener.start()
 
     @property
     def is_open(self) -> bool:
         """Whether nothing has ended the connection, as far as is known."""
-        return self._socket is not None
+        return self._why_ended is None
 
     def ask(self, call: Call[T]) -> T:
         """Sends a request and waits for its reply.
@@ -76,99 +79,227 @@ class Connection:
         refusal of the request the connection is closed, for its bytes cannot be told apart any
         more; the same holds where the wait is interrupted.
         """
-        with self._lock:
-            if self._socket is None:
-                raise ConnectionLost("the connection is closed")
-            data = self.conversation.begin(call)
-            deadline = None if self._timeout is None else time.monotonic() + self._timeout
-            header: Header | None = None
-            try:
-                lost = self._send(data, deadline)
-                try:
-                    # Of a server that closed while it was sent to, the last words may be there.
-                    header = self.conversation.header(self._receive_header(deadline))
-                except ConnectionLost as error:
-                    raise lost or error from error
-                return self.conversation.reply(call, header, self._receive(header.length, deadline))
-            except BaseException as error:
-                if header is None or self.conversation.ends_session(header, error):
-                    self._close()
+        waiting, header, lost = _Waiting(), None, None
+        try:
+            self._send(call, waiting)
+        except NoAnswerInTime:
+            raise
+        except ConnectionLost as error:
+            if waiting.sent_at is None:
                 raise
+            # Of a server that closed while it was sent to, the last words may be there.
+            lost = error
+        try:
+            header, payload = self._reply(waiting)
+            return self.conversation.reply(call, header, payload)
+        except BaseException as error:
+            if header is None or self.conversation.ends_session(header, error):
+                self._end(str(error))
+            if lost is not None and header is None and not isinstance(error, NoAnswerInTime):
+                raise lost from error
+            raise
 
     def tell(self, call: Call[None]) -> None:
         """Sends a request that has no reply. Raises `ConnectionLost` and `NoAnswerInTime`."""
-        with self._lock:
-            if self._socket is None:
-                raise ConnectionLost("the connection is closed")
-            deadline = None if self._timeout is None else time.monotonic() + self._timeout
-            try:
-                lost = self._send(self.conversation.begin(call), deadline)
-                if lost is not None:
-                    raise lost
-            except BaseException:
-                self._close()
-                raise
+        try:
+            self._send(call, None)
+        except ConnectionLost as error:
+            self._end(str(error))
+            raise
+
+    def cancel(self) -> None:
+        """Says that the requests under way are not wanted any more. Raises as `tell`."""
+        # Whatever is under way has been sent by then.
+        with self._sending:
+            with self._state:
+                if self._why_ended is not None:
+                    return
+                numbers = self.conversation.under_way
+                frames = [self.conversation.begin(calls.cancel(number))[1] for number in numbers]
+            self._send_bytes(b"".join(frames), time.monotonic())
 
     def close(self) -> None:
         """Ends the session, also one that waits in another thread; may be called again."""
-        open_socket = self._socket
-        if open_socket is not None:
-            with contextlib.suppress(OSError):
-                open_socket.shutdown(socket.SHUT_RDWR)
-        with self._lock:
-            self._close()
+        self._end("it was closed")
+        with self._state:
+            self._state.wait_for(lambda: not self._is_read, timeout=1.0)
+        with self._sending:
+            self._stream.close()
 
-    def _close(self) -> None:
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+    def _send(self, call: Call[Any], waiting: _Waiting | None) -> None:
+        """Sends a request when its turn comes; `waiting` is to have its reply."""
+        with self._order:
+            with self._state:
+                while self._why_ended is None and not self.conversation.has_room(call):
+                    self._state.wait()
+            with self._sending:
+                with self._state:
+                    if self._why_ended is not None:
+                        raise ConnectionLost(f"the connection is closed: {self._why_ended}")
+                    request_id, data = self.conversation.begin(call)
+                    now = time.monotonic()
+                    if waiting is not None:
+                        waiting.sent_at = now
+                        self._waiting[request_id] = waiting
+                self._send_bytes(data, now)
 
-    def _send(self, data: bytes, deadline: float | None) -> ConnectionLost | None:
-        assert self._socket is not None
-        self._socket.settimeout(_left(deadline))
+    def _send_bytes(self, data: bytes, since: float) -> None:
+        answer = self._patience.answer
         try:
-            self._socket.sendall(data)
+            self._stream.send(data, None if answer is None else since + answer)
         except TimeoutError as error:
+            self._end("the server does not take a request in time")
             raise NoAnswerInTime("the server does not take the request in time") from error
         except OSError as error:
-            lost = ConnectionLost(f"the connection broke while a request was sent: {error}")
-            lost.__cause__ = error
-            return lost
-        return None
+            what = f"the connection broke while a request was sent: {error}"
+            raise ConnectionLost(what) from error
+        except BaseException:
+            self._end("a request was interrupted")
+            raise
 
-    def _receive_header(self, deadline: float | None) -> bytes:
+    def _reply(self, waiting: _Waiting) -> tuple[Header, NDArray[np.uint8]]:
+        """The reply to a request; reads those of others too, unless another thread does."""
+        while True:
+            with self._state:
+                while waiting.reply is None and self._is_read and self._why_ended is None:
+                    self._state.wait(self._until_late(waiting))
+                if waiting.reply is not None:
+                    return waiting.reply
+                if self._why_ended is not None:
+                    raise ConnectionLost(self._why_ended)
+                self._is_read = True
+            self._read(self._deadline(waiting))
+
+    def _read(self, deadline: float | None) -> None:
+        """Reads one frame and gives it to whoever waits for it. Whoever calls has the turn."""
+        try:
+            header, payload = self._receive_frame(deadline)
+            with self._state:
+                self._deliver(header, payload)
+        except BaseException as error:
+            self._end(str(error))
+            raise
+        finally:
+            with self._state:
+                self._is_read = False
+                self._state.notify_all()
+
+    def _deliver(self, header: Header, payload: NDArray[np.uint8]) -> None:
+        if not self.conversation.answered(header):
+            return
+        self._answered_at = time.monotonic()
+        if header.request_id != 0:
+            self._waiting.pop(header.request_id).reply = header, payload
+            return
+        # The last words are for all.
+        for waiting in self._waiting.values():
+            waiting.reply = header, payload
+        self._waiting.clear()
+        if header.kind == Kind.REJECTED:
+            self._why_ended = self.conversation.last_words(payload)
+
+    def _until_late(self, waiting: _Waiting) -> float | None:
+        """Seconds until the server has taken too long. Raises `NoAnswerInTime`."""
+        deadline = self._deadline(waiting)
+        if deadline is None:
+            return None
+        left = deadline - time.monotonic()
+        if left <= 0.0:
+            raise self._late()
+        return left
+
+    def _deadline(self, waiting: _Waiting) -> float | None:
+        answer = self._patience.answer
+        if answer is None or waiting.sent_at is None:
+            return None
+        return max(waiting.sent_at, self._answered_at) + answer
+
+    def _late(self) -> NoAnswerInTime:
+        return NoAnswerInTime(f"no answer came in {self._patience.answer} s")
+
+    def _receive_frame(self, deadline: float | None) -> tuple[Header, NDArray[np.uint8]]:
         head = np.empty(HEADER_LEN, dtype=np.uint8)
         self._fill(head, deadline)
-        return head.tobytes()
-
-    def _receive(self, length: int, deadline: float | None) -> NDArray[np.uint8]:
-        payload = np.empty(min(length, FIRST_PIECE), dtype=np.uint8)
+        header = self.conversation.header(head.tobytes())
+        payload = np.empty(min(header.length, FIRST_PIECE), dtype=np.uint8)
         self._fill(payload, deadline)
-        while len(payload) < length:
+        while len(payload) < header.length:
             # What is announced is taken on trust only as far as what has come.
-            grown = np.empty(min(2 * len(payload), length), dtype=np.uint8)
+            grown = np.empty(min(2 * len(payload), header.length), dtype=np.uint8)
             grown[: len(payload)] = payload
             self._fill(grown[len(payload) :], deadline)
             payload = grown
-        return payload
+        check_payload(header, payload)
+        return header, payload
 
     def _fill(self, target: NDArray[np.uint8], deadline: float | None) -> None:
-        assert self._socket is not None
-        view, at = target.data, 0
+        view, at, silence = target.data, 0, self._patience.silence
+        until = deadline
         while at < len(view):
-            if deadline is not None:
-                self._socket.settimeout(_left(deadline))
+            if silence is not None:
+                given_up = time.monotonic() + silence
+                until = given_up if deadline is None else min(deadline, given_up)
             try:
-                count = self._socket.recv_into(view[at:])
+                count = self._stream.receive(view[at:], until)
             except TimeoutError as error:
-                raise NoAnswerInTime(f"no answer came in {self._timeout} s") from error
+                if until == deadline:
+                    raise self._late() from error
+                raise ConnectionLost(f"the server has been silent for {silence:g} s") from error
             except OSError as error:
                 raise ConnectionLost(f"the connection broke: {error}") from error
             if count == 0:
                 raise ConnectionLost("the server closed the connection")
             at += count
 
+    def _listen(self, every: float) -> None:
+        """Takes what the server says while nobody asks, so that it can go on saying it."""
+        while not self._has_ended.wait(every):
+            with self._state:
+                if self._is_read or self._waiting:
+                    continue
+                self._is_read = True
+            with contextlib.suppress(ConnectionLost, BadStream, UnsupportedVersion):
+                self._read_what_is_there()
 
-def _left(deadline: float | None) -> float | None:
-    """Seconds until a deadline, a moment at least."""
-    return None if deadline is None else max(deadline - time.monotonic(), 1e-3)
+    def _read_what_is_there(self) -> None:
+        while self._stream.is_readable():
+            self._read(None)
+            with self._state:
+                if self._is_read or self._why_ended is not None:
+                    return
+                self._is_read = True
+        with self._state:
+            self._is_read = False
+            self._state.notify_all()
+
+    def _end(self, why: str) -> None:
+        """Ends the session; the first reason stays."""
+        with self._state:
+            self._why_ended = self._why_ended or why
+            self._state.notify_all()
+        self._has_ended.set()
+        self._stream.shut_down()
+
+
+def _connected(host: str, port: int, context: ssl.SSLContext | None, patience: Patience) -> Stream:
+    timeout = patience.answer
+    try:
+        plain = socket.create_connection((host, port), timeout=timeout)
+    except TimeoutError as error:
+        raise NoAnswerInTime(f"{host}:{port} does not answer in {timeout} s") from error
+    except OSError as error:
+        raise ConnectionLost(f"{host}:{port} cannot be reached: {error}") from error
+    prepare_socket(plain)
+    if context is None:
+        return Stream(plain, patience.has_end)
+    try:
+        return TlsStream(context.wrap_socket(plain, server_hostname=host))
+    except ssl.SSLCertVerificationError:
+        plain.close()
+        raise
+    except TimeoutError as error:
+        plain.close()
+        raise NoAnswerInTime(f"{host}:{port} agrees on no encryption in time") from error
+    except OSError as error:
+        plain.close()
+        raise ConnectionLost(f"{host}:{port} agrees on no encryption: {error}") from error

@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from .answer import Answer, read_answer_arrays, read_answer_part
 from .arrays import U32, Floats, Numbers, numbers, positive, vector
 from .body import Body, body_arrays
+from .errors import BadStream
+from .fields import Part
 from .mesh import Mesh
-from .payload import Part, PayloadReader
+from .payload import PayloadReader, payload_of
 from .pose import Pose
 from .question import PRECISIONS, Precision
 from .report import ContactReport, read_contact_report
@@ -167,26 +169,25 @@ def contact_payload(
     """The payload of a `ContactFrame`."""
     triangles, of_body = candidate_triangles(mesh, state, bodies, step)
     wanted = np.zeros(0, U32) if nodes is None else numbers(nodes, "wanted nodes")
-    part = Part().raw(model)
-    part.fields("d3ddd", step.seconds, *step.gravity, step.density, step.viscosity)
-    part.fields("ddII", step.penetration_rel, step.residual_rel, step.rounds_max, step.newton_max)
-    part.fields("7d", *state.pose.numbers)
-    part.fields("6d", *state.velocity, *state.angular_velocity)
-    part.fields("II", len(state.force_nodes), len(state.contact_names))
+    ask = Part().fields("d3ddd", step.seconds, *step.gravity, step.density, step.viscosity)
+    ask.fields("ddII", step.penetration_rel, step.residual_rel, step.rounds_max, step.newton_max)
+    moved = Part().fields("7d", *state.pose.numbers)
+    moved.fields("6d", *state.velocity, *state.angular_velocity)
+    moved.fields("II", len(state.force_nodes), len(state.contact_names))
+    part = Part().raw(model).block(ask).block(moved)
     part.fields("II?I", len(bodies), len(triangles), nodes is not None, len(wanted))
     part.fields("I", PRECISIONS.index(precision))
     of_state = (state.force_nodes, state.forces, state.contact_names, state.contact_numbers)
-    return part.payload(*of_state, *body_arrays(bodies), triangles, of_body, wanted)
+    return payload_of(part, *of_state, *body_arrays(bodies), triangles, of_body, wanted)
 
 
 def read_contact_answer(reader: PayloadReader, node_count: int) -> ContactAnswer:
     """Reads a whole `ContactAnswer` about a mesh of so many nodes."""
-    report, counts = read_answer_part(reader)
-    contact = read_contact_report(reader)
-    *motion, force_count, contact_count = reader.fields(_STATE)
-    point_count, load_count = reader.fields(_COUNTS)
-    reader.end_part()
-    answer = read_answer_arrays(reader, report, counts)
+    part = read_answer_part(reader.part.block())
+    contact = read_contact_report(reader.part.block())
+    *motion, force_count, contact_count = reader.part.block().fields(_STATE)
+    point_count, load_count = reader.part.fields(_COUNTS)
+    answer = read_answer_arrays(reader, part)
     if answer.nodes is not None and len(answer.nodes) and int(answer.nodes.max()) >= node_count:
         reader.claimed(int(answer.nodes.max()), node_count - 1, "as the largest node")
     limits = reader.limits
@@ -215,7 +216,7 @@ def read_contact_answer(reader: PayloadReader, node_count: int) -> ContactAnswer
         answer.displacements,
         answer.reactions,
         answer.mask_forces,
-        report,
+        part.report,
         contact,
         state,
         _points(point_names, of_points),
@@ -224,8 +225,6 @@ def read_contact_answer(reader: PayloadReader, node_count: int) -> ContactAnswer
 
 
 def _pose(given: Floats) -> Pose:
-    from .errors import BadStream
-
     try:
         return Pose.from_numbers(given)
     except ValueError as error:

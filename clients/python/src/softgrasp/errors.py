@@ -35,18 +35,23 @@ class Refused(SoftgraspError):
     """The server refused a request; the session goes on unless the code says otherwise.
 
     `code` is the number on the wire, `text` a sentence for the user, `detail` more for a log.
+    `retry_after` says in how many seconds to ask again; None where the server does not know, or
+    where it is of no use.
     """
 
     code: int = 0
 
-    def __init__(self, code: int, text: str, detail: str = "") -> None:
+    def __init__(
+        self, code: int, text: str, detail: str = "", retry_after: float | None = None
+    ) -> None:
         super().__init__(f"{type(self).__name__} ({code}): {text}")
         self.code = code
         self.text = text
         self.detail = detail
+        self.retry_after = retry_after
 
-    def __reduce__(self) -> tuple[type[Refused], tuple[int, str, str]]:
-        return type(self), (self.code, self.text, self.detail)
+    def __reduce__(self) -> tuple[type[Refused], tuple[int, str, str, float | None]]:
+        return type(self), (self.code, self.text, self.detail, self.retry_after)
 
 
 class BadRequest(Refused):
@@ -122,7 +127,7 @@ class InternalFault(Refused):
 
 
 class UnsupportedVersion(Refused):
-    """13: the server does not speak this package's protocol version."""
+    """13: server and package speak no common version of the wire; the text names both."""
 
     code = 13
 
@@ -133,10 +138,22 @@ class Uncertain(Refused):
     code = 14
 
 
+class Cancelled(Refused):
+    """15: this client has cancelled the request (`Server.cancel`)."""
+
+    code = 15
+
+
+class Superseded(Refused):
+    """16: a newer frame with `newest_wins` came before this one was begun."""
+
+    code = 16
+
+
 REFUSALS: dict[int, type[Refused]] = {refusal.code: refusal for refusal in Refused.__subclasses__()}
 """The exception of every reject code."""
 
 
-def refusal_of(code: int, text: str, detail: str = "") -> Refused:
+def refusal_of(code: int, text: str, detail: str = "", retry_after: float | None = None) -> Refused:
     """The exception of a reject code; `Refused` itself for a number that is not known."""
-    return REFUSALS.get(code, Refused)(code, text, detail)
+    return REFUSALS.get(code, Refused)(code, text, detail, retry_after)

@@ -10,11 +10,11 @@ import google_crc32c
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import BadStream
+from .errors import BadStream, UnsupportedVersion
 from .limits import Limits
 
-VERSION = 3
-"""Version of the protocol that this package speaks."""
+VERSION = 4
+"""Version of the wire that this package speaks."""
 HEADER_LEN = 32
 """Bytes of a header."""
 _MAGIC = b"SGRP"
@@ -28,26 +28,22 @@ class Kind(IntEnum):
     """Kinds of messages; bit 15 is set when the server sends it."""
 
     HELLO = 0x0001
-    SOLVE_ONCE = 0x0002
+    ASK = 0x0002
     HAVE_MODEL = 0x0003
     UPLOAD_MODEL = 0x0004
-    FRAME = 0x0005
+    CANCEL = 0x0005
     PREFETCH = 0x0006
     DROP = 0x0007
     PING = 0x0008
-    SOLVE_LARGE = 0x0009
-    LARGE_FRAME = 0x000A
-    SOLVE_SEVERAL = 0x000B
-    CONTACT_FRAME = 0x000C
+    CONTACT_FRAME = 0x0009
     WELCOME = 0x8001
     ANSWER = 0x8002
     MODEL_STATE = 0x8003
     MODEL_READY = 0x8004
     REJECTED = 0x8005
+    ALIVE = 0x8006
     PONG = 0x8008
-    LARGE_ANSWER = 0x8009
-    SEVERAL_ANSWERS = 0x800B
-    CONTACT_ANSWER = 0x800C
+    CONTACT_ANSWER = 0x8009
 
 
 @dataclass(frozen=True)
@@ -81,14 +77,19 @@ def encode_frame(kind: int, request_id: int, payload: bytes) -> bytes:
 def decode_header(data: bytes, limits: Limits) -> Header:
     """The header in 32 bytes.
 
-    Raises `BadStream` for another magic or version, a wrong checksum, reserved flags, and a
-    payload over the limit: nothing is allocated for a length that cannot be trusted.
+    Raises `UnsupportedVersion` for another version, and `BadStream` for another magic, a wrong
+    checksum, reserved flags, and a payload over the limit: nothing is allocated for a length that
+    cannot be trusted.
     """
     magic, version, kind, flags, length, request_id, head_crc, checksum = _WHOLE.unpack(data)
     if magic != _MAGIC:
         raise BadStream(f"this is no Softgrasp server: it begins with {data[:4]!r}")
     if version != VERSION:
-        raise BadStream(f"the server speaks version {version} of the protocol, not {VERSION}")
+        raise UnsupportedVersion(
+            UnsupportedVersion.code,
+            f"the server speaks version {version} of the wire, this package version {VERSION}: "
+            "bring the older of the two up to date",
+        )
     if head_crc != crc32c(data[:24]):
         raise BadStream("the header of a message is damaged: its checksum does not fit")
     if flags != 0:
@@ -101,6 +102,10 @@ def decode_header(data: bytes, limits: Limits) -> Header:
 
 
 def check_payload(header: Header, payload: NDArray[np.uint8]) -> None:
-    """Raises `BadStream` if the checksum of the frame does not fit its payload."""
+    """Says that a payload is sound, and keeps it from being written to.
+
+    Raises `BadStream` if the checksum of the frame does not fit.
+    """
     if crc32c(payload, header.seed) != header.checksum:
         raise BadStream("a message is damaged: its checksum does not fit")
+    payload.flags.writeable = False

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 from .arrays import positive
-from .payload import Part
+from .fields import Part
 
 Deformation: TypeAlias = Literal["large", "auto"]
 """An equilibrium in any case, or a linear answer where its error is within `max_error`."""

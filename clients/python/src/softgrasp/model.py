@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import F64, U32, Floats, Numbers, numbers, positive
+from .fields import Part
 from .mesh import Mesh
-from .payload import Part
 
 Element: TypeAlias = Literal["t4", "t10", "t4-anp", "auto"]
 """Kind of element: linear, quadratic, linear with averaged pressure, or the server's choice."""

@@ -40,7 +40,8 @@ class ServerProgram:
         """Starts the program and waits until it listens, at most `wait` seconds.
 
         `program` is a path; without one the PATH is searched for `fea-server`. `arguments` stand
-        behind `--listen 127.0.0.1:0`, and behind `--threads` where `threads` says how many. Raises `ServerNotStarted` with what the program said.
+        behind `--listen 127.0.0.1:0`, and behind `--threads` where `threads` says how many. Raises
+        `ServerNotStarted` with what the program said.
         """
         path = find_program(program)
         self._log = tempfile.TemporaryFile()

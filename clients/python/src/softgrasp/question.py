@@ -8,12 +8,15 @@ from typing import Any, Literal, TypedDict, cast, get_args
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import NO_NUMBERS, Numbers, numbers, positive
+from .fields import Part
 from .load_case import LoadCase, mask_arrays
-from .payload import Part
 
 Precision = Literal["f64", "f32"]
 """How displacements travel: in double precision, or in half the bytes, to 2⁻²⁴ of the largest."""
 PRECISIONS: tuple[str, ...] = get_args(Precision)
+Report = Literal["full", "short", "none"]
+"""How much an answer's report tells: all, its numbers without texts, or nothing."""
+REPORTS: tuple[str, ...] = get_args(Report)
 
 
 class Options(TypedDict, total=False):
@@ -25,6 +28,13 @@ class Options(TypedDict, total=False):
     precision: Precision
     max_error: float | None
     deadline_ms: float | None
+    report: Report
+
+
+class FrameOptions(Options, total=False):
+    """The keyword arguments of frames, which ask about a kept model; see `Question`."""
+
+    newest_wins: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +53,17 @@ class Question:
     """Relative error that is good enough; an answer that misses it has a warning."""
     deadline_ms: float | None = None
     """Time after which the answer is of little use; a late answer has a warning."""
+    report: Report = "full"
+    """How much the report of the answer tells; less of it takes less time."""
+    newest_wins: bool = False
+    """Of frames of one model: one that has not been begun when a newer one with `newest_wins` comes
+    is refused as `Superseded`."""
 
     def __post_init__(self) -> None:
         if self.precision not in PRECISIONS:
             raise ValueError(f"precision is one of {PRECISIONS}, not {self.precision!r}")
+        if self.report not in REPORTS:
+            raise ValueError(f"report is one of {REPORTS}, not {self.report!r}")
         if self.nodes is not None:
             object.__setattr__(self, "nodes", numbers(self.nodes, "wanted nodes"))
         for name in ("max_error", "deadline_ms"):

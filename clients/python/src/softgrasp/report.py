@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 
+from .fields import Fields
 from .model import ELEMENTS
-from .payload import PayloadReader
+from .warning import AnswerWarning, read_warnings
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,11 @@ class StageTimes:
 
 @dataclass(frozen=True)
 class SolveReport:
-    """How an answer was found and how wrong it can be."""
+    """How an answer was found and how wrong it can be.
+
+    A short one (`report="short"`) has empty texts and no warnings; of one that nobody wanted
+    (`report="none"`) `is_told` is false, what can be None is None, and errors are NaN.
+    """
 
     method: str
     """Method that was used; never `auto`."""
@@ -63,14 +69,19 @@ class SolveReport:
     """Estimate of the largest error of a displacement, relative to the largest; no bound."""
     warning_level: str
     """`none`, `caution` or `serious`."""
-    warnings: tuple[str, ...]
-    """Sentences for the user."""
+    warnings: tuple[AnswerWarning, ...]
+    """Sentences for the user; each has its number as `code`."""
     peak_rss_bytes: int
     """Largest resident memory of the server since its start; 0 where the system does not tell."""
     factor_reused: bool
     """Whether the factor, or the small system of `condensed`, was kept from an earlier frame."""
     chosen_because: str
     """Why this method and element."""
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the server has told anything."""
+        return not math.isnan(self.residual_rel)
 
 
 @dataclass(frozen=True)
@@ -127,47 +138,50 @@ class ContactReport:
     """Nodes whose columns were computed for this step."""
 
 
-def read_solve_report(reader: PayloadReader) -> SolveReport:
-    """Reads the first field of an answer's part."""
-    method = reader.text()
-    element, unknown, known, *times, residual = reader.fields(_EQUATIONS)
-    bound, why = reader.option(), reader.text()
-    refinement_steps, rotation, strain = reader.fields(_SHAPE)
-    precision = reader.text()
-    condition, estimate = reader.option(), reader.option()
-    level = reader.choice(("none", "caution", "serious"), "warning level")
-    warnings = reader.texts()
-    peak, reused = reader.fields(_MEMORY)
+def read_solve_report(fields: Fields) -> SolveReport:
+    """Reads the block that an answer's part begins with; one without fields tells nothing."""
+    if fields.is_empty:
+        return _UNTOLD
+    method = fields.text()
+    element, unknown, known, *times, residual = fields.fields(_EQUATIONS)
+    bound, why = fields.option(), fields.option_text()
+    refinement_steps, rotation, strain = fields.fields(_SHAPE)
+    precision = fields.text()
+    condition, estimate = fields.option(), fields.option()
+    level = fields.u32()
+    warnings = read_warnings(fields)
+    peak, reused = fields.fields(_MEMORY)
     return SolveReport(
         method=method,
-        element=reader.named(element, ELEMENTS, "element"),
+        element=ELEMENTS[element] if element < len(ELEMENTS) else f"element {element}",
         unknown_dofs=unknown,
         known_dofs=known,
         stage_ms=StageTimes(*times),
         residual_rel=residual,
         error_bound_rel=bound,
-        error_bound_why=why,
+        error_bound_why=why or "",
         refinement_steps=refinement_steps,
         max_rotation_deg=rotation,
         max_strain=strain,
         precision=precision,
         condition_estimate=condition,
         error_estimate_rel=estimate,
-        warning_level=level,
+        # A level that is not known is at least serious.
+        warning_level=_LEVELS[min(level, len(_LEVELS) - 1)],
         warnings=warnings,
         peak_rss_bytes=peak,
-        factor_reused=reader.truth(reused),
-        chosen_because=reader.text(),
+        factor_reused=fields.truth(reused),
+        chosen_because=fields.text(),
     )
 
 
-def read_large_report(reader: PayloadReader) -> LargeReport:
-    """Reads the last field of the part of an answer at large deformation."""
-    deformation, newton, solves, age, substeps, jacobian = reader.fields(_LARGE)
-    energy = reader.option()
-    stretch, jumped, settled, plastic = reader.fields(_LARGE_END)
+def read_large_report(fields: Fields) -> LargeReport:
+    """Reads the block of an answer at large deformation."""
+    is_linear, newton, solves, age, substeps, jacobian = fields.fields(_LARGE)
+    energy = fields.option()
+    stretch, jumped, settled, plastic = fields.fields(_LARGE_END)
     return LargeReport(
-        deformation=reader.named(deformation, ("linear", "large"), "deformation"),
+        deformation="linear" if fields.truth(is_linear) else "large",
         newton_steps=newton,
         linear_solves=solves,
         factor_age=age,
@@ -175,23 +189,46 @@ def read_large_report(reader: PayloadReader) -> LargeReport:
         min_jacobian=jacobian,
         energy_error_rel=energy,
         max_stretch=stretch,
-        jumped=reader.truth(jumped),
-        settled=reader.truth(settled),
+        jumped=fields.truth(jumped),
+        settled=fields.truth(settled),
         plastic_strain=plastic,
     )
 
 
-def read_contact_report(reader: PayloadReader) -> ContactReport:
+def read_contact_report(fields: Fields) -> ContactReport:
     """Reads the report of a contact frame."""
-    depth, slip, residual, relative, cone, converged, *counts = reader.fields(_CONTACT)
+    depth, slip, residual, relative, cone, converged, *counts = fields.fields(_CONTACT)
     errors = (depth, slip, residual, relative, cone)
     rounds, sweeps, newton, columns = counts
-    return ContactReport(*errors, reader.truth(converged), rounds, sweeps, newton, columns)
+    return ContactReport(*errors, fields.truth(converged), rounds, sweeps, newton, columns)
 
 
+_LEVELS = ("none", "caution", "serious")
+_NO_TIMES = StageTimes(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_UNTOLD = SolveReport(
+    method="",
+    element="",
+    unknown_dofs=0,
+    known_dofs=0,
+    stage_ms=_NO_TIMES,
+    residual_rel=math.nan,
+    error_bound_rel=None,
+    error_bound_why="",
+    refinement_steps=0,
+    max_rotation_deg=math.nan,
+    max_strain=math.nan,
+    precision="",
+    condition_estimate=None,
+    error_estimate_rel=None,
+    warning_level="none",
+    warnings=(),
+    peak_rss_bytes=0,
+    factor_reused=False,
+    chosen_because="",
+)
 _EQUATIONS = struct.Struct("<IQQ7dd")
 _SHAPE = struct.Struct("<Idd")
 _MEMORY = struct.Struct("<QB")
-_LARGE = struct.Struct("<5Id")
+_LARGE = struct.Struct("<B4Id")
 _LARGE_END = struct.Struct("<dBBd")
 _CONTACT = struct.Struct("<5dB4I")

@@ -22,8 +22,8 @@ from .limits import Limits
 from .load_case import LoadCase, Mask
 from .model import Model
 from .program import ServerProgram
-from .question import Options, Precision, Question
-from .session import CLIENT, NamedModel, Session
+from .question import FrameOptions, Options, Precision, Question
+from .session import NamedModel, Session
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 
 class Server(Session):
-    """A session with a server; one request at a time, threads take turns.
+    """A session with a server; threads may ask at once and are answered in turn.
 
     Use it in a `with` block, or call `close`. Everything that asks raises `Refused` (by its
     subclasses, one for each number), `ConnectionLost`, `NoAnswerInTime` and `BadStream`, and
@@ -47,15 +47,19 @@ class Server(Session):
         tls: Tls = None,
         timeout: float | None = None,
         limits: Limits | None = None,
+        alive_every: float | None = None,
     ) -> None:
         """Connects to `HOST:PORT` and introduces itself.
 
         `token` is what the server was started with, `tls` how the way is encrypted (see
         `softgrasp.address.Tls`), `timeout` how many seconds an answer may take: None waits as
-        long as it takes. `limits` are what is read at most. Raises what every request raises,
-        `ssl.SSLError` for a certificate that is not trusted, and `OSError` for one not readable.
+        long as it takes. `limits` are what is read at most. With `alive_every` the server says
+        that it is there when it has said nothing for so many seconds (0.1 at least), and is given
+        up after three times its silence, however long it may work. Raises what every request
+        raises, `ssl.SSLError` for a certificate that is not trusted, and `OSError` for one not
+        readable.
         """
-        super().__init__(address, token, tls, timeout, limits)
+        super().__init__(address, token, tls, timeout, limits, alive_every)
         self._connect()
 
     @classmethod
@@ -133,6 +137,13 @@ class Server(Session):
         """Waits until the server has done all that was asked before."""
         self._ask(calls.ping())
 
+    def cancel(self) -> None:
+        """Says, from another thread, that the requests under way are not wanted any more.
+
+        The server refuses them as `Cancelled`, unless it has answered by then; the session goes on.
+        """
+        self._connection.cancel()
+
     def reconnect(self) -> None:
         """Ends the session and begins a new one with the same server.
 
@@ -161,9 +172,9 @@ class Server(Session):
     def _connect(self) -> None:
         host, port = split_address(self.address)
         context = tls_context(self._tls)
-        self._connection = Connection(host, port, context, self._timeout, self._limits)
+        self._connection = Connection(host, port, context, self._patience, self._limits)
         try:
-            self._welcome = self._ask(calls.hello(CLIENT, self._token))
+            self._welcome = self._ask(self._hello())
         except BaseException:
             self._connection.close()
             raise
@@ -192,7 +203,7 @@ class KeptModel(NamedModel):
         """Sends the model, which makes it ready for frames; without harm where it is there."""
         return self._server._ask(calls.upload_model(self.model, self.fixed_dofs))
 
-    def frame(self, case: LoadCase, **options: Unpack[Options]) -> Answer:
+    def frame(self, case: LoadCase, **options: Unpack[FrameOptions]) -> Answer:
         """Solves a load case by linear elasticity; the fixed nodes stay at zero."""
         return self._ask(calls.frame(self.hash, case, Question(**options)))
 
@@ -200,10 +211,21 @@ class KeptModel(NamedModel):
         self,
         case: LoadCase,
         large: LargeDeformation = AT_LARGE,
-        **options: Unpack[Options],
+        **options: Unpack[FrameOptions],
     ) -> LargeAnswer:
         """Finds an equilibrium at large deformation, from this session's last one on the model."""
         return self._ask(calls.large_frame(self.hash, case, large, Question(**options)))
+
+    def solve_several(
+        self, case: LoadCase, displacements: ArrayLike, **options: Unpack[FrameOptions]
+    ) -> SeveralAnswers:
+        """Solves for several sets of values of the case's known displacements in one request.
+
+        `displacements` has the shape (sets, known degrees of freedom), m; forces and masks act in
+        all sets.
+        """
+        call = calls.solve_several(self.hash, case, displacements, True, Question(**options))
+        return self._ask(call)
 
     def contact_frame(
         self,

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from . import calls
 from .address import Tls
-from .calls import Welcome
+from .arrays import positive
+from .calls import Call, Welcome
 from .limits import Limits
 from .model import Model
+from .patience import Patience
 from .program import ServerProgram
 
 CLIENT = "softgrasp for Python 0.1.0"
@@ -26,11 +29,15 @@ class Session:
         tls: Tls,
         timeout: float | None,
         limits: Limits | None,
+        alive_every: float | None,
     ) -> None:
         """Keeps what a connection is made with; connects to nothing."""
+        if alive_every is not None:
+            alive_every = max(positive(alive_every, "alive_every"), _ALIVE_MIN)
         self.address = address
         self._program: ServerProgram | None = None
-        self._token, self._tls, self._timeout = token, tls, timeout
+        self._token, self._tls = token, tls
+        self._patience = Patience(timeout, alive_every)
         self._limits = Limits() if limits is None else limits
 
     @property
@@ -39,9 +46,17 @@ class Session:
         return self._welcome
 
     @property
+    def capabilities(self) -> frozenset[str]:
+        """What the server can do, by name: `large`, `cases`, `contact`, `cancel`, …"""
+        return self._welcome.capabilities
+
+    @property
     def program(self) -> ServerProgram | None:
         """The program of a server that was spawned."""
         return self._program
+
+    def _hello(self) -> Call[Welcome]:
+        return calls.hello(CLIENT, self._token, self._patience.alive_every)
 
 
 class NamedModel:
@@ -53,3 +68,7 @@ class NamedModel:
         self.fixed_dofs = model.fixed_dofs(fixed)
         self.hash = model.hash(self.fixed_dofs)
         """Name of the model: 32 bytes."""
+
+
+_ALIVE_MIN = 0.1
+"""A server does not say that it is there more often; s."""

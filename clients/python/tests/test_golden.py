@@ -1,0 +1,189 @@
+"""Every message is encoded as its recorded bytes, and decoded from them."""
+
+import math
+
+import numpy as np
+import pytest
+from golden import golden, golden_reader, header_of
+
+import softgrasp.contact
+from softgrasp import (
+    Body,
+    Box,
+    Capsule,
+    ClosedSurface,
+    ContactStep,
+    LargeDeformation,
+    Limits,
+    LoadCase,
+    Mask,
+    Material,
+    Mesh,
+    Model,
+    ObjectState,
+    Plane,
+    Pose,
+    Question,
+    RigidMotionFree,
+    Sphere,
+    WarningCode,
+    calls,
+)
+from softgrasp.answer import read_answer, read_large_answer, read_several_answers
+from softgrasp.contact import read_contact_answer
+from softgrasp.conversation import Conversation
+from softgrasp.framing import HEADER_LEN, Kind, encode_frame
+
+REQUESTS = ["Hello", "Ask", "Ask-model", "Ask-large", "Ask-cases", "HaveModel", "UploadModel"]
+REQUESTS += ["Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
+NAME = bytes(0xA0 ^ k for k in range(32))
+POINTS = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0, 0, 0]]
+MATERIAL = Material(20_000.0, 0.45)
+HELD = LoadCase([9, 2], [0.0, -0.001], [4], [0.5])
+MASKED = HELD.mask([0, 2], (0, -0.001, 0), [0.25, 0.75]).mask([1], (0.0005, 0, 0))
+LARGE = LargeDeformation("auto", "neo-hookean-log", 1500.0, "from-rest", "timely")
+
+
+def labelled() -> Model:
+    return Model(Mesh(POINTS, [[0, 1, 2, 3]], [7]), {7: MATERIAL}, "t4")
+
+
+def contact_frame() -> calls.Call:
+    surface = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2]]
+    closed = ClosedSurface(surface[0], [*surface[1], [1, 2, 3]])
+    shapes = [Plane((0, 0, 1)), Capsule(0.008, 0.03), closed, Sphere(0.5), Box((0.5, 0.25, 0.125))]
+    bodies = [Body(shape, friction=0.5) for shape in shapes]
+    state = ObjectState(
+        Pose((0.5, 0.25, -0.125)),
+        np.array([0, 0, -0.5]),
+        np.array([0.25, 0, 0]),
+        np.array([2], np.uint32),
+        np.array([[0, 0.5, 1.0]]),
+        np.array([[1, 0, 2, 3]], np.uint32),
+        np.array([[0.5, 0.25, 0.25, 0, 0, 1.5]]),
+    )
+    step = ContactStep(
+        0.01, 1000.0, viscosity=0.005, penetration_rel=1e-6, rounds_max=16, newton_max=400
+    )
+    mesh = Mesh(POINTS, [[0, 1, 2, 3]])
+    return calls.contact_frame(NAME, mesh, state, bodies, step, [0, 3], "f64")
+
+
+def requests() -> dict[str, calls.Call]:
+    once = Question(method="gauss-jordan", reactions=False, deadline_ms=16.5)
+    frame = Question(nodes=[0, 2, 3], precision="f32", max_error=0.01)
+    newest = Question(
+        nodes=[0, 2, 3], precision="f32", max_error=0.01, report="short", newest_wins=True
+    )
+    plain = Model(Mesh(POINTS, [[0, 1, 2, 3]]), MATERIAL, "t10")
+    cases = [[0.0, -0.001], [0.0, -0.002], [-0.0, 0.001]]
+    return {
+        "Hello": calls.hello("sample 1", "secret", 2.0, ["haptics"]),
+        "Ask": calls.solve(labelled(), HELD, once),
+        "Ask-model": calls.frame(NAME, MASKED, newest),
+        "Ask-large": calls.large_frame(NAME, HELD, LARGE, frame),
+        "Ask-cases": calls.solve_several(labelled(), HELD, cases, False, once),
+        "HaveModel": calls.have_model(NAME),
+        "UploadModel": calls.upload_model(plain, plain.fixed_dofs([3])),
+        "Cancel": calls.cancel(2),
+        "Prefetch": calls.prefetch(NAME, [1, 3], [Mask([3, 1], [1.0, 2.0])]),
+        "Drop": calls.drop(NAME),
+        "Ping": calls.ping(0x0123456789ABCDEF),
+        "ContactFrame": contact_frame(),
+    }
+
+
+@pytest.mark.parametrize("name", REQUESTS)
+def test_requests_have_their_recorded_bytes(name: str, monkeypatch) -> None:
+    near = np.array([[0, 2, 3], [1, 2, 0]], np.uint32), np.array([1, 0], np.uint32)
+    monkeypatch.setattr(softgrasp.contact, "candidate_triangles", lambda *_: near)
+    expected, call = golden(name), requests()[name]
+    assert encode_frame(call.kind, header_of(expected).request_id, call.payload) == expected
+
+
+def test_answer_is_read() -> None:
+    answer = read_answer(golden_reader("Answer"))
+    assert answer.nodes is not None and answer.nodes.tolist() == [0, 2, 3]
+    expected = [[0, -0.001, 0.0005], [0, 0, 0], [0.00025, 0, 0]]
+    assert answer.displacements.tolist() == expected
+    assert answer.reactions.dofs.tolist() == [2] and answer.reactions.forces.tolist() == [-1.25]
+    assert answer.mask_forces.tolist() == [[0, -0.75, 0.125], [0.5, 0, 0]]
+    report = answer.report
+    assert report.is_told and (report.method, report.element) == ("sparse", "t4")
+    assert report.warnings == ("large rotation", "")
+    assert [warning.code for warning in report.warnings] == [WarningCode.ROTATION, 0]
+    assert (report.warning_level, answer.error_bound_rel) == ("caution", 1e-12)
+    assert (answer.error_bound_why, report.stage_ms.factor) == ("", 2.25)
+    assert report.chosen_because == "smallest predicted time"
+    assert answer.reactions.at([0, 5]).tolist() == [[0, 0, -1.25], [0, 0, 0]]
+
+
+def test_answer_at_large_deformation_is_read() -> None:
+    answer = read_large_answer(golden_reader("Answer-large"))
+    assert answer.nodes is not None and answer.nodes.tolist() == [1]
+    assert answer.displacements.tolist() == [[0, -0.005, 0.0005]]
+    assert answer.error_bound_rel is None and answer.error_bound_why == "large deformation"
+    large = answer.large
+    assert (large.deformation, large.newton_steps, large.factor_age) == ("large", 2, 7)
+    assert (large.min_jacobian, large.energy_error_rel, large.settled) == (0.75, 0.001, True)
+    assert (large.max_stretch, large.plastic_strain) == (1.5, 0.125)
+    with pytest.raises(softgrasp.BadStream, match="large deformation"):
+        read_large_answer(golden_reader("Answer"))
+
+
+def test_answers_of_several_cases_are_read() -> None:
+    several = read_several_answers(golden_reader("Answer-cases"))
+    first, further = several.cases
+    assert first.displacements.tolist() == [[0.5, 0, 0]] * 3
+    assert further.displacements.tolist() == [[1, -2, 0.25]] * 3
+    assert further.reactions.dofs.tolist() == [2] and further.reactions.forces.tolist() == [4.5]
+
+
+def test_report_that_nobody_wanted_tells_nothing() -> None:
+    answer = read_answer(golden_reader("Answer-untold"))
+    assert not answer.report.is_told and math.isnan(answer.residual_rel)
+    assert answer.error_bound_rel is None and answer.report.warnings == ()
+    assert answer.displacements[0].tolist() == [0, -0.001, 0.0005]
+
+
+def test_answer_of_a_contact_frame_is_read() -> None:
+    answer = read_contact_answer(golden_reader("ContactAnswer"), 4)
+    assert answer.contact.is_converged and answer.contact.columns_computed == 2
+    assert answer.state.velocity.tolist() == [0, 0, -0.5]
+    assert answer.state.contact_names.tolist() == [[1, 0, 2, 3]]
+    assert answer.points.slips.tolist() == [True] and answer.points.forces[0, 2] == 1.0
+    assert answer.loads.contacts.tolist() == [0, 1] and answer.loads.normal_forces[1] == 1.0
+    assert answer.report.method == "newton" and answer.report.element == "t4-anp"
+
+
+def test_greeting_is_read() -> None:
+    welcome = calls.hello("a test", None).read(golden_reader("Welcome"))
+    assert (welcome.server, welcome.version, welcome.threads) == ("sample server", "0.1.0", 4)
+    assert (welcome.limits, welcome.wire, welcome.idle) == (Limits(), 4, 600.0)
+    assert welcome.capabilities == {"cancel", "contact"}
+
+
+def test_small_replies_are_read() -> None:
+    assert calls.have_model(NAME).read(golden_reader("ModelState")) is True
+    call = calls.upload_model(labelled(), np.zeros(0, np.uint32))
+    ready = call.read(golden_reader("ModelReady"))
+    assert (ready.model, ready.unknown_dofs, ready.fixed_dofs) == (NAME, 9, 3)
+    assert ready.reused is False
+    nonce = 0x0123456789ABCDEF
+    assert calls.ping(nonce).read(golden_reader("Pong")) == nonce
+
+
+def test_refusal_is_read_with_when_to_ask_again() -> None:
+    frame = golden("Rejected")
+    payload = np.frombuffer(frame[HEADER_LEN:], dtype=np.uint8)
+    with pytest.raises(RigidMotionFree, match="about the z axis") as caught:
+        Conversation(Limits()).reply(calls.ping(), header_of(frame), payload)
+    assert (caught.value.code, caught.value.detail, caught.value.retry_after) == (3, "", 0.25)
+
+
+def test_word_that_the_server_is_there_answers_nothing() -> None:
+    conversation = Conversation(Limits())
+    number, _ = conversation.begin(calls.ping())
+    header = conversation.header(golden("Alive")[:HEADER_LEN])
+    assert (header.kind, header.request_id) == (Kind.ALIVE, 0)
+    assert not conversation.answered(header) and conversation.under_way == (number,)
