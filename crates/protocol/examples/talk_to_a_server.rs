@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let Reply::Answer(answer) = session.ask(&Ask::new(ready.model, question).into())? else {
             return Err("no answer to a frame".into());
         };
-        let pulled = |dof: u32| dof % 3 == 0 && right.contains(&(dof / 3));
+        let pulled = |dof: u32| dof.is_multiple_of(3) && right.contains(&(dof / 3));
         let force: f64 = answer.reactions.iter().filter(|r| pulled(r.dof)).map(|r| r.value).sum();
         let report = &answer.report;
         println!(
