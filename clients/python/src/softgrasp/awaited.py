@@ -89,7 +89,7 @@ class AwaitedConnection:
             return self.conversation.reply(call, header, payload)
         except BaseException as error:
             if self.conversation.ends_session(header, error):
-                self.close(str(error))
+                self._lose(ConnectionLost(str(error)))
             raise
 
     async def tell(self, call: Call[None]) -> None:
@@ -101,18 +101,10 @@ class AwaitedConnection:
         for request_id in self.conversation.under_way:
             self._cancel(request_id)
 
-    def close(self, why: str = "it was closed") -> None:
-        """Ends the session; the first reason stays."""
-        if self._why_ended is None:
-            self._why_ended = why
-        for reply in self._waiting.values():
-            if not reply.done():
-                reply.set_exception(ConnectionLost(self._why_ended))
-        self._waiting.clear()
-        self._has_news.set()
+    def close(self) -> None:
+        """Ends the session once what was written is on its way; may be called again."""
+        self._end("it was closed")
         self._writer.close()
-        if asyncio.current_task() is not self._listener:
-            self._listener.cancel()
 
     async def _send(self, call: Call[Any], reply: asyncio.Future[Received] | None) -> int:
         """Sends a request when its turn comes, and gives its number."""
@@ -134,13 +126,14 @@ class AwaitedConnection:
                 raise
             except NoAnswerInTime as error:
                 self._waiting.pop(request_id, None)
-                self.close(str(error))
+                self._lose(ConnectionLost(str(error)))
                 raise
             except OSError as error:
                 # Of a server that closed while it was sent to, the last words may be there.
                 if reply is None:
-                    self.close(str(error))
-                    raise ConnectionLost(f"the connection broke: {error}") from error
+                    lost = ConnectionLost(f"the connection broke: {error}")
+                    self._lose(lost)
+                    raise lost from error
             return request_id
 
     async def _drained(self) -> None:
@@ -173,7 +166,7 @@ class AwaitedConnection:
                 why = ConnectionLost(f"the server has been silent for {silence:g} s")
             if why is not None:
                 reply.cancel()
-                self.close(str(why))
+                self._lose(ConnectionLost(str(why)))
                 raise why
             until = min(moment for moment in (late_at, given_up_at) if moment is not None)
             done, _ = await asyncio.wait([reply], timeout=until - now)
@@ -225,12 +218,21 @@ class AwaitedConnection:
                 reply.set_result((header, payload))
         self._waiting.clear()
         if header.kind == Kind.REJECTED:
-            self.close(self.conversation.last_words(payload))
+            self._end(self.conversation.last_words(payload))
 
     def _lose(self, error: Exception) -> None:
-        """Ends the session with an error for all that wait."""
+        """Ends the session with an error for all that wait, and the connection with it."""
+        self._end(str(error), error)
+        self._writer.transport.abort()
+
+    def _end(self, why: str, error: Exception | None = None) -> None:
+        """Ends the session; the first reason stays."""
+        if self._why_ended is None:
+            self._why_ended = why
         for reply in self._waiting.values():
             if not reply.done():
-                reply.set_exception(error)
+                reply.set_exception(error or ConnectionLost(self._why_ended))
         self._waiting.clear()
-        self.close(str(error))
+        self._has_news.set()
+        if asyncio.current_task() is not self._listener:
+            self._listener.cancel()

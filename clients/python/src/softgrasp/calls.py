@@ -6,7 +6,7 @@ The blocking and the asynchronous server share these; neither knows a byte of th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from numpy.typing import ArrayLike, NDArray
@@ -132,14 +132,14 @@ def cancel(request_id: int) -> Call[None]:
 
 def solve(model: Model, case: LoadCase, question: Question) -> Call[Answer]:
     """One self-contained linear request."""
-    return _ask(_Asked(model, case, question), read_answer)
+    return _ask(model, case, question, read_answer)
 
 
 def solve_large(
     model: Model, case: LoadCase, large: LargeDeformation, question: Question
 ) -> Call[LargeAnswer]:
     """One self-contained request at large deformation."""
-    return _ask(_Asked(model, case, question, large), read_large_answer)
+    return _ask(model, case, question, read_large_answer, large=large)
 
 
 def solve_several(
@@ -157,8 +157,7 @@ def solve_several(
     if len(sets) == 0:
         raise ValueError("there is no set of displacements to solve for")
     case = case.with_displacements(sets[0])
-    asked = _Asked(subject, case, question, further=sets[1:], estimate=estimate)
-    return _ask(asked, read_several_answers)
+    return _ask(subject, case, question, read_several_answers, further=sets[1:], estimate=estimate)
 
 
 def have_model(model: bytes) -> Call[bool]:
@@ -188,14 +187,14 @@ def upload_model(model: Model, fixed_dofs: Numbers) -> Call[ModelReady]:
 
 def frame(model: bytes, case: LoadCase, question: Question) -> Call[Answer]:
     """A linear question about a kept model."""
-    return _ask(_Asked(model, case, question), read_answer)
+    return _ask(model, case, question, read_answer)
 
 
 def large_frame(
     model: bytes, case: LoadCase, large: LargeDeformation, question: Question
 ) -> Call[LargeAnswer]:
     """A question about a kept model at large deformation, on this session's path."""
-    return _ask(_Asked(model, case, question, large), read_large_answer)
+    return _ask(model, case, question, read_large_answer, large=large)
 
 
 def contact_frame(
@@ -230,22 +229,21 @@ def drop(model: bytes) -> Call[None]:
     return Call(Kind.DROP, payload_of(Part().raw(model)), None, _nothing)
 
 
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """Everything that one request for displacements says."""
+def _ask(
+    subject: Model | bytes,
+    case: LoadCase,
+    question: Question,
+    read: Callable[[PayloadReader], T],
+    *,
+    large: LargeDeformation | None = None,
+    further: Floats = NO_FLOATS,
+    estimate: bool = True,
+) -> Call[T]:
+    """Everything that one request for displacements says.
 
-    subject: Model | bytes
-    """A model that comes along, or the name of one that the server keeps."""
-    case: LoadCase
-    question: Question
-    large: LargeDeformation | None = None
-    further: Floats = field(default_factory=lambda: NO_FLOATS)
-    """Displacements of the further cases; shape (cases, known degrees of freedom)."""
-    estimate: bool = True
-
-
-def _ask(asked: _Asked, read: Callable[[PayloadReader], T]) -> Call[T]:
-    subject, case, question = asked.subject, asked.case, asked.question
+    `subject` is a model that comes along, or the name of one that the server keeps; `further` are
+    the displacements of further cases, shape (cases, known degrees of freedom).
+    """
     mesh: tuple[NDArray[Any], ...] = ()
     if isinstance(subject, Model):
         if question.newest_wins:
@@ -256,10 +254,10 @@ def _ask(asked: _Asked, read: Callable[[PayloadReader], T]) -> Call[T]:
     else:
         part = Part().fields("I", _OF_MODEL).raw(subject)
     part.fields("?", question.newest_wins).block(question.part(case))
-    part.option_block(None if asked.large is None else asked.large.part())
+    part.option_block(None if large is None else large.part())
     level = REPORTS.index(question.report)
-    part.fields("I?I", len(asked.further), not asked.estimate, level)
-    payload = payload_of(part, *mesh, *question.arrays(case), asked.further)
+    part.fields("I?I", len(further), not estimate, level)
+    payload = payload_of(part, *mesh, *question.arrays(case), further)
     return Call(Kind.ASK, payload, Kind.ANSWER, read)
 
 

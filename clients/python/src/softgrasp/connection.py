@@ -49,13 +49,16 @@ class Connection:
         """Connects. Raises `ConnectionLost`, `NoAnswerInTime`, and `ssl.SSLError` for a
         certificate that is not trusted."""
         self.conversation = Conversation(limits)
-        self._patience = patience
+        self._patience, self._silence = patience, patience.silence
+        self._head = memoryview(bytearray(HEADER_LEN))
         self._order = threading.Lock()
         """Of the thread whose request is the next to be sent."""
         self._sending = threading.Lock()
         """Of the thread whose frame is on the way out."""
-        self._state = threading.Condition()
+        self._lock = threading.Lock()
         """Guards what follows, and the conversation."""
+        self._state = threading.Condition(self._lock)
+        self._sleepers = 0
         self._waiting: dict[int, _Waiting] = {}
         self._is_read = False
         self._why_ended: str | None = None
@@ -111,7 +114,7 @@ class Connection:
         """Says that the requests under way are not wanted any more. Raises as `tell`."""
         # Whatever is under way has been sent by then.
         with self._sending:
-            with self._state:
+            with self._lock:
                 if self._why_ended is not None:
                     return
                 numbers = self.conversation.under_way
@@ -121,19 +124,21 @@ class Connection:
     def close(self) -> None:
         """Ends the session, also one that waits in another thread; may be called again."""
         self._end("it was closed")
-        with self._state:
-            self._state.wait_for(lambda: not self._is_read, timeout=1.0)
+        with self._lock:
+            given_up = time.monotonic() + 1.0
+            while self._is_read and time.monotonic() < given_up:
+                self._sleep(0.1)
         with self._sending:
             self._stream.close()
 
     def _send(self, call: Call[Any], waiting: _Waiting | None) -> None:
         """Sends a request when its turn comes; `waiting` is to have its reply."""
         with self._order:
-            with self._state:
+            with self._lock:
                 while self._why_ended is None and not self.conversation.has_room(call):
-                    self._state.wait()
+                    self._sleep(None)
             with self._sending:
-                with self._state:
+                with self._lock:
                     if self._why_ended is not None:
                         raise ConnectionLost(f"the connection is closed: {self._why_ended}")
                     request_id, data = self.conversation.begin(call)
@@ -160,9 +165,9 @@ class Connection:
     def _reply(self, waiting: _Waiting) -> tuple[Header, NDArray[np.uint8]]:
         """The reply to a request; reads those of others too, unless another thread does."""
         while True:
-            with self._state:
+            with self._lock:
                 while waiting.reply is None and self._is_read and self._why_ended is None:
-                    self._state.wait(self._until_late(waiting))
+                    self._sleep(self._until_late(waiting))
                 if waiting.reply is not None:
                     return waiting.reply
                 if self._why_ended is not None:
@@ -174,15 +179,24 @@ class Connection:
         """Reads one frame and gives it to whoever waits for it. Whoever calls has the turn."""
         try:
             header, payload = self._receive_frame(deadline)
-            with self._state:
-                self._deliver(header, payload)
         except BaseException as error:
-            self._end(str(error))
+            self._leave(str(error))
             raise
-        finally:
-            with self._state:
-                self._is_read = False
-                self._state.notify_all()
+        with self._lock:
+            self._is_read = False
+            try:
+                self._deliver(header, payload)
+            except BadStream as error:
+                self._why_ended = self._why_ended or str(error)
+                raise
+            finally:
+                self._wake()
+
+    def _leave(self, why: str) -> None:
+        """Ends the session and the turn of reading."""
+        with self._lock:
+            self._is_read = False
+        self._end(why)
 
     def _deliver(self, header: Header, payload: NDArray[np.uint8]) -> None:
         if not self.conversation.answered(header):
@@ -197,6 +211,19 @@ class Connection:
         self._waiting.clear()
         if header.kind == Kind.REJECTED:
             self._why_ended = self.conversation.last_words(payload)
+
+    def _sleep(self, timeout: float | None) -> None:
+        """Waits for news, with the lock."""
+        self._sleepers += 1
+        try:
+            self._state.wait(timeout)
+        finally:
+            self._sleepers -= 1
+
+    def _wake(self) -> None:
+        """Tells whoever waits that there is news, with the lock."""
+        if self._sleepers:
+            self._state.notify_all()
 
     def _until_late(self, waiting: _Waiting) -> float | None:
         """Seconds until the server has taken too long. Raises `NoAnswerInTime`."""
@@ -214,33 +241,39 @@ class Connection:
             return None
         return max(waiting.sent_at, self._answered_at) + answer
 
+    def _look_at_clock(self, deadline: float | None) -> None:
+        if deadline is not None and time.monotonic() > deadline:
+            raise self._late()
+
     def _late(self) -> NoAnswerInTime:
         return NoAnswerInTime(f"no answer came in {self._patience.answer} s")
 
     def _receive_frame(self, deadline: float | None) -> tuple[Header, NDArray[np.uint8]]:
-        head = np.empty(HEADER_LEN, dtype=np.uint8)
-        self._fill(head, deadline)
-        header = self.conversation.header(head.tobytes())
+        self._fill(self._head, deadline)
+        header = self.conversation.header(bytes(self._head))
         payload = np.empty(min(header.length, FIRST_PIECE), dtype=np.uint8)
-        self._fill(payload, deadline)
+        self._fill(payload.data, deadline)
         while len(payload) < header.length:
             # What is announced is taken on trust only as far as what has come.
             grown = np.empty(min(2 * len(payload), header.length), dtype=np.uint8)
             grown[: len(payload)] = payload
-            self._fill(grown[len(payload) :], deadline)
+            self._fill(grown.data[len(payload) :], deadline)
             payload = grown
         check_payload(header, payload)
         return header, payload
 
-    def _fill(self, target: NDArray[np.uint8], deadline: float | None) -> None:
-        view, at, silence = target.data, 0, self._patience.silence
+    def _fill(self, view: memoryview, deadline: float | None) -> None:
+        at, silence = 0, self._silence
         until = deadline
         while at < len(view):
+            if at:
+                # Whoever sends byte by byte never lets a wait end.
+                self._look_at_clock(deadline)
             if silence is not None:
                 given_up = time.monotonic() + silence
                 until = given_up if deadline is None else min(deadline, given_up)
             try:
-                count = self._stream.receive(view[at:], until)
+                count = self._stream.receive(view[at:] if at else view, until)
             except TimeoutError as error:
                 if until == deadline:
                     raise self._late() from error
@@ -254,7 +287,7 @@ class Connection:
     def _listen(self, every: float) -> None:
         """Takes what the server says while nobody asks, so that it can go on saying it."""
         while not self._has_ended.wait(every):
-            with self._state:
+            with self._lock:
                 if self._is_read or self._waiting:
                     continue
                 self._is_read = True
@@ -264,19 +297,19 @@ class Connection:
     def _read_what_is_there(self) -> None:
         while self._stream.is_readable():
             self._read(None)
-            with self._state:
+            with self._lock:
                 if self._is_read or self._why_ended is not None:
                     return
                 self._is_read = True
-        with self._state:
+        with self._lock:
             self._is_read = False
-            self._state.notify_all()
+            self._wake()
 
     def _end(self, why: str) -> None:
         """Ends the session; the first reason stays."""
-        with self._state:
+        with self._lock:
             self._why_ended = self._why_ended or why
-            self._state.notify_all()
+            self._wake()
         self._has_ended.set()
         self._stream.shut_down()
 

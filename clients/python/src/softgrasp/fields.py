@@ -77,7 +77,7 @@ class Part:
 class Fields:
     """Reads the fields of one block, front to back. All methods raise `BadStream`."""
 
-    def __init__(self, data: memoryview, limits: Limits) -> None:
+    def __init__(self, data: bytes, limits: Limits) -> None:
         self.limits = limits
         self._bytes = data
         self._len = len(data)
@@ -95,7 +95,7 @@ class Fields:
         if self._at <= self._len:
             return form.unpack_from(self._bytes, at)
         # An older writer does not know them all.
-        return form.unpack(bytes(self._bytes[at:]).ljust(form.size, b"\0"))
+        return form.unpack(self._bytes[at:].ljust(form.size, b"\0"))
 
     def u16(self) -> int:
         """A number of 16 bits."""
@@ -115,7 +115,9 @@ class Fields:
 
     def flag(self) -> bool:
         """A truth value."""
-        return self.truth(self.fields(_U8)[0])
+        at = self._at
+        self._at = at + 1
+        return at < self._len and self.truth(self._bytes[at])
 
     @staticmethod
     def truth(value: int) -> bool:
@@ -141,11 +143,11 @@ class Fields:
 
     def text(self) -> str:
         """A text."""
-        length = self.u64()
+        (length,) = self.fields(_U64)
         if length > self.limits.text_len_max:
             raise BadStream(f"a text of {length} bytes; {self.limits.text_len_max} are allowed")
         try:
-            return str(self._take(length, "a text"), "utf-8")
+            return self._take(length, "a text").decode()
         except UnicodeDecodeError as error:
             raise BadStream(f"a text is not UTF-8: {error}") from None
 
@@ -162,7 +164,7 @@ class Fields:
 
     def raw(self, length: int) -> bytes:
         """Bytes as they are: a hash."""
-        return bytes(self._take(length, "its small fields"))
+        return self._take(length, "its small fields")
 
     def block(self) -> Fields:
         """A structure that may grow; without fields where an older writer does not know it."""
@@ -172,7 +174,7 @@ class Fields:
         """Such a structure, which may be absent."""
         return self.block() if self.flag() else None
 
-    def _take(self, length: int, what: str) -> memoryview:
+    def _take(self, length: int, what: str) -> bytes:
         end = self._at + length
         if length and end > self._len:
             raise BadStream(f"a message ends inside {what}")
@@ -181,7 +183,6 @@ class Fields:
         return data
 
 
-_U8 = struct.Struct("<B")
 _U16 = struct.Struct("<H")
 _U32 = struct.Struct("<I")
 _U64 = struct.Struct("<Q")

@@ -54,7 +54,7 @@ class PayloadReader:
         self._at = _U64.size + length
         if self._at > self._len:
             raise BadStream("a message ends inside its small fields")
-        self.part = Fields(self._bytes[_U64.size : self._at], limits)
+        self.part = Fields(self._bytes[_U64.size : self._at].tobytes(), limits)
         """The small fields of the message."""
         self._skip_padding()
 

@@ -27,16 +27,18 @@ class Stream:
 
     def send(self, data: bytes, deadline: float | None) -> None:
         """Sends all bytes."""
-        view = memoryview(data)
-        while view:
-            view = view[self._send_some(view, deadline) :]
+        sent = self._send_some(data, deadline)
+        while sent < len(data):
+            look_at_clock(deadline)
+            sent += self._send_some(memoryview(data)[sent:], deadline)
 
     def receive(self, target: memoryview, deadline: float | None) -> int:
         """Receives what is there, at least a byte; 0 where the other side has closed."""
         while True:
-            look_at_clock(deadline)
-            with contextlib.suppress(TimeoutError):
+            try:
                 return self._socket.recv_into(target)
+            except TimeoutError:
+                look_at_clock(deadline)
 
     def is_readable(self) -> bool:
         """Whether something can be received without waiting."""
@@ -51,11 +53,12 @@ class Stream:
         """Gives the socket back."""
         self._socket.close()
 
-    def _send_some(self, view: memoryview, deadline: float | None) -> int:
+    def _send_some(self, view: bytes | memoryview, deadline: float | None) -> int:
         while True:
-            look_at_clock(deadline)
-            with contextlib.suppress(TimeoutError):
+            try:
                 return self._socket.send(view)
+            except TimeoutError:
+                look_at_clock(deadline)
 
     def _wait(self, for_what: int, timeout: float) -> bool:
         with _Selector() as selector:
@@ -90,7 +93,7 @@ class TlsStream(Stream):
         with contextlib.suppress(OSError):
             socket.socket.shutdown(self._wrapped, socket.SHUT_RDWR)
 
-    def _send_some(self, view: memoryview, deadline: float | None) -> int:
+    def _send_some(self, view: bytes | memoryview, deadline: float | None) -> int:
         while True:
             try:
                 with self._turn:
