@@ -145,7 +145,7 @@ operation_example() {
     say "the operation example"
     mkdir -p "$WORK/desk"
     "$BIN" mesh toothpaste --nodes 1000 --out "$WORK/desk/toothpaste.msh" > "$WORK/run.out"
-    open_window --hand mouse --eye -12,26,0.46
+    open_window --hand mouse --grasp thesis --eye -12,26,0.46
     sleep 2
     menu "Read file …" "file name" figure-6.1.png
     shows "file name" click toothpaste.msh
