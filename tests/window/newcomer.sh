@@ -14,7 +14,7 @@ source tests/window/driving.sh
 # seen NAME: a picture of the window, where pictures are kept.
 seen() {
     [ -n "$pictures" ] && command -v import >/dev/null || return 0
-    import -window root -crop "$size+0+0" +repage "$pictures/$size-$1.png"
+    import -window root -crop "$size+0+0" +repage "$pictures/$size-${1// /-}.png"
 }
 
 # Every key that does something, each as often as it takes to come back to where it began.
@@ -32,26 +32,22 @@ press_all() {
     no_panic
 }
 
-# Every entry of every menu but Exit, which ends the window below. What turns something on stands twice.
-# The object and the hand that the story has come last of theirs.
+# Every entry of every menu but Exit, which ends the window below; behind "=" the key that takes back what
+# it does. The object and the hand that the story has come last of theirs.
 entries=(
     "Object:Cube" "Object:Sphere" "Object:Toothpaste" "Object:Strawberry"
-    "Object:Read file …" "Object:page Softness and size" "Object:page Softness and size"
+    "Object:Read file …=Escape" "Object:page Softness and size=F4"
     "Solve:condensed" "Solve:front" "Solve:front-mixed" "Solve:pcg" "Solve:auto"
     "Solve:1 %" "Solve:0.01 %" "Solve:0.0001 %" "Solve:rounding only"
     "View:Displacement" "View:Largest principal strain" "View:Von Mises stress"
     "View:Estimated stress error" "View:Plain"
-    "View:show Elements" "View:show Elements" "View:show Shape at rest" "View:show Shape at rest"
-    "View:show Hand" "View:show Hand" "View:show Colliders" "View:show Colliders"
-    "View:show Contacts" "View:show Contacts" "View:show Forces" "View:show Forces"
-    "View:Next level of spheres" "View:Previous level of spheres"
+    "View:show Elements=w" "View:show Shape at rest=g" "View:show Hand=h" "View:show Colliders=l"
+    "View:show Contacts=o" "View:show Forces=n" "View:Next level of spheres" "View:Previous level of spheres"
     "View:Fair light" "View:Full light" "View:Plain light" "View:Frame the scene"
-    "Help:page Help" "Help:page Help" "Help:page Information" "Help:page Information"
-    "Help:page Timings" "Help:page Timings"
-    "Help:page Softness and size" "Help:page Softness and size"
-    "File:Read file …" "File:Save as …" "File:Keep shape" "File:Undo keep shape" "File:Detach"
+    "Help:page Help=Escape" "Help:page Information=F2" "Help:page Timings=F3" "Help:page Softness and size=F4"
+    "File:Read file …=Escape" "File:Save as …=Escape" "File:Keep shape" "File:Undo keep shape" "File:Detach"
     "File:Return to the origin" "File:Snapshot" "File:Record pictures" "File:End recording"
-    "right button:Detach" "right button:Return to the origin" "right button:Save as …"
+    "right button:Detach" "right button:Return to the origin" "right button:Save as …=Escape"
     "Hand:Mouse and keyboard" "Hand:Script: approach" "Hand:Script: attach" "Hand:Script: squeeze"
     "Hand:Script: release" "Hand:Script: regrasp" "Hand:Script: lift"
 )
@@ -99,7 +95,7 @@ choose() {
     open_menu "$1"
     if [[ "$opened" != *" $1 "* ]]; then
         opened+=" $1 "
-        seen "menu-${1// /-}"
+        seen "menu $1"
         # The pop-up menu has the entries of File.
         [ "$1" = "right button" ] || all_are_tried "$1"
     fi
@@ -110,28 +106,36 @@ choose() {
     xdotool mousemove "$x" "$y" click 1
     case "$2" in
         # They can be chosen in some states only.
-        "Keep shape" | "Undo keep shape") settle; xdotool key Escape; settle ;;
+        "Keep shape" | "Undo keep shape") settle; xdotool key Escape ;;
         "End recording") await 'wish="Record pictures"' ;;
         *) await "wish=\"${wish#page }\"" ;;
     esac
     # A menu that is chosen from closes in the next picture.
     settle 1
-    case "$1:$2" in
-        *"Read file …" | *"Save as …") settle; xdotool key Escape; settle ;;
-        Object:page*) ;;
-        Object:*) await "the object is now ${2,}" ;;
-        Hand:*) await 'the hand is now' ;;
-        "View:Fair light" | "View:Full light") await 'notice text="The processor draws here' ;;
-    esac
 }
 
 # choose_all: every entry of every menu, while the story begins anew again and again: at its end a card
 # offers the hand.
 choose_all() {
-    local entry count=0 opened=""
+    local entry name count=0 opened=""
     for entry in "${entries[@]}"; do
         [ $((count++ % 6)) -ne 0 ] || xdotool key comma
-        choose "${entry%%:*}" "${entry#*:}"
+        name="${entry%=*}"
+        choose "${name%%:*}" "${name#*:}"
+        case "$entry" in
+            *=*)
+                settle 1
+                seen "${name#*:}"
+                xdotool key "${entry##*=}"
+                settle
+                ;;
+            Object:*)
+                name="${name#*:}"
+                await "the object is now ${name,}"
+                ;;
+            Hand:*) await 'the hand is now' ;;
+            "View:Fair light" | "View:Full light") await 'notice text="The processor draws here' ;;
+        esac
         alive
     done
     xdotool key Escape
