@@ -145,7 +145,7 @@ operation_example() {
     say "the operation example"
     mkdir -p "$WORK/desk"
     "$BIN" mesh toothpaste --nodes 1000 --out "$WORK/desk/toothpaste.msh" > "$WORK/run.out"
-    open_window --hand mouse --eye -12,26,0.46
+    open_window --hand mouse --grasp thesis --eye -12,26,0.46
     sleep 2
     menu "Read file …" "file name" figure-6.1.png
     shows "file name" click toothpaste.msh
@@ -168,7 +168,7 @@ operation_example() {
     for finger in thumb little; do
         shows "$finger" slide "$finger" 3 40
     done
-    shows "close all" slide "close all" 40 97
+    shows "close all" slide "close all" 40 85
     await_news 60 "entered Deforming"
     sleep 8
     screen figure-6.10.png
@@ -195,7 +195,9 @@ shading_screen() {
     open_window --object toothpaste --hand scripted:squeeze --shading "$2" --show forces \
         --eye -150,25,0.40
     await_news 60 "entered Deforming"
-    sleep 6
+    # In the middle of the squeeze; however slowly the pictures are drawn, it stands still from here on.
+    sleep 4
+    xdotool key Return
     screen "$1"
     close_window
 }

@@ -64,23 +64,17 @@ close_window() {
 
 is_told() { grep -q "name=\"$1\" " "$WINDOW_LOG"; }
 
-# Until four more pictures have been shown, which is when the status at the lower left has changed
-# four times: the last one knows of everything that came before. Ten seconds where nothing changes.
+# Until four more pictures have been shown, which the log counts: the last one knows of everything that
+# came before.
 settle() {
-    local before now passed=0 since=$SECONDS
-    before=$(status_drawn)
-    while [ "$passed" -lt 4 ] && [ $((SECONDS - since)) -lt 10 ]; do
-        sleep 0.1
-        now=$(status_drawn)
-        if [ "$now" != "$before" ]; then
-            passed=$((passed + 1))
-            before=$now
-            since=$SECONDS
-        fi
-    done
+    local last
+    last=$(pictures_shown)
+    wait_until 60 "four pictures" pictures_since "$last"
 }
 
-status_drawn() { import -window root -crop 300x200+0+600 +repage gray:- | md5sum; }
+pictures_shown() { sed -nE 's/.*places: picture=([0-9]+).*/\1/p' "$WINDOW_LOG" | tail -n 1; }
+
+pictures_since() { [ $(($(pictures_shown) - ${1:-0})) -ge 4 ]; }
 
 # place NAME [SHARE]: where it was told last, its middle, or so many percent along its width.
 place() {

@@ -14,7 +14,7 @@ source tests/window/driving.sh
 # seen NAME: a picture of the window, where pictures are kept.
 seen() {
     [ -n "$pictures" ] && command -v import >/dev/null || return 0
-    import -window root -crop "$size+0+0" +repage "$pictures/$size-$1.png"
+    import -window root -crop "$size+0+0" +repage "$pictures/$size-${1// /-}.png"
 }
 
 # Every key that does something, each as often as it takes to come back to where it began.
@@ -32,43 +32,111 @@ press_all() {
     no_panic
 }
 
-# Entries of the menus, but for those that leave (what they lead to is tried elsewhere) and for the
-# hand, whose name is that of a menu too (its key is pressed).
+# Every entry of every menu but Exit, which ends the window below; behind "=" the key that takes back what
+# it does. The object and the hand that the story has come last of theirs.
 entries=(
-    "Object:Cube" "Object:Strawberry"
-    "Solve:condensed" "Solve:front" "Solve:pcg" "Solve:1 %" "Solve:0.0001 %" "Solve:rounding only" "Solve:auto"
+    "Object:Cube" "Object:Sphere" "Object:Toothpaste" "Object:Strawberry"
+    "Object:Read file …=Escape" "Object:page Softness and size=F4"
+    "Solve:condensed" "Solve:front" "Solve:front-mixed" "Solve:pcg" "Solve:auto"
+    "Solve:1 %" "Solve:0.01 %" "Solve:0.0001 %" "Solve:rounding only"
     "View:Displacement" "View:Largest principal strain" "View:Von Mises stress"
     "View:Estimated stress error" "View:Plain"
-    "View:show Elements" "View:show Elements" "View:show Shape at rest" "View:show Shape at rest"
-    "View:show Colliders" "View:show Colliders" "View:show Contacts" "View:show Contacts" "View:show Forces" "View:show Forces"
-    "View:Next level of the sphere tree" "View:Last level of the sphere tree"
+    "View:show Elements=w" "View:show Shape at rest=g" "View:show Hand=h" "View:show Colliders=l"
+    "View:show Contacts=o" "View:show Forces=n" "View:Next level of spheres" "View:Previous level of spheres"
     "View:Fair light" "View:Full light" "View:Plain light" "View:Frame the scene"
-    "Help:Help" "Help:Help" "Help:Information" "Help:Information" "Help:Timings" "Help:Timings"
-    "Help:Softness and size" "Help:Softness and size"
-    "File:Keep shape" "File:Undo keep shape" "File:Detach" "File:Return to the origin" "File:Snapshot"
+    "Help:page Help=Escape" "Help:page Information=F2" "Help:page Timings=F3" "Help:page Softness and size=F4"
+    "File:Read file …=Escape" "File:Save as …=Escape" "File:Keep shape" "File:Undo keep shape" "File:Detach"
+    "File:Return to the origin" "File:Snapshot" "File:Record pictures" "File:End recording"
+    "right button:Detach" "right button:Return to the origin" "right button:Save as …=Escape"
+    "Hand:Mouse and keyboard" "Hand:Script: approach" "Hand:Script: attach" "Hand:Script: squeeze"
+    "Hand:Script: release" "Hand:Script: regrasp" "Hand:Script: lift"
 )
+# What the log tells the place of besides.
+others="File|Object|Hand|Solve|View|Help|Exit|Take the hand|time line|preparing|newest|Cancel loading"
+others+="|Play or pause|One tick|From the beginning|stiffness|Poisson's ratio|size|nodes"
 
-# choose MENU ENTRY: an entry that is not there, or cannot be chosen now, is a click beside it.
-choose() {
+# open_menu MENU: from the bar, or the pop-up menu in the corner, where it has no room below.
+open_menu() {
     local at x y width
-    for name in "$@"; do
-        at=$(place "$name") || exit 1
+    mark
+    if [ "$1" = "right button" ]; then
+        xdotool mousemove $((${size%x*} - 25)) $((${size#*x} - 90)) click 3
+    else
+        at=$(place "$1") || exit 1
         read -r x y width <<<"$at"
         xdotool mousemove "$x" "$y" click 1
-        settle 3
-    done
+    fi
+    case "$1" in
+        Hand) await 'places: name="Script: lift"' ;;
+        Object) await 'places: name="page Softness and size"' ;;
+        Solve) await 'places: name="rounding only"' ;;
+        View) await 'places: name="Frame the scene"' ;;
+        Help) await 'places: name="page Help"' ;;
+        *) await 'places: name="Exit"' ;;
+    esac
+    # A menu is measured before it stands where it stays.
+    settle
 }
 
-# choose_all: every entry of every menu. The story begins anew again and again: at its end a card offers
-# the hand, and a click beside an entry would take it.
+# all_are_tried MENU: what the open menu has is in the list.
+all_are_tried() {
+    local name
+    while read -r name; do
+        case " ${entries[*]/#/|} " in
+            *"|$1:$name"*) ;;
+            *) fail "the entry '$name' of the menu $1 is tried by nobody" ;;
+        esac
+    done < <(new_lines | sed -nE 's/.*places: name="([^"]+)" x=.*/\1/p' | grep -vxE "$others" | sort -u)
+}
+
+# choose MENU ENTRY: the entry is in the window, and is heard.
+choose() {
+    local at x y width wish="${2#show }"
+    open_menu "$1"
+    if [[ "$opened" != *" $1 "* ]]; then
+        opened+=" $1 "
+        seen "menu $1"
+        # The pop-up menu has the entries of File.
+        [ "$1" = "right button" ] || all_are_tried "$1"
+    fi
+    at=$(place "$2") || exit 1
+    read -r x y width <<<"$at"
+    ((x - width / 2 >= 0 && x + width / 2 <= ${size%x*} && y >= 0 && y < ${size#*x})) ||
+        fail "$1, $2 lies outside the window, at $x $y"
+    xdotool mousemove "$x" "$y" click 1
+    case "$2" in
+        # They can be chosen in some states only.
+        "Keep shape" | "Undo keep shape") settle; xdotool key Escape ;;
+        "End recording") await 'wish="Record pictures"' ;;
+        *) await "wish=\"${wish#page }\"" ;;
+    esac
+    # A menu that is chosen from closes in the next picture.
+    settle 1
+}
+
+# choose_all: every entry of every menu, while the story begins anew again and again: at its end a card
+# offers the hand.
 choose_all() {
-    local entry count=0
+    local entry name count=0 opened=""
     for entry in "${entries[@]}"; do
-        xdotool key Escape
         [ $((count++ % 6)) -ne 0 ] || xdotool key comma
-        choose "${entry%%:*}" "${entry#*:}"
+        name="${entry%=*}"
+        choose "${name%%:*}" "${name#*:}"
+        case "$entry" in
+            *=*)
+                settle 1
+                seen "${name#*:}"
+                xdotool key "${entry##*=}"
+                settle
+                ;;
+            Object:*)
+                name="${name#*:}"
+                await "the object is now ${name,}"
+                ;;
+            Hand:*) await 'the hand is now' ;;
+            "View:Fair light" | "View:Full light") await 'notice text="The processor draws here' ;;
+        esac
         alive
-        ! grep -q 'the hand is now' "$log" || fail "$entry changes the hand"
     done
     xdotool key Escape
     settle
@@ -109,10 +177,8 @@ for size in ${SIZES:-800x600 1280x800 1920x1080}; do
     settle
     seen kept
     press_all
-    if [ "$size" = 800x600 ]; then
-        step "$size: every entry of every menu"
-        choose_all
-    fi
+    step "$size: every entry of every menu"
+    choose_all
     step "$size: the story ends with the person's turn, and begins anew"
     xdotool key comma
     mark
@@ -131,7 +197,11 @@ for size in ${SIZES:-800x600 1280x800 1920x1080}; do
     xdotool key F4
     settle
     seen softness
-    xdotool key ctrl+q
+    xdotool key F4 F2
+    settle
+    seen information
+    open_menu File
+    click Exit
     ended
 done
 

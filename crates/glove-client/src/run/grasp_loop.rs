@@ -270,10 +270,12 @@ impl GraspLoop {
         outcome.silent = self.reader.silent(now_s);
         let silent = &outcome.silent;
         let fallen = silent.iter().filter(|device| !self.silent.contains(device));
-        let tell = |device: &Device| {
-            let name = device.name();
-            Notice::refused(format!("the {name} is silent: the hand is held where it was"))
+        let what = match self.reader.measured(now_s) {
+            Some(_) => "the hand is held where it was",
+            None => "there is no hand yet",
         };
+        let tell =
+            |device: &Device| Notice::refused(format!("the {} is silent: {what}", device.name()));
         outcome.events.extend(fallen.map(tell).map(LoopEvent::Device));
         let back = self.silent.iter().filter(|device| !silent.contains(device));
         let tell = |device: &Device| Notice::done(format!("the {} speaks again", device.name()));

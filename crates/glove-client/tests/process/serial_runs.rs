@@ -171,6 +171,21 @@ fn devices_that_are_not_there_are_named_while_the_run_waits_for_them() {
 }
 
 #[test]
+fn glove_that_never_spoke_is_not_said_to_hold_a_hand_where_it_was() {
+    let folder = Folder::new();
+    let links = folder.path("ports");
+    let emulator = emulated(&links, &[]);
+    let hand = format!("serial:glove={links}/nowhere,tracker={links}/tracker");
+    // A device may take 5 s longer than the other to speak first.
+    let mut run = run_with(&folder, &hand, "480");
+    assert_eq!(run.wait().unwrap().code(), Some(1));
+    emulator.stop();
+    let report = report(&folder, "run.json");
+    assert!(happened(&report, "the glove is silent: there is no hand yet"), "{}", report["events"]);
+    assert!(!happened(&report, "where it was"), "{}", report["events"]);
+}
+
+#[test]
 fn swapped_devices_end_a_run_with_the_sentence_that_says_so() {
     let folder = Folder::new();
     let links = folder.path("ports");

@@ -24,6 +24,8 @@ struct Watched {
     /// Readings in a row at an end of the range after a jump, and after a way there.
     broken: u32,
     clipped: u32,
+    /// It has shown more than an end of its range; one that has not may be dead, which is told elsewhere.
+    has_read: bool,
     is_told_broken: bool,
     is_told_clipped: bool,
 }
@@ -83,7 +85,9 @@ impl Watched {
             }
             _ => {
                 self.broken = 0;
-                self.clipped = if is_end { self.clipped.saturating_add(1) } else { 0 };
+                self.has_read |= !is_end;
+                let is_clipped = is_end && self.has_read;
+                self.clipped = if is_clipped { self.clipped.saturating_add(1) } else { 0 };
                 self.taken = Some(value);
                 (value, false)
             }

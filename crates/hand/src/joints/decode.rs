@@ -63,7 +63,7 @@ struct RawObject {
 /// # Errors
 /// Why the line is not a record.
 pub(super) fn decode_line(line: &[u8]) -> Result<JointsRecord, JointsFaultKind> {
-    let raw: RawLine = serde_json::from_slice(line).map_err(|error| kind_of(&error))?;
+    let raw: RawLine = serde_json::from_slice(line).map_err(|error| kind_of(&error, line))?;
     // Without a palm the list begins with joint 1.
     let first = match raw.joints.count {
         JOINT_COUNT => 0,
@@ -88,7 +88,7 @@ pub(super) fn decode_line(line: &[u8]) -> Result<JointsRecord, JointsFaultKind> 
     Ok(record)
 }
 
-fn kind_of(error: &serde_json::Error) -> JointsFaultKind {
+fn kind_of(error: &serde_json::Error, line: &[u8]) -> JointsFaultKind {
     match error.classify() {
         Category::Data => {
             let text = error.to_string();
@@ -96,9 +96,17 @@ fn kind_of(error: &serde_json::Error) -> JointsFaultKind {
             JointsFaultKind::NotARecord { reason: plain.take(REASON_MAX).collect() }
         }
         Category::Io | Category::Syntax | Category::Eof => {
-            JointsFaultKind::NotJson { column: error.column() }
+            let column = error.column();
+            JointsFaultKind::NotJson { column, has_no_number: names_no_number(line, column) }
         }
     }
+}
+
+/// Whether a number that is none stands where a line stops being JSON.
+fn names_no_number(line: &[u8], column: usize) -> bool {
+    let around = column.saturating_sub(4)..line.len().min(column.saturating_add(4));
+    let around = line.get(around).unwrap_or_default().to_ascii_lowercase();
+    around.windows(3).any(|three| three == b"nan" || three == b"inf")
 }
 
 fn sample(entry: usize, raw: &RawEntry) -> Result<Option<JointSample>, JointsFaultKind> {

@@ -78,7 +78,9 @@ impl Doubts {
                 JointsFaultKind::JointCount { got: 21 } => {
                     "; a list of 21 has no metacarpals, `docs/joints.md` says which joints are needed"
                 }
-                JointsFaultKind::NotJson { .. } => "; numbers that are not finite are not JSON",
+                JointsFaultKind::NotJson { has_no_number: true, .. } => {
+                    "; numbers that are not finite are not JSON"
+                }
                 _ => "",
             };
             return Some(format!("the lines that come are no records of joints: {fault}{hint}"));
@@ -221,6 +223,21 @@ mod tests {
             let said = reader.doubt().unwrap_or_else(|| panic!("{number}: nothing was said"));
             assert!(said.contains("no records of joints") && said.contains("not finite"), "{said}");
             assert!(reader.measured().is_none(), "{number} moves a hand");
+        }
+    }
+
+    #[test]
+    fn plain_text_is_not_said_to_be_a_number_that_is_not_finite() {
+        for text in
+            ["hello there", "", "{\"hand\":\"right\"", "this line is infinite", "[[0.1,,0.2]]"]
+        {
+            let mut reader = JointsReader::new(HandDimensions::default(), None);
+            for i in 0..60 {
+                reader.feed(format!("{text}\n{{\n").as_bytes(), false, f64::from(i) / 30.0);
+            }
+            let said = reader.doubt().unwrap_or_else(|| panic!("{text}: nothing was said"));
+            assert!(said.contains("no records of joints"), "{text}: {said}");
+            assert!(!said.contains("not finite"), "{text}: {said}");
         }
     }
 

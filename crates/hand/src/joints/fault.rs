@@ -17,6 +17,8 @@ pub enum JointsFaultKind {
     NotJson {
         /// Column of the line, from 1.
         column: usize,
+        /// Whether NaN or an infinity stands there.
+        has_no_number: bool,
     },
     /// JSON, but not an object with the fields of a record.
     #[error("not a record: {reason}")]

@@ -81,7 +81,7 @@ fn set_up(
         }
     }
     for complaint in complaints.iter().chain(&disobeys) {
-        tracing::warn!(complaint, "the tracker refuses a command");
+        tracing::info!(complaint, "the tracker refuses a command");
     }
     port.discard_input();
     if settings.mode == TrackerMode::Continuous {

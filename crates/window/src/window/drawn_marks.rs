@@ -88,7 +88,7 @@ impl DrawnMarks {
             }
             if let (true, Some(all)) = (forces, &frame.grasp.forces) {
                 let arrow = arrow(&all[finger], scale, world_from_object);
-                if let Some(place) = held.or_else(|| pressed_place(frame, finger, &arrow)) {
+                if let Some(place) = pressed_place(frame, finger, held, &arrow) {
                     mark.show_force(&place, &arrow, OUTSIDE * radius);
                 }
             }
@@ -96,11 +96,19 @@ impl DrawnMarks {
     }
 }
 
-/// Where a fingertip presses that is glued to no node: the foremost of it in the direction of its force.
-fn pressed_place(frame: &ViewFrame, finger: usize, arrow: &Vector3<f64>) -> Option<Point3<f64>> {
-    let towards = arrow.try_normalize(1e-9)?;
-    let tip = frame.hand.as_ref()?.colliders().fingers[finger].tip;
-    Some(tip.centre + tip.radius * towards)
+/// Where a fingertip presses: the node that it is glued to, or the foremost of it in the direction of its
+/// force.
+fn pressed_place(
+    frame: &ViewFrame,
+    finger: usize,
+    held: Option<Point3<f64>>,
+    arrow: &Vector3<f64>,
+) -> Option<Point3<f64>> {
+    held.or_else(|| {
+        let towards = arrow.try_normalize(1e-9)?;
+        let tip = frame.hand.as_ref()?.colliders().fingers[finger].tip;
+        Some(tip.centre + tip.radius * towards)
+    })
 }
 
 fn tip_radius(hand: &HandView, finger: usize) -> f64 {
@@ -205,11 +213,13 @@ mod tests {
         let hand = pose(&dimensions, &JointAngles::flat(), palm);
         frame.hand = Some(HandView::of_pose(dimensions, &hand));
         let (arrow, tip) = (Vector3::new(0.0, -0.02, 0.0), hand.fingers[1].tip());
-        let place = pressed_place(&frame, 1, &arrow).unwrap();
+        let place = pressed_place(&frame, 1, None, &arrow).unwrap();
         let radius = dimensions.tip_radii()[1];
         assert!((place - tip).norm() < 2.5 * radius, "{place} is not at the fingertip {tip}");
-        assert_eq!(pressed_place(&frame, 1, &Vector3::zeros()), None, "it does not press");
+        let node = Point3::new(0.01, 0.02, 0.03);
+        assert_eq!(pressed_place(&frame, 1, Some(node), &arrow), Some(node), "it is glued to it");
+        assert_eq!(pressed_place(&frame, 1, None, &Vector3::zeros()), None, "it does not press");
         frame.hand = None;
-        assert_eq!(pressed_place(&frame, 1, &arrow), None);
+        assert_eq!(pressed_place(&frame, 1, None, &arrow), None);
     }
 }

@@ -5,6 +5,8 @@ use std::sync::Once;
 
 use kiss3d::prelude::Context;
 
+use crate::view::display::Level;
+
 /// What draws.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Graphics {
@@ -67,6 +69,14 @@ impl Graphics {
     fn of(info: &wgpu::AdapterInfo) -> Self {
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
         Self { name: format!("{} ({})", info.name, info.backend), is_software }
+    }
+
+    /// What a person who chooses this light should know of it here; nothing where it costs nothing.
+    pub fn price_of(&self, light: Level) -> Option<&'static str> {
+        (self.is_software && light != Level::Plain).then_some(
+            "The processor draws here: this light is slow, and takes memory with every picture. \
+             View, Plain light goes back.",
+        )
     }
 }
 
@@ -131,6 +141,7 @@ fn reason(panic: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::action::Action;
 
     #[test]
     fn panic_of_a_library_becomes_a_sentence() {
@@ -147,5 +158,19 @@ mod tests {
         assert_eq!(usable(DeviceType::Cpu, Backend::Gl), Err(NoGraphics::NoDriver));
         assert!(usable(DeviceType::Cpu, Backend::Vulkan).is_ok_and(|found| found.is_software));
         assert!(usable(DeviceType::DiscreteGpu, Backend::Gl).is_ok());
+    }
+
+    #[test]
+    fn light_that_takes_memory_where_the_processor_draws_is_not_chosen_without_a_word() {
+        let graphics = |is_software| Graphics { name: "one that draws".to_owned(), is_software };
+        for light in Level::ALL {
+            let told = graphics(true).price_of(light);
+            assert_eq!(told.is_some(), light != Level::Plain, "{light}: {told:?}");
+            let way_back = Action::Light(Level::Plain).label();
+            for words in ["The processor draws", "memory", way_back.as_str()] {
+                assert!(told.is_none_or(|told| told.contains(words)), "{light}: '{words}'");
+            }
+            assert_eq!(graphics(false).price_of(light), None, "{light} on a graphics card");
+        }
     }
 }

@@ -3,7 +3,10 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use egui::{Context, Event, Id, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2};
+use egui::epaint::ClippedShape;
+use egui::{
+    Color32, Context, Event, Id, Modifiers, PointerButton, Pos2, RawInput, Rect, Shape, Vec2,
+};
 use nalgebra::Vector3;
 use softgrasp_core::fem::Material;
 use softgrasp_grasp::grasp::StateName;
@@ -146,6 +149,79 @@ fn panels_do_not_overlap_in_windows_of_any_size() {
                 }
             }
         }
+    }
+}
+
+/// A picture with these panels, and the place of a card in it.
+fn picture(context: &Context, panels: &mut Panels, running: &Running) -> Vec<ClippedShape> {
+    let (display, colouring) = (Display::default(), Colouring::new(running.about.material));
+    let seen = seen(running, &display, &colouring);
+    let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 600.0));
+    let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
+    let mut output = context.run_ui(input, |ui| {
+        panels.show(ui.ctx(), &seen);
+    });
+    let shapes = std::mem::take(&mut output.shapes);
+    output.drop_without_applying_deltas();
+    shapes
+}
+
+#[test]
+fn status_that_grows_in_a_squeeze_does_not_lie_over_the_time_line_for_a_picture() {
+    let hand = HandChoice::Scripted(ScriptName::Lift);
+    let calm = running_with(hand, |frame| {
+        frame.grasp.state = Some(StateName::Free);
+        (frame.grasp.forces, frame.grasp.silent) = (None, Vec::new());
+    });
+    let (squeezed, context, mut panels) = (running(hand), Context::default(), Panels::default());
+    let rect = |name: &str| context.memory(|memory| memory.area_rect(Id::new(name))).unwrap();
+    (0..5).for_each(|_| drop(picture(&context, &mut panels, &calm)));
+    let low = rect("status");
+    picture(&context, &mut panels, &squeezed);
+    let high = rect("status");
+    assert!(high.height() > low.height() + 30.0, "{low:?} {high:?}");
+    for status in [low, high] {
+        let time_line = rect("time line");
+        assert!(status.bottom() <= time_line.top(), "{status:?} lies over {time_line:?}");
+    }
+}
+
+#[test]
+fn time_line_does_not_tremble_while_the_ticks_are_counted() {
+    let (context, mut panels) = (Context::default(), Panels::default());
+    let places = [7, 88, 111, 12_345].map(|tick| {
+        let hand = HandChoice::Scripted(ScriptName::Lift);
+        let running = running_with(hand, |frame| frame.tick = tick);
+        (0..4).for_each(|_| drop(picture(&context, &mut panels, &running)));
+        ["Play or pause", "time line"].map(|name| places::of(&context, name).unwrap())
+    });
+    assert!(places.iter().all(|place| *place == places[0]), "{places:?}");
+}
+
+#[test]
+fn menu_that_was_opened_is_not_looked_through() {
+    let (context, mut panels) = (Context::default(), Panels::default());
+    let running = running(HandChoice::Mouse);
+    (0..3).for_each(|_| drop(picture(&context, &mut panels, &running)));
+    panels.open_menu(&context, [300.0, 200.0].into());
+    // The first picture only measures it.
+    picture(&context, &mut panels, &running);
+    let shapes = picture(&context, &mut panels, &running);
+    let menu = context.memory(|memory| memory.area_rect(Id::new("pop-up menu"))).unwrap();
+    let grounds: Vec<_> = shapes.iter().flat_map(|clipped| rectangles(&clipped.shape)).collect();
+    let ground = grounds.iter().find(|(rect, _)| (rect.size() - menu.size()).length() < 2.0);
+    let (_, fill) = ground.unwrap_or_else(|| panic!("no ground of {menu:?}: {grounds:?}"));
+    assert!(fill.is_opaque(), "{fill:?}");
+}
+
+/// Rectangles of a shape that are filled, and with what.
+fn rectangles(shape: &Shape) -> Vec<(Rect, Color32)> {
+    match shape {
+        Shape::Rect(rect) if rect.fill != Color32::TRANSPARENT && rect.blur_width == 0.0 => {
+            vec![(rect.rect, rect.fill)]
+        }
+        Shape::Vec(shapes) => shapes.iter().flat_map(rectangles).collect(),
+        _ => Vec::new(),
     }
 }
 

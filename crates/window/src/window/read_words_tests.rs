@@ -123,6 +123,14 @@ fn large_object_is_said_to_be_prepared_with_what_the_server_is_at_and_that_the_h
     assert!(!read.contains("Preparing"), "{read}");
 }
 
+#[test]
+fn device_that_is_silent_before_there_was_a_hand_is_not_said_to_leave_the_hand_where_it_was() {
+    let silent = running_with(HandChoice::Live, |frame| frame.hand = None);
+    let read = read_panels(&silent, &mut Panels::default(), &[], Shading::Plain);
+    assert!(read.contains("The glove is silent: there is no hand yet."), "{read}");
+    assert!(!read.contains("stays where it was"), "{read}");
+}
+
 fn facts<'a>(display: &'a Display, method: &'a str, solved_by: Option<&'a str>) -> MenuFacts<'a> {
     MenuFacts {
         display,

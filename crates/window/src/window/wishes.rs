@@ -119,10 +119,8 @@ impl App {
 
     fn set_light(&mut self, level: Level) {
         self.display.level = level;
-        if self.graphics.is_software && level != Level::Plain {
-            let text = "The processor draws here: this light is slow, and takes memory with every \
-                        picture. View, plain light goes back.";
-            self.panels.notices.add(text, false);
+        if let Some(price) = self.graphics.price_of(level) {
+            self.panels.notices.add(price, false);
         }
     }
 

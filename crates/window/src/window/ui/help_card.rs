@@ -17,7 +17,7 @@ const ALWAYS: [(&str, &str); 13] = [
     ("Ctrl+O / Ctrl+S", "read a file / save as"),
     ("C", "next colouring: displacement, strain, stress, error"),
     ("W G H L O N", "elements, shape at rest, hand, colliders, contacts, forces"),
-    ("T (Shift)", "next (last) level of the sphere tree"),
+    ("T (Shift)", "next (previous) level of the sphere tree"),
     ("P / R", "snapshot / record pictures"),
     ("F1 F2 F3 F4", "this page, information, timings, softness and size"),
 ];

@@ -126,7 +126,12 @@ fn plain_entry(ui: &mut Ui, facts: &MenuFacts<'_>, action: &Action, enabled: boo
         .frame(false)
         .min_size(Vec2::new(ui.available_width(), 0.0));
     let response = ui.add_enabled(enabled, button);
-    places::tell(ui.ctx(), &label, &response);
+    // The page of help has the name of the menu that it is in.
+    let place = match action {
+        Action::Page(_) => format!("page {label}"),
+        _ => label,
+    };
+    places::tell(ui.ctx(), &place, &response);
     response.clicked()
 }
 
@@ -160,7 +165,23 @@ pub fn bar(context: &Context, facts: &MenuFacts<'_>) -> Option<Action> {
 fn choice(ui: &mut Ui, action: Action, is_chosen: bool) -> Option<Action> {
     let response = ui.radio(is_chosen, action.label());
     places::tell(ui.ctx(), &action.label(), &response);
-    response.clicked().then_some(action)
+    let is_wished = response.clicked();
+    if let Action::Method(name) = &action {
+        response.on_hover_text(about_method(name));
+    }
+    is_wished.then_some(action)
+}
+
+/// What a method does, for a person who does not know its name.
+fn about_method(name: &str) -> &'static str {
+    match name {
+        "auto" => "the server chooses for each question, and F2 tells why",
+        "condensed" => "frames from kept columns of the inverse: fast while the fingers stay",
+        "front" => "a factor of all equations, in double precision",
+        "front-mixed" => "a factor in single precision, refined until it is as good",
+        "pcg" => "conjugate gradients: many small steps and no factor",
+        _ => "named when the program was started",
+    }
 }
 
 fn objects(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {

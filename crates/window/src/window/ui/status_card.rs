@@ -20,8 +20,7 @@ pub struct Told {
 
 /// Shows the card at the lower left.
 pub fn show(context: &Context, frame: &ViewFrame, told: &Told) {
-    let offset = [theme::MARGIN, -theme::MARGIN - told.above];
-    theme::card(context, "status", Align2::LEFT_BOTTOM, offset, |ui| {
+    theme::low_card(context, "status", theme::MARGIN + told.above, |ui| {
         ui.set_max_width(300.0);
         ui.horizontal(|ui| {
             let (name, ground) = state(frame);
@@ -29,7 +28,11 @@ pub fn show(context: &Context, frame: &ViewFrame, told: &Told) {
             fingertips(ui, frame.grasp.tips);
         });
         for device in &frame.grasp.silent {
-            alarm(ui, format!("The {} is silent: the hand stays where it was.", device.name()));
+            let what = match frame.hand {
+                Some(_) => "the hand stays where it was",
+                None => "there is no hand yet",
+            };
+            alarm(ui, format!("The {} is silent: {what}.", device.name()));
         }
         if frame.server.link == LinkHealth::Reconnecting {
             alarm(ui, "Looking for the server. What you see waits for it.".to_owned());

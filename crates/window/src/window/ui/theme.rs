@@ -2,7 +2,7 @@
 
 use egui::{
     Align2, Area, Color32, Context, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Order,
-    RichText, ScrollArea, Shadow, Stroke, TextStyle, Ui, Vec2, Visuals,
+    Pos2, RichText, ScrollArea, Shadow, Stroke, TextStyle, Ui, UiBuilder, Vec2, Visuals,
 };
 
 /// Good, on time.
@@ -37,6 +37,8 @@ pub fn set_up(context: &Context) {
         style.spacing.item_spacing = Vec2::new(8.0, 5.0);
         style.spacing.button_padding = Vec2::new(9.0, 4.0);
         style.interaction.selectable_labels = false;
+        // A menu that comes up by and by is looked through for many pictures where few are drawn.
+        style.animation_time = 0.0;
     });
 }
 
@@ -56,6 +58,19 @@ pub fn card<R>(
         .order(Order::Middle)
         .show(context, |ui| card_frame().show(ui, content).inner)
         .inner
+}
+
+/// A card in the lower left corner, so far above the edge of the window. It is measured before it is put
+/// there, so that one that grows does not lie over what is below it for a picture.
+pub fn low_card(context: &Context, name: &str, above: f32, content: impl Fn(&mut Ui)) {
+    let screen = context.content_rect();
+    let measuring = UiBuilder::new().max_rect(screen).invisible();
+    let mut unseen = Ui::new(context.clone(), Id::new((name, "measured")), measuring);
+    let height = card_frame().show(&mut unseen, &content).response.rect.height();
+    Area::new(Id::new(name))
+        .fixed_pos(Pos2::new(screen.left() + MARGIN, screen.bottom() - above - height))
+        .order(Order::Middle)
+        .show(context, |ui| card_frame().show(ui, content));
 }
 
 /// A card that waits for an answer: it lies over all others.

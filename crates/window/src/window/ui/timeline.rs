@@ -1,6 +1,6 @@
 //! The time line of a run that is played: play, pause, one tick, and any tick that was seen.
 
-use egui::{Align2, Color32, Context, Pos2, Rect, Sense, Stroke, Ui, Vec2};
+use egui::{Align2, Color32, Context, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2};
 
 use super::{places, theme};
 use crate::view::action::Action;
@@ -29,6 +29,8 @@ pub enum TimelineWish {
 
 /// Room that the card's own buttons take beside the track, points.
 const TAKEN: f32 = 340.0;
+/// Width of the number of the tick, points.
+const TICKS_WIDTH: f32 = 48.0;
 /// Height of the card with its margin, points: what stands at the bottom stands above it.
 pub const HEIGHT: f32 = 62.0;
 
@@ -53,7 +55,9 @@ pub fn show(context: &Context, history: &History, playing: &Playing) -> Option<T
             if let Some(tick) = track(ui, history.marks(), (first, last), now, playing.first_tick) {
                 wish = Some(TimelineWish::LookAt(tick));
             }
-            ui.monospace(format!("{:>5}", now.saturating_sub(playing.first_tick)));
+            // Of one width, so that the line stays where it is while the ticks are counted.
+            let ticks = format!("{}", now.saturating_sub(playing.first_tick));
+            ui.add_sized([TICKS_WIDTH, 20.0], egui::Label::new(RichText::new(ticks).monospace()));
             let newest = ui.add_enabled(playing.looked_at.is_some(), egui::Button::new("newest"));
             if newest.clicked() {
                 wish = Some(TimelineWish::Newest);
