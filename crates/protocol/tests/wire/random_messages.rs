@@ -38,7 +38,7 @@ fn any_request() -> impl Strategy<Value = Request> {
         |(subject, question, large, count, ([without_estimate, newest_wins], report))| {
             let count = if question.known.is_empty() { 0 } else { count };
             let case = |k: usize| {
-                let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+                let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
                 question.known.iter().map(|known| sign * known.value).collect()
             };
             let cases = (0..count).map(case).collect();
