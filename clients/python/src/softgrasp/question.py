@@ -54,7 +54,7 @@ class Question:
     deadline_ms: float | None = None
     """Time after which the answer is of little use; a late answer has a warning."""
     report: Report = "full"
-    """How much the report of the answer tells; less of it takes less time."""
+    """How much the report of the answer tells; less of it has fewer bytes."""
     newest_wins: bool = False
     """Of frames of one model: one that has not been begun when a newer one with `newest_wins` comes
     is refused as `Superseded`."""
