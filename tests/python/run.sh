@@ -47,6 +47,7 @@ mesh=fuzz/seeds/mesh/cube-msh
 declare -A arguments=(
     [squeeze]="$mesh --out $work/squeezed.png"
     [sweep]="--out $work/stiffness.csv"
+    [grasps]="--out $work/grasps.jsonl"
 )
 for example in clients/python/examples/*.py; do
     name="$(basename "$example" .py)"
