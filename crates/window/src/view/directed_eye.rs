@@ -143,7 +143,10 @@ mod tests {
         assert!(there != first && directed.eye(&frame, there, GLIDE_S).is_none());
         directed.is_chosen();
         frame.acts.squeezing = squeezing(-0.05);
-        assert!(directed.eye(&frame, there, 9.0).is_none());
+        // A glide that was begun would be seen in its course only.
+        for now_s in [9.0, 9.0 + 0.5 * GLIDE_S, 9.0 + 2.0 * GLIDE_S] {
+            assert!(directed.eye(&frame, there, now_s).is_none(), "it is the person's");
+        }
     }
 
     #[test]

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use egui::epaint::ClippedShape;
 use egui::{
-    Color32, Context, Event, Id, Modifiers, PointerButton, Pos2, RawInput, Rect, Shape, Vec2,
+    Color32, Context, Event, FontDefinitions, FontFamily, Id, Modifiers, PointerButton, Pos2,
+    RawInput, Rect, Shape, Vec2,
 };
 use nalgebra::Vector3;
 use softgrasp_core::fem::Material;
@@ -189,6 +190,11 @@ fn status_that_grows_in_a_squeeze_does_not_lie_over_the_time_line_for_a_picture(
 #[test]
 fn time_line_does_not_tremble_while_the_ticks_are_counted() {
     let (context, mut panels) = (Context::default(), Panels::default());
+    // As in the window, whose digits are not of one width.
+    let mut fonts = FontDefinitions::default();
+    let letters = fonts.families[&FontFamily::Proportional].clone();
+    fonts.families.insert(FontFamily::Monospace, letters);
+    context.set_fonts(fonts);
     let places = [7, 88, 111, 12_345].map(|tick| {
         let hand = HandChoice::Scripted(ScriptName::Lift);
         let running = running_with(hand, |frame| frame.tick = tick);

@@ -23,7 +23,9 @@ pub const MARGIN: f32 = 12.0;
 
 /// Sets letters and colours once.
 pub fn set_up(context: &Context) {
-    context.set_visuals(Visuals::light());
+    // A field for letters is seen on a white card.
+    let field = Some(Color32::from_gray(238));
+    context.set_visuals(Visuals { text_edit_bg_color: field, ..Visuals::light() });
     context.all_styles_mut(|style| {
         let font = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles = [
@@ -78,7 +80,7 @@ pub fn dialog<R>(context: &Context, name: &str, content: impl FnOnce(&mut Ui) ->
     Area::new(Id::new(name))
         .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
         .order(Order::Foreground)
-        .show(context, |ui| card_frame().show(ui, content).inner)
+        .show(context, |ui| card_frame().fill(Color32::WHITE).show(ui, content).inner)
         .inner
 }
 
