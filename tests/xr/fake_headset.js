@@ -1,8 +1,8 @@
 // A headset that is not there: navigator.xr with two eyes and one tracked hand, which plays the frames of
 // `window.fakeHand` (25 places of a joint in tenths of a millimetre each, 15 frames a second) as often as a
-// display of 72 Hz asks. The eye is where the page puts the world's origin at the origin.
+// display of 72 Hz asks; where pictures come more slowly than 30 a second, the hand moves more slowly. The eye is where the page puts the world's origin at the origin.
 (() => {
-  const RATE_HZ = 72, FRAMES_HZ = 15, EYES_M = 0.032;
+  const RATE_HZ = 72, FRAMES_HZ = 15, STEP_MAX_S = 1 / 30, EYES_M = 0.032;
   const identity = { x: 0, y: 0, z: 0, w: 1 };
   window.XRRigidTransform = class {
     constructor(position = { x: 0, y: 0, z: 0 }, orientation = identity) {
@@ -38,7 +38,8 @@
       super();
       this.renderState = {};
       this.inputSources = [{ handedness: "right", hand: new Map(joints.map((j, i) => [i, j])) }];
-      this.begun = performance.now();
+      this.seconds = 0;
+      this.before = performance.now();
       window.fakeSession = this;
     }
     updateRenderState(state) { Object.assign(this.renderState, state); }
@@ -60,7 +61,10 @@
           projectionMatrix: new Float32Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + n) / (n - far), -1, 0, 0, (2 * far * n) / (n - far), 0]),
         };
       };
-      const seconds = window.fakeHandBegun ? (performance.now() - window.fakeHandBegun) / 1000 : 0;
+      const now = performance.now();
+      if (window.fakeHandMoves) this.seconds += Math.min((now - this.before) / 1000, STEP_MAX_S);
+      this.before = now;
+      const seconds = this.seconds;
       return {
         session: this,
         getViewerPose: () => ({ transform: new XRRigidTransform(eye), views: [view("left", -EYES_M), view("right", EYES_M)] }),

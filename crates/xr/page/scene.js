@@ -6,7 +6,7 @@ const GROUND_RADIUS_M = 3, MAX_CAPSULES = 12;
 
 export class Scene {
   constructor(canvas) {
-    const gl = canvas.getContext("webgl2", { antialias: true, xrCompatible: true, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl2", { antialias: true, xrCompatible: true });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.gl = gl;
     this.canvas = canvas;

@@ -1,6 +1,6 @@
 //! The page that a browser or a headset opens to see a run, and to take part in it.
 //!
-//! [`Page::open`] serves files and a WebSocket at an address with a token ([`token`], `site`,
+//! [`Page::open`] serves files and a WebSocket at an address with a token ([`token`], `routes`,
 //! `listening`). The ticks offer frames; a thread of its own (`painter`) makes numbers of them that
 //! browsers draw (`picture`, [`quantised`]), with the skins and colours of the window
 //! (`softgrasp_window::view`). Each page (`viewer`) gets what it has not drawn yet of the newest
@@ -15,6 +15,7 @@ mod page;
 mod painter;
 mod picture;
 pub mod quantised;
+mod routes;
 mod shown_hand;
 mod shown_object;
 mod site;

@@ -8,9 +8,8 @@ use tungstenite::{Message, WebSocket, connect};
 
 use super::*;
 use crate::from_page::{ACK, ACK_BYTES, JOINTS, JOINTS_BYTES};
-use crate::picture::Picture;
+use crate::picture::{ObjectMesh, Picture};
 use crate::quantised::QuantisedBox;
-use crate::shown_object::ObjectMesh;
 use crate::to_page::{OBJECT, PICTURE};
 
 type Socket = WebSocket<tungstenite::stream::MaybeTlsStream<TcpStream>>;

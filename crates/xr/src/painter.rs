@@ -22,7 +22,7 @@ use softgrasp_window::view::shading::Shading;
 use tokio::sync::watch;
 
 use crate::from_page::Ask;
-use crate::picture::Picture;
+use crate::picture::{Picture, PosedHand};
 use crate::quantised::{QuantisedBox, folded};
 use crate::shown_hand::ShownHand;
 use crate::shown_object::ShownObject;
@@ -258,13 +258,7 @@ impl Painter {
         self.space = None;
     }
 
-    fn pose_hand(
-        &mut self,
-        frame: &ViewFrame,
-    ) -> Option<(
-        Arc<crate::shown_hand::HandMesh>,
-        [[f32; 8]; softgrasp_window::view::hand_skin::BONE_COUNT],
-    )> {
+    fn pose_hand(&mut self, frame: &ViewFrame) -> Option<PosedHand> {
         let hand = frame.hand.as_ref()?;
         if self.hand.as_ref().is_none_or(|shown| !shown.fits(hand)) {
             let textures = &self.easel.textures;

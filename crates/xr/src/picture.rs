@@ -5,8 +5,6 @@ use std::sync::Arc;
 use softgrasp_window::view::hand_skin::BONE_COUNT;
 
 use crate::quantised::QuantisedBox;
-use crate::shown_hand::HandMesh;
-use crate::shown_object::ObjectMesh;
 
 /// One moment; shared by all pages that look.
 ///
@@ -17,7 +15,7 @@ pub struct Picture {
     /// The object.
     pub object: Arc<ObjectMesh>,
     /// The hand, and how its bones move.
-    pub hand: Option<(Arc<HandMesh>, [[f32; 8]; BONE_COUNT])>,
+    pub hand: Option<PosedHand>,
     /// Number that a headset gave the record which the hand follows.
     pub record: Option<u32>,
     /// Where the object is: translation in m, then x, y, z, w of the turn.
@@ -38,6 +36,9 @@ pub struct Picture {
     pub status: Arc<str>,
 }
 
+/// A hand, and how its bones move, as dual quaternions.
+pub type PosedHand = (Arc<HandMesh>, [[f32; 8]; BONE_COUNT]);
+
 impl Picture {
     /// Whether a page that has drawn the other one needs only what differs.
     pub fn goes_on_from(&self, before: &Self) -> bool {
@@ -47,4 +48,20 @@ impl Picture {
             && self.normals.len() == before.normals.len()
             && self.shares.len() == before.shares.len()
     }
+}
+
+/// The message that brings the unmoving part of an object to a page.
+pub struct ObjectMesh {
+    /// Another number is another object.
+    pub version: u32,
+    /// The message.
+    pub message: Vec<u8>,
+}
+
+/// The message that brings the unmoving part of a hand to a page.
+pub struct HandMesh {
+    /// Another number is another hand.
+    pub version: u32,
+    /// The message.
+    pub message: Vec<u8>,
 }

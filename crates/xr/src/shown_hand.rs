@@ -7,6 +7,7 @@ use softgrasp_window::view::frame::HandView;
 use softgrasp_window::view::hand_skin::{BONE_COUNT, HandSkin};
 use softgrasp_window::view::texture::Texture;
 
+use crate::picture::HandMesh;
 use crate::textures::Textures;
 use crate::to_page::{HandVertex, hand_message};
 
@@ -16,14 +17,6 @@ pub struct ShownHand {
     skin: HandSkin,
     /// What a page needs once.
     pub mesh: Arc<HandMesh>,
-}
-
-/// The message that brings the unmoving part of a hand to a page.
-pub struct HandMesh {
-    /// Another number is another hand.
-    pub version: u32,
-    /// The message.
-    pub message: Vec<u8>,
 }
 
 /// Bones that a vertex follows on a page; the others have so little weight that nobody sees it.

@@ -6,6 +6,7 @@ use softgrasp_grasp::object::RestShape;
 use softgrasp_window::view::frame::ObjectView;
 use softgrasp_window::view::object_skin::{Look, ObjectSkin, Part};
 
+use crate::picture::ObjectMesh;
 use crate::textures::Textures;
 use crate::to_page::{ObjectPart, object_message};
 
@@ -16,14 +17,6 @@ pub struct ShownObject {
     skin: ObjectSkin,
     /// What a page needs once.
     pub mesh: Arc<ObjectMesh>,
-}
-
-/// The message that brings the unmoving part of an object to a page.
-pub struct ObjectMesh {
-    /// Another number is another object.
-    pub version: u32,
-    /// The message.
-    pub message: Vec<u8>,
 }
 
 impl ShownObject {

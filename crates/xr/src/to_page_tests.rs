@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::picture::ObjectMesh;
 use crate::quantised::QuantisedBox;
-use crate::shown_object::ObjectMesh;
 
 /// Bytes of a picture before what differs in length.
 const PICTURE_HEAD: usize = 96;
