@@ -84,18 +84,8 @@ impl RunCommand {
             );
         }
         let mut pictures = RunPictures::start(&self.arguments, plan)?;
-        let shown_slowly = self.arguments.shown.animation.is_some() || page.is_some();
         let progress = Progress::start("preparing the object");
-        let setup = Setup {
-            record: self.arguments.record.clone(),
-            report: self.arguments.report.clone(),
-            threads: self.arguments.threads,
-            // Whoever looks at the page sees the story again.
-            ends_with_script: self.arguments.frames.is_none()
-                && (page.is_none() || !plan.begins_anew(&self.arguments)),
-            squeeze_times: if shown_slowly { 3 } else { 1 },
-            joints: page.as_ref().map(RunPage::joints),
-        };
+        let setup = self.setup(plan, page.as_ref());
         let at = |stage| match stage {
             SetupStage::Object(_) => {}
             SetupStage::Server => progress.now("starting the server"),
@@ -151,6 +141,21 @@ impl RunCommand {
             pictures.finish()?;
         }
         Ok(session.finish(interrupted)?)
+    }
+
+    /// How the run is made ready where no window shows it.
+    fn setup(&self, plan: &RunPlan, page: Option<&RunPage>) -> Setup {
+        let shown_slowly = self.arguments.shown.animation.is_some() || page.is_some();
+        Setup {
+            record: self.arguments.record.clone(),
+            report: self.arguments.report.clone(),
+            threads: self.arguments.threads,
+            // Whoever looks at the page sees the story again.
+            ends_with_script: self.arguments.frames.is_none()
+                && (page.is_none() || !plan.begins_anew(&self.arguments)),
+            squeeze_times: if shown_slowly { 3 } else { 1 },
+            joints: page.map(RunPage::joints),
+        }
     }
 }
 

@@ -267,11 +267,7 @@ impl RunArguments {
         ElasticMaterial::try_new(material.young, material.poisson)
             .context("the scene's material")?;
         let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
-        if hand == HandRequest::Xr && self.page.xr.is_none() {
-            bail!(
-                "--hand xr takes the hand of a headset from the page: give it an address by --xr"
-            );
-        }
+        let is_xr = self.takes_headset(&hand)?;
         let watched = self.is_watched();
         // Devices have a time of their own.
         let rate = self.rate.or((watched || hand.is_live()).then_some(WATCHED_RATE_HZ));
@@ -279,7 +275,6 @@ impl RunArguments {
         let object_size =
             self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
-        let is_xr = hand == HandRequest::Xr;
         Ok(RunPlan {
             object,
             nodes: self.nodes.or(scene.nodes).unwrap_or(NODES_DEFAULT),
@@ -305,14 +300,25 @@ impl RunArguments {
             is_live: hand.is_live(),
             hand,
             hand_configuration: self.hand_configuration()?,
-            // The page sends the hand in the world's frame.
-            world_from_sender: match (self.joints_origin, is_xr) {
-                (Some(at), _) => Some(Translation3::from(-at.coords).into()),
-                (None, true) => Some(Isometry3::identity()),
-                (None, false) => None,
-            },
+            world_from_sender: self.world_from_sender(is_xr),
             recording: None,
         })
+    }
+
+    /// Whether the hand is that of a headset, which a page has to send.
+    fn takes_headset(&self, hand: &HandRequest) -> anyhow::Result<bool> {
+        if *hand == HandRequest::Xr && self.page.xr.is_none() {
+            bail!(
+                "--hand xr takes the hand of a headset from the page: give it an address by --xr"
+            );
+        }
+        Ok(*hand == HandRequest::Xr)
+    }
+
+    /// Where a sender of joints is placed; a page sends the hand in the world's frame.
+    fn world_from_sender(&self, is_xr: bool) -> Option<Isometry3<f64>> {
+        let chosen = self.joints_origin.map(|at| Translation3::from(-at.coords).into());
+        chosen.or(is_xr.then(Isometry3::identity))
     }
 
     /// How the run grasps, by which equations, and with which hand.
