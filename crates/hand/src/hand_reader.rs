@@ -217,6 +217,11 @@ impl HandReader {
         self.joints.fit_errors()
     }
 
+    /// Number that a sender of joints gave the record which the hand follows.
+    pub fn joints_number(&self) -> Option<u64> {
+        self.joints.number()
+    }
+
     /// Takes bytes of the devices, in the order in which they came.
     ///
     /// Units: `now_s` s on the client's clock, the time of bytes that come with the tick.

@@ -22,6 +22,8 @@ pub enum HandRequest {
     Serial(SerialSource),
     /// A stream of joints that arrives here, over TCP or UDP.
     Joints(SocketAddr),
+    /// The hand that a headset tracks and the page for browsers sends.
+    Xr,
 }
 
 impl HandRequest {
@@ -31,7 +33,7 @@ impl HandRequest {
             Self::Scripted(script) => HandChoice::Scripted(*script),
             Self::Mouse => HandChoice::Mouse,
             Self::Replay(_) => HandChoice::Replay,
-            Self::Serial(_) | Self::Joints(_) => HandChoice::Live,
+            Self::Serial(_) | Self::Joints(_) | Self::Xr => HandChoice::Live,
         }
     }
 }
@@ -39,7 +41,7 @@ impl HandRequest {
 impl HandRequest {
     /// Whether devices send what they will, when they will.
     pub fn is_live(&self) -> bool {
-        matches!(self, Self::Serial(_) | Self::Joints(_))
+        matches!(self, Self::Serial(_) | Self::Joints(_) | Self::Xr)
     }
 }
 
@@ -51,6 +53,7 @@ impl FromStr for HandRequest {
             ("scripted", "") => Ok(Self::Scripted(ScriptName::default())),
             ("scripted", name) => Ok(Self::Scripted(name.parse().map_err(|e| format!("{e}"))?)),
             ("mouse", "") => Ok(Self::Mouse),
+            ("xr", "") => Ok(Self::Xr),
             ("replay", "") => Err("replay needs the file of a recording: replay:F.mcap".into()),
             ("replay", path) => Ok(Self::Replay(path.into())),
             ("serial", source) => Ok(Self::Serial(source.parse().map_err(|e| format!("{e}"))?)),
@@ -59,7 +62,7 @@ impl FromStr for HandRequest {
                 Ok(Self::Joints(address.map_err(|_| "joints needs IP:PORT to listen on")?))
             }
             _ => Err("there are scripted[:NAME], mouse, replay:F.mcap, \
-                      serial:glove=PATH[@BAUD],tracker=PATH[@BAUD] and joints:IP:PORT"
+                      serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT and xr"
                 .into()),
         }
     }
@@ -73,6 +76,7 @@ impl fmt::Display for HandRequest {
             Self::Replay(path) => write!(f, "replay:{}", path.display()),
             Self::Serial(source) => write!(f, "serial:{source}"),
             Self::Joints(address) => write!(f, "joints:{address}"),
+            Self::Xr => f.write_str("xr"),
         }
     }
 }

@@ -17,6 +17,8 @@ pub struct JointsReader {
     /// Where the sender's frame lies in the world; `None` until the first hand.
     world_from_sender: Option<Isometry3<f64>>,
     newest: Option<(FittedHand, f64)>,
+    /// Number that the sender gave the newest record that was fitted.
+    number: Option<u64>,
     faults: u64,
     fit_errors: FitErrors,
     doubts: Doubts,
@@ -54,6 +56,7 @@ impl JointsReader {
             measured: Vec::new(),
             world_from_sender,
             newest: None,
+            number: None,
             faults: 0,
             fit_errors: FitErrors::default(),
             doubts: Doubts::default(),
@@ -121,6 +124,11 @@ impl JointsReader {
         self.newest.map(|(_, time_s)| time_s)
     }
 
+    /// Number that the sender gave the newest record that was fitted.
+    pub fn number(&self) -> Option<u64> {
+        self.number
+    }
+
     /// Joint angles and palm (world) by the newest record.
     pub fn measured(&self) -> Option<(JointAngles, Isometry3<f64>)> {
         let (fitted, _) = self.newest?;
@@ -142,6 +150,7 @@ impl JointsReader {
                     Translation3::from(FIRST_PALM_M - first).into()
                 });
                 self.newest = Some((fitted, time_s));
+                self.number = record.frame;
                 let errors = &mut self.fit_errors;
                 let squares = errors.rms_m.powi(2) * errors.records as f64;
                 errors.records += 1;

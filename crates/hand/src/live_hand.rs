@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::arrival::{Arrival, Device};
-use crate::joints::JointsListener;
+use crate::joints::{ArrivedBytes, JointsFeed, JointsListener};
 use crate::notice::Notice;
 use crate::serial::{DeviceState, SerialDevices};
 
@@ -16,6 +16,7 @@ pub struct LiveHand {
 enum Source {
     Serial(Box<SerialDevices>),
     Joints(JointsListener),
+    Fed(JointsFeed),
 }
 
 impl LiveHand {
@@ -27,6 +28,11 @@ impl LiveHand {
     /// A stream of joints; `name` stands in reports.
     pub fn joints(listener: JointsListener, name: String) -> Self {
         Self { source: Source::Joints(listener), name }
+    }
+
+    /// Joints that another part of the program hands on; `name` stands in reports.
+    pub fn fed(feed: JointsFeed, name: String) -> Self {
+        Self { source: Source::Fed(feed), name }
     }
 
     /// Its name in reports.
@@ -52,16 +58,8 @@ impl LiveHand {
                 };
                 pieces.map(arrival).collect()
             }
-            Source::Joints(listener) => {
-                let pieces = listener.take().into_iter();
-                let arrival = |piece: crate::joints::ArrivedBytes| Arrival {
-                    device: Device::Joints,
-                    at_s: at(piece.arrived),
-                    is_datagram: piece.datagram,
-                    bytes: piece.bytes,
-                };
-                pieces.map(arrival).collect()
-            }
+            Source::Joints(listener) => joints(listener.take(), at),
+            Source::Fed(feed) => joints(feed.take(), at),
         }
     }
 
@@ -70,6 +68,7 @@ impl LiveHand {
         match &self.source {
             Source::Serial(devices) => devices.dropped(),
             Source::Joints(listener) => listener.dropped(),
+            Source::Fed(feed) => feed.dropped(),
         }
     }
 
@@ -93,9 +92,24 @@ impl LiveHand {
                 listener.senders(),
                 listener.local_addr()
             ))],
-            Source::Joints(_) => Vec::new(),
+            Source::Fed(feed) if feed.senders() == 0 => {
+                let text = "no headset sends a hand: open the page in its browser and enter";
+                vec![Notice::waits(text)]
+            }
+            Source::Joints(_) | Source::Fed(_) => Vec::new(),
         }
     }
+}
+
+/// Pieces of a stream of joints; `at` has the time of a moment on the client's clock, s.
+fn joints(pieces: Vec<ArrivedBytes>, at: impl Fn(Instant) -> Option<f64>) -> Vec<Arrival> {
+    let arrival = |piece: ArrivedBytes| Arrival {
+        device: Device::Joints,
+        at_s: at(piece.arrived),
+        is_datagram: piece.datagram,
+        bytes: piece.bytes,
+    };
+    pieces.into_iter().map(arrival).collect()
 }
 
 /// What a person has to know of a device.

@@ -22,6 +22,7 @@ mod live_samples;
 pub mod mesh;
 mod numbers;
 mod output;
+mod page_arguments;
 pub mod press;
 mod progress;
 pub mod record;
@@ -31,6 +32,8 @@ mod recorded_settings;
 pub mod replay;
 pub mod run;
 mod run_arguments;
+#[cfg_attr(not(feature = "xr"), path = "no_page.rs")]
+mod run_page;
 #[cfg_attr(not(feature = "window"), path = "no_pictures.rs")]
 mod run_pictures;
 mod run_recording;

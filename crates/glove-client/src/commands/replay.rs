@@ -61,7 +61,7 @@ impl ReplayCommand {
             ..RunArguments::default()
         };
         let run = RunCommand { arguments };
-        let report = run.without_window(&run.arguments.plan()?)?;
+        let report = run.without_window(&run.arguments.plan()?, None)?;
         tell(self.report.as_deref(), &report)?;
         match report.replay.as_ref().and_then(|replay| replay.failed(report.interrupted)) {
             Some(failed) if self.check => bail!(failed),

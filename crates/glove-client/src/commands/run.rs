@@ -9,6 +9,7 @@ use clap::Args;
 use super::device_sentences::DeviceSentences;
 use super::key_frames::KeyFrames;
 use super::run_arguments::{RunArguments, RunPlan};
+use super::run_page::{PageTalk, RunPage};
 use super::run_pictures::RunPictures;
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 #[cfg(feature = "window")]
@@ -41,28 +42,29 @@ impl RunCommand {
     /// and none came is a failure too; its report is written and its summary printed.
     pub fn run(&self) -> anyhow::Result<()> {
         let plan = self.arguments.plan()?;
-        match self.in_window(&plan)? {
+        let mut page = RunPage::open(&self.arguments, &plan)?;
+        match self.in_window(&plan, &mut page)? {
             Shown::InWindow(Some(report)) => tell(self.arguments.report.as_deref(), &report),
             Shown::InWindow(None) => Ok(()),
             Shown::Not => {
-                let report = self.without_window(&plan)?;
+                let report = self.without_window(&plan, page)?;
                 tell(self.arguments.report.as_deref(), &report)
             }
         }
     }
 
     #[cfg(feature = "window")]
-    fn in_window(&self, plan: &RunPlan) -> anyhow::Result<Shown> {
+    fn in_window(&self, plan: &RunPlan, page: &mut Option<RunPage>) -> anyhow::Result<Shown> {
         if self.arguments.is_without_window() {
             return Ok(Shown::Not);
         }
-        let opened = run_window::show(&self.arguments, plan)?;
+        let opened = run_window::show(&self.arguments, plan, page)?;
         Ok(opened.map_or(Shown::Not, |report| Shown::InWindow(report.map(Box::new))))
     }
 
     #[cfg(not(feature = "window"))]
     #[expect(clippy::unnecessary_wraps, reason = "a build with a window can fail here")]
-    fn in_window(&self, _plan: &RunPlan) -> anyhow::Result<Shown> {
+    fn in_window(&self, _plan: &RunPlan, _: &mut Option<RunPage>) -> anyhow::Result<Shown> {
         if !self.arguments.headless {
             eprintln!("glove-client: this build has no window; running without one");
         }
@@ -70,7 +72,11 @@ impl RunCommand {
     }
 
     /// Plays without a window; shows one line on a terminal.
-    pub(super) fn without_window(&self, plan: &RunPlan) -> anyhow::Result<RunReport> {
+    pub(super) fn without_window(
+        &self,
+        plan: &RunPlan,
+        mut page: Option<RunPage>,
+    ) -> anyhow::Result<RunReport> {
         if plan.hand == HandRequest::Mouse {
             bail!(
                 "--hand mouse needs the window: a run without one has nothing to be moved by; \
@@ -79,13 +85,7 @@ impl RunCommand {
         }
         let mut pictures = RunPictures::start(&self.arguments, plan)?;
         let progress = Progress::start("preparing the object");
-        let setup = Setup {
-            record: self.arguments.record.clone(),
-            report: self.arguments.report.clone(),
-            threads: self.arguments.threads,
-            ends_with_script: self.arguments.frames.is_none(),
-            squeeze_times: if self.arguments.shown.animation.is_some() { 3 } else { 1 },
-        };
+        let setup = self.setup(plan, page.as_ref());
         let at = |stage| match stage {
             SetupStage::Object(_) => {}
             SetupStage::Server => progress.now("starting the server"),
@@ -108,13 +108,21 @@ impl RunCommand {
         let mut sentences = DeviceSentences::start(status.speaker())
             .context("cannot start a thread beside the ticks")?;
         let timing = Timing { period: plan.period, ticks_max: self.arguments.frames };
-        // Without a window nobody asks for anything and nobody is told.
-        let (_controls, to_obey) = channel();
-        let (to_tell, _notices) = channel();
+        // Without a window and a page nobody asks for anything and nobody is told.
+        let (controls, to_obey) = channel();
+        let (to_tell, notices) = channel();
+        if let Some(page) = &mut page {
+            session.await_model();
+            let controls = controls.clone();
+            page.begin(&self.arguments, plan, PageTalk { controls, notices, has_window: false })?;
+        }
         let ticks = TickLoop::new(&mut session, timing, &to_obey, &to_tell);
         let interrupted = ticks.play(interruption::asked, |session, outcome, due, now_s| {
             status.show(due.tick, outcome);
             sentences.hear(outcome);
+            if let Some(page) = &mut page {
+                page.add(due, now_s, outcome, session);
+            }
             if let Some(pictures) = &mut pictures {
                 pictures.add(due, now_s, outcome, session)?;
             }
@@ -125,6 +133,7 @@ impl RunCommand {
         })?;
         drop(sentences);
         drop(status);
+        drop((page, controls));
         if let Some(key_frames) = key_frames {
             key_frames.finish()?;
         }
@@ -132,6 +141,21 @@ impl RunCommand {
             pictures.finish()?;
         }
         Ok(session.finish(interrupted)?)
+    }
+
+    /// How the run is made ready where no window shows it.
+    fn setup(&self, plan: &RunPlan, page: Option<&RunPage>) -> Setup {
+        let shown_slowly = self.arguments.shown.animation.is_some() || page.is_some();
+        Setup {
+            record: self.arguments.record.clone(),
+            report: self.arguments.report.clone(),
+            threads: self.arguments.threads,
+            // Whoever looks at the page sees the story again.
+            ends_with_script: self.arguments.frames.is_none()
+                && (page.is_none() || !plan.begins_anew(&self.arguments)),
+            squeeze_times: if shown_slowly { 3 } else { 1 },
+            joints: page.map(RunPage::joints),
+        }
     }
 }
 

@@ -25,6 +25,7 @@ use super::display_arguments::DisplayArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::hand_files::read_configuration;
 use super::numbers::{count, place, poisson, positive, speed, ticks};
+use super::page_arguments::PageArguments;
 use super::recorded_object::recorded_object;
 use super::recorded_settings::{recorded_hand, recorded_place, recorded_scene, recorded_settings};
 use crate::ask::connection::ServerChoice;
@@ -57,7 +58,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     pub(super) object_size: Option<f64>,
     /// The hand: scripted[:lift|approach|attach|squeeze|release|regrasp], mouse (in a window),
-    /// serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, or replay:F.mcap.
+    /// serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, xr (with --xr), or
+    /// replay:F.mcap.
     #[arg(long, value_name = "SOURCE")]
     pub(super) hand: Option<HandRequest>,
     /// Configuration of the hand, its glove and its tracker (hand.toml, made by `calibrate` and
@@ -121,6 +123,8 @@ pub struct RunArguments {
     /// What is seen.
     #[command(flatten)]
     pub(super) shown: DisplayArguments,
+    #[command(flatten)]
+    pub(super) page: PageArguments,
     /// Folder for the deformed object at key frames (VTU).
     #[arg(long, value_name = "D")]
     pub(super) out_dir: Option<PathBuf>,
@@ -216,6 +220,11 @@ impl RunArguments {
         self.headless || self.shown.wants_pictures()
     }
 
+    /// Whether a person watches: at a terminal beside the window, or the page. A pipe wants the result.
+    fn is_watched(&self) -> bool {
+        (console_is_watched() && !self.is_without_window()) || self.page.xr.is_some()
+    }
+
     /// The object that was named, with `--object` or without.
     pub(super) fn asked_object(&self) -> Option<&ObjectChoice> {
         self.object.as_ref().or(self.named_object.as_ref())
@@ -258,8 +267,8 @@ impl RunArguments {
         ElasticMaterial::try_new(material.young, material.poisson)
             .context("the scene's material")?;
         let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
-        // A person at a terminal watches; a pipe wants the result.
-        let watched = console_is_watched() && !self.is_without_window();
+        let is_xr = self.takes_headset(&hand)?;
+        let watched = self.is_watched();
         // Devices have a time of their own.
         let rate = self.rate.or((watched || hand.is_live()).then_some(WATCHED_RATE_HZ));
         let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
@@ -291,9 +300,25 @@ impl RunArguments {
             is_live: hand.is_live(),
             hand,
             hand_configuration: self.hand_configuration()?,
-            world_from_sender: self.joints_origin.map(|at| Translation3::from(-at.coords).into()),
+            world_from_sender: self.world_from_sender(is_xr),
             recording: None,
         })
+    }
+
+    /// Whether the hand is that of a headset, which a page has to send.
+    fn takes_headset(&self, hand: &HandRequest) -> anyhow::Result<bool> {
+        if *hand == HandRequest::Xr && self.page.xr.is_none() {
+            bail!(
+                "--hand xr takes the hand of a headset from the page: give it an address by --xr"
+            );
+        }
+        Ok(*hand == HandRequest::Xr)
+    }
+
+    /// Where a sender of joints is placed; a page sends the hand in the world's frame.
+    fn world_from_sender(&self, is_xr: bool) -> Option<Isometry3<f64>> {
+        let chosen = self.joints_origin.map(|at| Translation3::from(-at.coords).into());
+        chosen.or(is_xr.then(Isometry3::identity))
     }
 
     /// How the run grasps, by which equations, and with which hand.
@@ -341,7 +366,7 @@ impl RunArguments {
         let recording = read_recording(path)?;
         let setup = &recording.setup;
         let recorded_s = setup.period_s.unwrap_or(1.0 / WATCHED_RATE_HZ);
-        let watched = console_is_watched() && !self.is_without_window();
+        let watched = self.is_watched();
         let speed = self.speed.unwrap_or(if watched { 1.0 } else { 0.0 });
         let period = (speed > 0.0).then(|| (recorded_s / speed).min(PERIOD_MAX_S));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
@@ -383,11 +408,22 @@ impl RunPlan {
         Self { pace, period, ..self.clone() }
     }
 
+    /// Whether the hand is that of a headset.
+    #[cfg(feature = "xr")]
+    pub(super) fn takes_headset(&self) -> bool {
+        self.hand == HandRequest::Xr
+    }
+
+    /// Whether a script that is over begins anew: what is recorded, or counted in ticks, is one story.
+    pub(super) fn begins_anew(&self, arguments: &RunArguments) -> bool {
+        arguments.record.is_none() && arguments.frames.is_none() && self.recording.is_none()
+    }
+
     /// Its material as the solver knows it.
     ///
     /// # Errors
     /// Not seen: the plan was made of a good one.
-    #[cfg(feature = "window")]
+    #[cfg(any(feature = "window", feature = "xr"))]
     pub(super) fn elastic_material(&self) -> anyhow::Result<ElasticMaterial> {
         let Material { young, poisson } = self.settings.material;
         Ok(ElasticMaterial::try_new(young, poisson)?)

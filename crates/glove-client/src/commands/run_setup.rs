@@ -2,6 +2,8 @@
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
+#[cfg(any(feature = "window", feature = "xr"))]
+use std::sync::Arc;
 
 use anyhow::Context;
 use nalgebra::Isometry3;
@@ -11,19 +13,23 @@ use softgrasp_hand::foreign_recording::{ForeignHand, is_foreign};
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::hand_request::HandRequest;
 use softgrasp_hand::hand_source::HandSource;
-use softgrasp_hand::joints::JointsListener;
+use softgrasp_hand::joints::{JointsFeed, JointsListener};
 use softgrasp_hand::live_hand::LiveHand;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 use softgrasp_hand::mouse::MouseHand;
 use softgrasp_hand::recording::ReplayHand;
 use softgrasp_hand::scripted::{GraspPlan, NoGrasp, Planner, ScriptedHand};
 use softgrasp_hand::serial::{SerialDevices, SerialSettings};
+#[cfg(any(feature = "window", feature = "xr"))]
+use softgrasp_window::view::loading::LoadObject;
 
 use super::run_arguments::RunPlan;
 use super::run_recording::{check_object, start_recorder};
 use crate::ask::connection::Host;
 use crate::ask::link::Link;
 use crate::commands::interruption;
+#[cfg(any(feature = "window", feature = "xr"))]
+use crate::object::loading::ObjectRequest;
 use crate::object::loading::load;
 use crate::pace::Pace;
 use crate::pace::tick_budget::Priority;
@@ -61,6 +67,8 @@ pub(super) struct Setup {
     pub(super) ends_with_script: bool,
     /// How many times as long a script squeezes and holds.
     pub(super) squeeze_times: u32,
+    /// Where the hand of a headset comes from, where there is a page.
+    pub(super) joints: Option<JointsFeed>,
 }
 
 /// Makes a run ready; says at which stage it is. `seen` is shown the object before the first tick.
@@ -141,6 +149,20 @@ pub(super) fn make_ready(
     Ok(ReadyRun { session, host })
 }
 
+/// Loads other objects of the same size.
+#[cfg(any(feature = "window", feature = "xr"))]
+pub(super) fn load_beside(request: ObjectRequest) -> LoadObject {
+    Arc::new(move |wish, goes_on| {
+        let request = ObjectRequest {
+            choice: wish.choice,
+            nodes: wish.nodes.unwrap_or(request.nodes),
+            size_m: wish.size_m.or(request.size_m),
+            ..request.clone()
+        };
+        load(&request, goes_on).map_err(|error| error.to_string()).transpose()
+    })
+}
+
 /// The hand of a run; `grip` is how the scripted one grasps the object.
 fn hand_of(
     plan: &RunPlan,
@@ -169,6 +191,10 @@ fn hand_of(
         }
         (HandRequest::Joints(address), _) => {
             LiveHand::joints(JointsListener::bind(*address)?, plan.hand.to_string()).into()
+        }
+        (HandRequest::Xr, _) => {
+            let feed = setup.joints.clone().context("there is no page that sends a hand")?;
+            LiveHand::fed(feed, plan.hand.to_string()).into()
         }
         (HandRequest::Replay(path), _) if is_foreign(path) => {
             ForeignHand::read(path, hand_setup, plan.tick_s())?.into()

@@ -2,16 +2,15 @@
 
 use std::path::PathBuf;
 use std::process::exit;
-use std::sync::Arc;
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::loaded_object::LoadStage;
+use softgrasp_hand::notice::Notice;
 use softgrasp_os::one_line;
 use softgrasp_window::view::control::Control;
-use softgrasp_window::view::loading::LoadObject;
 use softgrasp_window::view::outlet::outlet;
 use softgrasp_window::window::{
     About, App, End, Opening, SQUEEZE_TIMES, Start, Started, Ticks, WhenLost,
@@ -19,11 +18,11 @@ use softgrasp_window::window::{
 
 use super::device_sentences::DeviceSentences;
 use super::run_arguments::{RunArguments, RunPlan};
-use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
+use super::run_page::{PageTalk, RunPage};
+use super::run_setup::{ReadyRun, Setup, SetupStage, load_beside, make_ready};
 use super::tell_report::tell;
 use crate::ask::connection::{Host, ServerChoice};
 use crate::commands::interruption;
-use crate::object::loading::{ObjectRequest, load};
 use crate::run::observer::{Foresight, Observer};
 use crate::run::run_report::RunReport;
 use crate::run::run_words::{words_of_contact, words_of_server};
@@ -43,6 +42,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 pub(super) fn show(
     arguments: &RunArguments,
     plan: &RunPlan,
+    page: &mut Option<RunPage>,
 ) -> anyhow::Result<Option<Option<RunReport>>> {
     let opening = Opening {
         display: arguments.shown.display(),
@@ -64,36 +64,61 @@ pub(super) fn show(
     };
     interruption::hear();
     let (begun, threads) = channel();
-    let start = start(arguments, plan, begun);
+    let start = start(arguments, plan, begun, page.take());
     let start = start.context("cannot start the thread that begins the run")?;
     app.show(start, interruption::asked)?;
     // It is there if the run began.
     Ok(Some(threads.try_recv().ok().map(TickThread::join).transpose()?))
 }
 
-/// Loads other objects of the same size.
-fn load_beside(request: ObjectRequest) -> LoadObject {
-    Arc::new(move |wish, goes_on| {
-        let request = ObjectRequest {
-            choice: wish.choice,
-            nodes: wish.nodes.unwrap_or(request.nodes),
-            size_m: wish.size_m.or(request.size_m),
-            ..request.clone()
-        };
-        load(&request, goes_on).map_err(|error| error.to_string()).transpose()
-    })
-}
-
 /// What the window holds of the ticks.
-fn in_window(thread: &mut TickThread, report: Option<PathBuf>) -> Ticks {
+fn in_window(
+    thread: &mut TickThread,
+    report: Option<PathBuf>,
+    page: Option<PageWays>,
+) -> std::io::Result<Ticks> {
     let end = thread.run_end();
     // Nobody has taken the sentences before.
-    let notices = thread.take_notices().unwrap_or_else(|| channel().1);
-    Ticks {
+    let mut notices = thread.take_notices().unwrap_or_else(|| channel().1);
+    if let Some(page) = page {
+        notices = page.connect(thread, notices)?;
+    }
+    Ok(Ticks {
         controls: thread.controls(),
         notices,
         is_over: Box::new(move || end.is_there()),
         when_lost: Some(when_lost(thread, report)),
+    })
+}
+
+/// What a page asks of the ticks, and what they have to say to it, beside the window.
+struct PageWays {
+    asked: Receiver<Control>,
+    to_tell: Sender<Notice>,
+}
+
+impl PageWays {
+    /// Hands the page's wishes to the ticks, and their sentences to both; gives the window's.
+    fn connect(
+        self,
+        thread: &TickThread,
+        notices: Receiver<Notice>,
+    ) -> std::io::Result<Receiver<Notice>> {
+        let Self { asked, to_tell } = self;
+        let controls = thread.controls();
+        std::thread::Builder::new().name("page wishes".to_owned()).spawn(move || {
+            // It ends with the page, or with the run.
+            asked.iter().try_for_each(|control| controls.send(control))
+        })?;
+        let (to_window, for_window) = channel();
+        std::thread::Builder::new().name("page notices".to_owned()).spawn(move || {
+            for notice in notices {
+                // Whoever has gone hears nothing.
+                let _ = to_tell.send(notice.clone());
+                let _ = to_window.send(notice);
+            }
+        })?;
+        Ok(for_window)
     }
 }
 
@@ -132,8 +157,10 @@ fn start(
     arguments: &RunArguments,
     plan: &RunPlan,
     begun: Sender<TickThread>,
+    mut page: Option<RunPage>,
 ) -> std::io::Result<Start> {
     let plan = plan.for_window();
+    let arguments_of_page = arguments.clone();
     let report = arguments.report.clone();
     let record = arguments.record.clone();
     let setup = Setup {
@@ -142,10 +169,10 @@ fn start(
         threads: arguments.threads,
         ends_with_script: false,
         squeeze_times: SQUEEZE_TIMES,
+        joints: page.as_ref().map(RunPage::joints),
     };
     let timing = Timing { period: plan.period, ticks_max: arguments.frames };
-    // What is recorded, or counted in ticks, is one story.
-    let begins_anew = arguments.record.is_none() && arguments.frames.is_none();
+    let begins_anew = plan.begins_anew(arguments);
     Start::begin(move |at| {
         let ReadyRun { mut session, host } =
             make_ready(&plan, &setup, |stage| at(step(stage)), |_| Ok(()))?;
@@ -163,6 +190,13 @@ fn start(
             begins_anew,
             server_stage: server_stage(&plan.server, &host),
         };
+        let mut ways = None;
+        if let Some(page) = &mut page {
+            let ((controls, asked), (to_tell, notices)) = (channel(), channel());
+            let talk = PageTalk { controls, notices, has_window: true };
+            page.begin(&arguments_of_page, &plan, talk)?;
+            ways = Some(PageWays { asked, to_tell });
+        }
         let (mut out, inlet) = outlet(FRAMES_EVERY);
         let (mut observer, mut foresight) = (Observer::default(), Foresight::default());
         let mut sentences = DeviceSentences::start(|text| eprintln!("glove-client: {text}"))
@@ -175,12 +209,15 @@ fn start(
             if out.is_due() {
                 let mut frame = observer.frame(due, now_s, outcome, session.grasp_loop());
                 frame.acts = foresight.acts(session.hand(), session.grasp_loop());
+                if let Some(page) = &mut page {
+                    page.show(&frame);
+                }
                 out.publish(Box::new(frame));
             }
         };
         let play = move || {
             let mut thread = TickThread::start(session, timing, || false, sink)?;
-            let ticks = in_window(&mut thread, report);
+            let ticks = in_window(&mut thread, report, ways)?;
             // Whoever shows the window waits for it.
             let _ = begun.send(thread);
             Ok(ticks)

@@ -103,6 +103,7 @@ impl Observer {
                 dimensions: setup.dimensions,
                 world_from_palm: hand.world_from_palm,
                 world_from_segment: *grasp_loop.shown_segments(),
+                record: grasp_loop.reader().joints_number(),
             }),
             grasp: GraspView {
                 state: outcome.state,

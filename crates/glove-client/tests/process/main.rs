@@ -20,6 +20,8 @@ mod interruption;
 mod joint_runs;
 mod killed_server;
 mod numbers;
+#[cfg(feature = "xr")]
+mod page;
 mod press;
 mod recordings;
 mod references;

@@ -69,8 +69,7 @@ mod tests {
         let mut frame = frame(1);
         let (dimensions, palm) = (HandDimensions::default(), Isometry3::translation(x_m, 0.1, 0.2));
         let hand = pose(&dimensions, &JointAngles::flat(), palm);
-        let world_from_segment = hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment));
-        frame.hand = Some(HandView { dimensions, world_from_palm: palm, world_from_segment });
+        frame.hand = Some(HandView::of_pose(dimensions, &hand));
         frame.object.rest_shapes = rest_shapes;
         frame
     }

@@ -64,6 +64,8 @@ pub struct HandView {
     pub world_from_palm: Isometry3<f64>,
     /// The segments, as the grasp shows them.
     pub world_from_segment: HandSegments,
+    /// Number that a sender of joints gave the record which the hand follows.
+    pub record: Option<u64>,
 }
 
 impl HandView {
@@ -75,6 +77,7 @@ impl HandView {
             world_from_segment: pose
                 .fingers
                 .map(|finger| finger.segments.map(|segment| segment.world_from_segment)),
+            record: None,
         }
     }
 

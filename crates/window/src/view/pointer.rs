@@ -111,11 +111,7 @@ mod tests {
         let mut with_palm_at = |z: f64| {
             let palm = Isometry3::from_parts(Translation3::new(0.0, -0.05, z), Default::default());
             let hand = pose(&dimensions, &JointAngles::flat(), palm);
-            frame.hand = Some(HandView {
-                dimensions,
-                world_from_palm: palm,
-                world_from_segment: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
-            });
+            frame.hand = Some(HandView::of_pose(dimensions, &hand));
             pointed_at(&frame, &from, &-Vector3::z())
         };
         assert_eq!(with_palm_at(0.2), PointedAt::Hand);

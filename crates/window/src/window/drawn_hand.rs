@@ -8,6 +8,7 @@ use super::drawn_mesh::{DrawnMesh, set_texture};
 use super::units::{UNITS_PER_M, drawn_point, rotation_from_y};
 use crate::view::frame::HandView;
 use crate::view::hand_skin::HandSkin;
+use crate::view::light::HAND;
 
 /// A hand on the graphics card.
 pub struct DrawnHand {
@@ -28,7 +29,8 @@ impl DrawnHand {
         let mut drawn = DrawnMesh::new(scene, skin.triangles(), &positions, &normals, skin.uvs());
         let node = drawn.node();
         node.set_color(Color::new(1.0, 1.0, 1.0, 1.0));
-        node.set_roughness(0.55).set_metallic(0.0).set_subsurface(0.25, 0.0);
+        let [roughness, subsurface] = HAND;
+        node.set_roughness(roughness).set_metallic(0.0).set_subsurface(subsurface, 0.0);
         set_texture(node, "skin", &HandSkin::texture());
         let colliders = DrawnColliders::new(scene, &hand.colliders());
         Self { dimensions: hand.dimensions, skin, drawn, colliders, positions, normals }

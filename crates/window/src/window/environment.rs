@@ -3,6 +3,7 @@
 use image::{DynamicImage, ImageBuffer, Rgb, Rgb32FImage};
 
 use crate::view::blend::smooth_step;
+use crate::view::light::HORIZON;
 
 /// Width of the picture of the surroundings; half of it is its height.
 const WIDTH: u32 = 256;
@@ -18,9 +19,6 @@ pub fn studio() -> DynamicImage {
     });
     DynamicImage::ImageRgb32F(picture)
 }
-
-/// Colour of the wall at the height of the eye, linear.
-pub const HORIZON: [f32; 3] = [0.78, 0.80, 0.83];
 
 fn radiance(azimuth: f64, elevation: f64) -> [f32; 3] {
     let up = elevation.sin();

@@ -14,7 +14,6 @@ mod environment;
 mod finger_keys;
 mod graphics;
 mod grips;
-mod ground_shade;
 mod input;
 mod lamps;
 mod lost_display;

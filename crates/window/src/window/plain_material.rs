@@ -18,9 +18,10 @@ use kiss3d::prelude::{
 };
 use kiss3d::resource::vertex_index::VERTEX_INDEX_FORMAT;
 
-use super::ground_shade::{Capsule, MAX_CAPSULES};
-use super::lamps::{FILL, FOG_M, KEY, Lamp, wall};
+use super::lamps::wall;
 use super::units::UNITS_PER_M;
+use crate::view::ground_shade::{Capsule, MAX_CAPSULES};
+use crate::view::light::{FILL, FOG_M, KEY, WRAP};
 
 /// A material as scene nodes share it.
 pub type SharedMaterial = Rc<RefCell<Box<dyn Material3d>>>;
@@ -30,8 +31,6 @@ pub type SharedCapsules = Rc<RefCell<Vec<Capsule>>>;
 
 /// Numbers that one object's uniforms consist of; see `Drawn` in the shader.
 const NUMBERS: usize = 3 * 16 + 10 * 4 + MAX_CAPSULES * 8;
-/// Light that gets around the edge of every body, so that no side is black.
-const WRAP: f32 = 0.25;
 
 /// Light by formulas: one lamp, one fill, the surroundings; no shadows but those on the ground.
 pub struct PlainMaterial {
@@ -156,13 +155,19 @@ impl PlainMaterial {
         numbers.extend([data.clearcoat(), data.clearcoat_roughness().clamp(0.05, 1.0)]);
         numbers.extend([fog_begin, 1.0 / (fog_end - fog_begin)]);
         numbers.extend([wall.r, wall.g, wall.b, 0.0]);
-        for Lamp { direction, colour, strength } in [KEY, FILL] {
-            numbers.extend(point(-direction.normalize()));
-            let [red, green, blue] = colour.map(|c| c * strength * std::f32::consts::FRAC_1_PI);
+        for lamp in [KEY, FILL] {
+            numbers.extend(point(-Vec3::from_array(lamp.direction).normalize()));
+            let [red, green, blue] = lamp.thrown();
             numbers.extend([red, green, blue, 0.0]);
         }
         if let Some(capsules) = &self.capsules {
-            numbers.extend(capsules.borrow().iter().take(MAX_CAPSULES).flat_map(Capsule::drawn));
+            numbers.extend(
+                capsules
+                    .borrow()
+                    .iter()
+                    .take(MAX_CAPSULES)
+                    .flat_map(|capsule| capsule.scaled(UNITS_PER_M)),
+            );
         }
         numbers.resize(NUMBERS, 0.0);
         numbers

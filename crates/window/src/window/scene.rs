@@ -9,11 +9,12 @@ use super::drawn_hand::DrawnHand;
 use super::drawn_marks::DrawnMarks;
 use super::drawn_object::DrawnObject;
 use super::drawn_spheres::{DrawnSpheres, Visit};
-use super::ground_shade::capsules;
-use super::stage::{GROUND_M, Stage};
+use super::stage::Stage;
 use crate::view::colouring::Colouring;
 use crate::view::display::{Display, Level, Spheres};
 use crate::view::frame::ViewFrame;
+use crate::view::ground_shade::capsules;
+use crate::view::light::GROUND_M;
 use crate::view::object_skin::Look;
 
 /// A scene on the graphics card.

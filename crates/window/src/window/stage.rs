@@ -7,13 +7,14 @@ use kiss3d::prelude::{
     Color, Fog, NumSamples, OrbitCamera3d, Projection, SceneNode3d, Vec3, Window,
 };
 
-use super::environment::{HORIZON, studio};
-use super::ground_shade::Capsule;
-use super::lamps::{FILL, FOG_M, KEY, SKY, wall};
+use super::environment::studio;
+use super::lamps::{light, wall};
 use super::plain_material::{PlainMaterial, SharedCapsules, SharedMaterial};
 use super::units::{UNITS_PER_M, drawn_point};
 use crate::view::camera::{FIELD_OF_VIEW, ViewCamera};
 use crate::view::display::Level;
+use crate::view::ground_shade::Capsule;
+use crate::view::light::{FILL, FOG_M, GROUND, GROUND_M, GROUND_ROUGHNESS, HORIZON, KEY, SKY};
 
 /// Lights and ground.
 pub struct Stage {
@@ -27,8 +28,6 @@ pub struct Stage {
     capsules: SharedCapsules,
 }
 
-/// The ground lies so far below the object's home where there is no table, m.
-pub const GROUND_M: f64 = -0.085;
 /// Radius of the ground, m: far beyond what is seen sharply.
 const GROUND_RADIUS_M: f32 = 3.0;
 /// Cascades of the key light, the only one that casts shadows; the renderer would keep room for sixteen.
@@ -43,13 +42,15 @@ impl Stage {
         let [fog_begin, fog_end] = FOG_M.map(|m| m * UNITS_PER_M);
         window.set_fog(Fog::linear(wall(), fog_begin, fog_end));
         window.hdr_settings_mut().tonemap = Tonemap::Neutral;
-        scene.add_light(KEY.light());
-        scene.add_light(FILL.light().with_casts_shadows(false));
+        scene.add_light(light(&KEY));
+        scene.add_light(light(&FILL).with_casts_shadows(false));
         let radius = GROUND_RADIUS_M * UNITS_PER_M;
         let mut ground = scene.add_cylinder(radius, 0.2);
         let below = drawn_point(&nalgebra::Point3::new(0.0, GROUND_M, 0.0));
         ground.set_position(below - Vec3::Y * 0.1);
-        ground.set_color(Color::new(0.66, 0.68, 0.71, 1.0)).set_roughness(0.85).set_metallic(0.0);
+        let [red, green, blue] = GROUND;
+        ground.set_color(Color::new(red, green, blue, 1.0));
+        ground.set_roughness(GROUND_ROUGHNESS).set_metallic(0.0);
         let (plain, capsules) = (PlainMaterial::of_bodies(), SharedCapsules::default());
         let plain_ground = PlainMaterial::of_ground(Rc::clone(&capsules));
         Self { ground, ground_m: GROUND_M, level: None, plain, plain_ground, capsules }

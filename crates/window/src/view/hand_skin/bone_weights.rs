@@ -7,7 +7,7 @@ use super::hand_body::HandBody;
 use crate::view::blend::smooth_step;
 
 /// The palm, two metacarpals that cup, three segments for each of five digits.
-pub(super) const BONE_COUNT: usize = 18;
+pub const BONE_COUNT: usize = 18;
 /// The palm with the wrist, and the metacarpals of index and middle finger.
 pub(super) const PALM: usize = 0;
 /// Metacarpals of ring and little finger.

@@ -19,4 +19,5 @@ mod surface_net;
 #[cfg(test)]
 mod tests;
 
+pub use bone_weights::BONE_COUNT;
 pub use skin::HandSkin;

@@ -22,6 +22,12 @@ impl RigidMotion {
         Self { real, dual: shift * real * 0.5 }
     }
 
+    /// Its eight numbers, x, y, z, w of either part.
+    pub fn numbers(&self) -> [f32; 8] {
+        let (real, dual) = (&self.real.coords, &self.dual.coords);
+        std::array::from_fn(|i| if i < 4 { real[i] } else { dual[i - 4] } as f32)
+    }
+
     /// Weighted average of some motions; the weights sum to 1.
     pub fn blend(motions: &[Self], weights: impl Iterator<Item = (usize, f64)>) -> Self {
         let zero = Quaternion::new(0.0, 0.0, 0.0, 0.0);

@@ -80,6 +80,35 @@ impl HandSkin {
         skin_texture()
     }
 
+    /// Vertices in the pose that the skin was made in. Units: m. Frame: palm.
+    pub fn places(&self) -> &[Vector3<f64>] {
+        &self.places
+    }
+
+    /// Outward unit normals in that pose.
+    pub fn normals(&self) -> &[Vector3<f64>] {
+        &self.normals
+    }
+
+    /// Bones that a vertex follows, the heaviest first, and how much; the weights sum to 1. None for
+    /// a vertex that is not there.
+    pub fn weights(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
+        let is_there = vertex < self.places.len();
+        is_there.then(|| self.weights.of(vertex)).into_iter().flatten()
+    }
+
+    /// How each bone moves from the pose that the skin was made in to this one, as a dual quaternion:
+    /// x, y, z, w of the turn, then of half of shift times turn. A vertex moves by their sum after
+    /// its weights, each with the sign that brings it nearer to the sum so far, divided by the length
+    /// of the turn.
+    pub fn bones(
+        &self,
+        world_from_palm: &Isometry3<f64>,
+        world_from_segment: &[[Isometry3<f64>; 3]; 5],
+    ) -> [[f32; 8]; BONE_COUNT] {
+        self.motions(world_from_palm, world_from_segment).map(|motion| motion.numbers())
+    }
+
     /// Fills `positions` (m) and `normals` (unit) of all vertices in the world.
     ///
     /// The segments are those of the hand as it is to be seen, which may differ from the measured

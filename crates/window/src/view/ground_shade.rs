@@ -2,8 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::units::{UNITS_PER_M, drawn_point};
-use crate::view::frame::{HandView, ViewFrame};
+use super::frame::{HandView, ViewFrame};
 
 /// Most capsules that darken the ground.
 pub const MAX_CAPSULES: usize = 12;
@@ -19,12 +18,12 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// Begin and radius, then the end, as they are drawn.
+    /// Begin and radius, then the end, as they are drawn with so many units per metre.
     ///
-    /// Units: drawn units. Frame: world.
-    pub fn drawn(&self) -> [f32; 8] {
-        let (begin, end) = (drawn_point(&self.begin), drawn_point(&self.end));
-        let radius = self.radius as f32 * UNITS_PER_M;
+    /// Frame: world.
+    pub fn scaled(&self, units_per_m: f32) -> [f32; 8] {
+        let [begin, end] = [self.begin, self.end].map(|p| p.coords.map(|x| x as f32 * units_per_m));
+        let radius = self.radius as f32 * units_per_m;
         [begin.x, begin.y, begin.z, radius, end.x, end.y, end.z, 0.0]
     }
 }

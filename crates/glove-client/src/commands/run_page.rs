@@ -1,0 +1,132 @@
+//! The page of a run: opened before the run, shown every tick that is due, closed after it.
+
+use std::sync::mpsc::{Receiver, Sender};
+
+use anyhow::Context;
+use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::joints::JointsFeed;
+use softgrasp_hand::notice::Notice;
+use softgrasp_window::view::control::Control;
+#[cfg(feature = "window")]
+use softgrasp_window::view::frame::ViewFrame;
+use softgrasp_window::view::object_skin::Look;
+use softgrasp_window::view::outlet::Outlet;
+use softgrasp_xr::{Page, PageEncryption, PageOptions, ShownRun};
+
+use super::run_arguments::{RunArguments, RunPlan};
+use super::run_setup::load_beside;
+use crate::pace::Due;
+use crate::run::observer::{Foresight, Observer};
+use crate::run::session::Session;
+use crate::run::tick_outcome::TickOutcome;
+
+/// A page that is served.
+pub(super) struct RunPage {
+    page: Page,
+    out: Option<Outlet>,
+    observer: Observer,
+    foresight: Foresight,
+}
+
+/// Both ends of the person's way to the ticks, as a page needs them.
+pub(super) struct PageTalk {
+    /// Where wishes go.
+    pub(super) controls: Sender<Control>,
+    /// Sentences for the person.
+    pub(super) notices: Receiver<Notice>,
+    /// Whether a window shows the run too.
+    pub(super) has_window: bool,
+}
+
+impl RunPage {
+    /// Serves the page, if one was asked for, and prints its address.
+    ///
+    /// # Errors
+    /// A port that is taken, a certificate that cannot be used.
+    pub(super) fn open(arguments: &RunArguments, plan: &RunPlan) -> anyhow::Result<Option<Self>> {
+        let Some(address) = arguments.page.xr else { return Ok(None) };
+        let page = &arguments.page;
+        let encryption = match (&page.xr_cert, &page.xr_key, page.xr_tls) {
+            (Some(certificate), Some(key), _) => Some(PageEncryption::read(certificate, key)?),
+            (_, _, true) => Some(PageEncryption::self_made(address.ip())?),
+            _ => None,
+        };
+        let is_encrypted = encryption.is_some();
+        let takes_hands = plan.takes_headset();
+        let page = Page::open(PageOptions { address, encryption, takes_hands })?;
+        eprintln!("glove-client: the page is at {}", page.address());
+        if !is_encrypted && !address.ip().is_loopback() {
+            eprintln!(
+                "glove-client: it is not encrypted: a headset shows it flat and tracks no hand; \
+                 --xr-tls encrypts it"
+            );
+        }
+        let (observer, foresight) = (Observer::default(), Foresight::default());
+        Ok(Some(Self { page, out: None, observer, foresight }))
+    }
+
+    /// Where the hand of a headset comes from.
+    pub(super) fn joints(&self) -> JointsFeed {
+        self.page.joints()
+    }
+
+    /// Shows a run from now on. To be called before the calling thread has real-time priority.
+    ///
+    /// # Errors
+    /// The system's, when it gives no thread.
+    pub(super) fn begin(
+        &mut self,
+        arguments: &RunArguments,
+        plan: &RunPlan,
+        talk: PageTalk,
+    ) -> anyhow::Result<()> {
+        let PageTalk { controls, notices, has_window } = talk;
+        let hand = plan.hand.choice();
+        let request = plan.object_request(&HandSetup::default());
+        let run = ShownRun {
+            look: Look::of(&plan.object.to_string()),
+            material: plan.elastic_material()?,
+            shading: arguments.shown.shading,
+            is_directed: matches!(hand, HandChoice::Scripted(_) | HandChoice::Mouse),
+            begins_anew: !has_window && plan.begins_anew(arguments),
+            has_window,
+            controls,
+            notices,
+            load: (!has_window).then(|| load_beside(request)),
+        };
+        let out = self.page.begin(run).context("cannot start a thread for the page")?;
+        self.out = Some(out);
+        Ok(())
+    }
+
+    /// Takes a tick.
+    pub(super) fn add(&mut self, due: Due, now_s: f64, outcome: &TickOutcome, session: &Session) {
+        self.observer.note(due, outcome);
+        let Some(out) = self.out.as_mut().filter(|out| out.is_due()) else { return };
+        let mut frame = self.observer.frame(due, now_s, outcome, session.grasp_loop());
+        frame.acts = self.foresight.acts(session.hand(), session.grasp_loop());
+        out.publish(Box::new(frame));
+    }
+
+    /// Takes a frame that somebody else has made.
+    #[cfg(feature = "window")]
+    pub(super) fn show(&mut self, frame: &ViewFrame) {
+        if let Some(out) = self.out.as_mut().filter(|out| out.is_due()) {
+            out.publish(Box::new(frame.clone()));
+        }
+    }
+}
+
+impl Drop for RunPage {
+    /// Tells how long hands took to pictures.
+    fn drop(&mut self) {
+        if let Some(took) = self.page.hand_to_picture() {
+            eprintln!(
+                "glove-client: headset: {} pictures of newer hands, {} ms from hand to picture (half of \
+                 them), {} ms (99 %)",
+                took.pictures, took.p50_ms, took.p99_ms
+            );
+        }
+    }
+}

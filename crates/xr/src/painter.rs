@@ -1,0 +1,298 @@
+//! The thread beside the ticks that makes pictures for the pages of what the ticks offer.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender};
+use std::time::{Duration, Instant};
+
+use softgrasp_core::fem::Material;
+use softgrasp_grasp::grasp::StateName;
+use softgrasp_hand::notice::{Notice, NoticeKind};
+use softgrasp_window::view::camera::ViewCamera;
+use softgrasp_window::view::colouring::Colouring;
+use softgrasp_window::view::control::Control;
+use softgrasp_window::view::directed_eye::DirectedEye;
+use softgrasp_window::view::frame::{NewsKind, ObjectView, ViewFrame};
+use softgrasp_window::view::ground_shade::capsules;
+use softgrasp_window::view::light::GROUND_M;
+use softgrasp_window::view::loading::LoadObject;
+use softgrasp_window::view::object_skin::Look;
+use softgrasp_window::view::outlet::Inlet;
+use softgrasp_window::view::shading::Shading;
+use tokio::sync::watch;
+
+use crate::from_page::Ask;
+use crate::picture::{Picture, PosedHand};
+use crate::quantised::{QuantisedBox, folded};
+use crate::shown_hand::ShownHand;
+use crate::shown_object::ShownObject;
+use crate::status::{Sentences, status_text};
+use crate::textures::Textures;
+use crate::wishes::{Granted, Wishes};
+
+/// A run that pages are to see.
+pub struct ShownRun {
+    /// What the object looks like.
+    pub look: Look,
+    /// What the object is made of, for the colours.
+    pub material: Material,
+    /// What the colours show; `None` shows strain while a script squeezes.
+    pub shading: Option<Shading>,
+    /// Whether a script moves the hand, so that colours are left to the page.
+    pub is_directed: bool,
+    /// Whether a script that is over begins anew after a pause.
+    pub begins_anew: bool,
+    /// Whether a window shows the run too, and asks for what it needs.
+    pub has_window: bool,
+    /// Where wishes go.
+    pub controls: Sender<Control>,
+    /// Sentences for the person.
+    pub notices: Receiver<Notice>,
+    /// Reads other objects; `None` where that is not the page's business.
+    pub load: Option<LoadObject>,
+}
+
+/// What the painter shares with the pages.
+pub struct Easel {
+    /// The newest picture.
+    pub pictures: watch::Sender<Option<Arc<Picture>>>,
+    /// Wishes of the pages.
+    pub asked: Receiver<Ask>,
+    /// How many pages look.
+    pub viewers: Arc<AtomicUsize>,
+    /// Pictures of surfaces.
+    pub textures: Textures,
+    /// Whether the painter is to end.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// The ticks are looked at so often.
+const LOOK_EVERY: Duration = Duration::from_millis(3);
+/// What is told changes no more often than this.
+const STATUS_EVERY: Duration = Duration::from_millis(100);
+/// A script begins anew so long after its end.
+const PAUSE: Duration = Duration::from_secs(9);
+/// Part of the picture's height by which the scene is seen lower: the menu lies above it.
+const UNDER_MENU: f64 = 0.07;
+/// Strain needs all nodes of an answer: of a larger mesh they take too long to send.
+const COLOURED_NODES_MAX: usize = 20_000;
+
+/// Makes pictures until it is told to stop.
+pub struct Painter {
+    run: ShownRun,
+    easel: Easel,
+    inlet: Inlet,
+    wishes: Wishes,
+    colouring: Colouring,
+    sentences: Sentences,
+    eye: DirectedEye,
+    camera: Option<ViewCamera>,
+    object: Option<ShownObject>,
+    hand: Option<ShownHand>,
+    hand_texture: Option<u32>,
+    version: u32,
+    space: Option<QuantisedBox>,
+    status: Arc<str>,
+    told: Option<Instant>,
+    asked_whole: bool,
+    over_since: Option<Instant>,
+    newest: Option<Box<ViewFrame>>,
+    places: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+}
+
+impl Painter {
+    /// A painter of what comes through an inlet.
+    pub fn new(run: ShownRun, easel: Easel, inlet: Inlet) -> Self {
+        let wishes = Wishes::new(run.controls.clone(), run.load.clone());
+        Self {
+            colouring: Colouring::new(run.material),
+            run,
+            easel,
+            inlet,
+            wishes,
+            sentences: Sentences::default(),
+            eye: DirectedEye::new(false).lowered(UNDER_MENU),
+            camera: None,
+            object: None,
+            hand: None,
+            hand_texture: None,
+            version: 0,
+            space: None,
+            status: "".into(),
+            told: None,
+            asked_whole: false,
+            over_since: None,
+            newest: None,
+            places: Vec::new(),
+            normals: Vec::new(),
+        }
+    }
+
+    /// Works until it is told to stop.
+    pub fn work(mut self) {
+        let mut had_viewers = false;
+        while !self.easel.stop.load(Ordering::Relaxed) {
+            self.hear();
+            let has_viewers = self.easel.viewers.load(Ordering::Relaxed) > 0;
+            let arrived = self.inlet.take();
+            let is_new = arrived.is_some();
+            if let Some(frame) = arrived {
+                self.take_news(&frame);
+                self.newest = Some(frame);
+            }
+            // Somebody who comes while the run stands still sees where it stands.
+            if has_viewers
+                && (is_new || !had_viewers)
+                && let Some(frame) = self.newest.take()
+            {
+                if let Some(picture) = self.paint(&frame) {
+                    self.easel.pictures.send_replace(Some(Arc::new(picture)));
+                }
+                self.newest = Some(frame);
+            }
+            had_viewers = has_viewers;
+            if !is_new {
+                std::thread::sleep(LOOK_EVERY);
+            }
+        }
+    }
+
+    /// Does what pages ask, and hears what the ticks say.
+    fn hear(&mut self) {
+        while let Ok(Notice { text, kind }) = self.run.notices.try_recv() {
+            self.sentences.say(text, kind == NoticeKind::Refused);
+        }
+        while let Ok(ask) = self.easel.asked.try_recv() {
+            let granted = self.wishes.grant(ask);
+            self.granted(granted);
+        }
+        let granted = self.wishes.look_after_reading();
+        self.granted(granted);
+    }
+
+    fn granted(&mut self, granted: Granted) {
+        match granted {
+            Granted::Nothing => {}
+            Granted::Said(text, refused) => self.sentences.say(text, refused),
+            Granted::Shading(shading) => self.run.shading = Some(shading),
+            Granted::Look(look) => self.run.look = look,
+        }
+    }
+
+    fn take_news(&mut self, frame: &ViewFrame) {
+        for news in frame.news.iter().filter(|news| news.kind == NewsKind::Refusal) {
+            self.sentences.say(news.text.clone(), true);
+        }
+        if !frame.acts.story_is_over {
+            self.over_since = None;
+        } else if self.run.begins_anew {
+            let since = *self.over_since.get_or_insert_with(Instant::now);
+            if since.elapsed() >= PAUSE {
+                self.over_since = None;
+                self.wishes.control(Control::Restart);
+            }
+        }
+    }
+
+    /// What the colours show now; asks for what they need.
+    fn shading(&mut self, frame: &ViewFrame) -> Shading {
+        let may_direct = self.run.is_directed
+            && self.run.shading.is_none()
+            && frame.object.rest.mesh().node_count() <= COLOURED_NODES_MAX;
+        let is_squeezed = frame.grasp.state == Some(StateName::Deforming);
+        let shading = match (self.run.shading, may_direct && is_squeezed) {
+            (Some(shading), _) => shading,
+            (None, true) => Shading::Strain,
+            (None, false) => Shading::Plain,
+        };
+        let whole = shading.needs_inside() || may_direct;
+        // A window asks for itself; what it does not need, nobody takes away from it.
+        if whole != self.asked_whole && (whole || !self.run.has_window) {
+            self.wishes.control(Control::SetWhole(whole));
+            self.asked_whole = whole;
+        }
+        shading
+    }
+
+    /// The picture of a frame; `None` for a shape that cannot be shown.
+    fn paint(&mut self, frame: &ViewFrame) -> Option<Picture> {
+        let shading = self.shading(frame);
+        self.colouring.follow(&frame.object, shading, frame.at_s);
+        let shape = frame.shape();
+        self.dress(&frame.object);
+        let object = self.object.as_mut()?;
+        object.follow(&shape, &mut self.places, &mut self.normals);
+        let (space, numbers) = counted(self.space, &self.places)?;
+        self.space = Some(space);
+        let shares = object.shares(self.colouring.shares(), numbers.len());
+        let mesh = Arc::clone(&object.mesh);
+        let hand = self.pose_hand(frame);
+        let pose = &frame.object.world_from_object;
+        let (t, q) = (&pose.translation, &pose.rotation);
+        Some(Picture {
+            tick: frame.tick,
+            object: mesh,
+            hand,
+            record: frame.hand.as_ref().and_then(|hand| u32::try_from(hand.record?).ok()),
+            world_from_object: [t.x, t.y, t.z, q.i, q.j, q.k, q.w].map(|x| x as f32),
+            ground_y: frame.object.table_y.unwrap_or(GROUND_M) as f32,
+            capsules: capsules(frame, &shape, true).iter().map(|c| c.scaled(1.0)).collect(),
+            space,
+            numbers,
+            normals: self.normals.iter().map(|normal| folded(*normal)).collect(),
+            shares,
+            status: self.status(frame),
+        })
+    }
+
+    fn dress(&mut self, object: &ObjectView) {
+        if self.object.as_mut().is_some_and(|shown| shown.is(object)) {
+            return;
+        }
+        // Another object that did not come through a page has no name here.
+        let is_ours = self.object.is_none() || !self.run.has_window;
+        let look = if is_ours { self.run.look } else { Look::Imported };
+        self.version += 1;
+        self.object = Some(ShownObject::new(self.version, look, object, &self.easel.textures));
+        self.space = None;
+    }
+
+    fn pose_hand(&mut self, frame: &ViewFrame) -> Option<PosedHand> {
+        let hand = frame.hand.as_ref()?;
+        if self.hand.as_ref().is_none_or(|shown| !shown.fits(hand)) {
+            let textures = &self.easel.textures;
+            let texture = *self.hand_texture.get_or_insert_with(|| ShownHand::texture(textures));
+            self.version += 1;
+            self.hand = Some(ShownHand::new(self.version, hand, texture));
+        }
+        let shown = self.hand.as_ref()?;
+        Some((Arc::clone(&shown.mesh), shown.bones(hand)))
+    }
+
+    fn status(&mut self, frame: &ViewFrame) -> Arc<str> {
+        if self.told.is_some_and(|then| then.elapsed() < STATUS_EVERY) {
+            return Arc::clone(&self.status);
+        }
+        self.told = Some(Instant::now());
+        let now = self.camera.unwrap_or_default();
+        let directed = self.eye.eye(frame, now, frame.at_s);
+        self.camera = directed.or(self.camera).or_else(|| frame.eye_beside_hand());
+        self.status = status_text(frame, &self.colouring, self.camera, &self.sentences).into();
+        Arc::clone(&self.status)
+    }
+}
+
+/// The numbers of all places: in the box that there is, or in a new one where they have left it.
+fn counted(
+    space: Option<QuantisedBox>,
+    places: &[[f32; 3]],
+) -> Option<(QuantisedBox, Vec<[u16; 3]>)> {
+    let count = |space: &QuantisedBox| places.iter().map(|place| space.numbers(*place)).collect();
+    if let Some((space, numbers)) = space.and_then(|space| Some((space, count(&space)?))) {
+        return Some((space, numbers));
+    }
+    let space = QuantisedBox::around(places)?;
+    let numbers: Option<Vec<[u16; 3]>> = count(&space);
+    Some((space, numbers?))
+}

@@ -1,0 +1,71 @@
+//! The pictures that lie on surfaces, packed once and fetched by number.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use softgrasp_window::view::texture::Texture;
+
+/// Pictures by number; clones hold the same.
+#[derive(Clone, Default)]
+pub struct Textures(Arc<Mutex<Kept>>);
+
+#[derive(Default)]
+struct Kept {
+    last: u32,
+    packed: BTreeMap<u32, Arc<Vec<u8>>>,
+}
+
+/// So many pictures are kept; the oldest go. An object has three at most, a hand one.
+const KEPT_MAX: usize = 12;
+
+impl Textures {
+    /// Packs a picture; its number, from 1 on. 0, which is none, where it cannot be packed.
+    pub fn add(&self, texture: &Texture) -> u32 {
+        let Some(packed) = packed(texture) else { return 0 };
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.last = kept.last.wrapping_add(1).max(1);
+        let number = kept.last;
+        kept.packed.insert(number, Arc::new(packed));
+        while kept.packed.len() > KEPT_MAX {
+            kept.packed.pop_first();
+        }
+        number
+    }
+
+    /// A packed picture: by gzip, width and height as 32-bit numbers, then red, green, blue and alpha
+    /// of each texel.
+    pub fn get(&self, number: u32) -> Option<Arc<Vec<u8>>> {
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.packed.get(&number).cloned()
+    }
+}
+
+fn packed(texture: &Texture) -> Option<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(&texture.width.to_le_bytes()).ok()?;
+    encoder.write_all(&texture.height.to_le_bytes()).ok()?;
+    encoder.write_all(&texture.rgba).ok()?;
+    encoder.finish().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flate2::read::GzDecoder;
+    use std::io::Read;
+
+    #[test]
+    fn picture_comes_back_by_its_number_and_the_oldest_go() {
+        let textures = Textures::default();
+        let texture = Texture::painted(4, 2, |u, v| [u, v, 0.5]);
+        let first = textures.add(&texture);
+        let mut bytes = Vec::new();
+        GzDecoder::new(&textures.get(first).unwrap()[..]).read_to_end(&mut bytes).unwrap();
+        assert_eq!((bytes[0], bytes[4], &bytes[8..]), (4, 2, &texture.rgba[..]));
+        let last = (0..KEPT_MAX).map(|_| textures.add(&texture)).last().unwrap();
+        assert!(textures.get(first).is_none() && textures.get(last).is_some());
+    }
+}

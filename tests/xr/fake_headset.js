@@ -1,0 +1,79 @@
+// A headset that is not there: navigator.xr with two eyes and one tracked hand, which plays the frames of
+// `window.fakeHand` (25 places of a joint in tenths of a millimetre each, 15 frames a second) as often as a
+// display of 72 Hz asks; where pictures come more slowly than 30 a second, the hand moves more slowly. The eye is where the page puts the world's origin at the origin.
+(() => {
+  const RATE_HZ = 72, FRAMES_HZ = 15, STEP_MAX_S = 1 / 30, EYES_M = 0.032;
+  const identity = { x: 0, y: 0, z: 0, w: 1 };
+  window.XRRigidTransform = class {
+    constructor(position = { x: 0, y: 0, z: 0 }, orientation = identity) {
+      this.position = { x: 0, y: 0, z: 0, w: 1, ...position };
+      this.orientation = { ...identity, ...orientation };
+    }
+    get matrix() {
+      const { x, y, z } = this.position;
+      return new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]);
+    }
+    get inverse() {
+      const { x, y, z } = this.position;
+      return new XRRigidTransform({ x: -x, y: -y, z: -z });
+    }
+  };
+  const space = { getOffsetReferenceSpace() { return space; } };
+  window.XRWebGLLayer = class {
+    constructor(session, gl) { this.gl = gl; this.framebuffer = null; }
+    getViewport(view) {
+      const { width, height } = this.gl.canvas;
+      return { x: view.eye === "left" ? 0 : width / 2, y: 0, width: width / 2, height };
+    }
+  };
+  const joints = Array.from({ length: 25 }, (_, joint) => ({ joint }));
+  // Where a joint is now, between two frames.
+  function place(joint, seconds) {
+    const frames = window.fakeHand, at = Math.min(seconds * FRAMES_HZ, frames.length - 1), i = Math.floor(at), t = at - i;
+    const a = frames[i][joint], b = frames[Math.min(i + 1, frames.length - 1)][joint];
+    return { x: 1e-4 * (a[0] + t * (b[0] - a[0])), y: 1e-4 * (a[1] + t * (b[1] - a[1])), z: 1e-4 * (a[2] + t * (b[2] - a[2])) };
+  }
+  class Session extends EventTarget {
+    constructor() {
+      super();
+      this.renderState = {};
+      this.inputSources = [{ handedness: "right", hand: new Map(joints.map((j, i) => [i, j])) }];
+      this.seconds = 0;
+      this.before = performance.now();
+      window.fakeSession = this;
+    }
+    updateRenderState(state) { Object.assign(this.renderState, state); }
+    async requestReferenceSpace() { return space; }
+    requestAnimationFrame(draw) {
+      setTimeout(() => { if (!this.ended) draw(performance.now(), this.frame()); }, 1000 / RATE_HZ);
+    }
+    frame() {
+      const eye = window.fakeEye || { x: 0, y: 0.38, z: 0.45 }, f = 1.2, n = 0.02, far = 20;
+      const aspect = 0.5 * this.renderState.baseLayer.gl.canvas.width / this.renderState.baseLayer.gl.canvas.height;
+      const tilt = 0.62, c = Math.cos(tilt), s = Math.sin(tilt);
+      // The head looks down at the table: a turn about X.
+      const view = (name, dx) => {
+        const transform = new XRRigidTransform({ ...eye, x: eye.x + dx });
+        const { x, y, z } = transform.position;
+        const inverse = new Float32Array([1, 0, 0, 0, 0, c, s, 0, 0, -s, c, 0, -x, -(c * y - s * z), -(s * y + c * z), 1]);
+        return {
+          eye: name, transform: { position: transform.position, inverse: { matrix: inverse } },
+          projectionMatrix: new Float32Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + n) / (n - far), -1, 0, 0, (2 * far * n) / (n - far), 0]),
+        };
+      };
+      const now = performance.now();
+      if (window.fakeHandMoves) this.seconds += Math.min((now - this.before) / 1000, STEP_MAX_S);
+      this.before = now;
+      const seconds = this.seconds;
+      return {
+        session: this,
+        getViewerPose: () => ({ transform: new XRRigidTransform(eye), views: [view("left", -EYES_M), view("right", EYES_M)] }),
+        getJointPose: ({ joint }) => ({ transform: new XRRigidTransform(place(joint, seconds)), radius: 0.01 }),
+      };
+    }
+    async end() { this.ended = true; this.dispatchEvent(new Event("end")); }
+  }
+  const xr = { isSessionSupported: async (mode) => mode === "immersive-vr", requestSession: async () => new Session() };
+  Object.defineProperty(navigator, "xr", { value: xr, configurable: true });
+  WebGL2RenderingContext.prototype.makeXRCompatible = async () => {};
+})();

@@ -1,0 +1,197 @@
+"""Looks at the page of a run: flat, in a fake headset, and after a loss. See run.sh."""
+
+import json
+import os
+import re
+import signal
+import struct
+import subprocess
+import sys
+import time
+import zlib
+from pathlib import Path
+
+from browser import Browser
+
+HERE = Path(__file__).parent
+OBJECT = ["--object", "strawberry", "--nodes", "1000"]
+
+
+def say(text):
+    print(f"xr: {text}", flush=True)
+
+
+class Run:
+    """A run that serves a page."""
+
+    def __init__(self, client, folder, *more):
+        self.log = Path(folder) / f"run-{time.monotonic_ns()}.log"
+        with open(self.log, "wb") as log:
+            self.process = subprocess.Popen(
+                [client, "run", "--headless", "--xr", "127.0.0.1:0", *OBJECT, *more],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=folder)
+        end = time.monotonic() + 60
+        while True:
+            told = re.search(r"the page is at (http\S+)", self.said())
+            if told:
+                self.address = told.group(1)
+                return
+            if time.monotonic() > end or self.process.poll() is not None:
+                raise RuntimeError(f"no page:\n{self.said()}")
+            time.sleep(0.05)
+
+    def said(self):
+        return self.log.read_text(errors="replace")
+
+    def end(self):
+        """Ends the run as Ctrl-C does; its exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(60)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+
+
+def pixels(file):
+    """Width, height and rows of a PNG picture of eight bits a channel without interlacing."""
+    data, at, packed = Path(file).read_bytes(), 8, b""
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        piece = data[at + 8:at + 8 + length]
+        if kind == b"IHDR":
+            width, height, _, colour = struct.unpack(">IIBB", piece[:10])
+        elif kind == b"IDAT":
+            packed += piece
+        at += 12 + length
+    each = {2: 3, 6: 4}[colour]
+    raw, rows, before = zlib.decompress(packed), [], bytearray(width * each)
+    for y in range(height):
+        begin = y * (width * each + 1)
+        filtered, row = raw[begin], bytearray(raw[begin + 1:begin + 1 + width * each])
+        for i in range(len(row)):
+            left = row[i - each] if i >= each else 0
+            up, corner = before[i], before[i - each] if i >= each else 0
+            if filtered == 1:
+                row[i] = (row[i] + left) & 255
+            elif filtered == 2:
+                row[i] = (row[i] + up) & 255
+            elif filtered == 3:
+                row[i] = (row[i] + (left + up) // 2) & 255
+            elif filtered == 4:
+                p = left + up - corner
+                a, b, c = abs(p - left), abs(p - up), abs(p - corner)
+                row[i] = (row[i] + (left if a <= b and a <= c else up if b <= c else corner)) & 255
+        rows.append([tuple(row[each * x:each * x + 3]) for x in range(width)])
+        before = row
+    return width, height, rows
+
+
+def share_of_red(rows, columns):
+    """Share of the pixels of some columns that are as red as a strawberry."""
+    seen = [pixel for row in rows[::3] for pixel in row[columns]]
+    return sum(r > 90 and r > 1.9 * g and r > 1.9 * b for r, g, b in seen) / len(seen)
+
+
+def check(holds, what):
+    if not holds:
+        raise AssertionError(what)
+
+
+def flat(client, program, folder, pictures):
+    """A browser without a headset sees a scripted hand squeeze and lift."""
+    run = Run(client, folder, "--hand", "scripted:lift", "--shading", "plain")
+    browser = Browser(program, folder)
+    try:
+        browser.open(run.address)
+        browser.until("window.softgrasp && softgrasp.figures.drawn > 3 && softgrasp.scene.picture")
+        browser.until("[...softgrasp.scene.textures.values()].every((t) => t)")
+        browser.until("softgrasp.figures.status.height_mm > 25 && softgrasp.figures.status.deforming")
+        browser.picture(f"{pictures}/flat.png")
+        width, height, rows = pixels(f"{pictures}/flat.png")
+        red = share_of_red(rows, slice(0, width))
+        check(red > 0.01, f"there is no strawberry in the picture: {red:.4f} of it is red")
+        # A drag turns the view.
+        before = browser.value("softgrasp.eye.now.yaw")
+        for kind, x in (("mousePressed", 640), ("mouseMoved", 700), ("mouseReleased", 700)):
+            browser.ask("Input.dispatchMouseEvent", {
+                "type": kind, "x": x, "y": 420, "button": "left", "buttons": 1, "clickCount": 1})
+        check(browser.value("softgrasp.eye.now.yaw") != before, "a drag does not turn the view")
+        browser.value("document.getElementById('colours').click()")
+        browser.until("softgrasp.figures.status.shading !== 'plain' && !document.getElementById('legend').hidden")
+        browser.until("softgrasp.scene.picture.coloured")
+        browser.picture(f"{pictures}/flat-coloured.png")
+        told = browser.value("document.getElementById('figures').textContent")
+        say(f"flat: {told}")
+        check(browser.value("softgrasp.figures.faults") == [], browser.value("softgrasp.figures.faults"))
+        browser.value("softgrasp.stream && document.querySelector('#exit-dialog').showModal()")
+        browser.value("document.querySelector('#exit-dialog button[value=exit]').click()")
+        browser.until("document.getElementById('state').textContent.includes('the run')", 30)
+        check(run.process.wait(60) == 0, f"the run ended with {run.process.returncode}")
+    finally:
+        browser.close()
+        run.end()
+
+
+def headset(client, program, folder, pictures):
+    """The tracked hand of a headset lifts the strawberry; the connection is lost and comes back."""
+    run = Run(client, folder, "--hand", "xr", "--grasp", "contact", "--shading", "plain")
+    browser = Browser(program, folder, (960, 480))
+    try:
+        browser.before_every_page((HERE / "fake_headset.js").read_text())
+        hand = json.loads((HERE / "lifting_hand.json").read_text())
+        browser.before_every_page(f"window.fakeHand = {json.dumps(hand)};")
+        browser.open(run.address)
+        browser.until("window.softgrasp && softgrasp.figures.drawn > 3 && softgrasp.scene.picture")
+        browser.until("[...softgrasp.scene.textures.values()].every((t) => t)")
+        browser.until("softgrasp.figures.status.server === 'connected' && !softgrasp.figures.status.preparing")
+        browser.until("!document.getElementById('enter').hidden")
+        browser.value("document.getElementById('enter').click()")
+        browser.until("softgrasp.figures.stereo > 10")
+        browser.until("softgrasp.scene.picture.hand !== 0")
+        browser.value("window.fakeHandMoves = true")
+        browser.until("softgrasp.figures.status.state === 'squeezed'")
+        browser.until("softgrasp.figures.status.height_mm > 15")
+        # The hand holds it up while the picture is taken.
+        browser.value("window.fakeHandMoves = false")
+        browser.picture(f"{pictures}/headset.png")
+        width, height, rows = pixels(f"{pictures}/headset.png")
+        for name, columns in (("left", slice(0, width // 2)), ("right", slice(width // 2, width))):
+            red = share_of_red(rows, columns)
+            check(red > 0.0008, f"the {name} eye sees no strawberry: {red:.4f} of it is red")
+        browser.value("window.fakeHandMoves = true")
+        say("lost: the connection is cut")
+        before = browser.value("softgrasp.stream.connections")
+        browser.value("softgrasp.card.ask && softgrasp.headset.stream.socket.close()")
+        browser.until(f"softgrasp.stream.connections > {before}", 30)
+        pictures_before = browser.value("softgrasp.stream.pictures")
+        browser.until(f"softgrasp.stream.pictures > {pictures_before} + 5", 30)
+        told = browser.value(
+            "JSON.stringify({stereo: softgrasp.figures.stereo, hands: softgrasp.stream.handsSent,"
+            "pictures: softgrasp.stream.pictures, hand_to_picture_ms: softgrasp.median(softgrasp.figures.latencies)})")
+        say(f"headset: {told}")
+        figures = json.loads(told)
+        check(figures["hands"] > 50 and figures["stereo"] > 50, "too few hands or pictures")
+        check(figures["hand_to_picture_ms"] is not None, "no latency was measured")
+        check(browser.value("softgrasp.figures.faults") == [], browser.value("softgrasp.figures.faults"))
+        # The menu of the board: leave the headset.
+        browser.value("softgrasp.headset.board.press('leave')")
+        browser.until("!softgrasp.headset.isInside")
+        check(run.end() == 0, f"the run ended with {run.process.returncode}:\n{run.said()}")
+        check("from hand to picture" in run.said(), f"the run tells no latency:\n{run.said()}")
+    finally:
+        browser.close()
+        run.end()
+
+
+def main():
+    client, folder, pictures = sys.argv[1:4]
+    program = os.environ["BROWSER_PROGRAM"]
+    for part in (flat, headset):
+        say(part.__doc__.split(";")[0].rstrip("."))
+        part(client, program, folder, pictures)
+
+
+if __name__ == "__main__":
+    main()
