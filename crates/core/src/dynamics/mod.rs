@@ -25,6 +25,8 @@ mod features;
 mod law_tests;
 mod near;
 mod outcome;
+#[cfg(test)]
+mod partial_slip_tests;
 mod pool;
 mod rigid_motion;
 mod rounds;
