@@ -21,6 +21,10 @@ mod bodies;
 mod checks;
 mod configuration;
 mod features;
+mod large_body;
+mod large_step;
+#[cfg(test)]
+mod large_tests;
 #[cfg(test)]
 mod law_tests;
 mod near;
@@ -39,6 +43,7 @@ mod tests;
 
 pub use bodies::MovingBody;
 pub use features::Candidate;
+pub use large_body::LargeBody;
 pub use near::{near_triangles, reach_of_step};
 pub use outcome::{BodyLoad, PointContact, StepOutcome};
 pub use rigid_motion::MassProperties;
