@@ -28,7 +28,7 @@ impl ProblemPoint {
             gap,
             frame: Matrix3::from_columns(&[normal, tangent, normal.cross(&tangent)]),
             arm: gap.place - scene.rigid.mass.centre,
-            relief: response.body().relief_of(&point.nodes, &point.weights),
+            relief: response.relief_of(&point.nodes, &point.weights),
         }
     }
 

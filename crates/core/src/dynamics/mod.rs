@@ -21,10 +21,16 @@ mod bodies;
 mod checks;
 mod configuration;
 mod features;
+mod large_body;
+mod large_step;
+#[cfg(test)]
+mod large_tests;
 #[cfg(test)]
 mod law_tests;
 mod near;
 mod outcome;
+#[cfg(test)]
+mod partial_slip_tests;
 mod pool;
 mod rigid_motion;
 mod rounds;
@@ -37,6 +43,7 @@ mod tests;
 
 pub use bodies::MovingBody;
 pub use features::Candidate;
+pub use large_body::LargeBody;
 pub use near::{near_triangles, reach_of_step};
 pub use outcome::{BodyLoad, PointContact, StepOutcome};
 pub use rigid_motion::MassProperties;

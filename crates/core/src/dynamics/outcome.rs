@@ -36,9 +36,21 @@ pub struct StepOutcome {
     pub sweeps: usize,
     /// Steps of Newton's method.
     pub newton_steps: usize,
+    /// Shapes that contact was solved about, one after the other; 1 for a linear step.
+    pub shapes: usize,
 }
 
 impl StepOutcome {
+    /// Whether it meets what was asked for, or its residuals and its penetration are smaller than those of
+    /// another outcome.
+    pub(super) fn is_nearer_than(&self, other: &Self) -> bool {
+        if self.is_converged {
+            return true;
+        }
+        let worst = |of: &Self| of.residual_rel.max(of.contact_residual_rel);
+        worst(self) < worst(other) && self.penetration_max <= other.penetration_max
+    }
+
     /// The outcome of the last part of a step, with what the parts before it have added.
     pub(super) fn after(self, before: &Self) -> Self {
         Self {
@@ -52,6 +64,7 @@ impl StepOutcome {
             rounds: self.rounds + before.rounds,
             sweeps: self.sweeps + before.sweeps,
             newton_steps: self.newton_steps + before.newton_steps,
+            shapes: self.shapes + before.shapes,
             ..self
         }
     }

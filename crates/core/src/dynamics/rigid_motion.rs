@@ -31,6 +31,15 @@ impl MassProperties {
     }
 }
 
+impl MassProperties {
+    /// The same mass with other moments of inertia; `None` where these have no inverse.
+    pub(super) fn with_inertia(self, inertia: Matrix3<f64>) -> Option<Self> {
+        let inverse_inertia = inertia.try_inverse()?;
+        let is_sound = inverse_inertia.iter().all(|x| x.is_finite());
+        is_sound.then_some(Self { inertia, inverse_inertia, ..self })
+    }
+}
+
 /// Force and torque about the centre of mass, in the object's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Wrench {

@@ -9,7 +9,7 @@ use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint};
 use super::pool::{Pool, force_at};
 use super::settings::StepSettings;
-use super::state::{HeldContact, ObjectState};
+use super::state::HeldContact;
 use super::step_error::StepError;
 use crate::contact::coulomb::SolveBudget;
 use crate::solve::condensed::Response;
@@ -29,6 +29,8 @@ pub(super) struct Found {
     pub pressing: Vec<(ProblemPoint, Vector3<f64>)>,
     pub penetration: f64,
     pub residual: f64,
+    /// Whether a force acts elsewhere than where the problem was made.
+    pub has_moved: bool,
     pub is_converged: bool,
     pub rounds: usize,
     pub sweeps: usize,
@@ -56,21 +58,19 @@ struct Round {
 }
 
 impl Rounds<'_, '_> {
-    pub fn play(&mut self, state: &ObjectState) -> Result<Found, StepError> {
+    /// Plays them from some contacts on, which act on an object that is placed and shaped so.
+    pub fn play(
+        &mut self,
+        held: Vec<HeldContact>,
+        start: &Configured<'_>,
+    ) -> Result<Found, StepError> {
         let (settings, size) = (self.settings, self.size);
         let allowed = settings.penetration_rel * size;
-        let start = Configured {
-            world_from_object: state.world_from_object,
-            displacement: &self.scene.begun,
-            body_forces: &[],
-        };
-        let is_known = |c: &&HeldContact| usize::from(c.body) < self.scene.bodies.len();
-        let held: Vec<HeldContact> = state.contacts.iter().filter(is_known).copied().collect();
         let mut pool = self.corners();
         for contact in &held {
             pool.add(contact.into(), &mut []);
         }
-        let mut about = self.scene.configuration(self.response, held, &start);
+        let mut about = self.scene.configuration(self.response, held, start);
         let (mut rounds, mut sweeps, mut newton_steps) = (0, 0, 0);
         let mut best: Option<(f64, Configuration, Round)> = None;
         loop {
@@ -93,12 +93,14 @@ impl Rounds<'_, '_> {
                     _ => (about, round),
                 };
                 let (penetration, residual) = (round.penetration, round.residual);
+                let has_moved = round.has_moved;
                 let pressing = round.into_pressing();
                 return Ok(Found {
                     end,
                     pressing,
                     penetration,
                     residual,
+                    has_moved,
                     is_converged,
                     rounds,
                     sweeps,

@@ -82,6 +82,18 @@ pub(super) fn at_nodes<'a>(contacts: impl IntoIterator<Item = &'a HeldContact>) 
     summed(contacts.into_iter().flat_map(of_contact).collect())
 }
 
+/// Forces at nodes as one field of all nodes.
+///
+/// Shapes: `dofs` 3N.
+pub(super) fn spread(forces: &[NodeForce], dofs: usize) -> Vec<f64> {
+    let mut field = vec![0.0; dofs];
+    for (node, force) in forces {
+        let at = 3 * *node as usize;
+        field[at..at + 3].iter_mut().zip(force.iter()).for_each(|(f, of_node)| *f += of_node);
+    }
+    field
+}
+
 /// A point of a triangle, by weights of its corners.
 pub(super) fn mix(corners: &[Vector3<f64>; 3], weights: &[f64; 3]) -> Point3<f64> {
     Point3::from(weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2])

@@ -7,14 +7,14 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
 use super::checks::{check, check_names, check_nodes, mass_of};
-use super::configuration::{Scene, sums_by_body};
+use super::configuration::{Configured, Scene, sums_by_body};
 use super::features::Candidate;
 use super::outcome::{BodyLoad, PointContact, StepOutcome};
 use super::pool::merged;
-use super::rigid_motion::{MassProperties, RigidStep};
+use super::rigid_motion::MassProperties;
 use super::rounds::{Found, Rounds};
 use super::settings::StepSettings;
-use super::state::{ObjectState, at_nodes};
+use super::state::{HeldContact, ObjectState, at_nodes};
 use super::step_error::StepError;
 use crate::contact::coulomb::{FrictionCone, state_of};
 use crate::solve::condensed::{Elasticity, Response};
@@ -35,6 +35,10 @@ pub struct ContactStep<'a> {
     pub settings: StepSettings,
 }
 
+/// Makes one part of a step, from where the part before it has ended.
+pub(super) type MakePart<'m> =
+    dyn FnMut(&ContactStep<'_>, &ObjectState, &[u32]) -> Result<StepOutcome, StepError> + 'm;
+
 /// Share of its thickness that a body moves in one part of a step at most.
 const WAY_OF_THICKNESS: f64 = 0.5;
 /// Most parts of a step.
@@ -53,6 +57,19 @@ impl ContactStep<'_> {
         check_nodes(state, self.vertices.len())?;
         let mass = mass_of(self.elasticity.body, &self.settings)?;
         let parts = self.parts(state, &mass);
+        self.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
+            part.advance_whole(begun, mass, wanted)
+        })
+    }
+
+    /// Makes equal parts of the step one after the other.
+    pub(super) fn in_parts(
+        &self,
+        parts: usize,
+        state: &ObjectState,
+        wanted: &[u32],
+        make: &mut MakePart<'_>,
+    ) -> Result<StepOutcome, StepError> {
         let share = |part: usize| part as f64 / parts as f64;
         let mut made: Option<StepOutcome> = None;
         for part in 0..parts {
@@ -64,7 +81,7 @@ impl ContactStep<'_> {
             let begun = made.as_ref().map_or(state, |made| &made.state);
             // Displacements are of no use before the last part.
             let wanted = if part + 1 == parts { wanted } else { &[] };
-            let next = of_part.advance_whole(begun, mass, wanted)?;
+            let next = make(&of_part, begun, wanted)?;
             made = Some(match made {
                 Some(before) => next.after(&before),
                 None => next,
@@ -75,7 +92,7 @@ impl ContactStep<'_> {
 
     /// Number of parts in none of which a body that can touch moves by more than a share of its
     /// thickness, seen from an object that goes on as it does: one that is carried along is still.
-    fn parts(&self, state: &ObjectState, mass: &MassProperties) -> usize {
+    pub(super) fn parts(&self, state: &ObjectState, mass: &MassProperties) -> usize {
         let before = &state.world_from_object;
         let after = drifted(state, mass, self.settings.seconds);
         let touching: BTreeSet<u16> = self.candidates.iter().map(|c| c.body).collect();
@@ -98,26 +115,24 @@ impl ContactStep<'_> {
         let mut response = self.response(state);
         response.need(state.forces.iter().map(|(node, _)| *node))?;
         response.need(at_nodes(&state.contacts).iter().map(|(node, _)| *node))?;
-        let settings = &self.settings;
-        let (seconds, gravity) = (settings.seconds, settings.gravity);
-        let scene = Scene {
-            vertices: self.vertices,
-            triangles: self.triangles,
-            bodies: self.bodies,
-            candidates: self.candidates,
-            rigid: RigidStep { state, mass, gravity, seconds },
-            viscosity: settings.viscosity,
-            begun: response.displacement(&state.forces),
-            world_from_bodies_begun: self.bodies_begun(state),
-        };
+        let scene = self.scene(state, mass, response.displacement(&state.forces));
         let size = self.size();
+        let settings = &self.settings;
         let mut rounds = Rounds { settings, size, scene: &scene, response: &mut response };
-        let found = rounds.play(state)?;
-        Ok(self.outcome(&scene, &response, &found, wanted))
+        let is_known = |c: &&HeldContact| usize::from(c.body) < self.bodies.len();
+        let held = state.contacts.iter().filter(is_known).copied().collect();
+        let start = Configured {
+            world_from_object: state.world_from_object,
+            displacement: &scene.begun,
+            body_forces: &[],
+        };
+        let found = rounds.play(held, &start)?;
+        let displacements = response.displacement_of(wanted, &found.end.forces);
+        Ok(self.outcome(&scene, &response, &found, displacements))
     }
 
     /// The bodies when the step begins, pushed back by the forces of that moment.
-    fn bodies_begun(&self, state: &ObjectState) -> Vec<Isometry3<f64>> {
+    pub(super) fn bodies_begun(&self, state: &ObjectState) -> Vec<Isometry3<f64>> {
         let turn = state.world_from_object.rotation;
         let forces = sums_by_body(&state.contacts, self.bodies.len());
         let pushed = |(body, force): (&MovingBody, &Vector3<f64>)| {
@@ -127,7 +142,7 @@ impl ContactStep<'_> {
     }
 
     /// Size of the object: the diagonal of its bounding box, m.
-    fn size(&self) -> f64 {
+    pub(super) fn size(&self) -> f64 {
         let (mut low, mut high) =
             (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for vertex in self.vertices {
@@ -138,21 +153,27 @@ impl ContactStep<'_> {
 
     /// The response of all nodes that the step can meet.
     fn response(&self, state: &ObjectState) -> Response<'_> {
+        Response::new(self.elasticity, self.rows(state))
+    }
+
+    /// All nodes that the step can meet, ascending.
+    pub(super) fn rows(&self, state: &ObjectState) -> Vec<u32> {
         let near = self.candidates.iter().flat_map(|c| self.triangles[c.triangle as usize]);
         let forced = state.forces.iter().map(|(node, _)| *node);
         let held = state.contacts.iter().flat_map(|contact| contact.nodes);
         let mut rows: Vec<u32> = near.chain(forced).chain(held).collect();
         rows.sort_unstable();
         rows.dedup();
-        Response::new(self.elasticity, rows)
+        rows
     }
 
-    fn outcome(
+    /// What is told of where the rounds have ended.
+    pub(super) fn outcome(
         &self,
         scene: &Scene<'_>,
         response: &Response<'_>,
         found: &Found,
-        wanted: &[u32],
+        displacements: Vec<[f64; 3]>,
     ) -> StepOutcome {
         let end = &found.end;
         let world_from_object = end.motion.world_from_object;
@@ -198,7 +219,7 @@ impl ContactStep<'_> {
                 forces: end.forces.clone(),
                 contacts: merged(&end.contacts),
             },
-            displacements: response.displacement_of(wanted, &end.forces),
+            displacements,
             slip_max: contacts.iter().map(|c| c.slip.norm()).fold(0.0, f64::max),
             contacts,
             loads,
@@ -211,6 +232,7 @@ impl ContactStep<'_> {
             rounds: found.rounds,
             sweeps: found.sweeps,
             newton_steps: found.newton_steps,
+            shapes: 1,
         }
     }
 }

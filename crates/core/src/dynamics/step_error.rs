@@ -54,6 +54,21 @@ pub enum StepError {
     /// State or pose that is not finite.
     #[error("a number of the object's state or of a body's pose is not finite")]
     NotFinite,
+    /// No shape at large deformation answers the forces of the state.
+    #[error(
+        "no shape was found that the forces of the object's state hold (what is left is \
+         {residual_rel:.1e} of them); begin from rest"
+    )]
+    NoShape {
+        /// Residual that was left, over the forces.
+        residual_rel: f64,
+    },
+    /// Wherever contact leads, an element would turn inside out.
+    #[error(
+        "an element would turn inside out wherever the bodies press the object to; move them less in \
+         a step, or use a finer mesh there"
+    )]
+    InsideOut,
     /// The elastic part failed.
     #[error(transparent)]
     Elastic(#[from] CondensedError),

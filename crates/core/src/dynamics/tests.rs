@@ -1,8 +1,11 @@
 //! Scenes with known answers: weight on a table, a pinch that lifts or slides, Hertz.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::*;
+use crate::fem::hyperelastic::Law;
 use crate::fem::{Element, Material};
 use crate::mesh::{BuiltIn, Surface, TetMesh, generate};
 use crate::model::Model;
@@ -13,8 +16,8 @@ use crate::solve::condensed::{Base, Columns, Elasticity, FreeBody};
 pub(super) struct Object {
     pub(super) model: Model,
     pub(super) surface: Surface,
-    base: Base,
-    body: FreeBody,
+    pub(super) base: Base,
+    pub(super) body: FreeBody,
     columns: Columns,
 }
 
@@ -44,25 +47,45 @@ impl Object {
         bodies: &[MovingBody],
         settings: StepSettings,
     ) -> StepOutcome {
+        self.with_step(state, bodies, settings, |step| {
+            step.advance(state, &self.surface.nodes).unwrap()
+        })
+    }
+
+    /// The same at large deformation.
+    pub(super) fn advance_large(
+        &self,
+        large: &mut LargeBody,
+        state: &ObjectState,
+        bodies: &[MovingBody],
+        settings: StepSettings,
+    ) -> StepOutcome {
+        self.with_step(state, bodies, settings, |step| {
+            step.advance_large(large, state, &self.surface.nodes).unwrap()
+        })
+    }
+
+    fn with_step<T>(
+        &self,
+        state: &ObjectState,
+        bodies: &[MovingBody],
+        settings: StepSettings,
+        make: impl FnOnce(ContactStep<'_>) -> T,
+    ) -> T {
         let vertices = self.model.mesh().vertices();
         let elasticity = Elasticity { base: &self.base, body: &self.body, columns: &self.columns };
-        let size = self.model.mesh().size();
-        let candidates = near_triangles(
-            vertices,
-            &self.surface.triangles,
-            &state.world_from_object,
-            bodies,
-            0.3 * size,
-        );
-        let step = ContactStep {
-            vertices,
-            triangles: &self.surface.triangles,
-            elasticity,
-            bodies,
-            candidates: &candidates,
-            settings,
-        };
-        step.advance(state, &self.surface.nodes).unwrap()
+        let triangles = &self.surface.triangles;
+        let margin = 0.3 * self.model.mesh().size();
+        let candidates =
+            near_triangles(vertices, triangles, &state.world_from_object, bodies, margin);
+        let candidates = &candidates;
+        make(ContactStep { vertices, triangles, elasticity, bodies, candidates, settings })
+    }
+
+    /// The object at large deformation, at rest.
+    pub(super) fn large(&self, law: Law) -> LargeBody {
+        let elements = Arc::new(self.model.hyperelastic(law).unwrap());
+        LargeBody::at_rest(elements, Arc::clone(self.model.stiffness().pattern()))
     }
 
     /// Mass at a density of 1000 kg/m³.

@@ -23,7 +23,7 @@ pub mod rates;
 mod sparse;
 mod stage;
 mod tiles;
-mod vectors;
+pub(crate) mod vectors;
 pub mod work;
 mod worked_out;
 mod zero_energy;

@@ -1,7 +1,7 @@
 //! Sums of vectors: norm, scalar product, difference.
 
 /// Euclidean norm, scaled so that tiny and huge units neither vanish nor overflow.
-pub(super) fn norm(v: &[f64]) -> f64 {
+pub(crate) fn norm(v: &[f64]) -> f64 {
     let square = sum_of_squares(v, |x| x);
     if SAFE_SQUARES.contains(&square) {
         return square.sqrt();

@@ -223,6 +223,11 @@ impl Base {
         &self.fixed
     }
 
+    /// Order and analysis of the factor, and of that of any matrix on its pattern.
+    pub fn analysis(&self) -> &FrontAnalysis {
+        self.factor.analysis()
+    }
+
     /// Nodal forces `K u` (3.36) of a displacement field.
     ///
     /// Shapes: 3N. Units: m, N.
@@ -246,7 +251,7 @@ impl Base {
     }
 }
 
-fn refuse(error: FrontError, partition: &Partition) -> CondensedError {
+pub(super) fn refuse(error: FrontError, partition: &Partition) -> CondensedError {
     match error {
         FrontError::NotPositive { row } => {
             let dof = partition.unknown().get(row).map_or(0, |&d| d as usize);

@@ -30,6 +30,19 @@ pub struct ContactColumns {
 }
 
 impl ContactColumns {
+    /// Columns of another matrix than the base's, about whose errors nothing is kept.
+    pub(super) fn of_fields(contact: Contact, fields: [Vec<f64>; 3]) -> Self {
+        let norms = fields.each_ref().map(|field| norm(field));
+        Self {
+            contact,
+            fields,
+            surface: WorkedOut::default(),
+            norms,
+            residuals: [f64::NAN; 3],
+            residual_bounds: [f64::NAN; 3],
+        }
+    }
+
     /// Displacements at the nodes of the surface, node by node; put together for the first who asks.
     ///
     /// Units: m/N.
@@ -57,6 +70,11 @@ impl Columns {
     /// Units: `bound` bytes.
     pub fn new(bound: usize) -> Self {
         Self { bound, kept: Mutex::default() }
+    }
+
+    /// Bytes that columns may take.
+    pub fn bound(&self) -> usize {
+        self.bound
     }
 
     /// Bytes the columns of one contact take at most.

@@ -6,6 +6,8 @@
 //! and of all displacements that answer it the one without a mean motion is Pᵀ K⁻ P f, where K⁻ may be
 //! the inverse of any stiffness that holds the body at as many degrees of freedom as it has motions.
 
+use std::ops::AddAssign;
+
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
 use rayon::prelude::*;
 
@@ -127,6 +129,11 @@ impl FreeBody {
         self.volume
     }
 
+    /// Volume that each node stands for, m³.
+    pub fn volumes(&self) -> &[f64] {
+        &self.volumes
+    }
+
     /// Centre of mass at rest.
     pub fn centre(&self) -> Point3<f64> {
         self.centre
@@ -135,6 +142,67 @@ impl FreeBody {
     /// Moments of inertia about the centre at a density of one, m⁵.
     pub fn inertia(&self) -> &Matrix3<f64> {
         &self.inertia
+    }
+
+    /// Moments of inertia about the centre in a deformed shape, at a density of one, m⁵.
+    ///
+    /// Shapes: `displacement` 3N.
+    pub fn inertia_of(&self, displacement: &[f64]) -> Matrix3<f64> {
+        let mut inertia = Matrix3::zeros();
+        for ((v, rest), u) in
+            self.volumes.iter().zip(&self.vertices).zip(displacement.chunks_exact(3))
+        {
+            let r = rest - self.centre + Vector3::from_column_slice(u);
+            inertia += *v * (r.norm_squared() * Matrix3::identity() - r * r.transpose());
+        }
+        inertia
+    }
+
+    /// `Rᵀ M u`: the mean motion of a displacement field, mass by mass at a density of one.
+    ///
+    /// Shapes: `displacement` 3N.
+    pub fn mean_motion(&self, displacement: &[f64]) -> Vector6<f64> {
+        let mut mean = Vector6::zeros();
+        for ((node, v), u) in self.volumes.iter().enumerate().zip(displacement.chunks_exact(3)) {
+            let u = Vector3::from_column_slice(u);
+            let turned = (self.vertices[node] - self.centre).cross(&u);
+            mean.fixed_rows_mut::<3>(0).add_assign(*v * u);
+            mean.fixed_rows_mut::<3>(3).add_assign(*v * turned);
+        }
+        mean
+    }
+
+    /// The columns of `M R`: loads that accelerate the body as a rigid one, 3N each.
+    pub fn mean_loads(&self) -> Vec<Vec<f64>> {
+        let load = |motion: usize| {
+            let of_node = |(node, v): (usize, &f64)| {
+                let along = self.motions(node).column(motion) * *v;
+                [along[0], along[1], along[2]]
+            };
+            self.volumes.iter().enumerate().flat_map(of_node).collect()
+        };
+        (0..6).map(load).collect()
+    }
+
+    /// Forces at all nodes less the columns of `M R` that leave a deformed shape without a resultant
+    /// force and torque.
+    ///
+    /// Shapes: `forces` and `displacement` 3N. Units: N, m.
+    pub fn balanced(&self, forces: &mut [f64], displacement: &[f64]) {
+        let (mut sum, mut carried) = (Vector6::zeros(), Matrix6::zeros());
+        for (node, (f, u)) in forces.chunks_exact(3).zip(displacement.chunks_exact(3)).enumerate() {
+            let r = self.vertices[node] - self.centre + Vector3::from_column_slice(u);
+            let mut here = Matrix3x6::zeros();
+            here.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+            here.fixed_view_mut::<3, 3>(0, 3).copy_from(&-r.cross_matrix());
+            sum += here.transpose() * Vector3::from_column_slice(f);
+            carried += self.volumes[node] * here.transpose() * self.motions(node);
+        }
+        let Some(acceleration) = carried.lu().solve(&sum) else { return };
+        for (node, f) in forces.chunks_exact_mut(3).enumerate() {
+            let inertia = self.volumes[node] * self.motions(node) * acceleration;
+            f.iter_mut().zip(inertia.iter()).for_each(|(f, i)| *f -= i);
+        }
     }
 
     /// Bytes of the responses.
@@ -235,6 +303,17 @@ impl FreeBody {
 
 /// Nodes that one thread relieves by itself.
 const NODES_ALONE: usize = 1024;
+
+impl Relief {
+    /// That of a compliance which is the free body's already.
+    pub fn none() -> Self {
+        Self {
+            acceleration: Matrix6x3::zeros(),
+            response: Matrix3x6::zeros(),
+            left: Matrix6x3::zeros(),
+        }
+    }
+}
 
 /// How inertia answers a force at a point, and how the held body answers inertia there.
 #[derive(Clone, Copy, Debug)]

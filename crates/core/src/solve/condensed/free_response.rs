@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::base::{Base, CondensedError};
 use super::columns::{Columns, ContactColumns};
-use super::free_body::FreeBody;
+use super::free_body::{FreeBody, Relief};
+use super::free_tangent::FreeTangent;
 use super::surface_columns::{Block, SurfaceNodes};
 use super::touched::Contact;
 
@@ -26,11 +27,31 @@ pub struct Elasticity<'a> {
     pub columns: &'a Columns,
 }
 
+/// The elastic part about a deformed shape: to first order its shape is `offset + C f`.
+#[derive(Clone, Copy)]
+pub struct ShapeResponse<'a> {
+    /// The base, whose order the tangent is factored in.
+    pub base: &'a Base,
+    /// What nothing holds.
+    pub body: &'a FreeBody,
+    /// C.
+    pub tangent: &'a FreeTangent,
+    /// The displacement that is left where no forces act, to first order; 3N, m.
+    pub offset: &'a [f64],
+}
+
+/// Where columns and displacements come from.
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    Linear(Elasticity<'a>),
+    Shape(ShapeResponse<'a>),
+}
+
 /// The response of some nodes (rows) to forces at nodes that are added as they are needed.
 ///
 /// Shapes: one 3 × 3 block for each row and each node with a force.
 pub struct Response<'a> {
-    elasticity: Elasticity<'a>,
+    source: Source<'a>,
     rows: Vec<u32>,
     /// Columns of the held compliance, by node of the force.
     kept: BTreeMap<u32, Arc<ContactColumns>>,
@@ -42,7 +63,14 @@ const TASK_ROWS: usize = 512;
 impl<'a> Response<'a> {
     /// Shapes: `rows` ascending nodes.
     pub fn new(elasticity: Elasticity<'a>, rows: Vec<u32>) -> Self {
-        Self { elasticity, rows, kept: BTreeMap::new() }
+        Self { source: Source::Linear(elasticity), rows, kept: BTreeMap::new() }
+    }
+
+    /// The response of a shape that is deformed already, to first order about it.
+    ///
+    /// Shapes: `rows` ascending nodes.
+    pub fn about(shape: ShapeResponse<'a>, rows: Vec<u32>) -> Self {
+        Self { source: Source::Shape(shape), rows, kept: BTreeMap::new() }
     }
 
     /// The nodes whose displacement can be asked for, ascending.
@@ -67,9 +95,17 @@ impl<'a> Response<'a> {
         if missing.is_empty() {
             return Ok(());
         }
-        let contacts: Vec<Contact> = missing.iter().map(|&node| Contact::Node(node)).collect();
-        let Elasticity { base, columns, .. } = self.elasticity;
-        self.kept.extend(missing.into_iter().zip(columns.of_contacts(base, &contacts)?));
+        let found = match self.source {
+            Source::Linear(Elasticity { base, columns, .. }) => {
+                let contacts: Vec<Contact> =
+                    missing.iter().map(|&node| Contact::Node(node)).collect();
+                columns.of_contacts(base, &contacts)?
+            }
+            Source::Shape(ShapeResponse { base, body, tangent, .. }) => {
+                tangent.columns(base, body, &missing)?
+            }
+        };
+        self.kept.extend(missing.into_iter().zip(found));
         Ok(())
     }
 
@@ -79,7 +115,7 @@ impl<'a> Response<'a> {
     /// If the node was not named to [`Response::need`].
     pub fn held(&self, node: u32) -> HeldCompliance<'_> {
         let columns = &self.kept[&node];
-        let nodes = &self.elasticity.base.surface;
+        let nodes = &self.base().surface;
         HeldCompliance {
             nodes,
             surface: columns.surface(nodes),
@@ -87,9 +123,33 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// The free body.
-    pub fn body(&self) -> &FreeBody {
-        self.elasticity.body
+    fn base(&self) -> &'a Base {
+        match self.source {
+            Source::Linear(elasticity) => elasticity.base,
+            Source::Shape(shape) => shape.base,
+        }
+    }
+
+    /// What inertia takes from the compliance between points whose columns are asked for; nothing where
+    /// the columns are those of the free body.
+    pub fn relief_of(&self, nodes: &[u32; 3], weights: &[f64; 3]) -> Relief {
+        match self.source {
+            Source::Linear(elasticity) => elasticity.body.relief_of(nodes, weights),
+            Source::Shape(_) => Relief::none(),
+        }
+    }
+
+    /// Finishes the displacement of some nodes under forces, of which that of the columns is there.
+    fn finish(&self, forces: &[NodeForce], nodes: &[u32], displacement: &mut [[f64; 3]]) {
+        match self.source {
+            Source::Linear(elasticity) => elasticity.body.relieve(forces, nodes, displacement),
+            Source::Shape(shape) => {
+                for (u, &node) in displacement.iter_mut().zip(nodes) {
+                    let offset = &shape.offset[3 * node as usize..3 * node as usize + 3];
+                    u.iter_mut().zip(offset).for_each(|(u, offset)| *u += offset);
+                }
+            }
+        }
     }
 
     /// Displacement of the rows under forces at needed nodes, in balance with inertia.
@@ -100,7 +160,7 @@ impl<'a> Response<'a> {
         for (node, force) in forces {
             self.held(*node).add(force, &self.rows, &mut u);
         }
-        self.body().relieve(forces, &self.rows, &mut u);
+        self.finish(forces, &self.rows, &mut u);
         u.into_iter().map(Vector3::from).collect()
     }
 
@@ -116,19 +176,20 @@ impl<'a> Response<'a> {
                 columns.add(force, nodes, u);
             }
         });
-        self.body().relieve(forces, nodes, &mut u);
+        self.finish(forces, nodes, &mut u);
         u
     }
 
-    /// `‖K u − P f‖ / ‖f‖` at most, by the residuals of the columns as computed.
+    /// `‖K u − P f‖ / ‖f‖` at most, by the residuals of the columns as computed; of a linear body.
     pub fn residual_rel(&self, forces: &[NodeForce]) -> f64 {
+        let Source::Linear(elasticity) = self.source else { return f64::NAN };
         let (mut residual, mut square) = (0.0, 0.0);
         for (node, force) in forces {
             let columns = &self.kept[node];
             residual += (0..3).map(|c| force[c].abs() * columns.residuals[c]).sum::<f64>();
             square += force.norm_squared();
         }
-        residual += self.body().residual(forces);
+        residual += elasticity.body.residual(forces);
         if square > 0.0 { residual / square.sqrt() } else { 0.0 }
     }
 }

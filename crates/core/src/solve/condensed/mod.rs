@@ -29,6 +29,7 @@ mod eigenvalue;
 mod exact;
 mod free_body;
 mod free_response;
+mod free_tangent;
 mod load_size;
 #[cfg(test)]
 mod mask_tests;
@@ -46,5 +47,6 @@ pub use certificate::{Certificate, Delivery};
 pub use columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
 pub use contact_set::{ContactAnswer, ContactSet};
 pub use free_body::{FreeBody, Relief};
-pub use free_response::{Elasticity, HeldCompliance, NodeForce, Response};
+pub use free_response::{Elasticity, HeldCompliance, NodeForce, Response, ShapeResponse};
+pub use free_tangent::FreeTangent;
 pub use touched::{Contact, Touched};

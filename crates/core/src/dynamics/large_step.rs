@@ -1,0 +1,363 @@
+//! One step at large deformation: contact about a shape to first order, then that shape again.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::checks::{check, check_names, check_nodes, mass_of};
+use super::configuration::{Configured, Scene};
+use super::large_body::{LargeBody, Shape};
+use super::outcome::StepOutcome;
+use super::rigid_motion::{MassProperties, RigidStep};
+use super::rounds::{Found, Rounds};
+use super::settings::StepSettings;
+use super::state::{HeldContact, ObjectState, at_nodes};
+use super::step::ContactStep;
+use super::step_error::StepError;
+use crate::solve::condensed::{FreeTangent, Response, ShapeResponse};
+
+/// Shapes that a step is solved about, one after the other.
+const SHAPES_MAX: usize = 24;
+/// A factor that leaves more than this of the residual is made anew.
+const LEFT_BY_FACTOR: f64 = 0.2;
+/// Residual that is expected of the shape that a step begins with.
+const LEFT_AT_FIRST: f64 = 0.5;
+/// Least residual of the elastic part that can be asked for.
+const RESIDUAL_MIN: f64 = 1e-10;
+/// How often a step that finds no end is cut into halves.
+const HALVINGS: usize = 2;
+/// Residual of either part above which halves of the step may do better.
+const LOST: f64 = 1e-3;
+/// Shapes in a row that are no nearer to what is asked for than the best, after which the step ends.
+const NO_NEARER_MAX: usize = 3;
+/// Contact about a shape that is off is solved no better than this share of how far that is.
+const INEXACT: f64 = 1e-3;
+
+/// An end of a step: the contacts, and the shape as it is to first order about another one.
+struct End {
+    found: Found,
+    displacement: Vec<f64>,
+    tangent: Arc<FreeTangent>,
+    offset: Vec<f64>,
+    /// Forces out of balance over those that made the shape …
+    residual_rel: f64,
+    /// … and over those that are told.
+    told: f64,
+    /// How far it is from what is asked for: at most 1 where it is met.
+    far: f64,
+}
+
+impl ContactStep<'_> {
+    /// Makes the step at large deformation: the elastic part is in balance in its deformed shape. The
+    /// body keeps the shape and a factor from step to step.
+    ///
+    /// Shapes: `wanted` nodes whose displacements are asked for.
+    ///
+    /// # Errors
+    /// [`StepError`]; a step that does not meet the law of contact or is out of balance is no error, it
+    /// says so.
+    pub fn advance_large(
+        &self,
+        large: &mut LargeBody,
+        state: &ObjectState,
+        wanted: &[u32],
+    ) -> Result<StepOutcome, StepError> {
+        check(&self.settings, self.bodies, state)?;
+        check_names(self.candidates, (self.triangles.len(), self.bodies.len()))?;
+        check_nodes(state, self.vertices.len())?;
+        large.take_shape_of(self.elasticity, &state.forces)?;
+        let mass = mass_of(self.elasticity.body, &self.settings)?;
+        let parts = self.parts(state, &mass);
+        self.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
+            part.advance_or_halve(large, begun, wanted, HALVINGS)
+        })
+    }
+
+    /// Makes the step at once, or in halves where it finds no end.
+    fn advance_or_halve(
+        &self,
+        large: &mut LargeBody,
+        state: &ObjectState,
+        wanted: &[u32],
+        halvings: usize,
+    ) -> Result<StepOutcome, StepError> {
+        let before = large.shape().clone();
+        let whole = self.advance_shape(large, state, wanted);
+        let is_lost = match &whole {
+            Ok(whole) => whole.residual_rel > LOST || whole.contact_residual_rel > LOST,
+            Err(error) => *error == StepError::InsideOut,
+        };
+        if halvings == 0 || !is_lost {
+            return whole;
+        }
+        let after = std::mem::replace(&mut *large.shape_mut(), before);
+        let halves = self.in_parts(2, state, wanted, &mut |half, begun, wanted| {
+            half.advance_or_halve(large, begun, wanted, halvings - 1)
+        });
+        match (halves, &whole) {
+            (Ok(halves), Err(_)) => Ok(halves),
+            (Ok(halves), Ok(whole)) if halves.is_nearer_than(whole) => Ok(halves),
+            _ => {
+                large.put(after);
+                whole
+            }
+        }
+    }
+
+    /// The whole step at once.
+    fn advance_shape(
+        &self,
+        large: &mut LargeBody,
+        state: &ObjectState,
+        wanted: &[u32],
+    ) -> Result<StepOutcome, StepError> {
+        let rows = self.rows(state);
+        let begun = at_rows(&rows, large.displacement());
+        let scene = self.scene(state, self.mass_of_shape(large)?, begun);
+        let is_known = |c: &&HeldContact| usize::from(c.body) < self.bodies.len();
+        let mut progress = Progress {
+            held: state.contacts.iter().filter(is_known).copied().collect(),
+            world_from_object: state.world_from_object,
+            body_forces: Vec::new(),
+            about: large.displacement().to_vec(),
+            best: None,
+            no_nearer: 0,
+            left: LEFT_AT_FIRST,
+            is_stale: large.tangent().is_none(),
+            effort: Effort::default(),
+        };
+        while progress.effort.shapes < SHAPES_MAX && progress.no_nearer < NO_NEARER_MAX {
+            let end = self.next_end(large, &scene, &rows, &mut progress)?;
+            if self.take(large, &scene, end, &mut progress) {
+                break;
+            }
+        }
+        let is_sound = |end: &End| end.residual_rel.is_finite() && end.told.is_finite();
+        let Some(end) = progress.best.filter(is_sound) else { return Err(StepError::InsideOut) };
+        let outcome = self.finished(large, &scene, (rows, end), wanted);
+        Ok(progress.effort.told(outcome))
+    }
+
+    /// Solves contact about the shape that was reached.
+    fn next_end(
+        &self,
+        large: &mut LargeBody,
+        scene: &Scene<'_>,
+        rows: &[u32],
+        progress: &mut Progress,
+    ) -> Result<End, StepError> {
+        let tangent = match large.tangent().filter(|_| !progress.is_stale) {
+            Some(kept) => kept,
+            None => large.factor_at(self.elasticity, &progress.about)?,
+        };
+        let start_rows = at_rows(rows, &progress.about);
+        let start = Configured {
+            world_from_object: progress.world_from_object,
+            displacement: &start_rows,
+            body_forces: &progress.body_forces,
+        };
+        let held = std::mem::take(&mut progress.held);
+        let about = (progress.about.as_slice(), &tangent, rows);
+        let end = self.end_about(large, scene, about, (held, &start), INEXACT * progress.left)?;
+        progress.effort.see(&end.found);
+        Ok(end)
+    }
+
+    /// Goes on to an end, as far as its elements keep their volume; says whether it is the last.
+    fn take(
+        &self,
+        large: &LargeBody,
+        scene: &Scene<'_>,
+        end: End,
+        progress: &mut Progress,
+    ) -> bool {
+        let Progress { about, best, no_nearer, left, .. } = progress;
+        let step: Vec<f64> =
+            end.displacement.iter().zip(about.iter()).map(|(new, old)| new - old).collect();
+        let share = large.share_of_step(about, &step);
+        let is_whole = share >= 1.0 && end.residual_rel.is_finite();
+        if is_whole {
+            about.clone_from(&end.displacement);
+        } else if share > 0.0 {
+            let share = share.min(0.5);
+            about.iter_mut().zip(&step).for_each(|(u, d)| *u += share * d);
+        }
+        progress.held.clone_from(&end.found.end.contacts);
+        progress.world_from_object = end.found.end.motion.world_from_object;
+        progress.body_forces.clone_from(&end.found.end.body_forces);
+        let (now, is_met) = (end.residual_rel, end.far <= 1.0);
+        let is_best = best.as_ref().is_none_or(|best| end.far < best.far);
+        *no_nearer = if is_best || !is_whole { 0 } else { *no_nearer + 1 };
+        if is_best {
+            *best = Some(end);
+        }
+        // Where contact alone is not met, another factor would not help.
+        let is_off = now > self.tolerance() && now > LEFT_BY_FACTOR * *left;
+        progress.is_stale = !is_whole || is_off;
+        *left = if now.is_finite() { now.min(LEFT_AT_FIRST) } else { LEFT_AT_FIRST };
+        if progress.held.is_empty() && scene.elastic_forces(&[]).is_empty() {
+            // Nothing presses: the shape is that of rest.
+            progress.is_stale |= progress.about.iter().any(|u| *u != 0.0);
+            progress.about.fill(0.0);
+        }
+        is_met || share.is_nan()
+    }
+
+    /// Residual of the elastic part that is small enough, over its forces.
+    fn tolerance(&self) -> f64 {
+        self.settings.residual_rel.max(RESIDUAL_MIN)
+    }
+
+    /// Contact about a shape to first order, and how well the shape that it leads to is in balance.
+    fn end_about(
+        &self,
+        large: &LargeBody,
+        scene: &Scene<'_>,
+        (about, tangent, rows): (&[f64], &Arc<FreeTangent>, &[u32]),
+        (held, start): (Vec<HeldContact>, &Configured<'_>),
+        exactness: f64,
+    ) -> Result<End, StepError> {
+        let (base, body) = (self.elasticity.base, self.elasticity.body);
+        let holding = large.elements().evaluate(about).forces;
+        let held_up = tangent.apply(base, body, &holding);
+        let offset: Vec<f64> = about.iter().zip(&held_up).map(|(u, c)| u - c).collect();
+        let shape = ShapeResponse { base, body, tangent, offset: &offset };
+        let mut response = Response::about(shape, rows.to_vec());
+        response.need(scene.elastic_forces(&[]).iter().map(|(node, _)| *node))?;
+        response.need(held.iter().flat_map(|contact| contact.nodes))?;
+        let asked = self.settings;
+        let settings = StepSettings {
+            residual_rel: asked.residual_rel.max(exactness),
+            penetration_rel: asked.penetration_rel.max(INEXACT * exactness),
+            ..asked
+        };
+        let size = self.size();
+        let mut rounds = Rounds { settings: &settings, size, scene, response: &mut response };
+        let found = rounds.play(held, start)?;
+        let all: Vec<u32> = (0..self.vertices.len() as u32).collect();
+        let mut displacement: Vec<f64> =
+            response.displacement_of(&all, &found.end.forces).into_flattened();
+        if found.end.forces.is_empty() && displacement.iter().all(|u| u.abs() < 1e-12 * size) {
+            displacement.fill(0.0);
+        }
+        let residual_rel =
+            large.balance(self.elasticity, &displacement, &found.end.forces).residual_rel;
+        // A force that has moved since acts on the shape that it had made before: that is told.
+        let told = match found.has_moved {
+            false => residual_rel,
+            true => {
+                let forces = scene.elastic_forces(&at_nodes(&found.end.contacts));
+                large.balance(self.elasticity, &displacement, &forces).residual_rel
+            }
+        };
+        let force_max = found.end.contacts.iter().map(|c| c.force.norm()).fold(0.0, f64::max);
+        let share = |off: f64, allowed: f64| if off > 0.0 { off / allowed } else { 0.0 };
+        let far = share(found.penetration, asked.penetration_rel * size)
+            .max(share(found.residual, asked.residual_rel * force_max))
+            .max(share(told, self.tolerance()));
+        let far = if found.has_moved { far.max(2.0) } else { far };
+        let tangent = Arc::clone(tangent);
+        Ok(End { found, displacement, tangent, offset, residual_rel, told, far })
+    }
+
+    /// Leaves the body in the shape of an end, and says what it is like.
+    fn finished(
+        &self,
+        large: &mut LargeBody,
+        scene: &Scene<'_>,
+        (rows, end): (Vec<u32>, End),
+        wanted: &[u32],
+    ) -> StepOutcome {
+        let (base, body) = (self.elasticity.base, self.elasticity.body);
+        let End { found, displacement, tangent, offset, told, far, .. } = end;
+        let shape = ShapeResponse { base, body, tangent: &tangent, offset: &offset };
+        let response = Response::about(shape, rows);
+        let of_node = |&node: &u32| {
+            let at = 3 * node as usize;
+            [displacement[at], displacement[at + 1], displacement[at + 2]]
+        };
+        let displacements = wanted.iter().map(of_node).collect();
+        let outcome = self.outcome(scene, &response, &found, displacements);
+        let forces = found.end.forces;
+        large.put(Shape { displacement, forces });
+        let is_converged = far <= 1.0;
+        StepOutcome { residual_rel: told, is_converged, ..outcome }
+    }
+
+    /// Mass and inertia of the body in its shape.
+    fn mass_of_shape(&self, large: &LargeBody) -> Result<MassProperties, StepError> {
+        let mass = mass_of(self.elasticity.body, &self.settings)?;
+        let inertia = self.elasticity.body.inertia_of(large.displacement());
+        Ok(mass.with_inertia(self.settings.density * inertia).unwrap_or(mass))
+    }
+
+    /// What does not change while the step is solved.
+    pub(super) fn scene<'s>(
+        &'s self,
+        state: &'s ObjectState,
+        mass: MassProperties,
+        begun: Vec<Vector3<f64>>,
+    ) -> Scene<'s> {
+        let StepSettings { seconds, gravity, viscosity, .. } = self.settings;
+        Scene {
+            vertices: self.vertices,
+            triangles: self.triangles,
+            bodies: self.bodies,
+            candidates: self.candidates,
+            rigid: RigidStep { state, mass, gravity, seconds },
+            viscosity,
+            begun,
+            world_from_bodies_begun: self.bodies_begun(state),
+        }
+    }
+}
+
+/// Where a step has got to.
+struct Progress {
+    /// Contacts of the last end, with the pose and the forces that it has.
+    held: Vec<HeldContact>,
+    world_from_object: Isometry3<f64>,
+    body_forces: Vec<Vector3<f64>>,
+    /// The shape that was reached, 3N, m.
+    about: Vec<f64>,
+    best: Option<End>,
+    /// Ends in a row that were no nearer to what is asked for than the best.
+    no_nearer: usize,
+    /// Residual of the last shape, over the forces.
+    left: f64,
+    /// Whether the factor is to be made anew.
+    is_stale: bool,
+    effort: Effort,
+}
+
+/// What a step has taken so far.
+#[derive(Clone, Copy, Default)]
+struct Effort {
+    shapes: usize,
+    rounds: usize,
+    sweeps: usize,
+    newton_steps: usize,
+}
+
+impl Effort {
+    fn see(&mut self, found: &Found) {
+        self.shapes += 1;
+        self.rounds += found.rounds;
+        self.sweeps += found.sweeps;
+        self.newton_steps += found.newton_steps;
+    }
+
+    fn told(self, outcome: StepOutcome) -> StepOutcome {
+        let Self { shapes, rounds, sweeps, newton_steps } = self;
+        StepOutcome { shapes, rounds, sweeps, newton_steps, ..outcome }
+    }
+}
+
+/// Displacement of some nodes.
+fn at_rows(rows: &[u32], displacement: &[f64]) -> Vec<Vector3<f64>> {
+    let of = |&node: &u32| {
+        let at = 3 * node as usize;
+        Vector3::from_column_slice(&displacement[at..at + 3])
+    };
+    rows.iter().map(of).collect()
+}
