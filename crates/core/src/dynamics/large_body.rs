@@ -237,7 +237,7 @@ impl LargeBody {
     fn settle(
         &mut self,
         elasticity: Elasticity<'_>,
-        displacement: &mut Vec<f64>,
+        displacement: &mut [f64],
         forces: &[NodeForce],
     ) -> Result<f64, CondensedError> {
         if forces.is_empty() {
