@@ -281,7 +281,9 @@ fn run_without_a_viewer_goes_on_and_one_that_comes_back_sees_the_whole_object() 
 fn page_that_cannot_be_served_is_one_sentence() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
-    let run = |more: &[&str]| [&["run", "--headless"], &OBJECT[..], more].concat();
+    fn run<'a>(more: &[&'a str]) -> Vec<&'a str> {
+        [&["run", "--headless"], &OBJECT[..], more].concat()
+    }
     let said = fail(1, &run(&["--xr", &address]));
     assert!(said.contains(&format!("cannot serve the page at {address}")), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
