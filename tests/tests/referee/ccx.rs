@@ -61,6 +61,22 @@ impl Ccx {
     /// # Panics
     /// If it takes too long, or ends well without printing every node.
     pub fn try_run(&self, folder: &Path, deck: &str, system: &System) -> Result<Results, String> {
+        let text = self.printed(folder, deck)?;
+        let read = |title| read_block(&text, title, system);
+        match (read("displacements"), read("forces")) {
+            (Some(displacement), Some(force)) => Ok(Results { displacement, force }),
+            _ => panic!("ccx ({}) has not printed every node:\n{text}", self.version),
+        }
+    }
+
+    /// All that one deck prints.
+    ///
+    /// # Errors
+    /// What CalculiX said, if it ends with an error.
+    ///
+    /// # Panics
+    /// If it takes too long.
+    pub fn printed(&self, folder: &Path, deck: &str) -> Result<String, String> {
         let results = folder.join("referee.dat");
         // A result of the run before must not be taken for one of this run.
         let _ = std::fs::remove_file(&results);
@@ -74,13 +90,8 @@ impl Ccx {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        let said = wait(child)?;
-        let text = std::fs::read_to_string(&results).unwrap_or_default();
-        let read = |title| read_block(&text, title, system);
-        match (read("displacements"), read("forces")) {
-            (Some(displacement), Some(force)) => Ok(Results { displacement, force }),
-            _ => panic!("ccx ({}) has not printed every node; it said:\n{said}", self.version),
-        }
+        wait(child)?;
+        Ok(std::fs::read_to_string(&results).unwrap_or_default())
     }
 }
 

@@ -11,6 +11,8 @@
 
 mod agreement;
 mod ccx;
+mod contact;
+mod contact_deck;
 mod deck;
 mod object;
 mod question;

@@ -124,7 +124,13 @@ class ContactReport:
     newton_steps: int
     """Steps of Newton's method."""
     columns_computed: int
-    """Nodes whose columns were computed for this step."""
+    """Nodes whose columns were computed for this step, by linear elasticity."""
+    deformation: str
+    """Which equations the elastic part was solved by: `linear` or `large`."""
+    shapes: int
+    """Shapes that contact was solved about; 1 for linear elasticity."""
+    factors: int
+    """Factors of the tangent that were made."""
 
 
 def read_solve_report(reader: PayloadReader) -> SolveReport:
@@ -185,8 +191,9 @@ def read_contact_report(reader: PayloadReader) -> ContactReport:
     """Reads the report of a contact frame."""
     depth, slip, residual, relative, cone, converged, *counts = reader.fields(_CONTACT)
     errors = (depth, slip, residual, relative, cone)
-    rounds, sweeps, newton, columns = counts
-    return ContactReport(*errors, reader.truth(converged), rounds, sweeps, newton, columns)
+    deformation = reader.choice(("linear", "large"), "deformation")
+    shapes = reader.fields(_CONTACT_END)
+    return ContactReport(*errors, reader.truth(converged), *counts, deformation, *shapes)
 
 
 _EQUATIONS = struct.Struct("<IQQ7dd")
@@ -195,3 +202,4 @@ _MEMORY = struct.Struct("<QB")
 _LARGE = struct.Struct("<5Id")
 _LARGE_END = struct.Struct("<dBBd")
 _CONTACT = struct.Struct("<5dB4I")
+_CONTACT_END = struct.Struct("<II")

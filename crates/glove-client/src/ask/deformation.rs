@@ -35,6 +35,17 @@ impl Deformation {
     }
 }
 
+impl Deformation {
+    /// What a server is asked; none where linear elasticity is.
+    pub fn choice(self) -> Option<DeformationChoice> {
+        match self {
+            Self::Linear => None,
+            Self::Large => Some(DeformationChoice::Large),
+            Self::Auto => Some(DeformationChoice::Auto),
+        }
+    }
+}
+
 impl FromStr for Deformation {
     type Err = DeformationError;
 
@@ -72,11 +83,7 @@ impl Elasticity {
 
     /// What a server is asked; `None` where a question of the linear kind is asked.
     pub fn ask(&self, path: PathChoice, pace: Pace) -> Option<LargeAsk> {
-        let deformation = match self.deformation {
-            Deformation::Linear => return None,
-            Deformation::Large => DeformationChoice::Large,
-            Deformation::Auto => DeformationChoice::Auto,
-        };
+        let deformation = self.deformation.choice()?;
         let Self { law, yield_stress, .. } = *self;
         Some(LargeAsk { deformation, law, yield_stress, path, pace })
     }

@@ -91,6 +91,8 @@ fn the_document_numbers_the_choices_of_large_deformation() {
         ("LargeAsk", 3, numbered(&[PathChoice::Continue, PathChoice::FromRest])),
         ("LargeAsk", 4, numbered(&[Pace::Repeatable, Pace::Timely])),
         ("LargeReport", 0, numbered(&[DeformationName::Linear, DeformationName::Large])),
+        ("ContactAsk", 9, numbered(&[LawName::NeoHookean, LawName::NeoHookeanLog])),
+        ("ContactReport", 10, numbered(&[DeformationName::Linear, DeformationName::Large])),
     ];
     for (title, row, variants) in known {
         assert_eq!(table(title)[row][1], format!("enum: {variants}"));
