@@ -22,6 +22,7 @@ from softgrasp import (
     Sphere,
     candidate_triangles,
 )
+from softgrasp.large import Deformation
 
 DENSITY, G = 1000.0, 9.81
 
@@ -153,3 +154,32 @@ def test_model_with_fixed_nodes_is_no_free_object(server: Server, bar: Bar) -> N
     kept = server.keep(bar.model, fixed=bar.left)
     with pytest.raises(Refused):
         kept.contact_frame(ObjectState(), [table()], ContactStep(0.01))
+
+
+def test_soft_block_at_large_deformation_carries_its_weight_and_is_pressed_more(
+    server: Server,
+) -> None:
+    mesh = Mesh.block((0.04, 0.03, 0.02), (4, 3, 2))
+    soft = server.keep(Model(mesh, Material(1_000.0, 0.3), "t4"))
+    heights = {}
+    deformations: tuple[Deformation | None, ...] = (None, "large", "auto")
+    for deformation in deformations:
+        state = ObjectState()
+        step = ContactStep(0.01, DENSITY, viscosity=0.02, deformation=deformation)
+        for _ in range(40):
+            answer = soft.contact_frame(state, [table()], step)
+            state = answer.state
+        weight = DENSITY * mesh.volume * G
+        assert answer.contact.is_converged
+        assert answer.loads.normal_forces[0] == pytest.approx(weight, rel=1e-6)
+        assert answer.contact.deformation == ("linear" if deformation is None else "large")
+        heights[deformation] = state.places(mesh)[mesh.nodes_at(z=0.02), 2].mean()
+    assert heights["large"] == pytest.approx(heights["auto"], abs=1e-5)
+    assert heights["large"] != pytest.approx(heights[None], abs=3e-5)
+
+
+def test_words_that_no_step_knows_are_refused() -> None:
+    with pytest.raises(ValueError, match="deformation"):
+        ContactStep(0.01, deformation="huge")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="law"):
+        ContactStep(0.01, law="rubber")  # type: ignore[arg-type]

@@ -11,8 +11,8 @@ use softgrasp_protocol::{
 use tokio::task::JoinHandle;
 
 use crate::answer::{
-    PosedContact, PosedFrame, Readiness, answer_cases, answer_large_frame, is_finite, prefetch,
-    prove, readiness, solve_large, solve_once, solve_several, upload,
+    PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases, answer_large_frame, is_finite,
+    prefetch,    prove, readiness, solve_large, solve_once, solve_several, upload,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;
@@ -42,6 +42,8 @@ pub(crate) struct RequestHandler {
     held: HeldModels,
     /// The equilibria that this session follows.
     paths: Paths,
+    /// The object that this session presses at large deformation.
+    pressed: PressedSeat,
     /// A path that is made beside the frames of this session.
     making: Option<JoinHandle<()>>,
     /// Counts this session from its first frame on.
@@ -75,6 +77,7 @@ impl RequestHandler {
             is_introduced: false,
             held: HeldModels::new(Arc::clone(resources)),
             paths: Paths::default(),
+            pressed: PressedSeat::default(),
             making: None,
             grasping: None,
             alive_every: None,
@@ -135,6 +138,7 @@ impl RequestHandler {
             Request::HaveModel(hash) => Reply::ModelState { known: self.held.hold(hash) },
             Request::Drop(hash) => {
                 self.paths.leave(hash);
+                self.pressed.with(|pressed| *pressed = None);
                 self.held.drop_model(hash);
                 return Ok(None);
             }
@@ -349,7 +353,8 @@ impl RequestHandler {
         let workers = &self.server.resources.workers;
         self.grasping.get_or_insert_with(|| self.server.grasping());
         let shared = Arc::clone(&resources);
-        let among_frames = move || match PosedContact::new(&shared, frame) {
+        let seat = Arc::clone(&self.pressed);
+        let among_frames = move || match PosedContact::new(&shared, frame, seat) {
             Err(refusal) => Ok(Err(refusal)),
             Ok(frame) if frame.is_prepared() => Ok(frame.answer(&shared, clock())),
             Ok(frame) => Err((Box::new(frame), clock)),

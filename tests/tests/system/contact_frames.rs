@@ -4,8 +4,7 @@ use fea_server::RunningServer;
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh};
 use softgrasp_protocol::{
-    BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, ModelHash, NodeChoice,
-    ObjectState, Precision, Reply, Request,
+    BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, Deformation, LawName, ModelHash, NodeChoice, ObjectState, Precision, Reply, Request,
 };
 use softgrasp_tests::questions::{object, upload};
 
@@ -18,6 +17,7 @@ struct Scene {
     mesh: TetMesh,
     surface: Surface,
     model: ModelHash,
+    deformation: Option<Deformation>,
 }
 
 impl Scene {
@@ -28,7 +28,7 @@ impl Scene {
             Ok(Reply::ModelReady(ready)) => ready.model,
             other => panic!("the upload got {other:?}"),
         };
-        Self { mesh, surface, model }
+        Self { mesh, surface, model, deformation: None }
     }
 
     fn frame(&self, state: ObjectState, step: u32) -> ContactFrame {
@@ -57,6 +57,8 @@ impl Scene {
                 residual_rel: 1e-6,
                 rounds_max: 12,
                 newton_max: 60,
+                deformation: self.deformation,
+                law: LawName::default(),
             },
             state,
             bodies: vec![
@@ -86,8 +88,16 @@ fn bits(mut answer: ContactAnswer) -> String {
 }
 
 fn played(server: &RunningServer, steps: u32) -> Vec<ContactAnswer> {
+    played_by(server, steps, None)
+}
+
+fn played_by(
+    server: &RunningServer,
+    steps: u32,
+    deformation: Option<Deformation>,
+) -> Vec<ContactAnswer> {
     let mut connection = client(server);
-    let scene = Scene::new(&mut connection);
+    let scene = Scene { deformation, ..Scene::new(&mut connection) };
     let mut state = ObjectState::at_rest(STILL);
     let mut answers = Vec::new();
     for step in 0..steps {
@@ -134,6 +144,56 @@ fn another_server_goes_on_with_the_state_that_one_has_given() {
         let answer = advance(&mut connection, scene.frame(state, step));
         assert!(bits(answer.clone()) == bits(expected.clone()), "step {step}");
         state = answer.state;
+    }
+}
+
+#[test]
+fn large_frames_have_the_same_bits_for_any_number_of_threads() {
+    let mut first: Option<Vec<String>> = None;
+    for threads in [1, 3] {
+        let answers = played_by(&server(threads), 12, Some(Deformation::Large));
+        let last = answers.last().unwrap();
+        assert!(last.contact.is_large);
+        assert!(last.loads[1].normal_force > 0.0, "{:?}", last.loads);
+        let found: Vec<String> = answers.into_iter().map(bits).collect();
+        match &first {
+            None => first = Some(found),
+            Some(first) => assert!(*first == found, "{threads} threads"),
+        }
+    }
+}
+
+/// The shape is not part of the state: another server finds it again from the forces.
+#[test]
+fn another_server_goes_on_at_large_deformation_with_the_state_that_one_has_given() {
+    let (one, other) = (server(2), server(2));
+    let large = Some(Deformation::Large);
+    let whole = played_by(&one, 12, large);
+    let mut connection = client(&other);
+    let scene = Scene { deformation: large, ..Scene::new(&mut connection) };
+    let mut state = whole[5].state.clone();
+    let size = scene.mesh.size();
+    for (step, expected) in (6..).zip(&whole[6..]) {
+        let answer = advance(&mut connection, scene.frame(state, step));
+        let (ours, theirs) = (&answer.answer.displacements, &expected.answer.displacements);
+        let pairs = ours.clone().into_f64().into_iter().zip(theirs.clone().into_f64());
+        let off = pairs.flat_map(|(a, b)| (0..3).map(move |k| (a[k] - b[k]).abs()));
+        let off = off.fold(0.0, f64::max);
+        assert!(off < 1e-5 * size, "step {step}: {off:e} m of {size} m");
+        state = answer.state;
+    }
+}
+
+#[test]
+fn auto_is_linear_for_a_touch_and_large_for_a_press() {
+    let answers = played_by(&server(2), 12, Some(Deformation::Auto));
+    let linear = answers.iter().take_while(|a| !a.contact.is_large);
+    assert!((1..12).contains(&linear.count()), "always the same");
+    for answer in &answers {
+        let report = &answer.answer.report;
+        let turned = report.max_rotation_deg.to_radians() + report.max_strain;
+        let is_linear = !answer.contact.is_large;
+        assert!(!is_linear || turned <= 2e-3, "{report:?}");
     }
 }
 

@@ -15,6 +15,7 @@ from .arrays import U32, Floats, Numbers, numbers, positive, vector
 from .body import Body, body_arrays
 from .errors import BadStream
 from .fields import Part
+from .large import DEFORMATIONS, LAWS, Deformation, Law
 from .mesh import Mesh
 from .payload import PayloadReader, payload_of
 from .pose import Pose
@@ -57,7 +58,7 @@ class ObjectState:
 
 @dataclass(frozen=True)
 class ContactStep:
-    """How a step is made. Raises `ValueError` for a length or a density of 0."""
+    """How a step is made. Raises `ValueError` for a length or a density of 0, and other words."""
 
     seconds: float
     """Length of the step, s."""
@@ -75,11 +76,31 @@ class ContactStep:
     """Most times that the contact problem is made anew."""
     newton_max: int = 1000
     """Steps of Newton's method after which no further round is begun."""
+    deformation: Deformation | None = None
+    """Large deformation, or linear elasticity where it suffices; None: linear elasticity."""
+    law: Law = "neo-hookean"
+    """Law of large deformation."""
 
     def __post_init__(self) -> None:
         positive(self.seconds, "the length of a step")
         positive(self.density, "the density")
         vector(self.gravity, "gravity")
+        if self.deformation not in (None, *DEFORMATIONS):
+            raise ValueError(f"deformation is None or one of {DEFORMATIONS}")
+        if self.law not in LAWS:
+            raise ValueError(f"law is one of {LAWS}, not {self.law!r}")
+
+    def part(self) -> Part:
+        """The fields on the wire."""
+        part = Part().fields("d3ddd", self.seconds, *self.gravity, self.density, self.viscosity)
+        part.fields(
+            "ddII", self.penetration_rel, self.residual_rel, self.rounds_max, self.newton_max
+        )
+        if self.deformation is None:
+            part.fields("B", 0)
+        else:
+            part.fields("BI", 1, DEFORMATIONS.index(self.deformation))
+        return part.fields("I", LAWS.index(self.law))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,12 +190,10 @@ def contact_payload(
     """The payload of a `ContactFrame`."""
     triangles, of_body = candidate_triangles(mesh, state, bodies, step)
     wanted = np.zeros(0, U32) if nodes is None else numbers(nodes, "wanted nodes")
-    ask = Part().fields("d3ddd", step.seconds, *step.gravity, step.density, step.viscosity)
-    ask.fields("ddII", step.penetration_rel, step.residual_rel, step.rounds_max, step.newton_max)
     moved = Part().fields("7d", *state.pose.numbers)
     moved.fields("6d", *state.velocity, *state.angular_velocity)
     moved.fields("II", len(state.force_nodes), len(state.contact_names))
-    part = Part().raw(model).block(ask).block(moved)
+    part = Part().raw(model).block(step.part()).block(moved)
     part.fields("II?I", len(bodies), len(triangles), nodes is not None, len(wanted))
     part.fields("I", PRECISIONS.index(precision))
     of_state = (state.force_nodes, state.forces, state.contact_names, state.contact_numbers)

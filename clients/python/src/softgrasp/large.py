@@ -54,5 +54,9 @@ _WORDS: dict[str, tuple[str, ...]] = {
     "pace": get_args(Pace),
 }
 
+DEFORMATIONS = _WORDS["deformation"]
+LAWS = _WORDS["law"]
+"""The words by their numbers on the wire."""
+
 AT_LARGE = LargeDeformation()
 """What is asked unless something else is said."""

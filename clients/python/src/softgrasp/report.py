@@ -135,7 +135,13 @@ class ContactReport:
     newton_steps: int
     """Steps of Newton's method."""
     columns_computed: int
-    """Nodes whose columns were computed for this step."""
+    """Nodes whose columns were computed for this step, by linear elasticity."""
+    deformation: str
+    """Which equations the elastic part was solved by: `linear` or `large`."""
+    shapes: int
+    """Shapes that contact was solved about; 1 for linear elasticity."""
+    factors: int
+    """Factors of the tangent that were made."""
 
 
 def read_solve_report(fields: Fields) -> SolveReport:
@@ -199,8 +205,11 @@ def read_contact_report(fields: Fields) -> ContactReport:
     """Reads the report of a contact frame."""
     depth, slip, residual, relative, cone, converged, *counts = fields.fields(_CONTACT)
     errors = (depth, slip, residual, relative, cone)
-    rounds, sweeps, newton, columns = counts
-    return ContactReport(*errors, fields.truth(converged), rounds, sweeps, newton, columns)
+    is_large, shapes, factors = fields.fields(_CONTACT_END)
+    deformation = "large" if fields.truth(is_large) else "linear"
+    return ContactReport(
+        *errors, fields.truth(converged), *counts, deformation, shapes, factors
+    )
 
 
 _LEVELS = ("none", "caution", "serious")
@@ -232,3 +241,4 @@ _MEMORY = struct.Struct("<QB")
 _LARGE = struct.Struct("<B4Id")
 _LARGE_END = struct.Struct("<dBBd")
 _CONTACT = struct.Struct("<5dB4I")
+_CONTACT_END = struct.Struct("<BII")

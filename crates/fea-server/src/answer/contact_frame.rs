@@ -1,21 +1,23 @@
-//! Answers one step of a free object among rigid bodies, from cached columns of the compliance.
+//! Answers one step of a free object among rigid bodies: linear from cached columns of the compliance, or
+//! at large deformation.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_core::contact::coulomb::PointState;
 use softgrasp_core::dynamics::{
-    BodyLoad, Candidate, ContactStep, MovingBody, ObjectState, PointContact, StepOutcome,
-    StepSettings,
+    BodyLoad, Candidate, ContactStep, MovingBody, ObjectState, PointContact, StepSettings,
 };
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{Contact, Elasticity};
 use softgrasp_protocol::{
     Answer, BodyLoad as LoadMessage, ContactAnswer, ContactFrame, ContactPoint, ContactReport,
-    Displacements, NodeChoice, Precision, SolveReport,
+    Deformation, Displacements, NodeChoice, Precision, SolveReport,
 };
 
+use super::contact_large::{LargeWish, Made, PressedSeat};
+use super::large::law_of;
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::last_peak_rss_bytes;
 use crate::plan::columns_ms;
@@ -34,6 +36,8 @@ pub(crate) struct PosedContact {
     settings: StepSettings,
     nodes: NodeChoice,
     precision: Precision,
+    /// What is asked of large deformation.
+    large: Option<LargeWish>,
 }
 
 impl PosedContact {
@@ -41,7 +45,11 @@ impl PosedContact {
     ///
     /// # Errors
     /// [`Refusal`] naming what is wrong.
-    pub fn new(resources: &Resources, frame: ContactFrame) -> Result<Self, Refusal> {
+    pub fn new(
+        resources: &Resources,
+        frame: ContactFrame,
+        seat: PressedSeat,
+    ) -> Result<Self, Refusal> {
         let ContactFrame {
             model,
             ask,
@@ -74,6 +82,8 @@ impl PosedContact {
             triangle,
             body: u16::try_from(body).unwrap_or(u16::MAX),
         };
+        let law = law_of(ask.law);
+        let wish = |deformation| LargeWish { model, deformation, law, seat };
         let candidates = (0u32..).zip(&triangle_bodies).map(candidate).collect();
         Ok(Self {
             stored,
@@ -84,12 +94,17 @@ impl PosedContact {
             settings: settings_of(&ask),
             nodes,
             precision,
+            large: ask.deformation.filter(|d| *d != Deformation::Linear).map(wish),
         })
     }
 
-    /// Whether nothing has to be made for it but a small problem.
+    /// Whether nothing has to be made for it but a small problem, or a factor of a shape at most.
     pub fn is_prepared(&self) -> bool {
-        self.stored.has_free_body() && self.missing() == 0
+        let is_there = match &self.large {
+            Some(wish) => wish.goes_on(),
+            None => self.missing() == 0,
+        };
+        self.stored.has_free_body() && is_there
     }
 
     /// What computing the columns that it may need is predicted to take.
@@ -137,22 +152,30 @@ impl PosedContact {
             NodeChoice::All => (0..mesh.node_count() as u32).collect(),
             NodeChoice::Nodes(nodes) => nodes.clone(),
         };
-        let outcome = step.advance(&self.state, &wanted)?;
+        let made = match &self.large {
+            Some(wish) => wish.advance(resources, &self.stored, &step, &self.state, &wanted)?,
+            None => Made::linear(step.advance(&self.state, &wanted)?),
+        };
         let computed = columns.computed().saturating_sub(computed);
         resources.models.trim();
         let mut stage_ms = clock.finish();
         let start = Instant::now();
-        let mut answer = self.answered(outcome, computed);
+        let mut answer = self.answered(made, computed);
         stage_ms.encode = ms_since(start);
         answer.answer.report.stage_ms = stage_ms;
         Ok(answer)
     }
 
-    fn answered(self, outcome: StepOutcome, computed: u64) -> ContactAnswer {
+    fn answered(self, made: Made, computed: u64) -> ContactAnswer {
+        let Made { outcome, is_large, factors, summary } = made;
+        let (method, factor_reused) = match is_large {
+            false => ("condensed", computed == 0),
+            true => ("newton", factors == 0),
+        };
         let model = &self.stored.model;
         let known = 3 * outcome.contacts.len() as u64;
         let report = SolveReport {
-            method: "condensed".to_owned(),
+            method: method.to_owned(),
             element: name_of(model.element()).into(),
             unknown_dofs: model.modelled_dofs() as u64 - known.min(model.modelled_dofs() as u64),
             known_dofs: known,
@@ -160,11 +183,11 @@ impl PosedContact {
             error_bound_why: Some(
                 "a contact frame has the residuals of both parts and no proven bound".to_owned(),
             ),
-            max_rotation_deg: f64::NAN,
-            max_strain: f64::NAN,
+            max_rotation_deg: summary.rotation_max.to_degrees(),
+            max_strain: summary.strain_max,
             precision: "f64".to_owned(),
             peak_rss_bytes: last_peak_rss_bytes(),
-            factor_reused: computed == 0,
+            factor_reused,
             chosen_because: "contact with friction".to_owned(),
             ..SolveReport::default()
         };
@@ -179,6 +202,9 @@ impl PosedContact {
             sweeps: outcome.sweeps as u32,
             newton_steps: outcome.newton_steps as u32,
             columns_computed: u32::try_from(computed).unwrap_or(u32::MAX),
+            is_large,
+            shapes: outcome.shapes as u32,
+            factors: factors as u32,
         };
         let displacements = Displacements::of(outcome.displacements, self.precision);
         ContactAnswer {

@@ -2,6 +2,7 @@
 
 mod condensed;
 mod contact_frame;
+mod contact_large;
 mod direct;
 mod factor;
 mod finite;
@@ -15,6 +16,7 @@ mod upload;
 mod warnings;
 
 pub(crate) use contact_frame::PosedContact;
+pub(crate) use contact_large::PressedSeat;
 pub(crate) use finite::is_finite;
 pub(crate) use frame::{PosedFrame, Readiness, answer_cases, readiness};
 pub(crate) use large_frame::answer_large_frame;

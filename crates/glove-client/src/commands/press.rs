@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use softgrasp_core::mesh::{Surface, TetMesh};
 use softgrasp_core::mesh_io::{PointField, write_vtu};
 use softgrasp_protocol::solve_report::SCHEMA;
-use softgrasp_protocol::{ContactAsk, ElementName, Material, Reply, Request};
+use softgrasp_protocol::{ContactAsk, Deformation, ElementName, LawName, Material, Reply, Request};
 
 use super::access_arguments::AccessArguments;
 use super::numbers::{count, poisson, positive, speed, vector};
@@ -57,9 +57,13 @@ pub struct PressCommand {
     /// Longest step, s.
     #[arg(long, default_value_t = 0.01, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     step: f64,
-    /// Equations of the elastic part.
-    #[arg(long, default_value = "linear", value_name = "linear", value_parser = ["linear"])]
-    deformation: String,
+    /// Equations of the elastic part: linear, large, or auto, which takes the linear ones where rotation
+    /// and strain promise an error below 0.2 %.
+    #[arg(long, default_value_t = Deformation::Linear, value_name = "linear|large|auto")]
+    deformation: Deformation,
+    /// Law of large deformation: neo-hookean or neo-hookean-log.
+    #[arg(long, default_value_t = LawName::NeoHookean, value_name = "neo-hookean|neo-hookean-log")]
+    material: LawName,
     /// Finite element.
     #[arg(long, default_value = "t4", value_name = "t4|t4-anp", value_parser = element)]
     element: ElementName,
@@ -181,6 +185,8 @@ impl PressCommand {
             residual_rel: 1e-9,
             rounds_max: 40,
             newton_max: 1000,
+            deformation: Some(self.deformation),
+            law: self.material,
         }
     }
 
@@ -201,7 +207,10 @@ impl PressCommand {
             friction: self.friction,
             viscosity: self.viscosity,
             element: self.element.as_str().to_owned(),
-            deformation: "linear",
+            deformation: self.deformation.as_str(),
+            material: (self.deformation != Deformation::Linear).then(|| self.material.to_string()),
+            steps_large: steps.iter().filter(|step| step.deformation == "large").count(),
+            residual_rel_max: most(|step| step.residual_rel),
             steps_not_converged: steps.iter().filter(|step| !step.converged).count(),
             penetration_max: most(|step| step.penetration_max),
             contact_residual_rel_max: most(|step| step.contact_residual_rel),
@@ -226,6 +235,12 @@ impl PressCommand {
             text.push_str(&format!(
                 "{} steps end above the residual asked for; the report says how far\n",
                 report.steps_not_converged
+            ));
+        }
+        if self.deformation != Deformation::Linear {
+            text.push_str(&format!(
+                "{} steps at large deformation, forces out of balance by {:.1e} at most\n",
+                report.steps_large, report.residual_rel_max
             ));
         }
         if let Some(last) = report.steps.last() {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use softgrasp_protocol::Deformation;
 
 use super::course::Step;
 
@@ -35,14 +36,20 @@ pub struct PressReport {
     pub viscosity: f64,
     /// Finite element.
     pub element: String,
-    /// `linear`.
+    /// `linear`, `large` or `auto`: what was asked for.
     pub deformation: &'static str,
+    /// Law of large deformation, where it was asked for.
+    pub material: Option<String>,
+    /// Steps at large deformation.
+    pub steps_large: usize,
     /// Steps whose gaps and residual are not within what was asked for.
     pub steps_not_converged: usize,
     /// Largest penetration of all steps, m.
     pub penetration_max: f64,
     /// Largest relative residual of contact of all steps.
     pub contact_residual_rel_max: f64,
+    /// Largest residual of the elastic part of all steps, over its forces.
+    pub residual_rel_max: f64,
     /// Every step.
     pub steps: Vec<StepReport>,
 }
@@ -84,6 +91,16 @@ pub struct StepReport {
     pub newton_steps: u32,
     /// Nodes whose columns were computed.
     pub columns_computed: u32,
+    /// `linear` or `large`: which equations the step was solved by.
+    pub deformation: &'static str,
+    /// Shapes that contact was solved about.
+    pub shapes: u32,
+    /// Factors of the tangent that were made.
+    pub factors: u32,
+    /// Largest rotation of an element, degrees, where it was worked out.
+    pub max_rotation_deg: Option<f64>,
+    /// Largest strain of an element, where it was worked out.
+    pub max_strain: Option<f64>,
     /// From sending to having the answer, ms.
     pub ms: f64,
 }
@@ -140,6 +157,14 @@ impl StepReport {
             rounds: contact.rounds,
             newton_steps: contact.newton_steps,
             columns_computed: contact.columns_computed,
+            deformation: match contact.is_large {
+                false => Deformation::Linear.as_str(),
+                true => Deformation::Large.as_str(),
+            },
+            shapes: contact.shapes,
+            factors: contact.factors,
+            max_rotation_deg: Some(report.max_rotation_deg).filter(|angle| angle.is_finite()),
+            max_strain: Some(report.max_strain).filter(|strain| strain.is_finite()),
             ms: step.ms,
         }
     }

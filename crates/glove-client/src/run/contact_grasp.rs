@@ -9,7 +9,7 @@ use softgrasp_grasp::hand::{HAND_BODIES, HandBody};
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_grasp::sphere_tree::{SearchedSurface, triangles_near};
 use softgrasp_protocol::{
-    BodyLoad, BodyShape, ContactAsk, ContactFrame, ContactReport, ModelHash, NodeChoice,
+    BodyLoad, BodyShape, ContactAsk, ContactFrame, ContactReport, LawName, ModelHash, NodeChoice,
     ObjectState,
 };
 
@@ -261,6 +261,8 @@ impl ContactGrasp {
             residual_rel: RESIDUAL_REL,
             rounds_max: ROUNDS_MAX,
             newton_max: NEWTON_MAX,
+            deformation: None,
+            law: LawName::default(),
         }
     }
 

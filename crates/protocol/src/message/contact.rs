@@ -3,6 +3,7 @@
 use wincode::{SchemaRead, SchemaWrite};
 
 use super::answer::{Answer, AnswerPart};
+use super::large::{Deformation, LawName};
 use super::model::ModelHash;
 use super::object_state::{ObjectState, ObjectStatePart};
 use super::question::{NodeChoice, Precision};
@@ -55,6 +56,10 @@ pub struct ContactAsk {
     pub rounds_max: u32,
     /// Steps of Newton's method after which no further round is begun.
     pub newton_max: u32,
+    /// Large deformation, or linear elasticity where it suffices; none for linear elasticity.
+    pub deformation: Option<Deformation>,
+    /// Law of large deformation.
+    pub law: LawName,
 }
 
 /// Answer to `ContactFrame`.
@@ -93,8 +98,14 @@ pub struct ContactReport {
     pub sweeps: u32,
     /// Steps of Newton's method.
     pub newton_steps: u32,
-    /// Nodes whose columns of the compliance were computed for this step.
+    /// Nodes whose columns of the compliance were computed for this step, by linear elasticity.
     pub columns_computed: u32,
+    /// Whether the elastic part was solved at large deformation.
+    pub is_large: bool,
+    /// Shapes that contact was solved about, one after the other; 1 for linear elasticity.
+    pub shapes: u32,
+    /// Factors of the tangent that were made.
+    pub factors: u32,
 }
 
 /// A point of the object's surface that presses on a body.

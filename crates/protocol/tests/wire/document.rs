@@ -86,6 +86,7 @@ fn the_document_numbers_the_choices_of_large_deformation() {
         ("LargeAsk", 1, numbered(&[LawName::NeoHookean, LawName::NeoHookeanLog])),
         ("LargeAsk", 3, numbered(&[PathChoice::Continue, PathChoice::FromRest])),
         ("LargeAsk", 4, numbered(&[Pace::Repeatable, Pace::Timely])),
+        ("ContactAsk", 9, numbered(&[LawName::NeoHookean, LawName::NeoHookeanLog])),
     ];
     for (title, row, variants) in known {
         assert_eq!(table(title)[row][1], format!("enum: {variants}"));

@@ -8,11 +8,18 @@ use crate::random_messages::{answer, number, point};
 
 /// Any contact frame.
 pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
-    let ask = (prop::array::uniform5(number()), point(), any::<[u32; 2]>()).prop_map(
+    let deformation = prop::option::of(prop_oneof![
+        Just(Deformation::Large),
+        Just(Deformation::Auto)
+    ]);
+    let law = prop_oneof![Just(LawName::NeoHookean), Just(LawName::NeoHookeanLog)];
+    let equations = (deformation, law);
+    let ask = (prop::array::uniform5(number()), point(), any::<[u32; 2]>(), equations).prop_map(
         |(
             [seconds, density, viscosity, penetration_rel, residual_rel],
             gravity,
             [rounds, steps],
+            (deformation, law),
         )| {
             ContactAsk {
                 seconds,
@@ -23,6 +30,8 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
                 residual_rel,
                 rounds_max: rounds,
                 newton_max: steps,
+                deformation,
+                law,
             }
         },
     );
@@ -41,8 +50,9 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
 
 /// Any answer to a contact frame.
 pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
-    let report = (prop::array::uniform5(number()), any::<bool>(), any::<[u32; 4]>()).prop_map(
-        |(numbers, is_converged, [rounds, sweeps, newton_steps, columns_computed])| {
+    let report = (prop::array::uniform5(number()), any::<bool>(), any::<[u32; 6]>()).prop_map(
+        |(numbers, is_converged, counts)| {
+            let [rounds, sweeps, newton_steps, columns_computed, shapes, factors] = counts;
             let [penetration_max, slip_max, residual, residual_rel, cone_violation] = numbers;
             ContactReport {
                 penetration_max,
@@ -55,6 +65,9 @@ pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
                 sweeps,
                 newton_steps,
                 columns_computed,
+                is_large: shapes % 2 == 1,
+                shapes,
+                factors,
             }
         },
     );

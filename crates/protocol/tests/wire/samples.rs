@@ -302,6 +302,8 @@ fn contact_frame() -> ContactFrame {
             residual_rel: 1e-9,
             rounds_max: 16,
             newton_max: 400,
+            deformation: Some(Deformation::Auto),
+            law: LawName::NeoHookeanLog,
         },
         state: object_state(),
         bodies: vec![
@@ -347,6 +349,9 @@ fn contact_answer() -> ContactAnswer {
             sweeps: 6,
             newton_steps: 5,
             columns_computed: 2,
+            is_large: true,
+            shapes: 4,
+            factors: 1,
         },
         state: object_state(),
         points: vec![point],

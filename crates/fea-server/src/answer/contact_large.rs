@@ -1,0 +1,166 @@
+//! A session's object at large deformation between two contact frames, and the steps that it makes.
+
+use std::sync::Arc;
+
+use softgrasp_core::dynamics::{ContactStep, LargeBody, ObjectState, StepOutcome};
+use softgrasp_core::fem::hyperelastic::{LargeSummary, Law};
+use softgrasp_core::solve::Method;
+use softgrasp_core::solve::condensed::Base;
+use softgrasp_core::solve::memory::Need;
+use softgrasp_protocol::{Deformation, ModelHash};
+
+use super::large::LINEAR_ERROR_REL;
+use super::large_once::promised_error;
+use crate::budget::Reservation;
+use crate::lock::Lock;
+use crate::plan::{PlanError, Subject, admit};
+use crate::refusal::Refusal;
+use crate::resources::Resources;
+use crate::store::StoredModel;
+
+/// Where a session keeps the object that it presses at large deformation.
+pub(crate) type PressedSeat = Arc<Lock<Option<Box<Pressed>>>>;
+
+/// An object at large deformation between two steps: its shape and the newest factor.
+pub(crate) struct Pressed {
+    model: ModelHash,
+    law: Law,
+    body: LargeBody,
+    /// Memory of the factor, given back with it.
+    reservation: Reservation,
+}
+
+/// What is asked of large deformation, of which model, and where the object is kept.
+pub(crate) struct LargeWish {
+    pub model: ModelHash,
+    pub deformation: Deformation,
+    pub law: Law,
+    pub seat: PressedSeat,
+}
+
+/// A step that was made, whether at large deformation, and at what cost.
+pub(super) struct Made {
+    pub outcome: StepOutcome,
+    pub is_large: bool,
+    pub factors: usize,
+    /// Rotation and stretches of the elements, where they were worked out.
+    pub summary: LargeSummary,
+}
+
+impl Made {
+    /// A step by linear elasticity.
+    pub fn linear(outcome: StepOutcome) -> Self {
+        Self { outcome, is_large: false, factors: 0, summary: LargeSummary::UNKNOWN }
+    }
+}
+
+impl Pressed {
+    /// The object at rest, and the memory of a factor reserved.
+    fn at_rest(
+        resources: &Resources,
+        stored: &StoredModel,
+        wish: &LargeWish,
+        base: &Base,
+    ) -> Result<Box<Self>, Refusal> {
+        let model = &stored.model;
+        let elements = Arc::new(model.hyperelastic(wish.law)?);
+        let pattern = model.stiffness().pattern();
+        let reservation = resources.budget.reservation();
+        // The tangent and its positive part stand beside the linear stiffness.
+        let blocks = pattern.block_count();
+        let held = (model.bytes() + 2 * blocks * size_of::<[f64; 9]>()) as u64;
+        let need = Need::counted(model.element(), Method::Front, held, blocks, base.analysis());
+        let subject = Subject::about(model, 0, Some(wish.model));
+        admit(&resources.models, &reservation, &[need], &subject).map_err(PlanError::Memory)?;
+        let body = LargeBody::at_rest(elements, Arc::clone(pattern));
+        Ok(Box::new(Self { model: wish.model, law: wish.law, body, reservation }))
+    }
+
+    /// What linear elasticity would be off by in the shape that the object has, over the largest
+    /// displacement.
+    fn promised(&self) -> f64 {
+        let summary = self.body.summary();
+        promised_error(summary.rotation_max, summary.strain_max)
+    }
+}
+
+impl LargeWish {
+    /// Whether the session keeps the object.
+    pub fn goes_on(&self) -> bool {
+        self.seat.with(|kept| kept.as_ref().is_some_and(|kept| self.is_of(kept)))
+    }
+
+    fn is_of(&self, kept: &Pressed) -> bool {
+        kept.model == self.model && kept.law == self.law
+    }
+
+    /// Makes a step.
+    ///
+    /// # Errors
+    /// [`Refusal`]; the object stays what it was.
+    pub(super) fn advance(
+        &self,
+        resources: &Resources,
+        stored: &StoredModel,
+        step: &ContactStep<'_>,
+        state: &ObjectState,
+        wanted: &[u32],
+    ) -> Result<Made, Refusal> {
+        let base = step.elasticity.base;
+        let kept = self.seat.with(Option::take).filter(|kept| self.is_of(kept));
+        let mut pressed = match kept {
+            Some(kept) => kept,
+            None => Pressed::at_rest(resources, stored, self, base)?,
+        };
+        let made = self.made(&mut pressed, step, state, wanted);
+        pressed.reservation.settle(pressed.body.bytes(base) as u64);
+        self.seat.with(|seat| *seat = Some(pressed));
+        made
+    }
+
+    fn made(
+        &self,
+        pressed: &mut Pressed,
+        step: &ContactStep<'_>,
+        state: &ObjectState,
+        wanted: &[u32],
+    ) -> Result<Made, Refusal> {
+        let may_be_linear = self.deformation == Deformation::Auto;
+        if may_be_linear
+            && pressed.promised() <= LINEAR_ERROR_REL
+            && let Some(made) = linear_if_small(pressed, step, state, wanted)?
+        {
+            return Ok(made);
+        }
+        let before = pressed.body.factors();
+        let outcome = step.advance_large(&mut pressed.body, state, wanted)?;
+        Ok(Made {
+            outcome,
+            is_large: true,
+            factors: pressed.body.factors() - before,
+            summary: pressed.body.summary(),
+        })
+    }
+}
+
+/// A step by linear elasticity, if rotation and strain at its end promise an error within what is
+/// allowed.
+fn linear_if_small(
+    pressed: &Pressed,
+    step: &ContactStep<'_>,
+    state: &ObjectState,
+    wanted: &[u32],
+) -> Result<Option<Made>, Refusal> {
+    let all: Vec<u32> = (0..step.vertices.len() as u32).collect();
+    let mut outcome = step.advance(state, &all)?;
+    let summary = pressed.body.summary_of(outcome.displacements.as_flattened());
+    let promised = promised_error(summary.rotation_max, summary.strain_max);
+    if promised > LINEAR_ERROR_REL || promised.is_nan() {
+        return Ok(None);
+    }
+    outcome.displacements = wanted
+        .iter()
+        .filter_map(|&node| outcome.displacements.get(node as usize).copied())
+        .collect();
+    Ok(Some(Made { outcome, is_large: false, factors: 0, summary }))
+}
