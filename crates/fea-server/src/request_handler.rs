@@ -12,7 +12,7 @@ use tokio::task::JoinHandle;
 
 use crate::answer::{
     PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases, answer_large_frame, is_finite,
-    prefetch,    prove, readiness, solve_large, solve_once, solve_several, upload,
+    prefetch, prove, readiness, solve_large, solve_once, solve_several, upload,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;

@@ -4,7 +4,8 @@ use fea_server::RunningServer;
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh};
 use softgrasp_protocol::{
-    BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, Deformation, LawName, ModelHash, NodeChoice, ObjectState, Precision, Reply, Request,
+    BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, Deformation, LawName,
+    ModelHash, NodeChoice, ObjectState, Precision, Reply, Request,
 };
 use softgrasp_tests::questions::{object, upload};
 

@@ -8,10 +8,8 @@ use crate::random_messages::{answer, number, point};
 
 /// Any contact frame.
 pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
-    let deformation = prop::option::of(prop_oneof![
-        Just(Deformation::Large),
-        Just(Deformation::Auto)
-    ]);
+    let deformation =
+        prop::option::of(prop_oneof![Just(Deformation::Large), Just(Deformation::Auto)]);
     let law = prop_oneof![Just(LawName::NeoHookean), Just(LawName::NeoHookeanLog)];
     let equations = (deformation, law);
     let ask = (prop::array::uniform5(number()), point(), any::<[u32; 2]>(), equations).prop_map(
