@@ -63,7 +63,14 @@ def contact_frame() -> calls.Call:
         np.array([[0.5, 0.25, 0.25, 0, 0, 1.5]]),
     )
     step = ContactStep(
-        0.01, 1000.0, viscosity=0.005, penetration_rel=1e-6, rounds_max=16, newton_max=400
+        0.01,
+        1000.0,
+        viscosity=0.005,
+        penetration_rel=1e-6,
+        rounds_max=16,
+        newton_max=400,
+        deformation="auto",
+        law="neo-hookean-log",
     )
     mesh = Mesh(POINTS, [[0, 1, 2, 3]])
     return calls.contact_frame(NAME, mesh, state, bodies, step, [0, 3], "f64")

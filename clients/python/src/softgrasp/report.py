@@ -205,11 +205,11 @@ def read_contact_report(fields: Fields) -> ContactReport:
     """Reads the report of a contact frame."""
     depth, slip, residual, relative, cone, converged, *counts = fields.fields(_CONTACT)
     errors = (depth, slip, residual, relative, cone)
+    rounds, sweeps, newton, columns = counts
     is_large, shapes, factors = fields.fields(_CONTACT_END)
     deformation = "large" if fields.truth(is_large) else "linear"
-    return ContactReport(
-        *errors, fields.truth(converged), *counts, deformation, shapes, factors
-    )
+    told = (fields.truth(converged), rounds, sweeps, newton, columns)
+    return ContactReport(*errors, *told, deformation, shapes, factors)
 
 
 _LEVELS = ("none", "caution", "serious")
