@@ -66,10 +66,10 @@ fn of_frame(ui: &mut Ui, frame: &ViewFrame) {
     row(ui, "shape at rest", format!("number {}", frame.object.rest_shapes));
     row(ui, "tick", format!("{}  ({:.1} s)", frame.tick, frame.at_s));
     row(ui, "ticks missed", frame.server.ticks_skipped.to_string());
-    row(ui, "device records that could not be read", frame.server.device_faults.to_string());
-    row(ui, "link to the server", frame.server.link.name());
+    row(ui, "unreadable records", frame.server.device_faults.to_string());
+    row(ui, "link", frame.server.link.name());
     if let Some(said) = &frame.server.said {
-        row(ui, "last heard of the server", said.clone());
+        row(ui, "server says", said.clone());
     }
     let Some(solve) = &frame.server.solve else { return };
     let equations =
