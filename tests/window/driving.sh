@@ -118,7 +118,7 @@ open_display() {
 # -- The program: to begin it, to read its log, to see that it ended
 
 # Seconds that anything may take.
-patience=60
+patience=120
 
 # begin NAME ARGUMENT...: opens a window; its log is NAME.log, its output NAME.out.
 begin() {
