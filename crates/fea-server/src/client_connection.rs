@@ -353,7 +353,9 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
             }
         }
         self.collect(None);
-        self.ahead.iter().any(|one| !one.is_cancelled && Ask::supersedes(&one.frame) == Some(model))
+        self.ahead
+            .iter()
+            .any(|one| !one.is_cancelled && Ask::kept_model(&one.frame) == Some((model, true)))
     }
 
     /// When to look at the client again, and what it is if it has not gone on by then; `None` for one

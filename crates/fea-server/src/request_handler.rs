@@ -132,7 +132,7 @@ impl RequestHandler {
             Request::Ask(ask) => ask.report,
             _ => ReportLevel::Full,
         };
-        let reply = match request {
+        let mut reply = match request {
             Request::Hello(hello) => self.welcome(&hello)?,
             Request::Ping { nonce } => Reply::Pong { nonce },
             Request::HaveModel(hash) => Reply::ModelState { known: self.held.hold(hash) },
@@ -161,13 +161,10 @@ impl RequestHandler {
         if !is_finite(&reply) {
             return Err(Refusal::NotFinite);
         }
-        Ok(Some(match reply {
-            Reply::Answer(answer) if level != ReportLevel::Full => {
-                let report = answer.report.clone().at_level(level);
-                Reply::Answer(Box::new(Answer { report, ..*answer }))
-            }
-            reply => reply,
-        }))
+        if let Reply::Answer(answer) = &mut reply {
+            answer.report = std::mem::take(&mut answer.report).at_level(level);
+        }
+        Ok(Some(reply))
     }
 
     /// Answers a question about a mesh that came along or a kept model, linear or large.

@@ -268,7 +268,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     /// client that goes is not worked for any longer.
     async fn handle(&mut self, frame: Frame, received: Reservation) -> Result<(), SessionError> {
         let (header, kind) = (frame.header, frame.kind());
-        let is_frame = Ask::is_about_model(&frame);
+        let kept_model = Ask::kept_model(&frame);
         let is_request = kind.is_some_and(|kind| !kind.is_reply());
         let start = Instant::now();
         // Without a token any request introduces a client, before it is worked for.
@@ -277,14 +277,16 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         }
         let metrics = &self.server.resources.metrics;
         metrics.received(HEADER_LEN + frame.payload.len());
-        let replied = match Ask::supersedes(&frame) {
-            Some(model) if self.connection.has_newer(model).await => Err(Refusal::Superseded),
+        let replied = match kept_model {
+            Some((model, true)) if self.connection.has_newer(model).await => {
+                Err(Refusal::Superseded)
+            }
             _ => work(&mut self.handler, &mut self.connection, frame, received)
                 .await
                 .inspect_err(|_| metrics.abandoned())?,
         };
         let refused = replied.as_ref().err().map(Refusal::code);
-        metrics.answered((kind, is_frame), start.elapsed(), refused);
+        metrics.answered((kind, kept_model.is_some()), start.elapsed(), refused);
         if self.handler.is_authorised() && is_request {
             self.introduced().await?;
             self.connection.make_known(self.handler.limits());

@@ -5,6 +5,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
+use fea_server::ServerConfig;
 use softgrasp_protocol::{
     Ask, Hello, ModelHash, RejectCode, Reply, ReportLevel, Request, VERSION, VersionRange,
 };
@@ -12,7 +13,7 @@ use softgrasp_tests::questions::{cube, frame, once, squeeze, upload};
 use softgrasp_tests::raw_session::{RawSession, raw_header, request_frame};
 use softgrasp_tests::watchdog::within;
 
-use crate::start::{answer, client, refusal, server};
+use crate::start::{answer, client, config, refusal, server};
 
 const LIMIT: Duration = Duration::from_secs(120);
 
@@ -174,6 +175,22 @@ fn several_cases_of_a_kept_model_are_the_answers_of_its_frames() {
     let (code, text) = refusal(&mut connection, &Request::from(large));
     assert_eq!(code, RejectCode::BadRequest);
     assert!(text.contains("one case at a time"), "{text}");
+}
+
+#[test]
+fn more_cases_of_a_kept_model_than_there_is_memory_for_are_refused() {
+    let config = ServerConfig { memory_limit: 16 << 20, ..config(1) };
+    let server = fea_server::start(config).unwrap();
+    let mesh = cube(64);
+    let mut connection = client(&server);
+    connection.ask(&Request::UploadModel(upload(&mesh))).unwrap();
+    let sound = frame(&mesh, 1.0, "condensed");
+    let values: Vec<f64> = sound.question.known.iter().map(|known| known.value).collect();
+    let many = Ask { cases: vec![values; 2000], ..sound.clone() };
+    let (code, text) = refusal(&mut connection, &Request::from(many));
+    assert_eq!(code, RejectCode::MemoryLimit, "{text}");
+    assert!(text.contains("2001 cases"), "{text}");
+    answer(&mut connection, &Request::from(sound));
 }
 
 #[test]

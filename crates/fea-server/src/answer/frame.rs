@@ -12,6 +12,7 @@ use super::condensed::{Contacts, PreparedSet, StrainOf};
 use super::direct::{self, Posed};
 use super::factor::{FactorRequest, because_of_memory};
 use super::finite::answer_is_finite;
+use super::several::check_cases;
 use crate::clock::StageClock;
 use crate::plan::{Subject, columns_ms, factor_ms, plan_frame};
 use crate::refusal::Refusal;
@@ -123,6 +124,9 @@ pub(crate) fn answer_cases(
     (message, cases): (QuestionMessage, Vec<Vec<f64>>),
     clock: &StageClock,
 ) -> Result<Answer, Refusal> {
+    let stored = resources.models.find(model).ok_or(Refusal::UnknownModel(model))?;
+    let reservation = resources.budget.reservation();
+    reservation.settle(check_cases(&stored.model, cases.len(), reservation.free())?);
     let mut answer = answer_frame(resources, model, message.clone(), clock.clone())?;
     for values in cases {
         let mut message = message.clone();

@@ -58,11 +58,8 @@ pub(crate) fn solve_several(
     let forces = checked_forces(&model, &known, &message)?;
     let work = Work { resources, reservation, request, message };
     let (factored, plan, why) = work.factored(plan, &model, &known, &mut clock)?;
-    let bytes = cases_bytes(&model, cases.len());
     let free = work.reservation.free().saturating_sub((factored.bytes() + model.bytes()) as u64);
-    if bytes > free {
-        return Err(Refusal::TooManyCases { cases: cases.len() + 1, bytes, free });
-    }
+    check_cases(&model, cases.len(), free)?;
     let posed = work.posed(&model, known, forces, why);
     let mut answer = direct::answer_several(&model, &factored, posed, &further, estimate, clock)?;
     add_plan_warnings(&plan, asked_element, poisson_max, &mut answer.report);
@@ -78,7 +75,17 @@ fn further(model: &Model, first: &[DofValue], cases: &[Vec<f64>]) -> Result<Vec<
     cases.iter().map(known).collect()
 }
 
-/// What solving and answering takes beside the factor.
-fn cases_bytes(model: &Model, cases: usize) -> u64 {
-    (VECTORS_PER_CASE * cases) as u64 * (3 * model.system_node_count() * size_of::<f64>()) as u64
+/// What solving and answering so many further cases takes beside the factor, if so much is free.
+///
+/// Units: bytes.
+///
+/// # Errors
+/// [`Refusal::TooManyCases`].
+pub(super) fn check_cases(model: &Model, cases: usize, free: u64) -> Result<u64, Refusal> {
+    let vector = (3 * model.system_node_count() * size_of::<f64>()) as u64;
+    let bytes = (VECTORS_PER_CASE * cases) as u64 * vector;
+    match bytes > free {
+        true => Err(Refusal::TooManyCases { cases: cases + 1, bytes, free }),
+        false => Ok(bytes),
+    }
 }

@@ -99,17 +99,18 @@ impl Ask {
         }
     }
 
-    /// The model whose older requests this frame makes needless; `None` where they stay wanted.
+    /// The kept model that a frame asks about, and whether it makes older requests about it needless.
     ///
-    /// Decodes nothing but the head.
-    pub fn supersedes(frame: &Frame) -> Option<ModelHash> {
-        let head = AskHead::of(frame).filter(|head| head.newest_wins)?;
-        head.model()
-    }
-
-    /// Whether a frame is a request about a kept model.
-    pub fn is_about_model(frame: &Frame) -> bool {
-        AskHead::of(frame).is_some_and(|head| head.model().is_some())
+    /// Decodes nothing but the first fields.
+    pub fn kept_model(frame: &Frame) -> Option<(ModelHash, bool)> {
+        if frame.kind() != Some(Kind::Ask) {
+            return None;
+        }
+        let head: AskHead = PayloadReader::new(&frame.payload).part().ok()?;
+        match head.subject {
+            SubjectPart::Model { model } => Some((model, head.newest_wins)),
+            SubjectPart::Mesh { .. } => None,
+        }
     }
 
     /// Arrays: those of the mesh if it comes along, those of the question, the cases one by one.
@@ -180,22 +181,6 @@ impl Ask {
             newest_wins: part.newest_wins,
             report: part.report,
         })
-    }
-}
-
-impl AskHead {
-    fn of(frame: &Frame) -> Option<Self> {
-        if frame.kind() != Some(Kind::Ask) {
-            return None;
-        }
-        PayloadReader::new(&frame.payload).part().ok()
-    }
-
-    fn model(&self) -> Option<ModelHash> {
-        match self.subject {
-            SubjectPart::Model { model } => Some(model),
-            SubjectPart::Mesh { .. } => None,
-        }
     }
 }
 

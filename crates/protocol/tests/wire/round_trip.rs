@@ -112,9 +112,12 @@ fn cases_that_do_not_fit_the_first_are_not_sent() {
 #[test]
 fn newest_wins_is_seen_without_the_arrays() {
     let variant = |name| variants().into_iter().find(|(known, _)| *known == name).unwrap().1;
-    let supersedes = |message: Message| Ask::supersedes(&only_frame(&message.encode()));
-    assert!(supersedes(variant("Ask-model")).is_some());
-    assert_eq!(supersedes(variant("Ask-large")), None, "older ones stay wanted");
-    assert_eq!(supersedes(sample(Kind::Ask)), None, "a mesh has no newer one");
-    assert_eq!(supersedes(sample(Kind::Ping)), None);
+    let seen = |message: Message| {
+        let kept = Ask::kept_model(&only_frame(&message.encode()));
+        kept.map(|(_, newest_wins)| newest_wins)
+    };
+    assert_eq!(seen(variant("Ask-model")), Some(true));
+    assert_eq!(seen(variant("Ask-large")), Some(false), "older ones stay wanted");
+    assert_eq!(seen(sample(Kind::Ask)), None, "a mesh has no newer one");
+    assert_eq!(seen(sample(Kind::Ping)), None);
 }
