@@ -115,7 +115,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "FACTOR", value_parser = speed, allow_hyphen_values = true)]
     pub(super) speed: Option<f64>,
     /// Ticks to play [default: until the script ends].
-    #[arg(long, value_name = "N", value_parser = ticks, allow_hyphen_values = true)]
+    #[arg(long, visible_alias = "ticks", value_name = "N", value_parser = ticks, allow_hyphen_values = true)]
     pub(super) frames: Option<u64>,
     /// No window.
     #[arg(long)]

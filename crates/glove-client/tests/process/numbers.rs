@@ -1,6 +1,6 @@
 //! Numbers that can never work are refused with the option's name and exit code 2.
 
-use crate::start::fail;
+use crate::start::{fail, succeed};
 
 const RUN: &[&str] = &["run", "--headless", "--object", "cube", "--nodes", "64"];
 const SOLVE: &[&str] = &["solve", "--mesh", "no.msh", "--known", "no.csv", "--out", "never.csv"];
@@ -39,4 +39,12 @@ fn negative_and_impossible_numbers_are_refused_by_name_and_not_taken_for_options
 fn nodes_of_a_run_are_refused_by_name_too() {
     let said = fail(2, &["run", "--headless", "--object", "cube", "--nodes", "-64"]);
     assert!(said.starts_with("error: invalid value '-64' for '--nodes <N>'"), "{said}");
+}
+
+#[test]
+fn ticks_are_counted_under_either_name() {
+    for option in ["--frames", "--ticks"] {
+        let told = succeed(&[RUN, &[option, "3"]].concat());
+        assert!(told.contains("ticks               3\n"), "{option}: {told}");
+    }
 }
