@@ -13,16 +13,12 @@ pub mod contact;
 pub mod echo;
 pub mod fit;
 pub mod flicker;
-pub mod frame;
 pub mod frontier;
 pub mod hard_cases;
-pub mod hold;
 pub mod large;
+pub mod latency;
 pub mod limits;
-pub mod load;
 pub mod machine;
-pub mod methods;
-pub mod onset;
 pub mod plot;
 mod programs;
 mod random;
@@ -34,13 +30,11 @@ pub mod sample;
 pub mod scaling;
 pub mod scene;
 pub mod service;
-pub mod session;
 pub mod stages;
 pub mod table;
 pub mod tail;
 pub mod thesis;
 pub mod threads;
-pub mod trust;
 mod visitors;
 
 use std::path::PathBuf;
@@ -50,20 +44,12 @@ pub use report::{Options, Report, ReportError};
 /// A report by its name on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum ReportName {
-    /// Time by stage and error of every method.
-    Methods,
-    /// Round trip of a frame over loopback TCP against an echo of the same bytes.
-    Frame,
+    /// Warm frames against an echo, the first frame of a grip, a request every millisecond.
+    Latency,
     /// Time against error of every method, precision and element.
     Frontier,
-    /// The first frame of a new grip, with and without prefetch.
-    Onset,
     /// The factor over fronts against what the machine can do at most.
     Limits,
-    /// A request every millisecond for a minute.
-    Hold,
-    /// What a user of `run` gets in real time.
-    Session,
     /// Figures 5.1, 5.2 and 6.13 to 6.16 of the thesis, measured again.
     Scaling,
     /// Force of one press on finer meshes by each contact model, and its frame time.
@@ -80,25 +66,17 @@ pub enum ReportName {
     Large,
     /// Random grips: the proven bound against the true error.
     Bound,
-    /// How many clients at 60 Hz one server serves in time.
-    Load,
-    /// A newcomer and a new contact beside others' long work; a crowd that sends large requests.
+    /// What users of one server get: in real time, beside others' long work, among many and hostile clients.
     Service,
-    /// Malformed frames, hostile connections, restarts and a long run.
-    Trust,
 }
 
 impl ReportName {
     /// The name, which is also that of its files.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Methods => "methods",
-            Self::Frame => "frame",
+            Self::Latency => "latency",
             Self::Frontier => "frontier",
-            Self::Onset => "onset",
             Self::Limits => "limits",
-            Self::Hold => "hold",
-            Self::Session => "session",
             Self::Scaling => "scaling",
             Self::Contact => "contact",
             Self::Accuracy => "accuracy",
@@ -107,9 +85,7 @@ impl ReportName {
             Self::Bound => "bound",
             Self::Flicker => "flicker",
             Self::Large => "large",
-            Self::Load => "load",
             Self::Service => "service",
-            Self::Trust => "trust",
         }
     }
 }
@@ -121,13 +97,9 @@ impl ReportName {
 /// [`ReportError::Failed`] comes after the files.
 pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>), ReportError> {
     let mut report = match name {
-        ReportName::Methods => methods::measure(options)?,
-        ReportName::Frame => frame::measure(options)?,
+        ReportName::Latency => latency::measure(options)?,
         ReportName::Frontier => frontier::measure(options)?,
-        ReportName::Onset => onset::measure(options)?,
         ReportName::Limits => limits::measure(options)?,
-        ReportName::Hold => hold::measure(options)?,
-        ReportName::Session => session::measure(options)?,
         ReportName::Scaling => scaling::measure(options)?,
         ReportName::Contact => contact::measure(options)?,
         ReportName::Accuracy => accuracy::measure(options)?,
@@ -136,9 +108,7 @@ pub fn run(name: ReportName, options: &Options) -> Result<(Report, Vec<PathBuf>)
         ReportName::Bound => bound::measure(options)?,
         ReportName::Flicker => flicker::measure(options)?,
         ReportName::Large => large::measure(options)?,
-        ReportName::Load => load::measure(options)?,
         ReportName::Service => service::measure(options)?,
-        ReportName::Trust => trust::measure(options)?,
     };
     report.end();
     let files = report.write(&options.out)?;

@@ -83,6 +83,11 @@ impl Report {
         self.head.push(("load after", load_text()));
     }
 
+    /// Begins a chapter: what follows belongs below its heading.
+    pub fn chapter(&mut self, heading: &str) {
+        self.text(format!("## {heading}"));
+    }
+
     /// Adds a paragraph.
     pub fn text(&mut self, markdown: impl Into<String>) {
         self.sections.push(Section::Text(markdown.into()));

@@ -44,19 +44,6 @@ fn run_quick(name: ReportName, folder: &Path) {
 }
 
 #[test]
-fn methods_are_timed_with_small_errors() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Methods, folder.path());
-    let methods = column(folder.path(), "methods.csv", "method");
-    assert!(methods.iter().any(|m| m == "gauss-jordan") && methods.len() >= 8);
-    for name in ["error_rel", "residual_rel"] {
-        let errors = numbers(folder.path(), "methods.csv", name);
-        assert!(errors.iter().all(|&e| e < 1e-11), "{name}: {errors:?}");
-    }
-    assert!(numbers(folder.path(), "methods.csv", "total_ms").iter().all(|&ms| ms > 0.0));
-}
-
-#[test]
 fn collision_is_timed_and_nothing_is_missed() {
     let folder = tempfile::tempdir().unwrap();
     run_quick(ReportName::Collision, folder.path());
@@ -169,26 +156,24 @@ fn contacts_are_pressed_and_timed_with_small_errors() {
     assert_eq!(phases, ["settle", "pinch", "lift", "hold"]);
 }
 
-#[test]
-fn frames_are_timed_beside_their_echo_with_small_errors() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Frame, folder.path());
-    for (file, rows) in [("frame.csv", 6), ("frame-methods.csv", 18)] {
+/// Warm frames are timed beside their echo, with small errors.
+fn warm_frames(folder: &Path) {
+    for (file, rows) in [("latency-frame.csv", 6), ("latency-frame-methods.csv", 18)] {
         for name in ["error_rel", "residual_rel"] {
-            let errors = numbers(folder.path(), file, name);
+            let errors = numbers(folder, file, name);
             assert!(errors.iter().all(|&e| e < 1e-11), "{file} {name}: {errors:?}");
             assert!(errors.len() >= rows, "{file}: {errors:?}");
         }
     }
-    assert_eq!(column(folder.path(), "frame.csv", "contact")[0], "mask");
+    assert_eq!(column(folder, "latency-frame.csv", "contact")[0], "mask");
     for name in ["alone_p50_ms", "echo_alone_p50_ms", "alone_over_echo_alone"] {
-        assert!(numbers(folder.path(), "frame.csv", name).iter().all(|&x| x > 0.0), "{name}");
+        assert!(numbers(folder, "latency-frame.csv", name).iter().all(|&x| x > 0.0), "{name}");
     }
     // Where an echo keeps a processor for itself, nothing takes turns with it.
-    let in_turn = column(folder.path(), "frame.csv", "frame_over_echo");
+    let in_turn = column(folder, "latency-frame.csv", "frame_over_echo");
     assert_eq!(in_turn.iter().filter(|ratio| ratio.is_empty()).count(), 2);
     // Warm frames reuse the factor of the first.
-    assert!(numbers(folder.path(), "frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
+    assert!(numbers(folder, "latency-frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
 }
 
 #[test]
@@ -231,29 +216,25 @@ fn frontier_marks_what_is_worth_its_time() {
     }
 }
 
-#[test]
-fn first_frames_of_grips_are_right_with_and_without_prefetch() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Onset, folder.path());
-    let of = |name| numbers(folder.path(), "onset.csv", name);
+/// First frames of grips are right, with and without prefetch.
+fn first_frames(folder: &Path) {
+    let of = |name| numbers(folder, "latency-onset.csv", name);
     for name in ["error_rel", "residual_rel"] {
         assert!(of(name).iter().all(|&e| e < 1e-10) && of(name).len() == 4, "{:?}", of(name));
     }
     assert!(of("compared").iter().chain(&of("sparse_solve_ms")).all(|&x| x > 0.0));
-    assert!(folder.path().join("onset.svg").is_file());
+    assert!(folder.join("latency-onset.svg").is_file());
 }
 
-#[test]
-fn a_held_pace_is_counted_and_every_answer_compared() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Hold, folder.path());
+/// A held pace is counted, and every answer compared.
+fn held_pace(folder: &Path) {
     let (rights, asked) = ("real_time", "asked");
-    let of = |name| column(folder.path(), "hold.csv", name);
+    let of = |name| column(folder, "latency-hold.csv", name);
     // The server and nobody, with real-time rights where the system grants them, and without.
     assert_eq!(of(asked)[..2], ["the server", "nobody"]);
     assert_eq!(of(rights).last().map(String::as_str), Some("no"));
-    assert!(numbers(folder.path(), "hold.csv", "ticks").iter().all(|&ticks| ticks == 500.0));
-    let late = numbers(folder.path(), "hold.csv", "late_percent");
+    assert!(numbers(folder, "latency-hold.csv", "ticks").iter().all(|&ticks| ticks == 500.0));
+    let late = numbers(folder, "latency-hold.csv", "late_percent");
     assert!(late.iter().all(|late| (0.0..=100.0).contains(late)), "{late:?}");
     let of_answers = |name| {
         let all: Vec<String> = of(name).into_iter().step_by(2).collect();
@@ -270,16 +251,14 @@ fn a_held_pace_is_counted_and_every_answer_compared() {
     assert!(of_answers("error_bound_rel").iter().all(|&bound| bound > 0.0 && bound < 1e-4));
 }
 
-#[test]
-fn a_session_of_the_real_programs_is_read_from_its_reports() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Session, folder.path());
-    let of = |name| numbers(folder.path(), "session.csv", name);
+/// A session of the real programs is read from its reports.
+fn session(folder: &Path) {
+    let of = |name| numbers(folder, "service-session.csv", name);
     assert_eq!(of("runs"), [1.0, 1.0, 2.0]);
     assert!(of("ticks").iter().all(|&ticks| ticks > 0.0), "{:?}", of("ticks"));
     // Every deforming tick is answered or has a reason, however slow the machine is.
-    let why = |name| column(folder.path(), "session-unanswered.csv", name);
-    for (server, (deforming, answered)) in column(folder.path(), "session.csv", "server")
+    let why = |name| column(folder, "service-session-unanswered.csv", name);
+    for (server, (deforming, answered)) in column(folder, "service-session.csv", "server")
         .iter()
         .zip(of("deforming").into_iter().zip(of("answered")))
     {
@@ -290,45 +269,37 @@ fn a_session_of_the_real_programs_is_read_from_its_reports() {
     }
     assert!(of("residual_rel").iter().all(|&e| e < 1e-9));
     // What was answered is shown for a while, and nothing is shown that is not old.
-    let ages = column(folder.path(), "session.csv", "age_max_ms");
+    let ages = column(folder, "service-session.csv", "age_max_ms");
     for (age, answered) in ages.iter().zip(of("answered")) {
         assert!(answered == 0.0 || age.parse::<f64>().unwrap() > 0.0, "{age}");
     }
-    let outcomes = column(folder.path(), "session-large.csv", "outcome");
+    let outcomes = column(folder, "service-session-large.csv", "outcome");
     assert_eq!(outcomes[0], "answered");
-    assert!(numbers(folder.path(), "session-large.csv", "nodes").iter().all(|&n| n > 900.0));
+    assert!(numbers(folder, "service-session-large.csv", "nodes").iter().all(|&n| n > 900.0));
 }
 
-#[test]
-fn clients_at_an_even_pace_get_right_answers() {
-    let folder = tempfile::tempdir().unwrap();
-    // A wrong answer, or a client that is not served, fails the report.
-    run_quick(ReportName::Load, folder.path());
-    let answers = numbers(folder.path(), "load.csv", "answers");
+/// Clients at an even pace get right answers; a wrong one fails the report.
+fn clients(folder: &Path) {
+    let answers = numbers(folder, "service-load.csv", "answers");
     assert!(answers.iter().all(|&count| count > 20.0), "{answers:?}");
-    assert_eq!(numbers(folder.path(), "load.csv", "clients"), [1.0, 2.0]);
+    assert_eq!(numbers(folder, "service-load.csv", "clients"), [1.0, 2.0]);
 }
 
-#[test]
-fn questions_beside_long_work_are_right_and_a_crowd_that_sends_is_counted() {
-    let folder = tempfile::tempdir().unwrap();
-    // A wrong answer beside long work, or other bits of the long work, fail the report.
-    run_quick(ReportName::Service, folder.path());
-    assert!(numbers(folder.path(), "service.csv", "asked").iter().all(|&asked| asked > 0.0));
-    let solves = numbers(folder.path(), "service-pace.csv", "solves_beside");
+/// Questions beside long work are right, and a crowd that sends is counted.
+fn beside(folder: &Path) {
+    assert!(numbers(folder, "service-beside.csv", "asked").iter().all(|&asked| asked > 0.0));
+    let solves = numbers(folder, "service-pace.csv", "solves_beside");
     assert!(solves.iter().all(|&solves| solves >= 2.0), "{solves:?}");
-    let refused = numbers(folder.path(), "service-receiving.csv", "refused");
-    let done = numbers(folder.path(), "service-receiving.csv", "done");
+    let refused = numbers(folder, "service-receiving.csv", "refused");
+    let done = numbers(folder, "service-receiving.csv", "done");
     assert!(refused.iter().zip(&done).all(|(refused, done)| refused + done == 8.0));
 }
 
-#[test]
-fn hostile_connections_and_restarts_cost_no_right_answer() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Trust, folder.path());
+/// Hostile connections and restarts cost no right answer.
+fn hostile(folder: &Path) {
     let (what, measured) = (
-        column(folder.path(), "trust.csv", "what"),
-        numbers(folder.path(), "trust.csv", "measured"),
+        column(folder, "service-trust.csv", "what"),
+        numbers(folder, "service-trust.csv", "measured"),
     );
     // Times and memory of so short a form say little; what is counted must be right.
     let counted = what.iter().zip(&measured).filter(|(what, _)| {
@@ -336,4 +307,23 @@ fn hostile_connections_and_restarts_cost_no_right_answer() {
     });
     let counted: Vec<_> = counted.collect();
     assert!(counted.len() >= 3 && counted.iter().all(|(_, count)| **count == 0.0), "{counted:?}");
+}
+
+#[test]
+fn frames_are_timed_with_small_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Latency, folder.path());
+    warm_frames(folder.path());
+    first_frames(folder.path());
+    held_pace(folder.path());
+}
+
+#[test]
+fn users_of_one_server_get_right_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    run_quick(ReportName::Service, folder.path());
+    session(folder.path());
+    beside(folder.path());
+    clients(folder.path());
+    hostile(folder.path());
 }

@@ -1,7 +1,9 @@
 //! Which source file imports which, read from the `use` lines and paths of a package.
 //!
 //! A name that a file only hands on (`pub use child::Name`) counts as imported from the file that
-//! defines it, so a table of contents ties nothing. Code behind `#[cfg(test)]` is left out.
+//! defines it, so a table of contents ties nothing. Methods that a file gives to a type of another file
+//! (an inherent `impl`) tie both ways: whoever has the type has them, and they work on its fields. Code
+//! behind `#[cfg(test)]` is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -21,6 +23,8 @@ struct Module {
     names: BTreeMap<String, Vec<String>>,
     /// Modules whose names it brings into its scope all at once.
     globs: Vec<Vec<String>>,
+    /// The types that it gives methods to.
+    implemented: Vec<Vec<String>>,
 }
 
 impl Package {
@@ -44,14 +48,24 @@ impl Package {
         self.modules.is_empty()
     }
 
-    /// The files that each file imports something from.
+    /// The files that each file imports something from, or has methods from.
     pub fn imports(&self) -> BTreeMap<&str, BTreeSet<&str>> {
         let of_module = |(at, module): (&Vec<String>, &Module)| {
             let found = module.paths.iter().filter_map(|path| self.definition(at, path, 0));
             let others = found.filter(|file| *file != module.file);
             (self.modules[at].file.as_str(), others.collect())
         };
-        self.modules.iter().map(of_module).collect()
+        let mut imports: BTreeMap<&str, BTreeSet<&str>> =
+            self.modules.iter().map(of_module).collect();
+        for (at, module) in &self.modules {
+            let defining =
+                module.implemented.iter().filter_map(|path| self.definition(at, path, 0));
+            for file in defining.filter(|file| *file != module.file) {
+                imports.entry(file).or_default().insert(&module.file);
+                imports.entry(&module.file).or_default().insert(file);
+            }
+        }
+        imports
     }
 
     /// Files that import themselves around other files, one list for each circle.
@@ -193,7 +207,8 @@ impl Module {
             }
         }
         paths.extend(inline_paths(&rest));
-        Ok(Self { file, paths, names, globs })
+        let implemented = implemented(&code);
+        Ok(Self { file, paths, names, globs, implemented })
     }
 }
 
@@ -237,6 +252,42 @@ fn split_outside_braces(text: &str) -> Vec<&str> {
     }
     parts.push(&text[start..]);
     parts
+}
+
+/// The types of `impl` blocks without a trait, at the beginning of a line as rustfmt leaves them.
+fn implemented(code: &str) -> Vec<Vec<String>> {
+    let headers = code.lines().filter_map(|line| line.strip_prefix("impl"));
+    let types = headers.filter_map(|header| {
+        let header = match header.strip_prefix('<') {
+            Some(_) => &header[closing_bracket(header)..],
+            None => header,
+        };
+        let name = header.trim_start().split(['<', ' ', '{']).next()?;
+        let is_of_trait = header.contains(" for ");
+        let is_own = ["struct", "enum"].iter().any(|kind| {
+            let ends = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+            code.split(&format!("{kind} {name}")).skip(1).any(ends)
+        });
+        (!is_of_trait && !is_own && !name.is_empty())
+            .then(|| name.split("::").map(str::to_owned).collect())
+    });
+    types.collect()
+}
+
+/// Length of a text up to the bracket that closes its first one (of generics).
+fn closing_bracket(text: &str) -> usize {
+    let mut depth = 0;
+    for (at, c) in text.char_indices() {
+        match c {
+            '<' => depth += 1,
+            '>' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return at + 1;
+        }
+    }
+    text.len()
 }
 
 /// Paths that stand in the code itself: words joined by `::`.
@@ -328,6 +379,24 @@ mod tests {
             ("part/b.rs", "use crate::part::Two;\npub struct B;\npub fn g() {}\n"),
         ]);
         assert_eq!(ends(package.circles()), [["a.rs", "b.rs"]]);
+    }
+
+    #[test]
+    fn methods_for_a_type_of_another_file_are_a_circle_but_a_trait_for_it_is_none() {
+        let files = |b: &str| {
+            let lib = "mod a;\nmod b;\nmod c;\n";
+            let a = "pub struct A<T>(T);\nimpl<T> A<T> {\n}\n";
+            let c = "pub use crate::a::A;\n";
+            self::package(&[("lib.rs", lib), ("a.rs", a), ("b.rs", b), ("c.rs", c)])
+        };
+        let (_folder, package) = files("use crate::c::A;\nimpl<T: Into<u8>> A<T> {\n}\n");
+        assert_eq!(ends(package.circles()), [["a.rs", "b.rs"]]);
+        let (_folder, package) = files("impl crate::a::A<u8> {\n    fn f() {}\n}\n");
+        assert_eq!(ends(package.circles()), [["a.rs", "b.rs"]]);
+        let (_folder, package) = files(
+            "use crate::a::A;\ntrait Own {}\nimpl<T> Own for A<T> {\n}\nimpl Local {\n}\nstruct Local;\n",
+        );
+        assert_eq!(package.circles(), Vec::<Vec<&str>>::new());
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use glove_client::object::scene::SceneFile;
 use softgrasp_core::mesh_io::{parse, parse_surface, write_msh41};
 use softgrasp_core::surface::MendedSurface;
-use softgrasp_hand::devices::calibration::Calibration;
+use softgrasp_hand::devices::calibration::read_calibration;
 use softgrasp_hand::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
 use softgrasp_hand::devices::fastrak::{
     Encoding, FastrakEvent, FastrakFormat, FastrakParser, LengthUnit, OutputList,
@@ -99,7 +99,7 @@ impl Parser {
             Self::Glove => glove(bytes),
             Self::Tracker => tracker(bytes),
             Self::Joints => JointsParser::new().feed_all(bytes, drop),
-            Self::Calibration => drop(Calibration::read(&String::from_utf8_lossy(bytes))),
+            Self::Calibration => drop(read_calibration(&String::from_utf8_lossy(bytes))),
             Self::HandSetup => drop(HandConfiguration::read(&String::from_utf8_lossy(bytes))),
             Self::Scene => drop(SceneFile::of_text(&String::from_utf8_lossy(bytes))),
             Self::Recordings => {

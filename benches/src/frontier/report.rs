@@ -144,7 +144,7 @@ table of meshes. Differences between elements smaller than that say nothing.\n\n
 A warm frame is one answer more with other displacements of the same patches, its residual (and for \
 `condensed` its certificate) with it. A cold start is everything from the mesh in memory to the \
 first answer: assembly, check of free motions, order, factor or inverse (for `condensed` base, \
-columns, small system), solve. Both without the wire, which `frame` and `onset` measure. All ways \
+columns, small system), solve. Both without the wire, which `latency` measures. All ways \
 take turns on one pool of as many threads as there are processors. Direct methods compute all nodes, \
 `condensed` those of the surface. `tolerance` is the residual at which `pcg` may stop; its first step \
 with a factor in single precision already goes below the coarse ones. Dense matrices above 512 MiB \

@@ -1,6 +1,6 @@
 //! Report `limits`: the factor over fronts against what the machine can do at most.
 
-mod before;
+mod one_size;
 mod product;
 mod report;
 mod request;

@@ -2,7 +2,7 @@
 
 use softgrasp_core::solve::Real;
 
-use super::before::{Rounds, table};
+use super::one_size::{Rounds, table};
 use super::round::{Problem, Round};
 use crate::plot::{Mark, Plot, PlotPoint, Scale, Series};
 use crate::report::{Options, Report, ReportError, progress};
@@ -14,7 +14,7 @@ use crate::threads::{pool, processors};
 const NODES: [usize; 7] = [1000, 3375, 10_648, 21_952, 46_656, 97_336, 157_464];
 /// Nodes above which a round is long enough to be taken once only.
 const LARGE: usize = 40_000;
-/// Nodes of the cube that was measured before the factor was worked on.
+/// Nodes of the cube that is looked at in detail.
 const IN_DETAIL: usize = 10_648;
 /// Nodes above which one thread alone would take minutes.
 const ALL_THREADS: usize = 60_000;
@@ -167,9 +167,8 @@ solves one right-hand side, whose residual is in the table.
 ";
 
 const IN_DETAIL_TEXT: &str = "\
-The cube of 10 648 nodes (163 MB of factor then). `before` was measured from outside on a quiet Intel \
-Xeon with AVX-512 and two cores, before the factor was worked on, and so was `others_then`; the rest is \
-of this run, medians with the smallest and the largest. Times are in ms. `first` is a factor in memory \
+The cube of 10 648 nodes: medians of this run with the smallest and the largest. Times are in \
+ms. `first` is a factor in memory \
 that the system hands out page by page, `again` one in memory that is there. 21 loads are solved by \
 `Factored::solve_several`: right-hand sides, solves, refinement and reactions; answers of both \
 precisions agree to 1e-11. The last rows are stages that `glove-client solve` reports in a process of \

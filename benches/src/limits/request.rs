@@ -26,6 +26,13 @@ pub struct Stages {
     pub solve: f64,
 }
 
+impl Stages {
+    /// All four.
+    pub fn all(&self) -> f64 {
+        self.assemble + self.order + self.factor + self.solve
+    }
+}
+
 impl Files {
     /// # Errors
     /// Where they cannot be written.

@@ -1,10 +1,28 @@
-//! Report `service`: what one client's long work costs the others, and what a crowd's bytes cost the
-//! server.
+//! Report `service`: what users of one server get: beside a running session, beside others' long work,
+//! among many clients, among hostile ones, over restarts and an hour.
 
-mod bars;
-mod beside;
-mod page;
-mod probe;
-mod receiving;
+mod beside_work;
+mod load;
+mod session;
+mod trust;
 
-pub use page::measure;
+use crate::report::{Options, Report, ReportError};
+use crate::threads::processors;
+
+/// Measures the report.
+///
+/// # Errors
+/// [`ReportError`]; a run that hangs, and an answer that is wrong, are some.
+pub fn measure(options: &Options) -> Result<Report, ReportError> {
+    let title = "Service: what the users of one server get";
+    let mut report = Report::begin("service", title, &processors().to_string(), options);
+    report.chapter("What a user of `run` gets in real time");
+    session::measure(options, &mut report)?;
+    report.chapter("What one client's long work costs the others");
+    beside_work::measure(options, &mut report)?;
+    report.chapter("How many clients one server serves in time");
+    load::measure(options, &mut report)?;
+    report.chapter("A server one can trust");
+    trust::measure(options, &mut report)?;
+    Ok(report)
+}

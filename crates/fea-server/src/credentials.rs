@@ -22,18 +22,18 @@ pub struct Renewal {
 /// A certificate with fewer days left is warned of.
 const DAYS_LEFT_MIN: u64 = 30;
 
-impl AccessArguments {
+impl Credentials {
     /// Reads the files, and warns of what is weak in them.
     ///
     /// # Errors
     /// What cannot be read or used, with the file.
-    pub fn read(&self) -> anyhow::Result<Credentials> {
-        let tokens = self.token_file.as_deref().map(Tokens::read).transpose()?;
-        let encryption = match (&self.tls_cert, &self.tls_key) {
+    pub fn read(access: &AccessArguments) -> anyhow::Result<Self> {
+        let tokens = access.token_file.as_deref().map(Tokens::read).transpose()?;
+        let encryption = match (&access.tls_cert, &access.tls_key) {
             (Some(certificate), Some(key)) => Some(Encryption::read(certificate, key)?),
             _ => None,
         };
-        for (what, file) in [("token", &self.token_file), ("key", &self.tls_key)] {
+        for (what, file) in [("token", &access.token_file), ("key", &access.tls_key)] {
             if let Some(file) = file {
                 warn_if_others_read(what, file);
             }
@@ -57,7 +57,7 @@ impl AccessArguments {
                 _ => tracing::info!(on, days_left, "the certificate expires"),
             }
         }
-        Ok(Credentials { tokens, encryption })
+        Ok(Self { tokens, encryption })
     }
 }
 
@@ -82,7 +82,7 @@ impl Renewal {
     /// Reads all files again. New clients need what is in them; sessions live on. Of files that cannot be
     /// used none is.
     pub fn read_again(&self) {
-        let read = match self.access.read() {
+        let read = match Credentials::read(&self.access) {
             Ok(read) => read,
             Err(error) => {
                 let error = softgrasp_os::one_line(error.as_ref());

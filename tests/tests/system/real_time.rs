@@ -12,6 +12,7 @@ use glove_client::pace::tick_budget::Priority;
 use glove_client::pace::{Due, Pace};
 use glove_client::run::grasp_loop::GraspLoop;
 use glove_client::run::run_report::RunReport;
+use glove_client::run::run_words::failure;
 use glove_client::run::session::Session;
 use glove_client::run::tick_outcome::TickOutcome;
 use nalgebra::Isometry3;
@@ -195,7 +196,7 @@ fn ticks_without_a_server_are_counted_as_such() {
     // All but the last, which still waits for a server when the run ends.
     let count = |why: &str| summary["unanswered"][why].as_u64().unwrap_or(0);
     assert_eq!(count("server_lost") + count("run_ended"), deforming, "{summary}");
-    assert!(report.failure().unwrap().contains("was lost"), "{:?}", report.failure());
+    assert!(failure(&report).unwrap().contains("was lost"), "{:?}", failure(&report));
 }
 
 #[test]
@@ -214,7 +215,7 @@ fn refused_model_is_sent_once_and_told_once() {
     let summary = json(&report);
     assert_eq!(summary["unanswered"]["refused"], summary["deforming_ticks"]);
     assert!(
-        report.failure().unwrap().ends_with("refused the model (MemoryLimit): it needs 9 bytes")
+        failure(&report).unwrap().ends_with("refused the model (MemoryLimit): it needs 9 bytes")
     );
 }
 

@@ -6,7 +6,8 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use softgrasp_grasp::hand::{HandDimensions, Handedness};
 use softgrasp_hand::devices::calibration::{
-    Calibration, CalibrationHeader, FitReport, SensorFit, ThumbFit, sensor_name,
+    Calibration, CalibrationHeader, FitReport, SensorFit, ThumbFit, read_calibration, sensor_name,
+    toml_text, virtual_hand_text,
 };
 use softgrasp_hand::devices::cyberglove::{SensorCount, SensorSet};
 use softgrasp_hand::hand_setup::HandConfiguration;
@@ -125,13 +126,13 @@ impl CalibrateCommand {
             hand_size_m: Some([dimensions.hand_length, dimensions.hand_breadth]),
         };
         let text = match self.out.extension().is_some_and(|extension| extension == "toml") {
-            true => calibration.to_toml()?,
-            false => calibration.to_virtual_hand(&header),
+            true => toml_text(&calibration)?,
+            false => virtual_hand_text(&calibration, &header),
         };
         write_file(&self.out, text.as_bytes())?;
         // A device or a pipe cannot be read again; its text can.
         let written = if self.out.is_file() { read_text(&self.out)? } else { text };
-        let (back, _) = Calibration::read(&written)
+        let (back, _) = read_calibration(&written)
             .with_context(|| format!("{} cannot be read back", self.out.display()))?;
         ensure!(
             back == *calibration,

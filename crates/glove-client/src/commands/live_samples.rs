@@ -9,7 +9,7 @@ use softgrasp_hand::devices::HandSample;
 use softgrasp_hand::devices::cyberglove::RawSensors;
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::hand_setup::HandConfiguration;
-use softgrasp_hand::serial::{SerialDevices, SerialSettings, SerialSource};
+use softgrasp_hand::serial::{SerialDevices, SerialSource, settings_of_hand};
 
 /// Gives the next reading of the glove; waits for it a short while, `None` if none came.
 pub(super) type NextReading = Box<dyn FnMut() -> Option<RawSensors>>;
@@ -49,7 +49,7 @@ impl Live {
                  devices` lists them), or recorded bytes, --from FOLDER"
             )
         };
-        let devices = SerialDevices::open(SerialSettings::of_hand(ports, configuration))?;
+        let devices = SerialDevices::open(settings_of_hand(ports, configuration))?;
         let reader = HandReader::of_devices(configuration.setup.clone(), None);
         Ok(Self { devices, reader, begun: Instant::now() })
     }

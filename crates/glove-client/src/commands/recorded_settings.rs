@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use softgrasp_hand::devices::calibration::Calibration;
+use softgrasp_hand::devices::calibration::read_toml;
 use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::recording::RecordedSetup;
 use softgrasp_protocol::{ElementName, LawName, Material};
@@ -64,7 +64,7 @@ fn recorded_element(name: &str) -> anyhow::Result<ElementName> {
 pub(super) fn recorded_hand(setup: &RecordedSetup) -> anyhow::Result<HandConfiguration> {
     let read = HandConfiguration::read(&setup.hand_setup);
     let mut configuration = read.context("the recording's hand")?;
-    let calibration = Calibration::from_toml(&setup.calibration);
+    let calibration = read_toml(&setup.calibration);
     configuration.setup.calibration = calibration.context("the recording's calibration")?;
     Ok(configuration)
 }

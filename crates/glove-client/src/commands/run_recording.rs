@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::ensure;
 use softgrasp_core::mesh::TetMesh;
+use softgrasp_hand::devices::calibration::toml_text;
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::recording::{RecordedFriction, RecordedSetup, Recorder, VERSION};
 
@@ -52,7 +53,7 @@ pub(super) fn start_recorder(
         hand,
         period_s: plan.period.map(|period| period.as_secs_f64()),
         hand_setup: plan.hand_configuration.to_text(),
-        calibration: plan.hand_configuration.setup.calibration.to_toml()?,
+        calibration: toml_text(&plan.hand_configuration.setup.calibration)?,
         is_live: plan.is_live,
         world_from_sender: plan.world_from_sender.as_ref().map(|pose| {
             let ([x, y, z], [qx, qy, qz, qw]): ([f64; 3], [f64; 4]) =

@@ -19,7 +19,7 @@ use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 use softgrasp_hand::mouse::MouseHand;
 use softgrasp_hand::recording::ReplayHand;
 use softgrasp_hand::scripted::{GraspPlan, NoGrasp, Planner, ScriptedHand};
-use softgrasp_hand::serial::{SerialDevices, SerialSettings};
+use softgrasp_hand::serial::{SerialDevices, settings_of_hand};
 #[cfg(any(feature = "window", feature = "xr"))]
 use softgrasp_window::view::loading::LoadObject;
 
@@ -186,7 +186,7 @@ fn hand_of(
             hand.holding(contact).with_planner(planner()?).into()
         }
         (HandRequest::Serial(source), _) => {
-            let settings = SerialSettings::of_hand(source, &plan.hand_configuration);
+            let settings = settings_of_hand(source, &plan.hand_configuration);
             LiveHand::serial(SerialDevices::open(settings)?, plan.hand.to_string()).into()
         }
         (HandRequest::Joints(address), _) => {

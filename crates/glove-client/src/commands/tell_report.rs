@@ -6,6 +6,7 @@ use anyhow::bail;
 
 use super::output::{print, write_json};
 use crate::run::run_report::RunReport;
+use crate::run::run_words::{describe, failure};
 
 /// Writes and prints the report.
 ///
@@ -16,11 +17,11 @@ pub(super) fn tell(path: Option<&Path>, report: &RunReport) -> anyhow::Result<()
         write_json(path, report)?;
     }
     // The reason comes first: whoever reads standard error and standard output together sees it.
-    match report.failure() {
+    match failure(report) {
         Some(failure) => {
-            print(&report.describe())?;
+            print(&describe(report))?;
             bail!(failure)
         }
-        None => print(&report.describe()),
+        None => print(&describe(report)),
     }
 }

@@ -1,87 +1,50 @@
-//! One tick of the client in fixed order: bytes, pose, contacts, grasp, request, answer.
+//! One tick of the client in fixed order: bytes, pose, contacts, grasp, request, answer; and what a person
+//! does to the object between two ticks.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use softgrasp_grasp::grasp::{
-    Command, Contact, Grasp, GraspEvent, HandSegments, KnownNode, StateName, StepInput, StepOutput,
-    sense,
+    Command, Contact, Grasp, GraspError, GraspEvent, HandSegments, StateName, StepInput,
+    StepOutput, sense,
 };
 use softgrasp_grasp::hand::{HandColliders, HandPose};
-use softgrasp_grasp::object::{ObjectError, SoftObject};
+use softgrasp_grasp::object::{ObjectError, RestShape, SoftObject};
 use softgrasp_hand::arrival::Device;
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::notice::Notice;
-use softgrasp_hand::sent::{RecordedAnswers, Sent};
-use softgrasp_protocol::{NodeChoice, Precision, Question, Want};
+use softgrasp_hand::sent::Sent;
+use softgrasp_protocol::{Material, MethodName};
 
-use crate::ask::digest::request_digest;
-use crate::ask::held_nodes::{HeldNodes, PrescribedDisplacements};
-use crate::ask::link::{Link, RequestEnd};
-use crate::ask::model_upload::ModelUpload;
-use crate::ask::prefetch::Prefetched;
+use crate::ask::link::Link;
 use crate::ask::solve_settings::{AnswerWishes, SolveSettings, Subscription};
 use crate::ask::unanswered::Unanswered;
-use crate::object::object_changes::ObjectChanges;
 use crate::object::object_place::ObjectPlace;
-use crate::object::object_work::{ObjectJob, ObjectWork};
 use crate::pace::Pace;
-use crate::run::contact_grasp::ContactGrasp;
-use crate::run::keep::Keep;
+use crate::run::changing::{Changing, Replacement};
+use crate::run::contact_grasp::{ContactGrasp, ContactScene};
+use crate::run::friction::FrictionTick;
+use crate::run::holding::Holding;
+use crate::run::live_object::LiveObject;
+use crate::run::placing::where_it_closes;
+use crate::run::questions::Questions;
+use crate::run::shown::Shown;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
 /// The client between devices and server.
 pub struct GraspLoop {
-    pub(crate) reader: HandReader,
-    pub(crate) object: SoftObject,
-    pub(crate) grasp: Grasp,
-    /// The grasp by contact with friction, which then takes the place of the thesis's rules.
-    pub(crate) contact: Option<Box<ContactGrasp>>,
+    reader: HandReader,
+    holding: Holding,
+    object: LiveObject,
     /// Where the object is put when the first hand comes.
-    pub(crate) place: ObjectPlace,
-    pub(crate) link: Link,
-    pub(crate) settings: SolveSettings,
-    pub(crate) wishes: AnswerWishes,
-    pub(crate) pace: Pace,
-    /// Time that a live frame at large deformation may take, ms.
-    pub(crate) answer_within_ms: Option<f64>,
-    /// Tick in which the grip began, to tell answers of an earlier grip from those of this one.
-    pub(crate) deforming_since: Option<u64>,
-    /// Tick whose answer the object shows.
-    pub(crate) shown_tick: Option<u64>,
-    /// Forces of the fingertips in the answer that the object shows.
-    pub(crate) shown_forces: Option<[Vector3<f64>; 5]>,
-    pub(crate) held: HeldNodes,
-    pub(crate) keep: Keep,
-    /// Whether the shape that the object shows has flowed, so that it will not go back to rest.
-    pub(crate) has_flowed: bool,
-    /// What the fingers held the object by in the last tick that asked.
-    pub(crate) last_known: Option<[KnownNode; 5]>,
-    pub(crate) changes: ObjectChanges,
-    pub(crate) work: ObjectWork,
-    pub(crate) prefetched: Prefetched,
-    pub(crate) world_from_object: Isometry3<f64>,
+    place: ObjectPlace,
     hand: Option<HandPose>,
-    pub(crate) shown_segments: HandSegments,
+    shown_segments: HandSegments,
     /// Devices that were silent in the last tick.
     silent: Vec<Device>,
-    /// Whether digests of requests are wanted.
-    pub(crate) digests: bool,
-    /// What the tick did with answers when it was recorded, while it is played again.
-    pub(crate) recorded: Option<RecordedAnswers>,
-    /// Requests that have ended and whose time to be taken has not come, while ticks are played
-    /// again.
-    pub(crate) held_back: Vec<RequestEnd>,
 }
-
-/// What a report says when the server has prepared the model of a rest shape.
-pub const MODEL_READY: &str = "model ready";
-/// Longest wait of a lockstep tick; a server that takes longer is overtaken.
-pub(crate) const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
-/// Share of the time from tick to tick in which a live frame at large deformation is to be answered;
-/// the rest is for what a solve takes longer, for the wire and for the shape.
-const SHARE_FOR_ANSWERS: f64 = 0.6;
 
 impl GraspLoop {
     /// A loop around an object at the origin; its model is sent to the server at once. To be made
@@ -97,70 +60,58 @@ impl GraspLoop {
         settings: SolveSettings,
         pace: Pace,
     ) -> std::io::Result<Self> {
-        let SolveSettings { material, element, max_error, .. } = settings;
-        link.set_model(ModelUpload::new(object.rest(), object.rest_shapes(), material, element));
+        let questions = Questions::new(link, settings, pace, &object);
+        let changing = Changing::start(pace)?;
         Ok(Self {
             reader,
-            object,
-            grasp,
-            contact: None,
+            holding: Holding::new(grasp),
+            object: LiveObject { shown: Shown::new(object), questions, changing },
             place: ObjectPlace::Home,
-            link,
-            settings,
-            wishes: AnswerWishes { max_error, ..AnswerWishes::default() },
-            pace,
-            deforming_since: None,
-            shown_tick: None,
-            shown_forces: None,
-            held: HeldNodes::default(),
-            keep: Keep::NotWanted,
-            has_flowed: false,
-            last_known: None,
-            changes: ObjectChanges::default(),
-            work: ObjectWork::start(pace)?,
-            prefetched: Prefetched::default(),
-            world_from_object: Isometry3::identity(),
             hand: None,
             shown_segments: [[Isometry3::identity(); 3]; 5],
             silent: Vec::new(),
-            digests: false,
-            recorded: None,
-            held_back: Vec::new(),
-            answer_within_ms: None,
         })
+    }
+
+    /// From now on the object is free and has weight, and the hand grasps it by contact with friction
+    /// instead of by the thesis's rules.
+    pub fn grasp_with_friction(&mut self, scene: ContactScene) {
+        self.holding.by_friction(scene, &mut self.object.shown);
+    }
+
+    /// The grasp by friction, if there is one.
+    pub fn contact_grasp(&self) -> Option<&ContactGrasp> {
+        self.holding.friction()
     }
 
     /// Tells how long it is from tick to tick: a live frame asks for its answer within that time.
     pub fn tick_every(&mut self, period: Duration) {
-        self.answer_within_ms = Some(SHARE_FOR_ANSWERS * 1e3 * period.as_secs_f64());
+        self.object.questions.tick_every(period);
     }
 
     /// Whether ticks wait for answers.
     pub fn pace(&self) -> Pace {
-        self.pace
+        self.object.questions.pace()
     }
 
     /// From now on every outcome has the digest of what was asked.
     pub fn want_digests(&mut self) {
-        self.digests = true;
+        self.object.questions.want_digests();
     }
 
     /// The object as it is now.
     pub fn object(&self) -> &SoftObject {
-        &self.object
+        self.object.shown.object()
     }
 
     /// Object pose after the last tick.
     pub fn world_from_object(&self) -> &Isometry3<f64> {
-        &self.world_from_object
+        self.object.shown.world_from_object()
     }
 
     /// State of the grasp.
     pub fn state(&self) -> StateName {
-        match &self.contact {
-            Some(contact) => contact.state_name(),
-            None => self.grasp.state().name(),
-        }
+        self.holding.state_name()
     }
 
     /// The hand as measured in the last tick.
@@ -176,7 +127,7 @@ impl GraspLoop {
 
     /// What each fingertip holds after the last tick, thumb first.
     pub fn contacts(&self) -> [Option<Contact>; 5] {
-        self.grasp.state().contacts()
+        self.holding.contacts()
     }
 
     /// Force of each fingertip on the object as it is shown, thumb first; `None` where the fingers
@@ -184,17 +135,22 @@ impl GraspLoop {
     ///
     /// Units: N. Frame: the object's.
     pub fn fingertip_forces(&self) -> Option<[Vector3<f64>; 5]> {
-        self.shown_forces
+        self.object.shown.forces()
     }
 
     /// Whether the server is preparing the object's model.
     pub fn is_model_prepared(&self) -> bool {
-        !self.link.is_giving_model()
+        !self.object.questions.link().is_giving_model()
     }
 
     /// Whether the server is there.
     pub fn is_connected(&self) -> bool {
-        self.link.is_connected()
+        self.object.questions.link().is_connected()
+    }
+
+    /// Whether the object is what was asked for, and the server there and prepared for it.
+    pub fn is_object_ready(&self) -> bool {
+        self.object.questions.link().has_model() && !self.object.changing.replaces()
     }
 
     /// The reader, for its faults.
@@ -204,14 +160,14 @@ impl GraspLoop {
 
     /// Waits until the server has answered all, at most so long.
     pub fn wait_idle(&self, at_most: Duration) -> bool {
-        self.link.wait_idle(at_most)
+        self.object.questions.link().wait_idle(at_most)
     }
 
     /// Waits until the server has answered all, at most so long, and until the work beside the ticks
     /// is done: what the next tick finds then does not depend on time.
     pub fn settle(&mut self, at_most: Duration) {
-        self.work.settle();
-        self.link.wait_idle(at_most);
+        self.object.changing.settle();
+        self.object.questions.link().wait_idle(at_most);
     }
 
     /// What the server has done since the last tick, when no tick follows.
@@ -220,7 +176,7 @@ impl GraspLoop {
     /// [`ObjectError`] when the object cannot be shown any more.
     pub fn take_last(&mut self) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
-        self.pick_up(&mut outcome)?;
+        self.object.pick_up(&mut self.holding, &mut outcome)?;
         Ok(outcome)
     }
 
@@ -231,37 +187,43 @@ impl GraspLoop {
     pub fn tick(&mut self, tick: u64, now_s: f64, sent: &Sent) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
         self.reader.feed(&sent.arrivals, now_s);
-        self.recorded.clone_from(&sent.recorded);
-        self.pick_up(&mut outcome)?;
-        self.save_when_whole(&mut outcome);
+        self.object.questions.begin_tick(sent.recorded.as_ref());
+        self.object.pick_up(&mut self.holding, &mut outcome)?;
+        self.object.save_when_whole(&mut self.holding, &mut outcome);
         self.look_at_devices(now_s, &mut outcome);
         // Until both devices have spoken there is no hand to act with.
         let Some(hand) = self.reader.hand(now_s) else { return Ok(outcome) };
         self.meet_first_hand(&hand, now_s);
-        self.take_work(&mut outcome);
-        let command = self.allowed(sent.command, &mut outcome);
+        self.object.take_work(&mut self.holding, &mut outcome);
+        let command = self.object.allowed(sent.command, &mut self.holding, &mut outcome);
         // In lockstep a shape is kept in the next tick, and the hand goes on.
-        let keeping = self.pace == Pace::Free && !matches!(self.keep, Keep::NotWanted);
-        if self.contact.is_some() {
-            self.tick_with_friction(tick, now_s, &hand, command, &mut outcome)?;
-            self.hand = Some(hand);
+        let keeping = self.pace() == Pace::Free && self.object.changing.keep().is_wanted();
+        if self.holding.friction().is_some() {
+            let dimensions = &self.reader.setup().dimensions;
+            let friction = FrictionTick { tick, now_s, hand: &hand, dimensions };
+            self.shown_segments =
+                friction.play(command, &mut self.holding, &mut self.object, &mut outcome)?;
             outcome.seen.keeping = keeping;
-            return Ok(outcome);
+        } else {
+            self.tick_of_the_thesis(tick, &hand, command, &mut outcome)?;
+            outcome.seen.keeping =
+                self.pace() == Pace::Free && self.object.changing.keep().is_wanted();
         }
-        let step = self.step(&hand, command, &mut outcome);
-        self.follow(tick, &step, &mut outcome)?;
-        self.world_from_object = step.world_from_object;
         self.hand = Some(hand);
-        self.shown_segments = step.world_from_segment;
-        outcome.events.extend(step.events.iter().map(|&event| LoopEvent::Grasp(event)));
-        outcome.state = Some(step.state);
-        outcome.seen.state = Some(step.state);
-        outcome.seen.world_from_object = step.world_from_object;
-        // In lockstep a shape is kept in the next tick, and the hand goes on.
-        outcome.seen.keeping = self.pace == Pace::Free && !matches!(self.keep, Keep::NotWanted);
-        outcome.recalled = step.recalled;
-        outcome.shown_tick = self.shown_tick;
         Ok(outcome)
+    }
+
+    /// Puts the object where the first hand closes, if that is wanted.
+    fn meet_first_hand(&mut self, hand: &HandPose, now_s: f64) {
+        let Some((angles, _)) = self.reader.measured(now_s) else { return };
+        if std::mem::take(&mut self.place) != ObjectPlace::Hand {
+            return;
+        }
+        let dimensions = self.reader.setup().dimensions;
+        let home = where_it_closes(&dimensions, &angles, hand, self.object());
+        if self.holding.set_home(home).is_ok() {
+            self.object.shown.place(home);
+        }
     }
 
     /// Tells when a device falls silent, and when it speaks again. A hand that is not heard of stays
@@ -284,6 +246,27 @@ impl GraspLoop {
         outcome.events.extend(self.reader.take_news().into_iter().map(LoopEvent::Device));
     }
 
+    /// What a tick by the rules of the thesis does once there is a hand.
+    fn tick_of_the_thesis(
+        &mut self,
+        tick: u64,
+        hand: &HandPose,
+        command: Option<Command>,
+        outcome: &mut TickOutcome,
+    ) -> Result<(), ObjectError> {
+        let step = self.step(hand, command, outcome);
+        self.follow(tick, &step, outcome)?;
+        self.object.shown.place(step.world_from_object);
+        self.shown_segments = step.world_from_segment;
+        outcome.events.extend(step.events.iter().map(|&event| LoopEvent::Grasp(event)));
+        outcome.state = Some(step.state);
+        outcome.seen.state = Some(step.state);
+        outcome.seen.world_from_object = step.world_from_object;
+        outcome.recalled = step.recalled;
+        outcome.shown_tick = self.object.shown.tick();
+        Ok(())
+    }
+
     fn step(
         &mut self,
         hand: &HandPose,
@@ -291,15 +274,17 @@ impl GraspLoop {
         outcome: &mut TickOutcome,
     ) -> StepOutput {
         let colliders = HandColliders::new(&self.reader.setup().dimensions, hand);
-        let world_from_object = self.grasp.world_from_object(&hand.world_from_palm);
-        let margin = self.grasp.release_margin();
-        let (tree, normals) = (self.object.tree(), self.object.normals());
+        let thesis = self.holding.thesis();
+        let world_from_object = thesis.world_from_object(&hand.world_from_palm);
+        let margin = thesis.release_margin();
+        let (tree, normals) = (self.object().tree(), self.object().normals());
         let fingers = sense(tree, normals, &colliders, &world_from_object, margin);
         let tips = fingers.map(|finger| finger.tip_in_object);
         outcome.seen.inside = std::array::from_fn(|i| fingers[i].tip_hits[0].is_some());
         outcome.tips = outcome.seen.inside;
-        self.prefetch(&tips, outcome);
-        self.grasp.step(&StepInput {
+        let tip_radii = self.reader.setup().dimensions.tip_radii();
+        self.object.prefetch(&tips, tip_radii, &mut self.holding, outcome);
+        self.holding.step(&StepInput {
             world_from_palm: hand.world_from_palm,
             world_from_segment: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
             fingers,
@@ -307,106 +292,163 @@ impl GraspLoop {
         })
     }
 
-    /// Does to object and server what the grasp decided.
+    /// Does to object and server what the rules of the thesis decided.
     fn follow(
         &mut self,
         tick: u64,
         step: &StepOutput,
         outcome: &mut TickOutcome,
     ) -> Result<(), ObjectError> {
-        if step.events.contains(&GraspEvent::ShapeKept)
-            && let Keep::Made(kept) = std::mem::replace(&mut self.keep, Keep::NotWanted)
-        {
-            self.changes.history.push(Arc::clone(self.object.rest_shape()));
-            self.show_from_now_on(*kept);
+        let tip_radii = self.reader.setup().dimensions.tip_radii();
+        let (holding, object) = (&mut self.holding, &mut self.object);
+        if step.events.contains(&GraspEvent::ShapeKept) {
+            object.keep_made();
         }
         match &step.known {
             Some(known) => {
                 outcome.tips = [true; 5];
-                let grip = *self.deforming_since.get_or_insert(tick);
-                if self.keep.freezes() {
+                let grip = object.questions.begin_grip(tick);
+                if object.changing.keep().freezes() {
                     outcome.unanswered.push((tick, Unanswered::KeepingShape));
                     return Ok(());
                 }
-                self.last_known = Some(*known);
-                let question = self.question(known);
-                if self.digests {
-                    outcome.request_digest = Some(request_digest(&question));
+                let wants_whole = object.changing.wants_whole();
+                let shown = object.shown.object();
+                let questions = &mut object.questions;
+                let question =
+                    questions.question_of_tick(shown, tip_radii, wants_whole, known, outcome);
+                if questions.ask(tick, grip, question, outcome) {
+                    object.wait_in_lockstep(holding, outcome)?;
                 }
-                self.ask(tick, grip, question, outcome)?;
             }
             // A tick whose input was ignored keeps the shape as it is.
             None if step.state == StateName::Deforming => {
                 outcome.unanswered.push((tick, Unanswered::InputIgnored));
             }
-            None => self.let_go(outcome)?,
+            None => object.let_go(holding, outcome)?,
         }
         Ok(())
     }
 
-    /// The fingers do not deform the object (any more).
-    fn let_go(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
-        if let Some(grip) = self.deforming_since
-            && self.springs_back()
-        {
-            return self.begin_to_spring_back(grip, outcome);
-        }
-        self.deforming_since = None;
-        if self.keep.is_dent() {
-            return Ok(());
-        }
-        self.stop_keeping(outcome);
-        self.refuse_to_save_half(outcome);
-        self.link.cancel();
-        self.object.relax()
+    /// Says where the object is put when the first hand is heard of.
+    pub fn put_object(&mut self, place: ObjectPlace) {
+        self.place = place;
     }
 
-    /// The question of a tick.
-    pub(crate) fn question(&mut self, known: &[KnownNode; 5]) -> Question {
-        let tip_radii = self.reader.setup().dimensions.tip_radii();
-        let contact = self.settings.contact;
-        let PrescribedDisplacements { of_dofs, masks, of_masks } =
-            self.held.prescribed_displacements(contact, &self.object, tip_radii, known);
-        let nodes = match self.settings.subscription {
-            Subscription::Surface
-                if matches!(self.keep, Keep::NotWanted) && self.changes.save_to.is_none() =>
-            {
-                NodeChoice::Nodes(self.object.surface().nodes.clone())
-            }
-            _ => NodeChoice::All,
+    /// Goes back to the rest shape before the last one that was kept; the object will be at home
+    /// and free. The news come with a later tick.
+    ///
+    /// # Errors
+    /// Why not, in a sentence.
+    pub fn undo_keep_shape(&mut self) -> Result<(), Notice> {
+        self.object.changing.refuse_while_changing()?;
+        let Some(earlier) = self.object.changing.history().last().map(Arc::clone) else {
+            return Err(Notice::refused("no shape has been kept: there is nothing to undo"));
         };
-        Question {
-            known: of_dofs,
-            masks,
-            mask_displacements: of_masks,
-            method: self.settings.method.clone(),
-            want: Want { nodes, reactions: self.wishes.forces, precision: Precision::F64 },
-            max_error: self.wishes.max_error.or(self.settings.error_of_frames()),
-            ..Question::default()
-        }
+        self.object.begin_to_replace(earlier, Replacement::EarlierShape);
+        Ok(())
     }
 
-    /// Lets the server prepare the columns of what a fingertip is about to touch.
-    pub(crate) fn prefetch(
-        &mut self,
-        tips_in_object: &[Point3<f64>; 5],
-        outcome: &mut TickOutcome,
-    ) {
-        // Only condensed frames are made of columns.
-        if !matches!(self.settings.method.as_str(), "auto" | "condensed") {
-            return;
+    /// Puts the object back to where it began, with the shape at rest that it began with. The news
+    /// come with a later tick.
+    ///
+    /// # Errors
+    /// Why not, in a sentence.
+    pub fn begin_anew(&mut self) -> Result<(), Notice> {
+        self.object.changing.refuse_while_changing()?;
+        self.put_object_home();
+        if let Some(first) = self.object.changing.history().first().map(Arc::clone) {
+            self.object.begin_to_replace(first, Replacement::FirstShape);
         }
-        let model = self.settings.contact;
-        let contacts = self.prefetched.next(model, self.object.tree(), tips_in_object);
-        if !contacts.is_empty() {
-            self.work.begin(ObjectJob::Prefetch {
-                rest: Arc::clone(self.object.rest_shape()),
-                rest_shapes: self.object.rest_shapes(),
-                model,
-                tip_radii: self.reader.setup().dimensions.tip_radii(),
-                contacts,
-            });
-            self.take_work(outcome);
-        }
+        Ok(())
+    }
+
+    /// Puts another object in the place of this one; it will be at home and free. The news come
+    /// with a later tick.
+    ///
+    /// # Errors
+    /// Why not, in a sentence.
+    pub fn replace_object(&mut self, rest: Arc<RestShape>, name: &str) -> Result<(), Notice> {
+        self.object.changing.refuse_while_changing()?;
+        self.object.begin_to_replace(rest, Replacement::Other(name.to_owned()));
+        Ok(())
+    }
+
+    /// Makes the object of another material; what holds it goes on holding it. An element that is the
+    /// cheapest that does not lock follows Poisson's ratio. The news come with a later tick.
+    ///
+    /// # Errors
+    /// Why not, in a sentence.
+    pub fn set_material(&mut self, material: Material) -> Result<(), Notice> {
+        self.object.set_material(material)
+    }
+
+    /// Turns the object about its centre while nothing holds it (thesis 6.1.2).
+    ///
+    /// Frame: the rotation is the world's.
+    ///
+    /// # Errors
+    /// [`GraspError`] while the hand holds it.
+    pub fn turn_object(&mut self, rotation: UnitQuaternion<f64>) -> Result<(), GraspError> {
+        let centre = self.world_from_object() * self.object().rest_shape().centre();
+        let about = Translation3::from(centre.coords);
+        let mut turned: Isometry3<f64> =
+            about * rotation * about.inverse() * self.world_from_object();
+        turned.rotation.renormalize();
+        self.holding.place(turned)?;
+        self.object.shown.place(turned);
+        Ok(())
+    }
+
+    /// Lets go of the object where it is, because the hand is replaced.
+    pub fn let_object_go(&mut self) {
+        self.holding.let_go();
+    }
+
+    /// Lets go of the object and puts it back to where it began.
+    pub fn put_object_home(&mut self) {
+        self.holding.put_home(&mut self.object.shown);
+    }
+
+    /// Saves the object as it is now, whole. Where the inside is not known it is asked for first.
+    /// The news come with a later tick.
+    ///
+    /// # Errors
+    /// Why not, in a sentence.
+    pub fn save(&mut self, path: PathBuf) -> Result<Option<Notice>, Notice> {
+        self.object.changing.save(path, self.object.shown.object())
+    }
+
+    /// The method from the next question on.
+    pub fn set_method(&mut self, method: MethodName) {
+        self.object.questions.set_method(method);
+    }
+
+    /// The nodes that are asked for from the next question on.
+    pub fn set_subscription(&mut self, subscription: Subscription) {
+        self.object.questions.settings_mut().subscription = subscription;
+    }
+
+    /// What the answers are to hold from the next question on.
+    pub fn wishes_mut(&mut self) -> &mut AnswerWishes {
+        self.object.questions.wishes_mut()
+    }
+
+    /// How many kept shapes can be undone.
+    pub fn undo_count(&self) -> usize {
+        self.object.changing.history().len()
+    }
+
+    /// Goes on with what is under way while no tick is played.
+    ///
+    /// # Errors
+    /// [`ObjectError`] when the object cannot be shown any more.
+    pub fn idle(&mut self) -> Result<TickOutcome, ObjectError> {
+        let mut outcome = TickOutcome::default();
+        self.object.pick_up(&mut self.holding, &mut outcome)?;
+        self.object.save_when_whole(&mut self.holding, &mut outcome);
+        self.object.take_work(&mut self.holding, &mut outcome);
+        self.object.ask_for_inside(self.reader.setup().dimensions.tip_radii());
+        Ok(outcome)
     }
 }

@@ -1,22 +1,23 @@
 //! A run: ticks from the hand to the deformed object, and the report of them.
 
 mod answer_tally;
-mod answering;
+mod changing;
 pub mod contact_grasp;
 pub mod contact_ledger;
-pub mod friction;
+mod friction;
 pub mod grasp_loop;
-mod keep;
-mod keeping;
+mod holding;
 pub mod latency;
-mod object_control;
+mod live_object;
 pub mod observer;
-pub mod placing;
+mod placing;
 pub mod played_ticks;
+pub mod questions;
 mod recorded_tick;
 pub mod run_report;
 pub mod run_words;
 pub mod session;
+mod shown;
 mod springback;
 pub mod status_line;
 pub mod tick_loop;

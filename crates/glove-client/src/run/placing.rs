@@ -4,9 +4,6 @@ use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use softgrasp_grasp::hand::{HandDimensions, HandPose, JointAngles, clearance, hand_bodies, pose};
 use softgrasp_grasp::object::SoftObject;
 
-use crate::object::object_place::ObjectPlace;
-use crate::run::grasp_loop::GraspLoop;
-
 /// Postures on the way from the hand as it is to a fist in which thumb and fingers are looked at, and how far
 /// that way goes.
 const POSTURES: u32 = 24;
@@ -18,33 +15,9 @@ const STEP_M: f64 = 2e-3;
 /// The object is moved away from the palm by no more than this, m.
 const AWAY_MAX_M: f64 = 0.2;
 
-impl GraspLoop {
-    /// Says where the object is put when the first hand is heard of.
-    pub fn put_object(&mut self, place: ObjectPlace) {
-        self.place = place;
-    }
-
-    /// Puts the object where the first hand closes, if that is wanted.
-    pub(crate) fn meet_first_hand(&mut self, hand: &HandPose, now_s: f64) {
-        let Some((angles, _)) = self.reader.measured(now_s) else { return };
-        if std::mem::take(&mut self.place) != ObjectPlace::Hand {
-            return;
-        }
-        let dimensions = self.reader.setup().dimensions;
-        let home = where_it_closes(&dimensions, &angles, hand, &self.object);
-        if self.grasp.set_home(home).is_err() {
-            return;
-        }
-        self.world_from_object = home;
-        if let Some(contact) = &mut self.contact {
-            contact.set_home(home);
-        }
-    }
-}
-
 /// Pose of an object, turned as it is at rest, between thumb and fingers of a hand that closes, moved out of
 /// the palm until there is room for it beside the hand as it is.
-fn where_it_closes(
+pub(crate) fn where_it_closes(
     dimensions: &HandDimensions,
     angles: &JointAngles,
     hand: &HandPose,

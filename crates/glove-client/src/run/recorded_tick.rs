@@ -11,7 +11,7 @@ use softgrasp_hand::recording::{
 use crate::ask::digest::Digest;
 use crate::pace::Due;
 use crate::run::grasp_loop::GraspLoop;
-use crate::run::springback::SPRINGBACK;
+use crate::run::questions::SPRINGBACK;
 use crate::run::tick_outcome::TickOutcome;
 
 /// What a tick made; the recorder adds what it took.

@@ -3,173 +3,168 @@
 use crate::pace::Pace;
 use crate::run::run_report::{ReplaySummary, RunReport};
 
-impl RunReport {
-    /// Why the run is a failure: answers were asked for and none came. `None` if it is none.
-    pub fn failure(&self) -> Option<String> {
-        if let Some(why) = &self.recording_failed {
-            return Some(why.clone());
-        }
-        if let Some(why) = &self.no_hand {
-            let why = match &why[..] {
-                [] => "its devices sent nothing that tells where it is".to_owned(),
-                why => why.join("; "),
-            };
-            return Some(format!("there was never a hand: {why}"));
-        }
-        let s = &self.summary;
-        if s.solves > 0 || s.deforming_ticks == 0 || self.interrupted {
-            return None;
-        }
-        let why = match &self.last_failure {
-            Some(what) => format!("the server {}", what.replacen("lost", "was lost", 1)),
-            None => {
-                s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
-            }
+/// Why the run is a failure: answers were asked for and none came. `None` if it is none.
+pub fn failure(report: &RunReport) -> Option<String> {
+    if let Some(why) = &report.recording_failed {
+        return Some(why.clone());
+    }
+    if let Some(why) = &report.no_hand {
+        let why = match &why[..] {
+            [] => "its devices sent nothing that tells where it is".to_owned(),
+            why => why.join("; "),
         };
-        Some(format!("none of {} deforming ticks was answered: {why}", s.deforming_ticks))
+        return Some(format!("there was never a hand: {why}"));
     }
+    let s = &report.summary;
+    if s.solves > 0 || s.deforming_ticks == 0 || report.interrupted {
+        return None;
+    }
+    let why = match &report.last_failure {
+        Some(what) => format!("the server {}", what.replacen("lost", "was lost", 1)),
+        None => {
+            s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
+        }
+    };
+    Some(format!("none of {} deforming ticks was answered: {why}", s.deforming_ticks))
+}
 
-    /// One screen for a person who has never seen the program.
-    pub fn describe(&self) -> String {
-        let s = &self.summary;
-        let mut text = format!(
-            "\n{} ({} nodes, {} tetrahedra, {:.0} mm), grasped by the hand {}\n  \
-             a fingertip holds {}; solved {}\n",
-            self.object.name,
-            self.object.nodes,
-            self.object.tets,
-            1e3 * self.object.size_m,
-            self.hand,
-            words_of_contact(&self.contact),
-            words_of_server(&self.server)
-        );
-        for note in &self.object.notes {
-            text.push_str(&format!("  {note}\n"));
-        }
-        text.push_str("\nWhat happened:\n");
-        for event in &self.events {
-            text.push_str(&format!("  tick {:>5}  {}\n", event.tick, event.what));
-        }
-        if self.events_left_out > 0 {
-            text.push_str(&format!("  and {} events more\n", self.events_left_out));
-        }
-        text.push_str(&format!("\n  ticks               {}", self.ticks));
-        if s.ticks_skipped > 0 {
-            text.push_str(&format!(
-                ", of which {} came too late and were skipped",
-                s.ticks_skipped
-            ));
-        }
-        text.push_str(&format!("\n  grasp states        {}\n", self.states_reached.join(", ")));
+/// One screen for a person who has never seen the program.
+pub fn describe(report: &RunReport) -> String {
+    let s = &report.summary;
+    let mut text = format!(
+        "\n{} ({} nodes, {} tetrahedra, {:.0} mm), grasped by the hand {}\n  \
+         a fingertip holds {}; solved {}\n",
+        report.object.name,
+        report.object.nodes,
+        report.object.tets,
+        1e3 * report.object.size_m,
+        report.hand,
+        words_of_contact(&report.contact),
+        words_of_server(&report.server)
+    );
+    for note in &report.object.notes {
+        text.push_str(&format!("  {note}\n"));
+    }
+    text.push_str("\nWhat happened:\n");
+    for event in &report.events {
+        text.push_str(&format!("  tick {:>5}  {}\n", event.tick, event.what));
+    }
+    if report.events_left_out > 0 {
+        text.push_str(&format!("  and {} events more\n", report.events_left_out));
+    }
+    text.push_str(&format!("\n  ticks               {}", report.ticks));
+    if s.ticks_skipped > 0 {
+        text.push_str(&format!(", of which {} came too late and were skipped", s.ticks_skipped));
+    }
+    text.push_str(&format!("\n  grasp states        {}\n", report.states_reached.join(", ")));
+    text.push_str(&format!(
+        "  deforming ticks     {} of {} answered\n",
+        s.solves, s.deforming_ticks
+    ));
+    for (why, count) in s.unanswered.by_count() {
+        text.push_str(&format!("    not answered      {count}: {why}\n"));
+    }
+    // A tick that waits for plans and kept shapes may compute for as long as they take.
+    if s.ticks_over_1_ms > 0 && report.pace == Pace::Free.name() {
         text.push_str(&format!(
-            "  deforming ticks     {} of {} answered\n",
-            s.solves, s.deforming_ticks
+            "  long ticks          {} computed for more than 1 ms ({:.1} ms at most)\n",
+            s.ticks_over_1_ms, s.compute_ms_max
         ));
-        for (why, count) in s.unanswered.by_count() {
-            text.push_str(&format!("    not answered      {count}: {why}\n"));
-        }
-        // A tick that waits for plans and kept shapes may compute for as long as they take.
-        if s.ticks_over_1_ms > 0 && self.pace == Pace::Free.name() {
-            text.push_str(&format!(
-                "  long ticks          {} computed for more than 1 ms ({:.1} ms at most)\n",
-                s.ticks_over_1_ms, s.compute_ms_max
-            ));
-        }
-        text.push_str(&self.words_of_answers());
-        text.push_str(&self.words_of_age());
-        text.push_str(&self.words_of_large());
-        text.push_str(&self.summary.contact.as_ref().map_or(String::new(), |c| c.words()));
-        text.push_str(&self.words_of_devices());
-        if self.interrupted {
-            text.push_str("  ended by the user\n");
-        }
-        text
     }
+    text.push_str(&words_of_answers(report));
+    text.push_str(&words_of_age(report));
+    text.push_str(&words_of_large(report));
+    text.push_str(&report.summary.contact.as_ref().map_or(String::new(), |c| c.words()));
+    text.push_str(&words_of_devices(report));
+    if report.interrupted {
+        text.push_str("  ended by the user\n");
+    }
+    text
+}
 
-    /// How large the systems of equations were, how soon they were solved, and how well.
-    fn words_of_answers(&self) -> String {
-        let (s, Some(solve)) = (&self.summary, self.last_answer()) else { return String::new() };
-        let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
-        let mut text = format!(
-            "  equations           {} unknown, {} prescribed, by {}\n  \
-             answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
-             residual            {:.1e} at most\n",
-            solve.report.unknown_dofs,
-            solve.report.known_dofs,
-            solve.report.method,
-            ms(s.round_trip_ms_p50),
-            ms(s.round_trip_ms_p99),
-            ms(s.round_trip_ms_max),
-            s.residual_rel_max,
-        );
-        if let (Some(turned), Some(strain)) = (s.max_rotation_deg, s.max_strain) {
-            text.push_str(&format!(
-                "  shape               turned by {turned:.1} degrees, strained by {:.0} % at most\n",
-                100.0 * strain,
-            ));
-        }
-        text
+/// How large the systems of equations were, how soon they were solved, and how well.
+fn words_of_answers(report: &RunReport) -> String {
+    let (s, Some(solve)) = (&report.summary, report.last_answer()) else { return String::new() };
+    let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
+    let mut text = format!(
+        "  equations           {} unknown, {} prescribed, by {}\n  \
+         answer came after   {} (median), {} (99 %), {} (slowest: a new grip)\n  \
+         residual            {:.1e} at most\n",
+        solve.report.unknown_dofs,
+        solve.report.known_dofs,
+        solve.report.method,
+        ms(s.round_trip_ms_p50),
+        ms(s.round_trip_ms_p99),
+        ms(s.round_trip_ms_max),
+        s.residual_rel_max,
+    );
+    if let (Some(turned), Some(strain)) = (s.max_rotation_deg, s.max_strain) {
+        text.push_str(&format!(
+            "  shape               turned by {turned:.1} degrees, strained by {:.0} % at most\n",
+            100.0 * strain,
+        ));
     }
+    text
+}
 
-    /// How old the shape was that was shown, in real time.
-    fn words_of_age(&self) -> String {
-        match (self.summary.shown_age_ms_p50, self.summary.shown_age_ms_max) {
-            (Some(median), Some(most)) if self.pace == Pace::Free.name() => {
-                format!("  shape shown         {median:.0} ms old (median), {most:.0} ms at most\n")
-            }
-            _ => String::new(),
+/// How old the shape was that was shown, in real time.
+fn words_of_age(report: &RunReport) -> String {
+    match (report.summary.shown_age_ms_p50, report.summary.shown_age_ms_max) {
+        (Some(median), Some(most)) if report.pace == Pace::Free.name() => {
+            format!("  shape shown         {median:.0} ms old (median), {most:.0} ms at most\n")
         }
+        _ => String::new(),
     }
+}
 
-    /// What is to be said of large deformation.
-    fn words_of_large(&self) -> String {
-        let s = &self.summary;
-        let Some(min_jacobian) = s.min_jacobian else { return String::new() };
-        let error = s.error_estimate_rel_max.unwrap_or(0.0);
-        let mut text = format!(
-            "  large deformation   {} of {} answers; off by {error:.1e} at most (estimated), volumes \
-             down to {min_jacobian:.2} of those at rest\n",
-            s.large_solves, s.solves
-        );
-        if s.jumps > 0 {
-            text.push_str(&format!("                      the shape jumped {} times\n", s.jumps));
-        }
-        text
+/// What is to be said of large deformation.
+fn words_of_large(report: &RunReport) -> String {
+    let s = &report.summary;
+    let Some(min_jacobian) = s.min_jacobian else { return String::new() };
+    let error = s.error_estimate_rel_max.unwrap_or(0.0);
+    let mut text = format!(
+        "  large deformation   {} of {} answers; off by {error:.1e} at most (estimated), volumes \
+         down to {min_jacobian:.2} of those at rest\n",
+        s.large_solves, s.solves
+    );
+    if s.jumps > 0 {
+        text.push_str(&format!("                      the shape jumped {} times\n", s.jumps));
     }
+    text
+}
 
-    /// What is to be said of silent devices, of the way of a sample, and of a replay.
-    fn words_of_devices(&self) -> String {
-        let (s, mut text) = (&self.summary, String::new());
-        if s.ticks_held > 0 {
-            text.push_str(&format!(
-                "  hand held           {} ticks, while a device was silent\n",
-                s.ticks_held
-            ));
-        }
-        let jumps = s.glove_jumps + s.tracker_jumps;
-        if jumps > 0 {
-            text.push_str(&format!(
-                "  damaged records     {jumps} readings jumped as no hand does and were not taken\n"
-            ));
-        }
-        if let Some(fit) = &s.joint_fit {
-            text.push_str(&format!(
-                "  hand fits joints    to {:.1} mm (root mean square), {:.1} mm at most\n",
-                1e3 * fit.rms_m,
-                1e3 * fit.most_m
-            ));
-        }
-        if let Some(latency) = &s.latency {
-            text.push_str(&format!(
-                "  sample to shape     {:.1} ms (median), {:.1} ms (99 %)\n",
-                latency.whole.p50_ms, latency.whole.p99_ms
-            ));
-        }
-        if let Some(replay) = &self.replay {
-            text.push_str(&replay.words());
-        }
-        text
+/// What is to be said of silent devices, of the way of a sample, and of a replay.
+fn words_of_devices(report: &RunReport) -> String {
+    let (s, mut text) = (&report.summary, String::new());
+    if s.ticks_held > 0 {
+        text.push_str(&format!(
+            "  hand held           {} ticks, while a device was silent\n",
+            s.ticks_held
+        ));
     }
+    let jumps = s.glove_jumps + s.tracker_jumps;
+    if jumps > 0 {
+        text.push_str(&format!(
+            "  damaged records     {jumps} readings jumped as no hand does and were not taken\n"
+        ));
+    }
+    if let Some(fit) = &s.joint_fit {
+        text.push_str(&format!(
+            "  hand fits joints    to {:.1} mm (root mean square), {:.1} mm at most\n",
+            1e3 * fit.rms_m,
+            1e3 * fit.most_m
+        ));
+    }
+    if let Some(latency) = &s.latency {
+        text.push_str(&format!(
+            "  sample to shape     {:.1} ms (median), {:.1} ms (99 %)\n",
+            latency.whole.p50_ms, latency.whole.p99_ms
+        ));
+    }
+    if let Some(replay) = &report.replay {
+        text.push_str(&words_of_replay(replay));
+    }
+    text
 }
 
 /// What a fingertip holds, by the name of `--contact`.
@@ -191,22 +186,18 @@ pub fn words_of_server(server: &str) -> String {
     }
 }
 
-impl ReplaySummary {
-    /// A line or two.
-    fn words(&self) -> String {
-        let Self { ticks, requests, difference, cut, .. } = self;
-        let found = match difference {
-            None if *ticks == 0 => "nothing was compared".to_owned(),
-            None => {
-                "poses, contacts, requests and displacements are the same bit by bit".to_owned()
-            }
-            Some(difference) => format!("it differs from {difference}"),
-        };
-        let mut text =
-            format!("  replay              {ticks} ticks, {requests} with requests: {found}\n");
-        if let Some(why) = cut {
-            text.push_str(&format!("                      the recording ends there: {why}\n"));
-        }
-        text
+/// What a replay has found, in a line or two.
+fn words_of_replay(replay: &ReplaySummary) -> String {
+    let ReplaySummary { ticks, requests, difference, cut, .. } = replay;
+    let found = match difference {
+        None if *ticks == 0 => "nothing was compared".to_owned(),
+        None => "poses, contacts, requests and displacements are the same bit by bit".to_owned(),
+        Some(difference) => format!("it differs from {difference}"),
+    };
+    let mut text =
+        format!("  replay              {ticks} ticks, {requests} with requests: {found}\n");
+    if let Some(why) = cut {
+        text.push_str(&format!("                      the recording ends there: {why}\n"));
     }
+    text
 }

@@ -78,3 +78,15 @@ pub struct TickOutcome {
     /// Sentences for the person.
     pub notices: Vec<Notice>,
 }
+
+impl TickOutcome {
+    /// Tells what was written to a file, or why nothing was.
+    pub(crate) fn tell_saved(&mut self, saved: Result<String, String>) {
+        let (notice, text) = match saved {
+            Ok(text) => (Notice::done(text.clone()), text),
+            Err(text) => (Notice::refused(text.clone()), text),
+        };
+        self.events.push(LoopEvent::Shape(text));
+        self.notices.push(notice);
+    }
+}

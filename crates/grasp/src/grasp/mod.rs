@@ -13,5 +13,6 @@ mod tests;
 
 pub use event::{Command, GraspEvent, KnownNode, StepInput, StepOutput};
 pub use sense::{FingerInput, sense};
-pub use state::{Contact, Grasp, GraspError, GraspState, HandSegments, Hold, StateName};
+pub use state::{Contact, GraspState, HandSegments, Hold, StateName};
+pub use step::{Grasp, GraspError};
 pub use table::transition_table;

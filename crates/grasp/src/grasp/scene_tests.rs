@@ -5,7 +5,8 @@ use proptest::prelude::*;
 
 use super::event::{GraspEvent, StepInput, StepOutput};
 use super::sense::sense;
-use super::state::{Grasp, GraspError, StateName};
+use super::state::StateName;
+use super::step::{Grasp, GraspError};
 use crate::hand::{Finger, FingerColliders, HandColliders};
 use crate::shape::{Cylinder, Sphere};
 use crate::sphere_tree::SphereTree;

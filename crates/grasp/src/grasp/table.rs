@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::event::{Command, StepInput};
 use super::sense::FingerInput;
-use super::state::{Grasp, StateName};
+use super::state::StateName;
+use super::step::Grasp;
 use crate::hand::Finger;
 use crate::sphere_tree::{ContactHit, TIP_HITS_MAX};
 

@@ -5,7 +5,8 @@ use proptest::prelude::*;
 
 use super::event::{Command, GraspEvent, StepInput};
 use super::sense::FingerInput;
-use super::state::{Contact, Grasp, GraspError, GraspState, Hold, StateName};
+use super::state::{Contact, GraspState, Hold, StateName};
+use super::step::{Grasp, GraspError};
 use super::table::{Case, grasp_in, transition_table};
 use crate::hand::Finger;
 use crate::sphere_tree::ContactHit;

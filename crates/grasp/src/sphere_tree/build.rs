@@ -2,46 +2,46 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::refit::search_cost;
-use super::tree::{LeafRest, SphereTree, TreeError, TreeNode, check_positions};
+use super::node::{LeafRest, TreeError, TreeNode, check_positions};
 use crate::shape::Sphere;
 
-impl SphereTree {
-    /// Builds the tree over `surface_nodes`, in O(n log n); the result does not depend on their order.
-    ///
-    /// Shapes: `positions` all mesh nodes; `surface_nodes` indices into them, repetitions ignored.
-    /// Units: those of `positions`. Frame: that of `positions` (the object's).
-    ///
-    /// # Errors
-    /// [`TreeError`] if there is no vertex, an index is out of range or a coordinate is not finite.
-    ///
-    /// Source: thesis 4.3.2–4.3.3, (4.1)–(4.6).
-    pub fn try_build(positions: &[Point3<f64>], surface_nodes: &[u32]) -> Result<Self, TreeError> {
-        if surface_nodes.is_empty() {
-            return Err(TreeError::NoVertices);
-        }
-        if surface_nodes.len() > VERTEX_COUNT_MAX {
-            let count = surface_nodes.len();
-            return Err(TreeError::TooMany { count, limit: VERTEX_COUNT_MAX });
-        }
-        check_positions(positions, surface_nodes)?;
+/// The spheres of a tree, breadth first, and the vertices in Morton order.
+pub(super) struct Cells {
+    pub(super) nodes: Vec<TreeNode>,
+    /// Mesh node in each slot.
+    pub(super) vertices: Vec<u32>,
+    /// Its position.
+    pub(super) points: Vec<Point3<f64>>,
+}
 
-        let cube = BoundingCube::around(surface_nodes.iter().map(|&n| positions[n as usize]));
-        let mut keyed: Vec<(u64, u32)> =
-            surface_nodes.iter().map(|&n| (cube.morton_code(&positions[n as usize]), n)).collect();
-        // Ties (one cell) fall in node order, so the input's order never shows.
-        keyed.sort_unstable();
-        keyed.dedup();
-
-        let codes: Vec<u64> = keyed.iter().map(|&(code, _)| code).collect();
-        let vertices: Vec<u32> = keyed.iter().map(|&(_, node)| node).collect();
-        let points: Vec<Point3<f64>> = vertices.iter().map(|&n| positions[n as usize]).collect();
-        let nodes = subdivide(&cube, &codes, &points);
-        let leaves = leaves(&nodes, &points);
-        let inner = (0..).zip(&nodes).filter(|(_, n)| !n.is_leaf()).map(|(i, _)| i).collect();
-        let cost = search_cost(&nodes);
-        Ok(Self { nodes, vertices, points, leaves, inner, cost_built: cost, cost })
+/// Subdivides the cube around the surface's vertices.
+///
+/// # Errors
+/// [`TreeError`] if there is no vertex, an index is out of range or a coordinate is not finite.
+///
+/// Source: thesis 4.3.2–4.3.3, (4.1)–(4.6).
+pub(super) fn cells(positions: &[Point3<f64>], surface_nodes: &[u32]) -> Result<Cells, TreeError> {
+    if surface_nodes.is_empty() {
+        return Err(TreeError::NoVertices);
     }
+    if surface_nodes.len() > VERTEX_COUNT_MAX {
+        let count = surface_nodes.len();
+        return Err(TreeError::TooMany { count, limit: VERTEX_COUNT_MAX });
+    }
+    check_positions(positions, surface_nodes)?;
+
+    let cube = BoundingCube::around(surface_nodes.iter().map(|&n| positions[n as usize]));
+    let mut keyed: Vec<(u64, u32)> =
+        surface_nodes.iter().map(|&n| (cube.morton_code(&positions[n as usize]), n)).collect();
+    // Ties (one cell) fall in node order, so the input's order never shows.
+    keyed.sort_unstable();
+    keyed.dedup();
+
+    let codes: Vec<u64> = keyed.iter().map(|&(code, _)| code).collect();
+    let vertices: Vec<u32> = keyed.iter().map(|&(_, node)| node).collect();
+    let points: Vec<Point3<f64>> = vertices.iter().map(|&n| positions[n as usize]).collect();
+    let nodes = subdivide(&cube, &codes, &points);
+    Ok(Cells { nodes, vertices, points })
 }
 
 /// Cube around the object; the cells are its subdivisions.
@@ -150,7 +150,8 @@ fn push_cell(
     levels.push(level);
 }
 
-fn leaves(nodes: &[TreeNode], points: &[Point3<f64>]) -> Vec<LeafRest> {
+/// The leaves, with their spheres relative to their first vertices.
+pub(super) fn leaves(nodes: &[TreeNode], points: &[Point3<f64>]) -> Vec<LeafRest> {
     let leaves = (0..).zip(nodes).filter(|(_, node)| node.is_leaf());
     leaves
         .map(|(node, &TreeNode { sphere, first_slot, slots, .. })| LeafRest {
@@ -238,37 +239,5 @@ mod tests {
             edge /= 2.0;
             radius /= 2.0;
         }
-    }
-
-    #[test]
-    fn bad_input_is_refused_with_its_node() {
-        let mut positions = vec![Point3::origin(); 3];
-        assert_eq!(SphereTree::try_build(&positions, &[]), Err(TreeError::NoVertices));
-        let error = SphereTree::try_build(&positions, &[0, 3]).unwrap_err();
-        assert_eq!(error, TreeError::IndexOutOfRange { node: 3, node_count: 3 });
-        for bad in [f64::NAN, f64::INFINITY, 1e200] {
-            positions[1].y = bad;
-            let error = SphereTree::try_build(&positions, &[0, 1]).unwrap_err();
-            assert_eq!(error, TreeError::NotFinite { node: 1 });
-            assert!(SphereTree::try_build(&positions, &[0, 2]).is_ok());
-        }
-    }
-
-    #[test]
-    fn coincident_vertices_share_one_leaf_and_end_the_subdivision() {
-        let positions = vec![Point3::new(1.0, 2.0, 3.0); 50];
-        let all: Vec<u32> = (0..50).collect();
-        let tree = SphereTree::try_build(&positions, &all).unwrap();
-        assert_eq!((tree.sphere_count(), tree.vertex_count()), (1, 50));
-    }
-
-    #[test]
-    fn order_and_repetition_of_the_surface_nodes_do_not_matter() {
-        let positions: Vec<_> =
-            (0..40).map(|i| Point3::new(f64::from(i * 7 % 40), f64::from(i), 0.5)).collect();
-        let forward: Vec<u32> = (0..40).collect();
-        let backward: Vec<u32> = (0..40).rev().chain(5..9).collect();
-        let tree = SphereTree::try_build(&positions, &forward).unwrap();
-        assert_eq!(tree, SphereTree::try_build(&positions, &backward).unwrap());
     }
 }

@@ -4,20 +4,10 @@ use std::ops::ControlFlow;
 
 use nalgebra::{Point3, Vector3};
 
-use super::overlap::{cylinder_meets_sphere, sphere_meets_sphere};
-use super::tree::{SphereTree, TreeError};
-use crate::shape::{Cylinder, Sphere};
-
-/// How close a collider is to the surface vertices.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Closeness {
-    /// No vertex within the margin.
-    Clear,
-    /// A vertex within the margin, none inside.
-    Near,
-    /// A vertex inside: the collider penetrates the object.
-    Colliding,
-}
+use super::node::TreeError;
+use super::overlap::sphere_meets_sphere;
+use super::tree::SphereTree;
+use crate::shape::Sphere;
 
 /// A surface vertex a fingertip is in contact with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,43 +67,6 @@ pub fn tip_hits(
         *hit = Some(ContactHit { node: c.node, distance: c.distance, normal });
     }
     hits
-}
-
-impl SphereTree {
-    /// How close a finger segment is: a vertex inside the cylinder, within `margin` of it, or none.
-    ///
-    /// Vertices only: a cylinder thinner than the mesh is coarse can pass between them.
-    /// Units: m. Frame: that of the tree.
-    pub fn closeness_to_cylinder(&self, cylinder: &Cylinder, margin: f64) -> Closeness {
-        self.closeness(margin, |sphere| cylinder_meets_sphere(cylinder, sphere))
-    }
-
-    /// As [`SphereTree::closeness_to_cylinder`], for a fingertip.
-    pub fn closeness_to_sphere(&self, tip: &Sphere, margin: f64) -> Closeness {
-        self.closeness(margin, |sphere| sphere_meets_sphere(tip, sphere))
-    }
-
-    fn closeness(&self, margin: f64, meets: impl Fn(&Sphere) -> bool) -> Closeness {
-        let mut closest = Closeness::Clear;
-        let grown = |s: &Sphere| Sphere { centre: s.centre, radius: s.radius + margin };
-        let _ = self.visit(
-            |sphere| meets(&grown(sphere)),
-            |_| false,
-            |leaf| {
-                for &centre in self.run(leaf).1 {
-                    if meets(&Sphere { centre, radius: 0.0 }) {
-                        closest = Closeness::Colliding;
-                        return ControlFlow::Break(());
-                    }
-                    if meets(&Sphere { centre, radius: margin }) {
-                        closest = Closeness::Near;
-                    }
-                }
-                ControlFlow::Continue(())
-            },
-        );
-        closest
-    }
 }
 
 /// Vertex normals: the plain average of the unit normals of the neighbouring faces, made unit.

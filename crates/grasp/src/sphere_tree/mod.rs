@@ -2,20 +2,18 @@
 
 mod build;
 mod contact;
-mod levels;
 #[cfg(test)]
 mod naive;
+mod node;
 mod overlap;
 mod refit;
-mod search;
 #[cfg(test)]
 mod tests;
 mod tree;
 mod triangles;
-mod visited;
 
-pub use contact::{Closeness, ContactHit, TIP_HITS_MAX, tip_hits, vertex_normals};
+pub use contact::{ContactHit, TIP_HITS_MAX, tip_hits, vertex_normals};
+pub use node::TreeError;
 pub use overlap::{cylinder_meets_sphere, sphere_meets_sphere};
-pub use tree::{SphereTree, TreeError};
+pub use tree::{Closeness, SphereTree, VisitedSphere};
 pub use triangles::{SearchedSurface, triangles_near};
-pub use visited::VisitedSphere;

@@ -2,8 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact::Closeness;
-use super::tree::SphereTree;
+use super::tree::{Closeness, SphereTree};
 use crate::shape::{Cylinder, Sphere};
 
 /// Finger-like solid.
@@ -30,7 +29,7 @@ pub(super) fn distance(probe: &Probe, point: &Point3<f64>) -> f64 {
 /// Vertices whose leaf sphere meets the probe, ascending; `None` if one is too close to call.
 pub(super) fn search(tree: &SphereTree, probe: &Probe) -> Option<Vec<u32>> {
     let mut found = Vec::new();
-    for node in tree.nodes.iter().filter(|n| n.is_leaf()) {
+    for node in tree.nodes().iter().filter(|n| n.is_leaf()) {
         let gap = distance(probe, &node.sphere.centre) - node.sphere.radius;
         let scale = node.sphere.radius + node.sphere.centre.coords.amax();
         if gap.abs() <= 1e-12 * scale {

@@ -3,10 +3,10 @@
 use nalgebra::{Point3, Unit, Vector3};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
+use softgrasp_core::mesh::{BuiltIn, Surface, generate};
 
 use super::naive::{self, Probe};
-use super::tree::SphereTree;
-use super::{VisitedSphere, tip_hits, vertex_normals};
+use super::{SphereTree, TreeError, VisitedSphere, tip_hits, vertex_normals};
 use crate::shape::{Cylinder, Sphere};
 
 /// Clouds, balls, flat sheets, lines, coincident points: 1 to 400 vertices, metres, finger scale.
@@ -80,8 +80,8 @@ fn tree_over(points: &[Point3<f64>]) -> SphereTree {
 fn assert_valid(tree: &SphereTree, points: &[Point3<f64>]) {
     let mut owners = vec![0; points.len()];
     let mut next_child = 1;
-    for node in &tree.nodes {
-        for &vertex in &tree.vertices[node.slot_range()] {
+    for node in tree.nodes() {
+        for &vertex in &tree.vertices()[node.slot_range()] {
             let gap = (points[vertex as usize] - node.sphere.centre).norm() - node.sphere.radius;
             assert!(gap <= 0.0, "vertex {vertex} is {gap:e} outside {node:?}");
         }
@@ -92,12 +92,12 @@ fn assert_valid(tree: &SphereTree, points: &[Point3<f64>]) {
         assert!((2..=8).contains(&node.children), "{node:?}");
         assert_eq!(node.child_range().start, next_child);
         next_child = node.child_range().end;
-        for child in &tree.nodes[node.child_range()] {
+        for child in &tree.nodes()[node.child_range()] {
             let reach = (child.sphere.centre - node.sphere.centre).norm() + child.sphere.radius;
             assert!(reach <= node.sphere.radius, "{child:?} leaves {node:?}");
         }
     }
-    assert_eq!(next_child, tree.nodes.len());
+    assert_eq!(next_child, tree.nodes().len());
     assert!(owners.iter().all(|&count| count == 1), "each vertex lies in exactly one leaf");
 }
 
@@ -163,7 +163,7 @@ proptest! {
             let mut ends: Vec<Sphere> =
                 visited.iter().filter(|v| v.overlaps && v.is_leaf).map(|v| v.sphere).collect();
             let found = search(&tree, &probe);
-            let leaves = tree.nodes.iter().filter(|node| node.is_leaf());
+            let leaves = tree.nodes().iter().filter(|node| node.is_leaf());
             let expected = leaves.filter(|leaf| found.contains(&tree.run(leaf).0[0]));
             let by_place = |a: &Sphere, b: &Sphere| {
                 let key = |s: &Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
@@ -390,4 +390,78 @@ fn a_real_object_is_found_as_by_brute_force_while_it_bends() {
         let seeds = probes(50).new_tree(&mut runner).unwrap().current();
         assert_search_is_exhaustive(&tree, &bent, &seeds);
     }
+}
+
+fn strawberry() -> (SphereTree, Vec<Point3<f64>>) {
+    let mesh = generate(BuiltIn::Strawberry, 800).unwrap();
+    let nodes = Surface::from_mesh(&mesh).nodes;
+    let points = nodes.iter().map(|&n| mesh.vertices()[n as usize]).collect();
+    (SphereTree::try_build(mesh.vertices(), &nodes).unwrap(), points)
+}
+
+#[test]
+fn levels_begin_with_the_root_and_end_with_the_leaves() {
+    let (tree, points) = strawberry();
+    assert_eq!(tree.spheres_at_level(0), [tree.bounding_sphere()]);
+    let leaves = tree.nodes().iter().filter(|node| node.is_leaf()).count();
+    let depth = tree.depth();
+    assert!((2..=22).contains(&depth), "{depth}");
+    assert_eq!(tree.spheres_at_level(depth).len(), leaves);
+    assert_eq!(tree.spheres_at_level(depth + 1).len(), leaves);
+    assert_eq!(leaves, points.len(), "no two vertices of this mesh coincide");
+}
+
+#[test]
+fn every_level_covers_every_vertex_with_more_and_smaller_spheres() {
+    let (tree, points) = strawberry();
+    let levels: Vec<_> = (0..=tree.depth()).map(|level| tree.spheres_at_level(level)).collect();
+    for spheres in &levels {
+        for point in &points {
+            let holds = |s: &Sphere| (point - s.centre).norm() <= s.radius * (1.0 + 1e-12);
+            assert!(spheres.iter().any(holds));
+        }
+    }
+    let mean =
+        |spheres: &[Sphere]| spheres.iter().map(|s| s.radius).sum::<f64>() / spheres.len() as f64;
+    for pair in levels.windows(2) {
+        assert!(pair[0].len() < pair[1].len() && mean(&pair[0]) > mean(&pair[1]));
+    }
+}
+
+#[test]
+fn one_vertex_is_one_level() {
+    let tree = SphereTree::try_build(&[Point3::origin()], &[0]).unwrap();
+    assert_eq!((tree.depth(), tree.spheres_at_level(0).len()), (0, 1));
+}
+
+#[test]
+fn bad_input_is_refused_with_its_node() {
+    let mut positions = vec![Point3::origin(); 3];
+    assert_eq!(SphereTree::try_build(&positions, &[]), Err(TreeError::NoVertices));
+    let error = SphereTree::try_build(&positions, &[0, 3]).unwrap_err();
+    assert_eq!(error, TreeError::IndexOutOfRange { node: 3, node_count: 3 });
+    for bad in [f64::NAN, f64::INFINITY, 1e200] {
+        positions[1].y = bad;
+        let error = SphereTree::try_build(&positions, &[0, 1]).unwrap_err();
+        assert_eq!(error, TreeError::NotFinite { node: 1 });
+        assert!(SphereTree::try_build(&positions, &[0, 2]).is_ok());
+    }
+}
+
+#[test]
+fn coincident_vertices_share_one_leaf_and_end_the_subdivision() {
+    let positions = vec![Point3::new(1.0, 2.0, 3.0); 50];
+    let all: Vec<u32> = (0..50).collect();
+    let tree = SphereTree::try_build(&positions, &all).unwrap();
+    assert_eq!((tree.sphere_count(), tree.vertex_count()), (1, 50));
+}
+
+#[test]
+fn order_and_repetition_of_the_surface_nodes_do_not_matter() {
+    let positions: Vec<_> =
+        (0..40).map(|i| Point3::new(f64::from(i * 7 % 40), f64::from(i), 0.5)).collect();
+    let forward: Vec<u32> = (0..40).collect();
+    let backward: Vec<u32> = (0..40).rev().chain(5..9).collect();
+    let tree = SphereTree::try_build(&positions, &forward).unwrap();
+    assert_eq!(tree, SphereTree::try_build(&positions, &backward).unwrap());
 }

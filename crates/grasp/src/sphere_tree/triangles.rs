@@ -43,7 +43,7 @@ pub fn triangles_near(
         let body_from_object = body.world_from_body_end.inverse() * world_from_object;
         // A corner is no farther from the body than its triangle's middle and the way from there.
         let reach = margin + 2.0 * reach_max;
-        surface.tree.nodes_within(&body_from_object, body, reach, &mut found);
+        nodes_near(surface.tree, &body_from_object, body, reach, &mut found);
         let mut triangles: Vec<u32> =
             found.drain(..).flat_map(|node| surface.stars.of_node(node)).copied().collect();
         triangles.sort_unstable();
@@ -76,29 +76,27 @@ impl Round {
     }
 }
 
-impl SphereTree {
-    /// Appends the vertices that are nearer to a body than a distance; some that are a little farther
-    /// may be among them.
-    fn nodes_within(
-        &self,
-        body_from_object: &Isometry3<f64>,
-        body: &MovingBody,
-        distance: f64,
-        out: &mut Vec<u32>,
-    ) {
-        let _ = self.visit(
-            |sphere| {
-                let centre = body_from_object * sphere.centre;
-                // A little more than the sphere, for what rounding takes.
-                body.shape.distance(&centre).distance <= distance + 1.000_001 * sphere.radius
-            },
-            |_| false,
-            |leaf| {
-                out.extend_from_slice(self.run(leaf).0);
-                ControlFlow::Continue(())
-            },
-        );
-    }
+/// Appends the vertices of a tree that are nearer to a body than a distance; some that are a little
+/// farther may be among them.
+fn nodes_near(
+    tree: &SphereTree,
+    body_from_object: &Isometry3<f64>,
+    body: &MovingBody,
+    distance: f64,
+    out: &mut Vec<u32>,
+) {
+    let _ = tree.visit(
+        |sphere| {
+            let centre = body_from_object * sphere.centre;
+            // A little more than the sphere, for what rounding takes.
+            body.shape.distance(&centre).distance <= distance + 1.000_001 * sphere.radius
+        },
+        |_| false,
+        |leaf| {
+            out.extend_from_slice(tree.run(leaf).0);
+            ControlFlow::Continue(())
+        },
+    );
 }
 
 #[cfg(test)]

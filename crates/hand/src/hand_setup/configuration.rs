@@ -12,7 +12,7 @@ use super::reading::{
     TrackerText, UnitWord,
 };
 use crate::devices::ReceiverMount;
-use crate::devices::calibration::{Calibration, Form};
+use crate::devices::calibration::{Form, read_calibration};
 use crate::devices::cyberglove::SensorCount;
 use crate::devices::fastrak::{Encoding, LengthUnit, OutputList, Station};
 use crate::hand_reader::HandSetup;
@@ -129,7 +129,7 @@ impl HandConfiguration {
     /// # Errors
     /// [`HandFileError`] for a text that is no calibration, or one for the other hand.
     pub fn take_calibration(&mut self, text: &str) -> Result<Form, HandFileError> {
-        let (mut calibration, form) = Calibration::read(text)?;
+        let (mut calibration, form) = read_calibration(text)?;
         let hand = self.setup.dimensions.handedness;
         // Right is also what a text that does not say is read as.
         let says_so = form == Form::Toml || calibration.hand == Handedness::Left;

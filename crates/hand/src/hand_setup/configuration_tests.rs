@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::super::{GloveMode, Hemisphere};
 use super::*;
-use crate::devices::calibration::CalibrationHeader;
+use crate::devices::calibration::{Calibration, CalibrationHeader, toml_text, virtual_hand_text};
 use crate::devices::fastrak::FastrakFormat;
 
 /// Everything that the file says, to compare two configurations.
@@ -175,16 +175,16 @@ fn a_calibration_must_be_for_the_same_hand() {
     let mut left = right.clone();
     left.hand = Handedness::Left;
     let mut configuration = HandConfiguration::read("format = 1\n[hand]\nside = \"left\"").unwrap();
-    let form = configuration.take_calibration(&left.to_virtual_hand(&header)).unwrap();
+    let form = configuration.take_calibration(&virtual_hand_text(&left, &header)).unwrap();
     assert_eq!((form, &configuration.setup.calibration), (Form::VirtualHand, &left));
-    let error = configuration.take_calibration(&right.to_toml().unwrap()).unwrap_err();
+    let error = configuration.take_calibration(&toml_text(&right).unwrap()).unwrap_err();
     assert_eq!(
         error.to_string(),
         "the calibration is for a right hand, the configuration for a left one"
     );
     let mut other = HandConfiguration::default();
     assert!(matches!(
-        other.take_calibration(&left.to_virtual_hand(&header)),
+        other.take_calibration(&virtual_hand_text(&left, &header)),
         Err(HandFileError::OtherHand { .. })
     ));
     assert!(matches!(other.take_calibration("hello"), Err(HandFileError::Calibration(_))));

@@ -7,26 +7,27 @@ use crate::hand_setup::{GloveMode as Asked, HandConfiguration};
 /// Readings per second of a glove, polled or streamed.
 const GLOVE_HZ: f64 = 100.0;
 
-impl SerialSettings {
-    /// The devices on these ports, set up as the configuration says; the speed of a line is the
-    /// port's.
-    pub fn of_hand(source: &SerialSource, configuration: &HandConfiguration) -> Self {
-        let HandConfiguration { setup, glove, tracker, .. } = configuration;
-        let mode = match glove.mode {
-            Asked::Polled => GloveMode::Polled { hz: GLOVE_HZ },
-            Asked::Streamed => GloveMode::Streamed { hz: GLOVE_HZ },
-        };
-        let glove = source.glove.clone().map(|port| GloveSettings {
-            mode,
-            options: setup.glove_options,
-            ..GloveSettings::new(port)
-        });
-        let tracker = source.tracker.clone().map(|port| TrackerSettings {
-            station: tracker.station,
-            format: setup.tracker,
-            hemisphere: tracker.hemisphere.direction(),
-            ..TrackerSettings::new(port)
-        });
-        Self { glove, tracker }
-    }
+/// The devices on these ports, set up as the configuration says; the speed of a line is the
+/// port's.
+pub fn settings_of_hand(
+    source: &SerialSource,
+    configuration: &HandConfiguration,
+) -> SerialSettings {
+    let HandConfiguration { setup, glove, tracker, .. } = configuration;
+    let mode = match glove.mode {
+        Asked::Polled => GloveMode::Polled { hz: GLOVE_HZ },
+        Asked::Streamed => GloveMode::Streamed { hz: GLOVE_HZ },
+    };
+    let glove = source.glove.clone().map(|port| GloveSettings {
+        mode,
+        options: setup.glove_options,
+        ..GloveSettings::new(port)
+    });
+    let tracker = source.tracker.clone().map(|port| TrackerSettings {
+        station: tracker.station,
+        format: setup.tracker,
+        hemisphere: tracker.hemisphere.direction(),
+        ..TrackerSettings::new(port)
+    });
+    SerialSettings { glove, tracker }
 }

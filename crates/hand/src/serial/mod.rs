@@ -22,6 +22,7 @@ pub mod probe;
 pub use arrivals::Arrived;
 pub use driver::DeviceState;
 pub use facts::{GloveFacts, TrackerFacts};
+pub use hand_settings::settings_of_hand;
 pub use serial_devices::{SerialDevices, SerialError};
 pub use settings::{
     GloveMode, GloveSettings, SerialSettings, SettingsError, TrackerFilter, TrackerMode,

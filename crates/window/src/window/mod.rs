@@ -30,12 +30,13 @@ mod running;
 mod scene;
 mod scene_input;
 mod seen_window;
+mod shown_view;
 mod stage;
 mod start;
 mod story;
 mod ui;
 mod units;
-mod wishes;
+mod window_run;
 
 pub use animation::{Animation, png};
 pub use app::App;

@@ -159,7 +159,7 @@ impl Worker {
         let Some(request) = &job.request else { return Ok(()) };
         let reached = match session.answer(&job.model, request, shared, budget) {
             // The shape stays where it was, and the next tick may ask for less.
-            Err(LinkError::Rejected(rejected)) if request.is_passing(&rejected) => {
+            Err(LinkError::Rejected(rejected)) if is_passing(request, &rejected) => {
                 session.tell_no_equilibrium(shared, request.grip, &rejected);
                 Err(Unanswered::NoEquilibrium)
             }
@@ -355,12 +355,10 @@ fn end(shared: &Shared, request: Option<TickRequest>, reached: Result<Box<Reache
     }
 }
 
-impl TickRequest {
-    /// Whether a refusal is about where this tick would have gone, not about the grip.
-    fn is_passing(&self, rejected: &Rejected) -> bool {
-        matches!(&self.asked, TickQuestion::Held { large: Some(_), .. })
-            && rejected.code == RejectCode::Uncertain
-    }
+/// Whether a refusal is about where this tick would have gone, not about the grip.
+fn is_passing(request: &TickRequest, rejected: &Rejected) -> bool {
+    matches!(&request.asked, TickQuestion::Held { large: Some(_), .. })
+        && rejected.code == RejectCode::Uncertain
 }
 
 /// The longest pause after a loss.

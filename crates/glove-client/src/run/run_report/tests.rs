@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::pace::tick_budget::Priority;
+use crate::run::run_words::failure;
 
 fn report() -> RunReport {
     let object =
@@ -42,7 +43,7 @@ fn every_deforming_tick_is_answered_or_has_one_reason() {
     counts.add(Unanswered::RunEnded, 1);
     assert_eq!(s.unanswered, counts);
     assert_eq!(s.deforming_ticks, s.solves as u64 + s.unanswered.total());
-    assert_eq!(report.failure(), None);
+    assert_eq!(failure(&report), None);
 }
 
 #[test]
@@ -81,7 +82,7 @@ fn run_without_any_answer_says_what_the_server_refused() {
     let unanswered = vec![(0, Unanswered::Refused)];
     tick(&mut report, 0, 0, TickOutcome { events: vec![refused], unanswered, ..deforming() });
     report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
-    let why = report.failure().unwrap();
+    let why = failure(&report).unwrap();
     assert_eq!(
         why,
         "none of 1 deforming ticks was answered: the server refused the model (BadRequest): \

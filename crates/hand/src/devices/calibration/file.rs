@@ -32,71 +32,72 @@ struct CalibrationText {
     sensor: Vec<SensorCalibration>,
 }
 
-impl Calibration {
-    /// Reads the text written by [`Calibration::to_toml`]; sensors may come in any order.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] for anything but one sound line for each of the 22 sensors.
-    pub fn from_toml(text: &str) -> Result<Self, CalibrationError> {
-        let read: CalibrationText =
-            toml::from_str(text).map_err(|e| CalibrationError::Syntax(e.to_string()))?;
-        if read.format != FORMAT {
-            return Err(CalibrationError::Format { found: read.format, reads: FORMAT });
-        }
-        let mut lines: [Option<SensorCalibration>; 22] = [None; 22];
-        for line in read.sensor {
-            check_sensor(&line)?;
-            if lines[line.sensor.index()].replace(line).is_some() {
-                return Err(CalibrationError::Twice(line.sensor));
-            }
-        }
-        let mut sensors = Self::default().sensors;
-        for sensor in Sensor::ALL {
-            let line = lines[sensor.index()].ok_or(CalibrationError::Missing(sensor))?;
-            sensors[sensor.index()] = line;
-        }
-        let calibration = Self {
-            hand: match read.hand {
-                Hand::Right => Handedness::Right,
-                Hand::Left => Handedness::Left,
-            },
-            dip_rule: read.dip_rule,
-            middle_bias: read.middle_bias,
-            thumb_coupling: read.thumb_coupling,
-            sensors,
-        };
-        check(&calibration)?;
-        Ok(calibration)
+/// Reads the text written by [`toml_text`]; sensors may come in any order.
+///
+/// # Errors
+/// [`CalibrationError`] for anything but one sound line for each of the 22 sensors.
+pub fn read_toml(text: &str) -> Result<Calibration, CalibrationError> {
+    let read: CalibrationText =
+        toml::from_str(text).map_err(|e| CalibrationError::Syntax(e.to_string()))?;
+    if read.format != FORMAT {
+        return Err(CalibrationError::Format { found: read.format, reads: FORMAT });
     }
+    let mut lines: [Option<SensorCalibration>; 22] = [None; 22];
+    for line in read.sensor {
+        check_sensor(&line)?;
+        if lines[line.sensor.index()].replace(line).is_some() {
+            return Err(CalibrationError::Twice(line.sensor));
+        }
+    }
+    let mut sensors = Calibration::default().sensors;
+    for sensor in Sensor::ALL {
+        let line = lines[sensor.index()].ok_or(CalibrationError::Missing(sensor))?;
+        sensors[sensor.index()] = line;
+    }
+    let calibration = Calibration {
+        hand: match read.hand {
+            Hand::Right => Handedness::Right,
+            Hand::Left => Handedness::Left,
+        },
+        dip_rule: read.dip_rule,
+        middle_bias: read.middle_bias,
+        thumb_coupling: read.thumb_coupling,
+        sensors,
+    };
+    check(&calibration)?;
+    Ok(calibration)
+}
 
-    /// The calibration as TOML text; every number comes back exactly.
-    ///
-    /// # Errors
-    /// [`CalibrationError::Syntax`] if the text cannot be made, which no field value causes.
-    pub fn to_toml(&self) -> Result<String, CalibrationError> {
-        let text = CalibrationText {
-            format: FORMAT,
-            hand: match self.hand {
-                Handedness::Right => Hand::Right,
-                Handedness::Left => Hand::Left,
-            },
-            dip_rule: self.dip_rule,
-            middle_bias: self.middle_bias,
-            thumb_coupling: self.thumb_coupling,
-            sensor: self.sensors.to_vec(),
-        };
-        toml::to_string(&text).map_err(|e| CalibrationError::Syntax(e.to_string()))
-    }
+/// The calibration as TOML text; every number comes back exactly.
+///
+/// # Errors
+/// [`CalibrationError::Syntax`] if the text cannot be made, which no field value causes.
+pub fn toml_text(calibration: &Calibration) -> Result<String, CalibrationError> {
+    let text = CalibrationText {
+        format: FORMAT,
+        hand: match calibration.hand {
+            Handedness::Right => Hand::Right,
+            Handedness::Left => Hand::Left,
+        },
+        dip_rule: calibration.dip_rule,
+        middle_bias: calibration.middle_bias,
+        thumb_coupling: calibration.thumb_coupling,
+        sensor: calibration.sensors.to_vec(),
+    };
+    toml::to_string(&text).map_err(|e| CalibrationError::Syntax(e.to_string()))
+}
 
-    /// The same calibration with one line replaced.
-    ///
-    /// # Errors
-    /// [`CalibrationError::Value`] if a number of the line cannot be.
-    pub fn with_sensor(mut self, line: SensorCalibration) -> Result<Self, CalibrationError> {
-        self.sensors[line.sensor.index()] = line;
-        check(&self)?;
-        Ok(self)
-    }
+/// A calibration with the line of one sensor replaced.
+///
+/// # Errors
+/// [`CalibrationError::Value`] if a number of the line cannot be.
+pub fn with_sensor(
+    mut calibration: Calibration,
+    line: SensorCalibration,
+) -> Result<Calibration, CalibrationError> {
+    calibration.sensors[line.sensor.index()] = line;
+    check(&calibration)?;
+    Ok(calibration)
 }
 
 #[cfg(test)]
@@ -105,34 +106,34 @@ mod tests {
     use proptest::prelude::*;
 
     fn text() -> String {
-        Calibration::default().to_toml().unwrap()
+        toml_text(&Calibration::default()).unwrap()
     }
 
     #[test]
     fn defaults_survive_being_written_and_read() {
         let default = Calibration::default();
-        assert_eq!(Calibration::from_toml(&text()).unwrap(), default);
+        assert_eq!(read_toml(&text()).unwrap(), default);
         let left = Calibration { hand: Handedness::Left, dip_rule: DipRule::TwoThirds, ..default };
-        assert_eq!(Calibration::from_toml(&left.to_toml().unwrap()).unwrap(), left);
+        assert_eq!(read_toml(&toml_text(&left).unwrap()).unwrap(), left);
         let thumb_coupling = ThumbCoupling {
             rotation_rad_per_abduction_count: 0.001,
             abduction_rad_per_rotation_count: -0.002,
         };
         let coupled = Calibration { thumb_coupling, ..left };
-        assert_eq!(Calibration::from_toml(&coupled.to_toml().unwrap()).unwrap(), coupled);
+        assert_eq!(read_toml(&toml_text(&coupled).unwrap()).unwrap(), coupled);
     }
 
     #[test]
     fn a_text_without_a_coupling_is_an_older_file_and_has_none() {
         assert!(!text().contains("coupling"));
-        assert!(Calibration::from_toml(&text()).unwrap().thumb_coupling.is_none());
+        assert!(read_toml(&text()).unwrap().thumb_coupling.is_none());
         let merged = text().replacen(
             "middle_bias = 0.5",
             "middle_bias = 0.5\nthumb_coupling = { rotation_rad_per_abduction_count = 0.01584, \
              abduction_rad_per_rotation_count = 0.00502 }",
             1,
         );
-        let error = Calibration::from_toml(&merged).unwrap_err();
+        let error = read_toml(&merged).unwrap_err();
         assert_eq!(error, CalibrationError::ThumbCoupling(0.01584, 0.00502));
     }
 
@@ -141,7 +142,7 @@ mod tests {
         let refused = |from: &str, to: &str| {
             let changed = text().replacen(from, to, 1);
             assert_ne!(changed, text(), "{from} is in the text");
-            Calibration::from_toml(&changed).unwrap_err()
+            read_toml(&changed).unwrap_err()
         };
         assert_eq!(
             refused("format = 1", "format = 2"),
@@ -171,7 +172,7 @@ mod tests {
             assert!(matches!(refused(from, to), CalibrationError::Syntax(_)));
         }
         let short = text().rsplit_once("[[sensor]]").unwrap().0.to_owned();
-        let error = Calibration::from_toml(&short).unwrap_err();
+        let error = read_toml(&short).unwrap_err();
         assert_eq!(error, CalibrationError::Missing(Sensor::WristYaw));
     }
 
@@ -183,7 +184,7 @@ mod tests {
             let mut damaged = text().into_bytes();
             let place = place.index(damaged.len());
             damaged[place] = byte;
-            if let Ok(read) = Calibration::from_toml(std::str::from_utf8(&damaged).unwrap()) {
+            if let Ok(read) = read_toml(std::str::from_utf8(&damaged).unwrap()) {
                 for line in &read.sensors {
                     prop_assert!(check_sensor(line).is_ok());
                 }

@@ -1,6 +1,7 @@
 //! Reads a calibration in any of the known forms.
 
 use super::checks::CalibrationError;
+use super::file::read_toml;
 use super::joint_xml::read_joint_xml;
 use super::linear::Calibration;
 use super::point_list::{is_point_line, read_point_list};
@@ -59,28 +60,26 @@ impl Form {
     }
 }
 
-impl Calibration {
-    /// Reads a calibration in whatever form it is written.
-    ///
-    /// Forms other than this program's own do not say which hand they are for; they are read as
-    /// for a right hand. A point list and a matrix are complete; in XML joints may be missing and
-    /// keep their default line.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] with the line and what was expected there.
-    pub fn read(text: &str) -> Result<(Self, Form), CalibrationError> {
-        // Editors of some systems put a mark before the first character.
-        let text = text.trim_start_matches('\u{feff}');
-        let form = Form::of(text).ok_or(CalibrationError::UnknownForm)?;
-        let read = match form {
-            Form::Toml => Self::from_toml(text),
-            Form::VirtualHand => read_virtual_hand(text),
-            Form::PointList => read_point_list(text),
-            Form::JointXml => read_joint_xml(text),
-            Form::SlopeMatrix => read_slope_matrix(text),
-        };
-        Ok((read?, form))
-    }
+/// Reads a calibration in whatever form it is written.
+///
+/// Forms other than this program's own do not say which hand they are for; they are read as
+/// for a right hand. A point list and a matrix are complete; in XML joints may be missing and
+/// keep their default line.
+///
+/// # Errors
+/// [`CalibrationError`] with the line and what was expected there.
+pub fn read_calibration(text: &str) -> Result<(Calibration, Form), CalibrationError> {
+    // Editors of some systems put a mark before the first character.
+    let text = text.trim_start_matches('\u{feff}');
+    let form = Form::of(text).ok_or(CalibrationError::UnknownForm)?;
+    let read = match form {
+        Form::Toml => read_toml(text),
+        Form::VirtualHand => read_virtual_hand(text),
+        Form::PointList => read_point_list(text),
+        Form::JointXml => read_joint_xml(text),
+        Form::SlopeMatrix => read_slope_matrix(text),
+    };
+    Ok((read?, form))
 }
 
 #[cfg(test)]

@@ -5,7 +5,9 @@ use softgrasp_grasp::hand::{Handedness, JointAngles};
 
 use super::*;
 use crate::devices::calibration::checks::check;
-use crate::devices::calibration::{CalibrationHeader, DipRule, ThumbCoupling, sensor_angle};
+use crate::devices::calibration::{
+    CalibrationHeader, DipRule, ThumbCoupling, sensor_angle, toml_text, virtual_hand_text,
+};
 use crate::devices::cyberglove::{RawSensors, Sensor, SensorCount, SensorSet};
 
 const HEADER: CalibrationHeader<'static> = CalibrationHeader {
@@ -16,7 +18,7 @@ const HEADER: CalibrationHeader<'static> = CalibrationHeader {
 };
 
 fn written() -> String {
-    Calibration::default().to_virtual_hand(&HEADER)
+    virtual_hand_text(&Calibration::default(), &HEADER)
 }
 
 /// The lines of a file that other readers see.
@@ -122,25 +124,25 @@ fn vendor_angles_of_a_written_file_are_those_of_this_program() {
 #[test]
 fn a_vendor_file_without_our_comments_is_read() {
     let text = table_only(&written());
-    let (read, form) = Calibration::read(&text).unwrap();
+    let (read, form) = read_calibration(&text).unwrap();
     assert_eq!((form, &read), (Form::VirtualHand, &Calibration::default()));
     let with_geometry =
         format!("{text}! ==\n3D HAND GEOMETRY follows:\n! ==\nLEFT HAND.\n  1.0 2.0 3.0\n");
-    let (left, _) = Calibration::read(&with_geometry).unwrap();
+    let (left, _) = read_calibration(&with_geometry).unwrap();
     assert_eq!(left.hand, Handedness::Left);
     // The angles are anatomical: the same for both hands.
     assert_eq!(Calibration { hand: Handedness::Right, ..left }, read);
     let windows = text.replace('\n', "\r\n");
-    assert_eq!(Calibration::read(&windows).unwrap().0, read);
+    assert_eq!(read_calibration(&windows).unwrap().0, read);
 }
 
 #[test]
 fn numbers_edited_in_the_table_win_over_the_exact_ones() {
     let text = written().replacen("  0     60    0.01584", "  0     61    0.01584", 1);
-    let (read, _) = Calibration::read(&text).unwrap();
+    let (read, _) = read_calibration(&text).unwrap();
     assert_eq!(read.sensor(Sensor::ThumbRotation).offset_counts, 61.0);
     let left_out = written().replacen("  0     60    0.00910", "  0     60    0.00000", 1);
-    let (read, _) = Calibration::read(&left_out).unwrap();
+    let (read, _) = read_calibration(&left_out).unwrap();
     assert!(read.sensor(Sensor::PalmArch).dead, "a gain of zero leaves a sensor out");
 }
 
@@ -149,7 +151,7 @@ fn errors_name_the_line_and_what_was_expected() {
     let refused = |from: &str, to: &str| {
         let changed = written().replacen(from, to, 1);
         assert_ne!(changed, written(), "{from} is in the text");
-        Calibration::read(&changed).unwrap_err().to_string()
+        read_calibration(&changed).unwrap_err().to_string()
     };
     let line = |part: &str| written().lines().position(|l| l == part).unwrap() + 1;
     let finger = line("FINGER 3:");
@@ -182,11 +184,11 @@ fn errors_name_the_line_and_what_was_expected() {
     assert!(refused("! softgrasp hand", "! softgrasp hands").contains("expected a known key"));
     let short = written().split("FINGER 5:").next().unwrap().to_owned();
     assert_eq!(
-        Calibration::read(&short).unwrap_err().to_string(),
+        read_calibration(&short).unwrap_err().to_string(),
         "the text ends where `FINGER 5:` should follow"
     );
     for text in ["", "hello", "! only a comment", "20 25"] {
-        assert!(Calibration::read(text).is_err(), "{text}");
+        assert!(read_calibration(text).is_err(), "{text}");
     }
 }
 
@@ -202,7 +204,7 @@ fn point_list() -> String {
 
 #[test]
 fn point_lists_become_lines_with_flexion_positive() {
-    let (read, form) = Calibration::read(&point_list()).unwrap();
+    let (read, form) = read_calibration(&point_list()).unwrap();
     assert_eq!(form, Form::PointList);
     let index = read.sensor(Sensor::IndexMcp);
     assert!(
@@ -222,9 +224,9 @@ fn point_lists_become_lines_with_flexion_positive() {
         "one angle says nothing"
     );
     let short: String = point_list().lines().take(21).map(|l| format!("{l}\n")).collect();
-    assert!(matches!(Calibration::read(&short), Err(CalibrationError::Ends { .. })));
+    assert!(matches!(read_calibration(&short), Err(CalibrationError::Ends { .. })));
     let broken = point_list().replacen("0.300000:50.000000", "0.300000:50.000000 x", 1);
-    assert!(Calibration::read(&broken).unwrap_err().to_string().starts_with("line 1: expected"));
+    assert!(read_calibration(&broken).unwrap_err().to_string().starts_with("line 1: expected"));
 }
 
 const XML: &str = r#"<?xml version="1.0" ?>
@@ -243,7 +245,7 @@ const XML: &str = r#"<?xml version="1.0" ?>
 
 #[test]
 fn joints_in_xml_become_lines_in_counts_and_radians() {
-    let (read, form) = Calibration::read(XML).unwrap();
+    let (read, form) = read_calibration(XML).unwrap();
     assert_eq!(form, Form::JointXml);
     let index = read.sensor(Sensor::IndexMcp);
     assert!((index.offset_counts - (1.0 + 254.0 * 0.25)).abs() < 1e-9);
@@ -253,7 +255,7 @@ fn joints_in_xml_become_lines_in_counts_and_radians() {
     assert_eq!(read.sensor(Sensor::RingMcp), Calibration::default().sensor(Sensor::RingMcp));
     let refused = |from: &str, to: &str| {
         let changed = XML.replacen(from, to, 1);
-        Calibration::read(&changed).unwrap_err().to_string()
+        read_calibration(&changed).unwrap_err().to_string()
     };
     assert!(refused("G_IndexMPJ", "G_Index").starts_with("line 4: expected `name="));
     assert!(refused("0.25", "a quarter").starts_with("line 5: expected `raw_value="));
@@ -261,7 +263,7 @@ fn joints_in_xml_become_lines_in_counts_and_radians() {
     assert!(
         refused("</Cyberglove_calibration>", "</Cyber").starts_with("line 12: expected a closing")
     );
-    assert!(matches!(Calibration::read("<a></a>"), Err(CalibrationError::Ends { .. })));
+    assert!(matches!(read_calibration("<a></a>"), Err(CalibrationError::Ends { .. })));
 }
 
 /// A matrix as GraspIt's, with numbers of this test.
@@ -286,7 +288,7 @@ fn matrix() -> String {
 
 #[test]
 fn slope_matrices_become_lines_and_a_coupled_thumb() {
-    let (read, form) = Calibration::read(&matrix()).unwrap();
+    let (read, form) = read_calibration(&matrix()).unwrap();
     assert_eq!(form, Form::SlopeMatrix);
     let index = read.sensor(Sensor::IndexMcp);
     assert!(
@@ -308,20 +310,20 @@ fn slope_matrices_become_lines_and_a_coupled_thumb() {
     assert!((thumb.abduction - (-0.017 * 180.0 + 0.013 * 115.0 + 1.5)).abs() < 1e-9, "{thumb:?}");
     let broken = matrix().replacen("0.015000", "fast", 1);
     assert!(
-        Calibration::read(&broken).unwrap_err().to_string().starts_with("line 3: expected a slope")
+        read_calibration(&broken).unwrap_err().to_string().starts_with("line 3: expected a slope")
     );
     let long = matrix() + "1.0\n";
     assert!(
-        Calibration::read(&long).unwrap_err().to_string().starts_with("line 23: expected nothing")
+        read_calibration(&long).unwrap_err().to_string().starts_with("line 23: expected nothing")
     );
     let alike = matrix().replacen("-0.017000", "0.011000", 1).replacen("0.013000", "0.015000", 1);
-    assert!(Calibration::read(&alike).unwrap_err().to_string().contains("thumb coupling"));
+    assert!(read_calibration(&alike).unwrap_err().to_string().contains("thumb coupling"));
 }
 
 #[test]
 fn toml_is_still_read() {
     let default = Calibration::default();
-    let (read, form) = Calibration::read(&default.to_toml().unwrap()).unwrap();
+    let (read, form) = read_calibration(&toml_text(&default).unwrap()).unwrap();
     assert_eq!((read, form), (default, Form::Toml));
 }
 
@@ -329,9 +331,9 @@ proptest! {
     #[test]
     fn every_calibration_comes_back_exactly(calibration in any_calibration()) {
         prop_assume!(check(&calibration).is_ok());
-        let text = calibration.to_virtual_hand(&HEADER);
+        let text = virtual_hand_text(&calibration, &HEADER);
         prop_assert!(text.lines().all(|line| line.len() <= 80));
-        let (read, form) = Calibration::read(&text).unwrap();
+        let (read, form) = read_calibration(&text).unwrap();
         prop_assert_eq!(form, Form::VirtualHand);
         prop_assert_eq!(read, calibration);
     }
@@ -346,8 +348,8 @@ proptest! {
             line.offset_counts = offsets[line.sensor.index()];
             line.gain_rad_per_count *= factors[line.sensor.index()];
         }
-        let text = table_only(&calibration.to_virtual_hand(&HEADER));
-        let (read, _) = Calibration::read(&text).unwrap();
+        let text = table_only(&virtual_hand_text(&calibration, &HEADER));
+        let (read, _) = read_calibration(&text).unwrap();
         let raw = calibration.raw_from_angles(&JointAngles::fist(), SensorCount::TwentyTwo);
         let [a, b] = [&calibration, &read].map(|c| c.angles(&raw, SensorSet::EMPTY));
         for sensor in Sensor::ALL {
@@ -360,7 +362,7 @@ proptest! {
 
     #[test]
     fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
-        let _ = Calibration::read(&String::from_utf8_lossy(&bytes));
+        let _ = read_calibration(&String::from_utf8_lossy(&bytes));
     }
 
     #[test]
@@ -383,7 +385,7 @@ proptest! {
                 }
             }
         }
-        if let Ok((read, _)) = Calibration::read(&String::from_utf8_lossy(&bytes)) {
+        if let Ok((read, _)) = read_calibration(&String::from_utf8_lossy(&bytes)) {
             prop_assert!(check(&read).is_ok());
             let raw = read.raw_from_angles(&JointAngles::fist(), SensorCount::TwentyTwo);
             let angles = read.angles(&raw, SensorSet::EMPTY).to_array();

@@ -81,48 +81,46 @@ pub struct CalibrationHeader<'a> {
     pub hand_size_m: Option<[f64; 2]>,
 }
 
-impl Calibration {
-    /// The calibration as VirtualHand text.
-    ///
-    /// Lines are at most 80 characters. What the vendor's table cannot hold (which hand, believed
-    /// ranges, rest angles, dead sensors, the rule for distal joints, thumb coupling, digits beyond
-    /// the printed ones) stands in comment lines `! softgrasp KEY VALUE`, which other readers skip;
-    /// with them the text comes back as exactly this calibration.
-    pub fn to_virtual_hand(&self, header: &CalibrationHeader<'_>) -> String {
-        let mut text = String::from("VHv1.0\n");
-        for line in header_lines(self, header) {
-            let short: String = line.chars().filter(|c| !c.is_control()).take(76).collect();
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "! {short}");
-        }
-        for (key, value) in notes_of(self) {
-            let _ = writeln!(text, "! softgrasp {key} {value}");
-        }
-        text.push_str("!\nGLOVE CALIBRATION follows:\n! joint, offset, gain, gesture\n");
-        for (finger, joints) in SLOTS.iter().enumerate() {
-            let _ = writeln!(text, "FINGER {finger}:");
-            for (joint, &slot) in joints.iter().enumerate() {
-                let (offset, gain) = self.numbers_of(slot);
-                let offset = printed_offset(offset);
-                let _ = writeln!(text, "{joint:>3} {offset:>6} {gain:>10.5} {:>5}", 0);
-            }
-        }
-        text.push_str("! E_O_CAL\n!\n");
-        text
+/// A calibration as VirtualHand text.
+///
+/// Lines are at most 80 characters. What the vendor's table cannot hold (which hand, believed
+/// ranges, rest angles, dead sensors, the rule for distal joints, thumb coupling, digits beyond
+/// the printed ones) stands in comment lines `! softgrasp KEY VALUE`, which other readers skip;
+/// with them the text comes back as exactly this calibration.
+pub fn virtual_hand_text(calibration: &Calibration, header: &CalibrationHeader<'_>) -> String {
+    let mut text = String::from("VHv1.0\n");
+    for line in header_lines(calibration, header) {
+        let short: String = line.chars().filter(|c| !c.is_control()).take(76).collect();
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "! {short}");
     }
-
-    /// Offset and gain of one line of the table, in the vendor's convention.
-    fn numbers_of(&self, slot: Slot) -> (f64, f64) {
-        let of = |sensor: Sensor| {
-            let line = self.sensor(sensor);
-            (line.offset_counts, vendor_gain(sensor, line.gain_rad_per_count))
-        };
-        match slot {
-            Slot::Sensor(sensor) => of(sensor),
-            Slot::IndexAbduction => of(Sensor::MiddleIndexAbduction),
-            Slot::MiddleAbduction => (of(Sensor::MiddleIndexAbduction).0, self.middle_bias),
-            Slot::Unused => (0.0, 0.0),
+    for (key, value) in notes_of(calibration) {
+        let _ = writeln!(text, "! softgrasp {key} {value}");
+    }
+    text.push_str("!\nGLOVE CALIBRATION follows:\n! joint, offset, gain, gesture\n");
+    for (finger, joints) in SLOTS.iter().enumerate() {
+        let _ = writeln!(text, "FINGER {finger}:");
+        for (joint, &slot) in joints.iter().enumerate() {
+            let (offset, gain) = numbers_of(calibration, slot);
+            let offset = printed_offset(offset);
+            let _ = writeln!(text, "{joint:>3} {offset:>6} {gain:>10.5} {:>5}", 0);
         }
+    }
+    text.push_str("! E_O_CAL\n!\n");
+    text
+}
+
+/// Offset and gain of one line of the table, in the vendor's convention.
+fn numbers_of(calibration: &Calibration, slot: Slot) -> (f64, f64) {
+    let of = |sensor: Sensor| {
+        let line = calibration.sensor(sensor);
+        (line.offset_counts, vendor_gain(sensor, line.gain_rad_per_count))
+    };
+    match slot {
+        Slot::Sensor(sensor) => of(sensor),
+        Slot::IndexAbduction => of(Sensor::MiddleIndexAbduction),
+        Slot::MiddleAbduction => (of(Sensor::MiddleIndexAbduction).0, calibration.middle_bias),
+        Slot::Unused => (0.0, 0.0),
     }
 }
 

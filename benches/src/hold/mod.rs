@@ -1,8 +1,0 @@
-//! Report `hold`: a request every millisecond for a minute, beside a loop that asks nobody.
-
-mod holder;
-mod kept;
-mod report;
-mod turns;
-
-pub use report::measure;

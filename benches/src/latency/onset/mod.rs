@@ -1,0 +1,7 @@
+//! From sending the first frame of a new grip to its answer.
+
+mod grips;
+mod report;
+mod trial;
+
+pub(super) use report::measure;

@@ -1,7 +1,0 @@
-//! Report `onset`: from sending the first frame of a new grip to its answer.
-
-mod grips;
-mod report;
-mod trial;
-
-pub use report::measure;

@@ -1,0 +1,9 @@
+//! What a user of `run` gets in real time, from runs of the real programs.
+
+mod large;
+mod live;
+mod record;
+mod report;
+mod way;
+
+pub(super) use report::measure;

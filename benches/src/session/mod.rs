@@ -1,9 +1,0 @@
-//! Report `session`: what a user of `run` gets in real time, from runs of the real programs.
-
-mod large;
-mod live;
-mod record;
-mod report;
-mod way;
-
-pub use report::measure;

@@ -1,0 +1,291 @@
+//! What becomes of the object besides the grasp: its next rest shape, another object, a file. Made beside
+//! the ticks.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use softgrasp_grasp::object::{RestShape, SoftObject};
+use softgrasp_hand::notice::Notice;
+
+use crate::ask::solve_settings::SolveSettings;
+use crate::object::object_work::{KeptShape, ObjectDone, ObjectJob, ObjectWork};
+use crate::object::saving::ShapeToSave;
+use crate::object::shape_history::ShapeHistory;
+use crate::pace::Pace;
+use crate::run::tick_outcome::{LoopEvent, TickOutcome};
+
+/// How far the next rest shape has come: a kept shape, or the dent that a hand has left.
+pub(crate) enum Keep {
+    /// Nobody wishes to keep a shape.
+    NotWanted,
+    /// The next answer is asked for whole: those so far brought the surface only.
+    WhenWhole,
+    /// The next rest shape is being made; the object keeps the shape it has.
+    BeingMade,
+    /// It is made, and the grasp is told in this tick.
+    Made(Box<KeptShape>),
+    /// The hand let go of an object that has flowed: the shape that it springs back to is asked for.
+    SpringsBack,
+    /// The shape that it has sprung back to is being made the next rest shape.
+    BecomesDent,
+}
+
+impl Keep {
+    /// Whether a shape is to be kept, or a dent.
+    pub(crate) fn is_wanted(&self) -> bool {
+        !matches!(self, Self::NotWanted)
+    }
+
+    /// Whether the object stays as it is until its next rest shape is there.
+    pub(crate) fn freezes(&self) -> bool {
+        matches!(self, Self::BeingMade | Self::Made(_)) || self.is_dent()
+    }
+
+    /// Whether what is made is the dent that the hand has left.
+    pub(crate) fn is_dent(&self) -> bool {
+        matches!(self, Self::SpringsBack | Self::BecomesDent)
+    }
+
+    /// Whether work beside the ticks is waited for.
+    pub(crate) fn awaits_work(&self) -> bool {
+        matches!(self, Self::BeingMade | Self::BecomesDent)
+    }
+}
+
+/// What takes the place of the object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Replacement {
+    /// Its rest shape before the last one was kept.
+    EarlierShape,
+    /// Its rest shape before the first one was kept.
+    FirstShape,
+    /// Another material for the rest shape that is there.
+    OtherMaterial,
+    /// Another object, by name.
+    Other(String),
+}
+
+/// Changes of the object that are under way, and the rest shapes that it had before.
+pub(crate) struct Changing {
+    keep: Keep,
+    history: ShapeHistory,
+    replacement: Option<Replacement>,
+    /// The file to write as soon as every node is known.
+    save_to: Option<PathBuf>,
+    /// The last question was asked again for all nodes, outside the ticks.
+    asked_whole: bool,
+    work: ObjectWork,
+}
+
+impl Changing {
+    /// Nothing under way.
+    ///
+    /// # Errors
+    /// The system's, when it gives no thread.
+    pub(crate) fn start(pace: Pace) -> std::io::Result<Self> {
+        Ok(Self {
+            keep: Keep::NotWanted,
+            history: ShapeHistory::default(),
+            replacement: None,
+            save_to: None,
+            asked_whole: false,
+            work: ObjectWork::start(pace)?,
+        })
+    }
+
+    /// How far the next rest shape has come.
+    pub(crate) fn keep(&self) -> &Keep {
+        &self.keep
+    }
+
+    /// Whether the answers must have every node: a shape or a file waits for the inside.
+    pub(crate) fn wants_whole(&self) -> bool {
+        self.keep.is_wanted() || self.save_to.is_some()
+    }
+
+    pub(crate) fn set_keep(&mut self, keep: Keep) {
+        self.keep = keep;
+    }
+
+    /// The shape that has been made, if it has been; nothing is kept any more then.
+    pub(crate) fn take_made(&mut self) -> Option<KeptShape> {
+        match std::mem::replace(&mut self.keep, Keep::NotWanted) {
+            Keep::Made(kept) => Some(*kept),
+            other => {
+                self.keep = other;
+                None
+            }
+        }
+    }
+
+    /// Nothing deforms the object any more: a shape that waits to be kept is not kept.
+    pub(crate) fn stop_keeping(&mut self, outcome: &mut TickOutcome) {
+        if self.keep.is_wanted() {
+            self.keep = Keep::NotWanted;
+            let text = "the hand let go before the shape could be kept";
+            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
+        }
+    }
+
+    /// Has the shape as it is now made into a rest shape; the object stays as it is meanwhile.
+    pub(crate) fn begin_to_keep(
+        &mut self,
+        keep: Keep,
+        object: &SoftObject,
+        settings: &SolveSettings,
+    ) {
+        self.keep = keep;
+        self.work.begin(ObjectJob::Keep {
+            rest: Arc::clone(object.rest_shape()),
+            vertices: object.shape().to_vec(),
+            rest_shapes: object.rest_shapes(),
+            material: settings.material,
+            element: settings.element,
+        });
+    }
+
+    /// Hands over a piece of work that changes nothing.
+    pub(crate) fn begin(&mut self, job: ObjectJob) {
+        self.work.begin(job);
+    }
+
+    /// The next piece of work that is done. New rest shapes only where the tick takes them.
+    pub(crate) fn take_done(&mut self, takes_shapes: bool) -> Option<ObjectDone> {
+        self.work.take_if(|done| {
+            takes_shapes || !matches!(done, ObjectDone::Kept(_) | ObjectDone::Replacement(_))
+        })
+    }
+
+    /// A rest shape whose work was lost with its thread is not waited for.
+    pub(crate) fn give_up_lost_work(&mut self, outcome: &mut TickOutcome) {
+        if self.keep.awaits_work() && !self.work.is_busy() {
+            self.keep = Keep::NotWanted;
+            let text = "the work on the new rest shape failed; this is a fault of the program";
+            outcome.events.push(LoopEvent::KeepRefused(text.to_owned()));
+        }
+    }
+
+    /// Waits until all work is done; what has come of it is still to be taken.
+    pub(crate) fn settle(&mut self) {
+        self.work.settle();
+    }
+
+    /// Remembers a rest shape before another takes its place.
+    pub(crate) fn remember(&mut self, rest: &Arc<RestShape>) {
+        self.history.push(Arc::clone(rest));
+    }
+
+    pub(crate) fn history(&self) -> &ShapeHistory {
+        &self.history
+    }
+
+    /// Whether the object is about to be replaced.
+    pub(crate) fn replaces(&self) -> bool {
+        self.replacement.is_some()
+    }
+
+    /// Refuses a change while another is under way.
+    ///
+    /// # Errors
+    /// The sentence for the person.
+    pub(crate) fn refuse_while_changing(&mut self) -> Result<(), Notice> {
+        // Work that is lost with its thread must not be waited for.
+        if !self.work.is_busy() {
+            self.replacement = None;
+        }
+        match self.replacement {
+            Some(_) => Err(Notice::refused("the object is being changed; wait a moment")),
+            None => Ok(()),
+        }
+    }
+
+    /// Has an object made that takes the place of this one.
+    pub(crate) fn begin_to_replace(
+        &mut self,
+        rest: Arc<RestShape>,
+        replacement: Replacement,
+        object: &SoftObject,
+        settings: &SolveSettings,
+    ) {
+        self.replacement = Some(replacement);
+        self.work.begin(ObjectJob::Replace {
+            rest,
+            rest_shapes: object.rest_shapes() + 1,
+            material: settings.material,
+            element: settings.element,
+        });
+    }
+
+    /// What the object that has been made is, if it is still wanted. The history of rest shapes
+    /// follows it.
+    pub(crate) fn take_replacement(&mut self) -> Option<Replacement> {
+        let replacement = self.replacement.take()?;
+        match &replacement {
+            Replacement::EarlierShape => drop(self.history.pop()),
+            Replacement::FirstShape | Replacement::Other(_) => self.history.clear(),
+            Replacement::OtherMaterial => {}
+        }
+        Some(replacement)
+    }
+
+    /// Saves the object as it is now, at once or when every node is known.
+    ///
+    /// # Errors
+    /// The sentence for the person, while another file waits.
+    pub(crate) fn save(
+        &mut self,
+        path: PathBuf,
+        object: &SoftObject,
+    ) -> Result<Option<Notice>, Notice> {
+        if let Some(earlier) = &self.save_to {
+            let text = format!("{} is still to be saved; wait a moment", earlier.display());
+            return Err(Notice::refused(text));
+        }
+        if object.is_whole() {
+            self.begin_to_save(path, object);
+            return Ok(None);
+        }
+        let text = format!("{} is saved when the inside of the object is known", path.display());
+        self.save_to = Some(path);
+        Ok(Some(Notice::waits(text)))
+    }
+
+    /// Begins to write the file that waits for the whole shape, once that is known; whether it began.
+    pub(crate) fn save_when_whole(&mut self, object: &SoftObject) -> bool {
+        if object.is_whole()
+            && let Some(path) = self.save_to.take()
+        {
+            self.asked_whole = false;
+            self.begin_to_save(path, object);
+            return true;
+        }
+        false
+    }
+
+    /// Whether the inside is still to be asked for outside the ticks.
+    pub(crate) fn asks_for_inside(&self) -> bool {
+        self.save_to.is_some() && !self.asked_whole
+    }
+
+    pub(crate) fn inside_is_asked_for(&mut self) {
+        self.asked_whole = true;
+    }
+
+    /// The file that waits for the inside of the object is not written.
+    pub(crate) fn refuse_to_save(&mut self, why: &str, outcome: &mut TickOutcome) {
+        self.asked_whole = false;
+        if let Some(path) = self.save_to.take() {
+            let text = format!("cannot save {}: {why}; save it again", path.display());
+            outcome.tell_saved(Err(text));
+        }
+    }
+
+    fn begin_to_save(&mut self, path: PathBuf, object: &SoftObject) {
+        self.work.begin(ObjectJob::Save(ShapeToSave {
+            path,
+            rest: Arc::clone(object.rest_shape()),
+            vertices: object.shape().to_vec(),
+            displacement: object.displacement().to_vec(),
+        }));
+    }
+}

@@ -1,0 +1,111 @@
+//! What holds the object: the rules of the thesis, or contact with friction in their place.
+
+use nalgebra::Isometry3;
+use softgrasp_grasp::grasp::{Contact, Grasp, GraspError, StateName, StepInput, StepOutput};
+
+use crate::run::contact_grasp::{ContactGrasp, ContactScene};
+use crate::run::shown::Shown;
+
+/// What holds the object.
+pub(crate) struct Holding {
+    thesis: Grasp,
+    /// Takes the place of the thesis's rules, which then only know the object's home.
+    friction: Option<Box<ContactGrasp>>,
+}
+
+impl Holding {
+    /// The rules of the thesis.
+    pub(crate) fn new(thesis: Grasp) -> Self {
+        Self { thesis, friction: None }
+    }
+
+    /// From now on contact with friction.
+    pub(crate) fn by_friction(&mut self, scene: ContactScene, shown: &mut Shown) {
+        let contact = ContactGrasp::new(scene, *self.thesis.home());
+        shown.place(contact.world_from_object());
+        self.friction = Some(Box::new(contact));
+    }
+
+    /// The rules of the thesis, whether or not they are what holds the object.
+    pub(crate) fn thesis(&self) -> &Grasp {
+        &self.thesis
+    }
+
+    /// A tick of the rules of the thesis.
+    pub(crate) fn step(&mut self, input: &StepInput) -> StepOutput {
+        self.thesis.step(input)
+    }
+
+    /// The grasp by friction, if there is one.
+    pub(crate) fn friction(&self) -> Option<&ContactGrasp> {
+        self.friction.as_deref()
+    }
+
+    pub(crate) fn friction_mut(&mut self) -> Option<&mut ContactGrasp> {
+        self.friction.as_deref_mut()
+    }
+
+    pub(crate) fn state_name(&self) -> StateName {
+        match &self.friction {
+            Some(contact) => contact.state_name(),
+            None => self.thesis.state().name(),
+        }
+    }
+
+    /// What each fingertip holds by the rules of the thesis, thumb first.
+    pub(crate) fn contacts(&self) -> [Option<Contact>; 5] {
+        self.thesis.state().contacts()
+    }
+
+    /// Lets go of the object where it is.
+    pub(crate) fn let_go(&mut self) {
+        self.thesis.let_go();
+        if let Some(contact) = &mut self.friction {
+            contact.let_go();
+        }
+    }
+
+    /// Puts a free object somewhere.
+    ///
+    /// # Errors
+    /// [`GraspError`] while the hand holds it.
+    pub(crate) fn place(&mut self, pose: Isometry3<f64>) -> Result<(), GraspError> {
+        match &mut self.friction {
+            Some(contact) if contact.state_name() == StateName::Deforming => {
+                return Err(GraspError::Held);
+            }
+            Some(contact) => contact.put(pose),
+            None => self.thesis.place(pose)?,
+        }
+        Ok(())
+    }
+
+    /// Another home, to which the object goes at once.
+    ///
+    /// # Errors
+    /// [`GraspError`] while the hand holds it.
+    pub(crate) fn set_home(&mut self, home: Isometry3<f64>) -> Result<(), GraspError> {
+        self.thesis.set_home(home)?;
+        if let Some(contact) = &mut self.friction {
+            contact.set_home(home);
+        }
+        Ok(())
+    }
+
+    /// Lets go of the object and puts it back to where it began. A table is as high as the lowest
+    /// point of the object there.
+    pub(crate) fn put_home(&mut self, shown: &mut Shown) {
+        self.thesis.let_go();
+        let home = *self.thesis.home();
+        // Nothing holds it any more.
+        if self.thesis.place(home).is_ok() {
+            shown.place(home);
+        }
+        if let Some(contact) = &mut self.friction {
+            let lowest = home.translation.y + shown.object().rest_shape().bottom();
+            let table_y = contact.scene().table_y.map(|_| lowest);
+            contact.meet_new_object(table_y);
+            shown.place(contact.world_from_object());
+        }
+    }
+}
