@@ -14,7 +14,7 @@ const COLUMN_BYTES: usize = 1 << 30;
 /// Time of a shape's base, of the first frame of a grip, and the median of warm frames, for surface
 /// nodes and for all; the worst error of all of them.
 pub fn run(problem: &Problem) -> anyhow::Result<serde_json::Value> {
-    let (base_ms, base) = timed_ms(|| problem.model.condense(&mut |_| {}));
+    let (base_ms, base) = timed_ms(|| problem.model.condense(None, &mut |_| {}));
     let base = base?;
     let columns = Columns::new(COLUMN_BYTES);
     let (known, right) = (&problem.known, &problem.reference[0].displacement);

@@ -28,7 +28,7 @@ pub(super) fn attack(
     seed: u64,
     amount: Amount,
 ) -> Result<Vec<(Kind, Tally)>, ReportError> {
-    let base = scene.model.condense(&mut |_| {})?;
+    let base = scene.model.condense(None, &mut |_| {})?;
     // Kept by the base, and `certify` finds it there.
     let _ = base.prove_eigenvalue_min();
     let columns = Columns::new(1 << 28);

@@ -64,7 +64,7 @@ impl Ball {
         let surface = Surface::from_mesh(&mesh);
         let material = Material::try_new(YOUNG, POISSON)?;
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {})?;
-        let base = model.condense(&mut |_| {})?;
+        let base = model.condense(None, &mut |_| {})?;
         let body = FreeBody::try_new(model.mesh(), &base)?;
         Ok(Self { model, surface, base, body, columns: Columns::new(usize::MAX) })
     }

@@ -105,7 +105,7 @@ impl Kept {
                 Ok(Self::Direct(Box::new(model.factor(&known.dofs, method, &mut |_| {})?)))
             }
             Way::Condensed => {
-                let base = model.condense(&mut |_| {})?;
+                let base = model.condense(None, &mut |_| {})?;
                 model.held_partition(&known.dofs)?;
                 let columns = Columns::new(usize::MAX);
                 let mut set = ContactSet::try_new(&base, &columns, &Touched::of_dofs(&known.dofs))

@@ -78,7 +78,7 @@ pub(super) fn condensed(
     let mut held: Vec<u32> = dofs.iter().chain(model.fixed()).copied().collect();
     held.sort_unstable();
     model.check_held(&held, &masks)?;
-    let base = model.condense(&mut |_| {})?;
+    let base = model.condense(None, &mut |_| {})?;
     let columns = Columns::new(COLUMN_BYTES);
     let set = ContactSet::try_new(&base, &columns, &Touched { dofs, masks })?;
     let answer = set.solve(&q)?;

@@ -189,7 +189,7 @@ pub(super) struct Linear {
 /// # Errors
 /// [`ReportError`].
 pub(super) fn linear(squeeze: &Squeeze, truth: &Truth) -> Result<Linear, ReportError> {
-    let base = squeeze.model.condense(&mut |_| {})?;
+    let base = squeeze.model.condense(None, &mut |_| {})?;
     let touched = Touched { dofs: Vec::new(), masks: squeeze.masks.clone() };
     let columns = Columns::new(1 << 30);
     let set = ContactSet::try_new(&base, &columns, &touched)?;

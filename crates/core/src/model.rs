@@ -1,24 +1,24 @@
 //! The finite element model of a body: mesh, stiffness, connected parts, fixed degrees of freedom.
 
-mod large;
+mod error;
 
 use std::sync::Arc;
 
+pub use error::ModelError;
+
 use crate::contact::{Mask, MaskError};
 pub use crate::fem::Element;
-use crate::fem::hyperelastic::YieldError;
+use crate::fem::hyperelastic::{Elements, Law};
 use crate::fem::{
-    AssemblyError, Material, NodalPatches, QuadraticMesh, Stiffness, StiffnessPattern,
-    StrainSummary, TooManyNodes, assemble, assemble_nodal_pressure, assemble_quadratic,
-    summarise_strain, summarise_strain_quadratic,
+    Material, NodalPatches, QuadraticMesh, Stiffness, StiffnessPattern, StrainSummary, assemble,
+    assemble_nodal_pressure, assemble_quadratic, summarise_strain, summarise_strain_quadratic,
 };
 use crate::mesh::{Bodies, TetMesh};
-use crate::solve::condensed::{Base, CondensedError};
-use crate::solve::equilibrium::Dependent;
+use crate::solve::condensed::Base;
+use crate::solve::equilibrium::{Hold, HoldOf};
 use crate::solve::memory::model_bytes;
 use crate::solve::{
-    Analysed, Factored, FreeMotion, KnownDisplacements, KnownError, Method, Partition,
-    PartitionError, RigidBodies, SolveError, Stage, find_free_motion,
+    Analysed, Factored, KnownDisplacements, Partition, RigidBodies, Stage, Within, find_free_motion,
 };
 
 /// Everything about a shape that does not depend on which nodes are touched.
@@ -39,57 +39,6 @@ pub struct Model {
     used_count: usize,
     stiffness: Arc<Stiffness>,
     fixed: Vec<u32>,
-}
-
-/// Why a model cannot be made or asked.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ModelError {
-    /// Material and regions do not fit.
-    #[error(transparent)]
-    Assembly(#[from] AssemblyError),
-    /// Known displacements contradict each other.
-    #[error(transparent)]
-    Known(#[from] KnownError),
-    /// Known degrees of freedom do not fit the mesh.
-    #[error(transparent)]
-    Partition(#[from] PartitionError),
-    /// A rigid motion is not held back.
-    #[error("{0}")]
-    Free(FreeMotion),
-    /// The method failed.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-    /// The mesh has too many edges for mid-edge nodes.
-    #[error(transparent)]
-    MidNodes(#[from] TooManyNodes),
-    /// A mid-edge node was named.
-    #[error("node {node} is given a displacement, but the mesh has {node_count} nodes (0-based)")]
-    NoSuchNode {
-        /// Node, from 0.
-        node: usize,
-        /// Nodes of the mesh.
-        node_count: usize,
-    },
-    /// A mask that does not fit the mesh.
-    #[error("mask {mask} (from 0): {reason}")]
-    Mask {
-        /// Which one, in the order given.
-        mask: usize,
-        /// What is wrong with it.
-        reason: MaskError,
-    },
-    /// The condensed engine does not know ten-node elements.
-    #[error("condensed works on linear tetrahedra; use front for ten-node ones")]
-    QuadraticCondensed,
-    /// The condensed engine failed.
-    #[error(transparent)]
-    Condensed(#[from] CondensedError),
-    /// Elements that cannot yield, or not so.
-    #[error(transparent)]
-    Yield(#[from] YieldError),
-    /// A mask that says what is said already.
-    #[error(transparent)]
-    Dependent(#[from] Dependent),
 }
 
 /// A partition and the known displacements in its order.
@@ -157,19 +106,11 @@ impl Model {
         self.used.len()
     }
 
-    /// Largest rotation and strain of a displacement field of the system.
+    /// Largest rotation and strain of a displacement field of the system, with a call of `pause`
+    /// every 50 µs or so.
     ///
     /// Shapes: `displacement` 3 per node of the system.
-    pub fn strain(&self, displacement: &[f64]) -> StrainSummary {
-        self.strain_with_pauses(displacement, &mut || {})
-    }
-
-    /// Largest rotation and strain of an element, with a call of `pause` every 50 µs or so.
-    pub fn strain_with_pauses(
-        &self,
-        displacement: &[f64],
-        pause: &mut dyn FnMut(),
-    ) -> StrainSummary {
+    pub fn strain(&self, displacement: &[f64], pause: &mut dyn FnMut()) -> StrainSummary {
         match &self.quadratic {
             None => summarise_strain(&self.mesh, displacement, pause),
             Some(quadratic) => summarise_strain_quadratic(quadratic, displacement, pause),
@@ -288,30 +229,23 @@ impl Model {
         Ok(Partition::try_new(&self.used, dofs)?)
     }
 
-    /// Base of the condensed engine for this shape.
-    ///
-    /// # Errors
-    /// [`ModelError::Condensed`].
-    pub fn condense(&self, on_stage: &mut dyn FnMut(Stage)) -> Result<Base, ModelError> {
-        self.condense_within(u64::MAX, on_stage)
-    }
-
-    /// Base of condensed columns whose factor may take so much memory only.
+    /// Base of the condensed engine for this shape; with a limit, its factor may take so much memory
+    /// only.
     ///
     /// Units: `limit` bytes.
     ///
     /// # Errors
-    /// [`ModelError::Condensed`].
-    pub fn condense_within(
+    /// [`ModelError::Condensed`], [`ModelError::QuadraticCondensed`].
+    pub fn condense(
         &self,
-        limit: u64,
+        limit: Option<u64>,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Base, ModelError> {
         let Self { mesh, bodies, rigid, stiffness, fixed, quadratic, .. } = self;
         if quadratic.is_some() {
             return Err(ModelError::QuadraticCondensed);
         }
-        Ok(Base::try_within(mesh, bodies, rigid, stiffness, fixed, limit, on_stage)?)
+        Ok(Base::try_new(mesh, bodies, rigid, stiffness, fixed, limit, on_stage)?)
     }
 
     /// Orders and analyses `K11` for a set of known degrees of freedom, after making sure that it
@@ -329,7 +263,8 @@ impl Model {
     }
 
     /// Inverts or factors `K11` for a set of known degrees of freedom, after making sure that it
-    /// holds every body.
+    /// holds every body; by a [`Method`](crate::solve::Method), or by a method [`Within`] a memory
+    /// limit.
     ///
     /// # Errors
     /// [`ModelError::Partition`], [`ModelError::Free`] naming the body and its motion,
@@ -339,27 +274,60 @@ impl Model {
     pub fn factor(
         &self,
         dofs: &[u32],
-        method: Method,
-        on_stage: &mut dyn FnMut(Stage),
-    ) -> Result<Factored, ModelError> {
-        self.factor_within(dofs, method, u64::MAX, on_stage)
-    }
-
-    /// Factor or inverse of `K11` that may take so much memory only.
-    ///
-    /// Units: `limit` bytes.
-    ///
-    /// # Errors
-    /// Those of [`Model::factor`]; [`SolveError::OverLimit`] with both numbers.
-    pub fn factor_within(
-        &self,
-        dofs: &[u32],
-        method: Method,
-        limit: u64,
+        how: impl Into<Within>,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Factored, ModelError> {
         let partition = self.held_partition(dofs)?;
-        Ok(Factored::try_within(&self.stiffness, partition, method, limit, on_stage)?)
+        Ok(Factored::try_new(&self.stiffness, partition, how, on_stage)?)
+    }
+
+    /// The elements of the model with a law for large deformation; they take the moduli from the
+    /// materials of the model.
+    ///
+    /// # Errors
+    /// None that making the model did not have.
+    pub fn hyperelastic(&self, law: Law) -> Result<Elements, ModelError> {
+        let quadratic = self.quadratic.as_ref();
+        Ok(Elements::try_new(&self.mesh, self.element, quadratic, law, &self.materials)?)
+    }
+
+    /// Hyperelastic elements with a yield stress above which they flow and stay deformed, if there is one.
+    ///
+    /// Units: Pa.
+    ///
+    /// # Errors
+    /// [`ModelError::Yield`] for a stress that is none, and for elements that cannot.
+    pub fn yielding(&self, law: Law, yield_stress: Option<f64>) -> Result<Elements, ModelError> {
+        let elements = self.hyperelastic(law)?;
+        Ok(match yield_stress {
+            Some(stress) => elements.with_yield(stress)?,
+            None => elements,
+        })
+    }
+
+    /// Largest Poisson's ratio of its materials.
+    pub fn poisson_max(&self) -> f64 {
+        self.materials.iter().map(Material::poisson).fold(-1.0, f64::max)
+    }
+
+    /// Known degrees of freedom and masks as a hold for equilibria; `before` lends its order if it
+    /// is by the same degrees of freedom.
+    ///
+    /// Shapes: `dofs` ascending, fixed ones among them; `masks` of this model.
+    ///
+    /// # Errors
+    /// [`ModelError::Partition`], [`ModelError::Free`], [`ModelError::Dependent`].
+    pub fn hold(
+        &self,
+        dofs: &[u32],
+        masks: Vec<Mask>,
+        before: Option<&Hold>,
+    ) -> Result<Hold, ModelError> {
+        self.check_held(dofs, &masks)?;
+        let partition = Partition::try_new(&self.used, dofs)?;
+        let Self { mesh, bodies, rigid, stiffness, .. } = self;
+        let body = HoldOf { mesh, bodies, rigid, stiffness };
+        Ok(Hold::try_new(body, partition, masks, before)?)
     }
 }
 
@@ -393,6 +361,7 @@ fn system(mesh: &TetMesh, element: Element, materials: &[Material]) -> Result<Sy
 mod tests {
     use super::*;
     use crate::mesh::{BuiltIn, generate};
+    use crate::solve::Method;
 
     fn cube() -> Model {
         let mesh = generate(BuiltIn::Cube, 64).unwrap();

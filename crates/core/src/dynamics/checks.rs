@@ -3,9 +3,8 @@
 use super::bodies::MovingBody;
 use super::features::Candidate;
 use super::rigid_motion::MassProperties;
-use super::settings::StepSettings;
+use super::settings::{StepError, StepSettings};
 use super::state::ObjectState;
-use super::step_error::StepError;
 use crate::solve::condensed::FreeBody;
 
 /// Looks at the numbers of settings, bodies and state.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::settings::StepError;
 use super::state::spread;
-use super::step_error::StepError;
 use crate::fem::StiffnessPattern;
 use crate::fem::hyperelastic::{Curvature, Elements, LargeSummary};
 use crate::solve::condensed::{Base, CondensedError, Elasticity, FreeBody, FreeTangent, NodeForce};
@@ -85,7 +85,7 @@ impl LargeBody {
         self.elements.summary(&self.shape.displacement)
     }
 
-    /// The same of another shape.
+    /// Rotation and stretches of the elements under another displacement field.
     ///
     /// Shapes: `displacement` 3N.
     pub fn summary_of(&self, displacement: &[f64]) -> LargeSummary {
@@ -100,12 +100,9 @@ impl LargeBody {
         &self.shape
     }
 
-    pub(super) fn shape_mut(&mut self) -> &mut Shape {
-        &mut self.shape
-    }
-
-    pub(super) fn put(&mut self, shape: Shape) {
-        self.shape = shape;
+    /// Puts the body into another shape; gives the one that it had.
+    pub(super) fn put(&mut self, shape: Shape) -> Shape {
+        std::mem::replace(&mut self.shape, shape)
     }
 
     /// The newest factor, if there is one.
@@ -128,7 +125,7 @@ impl LargeBody {
         let tangent = of(Curvature::AsItIs);
         let turning = self.turning_stiffness(body, displacement);
         let sprung = |share: f64| {
-            let mut sprung = tangent.towards(&tangent, 0.0);
+            let mut sprung = tangent.clone();
             sprung.add_springs(&springs(body, share * turning));
             sprung
         };
@@ -143,7 +140,8 @@ impl LargeBody {
             let positive = of(Curvature::PositivePart);
             for share in POSITIVE_SHARES {
                 if matches!(made, Err(CondensedError::NotPositiveDefinite { .. })) {
-                    let blended = tangent.towards(&positive, share);
+                    let mut blended = tangent.clone();
+                    blended.blend(&positive, share);
                     made = FreeTangent::try_new(base, body, &blended, bound);
                 }
             }

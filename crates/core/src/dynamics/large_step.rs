@@ -4,17 +4,16 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::checks::{check, check_names, check_nodes, mass_of};
+use super::checks::mass_of;
 use super::configuration::{Configured, Scene};
 use super::large_body::{LargeBody, Shape};
 use super::outcome::StepOutcome;
-use super::rigid_motion::{MassProperties, RigidStep};
+use super::rigid_motion::MassProperties;
 use super::rounds::{Found, Rounds};
-use super::settings::StepSettings;
+use super::settings::{StepError, StepSettings};
 use super::state::{HeldContact, ObjectState, at_nodes};
 use super::step::ContactStep;
-use super::step_error::StepError;
-use crate::solve::condensed::{FreeTangent, Response, ShapeResponse};
+use crate::solve::condensed::{Elasticity, FreeTangent, Response, ShapeResponse};
 
 /// Shapes that a step is solved about, one after the other.
 const SHAPES_MAX: usize = 24;
@@ -47,42 +46,42 @@ struct End {
     far: f64,
 }
 
-impl ContactStep<'_> {
-    /// Makes the step at large deformation: the elastic part is in balance in its deformed shape. The
-    /// body keeps the shape and a factor from step to step.
+/// A step at large deformation: the elastic part is in balance in its deformed shape. The body keeps the
+/// shape and a factor from step to step.
+pub struct LargeStep<'a, 'b> {
+    /// The step.
+    pub step: ContactStep<'a>,
+    /// The body in the shape that it has when the step begins.
+    pub body: &'b mut LargeBody,
+}
+
+impl LargeStep<'_, '_> {
+    /// Makes the step, in parts where a body moves so far that it could pass through the surface.
     ///
     /// Shapes: `wanted` nodes whose displacements are asked for.
     ///
     /// # Errors
     /// [`StepError`]; a step that does not meet the law of contact or is out of balance is no error, it
     /// says so.
-    pub fn advance_large(
-        &self,
-        large: &mut LargeBody,
-        state: &ObjectState,
-        wanted: &[u32],
-    ) -> Result<StepOutcome, StepError> {
-        check(&self.settings, self.bodies, state)?;
-        check_names(self.candidates, (self.triangles.len(), self.bodies.len()))?;
-        check_nodes(state, self.vertices.len())?;
-        large.take_shape_of(self.elasticity, &state.forces)?;
-        let mass = mass_of(self.elasticity.body, &self.settings)?;
-        let parts = self.parts(state, &mass);
-        self.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
-            part.advance_or_halve(large, begun, wanted, HALVINGS)
+    pub fn advance(self, state: &ObjectState, wanted: &[u32]) -> Result<StepOutcome, StepError> {
+        let Self { step, body } = self;
+        let mass = step.checked(state)?;
+        body.take_shape_of(step.elasticity, &state.forces)?;
+        let parts = step.parts(state, &mass);
+        step.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
+            LargeStep { step: *part, body }.advance_or_halve(begun, wanted, HALVINGS)
         })
     }
 
     /// Makes the step at once, or in halves where it finds no end.
     fn advance_or_halve(
-        &self,
-        large: &mut LargeBody,
+        &mut self,
         state: &ObjectState,
         wanted: &[u32],
         halvings: usize,
     ) -> Result<StepOutcome, StepError> {
-        let before = large.shape().clone();
-        let whole = self.advance_shape(large, state, wanted);
+        let before = self.body.shape().clone();
+        let whole = self.advance_shape(state, wanted);
         let is_lost = match &whole {
             Ok(whole) => whole.residual_rel > LOST || whole.contact_residual_rel > LOST,
             Err(error) => *error == StepError::InsideOut,
@@ -90,15 +89,16 @@ impl ContactStep<'_> {
         if halvings == 0 || !is_lost {
             return whole;
         }
-        let after = std::mem::replace(&mut *large.shape_mut(), before);
-        let halves = self.in_parts(2, state, wanted, &mut |half, begun, wanted| {
-            half.advance_or_halve(large, begun, wanted, halvings - 1)
+        let after = self.body.put(before);
+        let body = &mut *self.body;
+        let halves = self.step.in_parts(2, state, wanted, &mut |half, begun, wanted| {
+            LargeStep { step: *half, body }.advance_or_halve(begun, wanted, halvings - 1)
         });
         match (halves, &whole) {
             (Ok(halves), Err(_)) => Ok(halves),
             (Ok(halves), Ok(whole)) if halves.is_nearer_than(whole) => Ok(halves),
             _ => {
-                large.put(after);
+                self.body.put(after);
                 whole
             }
         }
@@ -106,49 +106,47 @@ impl ContactStep<'_> {
 
     /// The whole step at once.
     fn advance_shape(
-        &self,
-        large: &mut LargeBody,
+        &mut self,
         state: &ObjectState,
         wanted: &[u32],
     ) -> Result<StepOutcome, StepError> {
-        let rows = self.rows(state);
-        let begun = at_rows(&rows, large.displacement());
-        let scene = self.scene(state, self.mass_of_shape(large)?, begun);
-        let is_known = |c: &&HeldContact| usize::from(c.body) < self.bodies.len();
+        let step = self.step;
+        let rows = step.rows(state);
+        let begun = at_rows(&rows, self.body.displacement());
+        let scene = step.scene(state, self.mass_of_shape()?, begun);
         let mut progress = Progress {
-            held: state.contacts.iter().filter(is_known).copied().collect(),
+            held: step.held(state),
             world_from_object: state.world_from_object,
             body_forces: Vec::new(),
-            about: large.displacement().to_vec(),
+            about: self.body.displacement().to_vec(),
             best: None,
             no_nearer: 0,
             left: LEFT_AT_FIRST,
-            is_stale: large.tangent().is_none(),
+            is_stale: self.body.tangent().is_none(),
             effort: Effort::default(),
         };
         while progress.effort.shapes < SHAPES_MAX && progress.no_nearer < NO_NEARER_MAX {
-            let end = self.next_end(large, &scene, &rows, &mut progress)?;
-            if self.take(large, &scene, end, &mut progress) {
+            let end = self.next_end(&scene, &rows, &mut progress)?;
+            if self.take(&scene, end, &mut progress) {
                 break;
             }
         }
         let is_sound = |end: &End| end.residual_rel.is_finite() && end.told.is_finite();
         let Some(end) = progress.best.filter(is_sound) else { return Err(StepError::InsideOut) };
-        let outcome = self.finished(large, &scene, (rows, end), wanted);
+        let outcome = self.finished(&scene, (rows, end), wanted);
         Ok(progress.effort.told(outcome))
     }
 
     /// Solves contact about the shape that was reached.
     fn next_end(
-        &self,
-        large: &mut LargeBody,
+        &mut self,
         scene: &Scene<'_>,
         rows: &[u32],
         progress: &mut Progress,
     ) -> Result<End, StepError> {
-        let tangent = match large.tangent().filter(|_| !progress.is_stale) {
+        let tangent = match self.body.tangent().filter(|_| !progress.is_stale) {
             Some(kept) => kept,
-            None => large.factor_at(self.elasticity, &progress.about)?,
+            None => self.body.factor_at(self.step.elasticity, &progress.about)?,
         };
         let start_rows = at_rows(rows, &progress.about);
         let start = Configured {
@@ -158,23 +156,17 @@ impl ContactStep<'_> {
         };
         let held = std::mem::take(&mut progress.held);
         let about = (progress.about.as_slice(), &tangent, rows);
-        let end = self.end_about(large, scene, about, (held, &start), INEXACT * progress.left)?;
+        let end = self.end_about(scene, about, (held, &start), INEXACT * progress.left)?;
         progress.effort.see(&end.found);
         Ok(end)
     }
 
     /// Goes on to an end, as far as its elements keep their volume; says whether it is the last.
-    fn take(
-        &self,
-        large: &LargeBody,
-        scene: &Scene<'_>,
-        end: End,
-        progress: &mut Progress,
-    ) -> bool {
+    fn take(&self, scene: &Scene<'_>, end: End, progress: &mut Progress) -> bool {
         let Progress { about, best, no_nearer, left, .. } = progress;
         let step: Vec<f64> =
             end.displacement.iter().zip(about.iter()).map(|(new, old)| new - old).collect();
-        let share = large.share_of_step(about, &step);
+        let share = self.body.share_of_step(about, &step);
         let is_whole = share >= 1.0 && end.residual_rel.is_finite();
         if is_whole {
             about.clone_from(&end.displacement);
@@ -205,49 +197,48 @@ impl ContactStep<'_> {
 
     /// Residual of the elastic part that is small enough, over its forces.
     fn tolerance(&self) -> f64 {
-        self.settings.residual_rel.max(RESIDUAL_MIN)
+        self.step.settings.residual_rel.max(RESIDUAL_MIN)
     }
 
     /// Contact about a shape to first order, and how well the shape that it leads to is in balance.
     fn end_about(
         &self,
-        large: &LargeBody,
         scene: &Scene<'_>,
         (about, tangent, rows): (&[f64], &Arc<FreeTangent>, &[u32]),
         (held, start): (Vec<HeldContact>, &Configured<'_>),
         exactness: f64,
     ) -> Result<End, StepError> {
-        let (base, body) = (self.elasticity.base, self.elasticity.body);
-        let holding = large.elements().evaluate(about).forces;
+        let Elasticity { base, body, .. } = self.step.elasticity;
+        let holding = self.body.elements().evaluate(about).forces;
         let held_up = tangent.apply(base, body, &holding);
         let offset: Vec<f64> = about.iter().zip(&held_up).map(|(u, c)| u - c).collect();
         let shape = ShapeResponse { base, body, tangent, offset: &offset };
         let mut response = Response::about(shape, rows.to_vec());
         response.need(scene.elastic_forces(&[]).iter().map(|(node, _)| *node))?;
         response.need(held.iter().flat_map(|contact| contact.nodes))?;
-        let asked = self.settings;
+        let asked = self.step.settings;
         let settings = StepSettings {
             residual_rel: asked.residual_rel.max(exactness),
             penetration_rel: asked.penetration_rel.max(INEXACT * exactness),
             ..asked
         };
-        let size = self.size();
+        let size = self.step.size();
         let mut rounds = Rounds { settings: &settings, size, scene, response: &mut response };
         let found = rounds.play(held, start)?;
-        let all: Vec<u32> = (0..self.vertices.len() as u32).collect();
+        let all: Vec<u32> = (0..self.step.vertices.len() as u32).collect();
         let mut displacement: Vec<f64> =
             response.displacement_of(&all, &found.end.forces).into_flattened();
         if found.end.forces.is_empty() && displacement.iter().all(|u| u.abs() < 1e-12 * size) {
             displacement.fill(0.0);
         }
         let residual_rel =
-            large.balance(self.elasticity, &displacement, &found.end.forces).residual_rel;
+            self.body.balance(self.step.elasticity, &displacement, &found.end.forces).residual_rel;
         // A force that has moved since acts on the shape that it had made before: that is told.
         let told = match found.has_moved {
             false => residual_rel,
             true => {
                 let forces = scene.elastic_forces(&at_nodes(&found.end.contacts));
-                large.balance(self.elasticity, &displacement, &forces).residual_rel
+                self.body.balance(self.step.elasticity, &displacement, &forces).residual_rel
             }
         };
         let force_max = found.end.contacts.iter().map(|c| c.force.norm()).fold(0.0, f64::max);
@@ -262,13 +253,12 @@ impl ContactStep<'_> {
 
     /// Leaves the body in the shape of an end, and says what it is like.
     fn finished(
-        &self,
-        large: &mut LargeBody,
+        &mut self,
         scene: &Scene<'_>,
         (rows, end): (Vec<u32>, End),
         wanted: &[u32],
     ) -> StepOutcome {
-        let (base, body) = (self.elasticity.base, self.elasticity.body);
+        let Elasticity { base, body, .. } = self.step.elasticity;
         let End { found, displacement, tangent, offset, told, far, .. } = end;
         let shape = ShapeResponse { base, body, tangent: &tangent, offset: &offset };
         let response = Response::about(shape, rows);
@@ -277,38 +267,19 @@ impl ContactStep<'_> {
             [displacement[at], displacement[at + 1], displacement[at + 2]]
         };
         let displacements = wanted.iter().map(of_node).collect();
-        let outcome = self.outcome(scene, &response, &found, displacements);
+        let outcome = self.step.outcome(scene, &response, &found, displacements);
         let forces = found.end.forces;
-        large.put(Shape { displacement, forces });
+        self.body.put(Shape { displacement, forces });
         let is_converged = far <= 1.0;
         StepOutcome { residual_rel: told, is_converged, ..outcome }
     }
 
     /// Mass and inertia of the body in its shape.
-    fn mass_of_shape(&self, large: &LargeBody) -> Result<MassProperties, StepError> {
-        let mass = mass_of(self.elasticity.body, &self.settings)?;
-        let inertia = self.elasticity.body.inertia_of(large.displacement());
-        Ok(mass.with_inertia(self.settings.density * inertia).unwrap_or(mass))
-    }
-
-    /// What does not change while the step is solved.
-    pub(super) fn scene<'s>(
-        &'s self,
-        state: &'s ObjectState,
-        mass: MassProperties,
-        begun: Vec<Vector3<f64>>,
-    ) -> Scene<'s> {
-        let StepSettings { seconds, gravity, viscosity, .. } = self.settings;
-        Scene {
-            vertices: self.vertices,
-            triangles: self.triangles,
-            bodies: self.bodies,
-            candidates: self.candidates,
-            rigid: RigidStep { state, mass, gravity, seconds },
-            viscosity,
-            begun,
-            world_from_bodies_begun: self.bodies_begun(state),
-        }
+    fn mass_of_shape(&self) -> Result<MassProperties, StepError> {
+        let ContactStep { elasticity: Elasticity { body, .. }, settings, .. } = self.step;
+        let mass = mass_of(body, &settings)?;
+        let inertia = body.inertia_of(self.body.displacement());
+        Ok(mass.with_inertia(settings.density * inertia).unwrap_or(mass))
     }
 }
 

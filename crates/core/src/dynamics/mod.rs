@@ -27,27 +27,23 @@ mod large_step;
 mod large_tests;
 #[cfg(test)]
 mod law_tests;
-mod near;
 mod outcome;
 #[cfg(test)]
 mod partial_slip_tests;
-mod pool;
 mod rigid_motion;
 mod rounds;
 mod settings;
 mod state;
 mod step;
-mod step_error;
 #[cfg(test)]
 mod tests;
 
-pub use bodies::MovingBody;
+pub use bodies::{MovingBody, near_triangles, reach_of_step};
 pub use features::Candidate;
 pub use large_body::LargeBody;
-pub use near::{near_triangles, reach_of_step};
+pub use large_step::LargeStep;
 pub use outcome::{BodyLoad, PointContact, StepOutcome};
 pub use rigid_motion::MassProperties;
-pub use settings::StepSettings;
+pub use settings::{StepError, StepSettings};
 pub use state::{HeldContact, ObjectState};
 pub use step::ContactStep;
-pub use step_error::StepError;

@@ -6,12 +6,10 @@ use nalgebra::Vector3;
 
 use super::assemble::{ProblemPoint, problem, residual};
 use super::configuration::{Configuration, Configured, Scene};
-use super::features::{Candidate, MaterialPoint};
-use super::pool::{Pool, force_at};
-use super::settings::StepSettings;
+use super::features::{Candidate, MaterialPoint, Pool, force_at};
+use super::settings::{StepError, StepSettings};
 use super::state::HeldContact;
-use super::step_error::StepError;
-use crate::contact::coulomb::SolveBudget;
+use crate::contact::coulomb::{Solution, SolveBudget};
 use crate::solve::condensed::Response;
 
 /// Points nearer to a body than this share of the object's size are in the problem from the start.
@@ -114,7 +112,7 @@ impl Rounds<'_, '_> {
                 attempts_max: ATTEMPTS,
             };
             let problem = problem(self.scene, self.response, &about, &round.points)?;
-            let solution = problem.solve(&round.lambda, budget);
+            let solution = Solution::of(&problem, &round.lambda, budget);
             rounds += 1;
             sweeps += solution.sweeps;
             newton_steps += solution.newton_steps;

@@ -1,6 +1,10 @@
-//! How a step in time is made: its length, weight, viscosity, and how exactly it is solved.
+//! How a step in time is made: its length, weight, viscosity, and how exactly it is solved; and why a
+//! step cannot be made.
 
 use nalgebra::Vector3;
+
+use crate::contact::coulomb::ProblemError;
+use crate::solve::condensed::CondensedError;
 
 /// How a step is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,4 +40,78 @@ impl Default for StepSettings {
             newton_max: 400,
         }
     }
+}
+
+/// Why a step cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// A setting out of range.
+    #[error("{what} is {value}; it must be {expected}")]
+    Setting {
+        /// Which one.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// A candidate that names what is not there.
+    #[error(
+        "candidate {candidate} names triangle {triangle} of {triangles} and body {body} of {bodies}"
+    )]
+    Candidate {
+        /// Position in the list.
+        candidate: usize,
+        /// Triangle named.
+        triangle: u32,
+        /// Triangles there are.
+        triangles: usize,
+        /// Body named.
+        body: u16,
+        /// Bodies there are.
+        bodies: usize,
+    },
+    /// A node of the state that is not there.
+    #[error("the state names node {node}, but the mesh has {node_count} nodes (0-based)")]
+    Node {
+        /// The node.
+        node: u32,
+        /// Nodes of the mesh.
+        node_count: usize,
+    },
+    /// More points touch than one problem takes.
+    #[error(
+        "{points} points of the surface touch at once, at most {max} can; take a coarser mesh, or \
+         bodies that cover less of it"
+    )]
+    TooManyPoints {
+        /// Points that touch.
+        points: usize,
+        /// Points that can.
+        max: usize,
+    },
+    /// State or pose that is not finite.
+    #[error("a number of the object's state or of a body's pose is not finite")]
+    NotFinite,
+    /// No shape at large deformation answers the forces of the state.
+    #[error(
+        "no shape was found that the forces of the object's state hold (what is left is \
+         {residual_rel:.1e} of them); begin from rest"
+    )]
+    NoShape {
+        /// Residual that was left, over the forces.
+        residual_rel: f64,
+    },
+    /// Wherever contact leads, an element would turn inside out.
+    #[error(
+        "an element would turn inside out wherever the bodies press the object to; move them less in \
+         a step, or use a finer mesh there"
+    )]
+    InsideOut,
+    /// The elastic part failed.
+    #[error(transparent)]
+    Elastic(#[from] CondensedError),
+    /// The contact problem could not be made.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
 }

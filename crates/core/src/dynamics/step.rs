@@ -8,18 +8,17 @@ use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
 use super::checks::{check, check_names, check_nodes, mass_of};
 use super::configuration::{Configured, Scene, sums_by_body};
-use super::features::Candidate;
+use super::features::{Candidate, merged};
 use super::outcome::{BodyLoad, PointContact, StepOutcome};
-use super::pool::merged;
-use super::rigid_motion::MassProperties;
+use super::rigid_motion::{MassProperties, RigidStep};
 use super::rounds::{Found, Rounds};
-use super::settings::StepSettings;
+use super::settings::{StepError, StepSettings};
 use super::state::{HeldContact, ObjectState, at_nodes};
-use super::step_error::StepError;
 use crate::contact::coulomb::{FrictionCone, state_of};
 use crate::solve::condensed::{Elasticity, Response};
 
 /// An object, the bodies around it, and how long the step is.
+#[derive(Clone, Copy)]
 pub struct ContactStep<'a> {
     /// Places of all nodes at rest, in the object's frame.
     pub vertices: &'a [Point3<f64>],
@@ -52,14 +51,22 @@ impl ContactStep<'_> {
     /// # Errors
     /// [`StepError`]; a step that does not meet the law of contact is no error, it says so.
     pub fn advance(&self, state: &ObjectState, wanted: &[u32]) -> Result<StepOutcome, StepError> {
-        check(&self.settings, self.bodies, state)?;
-        check_names(self.candidates, (self.triangles.len(), self.bodies.len()))?;
-        check_nodes(state, self.vertices.len())?;
-        let mass = mass_of(self.elasticity.body, &self.settings)?;
+        let mass = self.checked(state)?;
         let parts = self.parts(state, &mass);
         self.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
             part.advance_whole(begun, mass, wanted)
         })
+    }
+
+    /// Mass of the object, once step and state are seen to name what is there, in numbers.
+    ///
+    /// # Errors
+    /// [`StepError`].
+    pub(super) fn checked(&self, state: &ObjectState) -> Result<MassProperties, StepError> {
+        check(&self.settings, self.bodies, state)?;
+        check_names(self.candidates, (self.triangles.len(), self.bodies.len()))?;
+        check_nodes(state, self.vertices.len())?;
+        mass_of(self.elasticity.body, &self.settings)
     }
 
     /// Makes equal parts of the step one after the other.
@@ -119,20 +126,44 @@ impl ContactStep<'_> {
         let size = self.size();
         let settings = &self.settings;
         let mut rounds = Rounds { settings, size, scene: &scene, response: &mut response };
-        let is_known = |c: &&HeldContact| usize::from(c.body) < self.bodies.len();
-        let held = state.contacts.iter().filter(is_known).copied().collect();
         let start = Configured {
             world_from_object: state.world_from_object,
             displacement: &scene.begun,
             body_forces: &[],
         };
-        let found = rounds.play(held, &start)?;
+        let found = rounds.play(self.held(state), &start)?;
         let displacements = response.displacement_of(wanted, &found.end.forces);
         Ok(self.outcome(&scene, &response, &found, displacements))
     }
 
+    /// Contacts of a state with bodies that are still there.
+    pub(super) fn held(&self, state: &ObjectState) -> Vec<HeldContact> {
+        let is_known = |c: &&HeldContact| usize::from(c.body) < self.bodies.len();
+        state.contacts.iter().filter(is_known).copied().collect()
+    }
+
+    /// What does not change while the step is solved.
+    pub(super) fn scene<'s>(
+        &'s self,
+        state: &'s ObjectState,
+        mass: MassProperties,
+        begun: Vec<Vector3<f64>>,
+    ) -> Scene<'s> {
+        let StepSettings { seconds, gravity, viscosity, .. } = self.settings;
+        Scene {
+            vertices: self.vertices,
+            triangles: self.triangles,
+            bodies: self.bodies,
+            candidates: self.candidates,
+            rigid: RigidStep { state, mass, gravity, seconds },
+            viscosity,
+            begun,
+            world_from_bodies_begun: self.bodies_begun(state),
+        }
+    }
+
     /// The bodies when the step begins, pushed back by the forces of that moment.
-    pub(super) fn bodies_begun(&self, state: &ObjectState) -> Vec<Isometry3<f64>> {
+    fn bodies_begun(&self, state: &ObjectState) -> Vec<Isometry3<f64>> {
         let turn = state.world_from_object.rotation;
         let forces = sums_by_body(&state.contacts, self.bodies.len());
         let pushed = |(body, force): (&MovingBody, &Vector3<f64>)| {

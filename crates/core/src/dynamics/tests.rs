@@ -26,7 +26,7 @@ impl Object {
         let surface = Surface::from_mesh(&mesh);
         let material = Material::try_new(young, poisson).unwrap();
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
-        let base = model.condense(&mut |_| {}).unwrap();
+        let base = model.condense(None, &mut |_| {}).unwrap();
         let body = FreeBody::try_new(model.mesh(), &base).unwrap();
         Self { model, surface, base, body, columns: Columns::new(usize::MAX) }
     }
@@ -61,7 +61,7 @@ impl Object {
         settings: StepSettings,
     ) -> StepOutcome {
         self.with_step(state, bodies, settings, |step| {
-            step.advance_large(large, state, &self.surface.nodes).unwrap()
+            LargeStep { step, body: large }.advance(state, &self.surface.nodes).unwrap()
         })
     }
 

@@ -226,19 +226,6 @@ impl Stiffness {
         }
     }
 
-    /// This matrix with a share of the way to another one on the same pattern.
-    ///
-    /// # Panics
-    /// If the other one is on another pattern.
-    pub fn towards(&self, other: &Self, share: f64) -> Self {
-        assert_eq!(self.blocks.len(), other.blocks.len(), "matrices on different patterns");
-        let mixed =
-            self.blocks.iter().zip(&other.blocks).map(|(a, b)| {
-                std::array::from_fn(|entry| a[entry] + share * (b[entry] - a[entry]))
-            });
-        Self { pattern: Arc::clone(&self.pattern), blocks: mixed.collect() }
-    }
-
     /// The diagonal, 3N, N/m; zero for nodes that no element uses.
     pub fn diagonal(&self) -> Vec<f64> {
         let mut diagonal = vec![0.0; 3 * self.node_count()];

@@ -24,7 +24,7 @@ pub use element::Element;
 pub use material::{Material, MaterialError};
 pub use nodal_patches::NodalPatches;
 pub use pattern::StiffnessPattern;
-pub(crate) use products::Products;
+pub(crate) use products::{Products, forces_of_columns};
 pub use quadratic_mesh::{QuadraticMesh, TooManyNodes};
 pub use strain::{StrainSummary, summarise_strain, summarise_strain_quadratic};
 pub use stress_recovery::{OtherNodeCount, StressRecovery};

@@ -18,41 +18,46 @@ pub(crate) struct Products {
 /// Nodes of a task.
 const TASK_NODES: usize = 64;
 
-impl Stiffness {
+impl Products {
     /// `K q` and `|K| |q|` for several displacements (3.36); rows in parallel, same bits always.
     ///
     /// Shapes: `q` 3N × `columns`, the numbers of one degree of freedom next to each other.
-    pub(crate) fn mul_columns(&self, q: &[f64], columns: usize) -> Products {
+    pub fn of(stiffness: &Stiffness, q: &[f64], columns: usize) -> Self {
         let (mut forces, mut sizes) = (vec![0.0; q.len()], vec![0.0; q.len()]);
-        let task = self.task_len(q, columns);
+        let task = task_len(stiffness, q, columns);
         let (arch, tasks) = (Arch::new(), sizes.par_chunks_mut(task));
         forces.par_chunks_mut(task).zip(tasks).enumerate().for_each(|(k, (forces, sizes))| {
             let first = k * TASK_NODES;
-            arch.dispatch(Rows { stiffness: self, first, q, columns, forces, sizes: Some(sizes) });
+            arch.dispatch(NodeRows { stiffness, first, q, columns, forces, sizes: Some(sizes) });
         });
-        Products { forces, sizes }
-    }
-
-    /// `K q` alone, with the same bits, in the place of what `forces` held.
-    ///
-    /// Shapes: as [`Stiffness::mul_columns`].
-    pub(crate) fn forces_of_columns(&self, q: &[f64], columns: usize, forces: &mut [f64]) {
-        assert_eq!(forces.len(), q.len(), "forces do not fit");
-        let (arch, task) = (Arch::new(), self.task_len(q, columns));
-        forces.par_chunks_mut(task).enumerate().for_each(|(k, forces)| {
-            let first = k * TASK_NODES;
-            arch.dispatch(Rows { stiffness: self, first, q, columns, forces, sizes: None });
-        });
-    }
-
-    fn task_len(&self, q: &[f64], columns: usize) -> usize {
-        assert_eq!(q.len(), AXES * self.node_count() * columns, "displacements do not fit");
-        TASK_NODES * AXES * columns.max(1)
+        Self { forces, sizes }
     }
 }
 
+/// `K q` alone, with the bits of [`Products`], in the place of what `forces` held.
+///
+/// Shapes: as [`Products::of`].
+pub(crate) fn forces_of_columns(
+    stiffness: &Stiffness,
+    q: &[f64],
+    columns: usize,
+    forces: &mut [f64],
+) {
+    assert_eq!(forces.len(), q.len(), "forces do not fit");
+    let (arch, task) = (Arch::new(), task_len(stiffness, q, columns));
+    forces.par_chunks_mut(task).enumerate().for_each(|(k, forces)| {
+        let first = k * TASK_NODES;
+        arch.dispatch(NodeRows { stiffness, first, q, columns, forces, sizes: None });
+    });
+}
+
+fn task_len(stiffness: &Stiffness, q: &[f64], columns: usize) -> usize {
+    assert_eq!(q.len(), AXES * stiffness.node_count() * columns, "displacements do not fit");
+    TASK_NODES * AXES * columns.max(1)
+}
+
 /// Some block rows of a product.
-struct Rows<'a> {
+struct NodeRows<'a> {
     stiffness: &'a Stiffness,
     first: usize,
     q: &'a [f64],
@@ -61,7 +66,7 @@ struct Rows<'a> {
     sizes: Option<&'a mut [f64]>,
 }
 
-impl WithSimd for Rows<'_> {
+impl WithSimd for NodeRows<'_> {
     type Output = ();
 
     #[inline(always)]

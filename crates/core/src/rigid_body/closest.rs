@@ -1,6 +1,6 @@
 //! Closest points of triangles, segments and points.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 
 /// Weights of the corners of a triangle that make a point of it; not negative, their sum is one.
 pub type Barycentric = [f64; 3];
@@ -132,6 +132,24 @@ fn crossing(
 /// seen from outside.
 pub(crate) fn area_normal(corners: &[Point3<f64>; 3]) -> Vector3<f64> {
     (corners[1] - corners[0]).cross(&(corners[2] - corners[0]))
+}
+
+/// Distance of a point from a body's surface, and the way out of the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SignedDistance {
+    /// Positive outside, negative inside, m.
+    pub distance: f64,
+    /// The direction in which the distance grows: out of the body.
+    pub normal: Unit<Vector3<f64>>,
+}
+
+/// A point of a triangle and its distance from a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deepest {
+    /// Weights of the corners.
+    pub weights: Barycentric,
+    /// Signed distance, and the way out of the body.
+    pub distance: SignedDistance,
 }
 
 #[cfg(test)]

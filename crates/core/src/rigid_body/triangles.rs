@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::closest::{Barycentric, area_normal, on_triangle, point_at};
-use super::distance::{Deepest, SignedDistance};
+use super::closest::{Deepest, SignedDistance};
 
 /// The inside of a closed surface of triangles.
 ///

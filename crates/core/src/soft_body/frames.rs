@@ -51,7 +51,7 @@ pub struct Frames<'a> {
 impl<'a> Frames<'a> {
     /// Factors the base and proves the bound's eigenvalue, which takes two factors.
     pub(super) fn try_new(model: &'a Model) -> Result<Self, SoftBodyError> {
-        let base = model.condense(&mut |_| {})?;
+        let base = model.condense(None, &mut |_| {})?;
         base.prove_eigenvalue_min();
         let nodes = (0..).take(model.mesh().node_count()).collect();
         Ok(Self { model, base, columns: Columns::new(COLUMNS_BYTES), set: None, nodes })

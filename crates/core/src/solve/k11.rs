@@ -83,3 +83,9 @@ pub(super) fn right_hand_side(
     }
     b
 }
+
+/// Row of `K11` where a pivot was not positive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct NotPositive {
+    pub row: usize,
+}

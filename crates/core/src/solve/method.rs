@@ -5,18 +5,26 @@ use std::str::FromStr;
 
 /// How displacements are found: by a factor or inverse of `K11`, without one, or from kept columns of
 /// the compliance.
+///
+/// Besides the methods below there are reference methods, which tests and reports compare with; they
+/// are not part of this page, and [`Method::DIRECT`] and their names reach them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Method {
     /// Gauss–Jordan elimination of Appendix A pivot by pivot, rows in parallel: the thesis's own
     /// loop.
+    #[doc(hidden)]
     GaussJordanPlain,
     /// Gauss–Jordan elimination by panels of pivots, as products of matrices.
+    #[doc(hidden)]
     GaussJordan,
     /// Explicit inverse in tiles, by symmetric sweeps.
+    #[doc(hidden)]
     DenseInverse,
     /// Tiled dense Cholesky factor.
+    #[doc(hidden)]
     DenseCholesky,
     /// Sparse Cholesky factor in a nested-dissection order, one thread.
+    #[doc(hidden)]
     SparseCholesky,
     /// Sparse Cholesky factor over the tree of fronts, all threads.
     Front,
@@ -85,6 +93,13 @@ impl Method {
         }
     }
 
+    /// The method with a memory limit.
+    ///
+    /// Units: `limit` bytes.
+    pub const fn within(self, limit: u64) -> Within {
+        Within { method: self, limit }
+    }
+
     /// Whether it stops at a residual and an estimated error, so that a larger error is sooner found.
     pub const fn stops_early(self) -> bool {
         matches!(self, Self::Pcg | Self::Multigrid)
@@ -131,6 +146,30 @@ impl Method {
             | Self::Multigrid
             | Self::Condensed => None,
         }
+    }
+}
+
+/// A method, and the memory that its factor or inverse may take while it is made.
+///
+/// ```
+/// use softgrasp_core::solve::{Method, Within};
+///
+/// let anything: Within = Method::Front.into();
+/// assert_eq!(anything.limit, u64::MAX);
+/// let at_most_a_gigabyte = Method::Front.within(1 << 30);
+/// assert_eq!(at_most_a_gigabyte.method, Method::Front);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Within {
+    /// The method.
+    pub method: Method,
+    /// Bytes.
+    pub limit: u64,
+}
+
+impl From<Method> for Within {
+    fn from(method: Method) -> Self {
+        method.within(u64::MAX)
     }
 }
 

@@ -16,7 +16,7 @@ use faer::prelude::*;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
 
-use super::pivot::NotPositive;
+use super::k11::NotPositive;
 
 /// Lower triangle of a symmetric matrix, or a lower triangular one, in square tiles.
 ///

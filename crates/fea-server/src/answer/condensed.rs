@@ -164,7 +164,7 @@ impl Contacts {
         stage_ms.encode = ms_since(start);
         let its_strain = match strain {
             StrainOf::ThisAnswer { .. } => {
-                Some(stored.model.strain(&set.full_displacement(base, &solved)))
+                Some(stored.model.strain(&set.full_displacement(base, &solved), &mut || {}))
             }
             StrainOf::Beside(_) => stored.strain_of(&self.touched, q),
         };
@@ -254,7 +254,7 @@ impl Contacts {
         workers.beside(move || {
             let mut rest = Rest::new();
             let displacement = set.full_displacement(&base, &solved);
-            let strain = stored.model.strain_with_pauses(&displacement, &mut || rest.rest());
+            let strain = stored.model.strain(&displacement, &mut || rest.rest());
             stored.keep_strain(touched, q, strain);
             drop(claimed);
         });

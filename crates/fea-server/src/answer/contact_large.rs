@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use softgrasp_core::dynamics::{ContactStep, LargeBody, ObjectState, StepOutcome};
+use softgrasp_core::dynamics::{ContactStep, LargeBody, LargeStep, ObjectState, StepOutcome};
 use softgrasp_core::fem::hyperelastic::{LargeSummary, Law};
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::condensed::Base;
@@ -133,7 +133,7 @@ impl LargeWish {
             return Ok(made);
         }
         let before = pressed.body.factors();
-        let outcome = step.advance_large(&mut pressed.body, state, wanted)?;
+        let outcome = LargeStep { step: *step, body: &mut pressed.body }.advance(state, wanted)?;
         Ok(Made {
             outcome,
             is_large: true,

@@ -49,7 +49,7 @@ pub(super) fn answer(
         Some(_) => factored.solve(stiffness, loads, on_stage).map(|solution| (solution, None)),
     }
     .map_err(|error| Refusal::Model(error.into()))?;
-    let strain = Some(model.strain(&solution.displacement));
+    let strain = Some(model.strain(&solution.displacement, &mut || {}));
     gather(model, factored, &posed, &solution, (certainty, strain), clock)
 }
 
@@ -78,7 +78,8 @@ pub(super) fn answer_several(
     }
     .map_err(|error| Refusal::Model(error.into()))?;
     let strain = estimate.then(|| {
-        let strains = solutions.iter().map(|solution| model.strain(&solution.displacement));
+        let strains =
+            solutions.iter().map(|solution| model.strain(&solution.displacement, &mut || {}));
         strains.fold(StrainSummary::default(), StrainSummary::or_larger)
     });
     let worst = |of: fn(&Solution) -> f64| solutions.iter().map(of).fold(0.0, f64::max);

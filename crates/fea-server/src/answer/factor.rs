@@ -97,7 +97,9 @@ impl FactorRequest<'_> {
             softgrasp_os::give_back_freed_memory();
         }
         let (stiffness, method) = (self.model.stiffness(), admitted.method);
-        match analysed.factor_within(stiffness, method, limit, &mut |stage| clock.begin(stage)) {
+        match Factored::of_analysed(analysed, stiffness, method.within(limit), &mut |s| {
+            clock.begin(s)
+        }) {
             // Too hard for single precision, which was taken for its size: what is short is memory.
             Err(SolveError::NotPositiveDefinite { .. }) if Some(&admitted) != needs.first() => {
                 Err(self.short_of(&needs[..1]))
@@ -156,7 +158,7 @@ impl FactorRequest<'_> {
             None => self.reservation.free().saturating_sub(self.held),
         };
         let on_stage = &mut |stage| clock.begin(stage);
-        match self.model.factor_within(self.dofs, method, limit, on_stage) {
+        match self.model.factor(self.dofs, method.within(limit), on_stage) {
             Err(ModelError::Solve(SolveError::OverLimit { needed, .. })) => {
                 Err(self.short_of(&[exact(needed)]))
             }

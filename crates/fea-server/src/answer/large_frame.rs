@@ -138,7 +138,7 @@ impl Frame {
             // Mid-edge nodes stay with the server: their strain is that of the report.
             return Ok(None);
         }
-        let strain = self.stored.model.strain(all.as_flattened());
+        let strain = self.stored.model.strain(all.as_flattened(), &mut || {});
         let rows = match &self.message.want.nodes {
             NodeChoice::All => all,
             NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| all[n as usize]).collect(),

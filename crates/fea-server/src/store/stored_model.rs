@@ -89,7 +89,7 @@ impl StoredModel {
     /// what the base leaves.
     pub fn new(model: Model, allowed: Allowed, on_stage: &mut dyn FnMut(Stage)) -> Self {
         let left = allowed.bytes.saturating_sub(model.bytes() as u64);
-        let base = model.condense_within(left, on_stage).map(Arc::new);
+        let base = model.condense(Some(left), on_stage).map(Arc::new);
         let base_bytes = base.as_ref().map_or(0, |base| base.bytes()) as u64;
         let column_bytes = allowed.column_cache.min(left.saturating_sub(base_bytes));
         Self {

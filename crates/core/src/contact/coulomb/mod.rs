@@ -1,15 +1,12 @@
 //! Contact with Coulomb friction between points: the cone, the problem, its solution, its residual.
 
 mod cone;
-#[cfg(test)]
-mod local;
 mod newton;
 mod problem;
 mod solution;
 mod splitting;
 #[cfg(test)]
 mod sweeps;
-mod working_set;
 
 pub use cone::{FrictionCone, PointForce};
 pub use problem::{ContactProblem, ProblemError};

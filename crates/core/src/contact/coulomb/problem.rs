@@ -115,6 +115,24 @@ impl ContactProblem {
         });
         residuals.fold(0.0, f64::max)
     }
+
+    /// Every force moved into its cone.
+    pub(super) fn projected(&self, lambda: &[f64]) -> Vec<f64> {
+        let points = self.cones.iter().enumerate();
+        points.flat_map(|(point, cone)| <[f64; 3]>::from(cone.project(at(lambda, point)))).collect()
+    }
+
+    /// Contact problem of some points alone.
+    pub(super) fn of_points(&self, points: &[usize]) -> Self {
+        let row = |k: usize| 3 * points[k / 3] + k % 3;
+        let rows = 3 * points.len();
+        Self {
+            w: DMatrix::from_fn(rows, rows, |r, c| self.w[(row(r), row(c))]),
+            b: (0..rows).map(|k| self.b[row(k)]).collect(),
+            cones: points.iter().map(|&i| self.cones[i]).collect(),
+            rho: points.iter().map(|&i| self.rho[i]).collect(),
+        }
+    }
 }
 
 /// The three numbers of a point.

@@ -1,4 +1,5 @@
-//! The solution of a contact problem, all points at once: Newton's method, with sweeps of a splitting where it strays.
+//! The solution of a contact problem: of the points that press, or would be pressed into, and of all
+//! points at once, by Newton's method with sweeps of a splitting where it strays.
 
 use super::cone::PointForce;
 use super::newton::Proximal;
@@ -50,6 +51,8 @@ pub struct Solution {
     pub is_converged: bool,
 }
 
+/// Times that points are added before all of them are solved for.
+const ADDITIONS_MAX: usize = 8;
 /// Steps of Newton's method from one set of forces …
 const NEWTON_STEPS: usize = 5;
 /// … and how often it may go on from where it ended, in one attempt.
@@ -75,90 +78,6 @@ const LEFT_TO_BEGIN_ANEW: f64 = 0.2;
 /// Over the largest force, or a newton, a residual that is no approximation of anything.
 const RUNAWAY: f64 = 10.0;
 
-impl ContactProblem {
-    /// The forces of all points at once, from some to begin with, each in its cone.
-    ///
-    /// Shapes: `lambda` 3n, N.
-    pub(super) fn solve_whole(&self, lambda: Vec<f64>, budget: SolveBudget) -> Solution {
-        let mut now = self.forces(lambda);
-        let mut best = now.clone();
-        let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
-        let mut splitting: Option<Splitting<'_>> = None;
-        let first = usize::from(now.residual < NEAR * force_max(&now.lambda));
-        for turn in (first..).take(budget.attempts_max) {
-            let before = now.residual;
-            if !now.is_within(&budget) {
-                newton_steps += self.newton(&mut now, &mut share, &budget);
-            }
-            if now.residual < best.residual {
-                best.clone_from(&now);
-            }
-            if best.is_within(&budget) {
-                break;
-            }
-            let mut begins_anew = now.residual < LEFT_TO_BEGIN_ANEW * before;
-            // Friction can make the splitting run away: no descent is proven for it.
-            let is_bounded = now.residual < force_max(&best.lambda).max(1.0) * RUNAWAY;
-            if !is_bounded {
-                now.clone_from(&best);
-                begins_anew = true;
-            }
-            let of_turn = SPLITTING_SHARES[turn % SPLITTING_SHARES.len()];
-            match &mut splitting {
-                Some(splitting) => {
-                    splitting.change_share(of_turn);
-                    if begins_anew {
-                        splitting.begin_at(&now.lambda);
-                    }
-                }
-                None => splitting = Splitting::new(self, &now.lambda, of_turn),
-            }
-            let Some(splitting) = &mut splitting else { break };
-            now = self.forces(splitting.advance(SWEEPS));
-            sweeps += SWEEPS;
-        }
-        let is_converged = best.is_within(&budget);
-        let motion = self.motion(&best.lambda);
-        let Forces { lambda, residual } = best;
-        Solution { lambda, motion, residual, sweeps, newton_steps, is_converged }
-    }
-
-    /// Newton's method from some forces, again and again while it pays; the number of its steps.
-    fn newton(&self, now: &mut Forces, share: &mut f64, budget: &SolveBudget) -> usize {
-        let (first, mut steps) = (now.residual, 0);
-        for _ in 0..NEWTON_ROUNDS {
-            let tolerance = 0.1 * now.allowed(budget);
-            let found = Proximal::new(self, &now.lambda, *share).solve(NEWTON_STEPS, tolerance);
-            steps += found.steps;
-            let is_solved = found.residual <= tolerance;
-            let next = self.forces(found.lambda);
-            let left = next.residual / now.residual;
-            if left < 1.0 {
-                *now = next;
-            }
-            let pays = left < LEFT || is_solved && left < LEFT_IF_SOLVED;
-            if !pays || now.is_within(budget) {
-                break;
-            }
-            if now.residual < LEFT_TO_SHRINK * first {
-                *share = (SHRINK * *share).max(SHARE_MIN);
-            }
-        }
-        steps
-    }
-
-    fn forces(&self, lambda: Vec<f64>) -> Forces {
-        let residual = self.residual_of(&lambda, &self.motion(&lambda));
-        Forces { lambda, residual }
-    }
-
-    /// Every force moved into its cone.
-    pub(super) fn projected(&self, lambda: &[f64]) -> Vec<f64> {
-        let points = self.cones.iter().enumerate();
-        points.flat_map(|(point, cone)| <[f64; 3]>::from(cone.project(at(lambda, point)))).collect()
-    }
-}
-
 /// Forces of all points, 3n, and their residual of the natural map, N.
 #[derive(Clone)]
 struct Forces {
@@ -167,6 +86,40 @@ struct Forces {
 }
 
 impl Forces {
+    fn new(problem: &ContactProblem, lambda: Vec<f64>) -> Self {
+        let residual = problem.residual_of(&lambda, &problem.motion(&lambda));
+        Self { lambda, residual }
+    }
+
+    /// Newton's method from some forces, again and again while it pays; the number of its steps.
+    fn improve(
+        &mut self,
+        problem: &ContactProblem,
+        share: &mut f64,
+        budget: &SolveBudget,
+    ) -> usize {
+        let (first, mut steps) = (self.residual, 0);
+        for _ in 0..NEWTON_ROUNDS {
+            let tolerance = 0.1 * self.allowed(budget);
+            let found = Proximal::new(problem, &self.lambda, *share).solve(NEWTON_STEPS, tolerance);
+            steps += found.steps;
+            let is_solved = found.residual <= tolerance;
+            let next = Self::new(problem, found.lambda);
+            let left = next.residual / self.residual;
+            if left < 1.0 {
+                *self = next;
+            }
+            let pays = left < LEFT || is_solved && left < LEFT_IF_SOLVED;
+            if !pays || self.is_within(budget) {
+                break;
+            }
+            if self.residual < LEFT_TO_SHRINK * first {
+                *share = (SHRINK * *share).max(SHARE_MIN);
+            }
+        }
+        steps
+    }
+
     /// Residual that is small enough, N.
     fn allowed(&self, budget: &SolveBudget) -> f64 {
         budget.allowed(&self.lambda)
@@ -194,6 +147,97 @@ pub fn state_of(force: &PointForce, friction: f64) -> PointState {
 }
 
 impl Solution {
+    /// The forces that obey the law of Signorini and Coulomb: exactly that law, no relaxation of it.
+    ///
+    /// Half of the points of a step are near and open. Those with a force, and those that are inside
+    /// where the others have their forces, are solved for alone, until no point is inside that has none.
+    ///
+    /// Shapes: `warm` 3n forces to begin with, those of the last tick, N.
+    pub fn of(problem: &ContactProblem, warm: &[f64], budget: SolveBudget) -> Self {
+        let n = problem.point_count();
+        let mut lambda = match warm.len() == 3 * n {
+            true => problem.projected(warm),
+            false => vec![0.0; 3 * n],
+        };
+        let mut motion = problem.motion(&lambda);
+        let mut is_in = vec![false; n];
+        let (mut sweeps, mut newton_steps) = (0, 0);
+        for _ in 0..ADDITIONS_MAX {
+            let joins = |&i: &usize| lambda[3 * i] > 0.0 || motion[3 * i] < 0.0;
+            let new: Vec<usize> = (0..n).filter(|&i| !is_in[i]).filter(joins).collect();
+            if new.is_empty() {
+                break;
+            }
+            new.into_iter().for_each(|i| is_in[i] = true);
+            let set: Vec<usize> = (0..n).filter(|&i| is_in[i]).collect();
+            let begin = set.iter().flat_map(|&i| <[f64; 3]>::from(at(&lambda, i))).collect();
+            let found = Self::of_whole(&problem.of_points(&set), begin, budget);
+            sweeps += found.sweeps;
+            newton_steps += found.newton_steps;
+            for (&i, force) in set.iter().zip(found.lambda.chunks_exact(3)) {
+                lambda[3 * i..3 * i + 3].copy_from_slice(force);
+            }
+            motion = problem.motion(&lambda);
+            if !found.is_converged {
+                break;
+            }
+        }
+        let residual = problem.residual_of(&lambda, &motion);
+        if residual <= budget.allowed(&lambda) {
+            return Self { lambda, motion, residual, sweeps, newton_steps, is_converged: true };
+        }
+        let whole = Self::of_whole(problem, lambda, budget);
+        let (sweeps, newton_steps) = (sweeps + whole.sweeps, newton_steps + whole.newton_steps);
+        Self { sweeps, newton_steps, ..whole }
+    }
+
+    /// The forces of all points at once, from some to begin with, each in its cone.
+    ///
+    /// Shapes: `lambda` 3n, N.
+    fn of_whole(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget) -> Self {
+        let mut now = Forces::new(problem, lambda);
+        let mut best = now.clone();
+        let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
+        let mut splitting: Option<Splitting<'_>> = None;
+        let first = usize::from(now.residual < NEAR * force_max(&now.lambda));
+        for turn in (first..).take(budget.attempts_max) {
+            let before = now.residual;
+            if !now.is_within(&budget) {
+                newton_steps += now.improve(problem, &mut share, &budget);
+            }
+            if now.residual < best.residual {
+                best.clone_from(&now);
+            }
+            if best.is_within(&budget) {
+                break;
+            }
+            let mut begins_anew = now.residual < LEFT_TO_BEGIN_ANEW * before;
+            // Friction can make the splitting run away: no descent is proven for it.
+            let is_bounded = now.residual < force_max(&best.lambda).max(1.0) * RUNAWAY;
+            if !is_bounded {
+                now.clone_from(&best);
+                begins_anew = true;
+            }
+            let of_turn = SPLITTING_SHARES[turn % SPLITTING_SHARES.len()];
+            match &mut splitting {
+                Some(splitting) => {
+                    splitting.change_share(of_turn);
+                    if begins_anew {
+                        splitting.begin_at(&now.lambda);
+                    }
+                }
+                None => splitting = Splitting::new(problem, &now.lambda, of_turn),
+            }
+            let Some(splitting) = &mut splitting else { break };
+            now = Forces::new(problem, splitting.advance(SWEEPS));
+            sweeps += SWEEPS;
+        }
+        let is_converged = best.is_within(&budget);
+        let motion = problem.motion(&best.lambda);
+        let Forces { lambda, residual } = best;
+        Self { lambda, motion, residual, sweeps, newton_steps, is_converged }
+    }
+
     /// Largest force of a point, N.
     pub fn force_max(&self) -> f64 {
         force_max(&self.lambda)

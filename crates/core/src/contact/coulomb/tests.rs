@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, Vector3};
 use proptest::prelude::*;
 
-use super::local::PointProblem;
 use super::problem::at;
+use super::sweeps::PointProblem;
 use super::sweeps::Sweeps;
 use super::*;
 
@@ -57,7 +57,7 @@ fn block_on_a_tilted_plane_sticks_below_the_angle_of_friction_and_slides_above()
     let angle = friction.atan().to_degrees();
     for (degrees, slides) in [(angle - 0.01, false), (angle + 0.01, true), (angle + 5.0, true)] {
         let problem = block.problem(tilted(degrees), h, friction);
-        let found = problem.solve(&[], SolveBudget::default());
+        let found = Solution::of(&problem, &[], SolveBudget::default());
         assert!(found.is_converged, "{degrees} degrees: residual {:e} N", found.residual);
         let weight = block.mass * 9.81;
         let (normal, along) =
@@ -83,7 +83,7 @@ fn points_that_are_nowhere_near_get_no_force_at_all() {
         vec![FrictionCone { friction: 1.0 }; 2],
     )
     .unwrap();
-    let found = problem.solve(&[], SolveBudget::default());
+    let found = Solution::of(&problem, &[], SolveBudget::default());
     assert_eq!(found.lambda, [0.0; 6]);
     assert!(found.is_converged && found.newton_steps == 0);
 }
@@ -150,7 +150,7 @@ proptest! {
     ) {
         let problem = fingertip(&places, press, shear, friction);
         let budget = SolveBudget { residual_rel: 1e-8, residual: 0.0, attempts_max: 20 };
-        let found = problem.solve(&[], budget);
+        let found = Solution::of(&problem, &[], budget);
         prop_assert!(found.is_converged, "residual {:e} of {:e} N", found.residual, found.force_max());
     }
 
@@ -164,7 +164,7 @@ proptest! {
         let w = compliance(n, &seed);
         let cones = vec![FrictionCone { friction }; n];
         let problem = ContactProblem::try_new(w, pushed[..3 * n].to_vec(), cones).unwrap();
-        let found = problem.solve(&[], SolveBudget::default());
+        let found = Solution::of(&problem, &[], SolveBudget::default());
         prop_assert!(found.is_converged, "residual {:e} of {:e} N", found.residual, found.force_max());
         prop_assert!((0..n).all(|i| found.motion[3 * i] > -1e-9));
         // The oracle: sweeps and nothing else.

@@ -1,141 +1,26 @@
-//! All elements of a body at rest, and what they answer to a displacement field.
+//! All elements of a body: their energy, forces and tangent at any displacement field.
 
-use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
+use std::sync::Arc;
 
-use super::averaged::Averaging;
+use super::averaged_volume::AveragedVolume;
+use super::body::{Body, Evaluated, Shape};
+use super::groups::Groups;
 use super::law::ModuliPart;
-use super::locals::{ELEMENTS_TOGETHER, Locals};
-use super::plastic::{Plastic, PlasticPoint};
-use super::{Deformed, Law, Moduli};
-use crate::fem::tet4::{self, Gradients};
-use crate::fem::{AssemblyError, Element, LameByRegion, Material, QuadraticMesh, dof, tet10};
+use super::principal::Curvature;
+use super::summary::{LargeSummary, gradient_change_max};
+use super::yielding::{Plastic, YieldError, Yielding};
+use super::{Law, step_limit, tangent};
+use crate::fem::{AssemblyError, Element, Material, QuadraticMesh, Stiffness, StiffnessPattern};
 use crate::mesh::TetMesh;
 
-/// Elements of a body: shape at rest, law and moduli.
+/// Elements of a body: shape at rest, law, moduli, and the plastic state where they yield.
 ///
 /// Shapes: M elements, N nodes of the system (mid-edge nodes behind the corners). Units: m, Pa.
 #[derive(Clone, Debug)]
 pub struct Elements {
-    pub(super) shape: Shape,
-    /// Gradients of the linear shape functions at rest, and the volume.
-    pub(super) rest: Vec<Gradients>,
-    pub(super) moduli: ModuliOf,
-    pub(super) node_count: usize,
-    /// Where the elements yield.
+    pub(super) body: Body,
+    /// `None` where the elements have no yield stress.
     pub(super) plastic: Option<Plastic>,
-}
-
-/// Nodes of the elements, by the kind of element.
-#[derive(Clone, Debug)]
-pub(super) enum Shape {
-    /// Four nodes, one point.
-    Linear(Locals<4>),
-    /// Four nodes, one point, the volume ratio averaged around nodes.
-    Averaged(Locals<4>, Averaging),
-    /// Ten nodes, four points.
-    Quadratic(Locals<10>),
-}
-
-/// Moduli of every element.
-#[derive(Clone, Debug)]
-pub(super) struct ModuliOf {
-    by_region: Vec<Moduli>,
-    /// Empty where one serves all.
-    regions: Vec<u32>,
-}
-
-impl ModuliOf {
-    /// Whether all elements have the same.
-    #[inline]
-    pub fn is_one(&self) -> bool {
-        self.by_region.len() == 1
-    }
-
-    /// Those of one element.
-    #[inline]
-    pub fn of(&self, tet: usize) -> Moduli {
-        match self.by_region.as_slice() {
-            [only] => *only,
-            several => several[self.regions.get(tet).map_or(0, |&r| r as usize)],
-        }
-    }
-}
-
-/// What a body answers to a displacement field.
-#[derive(Clone, Debug)]
-pub struct Evaluated {
-    /// Stored energy, and what a step dissipates where elements yield, J; infinite if an element
-    /// is inside out.
-    pub energy: f64,
-    /// Forces that hold the field, `∂W/∂u`, 3N, N; of no meaning where the energy is infinite.
-    pub forces: Vec<f64>,
-    /// Smallest volume ratio of an element at its points.
-    pub jacobian_min: f64,
-}
-
-/// What one piece of the elements adds up.
-#[derive(Clone, Copy)]
-pub(super) struct PieceSum {
-    energy: f64,
-    jacobian_min: f64,
-}
-
-impl Default for PieceSum {
-    fn default() -> Self {
-        Self { energy: 0.0, jacobian_min: f64::INFINITY }
-    }
-}
-
-impl PieceSum {
-    pub fn see(&mut self, energy: f64, j: f64) {
-        self.energy += energy;
-        // A NaN counts as inside out.
-        self.jacobian_min = if j >= self.jacobian_min { self.jacobian_min } else { j };
-    }
-}
-
-impl Evaluated {
-    /// What pieces of the elements add up to, with forces that were summed already.
-    pub(super) fn of_pieces(sums: &[PieceSum], forces: Vec<f64>) -> Self {
-        let mut total = PieceSum::default();
-        sums.iter().for_each(|piece| total.see(piece.energy, piece.jacobian_min));
-        let is_inside_out = total.jacobian_min <= 0.0 || total.jacobian_min.is_nan();
-        let energy = if is_inside_out { f64::INFINITY } else { total.energy };
-        Self { energy, forces, jacobian_min: total.jacobian_min }
-    }
-}
-
-/// Points of an element of K nodes and the share of its volume that each stands for.
-pub(super) const fn points_of<const K: usize>() -> usize {
-    if K == 4 { 1 } else { 4 }
-}
-
-/// Gradients of the K shape functions at one of the points.
-#[inline]
-pub(super) fn gradients_at<const K: usize>(rest: &Gradients, point: usize) -> [Vector3<f64>; K] {
-    if K == 4 {
-        std::array::from_fn(|i| rest.of_shape[i])
-    } else {
-        let all = tet10::shape_gradients(rest, tet10::QUADRATURE[point]);
-        std::array::from_fn(|i| all[i])
-    }
-}
-
-/// Displacement gradient `H = Σ u_a ∇N_aᵀ` of an element.
-#[inline]
-pub(super) fn gradient_of<const K: usize>(
-    nodes: &[u32; K],
-    gradients: &[Vector3<f64>; K],
-    u: &[f64],
-) -> Matrix3<f64> {
-    let mut h = Matrix3::zeros();
-    for (&node, gradient) in nodes.iter().zip(gradients) {
-        let at = dof(node as usize, 0);
-        let u = Vector3::new(u[at], u[at + 1], u[at + 2]);
-        h += u * gradient.transpose();
-    }
-    h
 }
 
 impl Elements {
@@ -153,46 +38,77 @@ impl Elements {
         law: Law,
         materials: &[Material],
     ) -> Result<Self, AssemblyError> {
-        LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
-        let by_region: Vec<Moduli> = materials.iter().map(|m| Moduli::new(law, m)).collect();
-        let moduli = ModuliOf { by_region, regions: mesh.regions().to_vec() };
-        let rest = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
-        let corners = || Locals::new(mesh.node_count(), mesh.tets());
-        let (shape, node_count) = match (element, quadratic) {
-            (Element::Tet10, Some(quadratic)) => {
-                let count = quadratic.node_count();
-                (Shape::Quadratic(Locals::new(count, quadratic.tets())), count)
-            }
-            (Element::Tet4Anp, _) => {
-                let averaging = Averaging::new(mesh, &rest);
-                (Shape::Averaged(corners(), averaging), mesh.node_count())
-            }
-            _ => (Shape::Linear(corners()), mesh.node_count()),
-        };
-        Ok(Self { shape, rest, moduli, node_count, plastic: None })
+        let body = Body::try_new(mesh, element, quadratic, law, materials)?;
+        Ok(Self { body, plastic: None })
+    }
+
+    /// These elements with a yield stress, without plastic strain at first. Their elasticity is
+    /// Hencky's then, with the moduli of the materials, whatever the law was:
+    /// `W = μ dev e : dev e + κ/2 (tr e)²`, e the logarithmic strain of `Fe` in `F = Fe Fp`. They
+    /// flow where von Mises' stress `√(3/2) ‖dev τ‖` of Kirchhoff's stress τ would exceed the yield
+    /// stress (no hardening).
+    ///
+    /// [`Elements::evaluate`] answers with the potential of a step from the last
+    /// [`Elements::commit`]: energy stored and what the step dissipates.
+    ///
+    /// Units: Pa.
+    ///
+    /// # Errors
+    /// [`YieldError::Stress`] if it is not a finite number above 0, [`YieldError::Averaged`] for
+    /// t4-anp.
+    ///
+    /// Source: Simo, CMAME 99 (1992) 61.
+    pub fn with_yield(self, stress_pa: f64) -> Result<Self, YieldError> {
+        let plastic = Some(Plastic::try_new(&self.body, stress_pa)?);
+        Ok(Self { plastic, ..self })
     }
 
     /// Nodes of the system.
     pub fn node_count(&self) -> usize {
-        self.node_count
+        self.body.node_count
     }
 
     /// Largest Poisson's ratio of the moduli.
     pub fn poisson_max(&self) -> f64 {
-        self.moduli.by_region.iter().map(Moduli::poisson).fold(-1.0, f64::max)
+        self.body.moduli.poisson_max()
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let per_tet = match self.shape {
-            Shape::Linear(_) => 32,
-            Shape::Averaged(..) => 96,
-            Shape::Quadratic(_) => 80,
-        };
-        let points = self.plastic.as_ref().map_or(0, |plastic| plastic.points.len());
-        self.rest.len() * (size_of::<Gradients>() + per_tet)
-            + 4 * self.node_count
-            + points * size_of::<PlasticPoint>()
+        self.body.bytes() + self.plastic.as_ref().map_or(0, Plastic::bytes)
+    }
+
+    /// Whether the elements have a yield stress.
+    pub fn is_plastic(&self) -> bool {
+        self.plastic.is_some()
+    }
+
+    /// Largest accumulated plastic strain of a point, `Σ √(2/3) ‖dev e‖` of what flowed; 0 without a
+    /// yield stress.
+    pub fn plastic_strain_max(&self) -> f64 {
+        self.plastic.as_ref().map_or(0.0, Plastic::strain_max)
+    }
+
+    /// Makes the plastic flow of a shape permanent, in parallel, the same bits for any number of
+    /// threads. Without a yield stress it does nothing.
+    ///
+    /// Shapes: `u` 3N. Units: m.
+    ///
+    /// # Panics
+    /// If `u` does not hold 3N numbers.
+    pub fn commit(&mut self, u: &[f64]) {
+        self.check(u);
+        if let Some(plastic) = &mut self.plastic {
+            plastic.commit(&self.body, u);
+        }
+    }
+
+    fn check(&self, u: &[f64]) {
+        assert_eq!(u.len(), 3 * self.node_count(), "displacements do not fit the body");
+    }
+
+    fn yielding<'a>(&'a self, plastic: &'a Plastic) -> Yielding<'a> {
+        Yielding { body: &self.body, plastic }
     }
 
     /// Energy and forces of a displacement field, in parallel, the same bits for any number of
@@ -203,96 +119,87 @@ impl Elements {
     /// # Panics
     /// If `u` does not hold 3N numbers.
     pub fn evaluate(&self, u: &[f64]) -> Evaluated {
-        assert_eq!(u.len(), 3 * self.node_count, "displacements do not fit the body");
+        self.check(u);
         if let Some(plastic) = &self.plastic {
-            return self.evaluate_yielding(plastic, u);
+            return self.yielding(plastic).evaluate(u);
         }
-        match &self.shape {
-            Shape::Linear(locals) => self.evaluate_groups(locals, u, ModuliPart::Whole),
-            Shape::Quadratic(locals) => self.evaluate_points(locals, u, ModuliPart::Whole),
+        let body = &self.body;
+        match &body.shape {
+            Shape::Linear(locals) => Groups { body, locals }.evaluate(u, ModuliPart::Whole),
+            Shape::Quadratic(locals) => body.evaluate_points(locals, u, ModuliPart::Whole),
             Shape::Averaged(locals, averaging) => {
-                let mut evaluated = self.evaluate_groups(locals, u, ModuliPart::WithoutVolume);
-                self.add_averaged(&mut evaluated, (locals, averaging), u);
+                let mut evaluated = Groups { body, locals }.evaluate(u, ModuliPart::WithoutVolume);
+                AveragedVolume::new(body, (locals, averaging), u).add_to(&mut evaluated);
                 evaluated
             }
         }
     }
 
-    /// Energy and forces, element by element and point by point.
-    pub(super) fn evaluate_points<const K: usize>(
+    /// The tangent stiffness of a displacement field, on the pattern of the linear one.
+    ///
+    /// Shapes: `u` 3N; `pattern` that of the element ([`StiffnessPattern`]). Units: m, N/m.
+    ///
+    /// # Panics
+    /// If pattern or displacements are those of another body.
+    pub fn tangent(
         &self,
-        locals: &Locals<K>,
+        pattern: &Arc<StiffnessPattern>,
         u: &[f64],
-        part: ModuliPart,
-    ) -> Evaluated {
-        let mut forces = Vec::new();
-        let points = points_of::<K>();
-        let sums = locals.for_each(&mut forces, |tet, forces, sum: &mut PieceSum| {
-            let (rest, moduli) = (&self.rest[tet], part.of(self.moduli.of(tet)));
-            let weight = rest.volume / points as f64;
-            *forces = [[0.0; 3]; K];
-            for point in 0..points {
-                let gradients = gradients_at::<K>(rest, point);
-                let deformed = Deformed::new(&gradient_of(&locals.tets[tet], &gradients, u));
-                sum.see(weight * moduli.energy(&deformed), deformed.j);
-                let stress = moduli.stress(&deformed) * weight;
-                for (force, gradient) in forces.iter_mut().zip(&gradients) {
-                    let f = stress * gradient;
-                    force.iter_mut().zip(f.iter()).for_each(|(sum, f)| *sum += f);
-                }
-            }
-        });
-        Evaluated::of_pieces(&sums, locals.gather(&forces))
+        curvature: Curvature,
+    ) -> Stiffness {
+        self.check(u);
+        let yielding = self.plastic.as_ref().map(|plastic| self.yielding(plastic));
+        tangent::assembled(&self.body, yielding.as_ref(), pattern, u, curvature)
     }
 
-    /// Calls `see(element, point of all points, H)` for the displacement gradient of every element at every point, and
-    /// gives one result for each piece of the elements.
-    pub(super) fn by_pieces<T: Send + Default>(
-        &self,
-        u: &[f64],
-        see: impl Fn(usize, usize, &Matrix3<f64>, &mut T) + Sync,
-    ) -> Vec<T> {
-        let pieces = (0..self.piece_count()).into_par_iter();
-        pieces.map(|piece| self.piece(u, piece, &see)).collect()
+    /// The tangent times a vector, without assembling it.
+    ///
+    /// Shapes: `u`, `v` and the result 3N. Units: m, N.
+    ///
+    /// # Panics
+    /// If the vectors do not hold 3N numbers.
+    pub fn tangent_times(&self, u: &[f64], v: &[f64]) -> Vec<f64> {
+        self.check(v);
+        match &self.plastic {
+            Some(plastic) => self.yielding(plastic).tangent_times(u, v),
+            None => tangent::times(&self.body, u, v),
+        }
     }
 
-    /// Pieces of the elements.
-    pub(super) fn piece_count(&self) -> usize {
-        self.rest.len().div_ceil(ELEMENTS_TOGETHER)
-    }
-
-    /// One piece of [`Elements::by_pieces`].
-    pub(super) fn piece<T: Default>(
-        &self,
-        u: &[f64],
-        piece: usize,
-        see: &impl Fn(usize, usize, &Matrix3<f64>, &mut T),
-    ) -> T {
-        match &self.shape {
+    /// Largest share, at most 1, of a step that leaves every element its volume: 0.9 of the smallest
+    /// positive root of any element's cubic `det(F + t dF)`, or 1.
+    ///
+    /// Shapes: `u`, `step` 3N. Units: m. Every element of `u` must have volume.
+    ///
+    /// Source: as in incremental potential contact (Li and others 2020), filtering of line search.
+    pub fn step_limit(&self, u: &[f64], step: &[f64]) -> f64 {
+        let body = &self.body;
+        match &body.shape {
             Shape::Linear(locals) | Shape::Averaged(locals, _) => {
-                self.piece_of(locals, u, piece, see)
+                Groups { body, locals }.step_limit(u, step)
             }
-            Shape::Quadratic(locals) => self.piece_of(locals, u, piece, see),
+            Shape::Quadratic(locals) => step_limit::one_by_one(body, locals, u, step),
         }
     }
 
-    fn piece_of<const K: usize, T: Default>(
-        &self,
-        locals: &Locals<K>,
-        u: &[f64],
-        piece: usize,
-        see: &impl Fn(usize, usize, &Matrix3<f64>, &mut T),
-    ) -> T {
-        let mut so_far = T::default();
-        let first = piece * ELEMENTS_TOGETHER;
-        for tet in first..(first + ELEMENTS_TOGETHER).min(locals.tets.len()) {
-            for point in 0..points_of::<K>() {
-                let gradients = gradients_at::<K>(&self.rest[tet], point);
-                let place = points_of::<K>() * tet + point;
-                see(tet, place, &gradient_of(&locals.tets[tet], &gradients, u), &mut so_far);
+    /// Largest change of a deformation gradient (Frobenius norm) that a step makes.
+    ///
+    /// Shapes: `step` 3N. Units: m; result 1.
+    pub fn gradient_change_max(&self, step: &[f64]) -> f64 {
+        let body = &self.body;
+        match &body.shape {
+            Shape::Linear(locals) | Shape::Averaged(locals, _) => {
+                Groups { body, locals }.gradient_change_max(step)
             }
+            Shape::Quadratic(_) => gradient_change_max(body, step),
         }
-        so_far
+    }
+
+    /// Largest rotation and stretches of a displacement field, in parallel.
+    ///
+    /// Shapes: `u` 3N. Units: m.
+    pub fn summary(&self, u: &[f64]) -> LargeSummary {
+        LargeSummary::of(&self.body, u)
     }
 }
 

@@ -8,12 +8,12 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Law;
-use super::elements::{Elements, Evaluated, PieceSum};
+use super::body::{Body, Evaluated, PieceSum};
+use super::connectivity::{ELEMENTS_TOGETHER, Locals};
 use super::lanes::{
     LANES_MAX, LaneMatrix, Lanes, cofactor, determinant, dot, product, scaled, trace,
 };
 use super::law::ModuliPart;
-use super::locals::{ELEMENTS_TOGETHER, Locals};
 use super::shrink::shrink_lanes;
 use super::step_limit::limit_of;
 
@@ -21,7 +21,7 @@ use super::step_limit::limit_of;
 #[derive(Clone, Copy)]
 struct Group<'a, S> {
     simd: S,
-    elements: &'a Elements,
+    body: &'a Body,
     tets: &'a [[u32; 4]],
     of: [usize; LANES_MAX],
 }
@@ -31,12 +31,12 @@ type LaneShapes<S> = [[Lanes<S>; 3]; 4];
 
 impl<'a, S: Simd> Group<'a, S> {
     #[inline(always)]
-    fn new(simd: S, elements: &'a Elements, tets: &'a [[u32; 4]], first: usize) -> Self {
+    fn new(simd: S, body: &'a Body, tets: &'a [[u32; 4]], first: usize) -> Self {
         let mut of = [tets.len() - 1; LANES_MAX];
         for lane in 0..LANES_MAX {
             of[lane] = of[lane].min(first + lane);
         }
-        Self { simd, elements, tets, of }
+        Self { simd, body, tets, of }
     }
 
     #[inline(always)]
@@ -46,7 +46,7 @@ impl<'a, S: Simd> Group<'a, S> {
             for axis in 0..3 {
                 let mut numbers = [0.0; LANES_MAX];
                 for lane in 0..S::F64_LANES {
-                    numbers[lane] = self.elements.rest[self.of[lane]].of_shape[corner][axis];
+                    numbers[lane] = self.body.rest[self.of[lane]].of_shape[corner][axis];
                 }
                 shapes[corner][axis] = Lanes::of(self.simd, &numbers);
             }
@@ -79,11 +79,11 @@ impl<'a, S: Simd> Group<'a, S> {
 
     #[inline(always)]
     fn moduli(&self, part: ModuliPart) -> LaneModuli<S> {
-        let first = part.of(self.elements.moduli.of(self.of[0]));
+        let first = part.of(self.body.moduli.of(self.of[0]));
         let (mut mu, mut volumetric) = ([first.mu; LANES_MAX], [first.volumetric; LANES_MAX]);
-        if !self.elements.moduli.is_one() {
+        if !self.body.moduli.is_one() {
             for lane in 0..S::F64_LANES {
-                let moduli = part.of(self.elements.moduli.of(self.of[lane]));
+                let moduli = part.of(self.body.moduli.of(self.of[lane]));
                 (mu[lane], volumetric[lane]) = (moduli.mu, moduli.volumetric);
             }
         }
@@ -95,7 +95,7 @@ impl<'a, S: Simd> Group<'a, S> {
     fn volumes(&self) -> Lanes<S> {
         let mut volumes = [0.0; LANES_MAX];
         for lane in 0..S::F64_LANES {
-            volumes[lane] = self.elements.rest[self.of[lane]].volume;
+            volumes[lane] = self.body.rest[self.of[lane]].volume;
         }
         Lanes::of(self.simd, &volumes)
     }
@@ -187,47 +187,44 @@ impl<S: Simd> LaneModuli<S> {
     }
 }
 
-impl Elements {
-    /// [`Elements::evaluate`] for linear elements.
-    pub(super) fn evaluate_groups(
-        &self,
-        locals: &Locals<4>,
-        u: &[f64],
-        part: ModuliPart,
-    ) -> Evaluated {
+/// The linear elements of a body, worked on in groups.
+#[derive(Clone, Copy)]
+pub(super) struct Groups<'a> {
+    pub body: &'a Body,
+    pub locals: &'a Locals<4>,
+}
+
+impl Groups<'_> {
+    /// Energy and forces of a displacement field.
+    pub fn evaluate(self, u: &[f64], part: ModuliPart) -> Evaluated {
+        let Self { body, locals } = self;
         let (u, arch) = (u.as_chunks().0, Arch::new());
         let mut forces = Vec::new();
         let sums = locals.for_each_piece(&mut forces, |first, forces| {
-            arch.dispatch(EvaluatePiece {
-                elements: self,
-                tets: &locals.tets,
-                u,
-                part,
-                first,
-                forces,
-            })
+            arch.dispatch(EvaluatePiece { body, tets: &locals.tets, u, part, first, forces })
         });
         Evaluated::of_pieces(&sums, locals.gather(&forces))
     }
 
     /// Largest norm of `dF` that a step makes of an element; no number if one has none.
-    pub(super) fn change_of_groups(&self, locals: &Locals<4>, step: &[f64]) -> f64 {
-        self.most_of_pieces(locals, (step, None)).sqrt()
+    pub fn gradient_change_max(self, step: &[f64]) -> f64 {
+        self.most_of_pieces(step, None).sqrt()
     }
 
-    /// [`Elements::step_limit`] for linear elements.
-    pub(super) fn limit_of_groups(&self, locals: &Locals<4>, u: &[f64], step: &[f64]) -> f64 {
-        1.0 - self.most_of_pieces(locals, (step, Some(u)))
+    /// Largest share of a step that leaves every element its volume.
+    pub fn step_limit(self, u: &[f64], step: &[f64]) -> f64 {
+        1.0 - self.most_of_pieces(step, Some(u))
     }
 
-    fn most_of_pieces(&self, locals: &Locals<4>, (step, u): (&[f64], Option<&[f64]>)) -> f64 {
-        let (tets, arch) = (&locals.tets, Arch::new());
+    fn most_of_pieces(self, step: &[f64], u: Option<&[f64]>) -> f64 {
+        let Self { body, locals: Locals { tets, .. } } = self;
+        let arch = Arch::new();
         let (step, u) = (step.as_chunks().0, u.map(|u| u.as_chunks().0));
         let pieces = (0..tets.len().div_ceil(ELEMENTS_TOGETHER)).into_par_iter();
         let most = pieces.map(|piece| {
             let first = piece * ELEMENTS_TOGETHER;
             let end = (first + ELEMENTS_TOGETHER).min(tets.len());
-            arch.dispatch(MostOfPiece { elements: self, tets, step, u, first, end })
+            arch.dispatch(MostOfPiece { body, tets, step, u, first, end })
         });
         most.collect::<Vec<f64>>().into_iter().fold(0.0, larger)
     }
@@ -235,7 +232,7 @@ impl Elements {
 
 /// Energy and forces of one piece of the elements.
 struct EvaluatePiece<'a> {
-    elements: &'a Elements,
+    body: &'a Body,
     tets: &'a [[u32; 4]],
     u: &'a [[f64; 3]],
     part: ModuliPart,
@@ -251,7 +248,7 @@ impl WithSimd for EvaluatePiece<'_> {
         let mut sum = PieceSum::default();
         for (at, forces) in self.forces.chunks_mut(S::F64_LANES).enumerate() {
             let first = self.first + S::F64_LANES * at;
-            let group = Group::new(simd, self.elements, self.tets, first);
+            let group = Group::new(simd, self.body, self.tets, first);
             let shapes = group.shapes();
             let point = group.moduli(self.part).at(&group.gradient(&shapes, self.u));
             let volumes = group.volumes();
@@ -278,7 +275,7 @@ impl WithSimd for EvaluatePiece<'_> {
 /// The largest squared norm of `dF` in one piece of the elements, or, with a shape given, the largest
 /// share of the step that is too much.
 struct MostOfPiece<'a> {
-    elements: &'a Elements,
+    body: &'a Body,
     tets: &'a [[u32; 4]],
     step: &'a [[f64; 3]],
     u: Option<&'a [[f64; 3]]>,
@@ -293,7 +290,7 @@ impl WithSimd for MostOfPiece<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
         let mut most = 0.0f64;
         for first in (self.first..self.end).step_by(S::F64_LANES) {
-            let group = Group::new(simd, self.elements, self.tets, first);
+            let group = Group::new(simd, self.body, self.tets, first);
             let shapes = group.shapes();
             let df = group.gradient(&shapes, self.step);
             let Some(u) = self.u else {

@@ -6,7 +6,6 @@ use std::str::FromStr;
 use nalgebra::Matrix3;
 
 use super::Deformed;
-use super::hencky::Hencky;
 use super::shrink::shrink;
 use crate::fem::Material;
 
@@ -113,12 +112,17 @@ impl Moduli {
         Self { law, mu: material.shear_modulus(), volumetric }
     }
 
-    /// Poisson's ratio at small strains.
-    pub(super) fn poisson(&self) -> f64 {
-        let kappa = match self.law {
+    /// κ, Pa.
+    pub(super) fn bulk(&self) -> f64 {
+        match self.law {
             Law::NeoHookean => self.volumetric,
             Law::NeoHookeanLog => self.volumetric + 2.0 / 3.0 * self.mu,
-        };
+        }
+    }
+
+    /// Poisson's ratio at small strains.
+    pub(super) fn poisson(&self) -> f64 {
+        let kappa = self.bulk();
         (3.0 * kappa - 2.0 * self.mu) / (6.0 * kappa + 2.0 * self.mu)
     }
 
@@ -126,15 +130,6 @@ impl Moduli {
     /// is [`Moduli::pressure_of_volume`].
     pub(super) fn without_volume(self) -> Self {
         Self { volumetric: 0.0, ..self }
-    }
-
-    /// Hencky's law with the same moduli, and with a largest deviatoric stress, Pa.
-    pub(super) fn hencky(self, radius: f64) -> Hencky {
-        let kappa = match self.law {
-            Law::NeoHookean => self.volumetric,
-            Law::NeoHookeanLog => self.volumetric + 2.0 / 3.0 * self.mu,
-        };
-        Hencky { mu: self.mu, kappa, radius }
     }
 
     /// Energy for each unit of volume at rest; infinite where the volume is gone.

@@ -3,48 +3,37 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
+use super::body::{Body, gradient_of, gradients_at, points_of};
+use super::connectivity::{ELEMENTS_TOGETHER, Locals};
 use super::deformed::cofactor;
-use super::elements::{Elements, Shape, gradient_of, gradients_at, points_of};
-use super::locals::{ELEMENTS_TOGETHER, Locals};
 
 /// Share of the way to the first element without volume that a step may go.
 const SHARE: f64 = 0.9;
 
-impl Elements {
-    /// Largest share, at most 1, of a step that leaves every element its volume: 0.9 of the smallest
-    /// positive root of any element's cubic `det(F + t dF)`, or 1.
-    ///
-    /// Shapes: `u`, `step` 3N. Units: m. Every element of `u` must have volume.
-    ///
-    /// Source: as in incremental potential contact (Li and others 2020), filtering of line search.
-    pub fn step_limit(&self, u: &[f64], step: &[f64]) -> f64 {
-        match &self.shape {
-            Shape::Linear(locals) | Shape::Averaged(locals, _) => {
-                self.limit_of_groups(locals, u, step)
-            }
-            Shape::Quadratic(locals) => self.limit(locals, u, step),
-        }
-    }
-
-    pub(super) fn limit<const K: usize>(&self, locals: &Locals<K>, u: &[f64], step: &[f64]) -> f64 {
-        let pieces = locals.tets.par_chunks(ELEMENTS_TOGETHER).enumerate();
-        let limits: Vec<f64> = pieces
-            .map(|(piece, tets)| {
-                let mut least = 1.0f64;
-                for (i, nodes) in tets.iter().enumerate() {
-                    let rest = &self.rest[piece * ELEMENTS_TOGETHER + i];
-                    for point in 0..points_of::<K>() {
-                        let gradients = gradients_at::<K>(rest, point);
-                        let f = gradient_of(nodes, &gradients, u) + Matrix3::identity();
-                        let df = gradient_of(nodes, &gradients, step);
-                        least = least.min(limit_of(volume_cubic(&f, &df)));
-                    }
+/// Largest share, at most 1, of a step that leaves every element its volume, point by point.
+pub(super) fn one_by_one<const K: usize>(
+    body: &Body,
+    locals: &Locals<K>,
+    u: &[f64],
+    step: &[f64],
+) -> f64 {
+    let pieces = locals.tets.par_chunks(ELEMENTS_TOGETHER).enumerate();
+    let limits: Vec<f64> = pieces
+        .map(|(piece, tets)| {
+            let mut least = 1.0f64;
+            for (i, nodes) in tets.iter().enumerate() {
+                let rest = &body.rest[piece * ELEMENTS_TOGETHER + i];
+                for point in 0..points_of::<K>() {
+                    let gradients = gradients_at::<K>(rest, point);
+                    let f = gradient_of(nodes, &gradients, u) + Matrix3::identity();
+                    let df = gradient_of(nodes, &gradients, step);
+                    least = least.min(limit_of(volume_cubic(&f, &df)));
                 }
-                least
-            })
-            .collect();
-        limits.into_iter().fold(1.0, f64::min)
-    }
+            }
+            least
+        })
+        .collect();
+    limits.into_iter().fold(1.0, f64::min)
 }
 
 /// Coefficients of `det(F + t dF)`, constant first.

@@ -2,8 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::Elements;
-use super::elements::Shape;
+use super::body::Body;
 
 /// What a displacement field does to the elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +41,12 @@ impl LargeSummary {
         jacobian_min: f64::NAN,
     };
 
+    /// Of a displacement field, in parallel.
+    pub(super) fn of(body: &Body, u: &[f64]) -> Self {
+        let pieces = body.by_pieces(u, |_, _, h, piece: &mut Self| piece.see(h));
+        pieces.iter().fold(Self::default(), Self::joined)
+    }
+
     fn joined(self, other: &Self) -> Self {
         Self {
             rotation_max: self.rotation_max.max(other.rotation_max),
@@ -71,32 +76,10 @@ impl LargeSummary {
     }
 }
 
-impl Elements {
-    /// Largest change of a deformation gradient (Frobenius norm) that a step makes.
-    ///
-    /// Shapes: `step` 3N. Units: m; result 1.
-    pub fn gradient_change_max(&self, step: &[f64]) -> f64 {
-        match &self.shape {
-            Shape::Linear(locals) | Shape::Averaged(locals, _) => {
-                self.change_of_groups(locals, step)
-            }
-            Shape::Quadratic(_) => self.change_one_by_one(step),
-        }
-    }
-
-    /// [`Elements::gradient_change_max`] of any elements.
-    pub(super) fn change_one_by_one(&self, step: &[f64]) -> f64 {
-        let pieces = self.by_pieces(step, |_, _, h, most: &mut f64| {
-            *most = most.max(h.norm_squared());
-        });
-        pieces.into_iter().fold(0.0, f64::max).sqrt()
-    }
-
-    /// Largest rotation and stretches of a displacement field, in parallel.
-    ///
-    /// Shapes: `u` 3N. Units: m.
-    pub fn summary(&self, u: &[f64]) -> LargeSummary {
-        let pieces = self.by_pieces(u, |_, _, h, piece: &mut LargeSummary| piece.see(h));
-        pieces.iter().fold(LargeSummary::default(), LargeSummary::joined)
-    }
+/// Largest change of a deformation gradient (Frobenius norm) that a step makes, point by point.
+pub(super) fn gradient_change_max(body: &Body, step: &[f64]) -> f64 {
+    let pieces = body.by_pieces(step, |_, _, h, most: &mut f64| {
+        *most = most.max(h.norm_squared());
+    });
+    pieces.into_iter().fold(0.0, f64::max).sqrt()
 }

@@ -1,18 +1,23 @@
-//! The base of a body, made once: held degrees of freedom, factor, motions without energy.
+//! The base of a body, made once: held degrees of freedom, factor, motions without energy, condition
+//! number, and the smallest eigenvalue of the held stiffness, estimated and proven from below.
+//!
+//! A Cholesky factor of `K_B − s I` that exists proves that the smallest eigenvalue is at least s less
+//! a margin (`docs/bound.md`, section 3).
 
 use std::sync::Arc;
 
+use super::error::CondensedError;
 use super::rigid::{Mode, Rigid};
-use super::rounding::asymmetry;
-use super::surface_columns::SurfaceNodes;
+use super::rounding::{SLACK, UNIT, asymmetry, gamma};
 use crate::fem::Stiffness;
-use crate::mesh::{Bodies, TetMesh};
+use crate::mesh::{Bodies, Surface, TetMesh};
+use crate::solve::certainty::{inverse_norm, row_sums};
 use crate::solve::definite::{hold, motions};
-use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
-use crate::solve::partition::AXIS_NAMES;
+use crate::solve::front::{FrontAnalysis, FrontFactor};
+use crate::solve::vectors::norm;
 use crate::solve::worked_out::WorkedOut;
 use crate::solve::zero_energy::RigidBodies;
-use crate::solve::{Partition, PartitionError, Stage};
+use crate::solve::{Partition, Stage};
 
 /// Base factor of one shape.
 ///
@@ -36,146 +41,32 @@ pub struct Base {
     /// The modes as one basis; `None` without modes or where the basis is not proven to be one.
     pub(super) rigid: Option<Rigid>,
     /// Skeel's condition number of `K_B`, once somebody has asked for it.
-    pub(super) condition: WorkedOut<f64>,
+    condition: WorkedOut<f64>,
     /// Lower bound of the smallest eigenvalue of `K_B`, once somebody has proven one.
-    pub(super) eigenvalue_min: WorkedOut<Option<f64>>,
+    eigenvalue_min: WorkedOut<Option<f64>>,
 }
 
-/// Why a shape cannot be condensed, or a question not be answered this way.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CondensedError {
-    /// Fixed degrees of freedom that do not fit.
-    #[error(transparent)]
-    Partition(#[from] PartitionError),
-    /// A body of very many hinged parts.
-    #[error("condensed: body {body} has too many hinged parts; use front")]
-    Hinges {
-        /// The body.
-        body: usize,
-    },
-    /// A pivot of `K_B` was not positive.
-    #[error(
-        "condensed: the stiffness is not positive definite at node {node} axis {axis}: an element \
-         there is degenerate"
-    )]
-    NotPositiveDefinite {
-        /// Node of the pivot.
-        node: usize,
-        /// Axis of the pivot.
-        axis: char,
-    },
-    /// The base factor is larger than it may be.
-    #[error(
-        "condensed: the base factor takes up to {needed} bytes while it is made, and may take \
-         {limit}; allow more memory, or use front-mixed, which takes half"
-    )]
-    OverLimit {
-        /// Bytes it would take at most.
-        needed: u64,
-        /// Bytes it may take.
-        limit: u64,
-    },
-    /// No memory.
-    #[error("condensed: no memory for the base factor ({bytes} bytes)")]
-    OutOfMemory {
-        /// Bytes asked for.
-        bytes: usize,
-    },
-    /// A contact set that alone is larger than the cache may be.
-    #[error(
-        "condensed: {contacts} touched nodes or masks need {needed} bytes of columns, more than the \
-         cache bound of {bound}; raise the bound or, for nodes, use front"
-    )]
-    CacheTooSmall {
-        /// Touched nodes and masks.
-        contacts: usize,
-        /// Bytes of their columns.
-        needed: usize,
-        /// The bound.
-        bound: usize,
-    },
-    /// The touched nodes and masks leave a motion free.
-    #[error("condensed: the touched nodes and masks do not hold the body")]
-    NotHeld,
-    /// The touched nodes and masks hold the body, but so weakly that rounding takes every digit.
-    #[error(
-        "condensed: the touched nodes and masks hold the body too weakly for double precision \
-         (condition of the small system {condition:.0e}); hold nodes further apart and not in line, \
-         or ask for front"
-    )]
-    HeldTooWeakly {
-        /// Condition of the small system; infinite where it has no inverse.
-        condition: f64,
-    },
-    /// A mask whose mean displacement follows from what else is held.
-    #[error(
-        "condensed: along {axis}, mask {mask} (from 0) says what other masks, touched nodes or fixed \
-         nodes say already, so its force is not determined; leave it out or move it"
-    )]
-    Dependent {
-        /// The mask, in the order given.
-        mask: usize,
-        /// Axis name.
-        axis: char,
-    },
-    /// A mask of a node that is not there.
-    #[error(
-        "condensed: mask {mask} names node {node}, but the mesh has {node_count} nodes (0-based)"
-    )]
-    NoSuchNode {
-        /// The mask, in the order given.
-        mask: usize,
-        /// The node.
-        node: u32,
-        /// Nodes of the mesh.
-        node_count: usize,
-    },
-    /// A body that cannot fly: it is held, or it has parts that move on their own.
-    #[error(
-        "condensed: contact with friction takes one body that nothing holds, which has 6 motions \
-         without energy; this one has {motions}"
-    )]
-    NotFree {
-        /// Motions without energy.
-        motions: usize,
-    },
-    /// The answer is not finite.
-    #[error("condensed: the answer is not finite; the known displacements are too large")]
-    NotFinite,
-}
+/// Share of the estimated smallest eigenvalue that the shifted factor must prove.
+const SHIFT_SHARE: f64 = 0.7;
+/// Steps of inverse iteration: the estimate only has to be good to a few per cent.
+const INVERSE_STEPS: usize = 12;
 
 impl Base {
-    /// Chooses the base of a shape and factors it on the current rayon pool.
+    /// Chooses the base of a shape and factors it on the current rayon pool; with a limit, the factor
+    /// may take so much memory only, which is looked at before it is allocated.
     ///
     /// Shapes: `rigid` that of `mesh` and `bodies`; `fixed` ascending degrees of freedom held at
-    /// zero by the scene.
+    /// zero by the scene. Units: `limit` bytes.
     ///
     /// # Errors
-    /// [`CondensedError`].
+    /// [`CondensedError`]; [`CondensedError::OverLimit`] with needed bytes and limit.
     pub fn try_new(
         mesh: &TetMesh,
         bodies: &Bodies,
         rigid: &RigidBodies,
         stiffness: &Arc<Stiffness>,
         fixed: &[u32],
-        on_stage: &mut dyn FnMut(Stage),
-    ) -> Result<Self, CondensedError> {
-        Self::try_within(mesh, bodies, rigid, stiffness, fixed, u64::MAX, on_stage)
-    }
-
-    /// Base whose factor may take so much memory only, which is looked at before it is allocated.
-    ///
-    /// Units: `limit` bytes.
-    ///
-    /// # Errors
-    /// Those of [`Base::try_new`], and [`CondensedError::OverLimit`] with both numbers.
-    pub fn try_within(
-        mesh: &TetMesh,
-        bodies: &Bodies,
-        rigid: &RigidBodies,
-        stiffness: &Arc<Stiffness>,
-        fixed: &[u32],
-        limit: u64,
+        limit: Option<u64>,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Self, CondensedError> {
         let fields =
@@ -187,12 +78,12 @@ impl Base {
         on_stage(Stage::Order);
         let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
         let needed = analysis.peak_bytes::<f64>() as u64;
-        if needed > limit {
+        if let Some(limit) = limit.filter(|limit| needed > *limit) {
             return Err(CondensedError::OverLimit { needed, limit });
         }
         on_stage(Stage::Factor);
         let factor = FrontFactor::try_new(&analysis, stiffness)
-            .map_err(|error| refuse(error, &partition))?;
+            .map_err(|error| CondensedError::of_factor(error, &partition))?;
         let modes: Vec<Mode> =
             fields.into_iter().map(|field| Mode::new(stiffness, field)).collect();
         let stiffest = stiffness.row_sum_max();
@@ -249,16 +140,118 @@ impl Base {
     pub fn bytes(&self) -> usize {
         self.factor.bytes() + self.modes.len() * 8 * self.dof_count() + self.surface.bytes()
     }
+
+    /// Skeel's condition number of the held shape, if it was estimated earlier.
+    pub(super) fn condition(&self) -> Option<f64> {
+        self.condition.get()
+    }
+
+    /// Estimates Skeel's condition number of the held shape, once, by a few solves.
+    pub fn estimate_condition(&self) -> f64 {
+        self.condition.get_or(|| {
+            let weights = row_sums(&self.stiffness, &self.partition);
+            inverse_norm(&weights, &|mut b, columns| {
+                self.factor.solve_in_place(&mut b, columns);
+                b
+            })
+        })
+    }
+
+    /// Proves a lower bound of the smallest eigenvalue of the symmetric part of `K_B`, once; costs a
+    /// second factor for the moment.
+    ///
+    /// Returns N/m, or `None` where double precision cannot prove one.
+    pub fn prove_eigenvalue_min(&self) -> Option<f64> {
+        self.eigenvalue_min.get_or(|| {
+            let estimate = self.estimate_eigenvalue_min()?;
+            let shift = SHIFT_SHARE * estimate;
+            let shifted = self.stiffness.shifted(-shift);
+            FrontFactor::<f64>::try_new(self.factor.analysis(), &shifted).ok()?;
+            // Rump 2006 for any order of summation; twice, for divisions by way of reciprocals.
+            let n = self.partition.unknown().len();
+            let margin = 2.0 * gamma(n + 3) * self.stiffness.trace() * SLACK;
+            // The shifted diagonal is rounded, and one triangle of K is read.
+            let proven = shift - margin - UNIT * self.stiffest * SLACK - self.asymmetry;
+            (proven > 0.0).then_some(proven * (1.0 - 1e-12))
+        })
+    }
+
+    /// Bound proven earlier, without proving one now.
+    pub fn eigenvalue_min(&self) -> Option<f64> {
+        self.eigenvalue_min.get().flatten()
+    }
+
+    /// Rayleigh quotient after some steps of inverse iteration: an estimate from above.
+    pub(super) fn estimate_eigenvalue_min(&self) -> Option<f64> {
+        let n = self.partition.unknown().len();
+        // A fixed start without symmetry.
+        let mut x: Vec<f64> = (0..n).map(|i| 1.0 + 0.5 * (1.7 * i as f64).sin()).collect();
+        let mut quotient = None;
+        for _ in 0..INVERSE_STEPS {
+            let size = norm(&x);
+            if size.is_nan() || size <= 0.0 || !size.is_finite() {
+                return None;
+            }
+            x.iter_mut().for_each(|v| *v /= size);
+            let mut y = x.clone();
+            self.factor.solve_in_place(&mut y, 1);
+            let along: f64 = x.iter().zip(&y).map(|(a, b)| a * b).sum();
+            quotient = (along > 0.0).then(|| 1.0 / along);
+            x = y;
+        }
+        quotient
+    }
 }
 
-pub(super) fn refuse(error: FrontError, partition: &Partition) -> CondensedError {
-    match error {
-        FrontError::NotPositive { row } => {
-            let dof = partition.unknown().get(row).map_or(0, |&d| d as usize);
-            CondensedError::NotPositiveDefinite { node: dof / 3, axis: AXIS_NAMES[dof % 3] }
+/// The nodes of a boundary surface, and where each of them stands among them.
+///
+/// Shapes: `nodes` ascending; `places` one for each node of the mesh.
+pub(super) struct SurfaceNodes {
+    nodes: Vec<u32>,
+    places: Vec<u32>,
+}
+
+/// Displacement of a node of the surface under a unit force along x, y and z, one after the other, m/N.
+pub(super) type Block = [f64; 9];
+
+/// Of a node that is inside.
+const INSIDE: u32 = u32::MAX;
+
+impl SurfaceNodes {
+    pub fn from_mesh(mesh: &TetMesh) -> Self {
+        let nodes = Surface::from_mesh(mesh).nodes;
+        let mut places = vec![INSIDE; mesh.node_count()];
+        for (place, &node) in (0..).zip(&nodes) {
+            places[node as usize] = place;
         }
-        FrontError::OutOfMemory { bytes } => CondensedError::OutOfMemory { bytes },
-        // The analysis was made from this very stiffness.
-        FrontError::OtherPattern => CondensedError::OutOfMemory { bytes: 0 },
+        Self { nodes, places }
+    }
+
+    /// Position of a node among those of the surface.
+    pub fn place_of(&self, node: u32) -> Option<usize> {
+        let place = self.places.get(node as usize).copied().unwrap_or(INSIDE);
+        (place != INSIDE).then_some(place as usize)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.places.as_slice())
+    }
+
+    /// Bytes of the blocks of one contact.
+    pub fn block_bytes(&self) -> usize {
+        self.nodes.len() * size_of::<Block>()
+    }
+
+    /// The blocks of a contact, in the order of the nodes.
+    ///
+    /// Shapes: `fields` displacement of every degree of freedom under a unit force along x, y, z; 3 × 3N.
+    pub fn blocks(&self, [x, y, z]: [&[f64]; 3]) -> Vec<Block> {
+        let block = |&node: &u32| {
+            let at = 3 * node as usize;
+            let [x, y, z] = [&x[at..at + 3], &y[at..at + 3], &z[at..at + 3]];
+            [x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]]
+        };
+        self.nodes.iter().map(block).collect()
     }
 }

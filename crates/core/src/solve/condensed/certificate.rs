@@ -3,11 +3,11 @@
 use nalgebra::DVector;
 
 use super::base::Base;
-use super::contact_set::{ContactAnswer, ContactSet};
+use super::correction::Correction;
+use super::overlap::{LoadSize, Overlap};
 use super::rounding::{SAFE, SLACK, gamma};
+use super::small_system::{ContactAnswer, SmallSystem};
 use super::verified::{Amplification, Verified};
-use crate::solve::Certainty;
-use crate::solve::certainty::{inverse_norm, row_sums};
 use crate::solve::vectors::norm;
 
 /// How wrong an answer can be.
@@ -40,76 +40,59 @@ const WEAKLY_HELD: &str =
     "the contacts hold the body so weakly that double precision proves no bound";
 const NO_USE: &str = "the proven error is as large as the displacements";
 
-impl Base {
-    /// Estimates Skeel's condition number of the held shape, once, by a few solves.
-    pub fn estimate_condition(&self) -> f64 {
-        self.condition.get_or(|| {
-            let weights = row_sums(&self.stiffness, &self.partition);
-            inverse_norm(&weights, &|mut b, columns| {
-                self.factor.solve_in_place(&mut b, columns);
-                b
-            })
-        })
-    }
+/// What answers of one contact set are judged by.
+#[derive(Clone, Copy)]
+pub(super) struct Judge<'a> {
+    pub base: &'a Base,
+    pub small: &'a SmallSystem,
+    pub overlap: &'a Overlap,
+    pub verified: &'a Verified,
+    pub load: &'a LoadSize,
+    /// What a second solve found, once there was one.
+    pub correction: Option<&'a Correction>,
 }
 
-impl ContactSet {
-    /// How certain the digits of every answer of this set are; `None` until the condition of the base
-    /// has been estimated ([`Base::estimate_condition`]).
-    ///
-    /// The errors of the columns balance but for what the small system makes of them, so the worse of
-    /// both conditions decides. The elimination of n unknowns has a backward error of up to n times
-    /// the unit roundoff (Higham 2002, 9.3).
-    pub fn certainty(&self, base: &Base) -> Option<Certainty> {
-        let unknowns = (self.places.len() + base.modes.len()) as f64;
-        let condition = base.condition.get()?.max(0.5 * unknowns * self.condition());
-        Some(Certainty::new(condition, f64::EPSILON))
-    }
-
-    /// How wrong an answer can be; costs no more than a few products of the size of the set.
-    ///
-    /// Shapes: `q` as in [`ContactSet::solve`]; `delivered` what
-    /// [`ContactSet::wanted_displacements`] gave, or all nodes where none were asked for (may be
-    /// empty).
-    pub fn certify(
-        &self,
-        base: &Base,
+impl Judge<'_> {
+    /// How wrong an answer can be that was delivered with this norm, m.
+    pub fn certificate(
+        self,
         q: &[f64],
         answer: &ContactAnswer,
-        delivered: &[[f64; 3]],
+        delivered: f64,
         delivery: Delivery,
     ) -> Certificate {
-        let residual_rel = self.residual_rel(base, q, answer);
-        let error_bound_rel = self.bound(base, q, answer, self.size_of(delivered), delivery);
-        Certificate { residual_rel, error_bound_rel }
+        Certificate {
+            residual_rel: self.residual_rel(q, answer),
+            error_bound_rel: self.bound(q, answer, delivered, delivery),
+        }
     }
 
-    fn residual_rel(&self, base: &Base, q: &[f64], answer: &ContactAnswer) -> f64 {
-        let places = self.places.iter().map(|&(at, axis)| self.columns[at].residuals[axis]);
+    fn residual_rel(self, q: &[f64], answer: &ContactAnswer) -> f64 {
+        let Self { base, small, .. } = self;
+        let places = small.places.iter().map(|&(at, axis)| small.columns[at].residuals[axis]);
         let residuals = places.chain(base.modes.iter().map(|m| m.residual));
         let amounts = answer.lambda.iter().chain(&answer.amounts);
         let mut residual: f64 = residuals.zip(amounts).map(|(r, amount)| amount.abs() * r).sum();
         // What the contacts are off moves their neighbours by at most so much force.
-        let stiffest = (base.stiffest * self.overlap.lift).max(self.scale);
+        let stiffest = (base.stiffest * self.overlap.lift).max(small.scale);
         residual += stiffest * answer.mismatch;
         let b = self.load.size(q);
         if b > 0.0 { residual / b } else { residual }
     }
 
     fn bound(
-        &self,
-        base: &Base,
+        self,
         q: &[f64],
         answer: &ContactAnswer,
         delivered: f64,
         delivery: Delivery,
     ) -> Result<f64, &'static str> {
+        let Self { base, verified, .. } = self;
         let eigenvalue = base.eigenvalue_min().ok_or(NOT_PROVEN)?;
         let asked = norm(q);
         if asked == 0.0 {
             return Err("nothing moves");
         }
-        let verified = &self.verified;
         if ![asked, eigenvalue, base.stiffest, verified.scale].iter().all(|x| SAFE.contains(x)) {
             return Err(OUT_OF_RANGE);
         }
@@ -118,7 +101,7 @@ impl ContactSet {
         let x: Vec<f64> = of_lambda.chain(answer.amounts.iter().copied()).collect();
         let x = DVector::from_vec(x);
         let missed = verified.mismatch(q, &x);
-        let plain = self.plain(base, &x, missed, factors);
+        let plain = self.plain(&x, missed, factors);
         let refined = self.refined(&x, missed, factors);
         let error = match (plain, refined) {
             (Some(plain), Some(refined)) => plain.min(refined),
@@ -126,7 +109,7 @@ impl ContactSet {
         };
         // The size of the exact answer, from below.
         let by_contacts = asked / self.overlap.stretch;
-        let by_all = self.correction().map_or(0.0, |c| c.size.at_least(&x));
+        let by_all = self.correction.map_or(0.0, |c| c.size.at_least(&x));
         let size = by_contacts.max((delivered / SLACK).max(by_all) - error) / SLACK;
         let rounded = match delivery {
             Delivery::Double => 0.0,
@@ -138,20 +121,14 @@ impl ContactSet {
     }
 
     /// The bound from the columns' residuals.
-    fn plain(
-        &self,
-        base: &Base,
-        x: &DVector<f64>,
-        missed: f64,
-        factors: Amplification,
-    ) -> Option<f64> {
-        let v = &self.verified;
+    fn plain(self, x: &DVector<f64>, missed: f64, factors: Amplification) -> Option<f64> {
+        let v = self.verified;
         // Written so that a NaN is refused too.
         let is_verified = v.eta < 0.5;
         let step = missed / (1.0 - v.eta);
         let residual = Verified::sum(&v.residuals, x) + v.left * step;
         let size = Verified::sum(&v.norms, x);
-        let moments = base.rigid.as_ref().map_or(0.0, |rigid| rigid.stiffness);
+        let moments = self.base.rigid.as_ref().map_or(0.0, |rigid| rigid.stiffness);
         let error = factors.of_residual * residual
             + factors.of_moment * moments * (size + v.moved * step)
             + v.moved * step
@@ -159,12 +136,12 @@ impl ContactSet {
         is_verified.then_some(error * SLACK)
     }
 
-    /// The bound from what a second solve found, once there was one ([`ContactSet::refine`]).
+    /// The bound from what a second solve found, once there was one ([`super::ContactSet::refine`]).
     ///
     /// What was found is all rounding, so it would be another number in other units; what is said is
     /// the smallest of some fixed multiples of what was expected that is no smaller.
-    fn refined(&self, x: &DVector<f64>, missed: f64, factors: Amplification) -> Option<f64> {
-        let (c, v) = (self.correction()?, &self.verified);
+    fn refined(self, x: &DVector<f64>, missed: f64, factors: Amplification) -> Option<f64> {
+        let (c, v) = (self.correction?, self.verified);
         // Written so that a NaN is refused too.
         let is_verified = c.eta < 0.5;
         if !is_verified {

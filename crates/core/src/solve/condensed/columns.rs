@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
-use super::base::{Base, CondensedError};
+use super::base::{Base, Block, SurfaceNodes};
+use super::error::CondensedError;
 use super::rounding::{rounding_of_product, settled};
-use super::surface_columns::{Block, SurfaceNodes};
 use super::touched::Contact;
 use crate::solve::vectors::norm;
 use crate::solve::worked_out::WorkedOut;

@@ -4,10 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::ball::Ball;
 use super::base::Base;
-use super::exact::{Accurate, disturbance, residual};
-use super::rounding::{SLACK, UNIT, gamma, rounding_of_product, settled};
+use super::rounding::{
+    Accurate, Ball, SLACK, UNIT, disturbance, gamma, residual, rounding_of_product, settled,
+};
 use super::touched::Touched;
 use super::verified::Verified;
 use crate::solve::vectors::norm;

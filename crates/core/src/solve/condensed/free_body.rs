@@ -11,9 +11,10 @@ use std::ops::AddAssign;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::base::{Base, CondensedError};
+use super::base::Base;
 #[cfg(test)]
 use super::columns::ContactColumns;
+use super::error::CondensedError;
 use crate::mesh::TetMesh;
 
 /// Rigid motions, masses and the response of the held body to them, made once for a shape.
@@ -349,7 +350,7 @@ mod tests {
         let mesh = generate(BuiltIn::Sphere, 200).unwrap();
         let material = Material::try_new(2.0e4, 0.4).unwrap();
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
-        let base = model.condense(&mut |_| {}).unwrap();
+        let base = model.condense(None, &mut |_| {}).unwrap();
         (model, base)
     }
 
@@ -423,7 +424,7 @@ mod tests {
         let material = Material::try_new(1.0e5, 0.3).unwrap();
         let fixed = [0, 1, 2, 15, 16, 17, 24, 25, 26].to_vec();
         let model = Model::try_new(mesh, Element::Tet4, &[material], fixed, &mut |_| {}).unwrap();
-        let base = model.condense(&mut |_| {}).unwrap();
+        let base = model.condense(None, &mut |_| {}).unwrap();
         let refused = FreeBody::try_new(model.mesh(), &base).err();
         assert_eq!(refused, Some(CondensedError::NotFree { motions: 0 }));
     }

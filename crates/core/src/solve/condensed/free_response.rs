@@ -6,11 +6,11 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::base::{Base, CondensedError};
+use super::base::{Base, Block, SurfaceNodes};
 use super::columns::{Columns, ContactColumns};
+use super::error::CondensedError;
 use super::free_body::{FreeBody, Relief};
 use super::free_tangent::FreeTangent;
-use super::surface_columns::{Block, SurfaceNodes};
 use super::touched::Contact;
 
 /// A force at a node, N, in the object's frame.

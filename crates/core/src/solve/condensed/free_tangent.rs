@@ -18,8 +18,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{DVector, Dyn, LU};
 use rayon::prelude::*;
 
-use super::base::{Base, CondensedError, refuse};
+use super::base::Base;
 use super::columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
+use super::error::CondensedError;
 use super::free_body::FreeBody;
 use super::touched::Contact;
 use crate::fem::Stiffness;
@@ -54,7 +55,7 @@ impl FreeTangent {
         bound: usize,
     ) -> Result<Self, CondensedError> {
         let factor = FrontFactor::try_new(base.factor.analysis(), tangent)
-            .map_err(|error| refuse(error, &base.partition))?;
+            .map_err(|error| CondensedError::of_factor(error, &base.partition))?;
         let loads = body.mean_loads();
         let pulls: Vec<Vec<f64>> = base.held.iter().map(|&dof| column(tangent, dof)).collect();
         let both: Vec<&[f64]> = loads.iter().chain(&pulls).map(Vec::as_slice).collect();
@@ -223,7 +224,7 @@ mod tests {
         let size = mesh.size();
         let material = Material::try_new(2.0e4, 0.4).unwrap();
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
-        let base = model.condense(&mut |_| {}).unwrap();
+        let base = model.condense(None, &mut |_| {}).unwrap();
         let body = FreeBody::try_new(model.mesh(), &base).unwrap();
         let elements = model.hyperelastic(Law::NeoHookean).unwrap();
         // Pressed by a hundredth, and bent.

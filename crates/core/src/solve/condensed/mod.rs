@@ -17,7 +17,6 @@
 //! for single nodes that is (3.43a), and λ are the reactions (3.43b). Nodes that the scene fixes are
 //! a true base and need no R.
 
-mod ball;
 mod base;
 #[cfg(test)]
 mod bound_tests;
@@ -25,28 +24,29 @@ mod certificate;
 mod columns;
 mod contact_set;
 mod correction;
-mod eigenvalue;
-mod exact;
+mod error;
 mod free_body;
 mod free_response;
 mod free_tangent;
-mod load_size;
 #[cfg(test)]
 mod mask_tests;
 mod overlap;
 mod rigid;
 mod rounding;
-mod surface_columns;
+mod small_system;
 #[cfg(test)]
 mod tests;
 mod touched;
 mod verified;
+mod wanted_rows;
 
-pub use base::{Base, CondensedError};
+pub use base::Base;
 pub use certificate::{Certificate, Delivery};
 pub use columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
-pub use contact_set::{ContactAnswer, ContactSet};
+pub use contact_set::ContactSet;
+pub use error::CondensedError;
 pub use free_body::{FreeBody, Relief};
 pub use free_response::{Elasticity, HeldCompliance, NodeForce, Response, ShapeResponse};
 pub use free_tangent::FreeTangent;
+pub use small_system::ContactAnswer;
 pub use touched::{Contact, Touched};

@@ -3,8 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::ball::Ball;
-use super::rounding::{SLACK, gamma, rounding_of_product, settled};
+use super::rounding::{Ball, SLACK, gamma, rounding_of_product, settled};
 use crate::fem::Stiffness;
 use crate::solve::vectors::norm;
 

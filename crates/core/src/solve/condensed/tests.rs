@@ -24,7 +24,8 @@ impl Shape {
         let stiffness = Arc::new(assemble(&pattern, &mesh, &[material]).unwrap());
         let bodies = Bodies::from_mesh(&mesh);
         let rigid = RigidBodies::new(&mesh, &bodies);
-        let base = Base::try_new(&mesh, &bodies, &rigid, &stiffness, fixed, &mut |_| {}).unwrap();
+        let base =
+            Base::try_new(&mesh, &bodies, &rigid, &stiffness, fixed, None, &mut |_| {}).unwrap();
         Self { mesh, stiffness, base, columns: Columns::new(1 << 30) }
     }
 

@@ -1,6 +1,6 @@
 //! The contacts of a frame: touched degrees of freedom, and masks.
 
-use super::base::CondensedError;
+use super::error::CondensedError;
 use crate::contact::Mask;
 
 /// What is held and gets a displacement: the columns of E.

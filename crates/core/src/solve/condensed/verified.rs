@@ -1,14 +1,12 @@
 //! What the bound needs of a contact set: the small system with its rounding, an inverse that is
 //! verified, and how stiffly the contacts hold the body (`docs/bound.md`, sections 4 and 5).
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 
-use super::ball::Ball;
 use super::base::Base;
 use super::columns::ContactColumns;
-use super::rounding::{SLACK, gamma, settled};
+use super::rounding::{Ball, SLACK, gamma, settled};
+use super::small_system::SmallSystem;
 use super::touched::Touched;
 
 /// The small system `S = [ s EᵀG  EᵀR ; (EᵀR)ᵀ 0 ]` as the stored columns define it.
@@ -56,15 +54,9 @@ pub(super) struct Amplification {
 
 impl Verified {
     /// Shapes: `small` and `inverse` k², scaled; `places` as in the contact set.
-    pub fn new(
-        base: &Base,
-        touched: &Touched,
-        columns: &[Arc<ContactColumns>],
-        places: &[(usize, usize)],
-        small: &DMatrix<f64>,
-        inverse: DMatrix<f64>,
-        scale: f64,
-    ) -> Self {
+    pub fn new(base: &Base, touched: &Touched, small: &SmallSystem, inverse: DMatrix<f64>) -> Self {
+        let SmallSystem { columns, places, matrix, scale, .. } = small;
+        let scale = *scale;
         let (c, k) = (places.len(), places.len() + base.modes.len());
         let field = |j: usize| match places.get(j) {
             Some(&(at, axis)) => (&columns[at].fields[axis], scale),
@@ -83,7 +75,7 @@ impl Verified {
                 }
             }
         }
-        let small = Ball { middle: small.clone(), radius };
+        let small = Ball { middle: matrix.clone(), radius };
         let product = small.times(&Ball::exact(inverse.clone()));
         let eta = if k > 0 { product.distance_from_identity() } else { 0.0 };
         let of_places = |of: fn(&ContactColumns, usize) -> f64| {

@@ -3,14 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::direction::Direction;
-use super::fallback::Fallback;
 use super::kernel::Kernel;
 use super::refinement::{Judged, Shrinking, steps_max};
-use super::solution::{Loads, Solution};
-use crate::fem::{Products, Stiffness};
+use super::solution::{Fallback, Loads, Solution, System};
+use crate::fem::{Products, Stiffness, forces_of_columns};
 use crate::solve::Partition;
-use crate::solve::columns::{PART_ROWS, roots, sum};
+use crate::solve::columns::{PART_ROWS, dots, roots, sum};
 
 /// Several answers on their way.
 ///
@@ -58,7 +56,7 @@ impl<'a> Block<'a> {
                 q[dof as usize * columns + j] = value;
             }
         }
-        let products = stiffness.mul_columns(&q, columns);
+        let products = Products::of(stiffness, &q, columns);
         let (forces, residual) = (external(partition, loads, columns), vec![0.0; rows]);
         let b_norms = Vec::new();
         let mut this =
@@ -69,11 +67,9 @@ impl<'a> Block<'a> {
 
     /// The answers by a factor; none of a load that needs to be solved alone.
     pub fn solve(
-        partition: &Partition,
-        stiffness: &Stiffness,
+        system: System<'_>,
         kernel: &Kernel,
         loads: &[Loads<'_>],
-        fallback: Option<Fallback>,
     ) -> Vec<Option<Solution>> {
         // What is no number would spread from one answer to the others.
         let is_number =
@@ -81,6 +77,7 @@ impl<'a> Block<'a> {
         if !loads.iter().all(is_number) {
             return vec![None; loads.len()];
         }
+        let System { stiffness, partition, fallback, .. } = system;
         let mut block = Block::new(partition, stiffness, loads);
         let progress = block.refine(kernel);
         (0..loads.len()).map(|j| block.solution(j, &progress, fallback)).collect()
@@ -118,7 +115,7 @@ impl<'a> Block<'a> {
         let mut correction = direction.memory();
         kernel.apply_to_rows(&self.residual, &mut correction, columns, self.partition);
         direction.turn(correction);
-        self.stiffness.forces_of_columns(&direction.p, columns, &mut direction.forces);
+        forces_of_columns(self.stiffness, &direction.p, columns, &mut direction.forces);
         let lengths = direction.lengths(&self.residual);
         let (added, whole) = self.add(direction, &lengths);
         let size = |(added, whole): (f64, f64)| if added == 0.0 { 0.0 } else { added / whole };
@@ -158,7 +155,7 @@ impl<'a> Block<'a> {
 
     /// `K q` anew, and how good the answers are.
     fn judge(&mut self) -> Progress {
-        self.products = self.stiffness.mul_columns(&self.q, self.columns);
+        self.products = Products::of(self.stiffness, &self.q, self.columns);
         let (backward, residual_norms) = self.find_residual();
         let found = backward.into_iter().zip(&residual_norms).zip(&self.b_norms);
         let judged = found.map(|((backward, &norm), &b_norm)| Judged::new(backward, norm, b_norm));
@@ -260,3 +257,76 @@ fn external(partition: &Partition, loads: &[Loads<'_>], columns: usize) -> Optio
         forces
     })
 }
+
+/// Directions in which several answers are corrected, each conjugate to the one before.
+///
+/// A factor in single precision is wrong in few shapes of displacement, the softest ones, so that
+/// plain refinement takes the same share off in every step. The length of a step that leaves the
+/// least energy of error, and conjugate directions, take those shapes out one after another.
+///
+/// Shapes: rows of all degrees of freedom (3N) × `columns` loads, the numbers of one row next to each
+/// other; known rows of `p` are zero.
+///
+/// Source: Hestenes and Stiefel 1952; the flexible form after Golub and Ye 1999.
+struct Direction {
+    columns: usize,
+    /// The direction, at first the answers themselves.
+    p: Vec<f64>,
+    /// `K p`; zeros as long as it is not known.
+    forces: Vec<f64>,
+    /// `pᵀ K p` of every load.
+    energy: Vec<f64>,
+    /// Memory of the direction before.
+    spare: Vec<f64>,
+}
+
+impl Direction {
+    fn new(rows: usize, columns: usize) -> Self {
+        let none = || vec![0.0; rows];
+        Self { columns, p: none(), forces: none(), energy: vec![0.0; columns], spare: none() }
+    }
+
+    /// Memory for corrections, with anything in it.
+    fn memory(&mut self) -> Vec<f64> {
+        std::mem::take(&mut self.spare)
+    }
+
+    /// Takes the corrections, made conjugate to the direction before.
+    fn turn(&mut self, mut correction: Vec<f64>) {
+        let columns = self.columns;
+        if self.energy.iter().any(|energy| *energy > 0.0) {
+            let common = dots(&correction, &self.forces, columns);
+            let share: Vec<f64> = common
+                .iter()
+                .zip(&self.energy)
+                .map(|(c, e)| if *e > 0.0 { c / e } else { 0.0 })
+                .collect();
+            let part = PART_ROWS * columns;
+            let pairs = correction.par_chunks_mut(part).zip(self.p.par_chunks(part));
+            pairs.for_each(|(correction, p)| {
+                for (c, p) in correction.chunks_exact_mut(columns).zip(p.chunks_exact(columns)) {
+                    for j in 0..columns {
+                        c[j] -= share[j] * p[j];
+                    }
+                }
+            });
+        }
+        self.spare = std::mem::replace(&mut self.p, correction);
+    }
+
+    /// How far each answer goes so that the energy of its error is least; as far as the correction
+    /// says where rounding hides that.
+    fn lengths(&mut self, residual: &[f64]) -> Vec<f64> {
+        self.energy = dots(&self.p, &self.forces, self.columns);
+        let work = dots(&self.p, residual, self.columns);
+        let length = |(work, energy): (f64, &f64)| match work / energy {
+            length if (LENGTH_MIN..LENGTH_MAX).contains(&length) => length,
+            _ => 1.0,
+        };
+        work.into_iter().zip(&self.energy).map(length).collect()
+    }
+}
+
+/// Lengths of a step that a factor of the same matrix can ask for.
+const LENGTH_MIN: f64 = 0.5;
+const LENGTH_MAX: f64 = 2.0;

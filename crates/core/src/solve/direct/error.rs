@@ -1,8 +1,7 @@
 //! Errors of the direct methods.
 
-use crate::solve::Method;
-use crate::solve::Partition;
 use crate::solve::partition::AXIS_NAMES;
+use crate::solve::{Method, Partition, Within};
 
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -88,6 +87,15 @@ pub enum SolveError {
 }
 
 impl SolveError {
+    /// Refuses a factor or inverse of so many unknowns that needs more bytes than it may take.
+    pub(super) fn check_limit(how: Within, needed: u64, unknown_dofs: usize) -> Result<(), Self> {
+        let Within { method, limit } = how;
+        match needed > limit {
+            true => Err(Self::OverLimit { method, unknown_dofs, needed, limit }),
+            false => Ok(()),
+        }
+    }
+
     /// A pivot that was not positive, at the node and axis of its row of `K11`.
     pub(super) fn not_positive(method: Method, partition: &Partition, row: usize) -> Self {
         let dof = partition.unknown().get(row).map_or(0, |&d| d as usize);

@@ -1,13 +1,87 @@
-//! What a method makes of `K11`: an explicit inverse, a factor or a hierarchy, and products with it.
+//! `K11` ordered and analysed, and what a method makes of it: an explicit inverse, a factor or a
+//! hierarchy, and products with it.
 
-use crate::solve::Partition;
+use std::sync::Arc;
+
+use super::error::SolveError;
+use crate::fem::Stiffness;
 use crate::solve::columns::norms;
-use crate::solve::front::FrontFactor;
-use crate::solve::gauss_jordan;
+use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
+use crate::solve::k11::{NotPositive, SparseK11, visit_k11};
+use crate::solve::memory::hierarchy_bytes;
 use crate::solve::multigrid::Hierarchy;
-use crate::solve::sparse::SparseFactor;
+use crate::solve::oracle::gauss_jordan;
+use crate::solve::oracle::sparse::{Analysis, SparseFactor};
 use crate::solve::tiles::Tiles;
 use crate::solve::vectors::norm;
+use crate::solve::{Method, Partition, Stage, Within, ordering};
+
+/// `K11` of one partition, ordered and analysed but not factored yet: what a factor will cost is
+/// known, so a precision can be chosen by it.
+///
+/// Source: thesis (3.41).
+#[derive(Clone)]
+pub struct Analysed {
+    partition: Partition,
+    analysis: Arc<FrontAnalysis>,
+}
+
+impl Analysed {
+    /// Orders and analyses `K11`; `on_stage` hears [`Stage::Order`].
+    pub fn new(
+        stiffness: &Stiffness,
+        partition: Partition,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Self {
+        on_stage(Stage::Order);
+        let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
+        Self { partition, analysis }
+    }
+
+    /// Operations, entries and memory of a factor.
+    pub fn analysis(&self) -> &Arc<FrontAnalysis> {
+        &self.analysis
+    }
+
+    /// Bytes held at most while the factor of a method over fronts is made, the factor included.
+    pub fn peak_bytes(&self, method: Method) -> u64 {
+        self.analysis.peak_bytes_of(method) as u64
+    }
+
+    /// The partition that was analysed.
+    pub(super) fn into_partition(self) -> Partition {
+        self.partition
+    }
+
+    /// The factor on the current rayon pool; `on_stage` hears [`Stage::Factor`].
+    ///
+    /// `stiffness` must be the one this was analysed from.
+    ///
+    /// # Errors
+    /// [`SolveError::NotPositiveDefinite`] with the node, [`SolveError::OutOfMemory`],
+    /// [`SolveError::NoSuchFactor`] for a method without fronts.
+    pub(super) fn kernel(
+        &self,
+        stiffness: &Stiffness,
+        method: Method,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Kernel, SolveError> {
+        let Self { partition, analysis } = self;
+        if !method.has_fronts() {
+            return Err(SolveError::NoSuchFactor { method });
+        }
+        on_stage(Stage::Factor);
+        let unknown_dofs = partition.unknown().len();
+        let failed = |error| match error {
+            FrontError::NotPositive { row } => SolveError::not_positive(method, partition, row),
+            _ => SolveError::OutOfMemory { method, unknown_dofs },
+        };
+        Ok(match method.is_single() {
+            false => Kernel::Front(FrontFactor::try_new(analysis, stiffness).map_err(failed)?),
+            true => Kernel::FrontSingle(FrontFactor::try_new(analysis, stiffness).map_err(failed)?),
+        })
+    }
+}
 
 /// An inverse of `K11`, a factor of it, or what stands in for one.
 pub(super) enum Kernel {
@@ -28,6 +102,70 @@ pub(super) enum Kernel {
 }
 
 impl Kernel {
+    /// What a method without fronts makes of `K11`, on the current rayon pool.
+    ///
+    /// # Errors
+    /// [`SolveError::NotPositiveDefinite`] with the node, [`SolveError::OutOfMemory`],
+    /// [`SolveError::OverLimit`], [`SolveError::NoSuchFactor`] for the others.
+    pub fn without_fronts(
+        stiffness: &Stiffness,
+        partition: &Partition,
+        how: Within,
+        on_stage: &mut dyn FnMut(Stage),
+    ) -> Result<Self, SolveError> {
+        let (n, method) = (partition.unknown().len(), how.method);
+        let check = |needed: u64| SolveError::check_limit(how, needed, n);
+        check(method.dense_bytes(n).unwrap_or(0))?;
+        let not_positive =
+            |error: NotPositive| SolveError::not_positive(method, partition, error.row);
+        let out_of_memory = || SolveError::OutOfMemory { method, unknown_dofs: n };
+        match method {
+            Method::GaussJordan | Method::GaussJordanPlain => {
+                on_stage(Stage::Factor);
+                let entries = n.checked_mul(n).ok_or_else(out_of_memory)?;
+                let mut inverse = Vec::new();
+                inverse.try_reserve_exact(entries).map_err(|_| out_of_memory())?;
+                inverse.resize(entries, 0.0);
+                visit_k11(stiffness, partition, |i, j, value| inverse[i * n + j] = value);
+                let inverted = match method {
+                    Method::GaussJordanPlain => gauss_jordan::invert_plainly(&mut inverse, n),
+                    _ => gauss_jordan::invert(&mut inverse, n),
+                };
+                inverted.map_err(not_positive)?;
+                Ok(Self::Inverse(inverse))
+            }
+            Method::DenseInverse | Method::DenseCholesky => {
+                on_stage(Stage::Factor);
+                let mut tiles = Tiles::zeros(n);
+                visit_k11(stiffness, partition, |i, j, value| tiles.add(i, j, value));
+                if method == Method::DenseInverse {
+                    tiles.invert().map_err(not_positive)?;
+                    return Ok(Self::TiledInverse(tiles));
+                }
+                tiles.factor().map_err(not_positive)?;
+                Ok(Self::TiledFactor(tiles))
+            }
+            Method::SparseCholesky => {
+                on_stage(Stage::Order);
+                let order = ordering::nested_dissection(stiffness, partition);
+                let k11 = SparseK11::new(stiffness, partition);
+                let analysis = Analysis::new(k11, order).map_err(|_| out_of_memory())?;
+                check(analysis.bytes())?;
+                on_stage(Stage::Factor);
+                Ok(Self::Sparse(Box::new(analysis.factor().map_err(not_positive)?)))
+            }
+            Method::Multigrid => {
+                let blocks = stiffness.pattern().block_count();
+                check(hierarchy_bytes(stiffness.node_count(), blocks) as u64)?;
+                on_stage(Stage::Factor);
+                Ok(Self::Multigrid(Box::new(Hierarchy::new(stiffness, partition))))
+            }
+            Method::Front | Method::FrontMixed | Method::Pcg | Method::Condensed => {
+                Err(SolveError::NoSuchFactor { method })
+            }
+        }
+    }
+
     /// Bytes held, `n` being the number of unknowns.
     pub fn bytes(&self, n: usize) -> usize {
         match self {

@@ -1,10 +1,13 @@
-//! Loads, and the displacements and reactions that they cause.
+//! Load cases of a partition, and the displacements and reactions that they cause.
+
+use std::fmt;
 
 use super::error::SolveError;
-use super::fallback::Fallback;
-use crate::solve::Partition;
+use crate::fem::Stiffness;
+use crate::solve::k11::right_hand_side;
+use crate::solve::{Method, Partition};
 
-/// Known displacements and external forces of one answer.
+/// One load case: prescribed displacements (Dirichlet values) and external forces.
 ///
 /// Shapes: `q_known` one per known degree of freedom of the partition, in its order; `forces`
 /// empty or 3N (entries on known degrees of freedom must be zero). Units: m, N.
@@ -17,6 +20,25 @@ pub struct Loads<'a> {
     /// Relative residual and estimated relative error that are good enough, both, for a method that
     /// can stop early ([`Method::Pcg`](crate::solve::Method::Pcg)); zero asks for all there is.
     pub residual_rel: f64,
+}
+
+/// Why a factor in single precision did not do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fallback {
+    /// A pivot of the factor was not positive in single precision.
+    NoFactor,
+    /// Refinement with the factor came to a halt before the answer was right.
+    Stalled,
+}
+
+impl fmt::Display for Fallback {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let why = match self {
+            Self::NoFactor => "single precision finds no factor",
+            Self::Stalled => "refinement with a single-precision factor comes to a halt",
+        };
+        write!(f, "{why}, so double precision was taken")
+    }
 }
 
 /// Displacements, reactions and how exact they are.
@@ -38,17 +60,62 @@ pub struct Solution {
     pub fallback: Option<Fallback>,
 }
 
-/// Whether loads fit a partition.
-pub(super) fn check(partition: &Partition, loads: Loads<'_>) -> Result<(), SolveError> {
-    let expected = partition.known().len();
-    if loads.q_known.len() != expected {
-        let given = loads.q_known.len();
-        return Err(SolveError::LoadCount { what: "known displacements", given, expected });
+/// `K11` of one partition, and what its answers are told with.
+#[derive(Clone, Copy)]
+pub(super) struct System<'a> {
+    pub stiffness: &'a Stiffness,
+    pub partition: &'a Partition,
+    pub method: Method,
+    pub fallback: Option<Fallback>,
+}
+
+impl System<'_> {
+    /// Whether a load case fits the partition.
+    pub fn check(self, loads: Loads<'_>) -> Result<(), SolveError> {
+        let expected = self.partition.known().len();
+        if loads.q_known.len() != expected {
+            let given = loads.q_known.len();
+            return Err(SolveError::LoadCount { what: "known displacements", given, expected });
+        }
+        let expected = self.partition.dof_count();
+        if !loads.forces.is_empty() && loads.forces.len() != expected {
+            let given = loads.forces.len();
+            return Err(SolveError::LoadCount { what: "external forces", given, expected });
+        }
+        Ok(())
     }
-    let expected = partition.dof_count();
-    if !loads.forces.is_empty() && loads.forces.len() != expected {
-        let given = loads.forces.len();
-        return Err(SolveError::LoadCount { what: "external forces", given, expected });
+
+    /// Right-hand side of (3.42a), n.
+    pub fn right_hand_side(self, loads: Loads<'_>) -> Vec<f64> {
+        right_hand_side(self.stiffness, self.partition, loads.q_known, loads.forces)
     }
-    Ok(())
+
+    /// Sets the prescribed displacements in a field of 3N.
+    pub fn prescribe(self, loads: Loads<'_>, q: &mut [f64]) {
+        for (&dof, &value) in self.partition.known().iter().zip(loads.q_known) {
+            q[dof as usize] = value;
+        }
+    }
+
+    /// `K11 x`, through the whole stiffness with zeros at the known degrees of freedom.
+    pub fn apply_k11(self, x: &[f64]) -> Vec<f64> {
+        let mut q = vec![0.0; self.partition.dof_count()];
+        self.partition.scatter_unknown(x, &mut q);
+        let f = self.stiffness.mul(&q);
+        self.partition.unknown().iter().map(|&dof| f[dof as usize]).collect()
+    }
+
+    /// Refuses displacements that are not finite numbers.
+    pub fn check_finite(self, q: &[f64]) -> Result<(), SolveError> {
+        match q.iter().all(|x| x.is_finite()) {
+            true => Ok(()),
+            false => Err(SolveError::NotFinite { method: self.method }),
+        }
+    }
+
+    /// Reactions (3.43b) at the known degrees of freedom.
+    pub fn reactions(self, q: &[f64]) -> Vec<f64> {
+        let f = self.stiffness.mul(q);
+        self.partition.known().iter().map(|&dof| f[dof as usize]).collect()
+    }
 }

@@ -11,7 +11,7 @@ use crate::fem::{Material, Stiffness, StiffnessPattern, assemble};
 use crate::mesh::{TetMesh, signed_volume};
 use crate::solve::front::{FrontAnalysis, FrontFactor};
 use crate::solve::k11::SparseK11;
-use crate::solve::sparse::Analysis;
+use crate::solve::oracle::sparse::Analysis;
 use crate::solve::{Method, Partition, ordering};
 
 /// n³ nodes, six tetrahedra a cell, inner nodes moved irregularly.
@@ -259,7 +259,8 @@ fn double_precision_is_not_taken_beyond_the_memory_limit() {
     let partition = Partition::try_new(&mesh.used_nodes(), &dofs).unwrap();
     let analysed = Analysed::new(&stiffness, partition, &mut |_| {});
     let limit = analysed.peak_bytes(Method::FrontMixed);
-    match analysed.factor_within(&stiffness, Method::FrontMixed, limit, &mut |_| {}) {
+    match Factored::of_analysed(analysed, &stiffness, Method::FrontMixed.within(limit), &mut |_| {})
+    {
         Err(SolveError::NotPositiveDefinite { .. }) => {}
         Err(other) => panic!("{other}"),
         Ok(factored) => {
@@ -369,7 +370,13 @@ fn conjugate_corrections_make_good_what_a_stiffer_factor_gets_wrong() {
     let q_known: Vec<f64> = known.iter().map(|k| k.1).collect();
     let turned: Vec<f64> = q_known.iter().rev().copied().collect();
     let loads = [&q_known, &turned].map(|q_known| Loads { q_known, ..Loads::default() });
-    for solution in Block::solve(&partition, &stiffness, &kernel, &loads, None) {
+    let system = solution::System {
+        stiffness: &stiffness,
+        partition: &partition,
+        method: Method::FrontMixed,
+        fallback: None,
+    };
+    for solution in Block::solve(system, &kernel, &loads) {
         let solution = solution.expect("corrections shrink");
         assert!(solution.residual_rel < 1e-13, "{}", solution.residual_rel);
         assert!(solution.refinement_steps <= 5, "{} corrections", solution.refinement_steps);

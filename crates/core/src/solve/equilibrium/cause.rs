@@ -1,10 +1,44 @@
 //! Why no equilibrium was found: what the last shape and the tangent there say.
 
-use super::descent::Lost;
 use super::goal::Goal;
 use super::inverse::FactorError;
 use super::outcome::NoEquilibrium;
-use super::path::Path;
+use super::shape::Shape;
+
+/// Why a descent did not get to where it should.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Lost {
+    /// Elements at what is moved would turn inside out, however small the step.
+    Flattened { share: f64 },
+    /// The energy found no lowest point.
+    NoMinimum { share: f64, residual_rel: f64 },
+    /// Neither the tangent nor its positive part has a factor.
+    Singular,
+    /// What was allowed to be spent is.
+    Spent { share: f64, residual_rel: f64 },
+    /// No memory for a factor.
+    OutOfMemory { bytes: usize },
+}
+
+impl Lost {
+    /// With the share of the motion that was done before.
+    pub fn after(self, done: f64) -> Self {
+        match self {
+            Self::Flattened { .. } => Self::Flattened { share: done },
+            Self::NoMinimum { residual_rel, .. } => Self::NoMinimum { share: done, residual_rel },
+            Self::Spent { residual_rel, .. } => Self::Spent { share: done, residual_rel },
+            other => other,
+        }
+    }
+
+    /// With the residual that was left.
+    pub fn with(self, residual_rel: f64) -> Self {
+        match self {
+            Self::Spent { share, .. } => Self::Spent { share, residual_rel },
+            other => other,
+        }
+    }
+}
 
 /// Poisson's ratio from which on volume that cannot change is what stops a motion.
 const POISSON_INCOMPRESSIBLE: f64 = 0.48;
@@ -13,8 +47,8 @@ const CREASE_STRETCH: f64 = 0.6;
 /// Stretch beyond which forces pull a body apart rather than press it.
 const DRAWN_STRETCH: f64 = 3.0;
 
-/// The cause, from a path at the last shape that was in balance.
-pub(super) fn of(path: &mut Path, goal: &Goal<'_>, lost: Lost) -> NoEquilibrium {
+/// The cause, from the last shape that was in balance.
+pub(super) fn of(shape: &Shape, goal: &Goal<'_>, lost: Lost) -> NoEquilibrium {
     let (share, residual_rel) = match lost {
         Lost::OutOfMemory { bytes } => return FactorError::OutOfMemory { bytes }.into(),
         Lost::Singular => return NoEquilibrium::Singular,
@@ -23,9 +57,9 @@ pub(super) fn of(path: &mut Path, goal: &Goal<'_>, lost: Lost) -> NoEquilibrium 
             (share, Some(residual_rel))
         }
     };
-    let summary = path.elements.summary(&path.q);
+    let summary = shape.elements.summary(&shape.q);
     let is_loaded = goal.forces.iter().any(|f| *f != 0.0);
-    let poisson = path.elements.poisson_max();
+    let poisson = shape.elements.poisson_max();
     if is_loaded && summary.stretch_max > DRAWN_STRETCH && residual_rel.is_some() {
         return NoEquilibrium::Overloaded { share, stretch: summary.stretch_max };
     }
@@ -64,9 +98,9 @@ mod tests {
         let held: Vec<u32> = (0..12).collect();
         let hold = model.hold(&held, vec![], None).unwrap();
         let elements = Arc::new(model.hyperelastic(Law::NeoHookean).unwrap());
-        let mut path = Path::new(elements, model.stiffness(), Arc::new(hold), q, false);
+        let shape = Shape::new(elements, model.stiffness(), Arc::new(hold), q, false);
         let forces = vec![force; 3 * model.system_node_count()];
-        of(&mut path, &Goal { q_known: &[0.0; 12], mask_q: &[], forces: &forces }, lost)
+        of(&shape, &Goal { q_known: &[0.0; 12], mask_q: &[], forces: &forces }, lost)
     }
 
     #[test]

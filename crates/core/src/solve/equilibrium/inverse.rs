@@ -1,9 +1,12 @@
 //! The inverse of an older tangent under the constraints of a hold: what corrections are made with.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use super::hold::Hold;
-use crate::fem::Stiffness;
+use crate::fem::hyperelastic::{Curvature, Elements};
+use crate::fem::{Stiffness, StiffnessPattern};
 use crate::solve::front::{FrontError, FrontFactor};
 use crate::solve::vectors::norm;
 
@@ -165,4 +168,78 @@ fn pulled(hold: &Hold, v: &[f64]) -> Vec<f64> {
     let rows = hold.sprung.iter().filter_map(|&dof| hold.partition.row_of(dof as usize));
     pulled.extend(rows.map(|row| v[row]));
     pulled
+}
+
+/// A factor to be made of the shape that a path has now, anywhere.
+pub struct Renewal {
+    pub(super) elements: Arc<Elements>,
+    pub(super) pattern: Arc<StiffnessPattern>,
+    pub(super) hold: Arc<Hold>,
+    pub(super) q: Vec<f64>,
+    pub(super) is_single: bool,
+}
+
+/// A factor that was made for a path.
+pub struct Renewed {
+    pub(super) hold: Arc<Hold>,
+    pub(super) inverse: Inverse,
+}
+
+/// How far from the tangent to its positive part a factor is looked for. Masks hold a body in ways
+/// that a factor does not know of, so the tangent of a pressed body often has none; the less is added
+/// to it, the better is its inverse.
+const POSITIVE_SHARES: [f64; 4] = [0.0, 0.1, 0.35, 1.0];
+
+impl Renewal {
+    /// Makes the factor: of the tangent as it is, or of its positive part where that has none.
+    ///
+    /// # Errors
+    /// [`FactorError`] if neither has one.
+    pub fn make(self) -> Result<Renewed, FactorError> {
+        let Self { elements, pattern, hold, q, is_single } = self;
+        let tangent_of = |curvature| elements.tangent(&pattern, &q, curvature);
+        let factored = Factored::try_new(&hold, is_single, POSITIVE_SHARES, tangent_of)?;
+        Ok(Renewed { inverse: factored.inverse, hold })
+    }
+}
+
+/// A tangent that was factored.
+pub(super) struct Factored {
+    pub inverse: Inverse,
+    /// The tangent, with the springs of the hold.
+    pub stiffness: Stiffness,
+    /// Share of the way to its positive part that was gone for a factor.
+    pub share: f64,
+}
+
+impl Factored {
+    /// Factors a tangent with shares of the way to its positive part, the first that has a factor.
+    ///
+    /// # Errors
+    /// [`FactorError`] if none has one.
+    pub fn try_new(
+        hold: &Hold,
+        is_single: bool,
+        shares: impl IntoIterator<Item = f64>,
+        tangent_of: impl Fn(Curvature) -> Stiffness,
+    ) -> Result<Self, FactorError> {
+        let mut positive = None;
+        for share in shares {
+            let mut stiffness = tangent_of(Curvature::AsItIs);
+            if share > 0.0 {
+                let part = || tangent_of(Curvature::PositivePart);
+                stiffness.blend(positive.get_or_insert_with(part), share);
+            }
+            let springs = hold.add_springs(&mut stiffness);
+            match Factor::try_new(hold, &stiffness, is_single) {
+                Ok(factor) => {
+                    let inverse = Inverse::new(hold, factor, springs);
+                    return Ok(Self { inverse, stiffness, share });
+                }
+                Err(FactorError::NotPositive) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Err(FactorError::NotPositive)
+    }
 }

@@ -2,35 +2,34 @@
 //! to frame, and judged by its own residual.
 
 mod cause;
+mod corrections;
 mod descent;
 mod find;
 #[cfg(test)]
 mod find_tests;
 mod follow;
+mod followed;
 mod goal;
 mod hold;
 mod inverse;
 #[cfg(test)]
 mod live_tests;
-mod motion;
 mod outcome;
 mod path;
 #[cfg(test)]
 mod plastic_tests;
-mod renewal;
 mod rigid_part;
 mod secants;
 mod settle;
+mod shape;
 #[cfg(test)]
 mod snap_tests;
 mod soft;
 #[cfg(test)]
 mod tests;
-mod watch;
 
 pub use goal::{Goal, Wish};
 pub use hold::{Dependent, Hold, HoldOf};
-pub use inverse::FactorError;
+pub use inverse::{FactorError, Renewal, Renewed};
 pub use outcome::{Equilibrium, NoEquilibrium};
 pub use path::Path;
-pub use renewal::{Renewal, Renewed};

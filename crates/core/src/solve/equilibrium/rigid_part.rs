@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
 use super::goal::Goal;
-use super::path::Path;
+use super::shape::Shape;
 
 /// A rotation about a centre and a translation.
 pub(super) struct RigidPart {
@@ -25,8 +25,8 @@ impl RigidPart {
     /// The rigid part of a motion from rest to a goal, if it is a large turn and most of the motion.
     ///
     /// Source: Kabsch, Acta Cryst. A32 (1976) 922.
-    pub fn of(path: &Path, goal: &Goal<'_>) -> Option<Self> {
-        let pairs = led_points(path, goal);
+    pub fn of(shape: &Shape, goal: &Goal<'_>) -> Option<Self> {
+        let pairs = led_points(shape, goal);
         let count = pairs.len() as f64;
         if pairs.len() < 3 {
             return None;
@@ -72,9 +72,9 @@ impl RigidPart {
 }
 
 /// Places at rest and where they are asked to go: nodes known along all axes, and means of masks.
-fn led_points(path: &Path, goal: &Goal<'_>) -> Vec<[Point3<f64>; 2]> {
-    let places = path.pattern.places();
-    let dofs = path.hold.dofs();
+fn led_points(shape: &Shape, goal: &Goal<'_>) -> Vec<[Point3<f64>; 2]> {
+    let places = shape.pattern.places();
+    let dofs = shape.hold.dofs();
     let known = dofs.windows(3).zip(goal.q_known.windows(3));
     let nodes = known.filter(|(d, _)| d[0] % 3 == 0 && d[2] == d[0] + 2).map(|(d, q)| {
         let place = places[d[0] as usize / 3];
@@ -82,7 +82,7 @@ fn led_points(path: &Path, goal: &Goal<'_>) -> Vec<[Point3<f64>; 2]> {
     });
     // The mean of a mask's places is what its weights make of the places' coordinates.
     let coordinates: Vec<f64> = places.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
-    let means = path.hold.means(&coordinates);
+    let means = shape.hold.means(&coordinates);
     let masks = means.chunks(3).zip(goal.mask_q.chunks(3)).map(|(c, q)| {
         let place = Point3::new(c[0], c[1], c[2]);
         [place, place + Vector3::new(q[0], q[1], q[2])]

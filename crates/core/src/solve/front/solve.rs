@@ -1,194 +1,60 @@
-//! Solves with a factor, over the whole tree of fronts or along a few of its paths.
+//! Substitution over the whole tree of fronts or along a few of its paths.
 
-use faer::{Mat, MatMut};
 use rayon::prelude::*;
 
+use super::Real;
 use super::analysis::{Front, FrontAnalysis};
 use super::lines::Lines;
-use super::substitute::{Panel, width};
-use super::{FrontFactor, Real};
-use crate::solve::Partition;
+use super::substitute::Panel;
 
 /// Subtrees whose panels times right-hand sides are below this are not split into tasks.
 const SERIAL_PRODUCTS: usize = 400_000;
 
-/// Rows that a task takes into the order of elimination or out of it.
-const TASK_ROWS: usize = 256;
-
 /// Which fronts a solve passes through; both sets are closed towards the roots.
-struct Paths {
+pub(super) struct Paths {
     /// Fronts that right-hand sides reach on the way up.
     up: Vec<bool>,
     /// Fronts needed on the way down.
     down: Vec<bool>,
 }
 
-impl<T: Real> FrontFactor<T> {
-    /// Solves `K11 X = B` in place on the current rayon pool; same bits for any number of threads.
-    ///
-    /// Shapes: `b` n × `columns` column-major. An `f32` factor rounds on the way in and answers
-    /// to about seven digits; refine with the residual in `f64`.
-    ///
-    /// # Panics
-    /// If `b` does not hold n × `columns` numbers.
-    ///
-    /// Source: thesis (3.43a).
-    pub fn solve_in_place(&self, b: &mut [f64], columns: usize) {
-        let n = self.analysis.row_count();
-        assert_eq!(b.len(), n * columns, "right-hand sides do not fit the factor");
-        if b.is_empty() {
-            return;
-        }
-        // As many at once as fit into the strips of the kernels.
-        for b in b.chunks_mut(n * T::SLAB) {
-            let columns = b.len() / n;
-            let mut x = self.strips(columns, |row, j| b[j * n + row]);
-            self.solve_ordered(&mut x, width::<T>(columns), &self.all_paths());
-            self.each_number(&x, columns, |row, j, x| b[j * n + row] = x);
-        }
+impl Paths {
+    /// All fronts, both ways.
+    pub fn all(analysis: &FrontAnalysis) -> Self {
+        let all = vec![true; analysis.fronts.len()];
+        Self { up: all.clone(), down: all }
     }
 
-    /// Solves `K11 X = B` for the unknown rows of B with the numbers of one row next to each other; X
-    /// is zero on the other rows.
-    ///
-    /// Shapes: `b` and `x` 3N × columns row-major; `scales` one number for each column, which it is
-    /// divided by on the way through the factor; `partition` the one that was analysed.
-    ///
-    /// # Panics
-    /// If the partition has other rows than the factor, or `b` and `x` do not fit it.
-    pub fn solve_rows(&self, (b, x): (&[f64], &mut [f64]), scales: &[f64], partition: &Partition) {
-        let (analysis, columns) = (&*self.analysis, scales.len());
-        assert_eq!(analysis.row_count(), partition.unknown().len(), "the factor has other rows");
-        assert_eq!((b.len(), x.len()), (partition.dof_count() * columns, b.len()), "other rows");
-        for first in (0..columns).step_by(T::SLAB) {
-            let some = first..columns.min(first + T::SLAB);
-            let width = width::<T>(some.len());
-            let by: Vec<f64> = scales[some.clone()].iter().map(|scale| scale.recip()).collect();
-            let mut strips = Lines::<T>::zeros(analysis.row_count() * width);
-            let rows = analysis.order.par_chunks(TASK_ROWS);
-            strips.par_chunks_mut(TASK_ROWS * width).zip(rows).for_each(|(strips, rows)| {
-                for (strip, &row) in strips.chunks_exact_mut(width).zip(rows) {
-                    let b =
-                        &b[partition.unknown()[row as usize] as usize * columns..][some.clone()];
-                    let scaled = b.iter().zip(&by).map(|(b, by)| T::from_f64(b * by));
-                    strip.iter_mut().zip(scaled).for_each(|(strip, b)| *strip = b);
-                }
-            });
-            self.solve_ordered(&mut strips, width, &self.all_paths());
-            x.par_chunks_mut(TASK_ROWS * columns).enumerate().for_each(|(k, rows)| {
-                for (i, x) in rows.chunks_exact_mut(columns).enumerate() {
-                    let Some(row) = partition.row_of(k * TASK_ROWS + i) else {
-                        x[some.clone()].fill(0.0);
-                        continue;
-                    };
-                    let strip = &strips[analysis.position[row] as usize * width..][..some.len()];
-                    for ((x, strip), scale) in
-                        x[some.clone()].iter_mut().zip(strip).zip(&scales[some.clone()])
-                    {
-                        *x = strip.to_f64() * scale;
-                    }
-                }
-            });
-        }
+    /// No front.
+    pub fn none(analysis: &FrontAnalysis) -> Self {
+        let none = vec![false; analysis.fronts.len()];
+        Self { up: none.clone(), down: none }
     }
 
-    fn all_paths(&self) -> Paths {
-        let all = vec![true; self.analysis.fronts.len()];
-        Paths { up: all.clone(), down: all }
+    /// Passes through a front and its ancestors on the way up.
+    pub fn pass_up(&mut self, analysis: &FrontAnalysis, front: usize) {
+        mark(&mut self.up, analysis, front);
     }
 
-    /// Right-hand sides in elimination order, `at(row of K11, column)`.
-    fn strips(&self, columns: usize, at: impl Fn(usize, usize) -> f64) -> Lines<T> {
-        let width = width::<T>(columns);
-        let mut x = Lines::zeros(self.analysis.row_count() * width);
-        for (x, &row) in x.chunks_exact_mut(width).zip(&self.analysis.order) {
-            for (j, x) in x[..columns].iter_mut().enumerate() {
-                *x = T::from_f64(at(row as usize, j));
-            }
-        }
-        x
+    /// Passes through a front and its ancestors on the way down.
+    pub fn pass_down(&mut self, analysis: &FrontAnalysis, front: usize) {
+        mark(&mut self.down, analysis, front);
     }
+}
 
-    /// Calls `visit(row of K11, column, number)` for what [`FrontFactor::strips`] has filled.
-    fn each_number(&self, x: &[T], columns: usize, mut visit: impl FnMut(usize, usize, f64)) {
-        for (x, &row) in x.chunks_exact(width::<T>(columns)).zip(&self.analysis.order) {
-            for (j, x) in x[..columns].iter().enumerate() {
-                visit(row as usize, j, x.to_f64());
-            }
-        }
-    }
-
-    /// Some rows of `K11⁻¹ B` for right-hand sides that are zero nearly everywhere.
-    ///
-    /// Only the fronts on the paths from the rows of `B` to the roots are passed on the way up,
-    /// and those on the paths from the roots to the wanted rows on the way down.
-    ///
-    /// Shapes: `right_hand_sides` one list of (row of `K11`, value) per column, repeated rows add
-    /// up; result `rows_wanted.len()` × columns, rows in the order asked for.
-    ///
-    /// # Panics
-    /// If a row is not below n.
-    ///
-    /// Source: thesis (3.43a), columns of the compliance.
-    pub fn solve_partial(
-        &self,
-        right_hand_sides: &[Vec<(usize, f64)>],
-        rows_wanted: &[usize],
-    ) -> Mat<f64> {
-        let columns = right_hand_sides.len();
-        let mut wanted = Mat::zeros(rows_wanted.len(), columns);
-        for (k, some) in right_hand_sides.chunks(T::SLAB).enumerate() {
-            let some_wanted = wanted.as_mut().get_mut(.., k * T::SLAB..k * T::SLAB + some.len());
-            self.solve_partial_some(some, rows_wanted, some_wanted);
-        }
-        wanted
-    }
-
-    /// Wanted rows of the solutions for a few sparse right-hand sides.
-    fn solve_partial_some(
-        &self,
-        right_hand_sides: &[Vec<(usize, f64)>],
-        rows_wanted: &[usize],
-        mut wanted: MatMut<'_, f64>,
-    ) {
-        let width = width::<T>(right_hand_sides.len());
-        let analysis = &*self.analysis;
-        let position = |row: usize| analysis.position[row] as usize;
-        // Fronts are sorted by their first row.
-        let front = |new: usize| analysis.fronts.partition_point(|f| f.first <= new) - 1;
-        let len = analysis.row_count() * width;
-        let mut x = Lines::zeros(len);
-        let x = &mut x[..len];
-        let mut paths = Paths {
-            up: vec![false; analysis.fronts.len()],
-            down: vec![false; analysis.fronts.len()],
-        };
-        for (j, entries) in right_hand_sides.iter().enumerate() {
-            for &(row, value) in entries {
-                let new = position(row);
-                x[new * width + j] += T::from_f64(value);
-                mark(&mut paths.up, analysis, front(new));
-            }
-        }
-        for &row in rows_wanted {
-            mark(&mut paths.down, analysis, front(position(row)));
-        }
-        self.solve_ordered(x, width, &paths);
-        for (i, &row) in rows_wanted.iter().enumerate() {
-            for j in 0..right_hand_sides.len() {
-                wanted[(i, j)] = x[position(row) * width + j].to_f64();
-            }
-        }
-    }
-
-    /// Solves in elimination order, each row with `width` numbers, one for each right-hand side.
-    fn solve_ordered(&self, x: &mut [T], width: usize, paths: &Paths) {
-        // Lines end with a whole cache line.
-        let x = &mut x[..self.analysis.row_count() * width];
-        let solve = Solve { factor: self, paths, width };
-        solve.up_siblings(&self.analysis.roots, 0, x);
-        solve.down_siblings(&self.analysis.roots, 0, x, &[]);
-    }
+/// Solves in elimination order along some paths, with the panels of a factor; each row of `x` has
+/// `width` numbers, one for each right-hand side.
+pub(super) fn solve_ordered<T: Real>(
+    (analysis, panels): (&FrontAnalysis, &[Lines<T>]),
+    x: &mut [T],
+    width: usize,
+    paths: &Paths,
+) {
+    // Lines end with a whole cache line.
+    let x = &mut x[..analysis.row_count() * width];
+    let solve = Solve { analysis, panels, paths, width };
+    solve.up_siblings(&analysis.roots, 0, x);
+    solve.down_siblings(&analysis.roots, 0, x, &[]);
 }
 
 /// Marks a front and its ancestors.
@@ -203,7 +69,8 @@ fn mark(marks: &mut [bool], analysis: &FrontAnalysis, front: usize) {
 
 /// One solve under way.
 struct Solve<'a, T> {
-    factor: &'a FrontFactor<T>,
+    analysis: &'a FrontAnalysis,
+    panels: &'a [Lines<T>],
     paths: &'a Paths,
     /// Numbers of a row.
     width: usize,
@@ -211,7 +78,7 @@ struct Solve<'a, T> {
 
 impl<T: Real> Solve<'_, T> {
     fn front(&self, v: usize) -> &Front {
-        &self.factor.analysis.fronts[v]
+        &self.analysis.fronts[v]
     }
 
     fn is_serial(&self, v: usize) -> bool {
@@ -220,8 +87,7 @@ impl<T: Real> Solve<'_, T> {
 
     /// The subtrees of siblings with their parts of `x`, which starts at front `first`.
     fn split<'x>(&self, heads: &[u32], first: usize, x: &'x mut [T]) -> Vec<(usize, &'x mut [T])> {
-        let (mut rest, mut start) =
-            (x, self.factor.analysis.fronts.get(first).map_or(0, |f| f.first));
+        let (mut rest, mut start) = (x, self.analysis.fronts.get(first).map_or(0, |f| f.first));
         let mut parts = Vec::with_capacity(heads.len());
         for &head in heads {
             let head = head as usize;
@@ -385,6 +251,6 @@ impl<T: Real> Solve<'_, T> {
 
     fn panel(&self, v: usize) -> Panel<'_, T> {
         let slabs = self.front(v).slabs::<T>();
-        Panel { values: &self.factor.panels[v], slabs }
+        Panel { values: &self.panels[v], slabs }
     }
 }

@@ -9,7 +9,7 @@ use super::*;
 use crate::fem::{Material, Stiffness, StiffnessPattern, assemble};
 use crate::mesh::{TetMesh, signed_volume};
 use crate::solve::k11::{SparseK11, visit_k11};
-use crate::solve::sparse::Analysis;
+use crate::solve::oracle::sparse::Analysis;
 use crate::solve::{Partition, ordering};
 
 /// Boxes of nodes side by side, not connected, six tetrahedra a cell, inner nodes moved; the

@@ -1,6 +1,6 @@
 //! Gathers neighbouring nodes into aggregates, the nodes of the next coarser level.
 
-use super::block_rows::{Rows, TASK_ROWS};
+use super::block_rows::{NodeMatrix, TASK_ROWS};
 use super::small::square;
 use rayon::prelude::*;
 
@@ -31,7 +31,7 @@ struct Strong {
 
 impl Strong {
     /// Neighbours by the norms of blocks, at least a share of the mean of a pair's own blocks.
-    fn new<const B: usize>(rows: &impl Rows<B, B>, share: f64) -> Self {
+    fn new<const B: usize>(rows: &impl NodeMatrix<B, B>, share: f64) -> Self {
         let count = rows.row_count();
         let own: Vec<f64> = (0..count)
             .into_par_iter()
@@ -85,7 +85,7 @@ impl Aggregates {
     pub const NONE: u32 = u32::MAX;
 
     /// Aggregates of the nodes of a matrix; `level` counts from 0, the finest.
-    pub fn new<const B: usize>(rows: &impl Rows<B, B>, level: usize) -> Self {
+    pub fn new<const B: usize>(rows: &impl NodeMatrix<B, B>, level: usize) -> Self {
         let share = STRONG * 0.5f64.powi(level as i32);
         for weaker in WEAKER {
             let this = Self::gather(&Strong::new(rows, weaker * share));

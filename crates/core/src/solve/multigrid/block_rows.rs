@@ -6,8 +6,8 @@ use rayon::prelude::*;
 /// Rows of one task of a parallel loop.
 pub(super) const TASK_ROWS: usize = 128;
 
-/// The entries of a matrix by rows, in double precision.
-pub(super) trait Rows<const R: usize, const C: usize>: Sync {
+/// A matrix of one block for each pair of nodes, read by rows in double precision.
+pub(super) trait NodeMatrix<const R: usize, const C: usize>: Sync {
     /// Number of block rows.
     fn row_count(&self) -> usize;
 
@@ -129,7 +129,7 @@ impl<const R: usize, const C: usize> BlockRows<R, C> {
     }
 }
 
-impl<const B: usize> Rows<B, B> for BlockRows<B, B> {
+impl<const B: usize> NodeMatrix<B, B> for BlockRows<B, B> {
     fn row_count(&self) -> usize {
         self.start.len() - 1
     }

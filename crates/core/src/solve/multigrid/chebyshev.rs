@@ -1,6 +1,6 @@
 //! Smoothing by Chebyshev's polynomials in `D⁻¹ A`, `D` the blocks on the diagonal.
 
-use super::block_rows::{BlockRows, Rows, TASK_ROWS};
+use super::block_rows::{BlockRows, NodeMatrix, TASK_ROWS};
 use super::ritz::Ritz;
 use super::small::{inverse, times};
 use super::sums::dot_blocks;

@@ -1,6 +1,6 @@
 //! The coarsest level: a dense factor where it is small, smoothing where it is not.
 
-use super::block_rows::{BlockRows, Rows};
+use super::block_rows::{BlockRows, NodeMatrix};
 use super::chebyshev::{Chebyshev, Vectors};
 use super::motions::MOTIONS;
 use crate::solve::tiles::Tiles;

@@ -1,6 +1,6 @@
 //! `K11` in blocks of three, as the finest level of a hierarchy sees it.
 
-use super::block_rows::Rows;
+use super::block_rows::NodeMatrix;
 use crate::fem::{AXES, Stiffness, dof};
 use crate::solve::Partition;
 
@@ -58,7 +58,7 @@ impl<'a> FineRows<'a> {
     }
 }
 
-impl Rows<AXES, AXES> for FineRows<'_> {
+impl NodeMatrix<AXES, AXES> for FineRows<'_> {
     fn row_count(&self) -> usize {
         self.nodes.len()
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::block_rows::{BlockRows, Rows};
+use super::block_rows::{BlockRows, NodeMatrix};
 use super::motions::MOTIONS;
 use super::small::{add_product, add_transposed_product, exact};
 
@@ -61,7 +61,7 @@ const TOGETHER: usize = 4096;
 ///
 /// Shapes: `p` and `by_column` nodes × aggregates; result aggregates × aggregates.
 pub(super) fn product<const B: usize>(
-    rows: &impl Rows<B, B>,
+    rows: &impl NodeMatrix<B, B>,
     p: &BlockRows<B, MOTIONS>,
     by_column: &ByColumn,
     aggregates: usize,
@@ -75,7 +75,7 @@ pub(super) fn product<const B: usize>(
 
 /// The rows of some aggregates.
 fn some_rows<const B: usize>(
-    rows: &impl Rows<B, B>,
+    rows: &impl NodeMatrix<B, B>,
     p: &BlockRows<B, MOTIONS>,
     by_column: &ByColumn,
     aggregates: Range<usize>,
@@ -111,7 +111,7 @@ fn some_rows<const B: usize>(
 
 /// The rows of some nodes of `A P`.
 fn times_prolongator<const B: usize>(
-    rows: &impl Rows<B, B>,
+    rows: &impl NodeMatrix<B, B>,
     p: &BlockRows<B, MOTIONS>,
     nodes: &[u32],
 ) -> BlockRows<B, MOTIONS> {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::block_rows::{Rows, TASK_ROWS};
+use super::block_rows::{NodeMatrix, TASK_ROWS};
 use super::chebyshev::Vectors;
 use super::coarsest::Coarsest;
 use super::fine_rows::FineRows;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::aggregates::Aggregates;
-use super::block_rows::{BlockRows, Rows, TASK_ROWS};
+use super::block_rows::{BlockRows, NodeMatrix, TASK_ROWS};
 use super::chebyshev::{Chebyshev, Vectors, subtract_product};
 use super::galerkin::{self, ByColumn};
 use super::motions::{MOTIONS, OfNode, orthonormal};
@@ -32,7 +32,7 @@ const OMEGA: f64 = 4.0 / 3.0;
 type Coarsened<const B: usize> = (BlockRows<B, MOTIONS>, ByColumn, Coarser);
 
 fn coarsen<const B: usize>(
-    rows: &impl Rows<B, B>,
+    rows: &impl NodeMatrix<B, B>,
     smoother: &Chebyshev<B>,
     motions: Vec<OfNode<B>>,
     number: usize,
@@ -52,7 +52,7 @@ impl<const B: usize> Level<B> {
     /// one.
     ///
     /// Shapes: `motions` one per node.
-    pub fn of_fine(rows: &impl Rows<B, B>, motions: Vec<OfNode<B>>) -> (Self, Coarser) {
+    pub fn of_fine(rows: &impl NodeMatrix<B, B>, motions: Vec<OfNode<B>>) -> (Self, Coarser) {
         let columns_of = |row: usize, columns: &mut Vec<u32>| {
             rows.visit(row, &mut |column, _| columns.push(column as u32));
         };

@@ -1,7 +1,7 @@
 //! The prolongator: how the nodes of a level follow the motions of aggregates.
 
 use super::aggregates::Aggregates;
-use super::block_rows::{BlockRows, Rows};
+use super::block_rows::{BlockRows, NodeMatrix};
 use super::motions::{MOTIONS, OfNode};
 use super::small::{add_product, inverse};
 
@@ -12,7 +12,7 @@ use super::small::{add_product, inverse};
 ///
 /// Source: Vaněk, Mandel, Brezina 1996, section 3.
 pub(super) fn smoothed<const B: usize>(
-    rows: &impl Rows<B, B>,
+    rows: &impl NodeMatrix<B, B>,
     aggregates: &Aggregates,
     tentative: &[OfNode<B>],
     omega: f64,

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::block_rows::Rows;
+use super::block_rows::NodeMatrix;
 use super::fine_rows::FineRows;
 use super::galerkin::{self, ByColumn};
 use super::level::Level;

@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 
-use super::super::elements::Shape;
+use super::super::body::Shape;
+use super::super::{Elements, step_limit, summary};
 use super::*;
 use crate::fem::{Element, Material};
 use crate::mesh::{BuiltIn, TetMesh, generate};
@@ -33,28 +34,29 @@ proptest! {
         let mesh = mesh();
         let law = if is_log { Law::NeoHookeanLog } else { Law::NeoHookean };
         let material = Material::try_new(2e4, 0.4).unwrap();
-        let elements = Elements::try_new(&mesh, Element::Tet4, None, law, &[material]).unwrap();
-        let Shape::Linear(locals) = &elements.shape else { panic!("linear elements") };
+        let body = Body::try_new(&mesh, Element::Tet4, None, law, &[material]).unwrap();
+        let Shape::Linear(locals) = &body.shape else { panic!("linear elements") };
+        let groups = Groups { body: &body, locals };
         let u = field(&mesh, bend, scale);
-        let one_by_one = elements.evaluate_points(locals, &u, ModuliPart::Whole);
+        let one_by_one = body.evaluate_points(locals, &u, ModuliPart::Whole);
         prop_assume!(one_by_one.energy.is_finite());
-        let together = elements.evaluate_groups(locals, &u, ModuliPart::Whole);
+        let together = groups.evaluate(&u, ModuliPart::Whole);
         let near = |a: f64, b: f64, of: f64| (a - b).abs() <= 1e-13 * of;
         let largest = one_by_one.forces.iter().fold(0.0f64, |most, f| most.max(f.abs()));
         for (a, b) in together.forces.iter().zip(&one_by_one.forces) {
             prop_assert!(near(*a, *b, largest), "{a:e} {b:e} of {largest:e}");
         }
         // Small energies are differences of two that are as large as the strain.
-        let rounding = 1e-15 * scale * elements.rest.iter().map(|r| r.volume).sum::<f64>() * 2e4;
+        let rounding = 1e-15 * scale * body.rest.iter().map(|r| r.volume).sum::<f64>() * 2e4;
         prop_assert!((together.energy - one_by_one.energy).abs()
             <= 1e-12 * one_by_one.energy + rounding);
         prop_assert!(near(together.jacobian_min, one_by_one.jacobian_min, 1.0));
 
         let step = field(&mesh, bend.map(|b| -1.7 * b), 1.0);
-        let limit = elements.limit(locals, &u, &step);
-        let change = elements.change_one_by_one(&step);
-        prop_assert!(near(elements.limit_of_groups(locals, &u, &step), limit, 100.0));
-        prop_assert!(near(elements.change_of_groups(locals, &step), change, change));
+        let limit = step_limit::one_by_one(&body, locals, &u, &step);
+        let change = summary::gradient_change_max(&body, &step);
+        prop_assert!(near(groups.step_limit(&u, &step), limit, 100.0));
+        prop_assert!(near(groups.gradient_change_max(&step), change, change));
     }
 }
 

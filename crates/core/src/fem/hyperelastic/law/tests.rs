@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, SMatrix, Vector3};
 use proptest::prelude::*;
 
-use super::super::positive_part;
+use super::super::tangent::positive_part;
 use super::*;
 
 const LAWS: [Law; 2] = [Law::NeoHookean, Law::NeoHookeanLog];

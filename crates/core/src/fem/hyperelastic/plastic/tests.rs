@@ -64,7 +64,7 @@ fn tangent_is_slope(state: &PlasticPoint, h: &Matrix3<f64>, df: &Matrix3<f64>, l
     let slope = (stress(state, &(h + df * step), law) - stress(state, &(h - df * step), law))
         / (2.0 * step);
     let trial = Trial::new(state, &Deformed::new(h)).unwrap();
-    let tangent = trial.tangent(law);
+    let tangent = trial.tangent(law, Curvature::AsItIs);
     let change = tangent.apply(df);
     assert!((slope - change).amax() < 1e-6 * (1.0 + change.amax()), "{slope} {change}");
     let through_matrix = tangent.matrix() * SMatrix::<f64, 9, 1>::from_column_slice(df.as_slice());
@@ -129,16 +129,16 @@ proptest! {
     ) {
         let (rest, point) = (PlasticPoint::default(), Deformed::new(&h));
         let trial = Trial::new(&rest, &point).unwrap();
-        let tangent = trial.tangent(law).matrix();
+        let tangent = trial.tangent(law, Curvature::AsItIs).matrix();
         let eigen = (tangent + tangent.transpose()).symmetric_eigen();
         let positive = eigen.eigenvalues.map(|value| 0.5 * value.max(0.0));
         let axes = eigen.eigenvectors;
         let naive = axes * SMatrix::from_diagonal(&positive) * axes.transpose();
-        let closed = trial.positive_tangent(law).matrix();
+        let closed = trial.tangent(law, Curvature::PositivePart).matrix();
         prop_assert!((closed - naive).amax() < 1e-9 * (1.0 + naive.amax()));
         // From a plastic state it is no less than the tangent, and has no negative eigenvalue.
         let trial = Trial::new(&state, &point).unwrap();
-        let (tangent, closed) = (trial.tangent(law).matrix(), trial.positive_tangent(law).matrix());
+        let (tangent, closed) = (trial.tangent(law, Curvature::AsItIs).matrix(), trial.tangent(law, Curvature::PositivePart).matrix());
         for matrix in [closed, closed - tangent] {
             let least = ((matrix + matrix.transpose()) * 0.5).symmetric_eigenvalues().min();
             prop_assert!(least > -1e-9 * (1.0 + closed.amax()), "{least}");
@@ -176,7 +176,7 @@ proptest! {
         // On the yield surface the tangent is the elastic one.
         let again = Trial::new(&after, &point).unwrap();
         let [yielding, elastic] =
-            [law, Hencky { radius: 1e9, ..law }].map(|law| again.tangent(law).matrix());
+            [law, Hencky { radius: 1e9, ..law }].map(|law| again.tangent(law, Curvature::AsItIs).matrix());
         prop_assert!((yielding - elastic).amax() < 1e-9 * elastic.amax());
         // Strain counts flow: as much as the trial strain was above the yield stress.
         let above = deviator(&logarithmic_strain(&trial.fe)).norm() - 0.5 * law.radius / law.mu;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Rotation3;
 
-use super::super::Law;
+use super::super::{Elements, Law};
 use super::*;
 use crate::fem::{Element, Material, QuadraticMesh, Stiffness};
 use crate::mesh::{BuiltIn, generate};
@@ -170,8 +170,8 @@ fn commits_keep_the_forces_and_take_what_was_dissipated() {
         let after = body.elements.evaluate(&u);
         // What flowed at the yield stress: V σ_y Δp.
         let plastic = body.elements.plastic.as_ref().unwrap();
-        let points = plastic.points.len() / body.elements.rest.len();
-        let of_tets = plastic.points.chunks(points).zip(&body.elements.rest);
+        let points = plastic.points.len() / body.elements.body.rest.len();
+        let of_tets = plastic.points.chunks(points).zip(&body.elements.body.rest);
         let flowed: f64 = of_tets
             .map(|(points, rest)| {
                 let mean = points.iter().map(|p| p.strain).sum::<f64>() / points.len() as f64;

@@ -1,4 +1,4 @@
-//! Gauss–Jordan elimination of the thesis's Appendix A, a panel of pivots at a time.
+//! Gauss–Jordan elimination of the thesis's Appendix A, pivot by pivot and a panel of pivots at a time.
 
 use std::ops::Range;
 
@@ -7,13 +7,54 @@ use faer::prelude::*;
 use faer::{Accum, Par};
 use rayon::prelude::*;
 
-use super::gauss_jordan_plain;
-use super::pivot::NotPositive;
+use crate::solve::k11::NotPositive;
+
+/// Inverts a symmetric positive definite matrix in place by Gauss–Jordan elimination without
+/// pivoting; the inner loop over rows runs on the current rayon pool with the same bits for any
+/// number of threads.
+///
+/// The thesis eliminates in two n × n matrices side by side (Figure A.2). Column i of the first is
+/// a unit vector once it is eliminated, and column i of the second is one until then, so both are
+/// kept in one n × n array; the arithmetic is that of (A.1) and (A.2) without the multiplications
+/// by known zeros and ones.
+///
+/// Shapes: `a` n × n, row-major. Units: N/m in, m/N out.
+///
+/// # Errors
+/// [`NotPositive`] with the row of the first pivot that is not positive.
+///
+/// Source: thesis Figure A.1, (A.1), (A.2).
+pub fn invert_plainly(a: &mut [f64], n: usize) -> Result<(), NotPositive> {
+    let mut pivot_row = vec![0.0; n];
+    for i in 0..n {
+        let pivot = a[i * n + i];
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return Err(NotPositive { row: i });
+        }
+        let row_i = &mut a[i * n..(i + 1) * n];
+        row_i[i] = 1.0;
+        for x in row_i.iter_mut() {
+            *x /= pivot;
+        }
+        pivot_row.copy_from_slice(row_i);
+        a.par_chunks_exact_mut(n).enumerate().with_min_len(16).for_each(|(k, row_k)| {
+            if k == i {
+                return;
+            }
+            let factor = row_k[i];
+            row_k[i] = 0.0;
+            for (x, p) in row_k.iter_mut().zip(&pivot_row) {
+                *x -= factor * p;
+            }
+        });
+    }
+    Ok(())
+}
 
 /// Inverts a symmetric positive definite matrix in place by Gauss–Jordan elimination without
 /// pivoting, on the current rayon pool with the same bits for any number of threads.
 ///
-/// The pivots are those of [`gauss_jordan_plain::invert`], in the same order. With `I` the rows of
+/// The pivots are those of [`invert_plainly`], in the same order. With `I` the rows of
 /// one panel of pivots, its steps on single rows become steps on the rows of `I` together: `A_II`
 /// is inverted by the same method, row panel `A_I` is multiplied by that inverse, and every other
 /// row takes off its `A_KI` times the row panel. What was one pass over the matrix per pivot is one
@@ -25,9 +66,9 @@ use super::pivot::NotPositive;
 /// [`NotPositive`] with the row of the first pivot that is not positive.
 ///
 /// Source: thesis Figure A.1, (A.1), (A.2), with blocks in the place of numbers.
-pub(super) fn invert(a: &mut [f64], n: usize) -> Result<(), NotPositive> {
+pub fn invert(a: &mut [f64], n: usize) -> Result<(), NotPositive> {
     let Some(Cut { width, height }) = Cut::of(n) else {
-        return gauss_jordan_plain::invert(a, n);
+        return invert_plainly(a, n);
     };
     let mut row_panel = vec![0.0; n * width];
     let mut column_panel = vec![0.0; n * width];
@@ -68,7 +109,7 @@ fn square_of(a: &[f64], n: usize, rows: Range<usize>) -> Vec<f64> {
 }
 
 /// Product of a row-major square matrix and a vector, rows in parallel.
-pub(super) fn mul(a: &[f64], x: &[f64]) -> Vec<f64> {
+pub fn mul(a: &[f64], x: &[f64]) -> Vec<f64> {
     if x.is_empty() {
         return Vec::new();
     }
@@ -194,6 +235,7 @@ impl<'a> RowPanel<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     /// A positive definite matrix with entries from a formula, row-major.
     fn definite(n: usize) -> Vec<f64> {
@@ -205,7 +247,7 @@ mod tests {
     fn panels_give_the_inverse_of_single_pivots_with_the_same_bits_for_any_threads() {
         for n in [1, 24, 25, 47, 192, 193, 257, 330, 1601] {
             let mut plain = definite(n);
-            gauss_jordan_plain::invert(&mut plain, n).unwrap();
+            invert_plainly(&mut plain, n).unwrap();
             let largest = plain.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             let inverses = [1, 2, 4, 7].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -231,5 +273,54 @@ mod tests {
                 assert_eq!(invert(&mut a, n), Err(NotPositive { row }), "n {n}, {bad}");
             }
         }
+    }
+
+    /// Figure A.1 letter by letter: two matrices, all columns.
+    fn invert_as_printed(global: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
+        let n = global.len();
+        let mut inverse = vec![vec![0.0; n]; n];
+        for (i, row) in inverse.iter_mut().enumerate() {
+            row[i] = 1.0;
+        }
+        for i in 0..n {
+            let pivot = global[i][i];
+            for j in 0..n {
+                global[i][j] /= pivot;
+                inverse[i][j] /= pivot;
+            }
+            for k in (0..n).filter(|&k| k != i) {
+                let factor = global[k][i];
+                for j in 0..n {
+                    global[k][j] -= factor * global[i][j];
+                    inverse[k][j] -= factor * inverse[i][j];
+                }
+            }
+        }
+        inverse
+    }
+
+    proptest! {
+        #[test]
+        fn one_array_gives_the_numbers_of_the_printed_two(seed in prop::collection::vec(-1.0..1.0f64, 49)) {
+            let n = 7;
+            let mut a = vec![0.0; n * n];
+            for i in 0..n {
+                for j in 0..n {
+                    a[i * n + j] = (0..n).map(|k| seed[i * n + k] * seed[j * n + k]).sum::<f64>()
+                        + if i == j { 1.0 } else { 0.0 };
+                }
+            }
+            let mut rows: Vec<Vec<f64>> = a.chunks(n).map(<[f64]>::to_vec).collect();
+            let printed = invert_as_printed(&mut rows);
+            invert_plainly(&mut a, n).unwrap();
+            // Equal, not close: the left-out operations are exact.
+            prop_assert_eq!(a, printed.concat());
+        }
+    }
+
+    #[test]
+    fn indefinite_matrix_is_refused_at_its_pivot() {
+        let mut a = vec![1.0, 2.0, 2.0, 1.0];
+        assert_eq!(invert_plainly(&mut a, 2), Err(NotPositive { row: 1 }));
     }
 }

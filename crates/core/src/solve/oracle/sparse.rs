@@ -10,23 +10,23 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Par, Side};
 
-use super::k11::SparseK11;
-use super::pivot::NotPositive;
+use crate::solve::k11::NotPositive;
+use crate::solve::k11::SparseK11;
 
 /// Order and symbolic analysis of `K11`.
-pub(super) struct Analysis {
+pub struct Analysis {
     k11: SparseK11,
     symbolic: SymbolicCholesky<usize>,
 }
 
 /// Numerical factor.
-pub(super) struct SparseFactor {
+pub struct SparseFactor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
 }
 
 /// The machine could not hold the factor.
-pub(super) struct OutOfMemory;
+pub struct OutOfMemory;
 
 // One faer thread: its own threads lose below 4000 nodes and would make the bits depend on their
 // number. Parallel work across the elimination tree is a method of its own.

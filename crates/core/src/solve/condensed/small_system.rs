@@ -1,0 +1,145 @@
+//! The small system of one set of contacts: the compliance between them and the motions without energy.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+use super::base::Base;
+use super::columns::ContactColumns;
+use super::error::CondensedError;
+use super::touched::Touched;
+use crate::solve::zero_energy::FREE_BELOW;
+
+/// The small system of one set of contacts, factored.
+///
+/// Shapes: c unknown forces, z modes; matrices (c + z)².
+pub(super) struct SmallSystem {
+    pub columns: Vec<Arc<ContactColumns>>,
+    /// Position in `columns` and axis of every unknown force.
+    pub places: Vec<(usize, usize)>,
+    /// Scaled `[ EᵀG EᵀR ; (EᵀR)ᵀ 0 ]`, so that both kinds of unknowns have size one.
+    pub matrix: DMatrix<f64>,
+    /// Factor of the same with `EᵀG` made symmetric: the two triangles differ by rounding. `None`
+    /// where nothing is unknown.
+    lu: Option<LU<f64, Dyn, Dyn>>,
+    /// Scale of λ.
+    pub scale: f64,
+    /// Condition in the Frobenius norm.
+    pub condition: f64,
+}
+
+/// Forces and motions that answer one set of displacements.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactAnswer {
+    /// Force of every contact, N: the reactions of (3.43b) at the touched degrees of freedom, then
+    /// the three components of each mask.
+    pub lambda: Vec<f64>,
+    /// Amounts of the modes.
+    pub amounts: Vec<f64>,
+    /// How far the contacts are from what was asked, as a norm, m.
+    pub mismatch: f64,
+}
+
+/// Above this condition the last digits of the small system are all rounding.
+const CONDITION_MAX: f64 = 1e14;
+/// Why a small system cannot be solved: `moved` says how far each motion without energy moves each
+/// contact, and a motion that moves none of them is free.
+///
+/// Shapes: `moved` one row per displacement of a contact, one column per motion.
+fn refusal(moved: &DMatrix<f64>, condition: f64) -> CondensedError {
+    let sizes = moved.clone().singular_values();
+    let is_free = moved.nrows() < moved.ncols()
+        || !moved.is_empty() && sizes.min() <= FREE_BELOW * sizes.max();
+    match is_free {
+        true => CondensedError::NotHeld,
+        false => CondensedError::HeldTooWeakly { condition },
+    }
+}
+
+impl SmallSystem {
+    /// Gathers the compliance between the contacts out of their columns and factors the system; gives
+    /// its inverse too.
+    ///
+    /// # Errors
+    /// [`CondensedError::NotHeld`] if a motion is left free, [`CondensedError::HeldTooWeakly`] if one
+    /// is nearly free.
+    pub fn try_new(
+        base: &Base,
+        touched: &Touched,
+        columns: Vec<Arc<ContactColumns>>,
+    ) -> Result<(Self, DMatrix<f64>), CondensedError> {
+        let places = touched.places();
+        let (c, z) = (places.len(), base.modes.len());
+        let compliance = DMatrix::from_fn(c, c, |i, j| {
+            let (at, axis) = places[j];
+            touched.mean(i, &columns[at].fields[axis])
+        });
+        let moved = DMatrix::from_fn(c, z, |i, k| touched.mean(i, &base.modes[k].field));
+        let trace = compliance.trace();
+        let scale = if trace > 0.0 { c as f64 / trace } else { base.stiffest };
+        let mut matrix = DMatrix::zeros(c + z, c + z);
+        matrix.view_mut((0, 0), (c, c)).copy_from(&(&compliance * scale));
+        matrix.view_mut((0, c), (c, z)).copy_from(&moved);
+        matrix.view_mut((c, 0), (z, c)).copy_from(&moved.transpose());
+        let symmetric = 0.5 * (&matrix + matrix.transpose());
+        let unsolvable = |condition| refusal(&moved, condition);
+        // A matrix without rows has no factor, and needs none.
+        let lu = (c + z > 0).then(|| symmetric.lu());
+        let inverse = match &lu {
+            Some(lu) => lu.try_inverse().ok_or_else(|| unsolvable(f64::INFINITY))?,
+            None => DMatrix::zeros(0, 0),
+        };
+        let condition = matrix.norm() * inverse.norm();
+        // Written so that a NaN is refused too.
+        if !(0.0..=CONDITION_MAX).contains(&condition) {
+            return Err(unsolvable(condition));
+        }
+        Ok((Self { columns, places, matrix, lu, scale, condition }, inverse))
+    }
+
+    /// Columns of the compliance and motions without energy, in the order of the unknowns.
+    pub fn fields<'a>(&'a self, base: &'a Base) -> impl Iterator<Item = &'a Vec<f64>> {
+        let columns = self.places.iter().map(|&(at, axis)| &self.columns[at].fields[axis]);
+        columns.chain(base.modes.iter().map(|mode| &mode.field))
+    }
+
+    /// Forces and motions for displacements of the contacts.
+    ///
+    /// Shapes: `q` one per touched degree of freedom, then three per mask, m.
+    ///
+    /// # Errors
+    /// [`CondensedError::NotHeld`], [`CondensedError::NotFinite`].
+    pub fn solve(&self, q: &[f64]) -> Result<ContactAnswer, CondensedError> {
+        let c = self.places.len();
+        let right = DVector::from_fn(self.matrix.nrows(), |i, _| q.get(i).copied().unwrap_or(0.0));
+        let solve = |right: &DVector<f64>| match &self.lu {
+            Some(lu) => lu.solve(right).ok_or(CondensedError::NotHeld),
+            None => Ok(right.clone()),
+        };
+        let mut x = solve(&right)?;
+        // One step of refinement takes out the rounding of the elimination and of the symmetry.
+        let miss = &right - &self.matrix * &x;
+        x += solve(&miss)?;
+        let mismatch = (&right - &self.matrix * &x).norm();
+        if !x.iter().all(|v| v.is_finite()) {
+            return Err(CondensedError::NotFinite);
+        }
+        Ok(ContactAnswer {
+            lambda: x.iter().take(c).map(|v| v * self.scale).collect(),
+            amounts: x.iter().skip(c).copied().collect(),
+            mismatch,
+        })
+    }
+
+    /// Displacement of every degree of freedom, 3N, m.
+    pub fn full_displacement(&self, base: &Base, answer: &ContactAnswer) -> Vec<f64> {
+        let mut u = vec![0.0; base.dof_count()];
+        let amounts = answer.lambda.iter().chain(&answer.amounts);
+        for (field, amount) in self.fields(base).zip(amounts) {
+            for (u, g) in u.iter_mut().zip(field) {
+                *u += amount * g;
+            }
+        }
+        u
+    }
+}
