@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use fea_server::ServerConfig;
-use glove_client::ask::deformation::Elasticity;
 use glove_client::ask::link::Link;
+use glove_client::ask::solve_settings::Elasticity;
 use glove_client::ask::solve_settings::{SolveSettings, Subscription};
 use glove_client::commands::run::RunCommand;
 use glove_client::pace::Pace;

@@ -1,7 +1,7 @@
 //! Noise of a glove and a tracker, put on the bytes that they send.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use softgrasp_hand::arrival::{Arrival, Device};
+use softgrasp_hand::sent::{Arrival, Device};
 
 use crate::random::Random;
 

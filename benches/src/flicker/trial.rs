@@ -8,10 +8,10 @@ use softgrasp_core::mesh::BuiltIn;
 use softgrasp_grasp::grasp::{Grasp, StateName, StepInput, sense};
 use softgrasp_grasp::hand::HandColliders;
 use softgrasp_grasp::object::{ContactModel, ObjectChoice};
-use softgrasp_hand::arrival::Arrival;
 use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
+use softgrasp_hand::sent::Arrival;
 
 use super::noise::Noise;
 

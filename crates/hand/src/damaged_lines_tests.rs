@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Vector3};
 use softgrasp_grasp::hand::JointAngles;
 
-use crate::arrival::{Arrival, Device};
 use crate::hand_reader::{HandReader, HandSetup};
 use crate::notice::NoticeKind;
+use crate::sent::{Arrival, Device};
 
 /// Numbers that look like chance and are the same every time.
 struct Chance(u64);

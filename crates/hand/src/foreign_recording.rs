@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::arrival::{Arrival, Device};
 use crate::devices::recordings::{LeapError, LeapRecording, TrajError, Trajectory};
 use crate::hand_reader::HandSetup;
 use crate::joints::JointsRecord;
 use crate::sent::Sent;
+use crate::sent::{Arrival, Device};
 use crate::serial::motion::Motion;
 
 /// A recording that is played in its own time.

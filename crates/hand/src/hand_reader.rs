@@ -3,7 +3,6 @@
 use nalgebra::{Isometry3, Translation3};
 use softgrasp_grasp::hand::{HandDimensions, HandPose, JointAngles, pose};
 
-use crate::arrival::{Arrival, Device};
 use crate::devices::calibration::{Calibration, sensor_name};
 use crate::devices::cyberglove::{
     self, GloveEvent, GloveParser, GloveRecord, RecordKind, RecordOptions, SensorCount,
@@ -18,6 +17,7 @@ use crate::devices::{
 };
 use crate::joints_reader::{FitErrors, JointsReader};
 use crate::notice::Notice;
+use crate::sent::{Arrival, Device};
 
 /// Everything that says how a hand, its glove and its tracker are set up.
 #[derive(Clone, Debug)]

@@ -1,11 +1,10 @@
-//! The hand that is asked for on the command line.
+//! Which kind of hand acts, and the hand that is asked for on the command line.
 
 use std::fmt;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::hand_choice::HandChoice;
 use crate::scripted::ScriptName;
 use crate::serial::SerialSource;
 
@@ -78,5 +77,25 @@ impl fmt::Display for HandRequest {
             Self::Joints(address) => write!(f, "joints:{address}"),
             Self::Xr => f.write_str("xr"),
         }
+    }
+}
+
+/// Where the hand comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HandChoice {
+    /// Played by the program, as device bytes.
+    Scripted(ScriptName),
+    /// Driven by mouse and keyboard, in a window.
+    Mouse,
+    /// A person's own hand, through a glove and a tracker, or tracked otherwise.
+    Live,
+    /// A recording that is played again.
+    Replay,
+}
+
+impl HandChoice {
+    /// Whether it is played, so that it can be paused; a person cannot.
+    pub fn is_played(self) -> bool {
+        matches!(self, Self::Scripted(_) | Self::Replay)
     }
 }

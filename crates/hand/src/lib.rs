@@ -17,12 +17,10 @@
 //! assert_eq!(records, 1);
 //! ```
 
-pub mod arrival;
 #[cfg(test)]
 mod damaged_lines_tests;
 pub mod devices;
 pub mod foreign_recording;
-pub mod hand_choice;
 pub mod hand_reader;
 pub mod hand_request;
 pub mod hand_setup;

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use crate::arrival::{Arrival, Device};
 use crate::joints::{ArrivedBytes, JointsFeed, JointsListener};
 use crate::notice::Notice;
+use crate::sent::{Arrival, Device};
 use crate::serial::{DeviceState, SerialDevices};
 
 /// Devices that are open, and whose bytes come by themselves.

@@ -1,7 +1,7 @@
 //! What an object that has flowed looks like when the hand lets go.
 
-use glove_client::ask::deformation::Elasticity;
 use glove_client::ask::link::Link;
+use glove_client::ask::solve_settings::Elasticity;
 use glove_client::ask::solve_settings::SolveSettings;
 use glove_client::pace::Pace;
 use glove_client::pace::tick_budget::Priority;

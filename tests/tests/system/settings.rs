@@ -1,6 +1,6 @@
 //! What the objects of these tests are, and how they are solved.
 
-use glove_client::ask::deformation::Elasticity;
+use glove_client::ask::solve_settings::Elasticity;
 use glove_client::ask::solve_settings::{SolveSettings, Subscription};
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_grasp::object::ContactModel;

@@ -12,10 +12,10 @@ use serde_json::Value;
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_grasp::grasp::{Grasp, StateName};
 use softgrasp_grasp::object::{ContactModel, SoftObject};
-use softgrasp_hand::arrival::{Arrival, Device};
 use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::joints::{JOINT_NAMES, WRIST};
 use softgrasp_hand::sent::Sent;
+use softgrasp_hand::sent::{Arrival, Device};
 use softgrasp_tests::shared::shared;
 
 use crate::settings::{linear_settings, sized};

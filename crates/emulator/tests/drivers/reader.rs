@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use softgrasp_hand::arrival::Device;
 use softgrasp_hand::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
 use softgrasp_hand::devices::fastrak::{
     Encoding, FastrakEvent, FastrakFormat, FastrakParser, LengthUnit, OutputList,
 };
+use softgrasp_hand::sent::Device;
 use softgrasp_hand::serial::{DeviceState, SerialDevices};
 
 use super::served::{HANG, number_of};

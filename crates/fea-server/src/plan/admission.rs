@@ -2,7 +2,7 @@
 //! made, by what is counted before a factor is.
 
 use softgrasp_core::fem::Element;
-use softgrasp_core::model::Model;
+use softgrasp_core::model::{Model, ModelError};
 use softgrasp_core::solve::memory::{Need, Problem};
 use softgrasp_core::solve::work::MeshSize;
 use softgrasp_core::solve::{Analysed, Method};
@@ -100,4 +100,21 @@ fn size_of(mesh: &MeshData) -> MeshSize {
         }
     }
     MeshSize { nodes: used.iter().filter(|used| **used).count(), tets: mesh.tets.len() }
+}
+
+/// Why a question cannot be answered as it was asked.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum PlanError {
+    #[error("condensed takes known displacements only, not forces; use front or auto")]
+    CondensedForces,
+    #[error("node {node} is fixed by the model and moved by the question; use front or auto")]
+    FixedMoved { node: u32 },
+    #[error("{method} does not answer masks; ask for condensed or auto")]
+    MasksDirect { method: softgrasp_core::solve::Method },
+    #[error("masks are answered by condensed only, and not here: {0}")]
+    MasksNotCondensed(Box<PlanError>),
+    #[error("{0}")]
+    Memory(Box<Shortage>),
+    #[error(transparent)]
+    Model(#[from] ModelError),
 }

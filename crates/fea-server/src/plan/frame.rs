@@ -4,7 +4,7 @@ use softgrasp_core::model::Known;
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::choose::{Plan, Question, SMALLER_THAN_FRONT};
 
-use super::error::PlanError;
+use super::admission::PlanError;
 use super::once::{ASKED, plan_for_masks};
 use crate::store::StoredModel;
 

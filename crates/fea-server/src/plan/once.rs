@@ -11,8 +11,8 @@ use softgrasp_core::solve::rates::Rates;
 use softgrasp_core::solve::work::Work;
 use softgrasp_core::solve::{Analysed, Method};
 
+use super::admission::PlanError;
 use super::admission::{Subject, admit};
-use super::error::PlanError;
 use super::rates::MeasuredRates;
 use crate::budget::Reservation;
 use crate::store::ModelStore;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use tokio::sync::{Semaphore, oneshot};
 
-use super::caught::{EndedAbnormally, caught};
 use super::fair_queue::{FairQueue, Turn};
 use super::pool::pool;
+use super::pool::{EndedAbnormally, caught};
 use crate::lock::Lock;
 
 /// Work of one size, and the pools that do it.

@@ -1,4 +1,11 @@
-//! A rayon pool of exact size whose threads stand back so far.
+//! Threads for work: a rayon pool of exact size, a panic that ends its own work only, and pauses for work
+//! that must keep neither pool nor core from the frames.
+
+use std::panic::AssertUnwindSafe;
+use std::time::Instant;
+
+use crate::awaited::Abandoned;
+use crate::lock::assert_none_is_held;
 
 /// A thread that waits inside a parallel loop takes other pieces, each on top of the last on one stack.
 const STACK_BYTES: usize = 16 << 20;
@@ -23,4 +30,55 @@ pub(super) fn pool(
         })
         .build()
         .map_err(std::io::Error::other)
+}
+
+/// The work on a request panicked, or the server stopped before it began; it has been logged.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the work on this request ended abnormally")]
+pub(crate) struct EndedAbnormally;
+
+/// The result of `work`; a panic is logged.
+///
+/// # Errors
+/// [`EndedAbnormally`] if it panicked.
+pub(super) fn caught<T>(place: &str, work: impl FnOnce() -> T) -> Result<T, EndedAbnormally> {
+    let checked = || {
+        assert_none_is_held();
+        work()
+    };
+    std::panic::catch_unwind(AssertUnwindSafe(checked)).map_err(|panic| {
+        if panic.is::<Abandoned>() {
+            tracing::info!("work {place} is ended, because its session has gone");
+            return EndedAbnormally;
+        }
+        let text = panic
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| panic.downcast_ref::<&str>().copied())
+            .unwrap_or("no text");
+        tracing::error!(panic = text, "work {place} ended abnormally");
+        EndedAbnormally
+    })
+}
+
+/// Lets a thread rest so that it works for a tenth of its time, in pieces far shorter than the
+/// slices in which a system hands out its cores: nothing that is urgent ever waits for it.
+pub(crate) struct Rest {
+    worked_since: Instant,
+}
+
+/// Time at rest per time at work.
+const REST_PER_WORK: u32 = 9;
+
+impl Rest {
+    /// Work begins.
+    pub fn new() -> Self {
+        Self { worked_since: Instant::now() }
+    }
+
+    /// Rests for what has been worked since the last rest.
+    pub fn rest(&mut self) {
+        std::thread::sleep(REST_PER_WORK * self.worked_since.elapsed());
+        self.worked_since = Instant::now();
+    }
 }

@@ -5,10 +5,10 @@ use std::sync::{Arc, mpsc};
 
 use tokio::sync::{Semaphore, oneshot};
 
-use super::caught::{EndedAbnormally, caught};
 use super::fair_queue::Turn;
 use super::lane::{Lane, Width};
 use super::pool::pool;
+use super::pool::{EndedAbnormally, caught};
 
 /// The pools, each behind a bounded queue.
 ///

@@ -3,7 +3,6 @@
 pub mod calculix_deck;
 pub mod connection;
 pub mod contact_frame;
-pub mod deformation;
 pub mod digest;
 pub mod discretisation;
 pub mod displacement_table;

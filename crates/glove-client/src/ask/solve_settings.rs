@@ -1,11 +1,11 @@
-//! What the object is made of and how its displacements are solved for.
+//! What the object is made of, how far its deformation may go, and how its displacements are solved for.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_grasp::object::ContactModel;
-use softgrasp_protocol::{Deformation, ElementName, Material, MethodName};
-
-use crate::ask::deformation::Elasticity;
+use softgrasp_protocol::{
+    Deformation, ElementName, LargeAsk, LawName, Material, MethodName, Pace, PathChoice,
+};
 
 /// What the object is made of and how it is to be solved.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,4 +65,48 @@ pub struct AnswerWishes {
     /// Whether the forces of the fingertips are wanted: every answer has them, and on the wire they
     /// take room (`GraspLoop::fingertip_forces`).
     pub forces: bool,
+}
+
+/// Deformation, law and yield stress of an object.
+///
+/// Units: Pa.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Elasticity {
+    /// Which equations.
+    pub deformation: Deformation,
+    /// Law of large deformation.
+    pub law: LawName,
+    /// Above it the material flows and stays deformed.
+    pub yield_stress: Option<f64>,
+}
+
+impl Elasticity {
+    /// That of the thesis.
+    pub const LINEAR: Self =
+        Self { deformation: Deformation::Linear, law: LawName::NeoHookean, yield_stress: None };
+
+    /// What a server is asked; `None` where a question of the linear kind is asked.
+    pub fn ask(&self, path: PathChoice, pace: Pace) -> Option<LargeAsk> {
+        let Self { deformation, law, yield_stress } = *self;
+        (deformation != Deformation::Linear).then_some(LargeAsk {
+            deformation,
+            law,
+            yield_stress,
+            path,
+            pace,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn linear_questions_ask_nothing_of_large_deformation() {
+        assert_eq!(Elasticity::LINEAR.ask(PathChoice::Continue, Pace::Timely), None);
+        let auto = Elasticity { deformation: Deformation::Auto, ..Elasticity::LINEAR };
+        let ask = auto.ask(PathChoice::FromRest, Pace::Repeatable).unwrap();
+        assert_eq!(ask.deformation, Deformation::Auto);
+    }
 }

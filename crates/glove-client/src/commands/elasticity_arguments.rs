@@ -5,7 +5,7 @@ use clap::Args;
 use softgrasp_protocol::{Deformation, LawName, MethodName};
 
 use super::numbers::positive;
-use crate::ask::deformation::Elasticity;
+use crate::ask::solve_settings::Elasticity;
 use crate::object::scene::SceneFile;
 
 /// How the object deforms.

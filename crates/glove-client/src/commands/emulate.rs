@@ -71,8 +71,8 @@ mod serving {
 
     use super::EmulateCommand;
     use crate::commands::interruption;
+    use crate::commands::output::Progress;
     use crate::commands::output::print;
-    use crate::commands::progress::Progress;
     use crate::commands::recorded_settings::recorded_hand;
     use crate::object::loading::{ObjectRequest, load};
     use crate::object::scene::{NODES_DEFAULT, size_to_hold};

@@ -8,10 +8,10 @@ use softgrasp_core::fill::{Deviation, FillTarget};
 use softgrasp_core::mesh::{Quality, Surface};
 
 use super::numbers::{count, positive};
+use super::output::Progress;
 use super::output::print;
-use super::progress::Progress;
 use crate::object::file_writing::write_file;
-use crate::object::mesh_writing::encode_mesh;
+use crate::object::mesh_file::encode_mesh;
 use crate::object::object_file::FilledSurface;
 use crate::object::scene::NODES_DEFAULT;
 

@@ -10,11 +10,11 @@ use softgrasp_core::solve::memory::Bytes;
 
 use super::output::print;
 use crate::ask::connection::OwnMachine;
-use crate::commands::progress::Progress;
+use crate::commands::output::Progress;
 use crate::inspect::inspection::Inspection;
 use crate::object::file_writing::write_file;
+use crate::object::mesh_file::encode_mesh;
 use crate::object::mesh_file::read_mesh_file;
-use crate::object::mesh_writing::encode_mesh;
 
 /// Tell what is in a mesh file, whether it can be used, and what an answer would cost.
 #[derive(Args)]

@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use nalgebra::Isometry3;
-use softgrasp_hand::arrival::Arrival;
 use softgrasp_hand::devices::HandSample;
 use softgrasp_hand::devices::cyberglove::RawSensors;
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::sent::Arrival;
 use softgrasp_hand::serial::{SerialDevices, SerialSource, settings_of_hand};
 
 /// Gives the next reading of the glove; waits for it a short while, `None` if none came.

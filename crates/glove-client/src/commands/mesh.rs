@@ -7,9 +7,9 @@ use softgrasp_core::mesh::{BuiltIn, Surface, generate};
 
 use super::numbers::count;
 use super::output::print;
-use crate::commands::progress::Progress;
+use crate::commands::output::Progress;
 use crate::object::file_writing::write_file;
-use crate::object::mesh_writing::encode_mesh;
+use crate::object::mesh_file::encode_mesh;
 
 /// Generate a built-in object and write it to a file.
 #[derive(Args)]

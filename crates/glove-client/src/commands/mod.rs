@@ -24,7 +24,6 @@ mod numbers;
 mod output;
 mod page_arguments;
 pub mod press;
-mod progress;
 pub mod record;
 mod recorded_object;
 mod recorded_samples;

@@ -12,8 +12,8 @@ use softgrasp_protocol::{ContactAsk, Deformation, ElementName, LawName, Material
 
 use super::access_arguments::AccessArguments;
 use super::numbers::{count, poisson, positive, speed, vector};
+use super::output::Progress;
 use super::output::{print, write_json};
-use super::progress::Progress;
 use crate::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
 use crate::ask::contact_frame::isometry_of;
 use crate::ask::displacement_table::write_displacements;

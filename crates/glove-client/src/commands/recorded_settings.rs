@@ -7,7 +7,7 @@ use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::recording::RecordedSetup;
 use softgrasp_protocol::{ElementName, LawName, Material};
 
-use crate::ask::deformation::Elasticity;
+use crate::ask::solve_settings::Elasticity;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
 use crate::run::contact_grasp::ContactScene;
 

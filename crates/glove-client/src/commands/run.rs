@@ -16,7 +16,7 @@ use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 use super::run_window;
 use super::tell_report::tell;
 use crate::commands::interruption;
-use crate::commands::progress::Progress;
+use crate::commands::output::Progress;
 use crate::pace::Pace;
 use crate::run::run_report::RunReport;
 use crate::run::status_line::StatusLine;

@@ -3,8 +3,8 @@
 use std::sync::mpsc::{Receiver, Sender};
 
 use anyhow::Context;
-use softgrasp_hand::hand_choice::HandChoice;
 use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::joints::JointsFeed;
 use softgrasp_hand::notice::Notice;
 use softgrasp_window::view::control::Control;

@@ -23,11 +23,11 @@ use super::output::{print, write_json};
 use super::solve_cases::{CaseFiles, read_values};
 use crate::ask::calculix_deck::CalculixDeck;
 use crate::ask::connection::{Host, ServerChoice};
-use crate::ask::deformation::Elasticity;
 use crate::ask::discretisation::DiscretisationEstimate;
 use crate::ask::displacement_table::{DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError};
 use crate::ask::model_upload::mesh_data;
-use crate::commands::progress::Progress;
+use crate::ask::solve_settings::Elasticity;
+use crate::commands::output::Progress;
 use crate::object::file_writing::write_file;
 use crate::object::mesh_file::read_mesh_file;
 

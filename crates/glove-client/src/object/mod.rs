@@ -3,7 +3,6 @@
 pub mod file_writing;
 pub mod loading;
 pub mod mesh_file;
-pub mod mesh_writing;
 pub mod object_file;
 pub mod object_place;
 pub mod object_work;

@@ -9,7 +9,7 @@ use softgrasp_core::mesh_io::PointField;
 use softgrasp_grasp::object::RestShape;
 
 use crate::object::file_writing::{FileWriteError, write_file};
-use crate::object::mesh_writing::{EncodeMeshError, encode_mesh};
+use crate::object::mesh_file::{EncodeMeshError, encode_mesh};
 
 /// A shape that is to be saved.
 ///

@@ -12,9 +12,9 @@ use softgrasp_grasp::grasp::{
 };
 use softgrasp_grasp::hand::{HandColliders, HandPose};
 use softgrasp_grasp::object::{ObjectError, RestShape, SoftObject};
-use softgrasp_hand::arrival::Device;
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::notice::Notice;
+use softgrasp_hand::sent::Device;
 use softgrasp_hand::sent::Sent;
 use softgrasp_protocol::{Material, MethodName};
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
-use crate::run::times::Times;
+use crate::run::answer_tally::Times;
 
 /// What is known of a tick that asked the server.
 #[derive(Clone, Copy, Debug, PartialEq)]

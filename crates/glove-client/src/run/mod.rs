@@ -23,4 +23,3 @@ pub mod status_line;
 pub mod tick_loop;
 pub mod tick_outcome;
 pub mod tick_thread;
-mod times;

@@ -1,9 +1,9 @@
 //! The outcome of one tick: events, the state of the grasp, answers, and ticks without one.
 
 use softgrasp_grasp::grasp::{GraspEvent, StateName};
-use softgrasp_hand::arrival::Device;
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::scripted::Seen;
+use softgrasp_hand::sent::Device;
 use softgrasp_protocol::solve_report::SolveSummary;
 
 use crate::ask::unanswered::Unanswered;

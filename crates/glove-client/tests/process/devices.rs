@@ -4,10 +4,10 @@
 
 use std::time::{Duration, Instant};
 
-use softgrasp_hand::arrival::Device;
 use softgrasp_hand::devices::cyberglove::{
     GloveEvent, GloveParser, RecordOptions, Sensor, SensorCount,
 };
+use softgrasp_hand::sent::Device;
 use softgrasp_hand::serial::{SerialDevices, SerialSettings};
 
 use crate::emulator::Emulator;

@@ -1,10 +1,10 @@
 //! What came over a serial line: told in a sentence where it is not what the device there would send.
 
-use crate::arrival::Device;
 use crate::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
 use crate::devices::fastrak::{
     Encoding, FastrakEvent, FastrakFormat, FastrakParser, LengthUnit, OutputList,
 };
+use crate::sent::Device;
 
 /// What has been heard of a device.
 #[derive(Clone, Debug, Default)]

@@ -1,4 +1,5 @@
-//! Bytes that arrived from a device and are not parsed yet, never more than a fixed number.
+//! Bytes that arrived from a device and are not parsed yet, never more than a fixed number, and how a parser
+//! is fed with more than it takes at once.
 
 /// Bounded first-in-first-out bytes.
 ///
@@ -30,6 +31,26 @@ impl Inbox {
     /// Forgets the first `count` waiting bytes.
     pub(super) fn consume(&mut self, count: usize) {
         self.start = (self.start + count).min(self.bytes.len());
+    }
+}
+
+/// Feeds all bytes to a parser and hands each of its events to `on_event`.
+///
+/// `feed` takes bytes and returns how many it took. Reading every event leaves less than one record
+/// or reply waiting, so each further call takes some.
+pub(super) fn feed_all<Parser: Iterator>(
+    parser: &mut Parser,
+    feed: impl Fn(&mut Parser, &[u8]) -> usize,
+    mut bytes: &[u8],
+    mut on_event: impl FnMut(Parser::Item),
+) {
+    loop {
+        let taken = feed(parser, bytes);
+        bytes = bytes.get(taken..).unwrap_or_default();
+        parser.by_ref().for_each(&mut on_event);
+        if bytes.is_empty() {
+            return;
+        }
     }
 }
 

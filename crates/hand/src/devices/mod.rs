@@ -5,7 +5,6 @@ pub mod calibration;
 pub mod cyberglove;
 mod detected;
 pub mod fastrak;
-mod feeding;
 mod heard;
 mod inbox;
 mod mount;

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::foxglove;
-use crate::arrival::Device;
+use crate::sent::Device;
 
 /// A channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::recorder::{Recorder, TickNews};
 use super::tick::{RecordedSetup, TickSeen};
 use super::{ReadError, Recording, VERSION, read_recording};
-use crate::arrival::{Arrival, Device};
 use crate::sent::Sent;
+use crate::sent::{Arrival, Device};
 
 /// Set-up of a recording; what it says matters to nobody here.
 pub(super) fn setup() -> RecordedSetup {

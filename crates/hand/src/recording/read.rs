@@ -12,7 +12,7 @@ use mcap::sans_io::LinearReaderOptions;
 use super::channels::Channel;
 use super::file::{DeviceBytes, bytes_of};
 use super::tick::{AnswerSeen, RecordedSetup, RecordedTick, SPRINGBACK_REFUSED, TickSeen};
-use crate::arrival::Arrival;
+use crate::sent::Arrival;
 
 /// A recording.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,7 +13,7 @@ use super::channels::Channel;
 use super::file::{DeviceBytes, RecordingFile, hex_of};
 use super::foxglove;
 use super::tick::{AnswerSeen, EventSeen, Intervention, RecordedSetup, SceneSeen, TickSeen};
-use crate::arrival::Arrival;
+use crate::sent::Arrival;
 use crate::sent::Sent;
 
 /// A recording that is being written.

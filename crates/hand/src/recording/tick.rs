@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use softgrasp_grasp::hand::{ANGLE_COUNT, HandDimensions};
 
 use super::stages::StageDigests;
-use crate::arrival::Arrival;
+use crate::sent::Arrival;
 
 /// How a recorded run was set up: enough to play it again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use crate::arrival::Device;
+use crate::sent::Device;
 
 /// Bytes of a device: a whole record or reply, or bytes that are none.
 #[derive(Clone, Debug, PartialEq, Eq)]

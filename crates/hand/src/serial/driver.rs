@@ -9,7 +9,7 @@ use super::arrivals::{Arrivals, Arrived};
 use super::port::{Lost, Port};
 use super::record_assembler::Piece;
 use super::source::PortName;
-use crate::arrival::Device;
+use crate::sent::Device;
 
 /// How a device is.
 #[derive(Clone, Debug, PartialEq)]

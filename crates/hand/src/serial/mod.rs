@@ -5,8 +5,6 @@ mod arrivals;
 mod driver;
 mod facts;
 mod glove_driver;
-mod glove_replies;
-mod hand_settings;
 mod listening;
 mod port;
 mod record_assembler;
@@ -14,7 +12,6 @@ mod serial_devices;
 mod settings;
 mod source;
 mod tracker_driver;
-mod tracker_replies;
 
 pub mod motion;
 pub mod probe;
@@ -22,8 +19,8 @@ pub mod probe;
 pub use arrivals::Arrived;
 pub use driver::DeviceState;
 pub use facts::{GloveFacts, TrackerFacts};
-pub use hand_settings::settings_of_hand;
 pub use serial_devices::{SerialDevices, SerialError};
+pub use settings::settings_of_hand;
 pub use settings::{
     GloveMode, GloveSettings, SerialSettings, SettingsError, TrackerFilter, TrackerMode,
     TrackerSettings,

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::glove_replies::{Payload, Reply, find_reply};
+use super::glove_driver::{Payload, Reply, find_reply};
 use super::port::{Lost, Port};
-use super::tracker_replies::{complaints, find_status};
+use super::tracker_driver::{find_status, refusals};
 
 /// What answers on a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,7 +84,7 @@ fn ask_who(port: &mut Port, baud: u32) -> Result<Option<Found>, Lost> {
         };
         return Ok(Some(Found::Glove { baud, sensors: Some(sensors), identity }));
     }
-    let complained = !complaints(&heard).is_empty();
+    let complained = !refusals(&heard).is_empty();
     // `S` makes a glove stream: it is stopped below.
     port.write(b"\rcS")?;
     let heard = listen(port, |heard| find_status(heard).is_some())?;

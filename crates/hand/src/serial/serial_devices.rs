@@ -8,7 +8,7 @@ use super::facts::{GloveFacts, TrackerFacts};
 use super::glove_driver::serve_glove;
 use super::settings::{SerialSettings, SettingsError};
 use super::tracker_driver::serve_tracker;
-use crate::arrival::Device;
+use crate::sent::Device;
 
 /// Why there are no drivers.
 #[derive(Debug, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! What a person can ask for, by menu, bar or key.
 
 use softgrasp_grasp::object::ObjectChoice;
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 
 use super::display::Level;
 use super::shading::Shading;

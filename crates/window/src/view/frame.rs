@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use softgrasp_grasp::grasp::{Contact, HandSegments, StateName};
 use softgrasp_grasp::hand::{HandColliders, HandDimensions, HandPose, pose_of_segments};
 use softgrasp_grasp::object::RestShape;
-use softgrasp_hand::arrival::Device;
+use softgrasp_hand::sent::Device;
 use softgrasp_protocol::solve_report::SolveSummary;
 
 use super::camera::ViewCamera;

@@ -1,9 +1,11 @@
 //! The light around the scene: a photographer's studio, painted by formula.
 
 use image::{DynamicImage, ImageBuffer, Rgb, Rgb32FImage};
+use kiss3d::prelude::{Color, Light, Vec3};
 
 use crate::view::blend::smooth_step;
-use crate::view::light::HORIZON;
+use crate::view::light;
+use crate::view::light::{HORIZON, Lamp};
 
 /// Width of the picture of the surroundings; half of it is its height.
 const WIDTH: u32 = 256;
@@ -34,6 +36,20 @@ fn radiance(azimuth: f64, elevation: f64) -> [f32; 3] {
     };
     let lamp = 2.4 * above + 2.6 * side(0.6) + 1.4 * side(3.9);
     std::array::from_fn(|i| HORIZON[i] * shade as f32 + lamp as f32)
+}
+
+/// A lamp for the renderer.
+pub fn light(lamp: &Lamp) -> Light {
+    let [red, green, blue] = lamp.colour;
+    let colour = Color::new(red, green, blue, 1.0);
+    let direction = Vec3::from_array(lamp.direction);
+    Light::directional(direction).with_color(colour).with_intensity(lamp.strength)
+}
+
+/// Colour of the wall behind everything.
+pub fn wall() -> Color {
+    let [red, green, blue] = light::wall();
+    Color::new(red, green, blue, 1.0)
 }
 
 #[cfg(test)]

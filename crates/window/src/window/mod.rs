@@ -15,9 +15,7 @@ mod finger_keys;
 mod graphics;
 mod grips;
 mod input;
-mod lamps;
 mod lost_display;
-mod opening;
 mod panels;
 #[cfg(test)]
 mod panels_tests;
@@ -44,7 +42,7 @@ pub use changes::SQUEEZE_TIMES;
 pub use graphics::{Graphics, NoGraphics};
 pub use image::RgbImage;
 pub use lost_display::End;
-pub use opening::Opening;
 pub use picture::Pictures;
 pub use running::{About, Ticks, WhenLost};
+pub use start::Opening;
 pub use start::{Start, Started};

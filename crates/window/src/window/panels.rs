@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use egui::{Align2, Context, Ui};
 use nalgebra::Vector2;
 use softgrasp_grasp::object::ObjectChoice;
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::mouse::MouseInput;
 
 use super::changes::Change;
@@ -16,12 +16,12 @@ use super::ui::information_card::{self, RunFacts};
 use super::ui::legend_card::{self, LegendText};
 use super::ui::menu::{self, MenuFacts, PopUp};
 use super::ui::notices::Notices;
-use super::ui::preparing_card::{self, Preparing};
 use super::ui::softness_card::{Is, Softness, SoftnessWish};
 use super::ui::status_card::{self, Told};
 use super::ui::timeline::{self, Playing, TimelineWish};
 use super::ui::timings_card::Timings;
-use super::ui::{help_card, loading_card, theme, turn_card};
+use super::ui::waiting_cards::{self, Preparing};
+use super::ui::{help_card, theme};
 use crate::view::action::Action;
 use crate::view::colouring::Colouring;
 use crate::view::display::Display;
@@ -149,13 +149,13 @@ impl Panels {
         }
         let mut asked = Asked::default();
         if let Some((step, name)) = seen.starting {
-            asked.cancel = loading_card::show(context, name, step);
+            asked.cancel = waiting_cards::loading(context, name, step);
         }
         if let Some(running) = seen.running {
             self.show_run(context, seen, running, &mut asked);
         }
         if let Some((stage, name)) = seen.change.stage() {
-            asked.cancel |= loading_card::show(context, &name, stage as usize);
+            asked.cancel |= waiting_cards::loading(context, &name, stage as usize);
         }
         if seen.running.is_none() {
             let offset = [0.0, theme::BELOW_BAR];
@@ -285,9 +285,9 @@ impl Panels {
         if seen.story_begins_in.is_some() {
             self.hint_gone = true;
             let begins_in = seen.story_begins_in.filter(|_| running.about.begins_anew);
-            asked.takes_hand = turn_card::show(ui, &running.about.object, begins_in);
+            asked.takes_hand = waiting_cards::turn(ui, &running.about.object, begins_in);
         } else if let Some(preparing) = self.preparing(running) {
-            preparing_card::show(ui, &preparing);
+            waiting_cards::preparing(ui, &preparing);
         } else if !self.hint_gone {
             help_card::hint(ui, running.about.hand, running.about.is_lifted);
         }
@@ -301,7 +301,7 @@ impl Panels {
             return None;
         };
         let since = self.prepares_since.get_or_insert_with(Instant::now).elapsed();
-        (since > preparing_card::BRIEF).then(|| Preparing {
+        (since > waiting_cards::BRIEF).then(|| Preparing {
             object: &running.about.object,
             nodes: frame.object.rest.mesh().node_count(),
             stage: (running.about.server_stage)(),

@@ -11,9 +11,9 @@ use egui::{
 use nalgebra::Vector3;
 use softgrasp_core::fem::Material;
 use softgrasp_grasp::grasp::StateName;
-use softgrasp_hand::arrival::Device;
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::scripted::ScriptName;
+use softgrasp_hand::sent::Device;
 
 use super::changes::Change;
 use super::panels::{Panels, Seen};

@@ -18,7 +18,7 @@ use kiss3d::prelude::{
 };
 use kiss3d::resource::vertex_index::VERTEX_INDEX_FORMAT;
 
-use super::lamps::wall;
+use super::environment::wall;
 use super::units::UNITS_PER_M;
 use crate::view::ground_shade::{Capsule, MAX_CAPSULES};
 use crate::view::light::{FILL, FOG_M, KEY, WRAP};

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use egui::epaint::ClippedShape;
 use egui::{Context, Pos2, RawInput, Rect, Shape, Ui, Vec2};
 use softgrasp_grasp::grasp::StateName;
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::scripted::ScriptName;
 
 use super::panels::Panels;

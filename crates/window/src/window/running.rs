@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
 
 use softgrasp_core::fem::Material;
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::notice::{Notice, NoticeKind};
 use softgrasp_protocol::MethodName;
 

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use kiss3d::prelude::{Action as Press, Key, Modifiers, Window, WindowEvent};
 use nalgebra::Vector2;
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::mouse::MouseInput;
 
 use super::finger_keys::FingerKeys;

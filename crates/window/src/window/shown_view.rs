@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use kiss3d::prelude::{OrbitCamera3d, SceneNode3d, Window};
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 
 use super::director::Director;
 use super::scene::Scene;

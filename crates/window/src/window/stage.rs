@@ -8,7 +8,7 @@ use kiss3d::prelude::{
 };
 
 use super::environment::studio;
-use super::lamps::{light, wall};
+use super::environment::{light, wall};
 use super::plain_material::{PlainMaterial, SharedCapsules, SharedMaterial};
 use super::units::{UNITS_PER_M, drawn_point};
 use crate::view::camera::{FIELD_OF_VIEW, ViewCamera};

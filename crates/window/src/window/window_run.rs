@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use kiss3d::prelude::Window;
 use softgrasp_core::fem::Material as ElasticMaterial;
 use softgrasp_grasp::object::{ContactModel, ObjectChoice};
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::mouse::MouseInput;
 use softgrasp_protocol::Material;
 

@@ -4,8 +4,8 @@ use super::record::{
     GloveEncoding, GloveRecord, RecordError, RecordOptions, decode_frame, decode_line,
 };
 use super::sensor::SensorCount;
-use crate::devices::feeding::feed_all;
 use crate::devices::inbox::Inbox;
+use crate::devices::inbox::feed_all;
 
 /// What the interface unit complains about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

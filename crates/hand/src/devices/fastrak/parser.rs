@@ -4,8 +4,8 @@ use super::decode::{Head, head};
 use super::fault::{FastrakFault, FastrakFaultKind};
 use super::flip::{FlipWatch, HemisphereFlip};
 use super::record::{FastrakFormat, FastrakRecord};
-use crate::devices::feeding::feed_all;
 use crate::devices::inbox::Inbox;
+use crate::devices::inbox::feed_all;
 
 /// What the stream contained.
 #[derive(Clone, Debug, PartialEq)]

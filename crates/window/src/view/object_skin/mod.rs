@@ -7,15 +7,13 @@ mod calyx;
 mod cap;
 mod crease;
 mod curved_surface;
-mod fruit_paint;
 mod lettering;
 mod look;
+mod paint;
 mod part;
 mod seeds;
 mod skin;
 mod tessellation;
-mod toy_paint;
-mod tube_paint;
 mod tube_profile;
 mod unwrap;
 

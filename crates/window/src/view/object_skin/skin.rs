@@ -6,12 +6,10 @@ use softgrasp_grasp::object::RestShape;
 use super::body::{Body, SpreadBody};
 use super::calyx::Calyx;
 use super::cap::Cap;
-use super::fruit_paint::FruitPaint;
 use super::look::Look;
+use super::paint::{FruitPaint, TubePaint, ball, foam};
 use super::part::{Part, SurfaceMaterial};
 use super::seeds::Seeds;
-use super::toy_paint;
-use super::tube_paint::TubePaint;
 use super::tube_profile::TubeProfile;
 use super::unwrap::Unwrap;
 
@@ -118,14 +116,13 @@ fn dress(look: Look, rest: &RestShape, body: &mut Body) -> Dressed {
             let spread = body.spread(&Unwrap::Faces { low, high });
             let mut material = SurfaceMaterial::plain([1.0; 3], 0.85);
             material.subsurface = 0.15;
-            material.texture = Some(toy_paint::foam());
+            material.texture = Some(foam());
             Dressed { spread, material, riders: Riders::None }
         }
         Look::Sphere => {
             let centre = rest.centre();
             let spread = body.spread(&Unwrap::Discs { centre });
-            let baked =
-                spread.with(&body.triangles).bake(2048, 1024, |p| toy_paint::ball(&centre, p));
+            let baked = spread.with(&body.triangles).bake(2048, 1024, |p| ball(&centre, p));
             let mut material = SurfaceMaterial::plain([1.0; 3], 0.48);
             material.clearcoat = (0.25, 0.3);
             material.subsurface = 0.1;

@@ -1,7 +1,7 @@
 //! The page that explains mouse and keys (F1), and the hint that a newcomer sees first.
 
 use egui::{Context, Grid, RichText, ScrollArea, Ui};
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 
 use super::theme;
 

@@ -3,7 +3,7 @@
 use egui::{Align2, Area, Button, Context, Frame, Id, Order, Pos2, Ui, Vec2};
 use softgrasp_core::mesh::BuiltIn;
 use softgrasp_grasp::object::ObjectChoice;
-use softgrasp_hand::hand_choice::HandChoice;
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::scripted::ScriptName;
 
 use super::places;
