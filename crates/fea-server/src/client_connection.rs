@@ -15,8 +15,8 @@ use tokio::time::{Instant, sleep, sleep_until, timeout, timeout_at};
 
 use crate::budget::Reservation;
 use crate::config::ServerConfig;
+use crate::no_room::NoRoom;
 use crate::places::NoPlace;
-use crate::resources::NoRoom;
 use crate::room::Room;
 
 /// Frames from and bytes to one client, each with a limit on how long the client may hold it up.

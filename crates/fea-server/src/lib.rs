@@ -37,6 +37,7 @@ mod log_line;
 mod machine_memory;
 mod manners;
 mod metrics;
+mod no_room;
 mod origin;
 mod pace;
 mod paths;

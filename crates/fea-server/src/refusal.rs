@@ -9,8 +9,8 @@ use softgrasp_core::solve::equilibrium::NoEquilibrium;
 use softgrasp_core::solve::{Method, SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected, VERSION};
 
+use crate::no_room::NoRoom;
 use crate::plan::PlanError;
-use crate::resources::NoRoom;
 use crate::workers::EndedAbnormally;
 
 /// Why a request is refused, before it becomes a message.

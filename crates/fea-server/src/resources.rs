@@ -32,18 +32,3 @@ impl Resources {
         Self { config, access, models, budget, workers, rates, metrics, log_lines }
     }
 }
-
-/// There is no memory for a request.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum NoRoom {
-    #[error(
-        "the request has {bytes} bytes; to receive and read it takes twice as much, and this server \
-         has {limit} in all (--memory-limit)"
-    )]
-    Never { bytes: u64, limit: u64 },
-    #[error(
-        "the request has {bytes} bytes, and of the {limit} bytes of this server {taken} are taken \
-         (--memory-limit); send it again later"
-    )]
-    Now { bytes: u64, limit: u64, taken: u64 },
-}

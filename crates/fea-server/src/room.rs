@@ -6,7 +6,7 @@ use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
 use crate::budget::Reservation;
-use crate::resources::NoRoom;
+use crate::no_room::NoRoom;
 use crate::resources::Resources;
 
 /// The memory that one session takes for the request that it receives.

@@ -5,7 +5,7 @@ use softgrasp_grasp::hand::JointAngles;
 use super::fit_quality::{Complaint, SensorQuality, mean};
 use super::linear::{Calibration, SensorCalibration, sensor_angle};
 use super::thumb::{THUMB_ROOT, ThumbCoupling};
-use super::thumb::{ThumbFit, ThumbRoot, fit_thumb};
+use super::thumb_fit::{ThumbFit, ThumbRoot, fit_thumb};
 use crate::devices::cyberglove::{RawSensors, Sensor, SensorSet, is_rail};
 
 /// What a fit could say about one sensor.
