@@ -46,7 +46,7 @@ pub struct Model {
 pub struct Known {
     /// All known degrees of freedom, those fixed by the scene among them, ascending.
     pub dofs: Vec<u32>,
-    /// `Q_k`, m.
+    /// Prescribed displacements (Dirichlet values) `Q_k`, m.
     pub q_known: Vec<f64>,
 }
 
@@ -117,7 +117,7 @@ impl Model {
         }
     }
 
-    /// The mesh.
+    /// The mesh that the model was made of.
     pub fn mesh(&self) -> &TetMesh {
         &self.mesh
     }

@@ -4,15 +4,13 @@
 //! This is the short way through [`crate::model`] and [`crate::solve`]. Who has budgets of memory,
 //! stages to report, masks or contact goes there.
 
-mod answer;
 mod frames;
 mod load_case;
 
 use std::sync::Arc;
 
-pub use answer::{Answer, Inexactness, LargeAnswer, SoftBodyError};
 pub use frames::Frames;
-pub use load_case::{Axis, LoadCase};
+pub use load_case::{Answer, Axis, Inexactness, LargeAnswer, LoadCase, SoftBodyError};
 
 use crate::fem::hyperelastic::Law;
 use crate::fem::{Element, Material};
@@ -98,8 +96,8 @@ impl SoftBody {
         let found = factored.solve_for_certain(self.model.stiffness(), loads, &mut |_| {});
         let (solution, certainty) = found.map_err(ModelError::from)?;
         Ok(Answer {
-            displacements: answer::by_node(&self.model, &solution.displacement),
-            reactions: answer::reactions(&known.dofs, &solution.reaction),
+            displacements: load_case::by_node(&self.model, &solution.displacement),
+            reactions: load_case::reactions(&known.dofs, &solution.reaction),
             residual_rel: solution.residual_rel,
             inexactness: Inexactness::Estimated(certainty.error_rel),
         })
@@ -153,8 +151,8 @@ impl SoftBody {
         let found = path.find(&goal, &Wish::EXACT)?;
         Ok(LargeAnswer {
             answer: Answer {
-                displacements: answer::by_node(&self.model, path.displacement()),
-                reactions: answer::reactions(&known.dofs, &found.reactions),
+                displacements: load_case::by_node(&self.model, path.displacement()),
+                reactions: load_case::reactions(&known.dofs, &found.reactions),
                 residual_rel: found.residual_rel,
                 inexactness: Inexactness::Estimated(found.error_estimate_rel),
             },

@@ -1,4 +1,5 @@
-//! A mask: surface nodes with weights, whose weighted mean displacement is prescribed.
+//! A mask: surface nodes with weights, whose weighted mean displacement is prescribed (a boundary condition
+//! on an average, beside Dirichlet values at single nodes).
 
 use std::cmp::Ordering;
 
@@ -23,32 +24,32 @@ pub enum MaskError {
     /// A weight that is negative or no number.
     #[error("node {node} has the weight {weight}; weights must be finite and not negative")]
     Weight {
-        /// The node.
+        /// The node, from 0.
         node: u32,
         /// Its weight.
         weight: f64,
     },
-    /// A node named twice.
+    /// The mask names a node twice.
     #[error("node {node} is in it twice; name each node once")]
     Twice {
-        /// The node.
+        /// The node, from 0.
         node: u32,
     },
-    /// A node that is not there.
+    /// The mask names a node that the mesh does not have.
     #[error("it names node {node}, but the mesh has {node_count} nodes (0-based)")]
     NoSuchNode {
-        /// The node.
+        /// The node, from 0.
         node: u32,
         /// Nodes of the mesh.
         node_count: usize,
     },
-    /// A node in no element.
+    /// The mask names a node that no element uses.
     #[error("node {node} is in it, but no tetrahedron uses that node; leave it out")]
     Orphan {
-        /// The node.
+        /// The node, from 0.
         node: u32,
     },
-    /// Nodes of two bodies.
+    /// The mask names nodes of two bodies.
     #[error("nodes {first} and {second} belong to different bodies; give each body its own mask")]
     SeveralBodies {
         /// A node of one body.

@@ -9,7 +9,7 @@ use crate::rigid_body::RigidShape;
 /// A rigid body, where it is when the step begins and when it ends.
 #[derive(Clone, Debug)]
 pub struct MovingBody {
-    /// Its shape.
+    /// Shape of the body, in the body's frame.
     pub shape: RigidShape,
     /// Pose at the beginning of the step.
     pub world_from_body_start: Isometry3<f64>,

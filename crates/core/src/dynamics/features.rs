@@ -133,7 +133,7 @@ const NEAR: f64 = 0.1;
 const POINTS_OF_TRIANGLE: usize = 3;
 
 impl Pool {
-    /// All points.
+    /// Corners and points inside triangles.
     pub fn iter(&self) -> impl Iterator<Item = &MaterialPoint> {
         self.corners.iter().chain(&self.inside)
     }

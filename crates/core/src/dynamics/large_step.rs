@@ -4,15 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::checks::mass_of;
 use super::configuration::{Configured, Scene};
 use super::large_body::{LargeBody, Shape};
-use super::outcome::StepOutcome;
 use super::rigid_motion::MassProperties;
 use super::rounds::{Found, Rounds};
 use super::settings::{StepError, StepSettings};
-use super::state::{HeldContact, ObjectState, at_nodes};
-use super::step::ContactStep;
+use super::state::{HeldContact, ObjectState, StepOutcome, at_nodes};
+use super::step::{ContactStep, mass_of};
 use crate::solve::condensed::{Elasticity, FreeTangent, Response, ShapeResponse};
 
 /// Shapes that a step is solved about, one after the other.
@@ -49,7 +47,7 @@ struct End {
 /// A step at large deformation: the elastic part is in balance in its deformed shape. The body keeps the
 /// shape and a factor from step to step.
 pub struct LargeStep<'a, 'b> {
-    /// The step.
+    /// Object, bodies and settings of the step.
     pub step: ContactStep<'a>,
     /// The body in the shape that it has when the step begins.
     pub body: &'b mut LargeBody,
@@ -104,7 +102,7 @@ impl LargeStep<'_, '_> {
         }
     }
 
-    /// The whole step at once.
+    /// Makes the whole step at once.
     fn advance_shape(
         &mut self,
         state: &ObjectState,
@@ -283,7 +281,7 @@ impl LargeStep<'_, '_> {
     }
 }
 
-/// Where a step has got to.
+/// The state of a step between two shapes.
 struct Progress {
     /// Contacts of the last end, with the pose and the forces that it has.
     held: Vec<HeldContact>,

@@ -18,7 +18,6 @@
 
 mod assemble;
 mod bodies;
-mod checks;
 mod configuration;
 mod features;
 mod large_body;
@@ -27,9 +26,6 @@ mod large_step;
 mod large_tests;
 #[cfg(test)]
 mod law_tests;
-mod outcome;
-#[cfg(test)]
-mod partial_slip_tests;
 mod rigid_motion;
 mod rounds;
 mod settings;
@@ -42,8 +38,8 @@ pub use bodies::{MovingBody, near_triangles, reach_of_step};
 pub use features::Candidate;
 pub use large_body::LargeBody;
 pub use large_step::LargeStep;
-pub use outcome::{BodyLoad, PointContact, StepOutcome};
 pub use rigid_motion::MassProperties;
 pub use settings::{StepError, StepSettings};
+pub use state::{BodyLoad, PointContact, StepOutcome};
 pub use state::{HeldContact, ObjectState};
 pub use step::ContactStep;

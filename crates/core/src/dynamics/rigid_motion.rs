@@ -10,7 +10,7 @@ use crate::solve::condensed::FreeBody;
 /// Units: kg, m, kg m². Frame: the object's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// Mass.
+    /// Mass of the body, kg.
     pub mass: f64,
     /// Centre of mass at rest.
     pub centre: Point3<f64>,
@@ -32,7 +32,7 @@ impl MassProperties {
 }
 
 impl MassProperties {
-    /// The same mass with other moments of inertia; `None` where these have no inverse.
+    /// This mass with other moments of inertia; `None` where these have no inverse.
     pub(super) fn with_inertia(self, inertia: Matrix3<f64>) -> Option<Self> {
         let inverse_inertia = inertia.try_inverse()?;
         let is_sound = inverse_inertia.iter().all(|x| x.is_finite());
@@ -43,9 +43,9 @@ impl MassProperties {
 /// Force and torque about the centre of mass, in the object's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Wrench {
-    /// N.
+    /// Force, N.
     pub force: Vector3<f64>,
-    /// N m.
+    /// Torque about the centre of mass, N m.
     pub torque: Vector3<f64>,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct RigidMotion {
 pub(super) struct RigidStep<'a> {
     pub state: &'a ObjectState,
     pub mass: MassProperties,
-    /// m/s², world.
+    /// Acceleration of free fall, m/s², world.
     pub gravity: Vector3<f64>,
     pub seconds: f64,
 }

@@ -75,13 +75,7 @@ impl Rounds<'_, '_> {
             let round = self.round(&mut about, &mut pool, (MARGIN * size, allowed))?;
             let force_max =
                 about.contacts.iter().map(|contact| contact.force.norm()).fold(0.0, f64::max);
-            // How far the round is from what is asked for: at most 1 where it is met.
-            let allowed_residual = settings.residual_rel * force_max;
-            let far = (round.penetration / allowed).max(match allowed_residual > 0.0 {
-                true => round.residual / allowed_residual,
-                false if round.residual == 0.0 => 0.0,
-                false => f64::INFINITY,
-            });
+            let far = round.far(allowed, settings.residual_rel * force_max);
             let is_converged = far <= 1.0 && !round.has_moved;
             let is_last = rounds >= settings.rounds_max || newton_steps >= settings.newton_max;
             if is_converged || is_last {
@@ -125,7 +119,7 @@ impl Rounds<'_, '_> {
         }
     }
 
-    /// The corners of all candidates.
+    /// Material points at the corners of all candidates.
     fn corners(&self) -> Pool {
         let corner =
             |c: &Candidate| self.scene.triangles[c.triangle as usize].map(|node| (c.body, node));
@@ -182,6 +176,15 @@ impl Rounds<'_, '_> {
 }
 
 impl Round {
+    /// How far the round is from an allowed penetration and residual: at most 1 where they are met.
+    fn far(&self, allowed: f64, allowed_residual: f64) -> f64 {
+        (self.penetration / allowed).max(match allowed_residual > 0.0 {
+            true => self.residual / allowed_residual,
+            false if self.residual == 0.0 => 0.0,
+            false => f64::INFINITY,
+        })
+    }
+
     /// The points that press, and their forces in the object's frame.
     fn into_pressing(self) -> Vec<(ProblemPoint, Vector3<f64>)> {
         let forces = self.lambda.chunks_exact(3).map(Vector3::from_column_slice);
@@ -195,7 +198,7 @@ impl Round {
     }
 }
 
-/// The contacts that press.
+/// Contacts with a force along the normal.
 fn pressing(points: &[ProblemPoint], lambda: &[f64]) -> Vec<HeldContact> {
     let forces = lambda.chunks_exact(3).map(Vector3::from_column_slice);
     points

@@ -45,14 +45,14 @@ impl Default for StepSettings {
 /// Why a step cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
-    /// A setting out of range.
+    /// A setting is out of its range.
     #[error("{what} is {value}; it must be {expected}")]
     Setting {
-        /// Which one.
+        /// Name of the setting.
         what: &'static str,
-        /// What it is.
+        /// Value of the setting.
         value: f64,
-        /// What it must be.
+        /// Range of the setting, in words.
         expected: &'static str,
     },
     /// A candidate that names what is not there.
@@ -60,21 +60,21 @@ pub enum StepError {
         "candidate {candidate} names triangle {triangle} of {triangles} and body {body} of {bodies}"
     )]
     Candidate {
-        /// Position in the list.
+        /// Position in the list of candidates.
         candidate: usize,
-        /// Triangle named.
+        /// Triangle that the candidate names.
         triangle: u32,
-        /// Triangles there are.
+        /// Number of triangles.
         triangles: usize,
-        /// Body named.
+        /// Body that the candidate names.
         body: u16,
-        /// Bodies there are.
+        /// Number of bodies.
         bodies: usize,
     },
     /// A node of the state that is not there.
     #[error("the state names node {node}, but the mesh has {node_count} nodes (0-based)")]
     Node {
-        /// The node.
+        /// The node, from 0.
         node: u32,
         /// Nodes of the mesh.
         node_count: usize,
@@ -85,9 +85,9 @@ pub enum StepError {
          bodies that cover less of it"
     )]
     TooManyPoints {
-        /// Points that touch.
+        /// Points of the surface that touch.
         points: usize,
-        /// Points that can.
+        /// Points that one problem takes.
         max: usize,
     },
     /// State or pose that is not finite.

@@ -6,16 +6,14 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
-use super::checks::{check, check_names, check_nodes, mass_of};
 use super::configuration::{Configured, Scene, sums_by_body};
 use super::features::{Candidate, merged};
-use super::outcome::{BodyLoad, PointContact, StepOutcome};
 use super::rigid_motion::{MassProperties, RigidStep};
 use super::rounds::{Found, Rounds};
 use super::settings::{StepError, StepSettings};
-use super::state::{HeldContact, ObjectState, at_nodes};
+use super::state::{BodyLoad, HeldContact, ObjectState, PointContact, StepOutcome, at_nodes};
 use crate::contact::coulomb::{FrictionCone, state_of};
-use crate::solve::condensed::{Elasticity, Response};
+use crate::solve::condensed::{Elasticity, FreeBody, Response};
 
 /// An object, the bodies around it, and how long the step is.
 #[derive(Clone, Copy)]
@@ -26,7 +24,7 @@ pub struct ContactStep<'a> {
     pub triangles: &'a [[u32; 3]],
     /// The elastic part.
     pub elasticity: Elasticity<'a>,
-    /// The bodies.
+    /// Rigid bodies around the object.
     pub bodies: &'a [MovingBody],
     /// Pairs of triangle and body that can touch in this step.
     pub candidates: &'a [Candidate],
@@ -112,7 +110,7 @@ impl ContactStep<'_> {
         most.ceil().min(PARTS_MAX) as usize
     }
 
-    /// The whole step at once.
+    /// Makes the whole step at once.
     fn advance_whole(
         &self,
         state: &ObjectState,
@@ -198,14 +196,13 @@ impl ContactStep<'_> {
         rows
     }
 
-    /// What is told of where the rounds have ended.
-    pub(super) fn outcome(
+    /// The points that press, and the sum of each body's forces.
+    fn contacts_and_loads(
         &self,
         scene: &Scene<'_>,
         response: &Response<'_>,
         found: &Found,
-        displacements: Vec<[f64; 3]>,
-    ) -> StepOutcome {
+    ) -> (Vec<PointContact>, Vec<BodyLoad>) {
         let end = &found.end;
         let world_from_object = end.motion.world_from_object;
         let mut loads = vec![BodyLoad::default(); self.bodies.len()];
@@ -236,6 +233,20 @@ impl ContactStep<'_> {
                 state: state_of(&local, body.friction),
             });
         }
+        (contacts, loads)
+    }
+
+    /// What is told of where the rounds have ended.
+    pub(super) fn outcome(
+        &self,
+        scene: &Scene<'_>,
+        response: &Response<'_>,
+        found: &Found,
+        displacements: Vec<[f64; 3]>,
+    ) -> StepOutcome {
+        let end = &found.end;
+        let world_from_object = end.motion.world_from_object;
+        let (contacts, loads) = self.contacts_and_loads(scene, response, found);
         let force_max = contacts.iter().map(|c| c.force.norm()).fold(0.0, f64::max);
         let relative = if force_max > 0.0 { found.residual / force_max } else { 0.0 };
         let violation = |(point, force): &(ProblemPoint, Vector3<f64>)| {
@@ -274,4 +285,84 @@ fn drifted(state: &ObjectState, mass: &MassProperties, seconds: f64) -> Isometry
     let turn = UnitQuaternion::from_scaled_axis(seconds * state.angular_velocity);
     let shift = Translation3::from(centre.coords + seconds * state.velocity);
     shift * turn * Translation3::from(-centre.coords) * state.world_from_object
+}
+
+/// Looks at the numbers of settings, bodies and state.
+///
+/// # Errors
+/// [`StepError::Setting`] naming the number, [`StepError::NotFinite`].
+pub(super) fn check(
+    settings: &StepSettings,
+    bodies: &[MovingBody],
+    state: &ObjectState,
+) -> Result<(), StepError> {
+    let setting = |what, value, expected| Err(StepError::Setting { what, value, expected });
+    if !(settings.seconds > 0.0 && settings.seconds.is_finite()) {
+        return setting("the length of the step", settings.seconds, "a positive number of seconds");
+    }
+    if !(settings.viscosity >= 0.0 && settings.viscosity.is_finite()) {
+        return setting("the viscosity", settings.viscosity, "a number of seconds, at least 0");
+    }
+    for body in bodies {
+        if !(body.friction >= 0.0 && body.friction.is_finite()) {
+            return setting("the friction of a body", body.friction, "a number, at least 0");
+        }
+        if !(body.compliance >= 0.0 && body.compliance.is_finite()) {
+            return setting("the compliance of a body", body.compliance, "m/N, at least 0");
+        }
+    }
+    let poses = bodies.iter().flat_map(|b| [b.world_from_body_start, b.world_from_body_end]);
+    let poses_are_finite = poses.into_iter().all(|pose| {
+        pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
+    });
+    let is_weight_finite = settings.gravity.iter().all(|x| x.is_finite());
+    match state.is_finite() && poses_are_finite && is_weight_finite {
+        true => Ok(()),
+        false => Err(StepError::NotFinite),
+    }
+}
+
+/// Looks whether the candidates name triangles and bodies that are there.
+///
+/// # Errors
+/// [`StepError::Candidate`].
+pub(super) fn check_names(
+    candidates: &[Candidate],
+    (triangles, bodies): (usize, usize),
+) -> Result<(), StepError> {
+    let is_there =
+        |c: &Candidate| (c.triangle as usize) < triangles && usize::from(c.body) < bodies;
+    match candidates.iter().position(|named| !is_there(named)) {
+        None => Ok(()),
+        Some(candidate) => {
+            let Candidate { triangle, body } = candidates[candidate];
+            Err(StepError::Candidate { candidate, triangle, triangles, body, bodies })
+        }
+    }
+}
+
+/// Looks whether the state names nodes that are there.
+///
+/// # Errors
+/// [`StepError::Node`].
+pub(super) fn check_nodes(state: &ObjectState, node_count: usize) -> Result<(), StepError> {
+    let held = state.contacts.iter().flat_map(|contact| contact.nodes);
+    let mut named = state.forces.iter().map(|(node, _)| *node).chain(held);
+    match named.find(|node| *node as usize >= node_count) {
+        Some(node) => Err(StepError::Node { node, node_count }),
+        None => Ok(()),
+    }
+}
+
+/// Mass and inertia of the object.
+///
+/// # Errors
+/// [`StepError::Setting`] for a density that gives none.
+pub(super) fn mass_of(
+    body: &FreeBody,
+    settings: &StepSettings,
+) -> Result<MassProperties, StepError> {
+    let (what, value) = ("the density", settings.density);
+    let expected = "a positive number of kg/m³";
+    MassProperties::of(body, value).ok_or(StepError::Setting { what, value, expected })
 }

@@ -24,7 +24,7 @@ pub enum AssemblyError {
     /// A region label without a material.
     #[error("element {tet} has region {region}, but {materials} materials were given")]
     NoMaterial {
-        /// Element index.
+        /// Index of the element, from 0.
         tet: usize,
         /// Its region label.
         region: u32,
@@ -294,7 +294,7 @@ impl Stiffness {
         f
     }
 
-    /// The same matrix with `shift` added to every diagonal entry, N/m.
+    /// This stiffness with `shift` added to every diagonal entry, N/m.
     pub fn shifted(&self, shift: f64) -> Self {
         let mut shifted = self.clone();
         for node in 0..self.node_count() {

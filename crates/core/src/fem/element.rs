@@ -1,6 +1,13 @@
-//! The kinds of finite elements, and their names.
+//! The kinds of finite elements, and the numbering of degrees of freedom.
 
 /// Which finite element a model is made of, in the order of what they cost.
+///
+/// ```
+/// use softgrasp_core::Element;
+///
+/// assert_eq!(Element::ALL.map(Element::name), ["t4", "t4-anp", "t10"]);
+/// assert_eq!(Element::Tet10.node_count(), 10);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Element {
     /// Linear tetrahedron (thesis chapter 3).
@@ -32,4 +39,12 @@ impl Element {
             Self::Tet10 => 10,
         }
     }
+}
+
+/// Degrees of freedom per node: displacements along x, y and z.
+pub const AXES: usize = 3;
+
+/// Index of the degree of freedom of `node` along `axis` (0 x, 1 y, 2 z): `3·node + axis` (3.45).
+pub const fn dof(node: usize, axis: usize) -> usize {
+    AXES * node + axis
 }

@@ -8,6 +8,15 @@ use nalgebra::Matrix6;
 /// Invariant: `young` > 0, −1 < `poisson` < 0.5, both finite.
 ///
 /// Source: thesis (3.9).
+///
+/// ```
+/// use softgrasp_core::Material;
+///
+/// let silicone = Material::try_new(1.0e5, 0.49)?;
+/// assert_eq!((silicone.young(), silicone.poisson()), (1.0e5, 0.49));
+/// assert!(Material::try_new(1.0e5, 0.5).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     young: f64,
@@ -20,7 +29,7 @@ pub enum MaterialError {
     /// Young's modulus is not a positive finite number.
     #[error("Young's modulus is {young}; it must be a finite number above 0 Pa")]
     Young {
-        /// The value given.
+        /// Modulus or ratio that was given.
         young: f64,
     },
     /// Poisson's ratio is outside (−1, 0.5).
@@ -29,7 +38,7 @@ pub enum MaterialError {
          (0.5 is incompressible: use 0.49 or so)"
     )]
     Poisson {
-        /// The value given.
+        /// Modulus or ratio that was given.
         poisson: f64,
     },
 }

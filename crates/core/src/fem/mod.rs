@@ -1,9 +1,7 @@
 //! Finite elements (thesis chapter 3): material, tetrahedra, assembly, strain.
 
 mod assembly;
-mod dofs;
 mod element;
-mod elements_around;
 pub mod hyperelastic;
 mod material;
 mod nodal_patches;
@@ -19,8 +17,8 @@ use assembly::LameByRegion;
 pub use assembly::{
     AssemblyError, Stiffness, assemble, assemble_nodal_pressure, assemble_quadratic,
 };
-pub use dofs::{AXES, dof};
 pub use element::Element;
+pub use element::{AXES, dof};
 pub use material::{Material, MaterialError};
 pub use nodal_patches::NodalPatches;
 pub use pattern::StiffnessPattern;

@@ -17,9 +17,8 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::elements_around::elements_around;
 use super::tet4;
-use crate::mesh::TetMesh;
+use crate::mesh::{Incidence, TetMesh};
 
 /// The elements of one region around one node, and what they make of the volume there.
 ///
@@ -30,7 +29,7 @@ pub struct NodalPatches {
     nodes: Vec<u32>,
     /// `∂θ/∂u` of every node of a patch, 1/m.
     gradients: Vec<Vector3<f64>>,
-    /// `V_a`, m³.
+    /// Volume `V_a` of the patch at rest, m³.
     volumes: Vec<f64>,
     /// An element of the patch, which knows its material.
     tets: Vec<u32>,
@@ -39,14 +38,14 @@ pub struct NodalPatches {
     of_node: Vec<u32>,
 }
 
-/// One patch.
+/// One patch: its nodes, their gradients and its volume.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodalPatch<'a> {
     /// Its nodes, ascending.
     pub nodes: &'a [u32],
     /// `∂θ/∂u` of each, 1/m.
     pub gradients: &'a [Vector3<f64>],
-    /// `V_a`, m³.
+    /// Volume `V_a` of the patch at rest, m³.
     pub volume: f64,
     /// One of its elements.
     pub tet: usize,
@@ -68,10 +67,10 @@ impl NodalPatches {
     /// Source: Bonet and Burton 1998, see the module.
     pub fn new(mesh: &TetMesh) -> Self {
         let gradients_of_tets = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
-        let (around_start, around) = elements_around(mesh.node_count(), mesh.tets());
-        let at_node =
-            |ends: &[usize]| patches_of(mesh, &gradients_of_tets, &around[ends[0]..ends[1]]);
-        let made: Vec<Made> = around_start.par_windows(2).flat_map_iter(at_node).collect();
+        let around = Incidence::new(mesh.node_count(), mesh.tets());
+        let at_node = |node: u32| patches_of(mesh, &gradients_of_tets, around.tets(node));
+        let made: Vec<Made> =
+            (0..mesh.node_count() as u32).into_par_iter().flat_map_iter(at_node).collect();
         let mut start = vec![0];
         let (mut nodes, mut gradients) = (Vec::new(), Vec::new());
         let mut patches: Vec<Vec<u32>> = vec![Vec::new(); mesh.node_count()];

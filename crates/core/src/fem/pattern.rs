@@ -3,9 +3,8 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use super::elements_around::elements_around;
 use super::{NodalPatches, QuadraticMesh};
-use crate::mesh::TetMesh;
+use crate::mesh::{Incidence, TetMesh};
 
 /// Sparsity pattern of `kᵍ` by 3 × 3 node blocks, and for each block row the elements that add to
 /// it, in element order: rows can be summed in parallel with the same bits on any thread count.
@@ -31,7 +30,7 @@ pub struct StiffnessPattern {
 /// One element seen from one of its nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Around {
-    /// Element index.
+    /// Index of the element, from 0.
     tet: u32,
     /// Which of the element's nodes the row's node is.
     local: u8,
@@ -40,7 +39,7 @@ struct Around {
 /// One element that adds to a block row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contribution<'a, const K: usize> {
-    /// Element index.
+    /// Index of the element, from 0.
     pub tet: usize,
     /// Which of the element's nodes the row's node is, from 0.
     pub local: usize,
@@ -78,7 +77,8 @@ impl StiffnessPattern {
         patches: Option<&NodalPatches>,
     ) -> Self {
         let node_count = places.len();
-        let (around_start, tets_around) = elements_around(node_count, tets);
+        let Incidence { starts: around_start, tets: tets_around } =
+            Incidence::new(node_count, tets);
         let rows: Vec<BlockRow> = (0..node_count)
             .into_par_iter()
             .with_min_len(64)

@@ -37,7 +37,7 @@ pub struct QuadraticMesh {
 pub struct TooManyNodes {
     /// Nodes of the linear mesh.
     pub corners: usize,
-    /// Its edges.
+    /// Edges of the mesh.
     pub edges: usize,
 }
 

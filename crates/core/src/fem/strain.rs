@@ -15,7 +15,7 @@ pub struct StrainSummary {
 }
 
 impl StrainSummary {
-    /// The larger of both, each by itself.
+    /// Component-wise maximum of two summaries, of two load cases for one.
     pub fn or_larger(self, other: Self) -> Self {
         Self {
             rotation_max: self.rotation_max.max(other.rotation_max),

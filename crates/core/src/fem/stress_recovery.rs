@@ -46,7 +46,7 @@ type Tensor = Vector6<f64>;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{got} displacements were given for the {expected} nodes of the mesh")]
 pub struct OtherNodeCount {
-    /// Displacements given.
+    /// Displacements that were given.
     pub got: usize,
     /// Nodes of the mesh.
     pub expected: usize,

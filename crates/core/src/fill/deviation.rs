@@ -14,7 +14,7 @@ use crate::surface::{SurfaceTree, TriangleSurface};
 pub struct Deviation {
     /// Root mean square, weighted by area.
     pub rms: f64,
-    /// Largest distance.
+    /// Largest distance, m.
     pub max: f64,
     /// The point with the largest distance.
     pub at: Point3<f64>,

@@ -5,8 +5,7 @@ use nalgebra::Point3;
 use super::deviation::{Deviation, deviations};
 use super::fit::{self, Fitted};
 use super::skin::Skin;
-use super::swell::{Swollen, swell, volume_of};
-use super::volume::enclosed;
+use super::swell::{Swollen, enclosed, swell, volume_of};
 use crate::mesh::TetMesh;
 use crate::surface::{MendedSurface, SurfaceError, SurfaceMending, TriangleSurface};
 
@@ -62,25 +61,25 @@ pub struct Filled {
 /// Why a surface cannot be filled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FillError {
-    /// Nothing that bounds anything.
+    /// The triangles bound nothing.
     #[error("the surface has no triangle with an area")]
     NoArea,
     /// Fewer or more nodes than meshes are made with.
     #[error("{nodes} nodes asked for; there can be {FILL_NODES_MIN} to {FILL_NODES_MAX}")]
     NodeCount {
-        /// Nodes asked for.
+        /// Number of nodes that was asked for.
         nodes: usize,
     },
     /// A size that is no length, or far too small or large for the object.
     #[error("cells of {size} do not suit an object of {extent}; there can be {least} to {most}")]
     Size {
-        /// Size asked for.
+        /// Edge of the elements that was asked for, m.
         size: f64,
         /// Longest edge of the box around the surface.
         extent: f64,
-        /// Smallest size.
+        /// Smallest edge that can be asked for, m.
         least: f64,
-        /// Largest size.
+        /// Largest edge that can be asked for, m.
         most: f64,
     },
     /// No point has the surface around it.

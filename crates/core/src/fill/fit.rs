@@ -16,7 +16,7 @@ pub(super) struct Fitted {
     pub(super) coarsest: f64,
     /// Pieces left out.
     pub(super) pieces_left_out: usize,
-    /// Their share of the volume.
+    /// Share of the volume that these pieces have.
     pub(super) left_out: f64,
     /// Edges and nodes where the boundary touches itself.
     pub(super) hinges: usize,

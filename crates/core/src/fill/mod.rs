@@ -12,7 +12,6 @@ mod grid;
 mod octree;
 mod skin;
 mod swell;
-mod volume;
 
 #[cfg(test)]
 mod banana_tests;

@@ -66,7 +66,7 @@ fn judge(tree: &SurfaceTree, corners: &[Point3<f64>; 3], small: f64) -> (bool, f
     (true, exit.map_or(f64::INFINITY, |hit| hit.at))
 }
 
-/// The same surface with triangles in four, until no edge is longer than `longest` or there are many.
+/// The surface with its triangles cut in four, until no edge is longer than `longest` or there are many.
 fn divided(surface: &TriangleSurface, longest: f64) -> TriangleSurface {
     let mut points = surface.points().to_vec();
     let mut done = Vec::new();

@@ -1,8 +1,7 @@
 //! Connected parts of a mesh: bodies are connected through nodes, pieces through faces.
 
 use super::TetMesh;
-use super::disjoint_sets::DisjointSets;
-use super::faces::Faces;
+use super::surface::Faces;
 
 /// Which body and which piece every element belongs to.
 ///
@@ -102,6 +101,33 @@ fn label(roots: impl Iterator<Item = usize>, root_count: usize) -> (Vec<u32>, Ve
         })
         .collect();
     (labels, counts)
+}
+
+/// Union-find with path halving; the smaller root wins, so results do not depend on the order.
+pub(crate) struct DisjointSets {
+    parent: Vec<usize>,
+}
+
+impl DisjointSets {
+    /// Every member in a set of its own.
+    pub(crate) fn new(count: usize) -> Self {
+        Self { parent: (0..count).collect() }
+    }
+
+    /// The smallest member of the set of `at`.
+    pub(crate) fn root(&mut self, mut at: usize) -> usize {
+        while self.parent[at] != at {
+            self.parent[at] = self.parent[self.parent[at]];
+            at = self.parent[at];
+        }
+        at
+    }
+
+    /// Makes one set of the sets of `a` and `b`.
+    pub(crate) fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b)] = a.min(b);
+    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::faces::Faces;
+use super::surface::Faces;
 use super::tet_mesh::TetMesh;
 
 /// Neighbouring elements that lie on the same side of the face they share, so that they overlap.
@@ -57,7 +57,7 @@ impl Folds {
 fn is_same_side(mesh: &TetMesh, a: usize, b: usize) -> bool {
     let outward = |id: usize| {
         let corners = mesh.tets()[id / 4];
-        let face = super::faces::OUTWARD[id % 4].map(|c| corners[c]);
+        let face = super::surface::OUTWARD[id % 4].map(|c| corners[c]);
         // From its smallest node on.
         let first = (0..3).min_by_key(|&i| face[i]).unwrap_or(0);
         [face[first], face[(first + 1) % 3], face[(first + 2) % 3]]

@@ -10,7 +10,7 @@ use super::tet_mesh::signed_volume;
 /// Elements that would have no volume, or a negative one, if the vertices moved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inversion {
-    /// How many.
+    /// Number of inverted elements.
     pub count: usize,
     /// Elements of the mesh.
     pub tets: usize,

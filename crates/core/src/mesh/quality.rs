@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{Point3, Vector3};
 
 use super::TetMesh;
-use super::faces::OUTWARD;
+use super::surface::OUTWARD;
 use super::tet_mesh::signed_volume;
 
 /// Shape of one tetrahedron.
@@ -19,7 +19,7 @@ pub struct TetQuality {
     pub dihedral_max: f64,
     /// Three times the inscribed radius over the circumscribed radius.
     pub radius_ratio: f64,
-    /// Signed volume.
+    /// Signed volume of the element, m³.
     pub volume: f64,
 }
 

@@ -10,6 +10,19 @@ use nalgebra::Point3;
 /// `det J / 6` (3.33), where row i of `J` is corner i − corner 4 (3.23).
 ///
 /// Source: thesis Table 3.1.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use softgrasp_core::TetMesh;
+///
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// let corners = corners.map(Point3::from).to_vec();
+/// let mesh = TetMesh::try_new(corners.clone(), vec![[1, 0, 2, 3]], vec![])?;
+/// assert!((mesh.signed_volume(0) - 1.0 / 6.0).abs() < 1e-15);
+/// // With its corners the other way round the element would be inside out.
+/// assert!(TetMesh::try_new(corners, vec![[0, 1, 2, 3]], vec![]).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
     vertices: Vec<Point3<f64>>,
@@ -35,7 +48,7 @@ pub enum MeshError {
     NotPositive {
         /// Element index, from 0.
         tet: usize,
-        /// Its signed volume.
+        /// Signed volume of the element, m³.
         volume: f64,
     },
     /// A coordinate is NaN or infinite.
@@ -47,12 +60,12 @@ pub enum MeshError {
     /// The label list has another length than the element list.
     #[error("{labels} region labels for {tets} tetrahedra")]
     RegionCount {
-        /// Labels given.
+        /// Region labels that were given.
         labels: usize,
-        /// Elements given.
+        /// Elements that were given.
         tets: usize,
     },
-    /// Nothing to model.
+    /// There are no elements.
     #[error("the mesh has no tetrahedra")]
     Empty,
 }
@@ -148,7 +161,7 @@ impl TetMesh {
         (low, high)
     }
 
-    /// The same elements over moved vertices (keep shape, section 6.1.2).
+    /// This mesh over moved vertices (keep shape, section 6.1.2).
     ///
     /// Shapes: `vertices` as many points as before.
     ///
@@ -164,6 +177,40 @@ impl TetMesh {
 /// Source: thesis (3.23), (3.33).
 pub fn signed_volume(c: &[Point3<f64>; 4]) -> f64 {
     (c[0] - c[3]).dot(&(c[1] - c[3]).cross(&(c[2] - c[3]))) / 6.0
+}
+
+/// Elements around every node, as one list with borders.
+pub(crate) struct Incidence {
+    /// Borders: elements of node n are `tets[starts[n] .. starts[n + 1]]`.
+    pub starts: Vec<usize>,
+    pub tets: Vec<u32>,
+}
+
+impl Incidence {
+    /// Lists the elements of K nodes around each of `node_count` nodes, ascending.
+    pub fn new<const K: usize>(node_count: usize, tets: &[[u32; K]]) -> Self {
+        let mut starts = vec![0; node_count + 1];
+        for n in tets.iter().flatten() {
+            starts[*n as usize + 1] += 1;
+        }
+        for n in 1..starts.len() {
+            starts[n] += starts[n - 1];
+        }
+        let mut next = starts.clone();
+        let mut listed = vec![0; K * tets.len()];
+        for (t, corners) in (0u32..).zip(tets) {
+            for n in corners {
+                listed[next[*n as usize]] = t;
+                next[*n as usize] += 1;
+            }
+        }
+        Self { starts, tets: listed }
+    }
+
+    /// Elements around one node.
+    pub fn tets(&self, node: u32) -> &[u32] {
+        &self.tets[self.starts[node as usize]..self.starts[node as usize + 1]]
+    }
 }
 
 #[cfg(test)]

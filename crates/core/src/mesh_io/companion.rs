@@ -5,7 +5,7 @@ use std::fmt;
 /// A file to be found beside the one that is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Companion {
-    /// The same name with another extension (without the dot): TetGen's other half.
+    /// The file's name with another extension (without the dot): TetGen's other half.
     Extension(&'static str),
     /// A file name out of the file (`*INCLUDE` of decks and of Vega); it comes from outside, so the
     /// caller decides which folders it may reach.

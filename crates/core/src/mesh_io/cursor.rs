@@ -51,7 +51,7 @@ impl<'a> Cursor<'a> {
         1 + before.iter().filter(|&&b| b == b'\n').count()
     }
 
-    /// The same position in a file that ends after `length` more bytes.
+    /// A cursor at this position whose file ends after `length` more bytes.
     pub(super) fn limited(&self, length: usize) -> Self {
         let end = self.position.saturating_add(length);
         Self { bytes: self.bytes.get(..end).unwrap_or(self.bytes), ..self.clone() }

@@ -9,7 +9,7 @@ use super::deck_assembly::{Instance, assemble};
 use super::deck_keyword::{Keyword, deck_cell, fields};
 use super::deck_part::{DeckPart, Member};
 use super::error::MeshFileError;
-use super::included::Included;
+use super::findings::Included;
 use super::number::{parse_integer, parse_real};
 use super::raw_mesh::RawMesh;
 
@@ -20,7 +20,7 @@ const GENERATORS: [&str; 9] =
 /// What the data lines after a keyword are.
 #[derive(Clone, Debug)]
 enum Section {
-    /// Not looked into.
+    /// A block whose lines are passed over.
     Ignored,
     Nodes,
     Elements(ElementBlock),
@@ -29,7 +29,7 @@ enum Section {
         set: usize,
         generate: bool,
     },
-    /// Where an instance stands.
+    /// Translation and rotation of an instance.
     Placing,
 }
 

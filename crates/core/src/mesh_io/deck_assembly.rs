@@ -6,7 +6,7 @@ use super::cursor::Cursor;
 use super::deck_keyword::fields;
 use super::deck_part::{DeckPart, PartRegions};
 use super::error::{Fault, MeshFileError};
-use super::node_labels::NodeLabels;
+use super::labels::NodeLabels;
 use super::number::parse_real;
 use super::raw_mesh::RawMesh;
 

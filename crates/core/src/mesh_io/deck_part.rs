@@ -36,7 +36,7 @@ struct ElementSet {
 /// The data of a part, of an instance, or of a deck that has none of them.
 #[derive(Debug, Default)]
 pub(super) struct DeckPart {
-    /// As given; empty outside parts.
+    /// Name of the part, as given; empty outside parts.
     pub(super) name: String,
     pub(super) points: Vec<Point3<f64>>,
     pub(super) node_labels: Vec<i64>,

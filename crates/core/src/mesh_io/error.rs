@@ -33,17 +33,17 @@ pub enum Fault {
     /// A known format that is not read.
     #[error("this is {what}, which is not read here; {}", what.advice())]
     Foreign {
-        /// The format.
+        /// The format, which is recognised and not read.
         what: Foreign,
     },
     /// Something else stands where the format demands a certain thing.
     #[error("{at}: expected {expected}, found {found}")]
     Syntax {
-        /// Where.
+        /// Place in the file.
         at: Place,
         /// What the format demands.
         expected: String,
-        /// What is there.
+        /// What the file has there.
         found: String,
     },
     /// An announced count that the file does not keep.
@@ -51,19 +51,19 @@ pub enum Fault {
     Count {
         /// Where the count or the array stands.
         at: Place,
-        /// Which array.
+        /// Name of the array.
         array: String,
-        /// What was announced.
+        /// What the file announced.
         expected: String,
-        /// What is there.
+        /// What the file has there.
         found: String,
     },
     /// The format allows it, this reader does not read it.
     #[error("{at}: {what} is not read here; convert it with Gmsh or meshio to MSH 4.1")]
     Unsupported {
-        /// Where.
+        /// Place in the file.
         at: Place,
-        /// The construct.
+        /// The construct, as the file names it.
         what: String,
     },
     /// A second file is needed and was not given.
@@ -85,16 +85,16 @@ pub enum Fault {
     /// Two nodes with one label.
     #[error("node label {label} is given to two nodes")]
     DuplicateLabel {
-        /// The label.
+        /// The label that stands twice or nowhere.
         label: i64,
     },
-    /// Nothing to model.
+    /// The file has no tetrahedra.
     #[error("no tetrahedra: {found}")]
     NoTetrahedra {
         /// What the file has instead.
         found: String,
     },
-    /// A surface was wanted.
+    /// A surface was wanted, and the file holds tetrahedra.
     #[error("this is no surface that is read here; there are STL, OBJ, PLY, OFF and glTF")]
     NoSurface,
     /// The file was read, but its content is no surface.

@@ -8,7 +8,7 @@ use super::cell_kind::{CellKind, Shape};
 use super::companion::FindCompanion;
 use super::cursor::{Cursor, quote, words};
 use super::error::MeshFileError;
-use super::included::Included;
+use super::findings::Included;
 use super::number::{parse_integer, parse_real};
 use super::raw_mesh::RawMesh;
 use super::xml::{Event, attribute, next_event};
@@ -232,7 +232,7 @@ impl Reader<'_, '_> {
 }
 
 impl Open {
-    /// What it has to hold.
+    /// What the section's children are called.
     fn contents(&self) -> &'static str {
         match self {
             Self::Node(_) => "the coordinates of a node",

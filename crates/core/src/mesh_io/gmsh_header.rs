@@ -1,14 +1,14 @@
 //! The `$MeshFormat` section of Gmsh files, and the end marks that all sections share.
 
-use super::byte_order::ByteOrder;
 use super::cursor::Cursor;
 use super::error::MeshFileError;
 use super::number::parse_integer;
+use super::scalar::ByteOrder;
 
 /// What `$MeshFormat` says; MSH 1 has no such section.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Header {
-    /// 2 or 4.
+    /// Version of the format: 2 or 4.
     pub(super) major: i64,
     /// Digits after the point.
     pub(super) minor: i64,

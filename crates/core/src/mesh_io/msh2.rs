@@ -2,13 +2,13 @@
 
 use nalgebra::Point3;
 
-use super::byte_order::ByteOrder;
 use super::cell_kind::{CellKind, Shape, gmsh_cell};
 use super::cursor::Cursor;
 use super::error::MeshFileError;
+use super::gmsh::{read_integers, read_labelled_points};
 use super::gmsh_header::{Header, end_section};
-use super::msh1::{read_integers, read_labelled_points};
 use super::raw_mesh::RawMesh;
+use super::scalar::ByteOrder;
 
 /// Reads the section `$Nodes`.
 pub(super) fn read_nodes(

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use super::byte_order::ByteOrder;
 use super::cell_kind::{CellKind, Shape, gmsh_cell};
 use super::cursor::Cursor;
 use super::error::MeshFileError;
+use super::gmsh::read_integers;
 use super::gmsh_header::{Header, end_section};
-use super::msh1::read_integers;
 use super::raw_mesh::RawMesh;
+use super::scalar::ByteOrder;
 
 /// First physical group of each volume entity, from `$Entities`.
 #[derive(Debug, Default)]
@@ -33,7 +33,7 @@ impl<'c, 'a> Values<'c, 'a> {
         Ok(Self { cursor, binary: header.binary, size_bytes: header.size_bytes })
     }
 
-    /// `int`.
+    /// A number of Gmsh's type `int`.
     fn int(&mut self, what: &str) -> Result<i64, MeshFileError> {
         match self.binary {
             None => self.cursor.integer(what),
@@ -67,7 +67,7 @@ impl<'c, 'a> Values<'c, 'a> {
         Ok(count)
     }
 
-    /// `double`.
+    /// A number of Gmsh's type `double`.
     fn real(&mut self, what: &str) -> Result<f64, MeshFileError> {
         match self.binary {
             None => self.cursor.real(what),

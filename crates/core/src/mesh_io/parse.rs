@@ -2,12 +2,12 @@
 
 use super::companion::{Companion, FindCompanion};
 use super::cursor::{Cursor, quote};
+use super::encoding::{Unpacker, is_gzip};
 use super::error::{Fault, MeshFileError};
-use super::gzip::{Unpacker, is_gzip};
 use super::sniff::{Sniffed, sniff_unpacked, without_mark};
 use super::{
-    Format, MeshFile, deck, febio, gmsh, medit, medit_binary, netgen, tet, tetgen, thesis_lists,
-    vega, vtk_legacy, vtu, xdmf,
+    Format, MeshFile, deck, febio, gmsh, medit, netgen, tet, tetgen, thesis_lists, vega,
+    vtk_legacy, vtu, xdmf,
 };
 
 /// Reads a mesh file of any known format.
@@ -80,7 +80,7 @@ fn read(
         Format::Vtu => vtu::read(plain),
         Format::TetGen => tetgen::read(name, bytes, companion),
         Format::Medit => medit::read(commented),
-        Format::MeditBinary => medit_binary::read(plain),
+        Format::MeditBinary => medit::read_binary(plain),
         Format::Netgen => netgen::read(commented),
         Format::Febio => febio::read(name, bytes, companion),
         Format::Xdmf => xdmf::read(name, bytes, companion),

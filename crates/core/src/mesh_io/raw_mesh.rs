@@ -6,8 +6,8 @@ use nalgebra::Point3;
 
 use super::cell_kind::{CellKind, Shape};
 use super::error::{Fault, MeshFileError};
+use super::labels::NodeLabels;
 use super::mending::repeated;
-use super::node_labels::NodeLabels;
 use crate::mesh::{MeshError, TetMesh};
 use crate::mesh_io::{BadTet, Findings, Format, Mending, MeshFile, TetFault};
 
@@ -18,7 +18,7 @@ const DEGENERATE: f64 = 1e-14;
 struct Sound {
     tets: Vec<[u32; 4]>,
     kept: Vec<usize>,
-    /// Ascending by record number.
+    /// Tetrahedra that were put right or dropped, ascending by record number.
     bad: Vec<BadTet>,
     volume_in_file: f64,
 }
@@ -237,7 +237,7 @@ impl RawMesh {
     }
 }
 
-/// The same tetrahedron with the other orientation; applied twice it is the same list again.
+/// A tetrahedron with its orientation turned round; twice turned it is as it was.
 pub(super) fn mirrored([a, b, c, d]: [u32; 4]) -> [u32; 4] {
     [a, b, d, c]
 }

@@ -2,7 +2,7 @@
 
 use super::cursor::{Cursor, find, words};
 use super::number::parse_integer;
-use super::{Foreign, Format, gzip, tetgen, thesis_lists};
+use super::{Foreign, Format, encoding, tetgen, thesis_lists};
 
 /// A format known by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,8 +15,8 @@ pub enum Sniffed {
 
 /// Format of the bytes, or of what gzip packed in them; `None` if nothing known begins like this.
 pub fn sniff(bytes: &[u8]) -> Option<Sniffed> {
-    match gzip::is_gzip(bytes) {
-        true => sniff_unpacked(&gzip::beginning(bytes)),
+    match encoding::is_gzip(bytes) {
+        true => sniff_unpacked(&encoding::beginning(bytes)),
         false => sniff_unpacked(bytes),
     }
 }

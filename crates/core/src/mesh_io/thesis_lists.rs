@@ -5,9 +5,9 @@ use std::io::Write;
 use super::cell_kind::{CellKind, Shape};
 use super::cursor::Cursor;
 use super::error::MeshFileError;
+use super::labels::RegionNumbers;
 use super::raw_mesh::RawMesh;
-use super::region_numbers::RegionNumbers;
-use super::write_error::WriteError;
+use super::write::WriteError;
 use crate::mesh::TetMesh;
 
 /// First words of the file.

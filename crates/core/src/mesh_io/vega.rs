@@ -8,7 +8,7 @@ use super::cell_kind::{CellKind, Shape};
 use super::companion::FindCompanion;
 use super::cursor::{Cursor, words};
 use super::error::MeshFileError;
-use super::included::Included;
+use super::findings::Included;
 use super::number::{parse_integer, parse_real};
 use super::raw_mesh::RawMesh;
 

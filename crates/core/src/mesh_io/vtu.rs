@@ -2,12 +2,12 @@
 
 use nalgebra::Point3;
 
-use super::byte_order::ByteOrder;
 use super::cursor::{Cursor, find};
 use super::error::{Fault, MeshFileError};
 use super::number::parse_integer;
 use super::raw_mesh::RawMesh;
-use super::vtk_cells::VtkCells;
+use super::scalar::ByteOrder;
+use super::vtk_legacy::VtkCells;
 use super::vtu_array::{Appended, BinaryRules, Budget, Compressor, DataArray};
 use super::xml::{Event, attribute, next_event};
 

@@ -2,11 +2,10 @@
 
 use std::io::Read;
 
-use super::base64;
-use super::byte_order::ByteOrder;
 use super::cursor::Cursor;
+use super::encoding;
 use super::error::MeshFileError;
-use super::scalar::{Scalar, unsigned};
+use super::scalar::{ByteOrder, Scalar, unsigned};
 use super::xml::attribute;
 
 /// All compressed arrays of a mesh that can be modelled are smaller together (16 million
@@ -163,11 +162,11 @@ impl Packed<'_, '_> {
     /// Base64 of lengths and data; appended arrays are followed by others, so that the lengths
     /// are read first to know where this one ends.
     fn unpack_base64(&self, text: &[u8]) -> Result<Vec<u8>, MeshFileError> {
-        let first = base64::decode(text, self.rules.header_bytes);
+        let first = encoding::decode(text, self.rules.header_bytes);
         let mut length = self.header_length(&first)?;
-        let header = base64::decode(text, length);
+        let header = encoding::decode(text, length);
         length = length.saturating_add(self.data_length(&header)?);
-        self.unpack(&base64::decode(text, length))
+        self.unpack(&encoding::decode(text, length))
     }
 
     /// Bytes of the array out of bytes that begin with its lengths.

@@ -1,11 +1,10 @@
 //! One `DataItem` of an XDMF file: numbers as text, or raw bytes in a file beside it.
 
-use super::byte_order::ByteOrder;
 use super::companion::{Companion, FindCompanion};
 use super::cursor::Cursor;
 use super::error::{Fault, MeshFileError};
 use super::number::parse_integer;
-use super::scalar::Scalar;
+use super::scalar::{ByteOrder, Scalar};
 use super::xml::attribute;
 
 /// All arrays in raw bytes of a mesh that can be modelled are smaller together; many items may

@@ -18,12 +18,12 @@ use super::triangles::RigidMesh;
 pub enum RigidShape {
     /// A ball around the origin.
     Sphere {
-        /// Its radius.
+        /// Radius of the ball.
         radius: f64,
     },
     /// All points within a radius of a segment along z, centred at the origin.
     Capsule {
-        /// The radius.
+        /// Distance of the surface from the segment.
         radius: f64,
         /// Length of the segment, between the centres of the two half balls.
         length: f64,
@@ -51,7 +51,7 @@ pub enum ShapeError {
     /// A size that is no positive number.
     #[error("{what} is {value}; it must be a positive number of metres")]
     Size {
-        /// Which size.
+        /// Name of the size.
         what: &'static str,
         /// What it is.
         value: f64,

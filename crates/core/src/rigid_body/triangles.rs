@@ -44,7 +44,7 @@ pub enum RigidMeshError {
     /// A corner that is not there.
     #[error("triangle {triangle} names vertex {vertex}, but there are {vertex_count} (0-based)")]
     NoSuchVertex {
-        /// The triangle.
+        /// Index of the triangle, from 0.
         triangle: usize,
         /// The vertex it names.
         vertex: u32,
@@ -54,7 +54,7 @@ pub enum RigidMeshError {
     /// A coordinate that is not finite.
     #[error("vertex {vertex} is not finite")]
     NotFinite {
-        /// The vertex.
+        /// Index of the vertex, from 0.
         vertex: usize,
     },
     /// An edge that does not join exactly two triangles of the same sense.
@@ -73,7 +73,7 @@ pub enum RigidMeshError {
     /// A surface that is turned inside out.
     #[error("the surface encloses the volume {volume:e} m³; turn its triangles outward")]
     InsideOut {
-        /// Signed volume.
+        /// Signed volume that the triangles enclose, m³.
         volume: f64,
     },
 }

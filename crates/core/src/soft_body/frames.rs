@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::answer::{Answer, Inexactness, SoftBodyError, reactions};
-use super::load_case::LoadCase;
+use super::load_case::{Answer, Inexactness, LoadCase, SoftBodyError, reactions};
 use crate::model::Model;
 use crate::solve::condensed::{Base, Columns, ContactSet, Delivery, Touched};
 

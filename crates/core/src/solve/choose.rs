@@ -34,9 +34,9 @@ pub struct Question {
 /// Units: relative error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Element.
+    /// Finite element of the plan.
     pub element: Element,
-    /// Method.
+    /// Method of the plan.
     pub method: Method,
     /// Methods that are taken in its place, the first that fits, where its factor needs more memory than
     /// there is.
@@ -56,7 +56,7 @@ pub struct Plan {
 /// What a plan is predicted to cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
-    /// Time, ms.
+    /// Predicted time, ms.
     pub ms: f64,
     /// Memory at most, bytes.
     pub bytes: f64,

@@ -12,7 +12,7 @@ use crate::fem::{AXES, Element};
 /// Units: bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Need {
-    /// Element.
+    /// Finite element of the model.
     pub element: Element,
     /// Method. That of [`Method::Condensed`] is its base, without the columns, which have a bound of
     /// their own.
@@ -211,7 +211,7 @@ pub struct Bytes(pub u64);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{text}' is no number of bytes; write 8GiB, 512MiB, 2GB, or the bytes themselves")]
 pub struct NoBytes {
-    /// As given.
+    /// The text as it was given.
     pub text: String,
 }
 

@@ -1,4 +1,4 @@
-//! The methods that answer a question, and their names.
+//! The methods that answer a question, the stages of an answer, and their names.
 
 use std::fmt;
 use std::str::FromStr;
@@ -39,7 +39,7 @@ pub enum Method {
     Condensed,
 }
 
-/// A name that no method has.
+/// No method has the name.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "no method is called '{name}'; there are {}, {} and auto",
@@ -161,9 +161,9 @@ impl Method {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Within {
-    /// The method.
+    /// Method that factors or inverts.
     pub method: Method,
-    /// Bytes.
+    /// Bytes that the factor or inverse may take.
     pub limit: u64,
 }
 
@@ -188,4 +188,18 @@ impl FromStr for Method {
             .find(|m| m.name() == name)
             .ok_or_else(|| UnknownMethod { name: name.to_owned() })
     }
+}
+
+/// A stage of the work. The core has no clock: it announces each stage as it begins, and whoever
+/// called takes the time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Stiffness from mesh and material.
+    Assemble,
+    /// Fill-reducing order and symbolic analysis.
+    Order,
+    /// Numerical factor or inverse of `K11`.
+    Factor,
+    /// Right-hand side, substitution, refinement, residual, reactions.
+    Solve,
 }

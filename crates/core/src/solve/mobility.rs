@@ -1,4 +1,5 @@
-//! Finds motions without energy that the known displacements leave free.
+//! Finds rigid motions and other motions without energy that the prescribed displacements (Dirichlet
+//! values) leave free.
 //!
 //! `K11` is positive definite exactly when no such motion is left; it is decided here before
 //! anything is factored.
@@ -33,12 +34,12 @@ pub struct FreeMotion {
 /// A rigid motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// Along a unit direction.
+    /// A translation along a direction of length one.
     Translation {
-        /// Unit direction.
+        /// Direction of the axis, of length one.
         direction: Vector3<f64>,
     },
-    /// About an axis.
+    /// A rotation about an axis.
     Rotation {
         /// A point of the axis, in mesh units.
         point: Point3<f64>,

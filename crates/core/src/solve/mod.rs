@@ -2,9 +2,7 @@
 
 mod certainty;
 pub mod choose;
-mod columns;
 pub mod condensed;
-mod definite;
 mod direct;
 pub mod equilibrium;
 mod front;
@@ -18,7 +16,6 @@ mod ordering;
 mod partition;
 mod pcg;
 pub mod rates;
-mod stage;
 mod tiles;
 pub(crate) mod vectors;
 pub mod work;
@@ -28,8 +25,8 @@ mod zero_energy;
 pub use certainty::{Certainty, ERROR_REFUSED, ERROR_SERIOUS, ERROR_UNREMARKABLE};
 pub use direct::{Analysed, Factored, Fallback, Loads, Solution, SolveError};
 pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};
+pub use method::Stage;
 pub use method::{Method, UnknownMethod, Within};
 pub use mobility::{FreeMotion, Motion, find_free_motion};
 pub use partition::{KnownDisplacements, KnownError, Partition, PartitionError};
-pub use stage::Stage;
 pub use zero_energy::RigidBodies;

@@ -1,6 +1,7 @@
-//! Degrees of freedom split into unknown (1) and known (2) (thesis 3.41).
+//! Boundary conditions: degrees of freedom split into unknown (1) and known (2), which have prescribed
+//! displacements (Dirichlet values), as in thesis (3.41).
 
-/// Known displacements `Q_k`, one value per degree of freedom, sorted by degree of freedom.
+/// Prescribed displacements (Dirichlet values) `Q_k`, one value per degree of freedom, sorted by degree of freedom.
 ///
 /// Units: m.
 ///
@@ -21,21 +22,21 @@ pub enum KnownError {
         node: usize,
         /// Axis name, `x`, `y` or `z`.
         axis: char,
-        /// One of the values.
+        /// One of the prescribed displacements, m.
         first: f64,
-        /// The other one.
+        /// The other prescribed displacement, m.
         second: f64,
     },
-    /// NaN or infinity.
+    /// A prescribed displacement is NaN or infinite.
     #[error(
         "node {node} axis {axis} is given the displacement {value}, which is not a finite number"
     )]
     NotFinite {
         /// Node, from 0.
         node: usize,
-        /// Axis name.
+        /// Axis of the degree of freedom: x, y or z.
         axis: char,
-        /// The value.
+        /// The prescribed displacement.
         value: f64,
     },
 }
@@ -99,7 +100,7 @@ const NOT_UNKNOWN: u32 = u32::MAX;
 /// Known degrees of freedom that do not fit the mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PartitionError {
-    /// No such degree of freedom.
+    /// The mesh has no such degree of freedom.
     #[error("node {node} is given a displacement, but the mesh has {node_count} nodes (0-based)")]
     NoSuchNode {
         /// Node, from 0.
@@ -115,7 +116,7 @@ pub enum PartitionError {
         /// Node, from 0.
         node: usize,
     },
-    /// Not ascending, or twice the same.
+    /// The degrees of freedom are not ascending, or one stands twice.
     #[error("known degrees of freedom are not ascending at position {position}")]
     NotSorted {
         /// Position in the list.

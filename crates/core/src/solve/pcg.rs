@@ -2,7 +2,7 @@
 
 use super::vectors::{add_scaled, dot, norm, subtract};
 
-/// When to stop.
+/// Residual and error at which conjugate gradients stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PcgParams {
     /// `‖b − A x‖ / ‖b‖` to reach.
@@ -13,11 +13,11 @@ pub(super) struct PcgParams {
     pub steps_max: u32,
 }
 
-/// What was reached.
+/// Residual and error that conjugate gradients have reached.
 pub(super) struct PcgOutcome {
     /// `b − A x`.
     pub residual: Vec<f64>,
-    /// Steps taken.
+    /// Steps of conjugate gradients.
     pub steps: u32,
     /// Estimate of `‖error‖ / ‖x‖`.
     pub error_estimate_rel: f64,

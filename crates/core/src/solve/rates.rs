@@ -36,7 +36,7 @@ pub struct FactorRates {
 pub struct FactorSample {
     /// Numbers of the factor.
     pub entries: f64,
-    /// Operations.
+    /// Floating-point operations of the factor.
     pub flops: f64,
     /// Time of the factor, s.
     pub factor_s: f64,

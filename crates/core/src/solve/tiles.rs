@@ -67,8 +67,6 @@ impl Tiles {
             self.tiles[at(i, j)][(row % self.side, column % self.side)] += value;
         }
     }
-
-    /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.tiles.iter().map(|tile| size_of::<f64>() * tile.nrows() * tile.ncols()).sum()
     }
@@ -135,15 +133,7 @@ impl Tiles {
                 }
             }
             let (_, _, inverse) = column.remove(k);
-            let pairs = column.par_iter_mut().zip(&mut before).with_max_len(1);
-            pairs.for_each(|((_, j, tile), before)| {
-                let mut before = before.submatrix_mut(0, 0, tile.nrows(), tile.ncols());
-                before.copy_from(&**tile);
-                match *j < k {
-                    true => matmul(tile, Accum::Replace, &*inverse, before, -1.0, Par::Seq),
-                    false => matmul(tile, Accum::Replace, before, &*inverse, 1.0, Par::Seq),
-                }
-            });
+            multiply_column((k, inverse), &mut column, &mut before);
             // `W_i P` (its negative for i < k) and `W_jᵀ`.
             let left = |i: usize| match i < k {
                 true => column[i].2.transpose(),
@@ -245,6 +235,23 @@ fn invert_tile(tile: &mut Mat<f64>) -> Result<(), usize> {
     triangular::matmul(&mut *tile, lower, accum, transposed, upper, &w, lower, 1.0, Par::Seq);
     mirror(tile);
     Ok(())
+}
+
+/// Multiplies the tiles of column k by the inverse of its own tile, with a minus sign left of it; keeps
+/// what they were before.
+fn multiply_column(
+    (k, inverse): (usize, &Mat<f64>),
+    column: &mut [(usize, usize, &mut Mat<f64>)],
+    before: &mut [Mat<f64>],
+) {
+    column.par_iter_mut().zip(before).with_max_len(1).for_each(|((_, j, tile), before)| {
+        let mut before = before.submatrix_mut(0, 0, tile.nrows(), tile.ncols());
+        before.copy_from(&**tile);
+        match *j < k {
+            true => matmul(tile, Accum::Replace, inverse, before, -1.0, Par::Seq),
+            false => matmul(tile, Accum::Replace, before, inverse, 1.0, Par::Seq),
+        }
+    });
 }
 
 /// `tile −= left · right` in the lower triangle, where the product is symmetric.

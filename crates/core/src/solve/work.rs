@@ -26,9 +26,9 @@ pub struct Work {
 /// Nodes and elements of a mesh of linear tetrahedra.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshSize {
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tets: usize,
 }
 

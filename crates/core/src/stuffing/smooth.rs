@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::incidence::Incidence;
 use super::pieces::Stuffing;
+use crate::mesh::Incidence;
 
 /// Raises the smallest dihedral angles of a stuffed solid by moving nodes one at a time.
 ///

@@ -1,6 +1,5 @@
 //! Surfaces of triangles as scanners and drawing programs give them: mended, asked what is inside.
 
-mod hole;
 mod mending;
 mod moments;
 mod oriented;
@@ -10,7 +9,7 @@ mod triangle_surface;
 #[cfg(test)]
 pub(crate) mod samples;
 
-pub use hole::Hole;
+pub use mending::Hole;
 pub use mending::{MendedSurface, SurfaceMending};
 pub use tree::{Closest, Hit, SurfaceTree};
 pub use triangle_surface::{SurfaceError, TriangleSurface};

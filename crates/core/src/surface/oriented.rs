@@ -14,9 +14,9 @@ pub(super) struct Turned {
     pub(super) shells: usize,
     /// Shells: triangles joined by edges.
     pub(super) shell_count: usize,
-    /// Edges of one triangle.
+    /// Edges that belong to one triangle only.
     pub(super) open_edges: Vec<[u32; 2]>,
-    /// Edges of three and more triangles.
+    /// Number of edges of three and more triangles.
     pub(super) crowded_edges: usize,
 }
 

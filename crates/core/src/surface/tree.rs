@@ -242,7 +242,7 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// With the root.
+    /// A tree that has only the root.
     fn new() -> Self {
         Self { branches: [0; 64], count: 1 }
     }

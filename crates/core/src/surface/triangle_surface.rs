@@ -14,23 +14,23 @@ pub struct TriangleSurface {
 /// Why points and triangles are no surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
-    /// No triangle at all.
+    /// The surface has no triangle.
     #[error("there is no triangle")]
     Empty,
-    /// A corner that is not there.
+    /// A triangle names a point that is not there.
     #[error("triangle {triangle} (from 0) names point {point}, but there are {points} (from 0)")]
     NoSuchPoint {
-        /// The triangle.
+        /// Index of the triangle, from 0.
         triangle: usize,
         /// The point it names.
         point: u32,
-        /// Points there are.
+        /// Number of points.
         points: usize,
     },
     /// A coordinate that is not finite.
     #[error("point {point} (from 0) is not finite")]
     NotFinite {
-        /// The point.
+        /// Index of the point, from 0.
         point: usize,
     },
 }
@@ -104,7 +104,7 @@ impl TriangleSurface {
             .sum()
     }
 
-    /// The same surface with every coordinate times `factor`.
+    /// This surface with every coordinate times `factor`.
     ///
     /// # Errors
     /// [`SurfaceError::NotFinite`].

@@ -20,7 +20,7 @@ pub(super) struct Proximal<'a> {
     problem: &'a ContactProblem,
     /// Compliance added to each point, m/N.
     added: Vec<f64>,
-    /// Forces it is counted from.
+    /// Forces that the added compliance is unloaded at, N.
     from: &'a [f64],
 }
 

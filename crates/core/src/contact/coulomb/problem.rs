@@ -30,7 +30,7 @@ pub enum ProblemError {
     Sizes {
         /// Number of points.
         points: usize,
-        /// Rows they need.
+        /// Rows that the points need: three each.
         expected: usize,
         /// Rows of the operator.
         rows: usize,
@@ -42,9 +42,9 @@ pub enum ProblemError {
         "contact point {point} has the compliance {compliance:e} m/N along its normal; it must be positive"
     )]
     Rigid {
-        /// The point.
+        /// The point, from 0.
         point: usize,
-        /// Its compliance.
+        /// Its compliance along the normal, m/N.
         compliance: f64,
     },
     /// A number that is not finite.

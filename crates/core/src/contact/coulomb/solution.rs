@@ -26,7 +26,7 @@ impl Default for SolveBudget {
 /// What a point does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointState {
-    /// No force.
+    /// The point carries no force.
     Open,
     /// Force within the cone.
     Sticking,

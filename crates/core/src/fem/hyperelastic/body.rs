@@ -37,7 +37,7 @@ pub(super) enum Shape {
 #[derive(Clone, Debug)]
 pub(super) struct ModuliOf {
     by_region: Vec<Moduli>,
-    /// Empty where one serves all.
+    /// Region of each element; empty where one material serves all.
     regions: Vec<u32>,
 }
 
@@ -176,8 +176,6 @@ impl Body {
         };
         Ok(Self { shape, rest, moduli, node_count })
     }
-
-    /// Bytes held.
     pub fn bytes(&self) -> usize {
         let per_tet = match self.shape {
             Shape::Linear(_) => 32,

@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::fem::elements_around::elements_around;
 use crate::fem::tet4::Gradients;
-use crate::mesh::TetMesh;
+use crate::mesh::{Incidence, TetMesh};
 
 /// Elements that one task works on.
 pub(super) const ELEMENTS_TOGETHER: usize = 256;
@@ -95,7 +94,7 @@ pub(super) struct Averaging {
     start: Vec<u32>,
     /// Elements of patch p: `tets[start[p] .. start[p + 1]]`, ascending.
     tets: Vec<u32>,
-    /// `V_a`, m³.
+    /// Volume `V_a` at rest of every patch, m³.
     volumes: Vec<f64>,
     /// Patch of each corner of each element.
     pub of_corners: Vec<[u32; 4]>,
@@ -104,12 +103,12 @@ pub(super) struct Averaging {
 impl Averaging {
     /// The patches of a mesh, by node, then by region.
     pub fn new(mesh: &TetMesh, rest: &[Gradients]) -> Self {
-        let (around_start, around) = elements_around(mesh.node_count(), mesh.tets());
+        let around = Incidence::new(mesh.node_count(), mesh.tets());
         let region = |tet: u32| mesh.regions().get(tet as usize).copied().unwrap_or(0);
         let mut of_corners = vec![[0u32; 4]; mesh.tets().len()];
         let (mut start, mut tets, mut volumes) = (vec![0u32], Vec::new(), Vec::new());
         for node in 0..mesh.node_count() {
-            let mut here = around[around_start[node]..around_start[node + 1]].to_vec();
+            let mut here = around.tets(node as u32).to_vec();
             here.sort_by_key(|&tet| (region(tet), tet));
             for patch in here.chunk_by(|&a, &b| region(a) == region(b)) {
                 let number = volumes.len() as u32;
@@ -128,7 +127,7 @@ impl Averaging {
         Self { start, tets, volumes, of_corners }
     }
 
-    /// Patches.
+    /// Number of patches.
     pub fn len(&self) -> usize {
         self.volumes.len()
     }

@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 /// Shapes: 3 × 3. Units: 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Deformed {
-    /// `F`.
+    /// Deformation gradient `F`.
     pub f: Matrix3<f64>,
     /// `F⁻ᵀ`, or no numbers where the volume is gone.
     pub f_inverse_transposed: Matrix3<f64>,

@@ -73,7 +73,7 @@ impl Elements {
         self.body.moduli.poisson_max()
     }
 
-    /// Bytes held.
+    /// Bytes that it holds in memory.
     pub fn bytes(&self) -> usize {
         self.body.bytes() + self.plastic.as_ref().map_or(0, Plastic::bytes)
     }

@@ -125,7 +125,7 @@ fn deformation<S: Simd>(h: &LaneMatrix<S>) -> LaneMatrix<S> {
     f
 }
 
-/// Green's strain.
+/// Green's strain of a group from its displacement gradients.
 #[inline(always)]
 fn green<S: Simd>(h: &LaneMatrix<S>) -> LaneMatrix<S> {
     let mut green = *h;

@@ -104,7 +104,7 @@ pub(super) fn trace<S: Simd>(m: &LaneMatrix<S>) -> Lanes<S> {
     m[0][0] + m[1][1] + m[2][2]
 }
 
-/// `a b`.
+/// Products `a b` of a group's matrices.
 #[inline(always)]
 pub(super) fn product<S: Simd>(a: &LaneMatrix<S>, b: &LaneMatrix<S>) -> LaneMatrix<S> {
     let mut c = *a;

@@ -10,6 +10,13 @@ use super::shrink::shrink;
 use crate::fem::Material;
 
 /// Which energy a material stores. Small strains give the linear answers (3.15) by both.
+///
+/// ```
+/// use softgrasp_core::Law;
+///
+/// assert_eq!("neo-hookean".parse(), Ok(Law::default()));
+/// assert_eq!(Law::NeoHookeanLog.to_string(), "neo-hookean-log");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Law {
     /// `W = μ/2 (J^−2/3 tr FᵀF − 3) + κ/2 (J − 1)²`: that of Abaqus, Ansys and CalculiX.
@@ -73,20 +80,20 @@ pub struct Moduli {
 /// Source: derivative of [`Moduli::stress`]; compared with differences in the tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TangentCoefficients {
-    /// Of `dF`.
+    /// Coefficient of `dF`.
     pub a: f64,
-    /// Of `(G : dF) F + (F : dF) G`.
+    /// Coefficient of `(G : dF) F + (F : dF) G`.
     pub b: f64,
-    /// Of `(G : dF) G`.
+    /// Coefficient of `(G : dF) G`.
     pub c: f64,
-    /// Of `G dFᵀ G`.
+    /// Coefficient of `G dFᵀ G`.
     pub d: f64,
 }
 
 /// Which part of the moduli counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ModuliPart {
-    /// All.
+    /// Change of shape and change of volume.
     Whole,
     /// Without the change of volume, which is averaged around nodes.
     WithoutVolume,
@@ -112,7 +119,7 @@ impl Moduli {
         Self { law, mu: material.shear_modulus(), volumetric }
     }
 
-    /// κ, Pa.
+    /// Bulk modulus κ at small strains, Pa.
     pub(super) fn bulk(&self) -> f64 {
         match self.law {
             Law::NeoHookean => self.volumetric,
@@ -189,7 +196,7 @@ impl Moduli {
         0.5 * self.volumetric * x * x
     }
 
-    /// `U′(J)`, Pa.
+    /// Pressure `U′(J)` of a change of volume, Pa.
     #[inline]
     pub(super) fn pressure_of_volume(&self, j_minus_one: f64) -> f64 {
         match self.law {
@@ -198,7 +205,7 @@ impl Moduli {
         }
     }
 
-    /// `U″(J)`, Pa. That of the logarithmic law is negative beyond J = e.
+    /// Stiffness `U″(J)` of a change of volume, Pa. That of the logarithmic law is negative beyond J = e.
     #[inline]
     pub(super) fn bulk_of_volume(&self, j_minus_one: f64) -> f64 {
         match self.law {

@@ -14,9 +14,9 @@ use super::principal::{Curvature, OfStrains, Principal, PrincipalTangent};
 /// classical return mapping schemes of the infinitesimal theory", CMAME 99 (1992) 61.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hencky {
-    /// μ.
+    /// Shear modulus μ.
     pub mu: f64,
-    /// κ.
+    /// Bulk modulus κ.
     pub kappa: f64,
     /// Largest norm of the deviatoric Kirchhoff stress, `√(2/3) σ_y`.
     pub radius: f64,
@@ -28,7 +28,7 @@ pub(super) struct TrialStrains {
     law: Hencky,
     trace: f64,
     deviator: Vector3<f64>,
-    /// `‖dev e‖`.
+    /// Norm `‖dev e‖` of the deviatoric strain.
     size: f64,
 }
 

@@ -99,9 +99,9 @@ pub(super) struct PrincipalTangent {
     pub right: Matrix3<f64>,
     /// Second derivatives of the energy by the stretches.
     pub stretches: Matrix3<f64>,
-    /// Of `D_ik + D_ki`, by [`PAIRS`].
+    /// Stiffness of the flips `D_ik + D_ki`, by [`PAIRS`].
     pub flips: [f64; 3],
-    /// Of `D_ik − D_ki`, by [`PAIRS`].
+    /// Stiffness of the twists `D_ik − D_ki`, by [`PAIRS`].
     pub twists: [f64; 3],
 }
 

@@ -41,7 +41,7 @@ impl LargeSummary {
         jacobian_min: f64::NAN,
     };
 
-    /// Of a displacement field, in parallel.
+    /// The summary of a displacement field, in parallel.
     pub(super) fn of(body: &Body, u: &[f64]) -> Self {
         let pieces = body.by_pieces(u, |_, _, h, piece: &mut Self| piece.see(h));
         pieces.iter().fold(Self::default(), Self::joined)

@@ -36,17 +36,17 @@ pub enum GenerateError {
     /// Fewer or more nodes than objects are made with.
     #[error("{nodes} nodes asked for a {shape}; it can have {NODES_MIN} to {NODES_MAX}")]
     NodeCount {
-        /// The object.
+        /// The object that was asked for.
         shape: BuiltIn,
-        /// Nodes asked for.
+        /// Number of nodes that was asked for.
         nodes: usize,
     },
     /// No lattice gave a closed body in one piece.
     #[error("no lattice gives a sound {shape} of about {nodes} nodes")]
     NoLattice {
-        /// The object.
+        /// The object that was asked for.
         shape: BuiltIn,
-        /// Nodes asked for.
+        /// Number of nodes that was asked for.
         nodes: usize,
     },
     /// The elements do not make a mesh.

@@ -2,7 +2,8 @@
 
 use nalgebra::Point3;
 
-use crate::stuffing::{Incidence, Stuffing, least_sine};
+use crate::mesh::Incidence;
+use crate::stuffing::{Stuffing, least_sine};
 
 /// Splits up to `count` inner edges, spread over the solid, no two at one element.
 ///

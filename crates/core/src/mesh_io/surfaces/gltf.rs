@@ -1,14 +1,13 @@
 //! glTF 2.0, as JSON with buffers beside or inside it, or as one binary file (GLB).
 
-use nalgebra::Point3;
+use nalgebra::{Matrix4, Point3, Quaternion, Transform3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
-use super::gltf_accessor::Buffers;
-use super::gltf_nodes::placed_meshes;
 use super::raw_surface::RawSurface;
 use crate::mesh_io::cursor::Cursor;
 use crate::mesh_io::error::MeshFileError;
-use crate::mesh_io::{Companion, base64};
+use crate::mesh_io::scalar::{ByteOrder, Scalar};
+use crate::mesh_io::{Companion, encoding};
 
 /// Triangles that are read at most, so that one mesh placed many times does not fill the memory.
 const TRIANGLES_MAX: usize = 20_000_000;
@@ -53,9 +52,7 @@ pub(super) fn read(
             let place = |p: &Point3<f64>| world_from_mesh.transform_point(p);
             raw.points.extend(points.iter().map(place));
             let count = points.len() as u32;
-            // A transform that mirrors turns the triangles; mending would see it only where other
-            // meshes join.
-            let is_mirrored = world_from_mesh.matrix().fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+            let is_mirrored = is_mirror(&world_from_mesh);
             for mut triangle in triangles(mode, &corners) {
                 if let Some(&far) = triangle.iter().find(|n| **n >= count) {
                     return Err(whole.count_fault(
@@ -75,6 +72,12 @@ pub(super) fn read(
         raw.notes.push(format!("{other_modes} primitives of points or lines were left out"));
     }
     Ok(raw)
+}
+
+/// Whether a transform mirrors, which turns the triangles; mending would see it only where other meshes
+/// join.
+fn is_mirror(world_from_mesh: &Transform3<f64>) -> bool {
+    world_from_mesh.matrix().fixed_view::<3, 3>(0, 0).determinant() < 0.0
 }
 
 /// The JSON text, and the buffer of a binary file.
@@ -123,7 +126,7 @@ fn load_buffers(
                 Some(data) => {
                     let text = data.split_once(";base64,").map(|(_, text)| text);
                     let text = text.ok_or_else(|| cursor.unsupported("a buffer without base64"))?;
-                    base64::decode(text.as_bytes(), usize::MAX)
+                    encoding::decode(text.as_bytes(), usize::MAX)
                 }
                 None => {
                     let wanted = Companion::FileName(uri.to_owned());
@@ -152,4 +155,176 @@ fn triangles(mode: u64, corners: &[u32]) -> Vec<[u32; 3]> {
         },
         _ => corners.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
     }
+}
+
+/// The buffers, and the text that says what lies where in them.
+pub(super) struct Buffers<'a> {
+    pub(super) json: &'a Value,
+    pub(super) data: &'a [Vec<u8>],
+    pub(super) cursor: &'a Cursor<'a>,
+}
+
+impl Buffers<'_> {
+    /// Points of an accessor of three single precision numbers each.
+    pub(super) fn points(&self, accessor: u64) -> Result<Vec<Point3<f64>>, MeshFileError> {
+        let about = self.entry("accessors", Some(accessor))?;
+        if about["type"] != "VEC3" || about["componentType"].as_u64() != Some(5126) {
+            return Err(self.cursor.unsupported("glTF positions other than three floats"));
+        }
+        let records = self.records(about, 12)?;
+        Ok(records
+            .map(|bytes| Point3::from_slice(&Scalar::F32.reals(bytes, ByteOrder::Little)))
+            .collect())
+    }
+
+    /// Indices of an accessor of whole numbers of any size.
+    pub(super) fn indices(&self, accessor: u64) -> Result<Vec<u32>, MeshFileError> {
+        let about = self.entry("accessors", Some(accessor))?;
+        let kind = match about["componentType"].as_u64() {
+            Some(5121) => Scalar::U8,
+            Some(5123) => Scalar::U16,
+            Some(5125) => Scalar::U32,
+            _ => return Err(self.cursor.unsupported("glTF indices other than whole numbers")),
+        };
+        let records = self.records(about, kind.bytes())?;
+        let index = |bytes| {
+            let values = kind.integers(bytes, ByteOrder::Little);
+            values.first().and_then(|v| u32::try_from(*v).ok()).unwrap_or(u32::MAX)
+        };
+        Ok(records.map(index).collect())
+    }
+
+    /// The bytes of each record of an accessor, `length` of them each; checked against the buffer
+    /// before anything is made.
+    fn records(
+        &self,
+        about: &Value,
+        length: usize,
+    ) -> Result<impl Iterator<Item = &[u8]>, MeshFileError> {
+        if about.get("sparse").is_some() {
+            return Err(self.cursor.unsupported("a sparse glTF accessor"));
+        }
+        let view = self.entry("bufferViews", about["bufferView"].as_u64())?;
+        let buffer = usize_of(&view["buffer"]).and_then(|b| self.data.get(b));
+        let number = |value: &Value| if value.is_null() { Some(0) } else { usize_of(value) };
+        let stride = match view.get("byteStride") {
+            Some(stride) => usize_of(stride).filter(|s| *s >= length),
+            None => Some(length),
+        };
+        let count = usize_of(&about["count"]);
+        let offset = number(&view["byteOffset"])
+            .zip(number(&about["byteOffset"]))
+            .and_then(|(view, own)| view.checked_add(own));
+        let whole = (|| {
+            let (count, stride, offset) = (count?, stride?, offset?);
+            let bytes = buffer?.get(offset..)?;
+            let needed = match count {
+                0 => 0,
+                _ => (count - 1).checked_mul(stride)?.checked_add(length)?,
+            };
+            Some(bytes.get(..needed)?.chunks(stride))
+        })();
+        let whole = whole.ok_or_else(|| {
+            self.cursor.count_fault(
+                "a glTF accessor",
+                &format!("{} records of {length} bytes", about["count"]),
+                &format!("a buffer of {} bytes", buffer.map_or(0, Vec::len)),
+            )
+        })?;
+        Ok(whole.filter_map(move |record| record.get(..length)))
+    }
+
+    fn entry(&self, list: &str, index: Option<u64>) -> Result<&Value, MeshFileError> {
+        let found = index
+            .and_then(|i| usize::try_from(i).ok())
+            .and_then(|i| self.json[list].as_array()?.get(i));
+        found.ok_or_else(|| {
+            let index = index.map_or("none".to_owned(), |i| i.to_string());
+            self.cursor.count_fault(list, &format!("an entry {index}"), "no such entry")
+        })
+    }
+}
+
+fn usize_of(value: &Value) -> Option<usize> {
+    value.as_u64().and_then(|n| usize::try_from(n).ok())
+}
+
+/// The meshes of the scene by index, each with the transform of its nodes. Without a scene all nodes
+/// that no other has as a child are its roots; without nodes every mesh is where it was drawn.
+pub(super) fn placed_meshes(
+    json: &Value,
+    cursor: &Cursor,
+) -> Result<Vec<(usize, Transform3<f64>)>, MeshFileError> {
+    let empty = Vec::new();
+    let nodes = json["nodes"].as_array().unwrap_or(&empty);
+    let meshes = json["meshes"].as_array().map_or(0, Vec::len);
+    if nodes.is_empty() {
+        return Ok((0..meshes).map(|mesh| (mesh, Transform3::identity())).collect());
+    }
+    let scene = json["scene"].as_u64().and_then(|s| usize::try_from(s).ok()).unwrap_or(0);
+    let roots = match json["scenes"].as_array().and_then(|scenes| scenes.get(scene)) {
+        Some(scene) => indices(&scene["nodes"]),
+        None => {
+            let children: Vec<usize> = nodes.iter().flat_map(|n| indices(&n["children"])).collect();
+            (0..nodes.len()).filter(|n| !children.contains(n)).collect()
+        }
+    };
+    let mut placed = Vec::new();
+    let mut is_seen = vec![false; nodes.len()];
+    let mut waiting: Vec<(usize, Transform3<f64>)> =
+        roots.into_iter().rev().map(|node| (node, Transform3::identity())).collect();
+    while let Some((index, world_from_parent)) = waiting.pop() {
+        let Some(node) = nodes.get(index) else {
+            return Err(cursor.count_fault("nodes", &format!("a node {index}"), "no such node"));
+        };
+        // Nodes form trees; one that comes again would go round for ever.
+        if std::mem::replace(&mut is_seen[index], true) {
+            return Err(cursor.count_fault(
+                "nodes",
+                "trees of nodes",
+                &format!("node {index} twice"),
+            ));
+        }
+        let Some(parent_from_node) = transform(node) else {
+            return Err(cursor.unsupported(&format!("the transform of node {index}")));
+        };
+        let world_from_node = world_from_parent * parent_from_node;
+        if let Some(mesh) = node["mesh"].as_u64().and_then(|m| usize::try_from(m).ok()) {
+            placed.push((mesh, world_from_node));
+        }
+        let children = indices(&node["children"]);
+        waiting.extend(children.into_iter().rev().map(|child| (child, world_from_node)));
+    }
+    Ok(placed)
+}
+
+/// Transform of a node: a matrix by columns, or translation, rotation (x, y, z, w) and scale.
+fn transform(node: &Value) -> Option<Transform3<f64>> {
+    if node.get("matrix").is_some() {
+        let matrix = Matrix4::from_column_slice(&numbers::<16>(&node["matrix"])?);
+        return Some(Transform3::from_matrix_unchecked(matrix));
+    }
+    let or = |key: &str, default: &[f64]| match node.get(key) {
+        None => Some(default.to_vec()),
+        Some(value) if default.len() == 4 => numbers::<4>(value).map(|n| n.to_vec()),
+        Some(value) => numbers::<3>(value).map(|n| n.to_vec()),
+    };
+    let move_by = Vector3::from_column_slice(&or("translation", &[0.0; 3])?);
+    let turn = or("rotation", &[0.0, 0.0, 0.0, 1.0])?;
+    let scale = Vector3::from_column_slice(&or("scale", &[1.0; 3])?);
+    let turn = UnitQuaternion::try_new(Quaternion::new(turn[3], turn[0], turn[1], turn[2]), 1e-6)?;
+    let matrix = Translation3::from(move_by).to_homogeneous()
+        * turn.to_homogeneous()
+        * Matrix4::new_nonuniform_scaling(&scale);
+    Some(Transform3::from_matrix_unchecked(matrix))
+}
+
+fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
+    let values: Option<Vec<f64>> = value.as_array()?.iter().map(Value::as_f64).collect();
+    values?.try_into().ok()
+}
+
+fn indices(list: &Value) -> Vec<usize> {
+    let index = |v: &Value| v.as_u64().and_then(|n| usize::try_from(n).ok());
+    list.as_array().into_iter().flatten().filter_map(index).collect()
 }

@@ -1,13 +1,10 @@
 //! Surface files: STL, OBJ, PLY, OFF and glTF, read into points and triangles.
 
 mod gltf;
-mod gltf_accessor;
-mod gltf_nodes;
 mod obj;
 mod off;
 mod parse;
 mod ply;
-mod ply_header;
 mod raw_surface;
 mod stl;
 

@@ -4,8 +4,8 @@ use std::fmt;
 
 use super::{gltf, obj, off, ply, stl};
 use crate::mesh_io::cursor::Cursor;
+use crate::mesh_io::encoding::{Unpacker, is_gzip};
 use crate::mesh_io::error::{Fault, MeshFileError};
-use crate::mesh_io::gzip::{Unpacker, is_gzip};
 use crate::mesh_io::sniff::{Sniffed, sniff_unpacked, without_mark};
 use crate::mesh_io::{Companion, Foreign};
 use crate::surface::TriangleSurface;

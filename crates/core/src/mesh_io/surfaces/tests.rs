@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
 use super::{SurfaceFile, SurfaceFormat, parse_surface};
-use crate::mesh_io::{Companion, MeshFileError, base64};
+use crate::mesh_io::{Companion, MeshFileError, encoding};
 use crate::surface::samples::cuboid;
 use crate::surface::{MendedSurface, TriangleSurface};
 
@@ -118,7 +118,7 @@ fn gltf_json(buffer: &str) -> String {
 }
 
 fn gltf_embedded() -> Vec<u8> {
-    let data = String::from_utf8(base64::encode(&gltf_buffer())).unwrap();
+    let data = String::from_utf8(encoding::encode(&gltf_buffer())).unwrap();
     let uri = format!(r#", "uri": "data:application/octet-stream;base64,{data}""#);
     gltf_json(&uri).into_bytes()
 }

@@ -99,7 +99,7 @@ fn displacements_travel_beside_the_mesh() {
     let text = String::from_utf8(bytes.clone()).unwrap();
     assert!(text.contains("Name=\"displacement &lt;m&gt;\" NumberOfComponents=\"3\""));
     let data: Vec<u8> = values.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
-    let packed = crate::mesh_io::base64::encode(&[&96_u64.to_le_bytes()[..], &data].concat());
+    let packed = crate::mesh_io::encoding::encode(&[&96_u64.to_le_bytes()[..], &data].concat());
     assert!(text.contains(std::str::from_utf8(&packed).unwrap()));
     let file = read(bytes).unwrap();
     assert_eq!(file.mesh, one_tet());

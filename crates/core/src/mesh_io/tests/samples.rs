@@ -4,10 +4,9 @@ use std::fmt::Write;
 
 use nalgebra::Point3;
 
-use super::binary_medit::meshb;
 use super::deck_quirks::deck;
 use super::febio_quirks::febio;
-use super::netgen_quirks::netgen_sample;
+use super::other_quirks::{meshb, netgen_sample};
 use super::vtu_samples::vtu_samples;
 use super::xdmf_quirks::xdmf;
 use crate::mesh_io::{Format, MeshFile, MeshFileError, parse};

@@ -152,7 +152,7 @@ fn packed_lengths_that_lie_are_refused_before_unpacking() {
     // 2³² − 1 bytes announced, or as many blocks, or as many bytes out of one LZ4 block.
     let array = |compressor: &str, header: &[u32]| {
         let bytes: Vec<u8> = header.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let text = crate::mesh_io::base64::encode(&bytes);
+        let text = crate::mesh_io::encoding::encode(&bytes);
         let text = format!("{}AAAA", String::from_utf8(text).unwrap());
         vtu_text(&text, CONNECTIVITY, "4 8", "10 10")
             .replace("format=\"ascii\">AAA", "format=\"binary\">AAA")

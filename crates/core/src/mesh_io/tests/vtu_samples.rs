@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::samples::{Order, POINTS, Sample, TETS};
-use crate::mesh_io::{Format, base64};
+use crate::mesh_io::{Format, encoding};
 
 /// How the binary arrays of a VTU file are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,8 +61,8 @@ impl Encoding {
         match (self.raw, self.packing) {
             (true, _) => [header, data].concat(),
             // VTK encodes lengths and plain data together, lengths and blocks apart.
-            (false, Packing::Plain) => base64::encode(&[header, data].concat()),
-            (false, _) => [base64::encode(&header), base64::encode(&data)].concat(),
+            (false, Packing::Plain) => encoding::encode(&[header, data].concat()),
+            (false, _) => [encoding::encode(&header), encoding::encode(&data)].concat(),
         }
     }
 

@@ -20,9 +20,9 @@ pub(super) struct Correction {
     pub error: Form,
     /// `‖T x‖` where rounding is replaced by fixed disturbances of the stiffness.
     pub expected: Form,
-    /// `‖M x‖`.
+    /// Form of the answer's size `‖M x‖`.
     pub size: Form,
-    /// `‖|M| |x|‖`.
+    /// Form of `‖|M| |x|‖`, with absolute values of all entries.
     pub sizes: Form,
     /// Bounds on how far the columns of T are off.
     pub off: Vec<f64>,

@@ -13,7 +13,7 @@ pub enum CondensedError {
     /// A body of very many hinged parts.
     #[error("condensed: body {body} has too many hinged parts; use front")]
     Hinges {
-        /// The body.
+        /// Index of the body, from 0.
         body: usize,
     },
     /// A pivot of `K_B` was not positive.
@@ -38,7 +38,7 @@ pub enum CondensedError {
         /// Bytes it may take.
         limit: u64,
     },
-    /// No memory.
+    /// The system had no memory for the base factor.
     #[error("condensed: no memory for the base factor ({bytes} bytes)")]
     OutOfMemory {
         /// Bytes asked for.
@@ -54,7 +54,7 @@ pub enum CondensedError {
         contacts: usize,
         /// Bytes of their columns.
         needed: usize,
-        /// The bound.
+        /// Bytes that the cache may hold.
         bound: usize,
     },
     /// The touched nodes and masks leave a motion free.
@@ -78,7 +78,7 @@ pub enum CondensedError {
     Dependent {
         /// The mask, in the order given.
         mask: usize,
-        /// Axis name.
+        /// Axis of the constraint: x, y or z.
         axis: char,
     },
     /// A mask of a node that is not there.
@@ -88,7 +88,7 @@ pub enum CondensedError {
     NoSuchNode {
         /// The mask, in the order given.
         mask: usize,
-        /// The node.
+        /// The node, from 0.
         node: u32,
         /// Nodes of the mesh.
         node_count: usize,

@@ -32,7 +32,7 @@ pub struct FreeBody {
     centre: Point3<f64>,
     /// Moments of inertia about the centre at a density of one, m⁵.
     inertia: Matrix3<f64>,
-    /// A.
+    /// Inverse of the moments A of the rigid motions.
     inverse: Matrix6<f64>,
     /// `K⁻ M R`, by node.
     response: Vec<Matrix3x6<f64>>,

@@ -34,13 +34,13 @@ pub struct ShapeResponse<'a> {
     pub base: &'a Base,
     /// What nothing holds.
     pub body: &'a FreeBody,
-    /// C.
+    /// Compliance C of the deformed shape.
     pub tangent: &'a FreeTangent,
     /// The displacement that is left where no forces act, to first order; 3N, m.
     pub offset: &'a [f64],
 }
 
-/// Where columns and displacements come from.
+/// Stiffness that columns and displacements follow from.
 #[derive(Clone, Copy)]
 enum Source<'a> {
     Linear(Elasticity<'a>),

@@ -31,14 +31,12 @@ mod free_tangent;
 #[cfg(test)]
 mod mask_tests;
 mod overlap;
-mod rigid;
 mod rounding;
 mod small_system;
 #[cfg(test)]
 mod tests;
 mod touched;
 mod verified;
-mod wanted_rows;
 
 pub use base::Base;
 pub use certificate::{Certificate, Delivery};

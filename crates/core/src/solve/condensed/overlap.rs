@@ -11,7 +11,7 @@ use super::error::CondensedError;
 use super::touched::Touched;
 use crate::solve::partition::AXIS_NAMES;
 
-/// Sizes of E.
+/// Sizes of the columns E of the contacts.
 ///
 /// Units: 1.
 pub(super) struct Overlap {
@@ -63,7 +63,7 @@ impl Overlap {
         self.gram.clone()?.cholesky().map(|factor| factor.inverse())
     }
 
-    /// Numbers kept.
+    /// Numbers kept of `EᵀE`.
     pub fn len(&self) -> usize {
         self.gram.as_ref().map_or(0, DMatrix::len)
     }
@@ -150,7 +150,7 @@ impl LoadSize {
         }
     }
 
-    /// `‖b‖`.
+    /// Norm `‖b‖` of the load that displacements `q` of the contacts are equal to.
     pub fn size(&self, q: &[f64]) -> f64 {
         let columns = self.products.column_iter().zip(q);
         let along = |column: &[f64]| column.iter().zip(q).map(|(p, q)| p * q).sum::<f64>();

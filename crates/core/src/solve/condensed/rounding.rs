@@ -203,7 +203,7 @@ impl Ball {
         Self { middle, radius: radius * SLACK }
     }
 
-    /// All transposes.
+    /// Transposes of all members.
     pub fn transposed(&self) -> Self {
         Self { middle: self.middle.transpose(), radius: self.radius.transpose() }
     }

@@ -18,7 +18,7 @@ pub struct Touched {
 /// One thing that columns of the compliance belong to.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Contact {
-    /// A node.
+    /// A single node.
     Node(u32),
     /// A mask, named by the exact bits of its nodes and weights.
     Mask(Mask),

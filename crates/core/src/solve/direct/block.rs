@@ -8,7 +8,7 @@ use super::refinement::{Judged, Shrinking, steps_max};
 use super::solution::{Fallback, Loads, Solution, System};
 use crate::fem::{Products, Stiffness, forces_of_columns};
 use crate::solve::Partition;
-use crate::solve::columns::{PART_ROWS, dots, roots, sum};
+use crate::solve::vectors::{PART_ROWS, dots, roots, sum};
 
 /// Several answers on their way.
 ///
@@ -20,7 +20,7 @@ pub(super) struct Block<'a> {
     columns: usize,
     /// External forces; none where no load has any.
     forces: Option<Vec<f64>>,
-    /// Displacements.
+    /// Displacements of all degrees of freedom, m.
     q: Vec<f64>,
     /// `K q`, and its rounding.
     products: Products,
@@ -30,15 +30,15 @@ pub(super) struct Block<'a> {
     b_norms: Vec<f64>,
 }
 
-/// How far the answers are.
+/// How good the answers of a block are.
 struct Progress {
     /// Goodness of each answer.
     judged: Vec<Judged>,
     /// Sizes of the residuals.
     residual_norms: Vec<f64>,
-    /// Corrections taken.
+    /// Corrections that were added so far.
     steps: u32,
-    /// Of a single-precision factor's corrections only.
+    /// How the corrections of each answer shrink; `None` for a factor in double precision.
     shrinking: Option<Vec<Shrinking>>,
 }
 
@@ -230,7 +230,7 @@ impl Progress {
         self.worst() <= 1.0 && self.shrinking.iter().flatten().all(Shrinking::is_done)
     }
 
-    /// What the worst answer lacks.
+    /// Component-wise maximum of what the answers lack.
     fn worst(&self) -> f64 {
         let most = |most: f64, off: f64| if off > most || off.is_nan() { off } else { most };
         self.judged.iter().map(|judged| judged.off).fold(0.0, most)

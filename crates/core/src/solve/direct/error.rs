@@ -20,13 +20,13 @@ pub enum SolveError {
     /// A method without a factor of the kind that is made here.
     #[error("{method} has no factor of this kind")]
     NoSuchFactor {
-        /// The method.
+        /// Method that was asked for.
         method: Method,
     },
     /// Memory for the factor could not be had.
     #[error("{method}: no memory for the factor of {unknown_dofs} unknowns")]
     OutOfMemory {
-        /// Method that asked.
+        /// Method that needs the memory.
         method: Method,
         /// Size of `K11`.
         unknown_dofs: usize,
@@ -37,7 +37,7 @@ pub enum SolveError {
          it is made, and may take {limit}"
     )]
     OverLimit {
-        /// Method that asked.
+        /// Method that needs the memory.
         method: Method,
         /// Size of `K11`.
         unknown_dofs: usize,
@@ -54,9 +54,9 @@ pub enum SolveError {
          are hard without a factor: use front or front-mixed, or allow a larger error"
     )]
     NotConverged {
-        /// Method used.
+        /// Method that was used.
         method: Method,
-        /// Steps taken.
+        /// Steps of conjugate gradients.
         steps: u32,
         /// `‖b − K11 x‖ / ‖b‖` reached.
         residual_rel: f64,
@@ -71,17 +71,17 @@ pub enum SolveError {
          displacements are too large or too small for double precision"
     )]
     NotFinite {
-        /// Method used.
+        /// Method that was used.
         method: Method,
     },
     /// Loads that do not fit the partition.
     #[error("{given} values for {expected} {what}")]
     LoadCount {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
-        /// Values given.
+        /// Values that were given.
         given: usize,
-        /// Values expected.
+        /// Values that the partition has places for.
         expected: usize,
     },
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::error::SolveError;
 use crate::fem::Stiffness;
-use crate::solve::columns::norms;
 use crate::solve::front::{FrontAnalysis, FrontError, FrontFactor};
 use crate::solve::k11::{NotPositive, SparseK11, visit_k11};
 use crate::solve::memory::hierarchy_bytes;
@@ -14,6 +13,7 @@ use crate::solve::oracle::gauss_jordan;
 use crate::solve::oracle::sparse::{Analysis, SparseFactor};
 use crate::solve::tiles::Tiles;
 use crate::solve::vectors::norm;
+use crate::solve::vectors::norms;
 use crate::solve::{Method, Partition, Stage, Within, ordering};
 
 /// `K11` of one partition, ordered and analysed but not factored yet: what a factor will cost is

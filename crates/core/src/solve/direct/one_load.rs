@@ -50,8 +50,7 @@ pub(super) fn solve(
     let System { stiffness, partition, .. } = system;
     let b = system.right_hand_side(loads);
     let b_norm = norm(&b);
-    let mut q = vec![0.0; partition.dof_count()];
-    system.prescribe(loads, &mut q);
+    let mut q = system.prescribed(loads);
     let mut x = if stops_early { vec![0.0; b.len()] } else { kernel.apply(b.clone()) };
     let apply = |x: &[f64]| system.apply_k11(x);
     let mut residual = subtract(&b, &apply(&x));

@@ -83,9 +83,9 @@ impl Shrinking {
 pub(super) struct Course {
     /// What was found of the answer as it is.
     pub judged: Judged,
-    /// Corrections taken.
+    /// Corrections that were added to the answer.
     pub steps: u32,
-    /// Of a single-precision factor's corrections only.
+    /// How the corrections shrink; `None` for a factor in double precision.
     shrinking: Option<Shrinking>,
 }
 

@@ -13,7 +13,7 @@ use crate::solve::{Method, Partition};
 /// empty or 3N (entries on known degrees of freedom must be zero). Units: m, N.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Loads<'a> {
-    /// `Q_k`.
+    /// Prescribed displacements (Dirichlet values) `Q_k`.
     pub q_known: &'a [f64],
     /// `f₁` of (3.7), scattered over all degrees of freedom.
     pub forces: &'a [f64],
@@ -95,6 +95,13 @@ impl System<'_> {
         for (&dof, &value) in self.partition.known().iter().zip(loads.q_known) {
             q[dof as usize] = value;
         }
+    }
+
+    /// The field of 3N with the prescribed displacements alone.
+    pub fn prescribed(self, loads: Loads<'_>) -> Vec<f64> {
+        let mut q = vec![0.0; self.partition.dof_count()];
+        self.prescribe(loads, &mut q);
+        q
     }
 
     /// `K11 x`, through the whole stiffness with zeros at the known degrees of freedom.

@@ -10,7 +10,7 @@ use super::shape::Shape;
 pub(super) enum Lost {
     /// Elements at what is moved would turn inside out, however small the step.
     Flattened { share: f64 },
-    /// The energy found no lowest point.
+    /// The descent found no minimum of the energy.
     NoMinimum { share: f64, residual_rel: f64 },
     /// Neither the tangent nor its positive part has a factor.
     Singular,

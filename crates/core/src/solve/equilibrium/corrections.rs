@@ -5,9 +5,8 @@ use std::sync::Arc;
 use super::goal::{Goal, Wish};
 use super::hold::Hold;
 use super::inverse::{FactorError, Inverse, Renewed};
-use super::secants::Secants;
+use super::secants::{Secants, Soft};
 use super::shape::{Moved, Shape};
-use super::soft::Soft;
 use crate::fem::hyperelastic::Evaluated;
 use crate::solve::vectors::dot;
 
@@ -59,8 +58,6 @@ impl Corrections {
             wants_factor: false,
         }
     }
-
-    /// Bytes held.
     pub fn bytes(&self) -> usize {
         let inverse = self.inverse.as_ref().map_or(0, |inverse| inverse.bytes());
         inverse + self.secants.bytes()

@@ -44,7 +44,7 @@ pub(super) struct Patience {
 }
 
 impl Patience {
-    /// Of frames.
+    /// Patience with the motion of a frame.
     pub const OF_FRAMES: Self = Self { failed_pieces: 40, solves: u32::MAX };
 }
 

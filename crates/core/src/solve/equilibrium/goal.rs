@@ -9,7 +9,7 @@ use super::hold::Hold;
 /// `forces` 3N of the system, or empty. Units: m, N.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal<'a> {
-    /// `Q_k`.
+    /// Prescribed displacements (Dirichlet values) `Q_k`.
     pub q_known: &'a [f64],
     /// Mean displacement of each mask.
     pub mask_q: &'a [f64],

@@ -8,9 +8,9 @@ use nalgebra::DMatrix;
 use crate::contact::Mask;
 use crate::fem::Stiffness;
 use crate::mesh::{Bodies, TetMesh};
-use crate::solve::definite::held_for_definiteness;
 use crate::solve::front::FrontAnalysis;
 use crate::solve::partition::AXIS_NAMES;
+use crate::solve::zero_energy::held_for_definiteness;
 use crate::solve::{Partition, RigidBodies};
 
 /// What holds a body, ordered and analysed for factors of any tangent.
@@ -40,14 +40,14 @@ pub struct Hold {
 pub struct Dependent {
     /// The mask, in the order given.
     pub mask: usize,
-    /// Axis name.
+    /// Axis of the constraint: x, y or z.
     pub axis: char,
 }
 
 /// The body that is held.
 #[derive(Clone, Copy)]
 pub struct HoldOf<'a> {
-    /// Its mesh.
+    /// Mesh of the body.
     pub mesh: &'a TetMesh,
     /// Its connected bodies.
     pub bodies: &'a Bodies,

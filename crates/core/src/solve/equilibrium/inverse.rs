@@ -19,10 +19,10 @@ pub(super) enum Factor {
 /// Why a tangent has no factor.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FactorError {
-    /// A direction without positive stiffness.
+    /// The tangent has a direction without positive stiffness.
     #[error("the tangent stiffness is not positive definite")]
     NotPositive,
-    /// No memory.
+    /// The system had no memory for the factor.
     #[error("no memory for a factor of {bytes} bytes")]
     OutOfMemory {
         /// Bytes asked for.
@@ -155,8 +155,6 @@ impl Inverse {
         }
         r
     }
-
-    /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.factor.bytes() + size_of_val(self.columns.as_slice())
     }

@@ -18,13 +18,9 @@ mod outcome;
 mod path;
 #[cfg(test)]
 mod plastic_tests;
-mod rigid_part;
 mod secants;
 mod settle;
 mod shape;
-#[cfg(test)]
-mod snap_tests;
-mod soft;
 #[cfg(test)]
 mod tests;
 

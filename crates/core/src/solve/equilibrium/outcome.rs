@@ -59,7 +59,7 @@ pub enum NoEquilibrium {
     BranchEnded {
         /// Share of the motion that was followed.
         share: f64,
-        /// Residual that was left.
+        /// Imbalance that was left, relative to the forces that hold the body.
         residual_rel: f64,
     },
     /// The surface creases: an element is pressed further than any smooth surface can be.
@@ -121,15 +121,15 @@ pub enum NoEquilibrium {
     NotConverged {
         /// Share of the motion that was followed.
         share: f64,
-        /// Solves it took.
+        /// Solves with a factor that were made.
         solves: u32,
-        /// Residual that was left.
+        /// Imbalance that was left, relative to the forces that hold the body.
         residual_rel: f64,
     },
     /// The tangent has no factor.
     #[error("no equilibrium found: {0}")]
     Factor(#[from] super::FactorError),
-    /// Numbers too large.
+    /// Displacements or forces are too large for double precision.
     #[error("no equilibrium found: displacements or forces are not finite numbers")]
     NotFinite,
 }

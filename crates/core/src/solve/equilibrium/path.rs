@@ -47,7 +47,7 @@ impl Path {
         &self.followed.shape.q
     }
 
-    /// The elements.
+    /// Elements of the body, in their plastic state.
     pub fn elements(&self) -> &Arc<Elements> {
         &self.followed.shape.elements
     }
@@ -57,7 +57,7 @@ impl Path {
         &self.followed.shape.hold
     }
 
-    /// Bytes held.
+    /// Bytes that it holds in memory.
     pub fn bytes(&self) -> usize {
         // The softest motion and its force are as long as the unknown.
         self.followed.corrections.bytes() + 4 * size_of_val(self.displacement())

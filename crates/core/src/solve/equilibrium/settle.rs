@@ -115,7 +115,7 @@ pub(super) fn settle(
     Ok(settling.ended(was_settled))
 }
 
-/// Corrections under way.
+/// Corrections of a shape, while they are made.
 struct Settling<'a> {
     shape: &'a mut Shape,
     corrections: &'a mut Corrections,

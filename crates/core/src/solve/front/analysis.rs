@@ -1,11 +1,10 @@
 //! Everything about a factor that depends on the pattern of `K11` only: fronts, where entries and
 //! contributions go, work and memory.
 
-use super::Real;
 use super::etree::{EliminationTree, NONE, inverse};
-use super::runs;
 use super::slabs::{BlockSlabs, Slabs};
 use super::supernodes::{Supernodes, flops};
+use super::{Real, runs};
 use crate::fem::{AXES, Stiffness, dof};
 use crate::solve::ordering::NodeGraph;
 use crate::solve::{Method, Partition};
@@ -25,9 +24,9 @@ const SERIAL_FLOPS: f64 = 30e6;
 pub struct FrontAnalysis {
     /// `order[new]` is the row of `K11` eliminated at `new`.
     pub(super) order: Vec<u32>,
-    /// Its inverse.
+    /// Place in the order of elimination of every row of `K11`.
     pub(super) position: Vec<u32>,
-    /// Postordered: children before parents, subtrees contiguous.
+    /// The fronts in postorder: children before parents, subtrees contiguous.
     pub(super) fronts: Vec<Front>,
     /// Fronts without a parent.
     pub(super) roots: Vec<u32>,
@@ -184,7 +183,7 @@ impl FrontAnalysis {
         this
     }
 
-    /// Children, roots and sums over subtrees.
+    /// Links the fronts to their children and sums over subtrees.
     fn link(&mut self, supernodes: &Supernodes) {
         for v in 0..self.fronts.len() {
             let parent = supernodes.parent[v];

@@ -3,8 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::Real;
-use super::lines::Lines;
-use super::slabs::BlockSlabs;
+use super::slabs::{BlockSlabs, Lines};
 
 /// A front's contribution block on its way to the parent.
 ///

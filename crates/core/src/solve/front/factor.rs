@@ -11,8 +11,7 @@ use super::analysis::{Front, FrontAnalysis};
 use super::assembly::{AddToPanel, Contribution, add_entries};
 use super::blocks::{Block, Blocks};
 use super::dense::{TASK_SLABS, Tasks, factor_panel, form_contribution};
-use super::lines::Lines;
-use super::slabs::Slabs;
+use super::slabs::{Lines, Slabs};
 use super::solve::{Paths, solve_ordered};
 use super::substitute::width;
 use crate::fem::Stiffness;
@@ -251,7 +250,7 @@ impl<T: Real> FrontFactor<T> {
     }
 }
 
-/// One factorisation under way.
+/// A factorisation, while it is made.
 struct Run<'a, T> {
     analysis: &'a FrontAnalysis,
     stiffness: &'a Stiffness,

@@ -7,7 +7,6 @@ mod dense;
 mod etree;
 mod factor;
 mod kernel;
-mod lines;
 mod real;
 mod runs;
 mod slabs;

@@ -24,9 +24,9 @@ pub trait Real:
     + Sync
     + sealed::Sealed
 {
-    /// Zero.
+    /// The number 0.
     const ZERO: Self;
-    /// One.
+    /// The number 1.
     const ONE: Self;
     /// Rows of a slab: one column of a slab is 192 bytes, three vectors of 512 bits.
     const SLAB: usize;
@@ -37,10 +37,10 @@ pub trait Real:
     /// Nearest number of this precision.
     fn from_f64(value: f64) -> Self;
 
-    /// Exact value.
+    /// The number in double precision, exactly.
     fn to_f64(self) -> f64;
 
-    /// Square root.
+    /// Square root of the number.
     fn root(self) -> Self;
 
     /// Whether a pivot can be divided by: positive and finite.

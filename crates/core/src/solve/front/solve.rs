@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Real;
 use super::analysis::{Front, FrontAnalysis};
-use super::lines::Lines;
+use super::slabs::Lines;
 use super::substitute::Panel;
 
 /// Subtrees whose panels times right-hand sides are below this are not split into tasks.
@@ -25,7 +25,7 @@ impl Paths {
         Self { up: all.clone(), down: all }
     }
 
-    /// No front.
+    /// Paths through no front.
     pub fn none(analysis: &FrontAnalysis) -> Self {
         let none = vec![false; analysis.fronts.len()];
         Self { up: none.clone(), down: none }
@@ -67,7 +67,7 @@ fn mark(marks: &mut [bool], analysis: &FrontAnalysis, front: usize) {
     }
 }
 
-/// One solve under way.
+/// A substitution, while it is made.
 struct Solve<'a, T> {
     analysis: &'a FrontAnalysis,
     panels: &'a [Lines<T>],

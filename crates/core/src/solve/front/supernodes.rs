@@ -21,7 +21,7 @@ pub(super) struct Supernodes {
 
 /// Supernode while it is being merged.
 struct Group {
-    /// Columns eliminated.
+    /// Columns that the supernode eliminates.
     columns: u32,
     /// Rows of the front, eliminated ones included.
     rows: u32,

@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
+use super::chebyshev::Ritz;
 use super::hierarchy::{Hierarchy, Workspace};
-use super::ritz::Ritz;
-use super::sums::{PART, dot, norm};
+use super::small::{PART, dot, norm};
 use crate::fem::Stiffness;
 use crate::solve::Partition;
 
-/// When to stop.
+/// Residual and error at which conjugate gradients stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Goal {
     /// `‖b − K11 x‖ / ‖b‖` to reach.
@@ -19,7 +19,7 @@ pub(crate) struct Goal {
     pub steps_max: u32,
 }
 
-/// What was reached.
+/// Answer of conjugate gradients, and how good it is.
 pub(crate) struct Outcome {
     /// The answer, 3N, zero on known rows.
     pub x: Vec<f64>,
@@ -29,7 +29,7 @@ pub(crate) struct Outcome {
     pub residual_rel: f64,
     /// Estimate of `‖error‖ / ‖x‖`.
     pub error_estimate_rel: f64,
-    /// Steps taken.
+    /// Steps of conjugate gradients.
     pub steps: u32,
 }
 

@@ -7,7 +7,6 @@ use super::block_rows::{BlockRows, NodeMatrix, TASK_ROWS};
 use super::chebyshev::{Chebyshev, Vectors, subtract_product};
 use super::galerkin::{self, ByColumn};
 use super::motions::{MOTIONS, OfNode, orthonormal};
-use super::prolongator;
 
 /// One level of a hierarchy, B unknowns at each node.
 pub(super) struct Level<const B: usize> {
@@ -40,7 +39,7 @@ fn coarsen<const B: usize>(
     let aggregates = Aggregates::new(rows, number);
     let (tentative, coarse_motions) = orthonormal(&motions, &aggregates);
     drop(motions);
-    let p = prolongator::smoothed(rows, &aggregates, &tentative, OMEGA / smoother.largest());
+    let p = galerkin::smoothed(rows, &aggregates, &tentative, OMEGA / smoother.largest());
     drop(tentative);
     let by_column = ByColumn::new(&p, rows.row_count(), aggregates.count());
     let a = galerkin::product(rows, &p, &by_column, aggregates.count());
@@ -86,13 +85,11 @@ impl<const B: usize> Level<B> {
         self.a.row_count()
     }
 
-    /// The prolongator.
+    /// How nodes of this level follow the motions of aggregates.
     #[cfg(test)]
     pub fn prolongator(&self) -> &BlockRows<B, MOTIONS> {
         &self.p
     }
-
-    /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.a.bytes() + self.smoother.bytes() + self.p.bytes() + self.by_column.bytes()
     }

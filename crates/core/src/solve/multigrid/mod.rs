@@ -12,17 +12,12 @@
 mod aggregates;
 mod block_rows;
 mod chebyshev;
-mod coarsest;
 mod conjugate;
-mod fine_rows;
 mod galerkin;
 mod hierarchy;
 mod level;
 mod motions;
-mod prolongator;
-mod ritz;
 mod small;
-mod sums;
 #[cfg(test)]
 mod tests;
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::aggregates::Aggregates;
-use super::fine_rows::FineRows;
+use super::block_rows::FineRows;
 use crate::fem::AXES;
 
 /// Rigid motions: three translations, three rotations.

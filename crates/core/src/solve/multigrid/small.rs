@@ -1,4 +1,10 @@
-//! Products and inverses of blocks, whose sizes are known when the program is compiled.
+//! Products and inverses of blocks, whose sizes are known when the program is compiled; and sums over long
+//! vectors in parts of a fixed length, whose sums are added in their order, so that any number of threads
+//! gives the same bits.
+
+use rayon::prelude::*;
+
+use crate::solve::vectors::{self, SAFE_SQUARES};
 
 /// `sum + a b`.
 #[inline(always)]
@@ -32,7 +38,7 @@ pub(super) fn add_transposed_product<const R: usize, const K: usize, const C: us
     }
 }
 
-/// `a x`.
+/// Product `a x` of a block and a vector.
 #[inline(always)]
 pub(super) fn times<const B: usize>(a: &[[f32; B]; B], x: &[f32; B]) -> [f32; B] {
     a.map(|line| line.iter().zip(x).map(|(a, x)| a * x).sum())
@@ -92,6 +98,58 @@ fn inverse_of_diagonal<const B: usize>(a: &[[f64; B]; B]) -> [[f64; B]; B] {
 /// Sum of the squares of the entries.
 pub(super) fn square<const R: usize, const C: usize>(a: &[[f64; C]; R]) -> f64 {
     a.iter().flatten().map(|x| x * x).sum()
+}
+
+/// Numbers of a part.
+pub(super) const PART: usize = 4096;
+/// Sums that run beside each other.
+const LANES: usize = 8;
+
+/// Scalar product `aᵀ b` of long vectors.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let parts: Vec<f64> =
+        a.par_chunks(PART).zip(b.par_chunks(PART)).map(|(a, b)| of_part(a, b)).collect();
+    parts.iter().sum()
+}
+
+fn of_part(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    for (sum, (a, b)) in sums.iter_mut().zip(a_rest.iter().zip(b_rest)) {
+        *sum = a * b;
+    }
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..LANES {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum()
+}
+
+/// Euclidean norm of a long vector.
+pub(super) fn norm(v: &[f64]) -> f64 {
+    match dot(v, v) {
+        square if SAFE_SQUARES.contains(&square) => square.sqrt(),
+        _ => vectors::norm(v),
+    }
+}
+
+/// Largest absolute value; a NaN is passed over.
+pub(super) fn largest(v: &[f64]) -> f64 {
+    v.par_chunks(PART).map(vectors::largest).reduce(|| 0.0, f64::max)
+}
+
+/// `aᵀ b` of vectors of blocks, in double precision.
+pub(super) fn dot_blocks<const B: usize>(a: &[[f32; B]], b: &[[f32; B]]) -> f64 {
+    let parts: Vec<f64> = a
+        .par_chunks(PART)
+        .zip(b.par_chunks(PART))
+        .map(|(a, b)| {
+            let products = a.iter().flatten().zip(b.iter().flatten());
+            products.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+        })
+        .collect();
+    parts.iter().sum()
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::block_rows::NodeMatrix;
-use super::fine_rows::FineRows;
+use super::block_rows::{FineRows, NodeMatrix};
 use super::galerkin::{self, ByColumn};
 use super::level::Level;
 use super::motions::{self, MOTIONS};

@@ -19,7 +19,7 @@ pub struct Analysis {
     symbolic: SymbolicCholesky<usize>,
 }
 
-/// Numerical factor.
+/// Numerical factor over a symbolic analysis.
 pub struct SparseFactor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,

@@ -1,9 +1,8 @@
 //! Fill-reducing order: nested dissection of the graph of nodes by planes between their places.
 
 mod dissection;
-mod graph;
 mod part;
 mod separator;
 mod vertex_cut;
 
-pub(super) use graph::{NodeGraph, nested_dissection};
+pub(super) use dissection::{NodeGraph, nested_dissection};

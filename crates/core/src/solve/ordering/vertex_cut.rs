@@ -215,7 +215,7 @@ impl<'a> Flow<'a> {
         false
     }
 
-    /// One unit along a path.
+    /// Sends one unit of flow along a path.
     fn send(&mut self, path: &[usize]) {
         self.previous[path[0] / 2] = NONE;
         for pair in path.windows(2) {

@@ -4,5 +4,4 @@ mod convergence;
 mod element;
 mod exact_quadrature;
 mod fixtures;
-mod patch;
 mod whole_objects;
