@@ -123,7 +123,7 @@ impl App {
         run.look(window);
         let asked = run.draw_panels(window, pace.fps());
         run.obey(asked, window);
-        let (root, camera) = run.view.to_draw();
+        let (root, camera) = run.view.drawing();
         let is_open = pollster::block_on(window.render_3d(root, camera));
         run.was_seen(window);
         let now = Instant::now();

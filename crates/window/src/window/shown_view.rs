@@ -60,7 +60,7 @@ impl ShownView {
     }
 
     /// The root of the scene, and the camera that draws it.
-    pub(super) fn to_draw(&mut self) -> (&mut SceneNode3d, &mut OrbitCamera3d) {
+    pub(super) fn drawing(&mut self) -> (&mut SceneNode3d, &mut OrbitCamera3d) {
         place_camera(&mut self.drawn_camera, &self.camera);
         (self.scene.root(), &mut self.drawn_camera)
     }
