@@ -1,8 +1,9 @@
 //! Times of contact steps with friction: five fingertips close on a body, hold it and lift it, by linear
 //! elasticity and at large deformation; each step with how well it meets the law of contact.
 //!
-//! `press_times SHAPE NODES [linear|large] [RESIDUAL]`: SHAPE a built-in object of its own size, RESIDUAL
-//! the relative residual that is asked for.
+//! `press_times SHAPE NODES [linear|large] [RESIDUAL] [STEPS]`: SHAPE a built-in object of its own size,
+//! RESIDUAL the relative residual that is asked for, STEPS of the hold. `moved_um` is how far the object's
+//! place at the end of a phase is from that at its middle.
 #![allow(clippy::print_stdout, reason = "a table on standard output is what it is for")]
 
 use std::sync::Arc;
@@ -23,7 +24,8 @@ use softgrasp_core::solve::condensed::{Columns, Elasticity, FreeBody};
 /// Radius of a fingertip, m.
 const TIP_M: f64 = 0.008;
 /// Steps of each phase, 10 ms each.
-const PHASES: [(&str, usize); 3] = [("close", 25), ("hold", 25), ("lift", 25)];
+const PHASES: [&str; 3] = ["close", "hold", "lift"];
+const STEPS: usize = 25;
 /// Share of the body's breadth that the fingers close by.
 const CLOSED_BY: f64 = 0.2;
 
@@ -47,6 +49,7 @@ fn main() {
     let nodes = arguments.next().map_or(1000, |n| n.parse().expect("a number of nodes"));
     let is_large = arguments.next().is_some_and(|word| word == "large");
     let residual_rel = arguments.next().map_or(1e-9, |r| r.parse().expect("a residual"));
+    let hold_steps = arguments.next().map_or(STEPS, |n| n.parse().expect("a number of steps"));
     let mesh = generate(shape, nodes).expect("a mesh");
     let surface = Surface::from_mesh(&mesh);
     let (low, high) = mesh.bounds();
@@ -57,12 +60,7 @@ fn main() {
     let columns = Columns::new(1 << 30);
     let elements = Arc::new(model.hyperelastic(Law::NeoHookean).expect("elements"));
     let mut large = LargeBody::at_rest(elements, Arc::clone(model.stiffness().pattern()));
-    let settings = StepSettings {
-        gravity: -9.81 * Vector3::y(),
-        viscosity: 0.02,
-        residual_rel,
-        ..StepSettings::default()
-    };
+    let settings = StepSettings { viscosity: 0.02, residual_rel, ..StepSettings::default() };
     let tip = RigidShape::sphere(TIP_M).expect("a sphere");
     let mut state = ObjectState::at_rest(Isometry3::identity());
     println!(
@@ -74,11 +72,15 @@ fn main() {
     println!(
         "phase  p50_ms  p90_ms  max_ms  contacts  shapes  factors  rounds  newton  residual  contact_residual"
     );
-    let mut step_number = 0usize;
-    for (phase, steps) in PHASES {
+    for (number, phase) in PHASES.into_iter().enumerate() {
+        let steps = if phase == "hold" { hold_steps } else { STEPS };
+        let mut middle = Isometry3::identity();
         let mut found: Vec<(f64, usize, StepOutcome)> = Vec::new();
-        for _ in 0..steps {
-            let [from, to] = [step_number, step_number + 1].map(|k| k as f64 / steps as f64);
+        // Nothing holds it before the fingers are closed.
+        let gravity = if phase == "close" { Vector3::zeros() } else { -9.81 * Vector3::y() };
+        let settings = StepSettings { gravity, ..settings };
+        for k in 0..steps {
+            let [from, to] = [k, k + 1].map(|k| number as f64 + k as f64 / steps as f64);
             let starts = tips(&low, &high, from);
             let bodies: Vec<MovingBody> = starts
                 .into_iter()
@@ -111,7 +113,9 @@ fn main() {
             let outcome = outcome.expect("a step");
             state = outcome.state.clone();
             found.push((ms, large.factors() - before, outcome));
-            step_number += 1;
+            if k == steps / 2 {
+                middle = state.world_from_object;
+            }
         }
         let mut ms: Vec<f64> = found.iter().map(|(ms, ..)| *ms).collect();
         ms.sort_by(f64::total_cmp);
@@ -122,7 +126,7 @@ fn main() {
             found.iter().map(|(.., outcome)| of(outcome)).fold(0.0, f64::max)
         };
         println!(
-            "{phase:<6} {:>6.2}  {:>6.2}  {:>6.2}  {:>8.1}  {:>6.1}  {:>7.2}  {:>6.1}  {:>6.1}  {:>8.1e}  {:>8.1e}",
+            "{phase:<6} {:>6.2}  {:>6.2}  {:>6.2}  {:>8.1}  {:>6.1}  {:>7.2}  {:>6.1}  {:>6.1}  {:>8.1e}  {:>8.1e}  {:.3}",
             ms[ms.len() / 2],
             ms[ms.len() * 9 / 10],
             ms[ms.len() - 1],
@@ -133,6 +137,7 @@ fn main() {
             mean(&|f| f.2.newton_steps as f64),
             most(&|o| o.residual_rel),
             most(&|o| o.contact_residual_rel),
+            1e6 * (state.world_from_object.translation.vector - middle.translation.vector).norm(),
         );
     }
 }
