@@ -1,13 +1,11 @@
-//! Gmsh MSH files: the sections that versions 1, 2 and 4 share, and those of version 1: `$NOD` with
-//! `id x y z`, `$ELM` with `id type physical elementary count nodes…`.
+//! Gmsh MSH files: the header and the sections that versions 1, 2 and 4 share.
 
-use super::cell_kind::{CellKind, Shape, gmsh_cell};
 use super::cursor::{Cursor, words};
 use super::error::MeshFileError;
-use super::gmsh_header::{end_section, read_header};
+use super::msh1::{end_section, read_header};
 use super::number::parse_integer;
 use super::raw_mesh::RawMesh;
-use super::{msh2, msh4};
+use super::{msh1, msh2, msh4};
 
 /// Reads an MSH file of version 1, 2 or 4.
 ///
@@ -24,8 +22,8 @@ pub(super) fn read(mut cursor: Cursor) -> Result<RawMesh, MeshFileError> {
         let Some(token) = cursor.token() else { break };
         match (token, header) {
             (b"$MeshFormat", _) => header = Some(read_header(&mut cursor)?),
-            (b"$NOD", _) => read_nodes(&mut cursor, &mut raw)?,
-            (b"$ELM", _) => read_elements(&mut cursor, &mut raw)?,
+            (b"$NOD", _) => msh1::read_nodes(&mut cursor, &mut raw)?,
+            (b"$ELM", _) => msh1::read_elements(&mut cursor, &mut raw)?,
             (b"$Nodes", Some(h)) if h.major == 2 => msh2::read_nodes(&mut cursor, h, &mut raw)?,
             (b"$Nodes", Some(h)) => msh4::read_nodes(&mut cursor, h, &mut raw)?,
             (b"$Elements", Some(h)) if h.major == 2 => {
@@ -88,72 +86,4 @@ fn skip_section(cursor: &mut Cursor, section: &[u8]) -> bool {
         }
     }
     false
-}
-
-/// Reads the section `$NOD`.
-pub(super) fn read_nodes(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<(), MeshFileError> {
-    read_labelled_points(cursor, raw)?;
-    end_section(cursor, "$ENDNOD")
-}
-
-/// A count, then `label x y z` for each node: the same in the text files of MSH 1 and 2.
-pub(super) fn read_labelled_points(
-    cursor: &mut Cursor,
-    raw: &mut RawMesh,
-) -> Result<(), MeshFileError> {
-    let count = cursor.count("the number of nodes")?;
-    cursor.check_count(count, 8, "nodes")?;
-    raw.points.reserve(count);
-    raw.node_labels.reserve(count);
-    for _ in 0..count {
-        raw.node_labels.push(cursor.integer("a node label")?);
-        raw.points.push(cursor.point()?);
-    }
-    Ok(())
-}
-
-/// Reads the section `$ELM`.
-pub(super) fn read_elements(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<(), MeshFileError> {
-    let count = cursor.count("the number of elements")?;
-    cursor.check_count(count, 10, "elements")?;
-    let mut fields = Vec::new();
-    for _ in 0..count {
-        read_integers(cursor, &mut fields, "an element line: id, type, two regions, count, nodes")?;
-        let (number, regions, announced, nodes) = match fields.as_slice() {
-            &[_, number, physical, elementary, announced, ref nodes @ ..] => {
-                (number, [physical, elementary], announced, nodes)
-            }
-            _ => return Err(cursor.expected("five numbers and the nodes of an element")),
-        };
-        if usize::try_from(announced) != Ok(nodes.len()) {
-            let found = nodes.len().to_string();
-            return Err(cursor.count_fault("nodes of an element", &announced.to_string(), &found));
-        }
-        let kind = gmsh_cell(number).unwrap_or(CellKind::new(Shape::Unknown(number), nodes.len()));
-        if kind.nodes != nodes.len() {
-            let (expected, found) = (kind.nodes.to_string(), nodes.len().to_string());
-            let array = format!("nodes of an element of type {number}");
-            return Err(cursor.count_fault(&array, &expected, &found));
-        }
-        raw.add_cell(kind, nodes, regions);
-    }
-    end_section(cursor, "$ENDELM")
-}
-
-/// The next line as integers, into a buffer that is used again and again.
-pub(super) fn read_integers(
-    cursor: &mut Cursor,
-    fields: &mut Vec<i64>,
-    what: &str,
-) -> Result<(), MeshFileError> {
-    let before = cursor.clone();
-    fields.clear();
-    let line = cursor.line().unwrap_or_default();
-    for word in words(line) {
-        match parse_integer(word) {
-            Some(value) => fields.push(value),
-            None => return Err(cursor.expected_instead(what, line)),
-        }
-    }
-    if fields.is_empty() { Err(before.expected(what)) } else { Ok(()) }
 }

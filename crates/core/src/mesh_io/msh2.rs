@@ -5,8 +5,7 @@ use nalgebra::Point3;
 use super::cell_kind::{CellKind, Shape, gmsh_cell};
 use super::cursor::Cursor;
 use super::error::MeshFileError;
-use super::gmsh::{read_integers, read_labelled_points};
-use super::gmsh_header::{Header, end_section};
+use super::msh1::{Header, end_section, read_integers, read_labelled_points};
 use super::raw_mesh::RawMesh;
 use super::scalar::ByteOrder;
 
