@@ -1,6 +1,6 @@
 //! Sums of vectors: norm, scalar product, difference; and of several vectors that stand side by side, the
-//! numbers of one row next to each other. Rows are taken in parts of a fixed length and the parts' sums added in their order, so that any
-//! number of threads gives the same bits.
+//! numbers of one row next to each other. Rows are taken in parts of a fixed length and the parts' sums added
+//! in their order, so that any number of threads gives the same bits.
 
 use rayon::prelude::*;
 
