@@ -1,5 +1,6 @@
 //! The finite element model of a body: mesh, stiffness, connected parts, fixed degrees of freedom.
 
+mod fields;
 mod large;
 
 use std::sync::Arc;

@@ -4,6 +4,7 @@ mod assembly;
 mod dofs;
 mod element;
 mod elements_around;
+pub mod fields;
 pub mod hyperelastic;
 mod material;
 mod nodal_patches;

@@ -62,4 +62,4 @@ pub use surfaces::{SurfaceFile, SurfaceFormat, parse_surface, surface_format};
 pub use thesis_lists::{write_thesis_lists, write_thesis_lists_labelled};
 pub use write_error::WriteError;
 pub use write_msh41::{write_msh41, write_msh41_labelled};
-pub use write_vtu::{PointField, write_vtu, write_vtu_labelled};
+pub use write_vtu::{PointField, VtuField, write_vtu, write_vtu_fields, write_vtu_labelled};

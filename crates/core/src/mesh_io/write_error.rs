@@ -3,14 +3,14 @@
 /// Data for a file that does not fit the mesh.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WriteError {
-    /// A field has not one vector per node.
-    #[error("field {field}: expected {expected} vectors, one per node, found {found}")]
+    /// A field has not one value per node or element.
+    #[error("field {field}: expected {expected} values, found {found}")]
     FieldLength {
         /// Name of the field.
         field: String,
-        /// Nodes of the mesh.
+        /// Nodes or elements of the mesh.
         expected: usize,
-        /// Vectors given.
+        /// Values given.
         found: usize,
     },
     /// A triangle of the display list names a node that is not there.

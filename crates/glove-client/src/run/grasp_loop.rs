@@ -14,7 +14,7 @@ use softgrasp_hand::arrival::Device;
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::sent::{RecordedAnswers, Sent};
-use softgrasp_protocol::{NodeChoice, Precision, Question, Want};
+use softgrasp_protocol::{NodeChoice, Question, Want};
 
 use crate::ask::digest::request_digest;
 use crate::ask::held_nodes::{HeldNodes, PrescribedDisplacements};
@@ -380,7 +380,7 @@ impl GraspLoop {
             masks,
             mask_displacements: of_masks,
             method: self.settings.method.clone(),
-            want: Want { nodes, reactions: self.wishes.forces, precision: Precision::F64 },
+            want: Want { nodes, reactions: self.wishes.forces, ..Want::default() },
             max_error: self.wishes.max_error.or(self.settings.error_of_frames()),
             ..Question::default()
         }

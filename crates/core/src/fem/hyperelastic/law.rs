@@ -115,11 +115,8 @@ impl Moduli {
 
     /// Poisson's ratio at small strains.
     pub(super) fn poisson(&self) -> f64 {
-        let kappa = match self.law {
-            Law::NeoHookean => self.volumetric,
-            Law::NeoHookeanLog => self.volumetric + 2.0 / 3.0 * self.mu,
-        };
-        (3.0 * kappa - 2.0 * self.mu) / (6.0 * kappa + 2.0 * self.mu)
+        let (mu, kappa) = self.at_small_strain();
+        (3.0 * kappa - 2.0 * mu) / (6.0 * kappa + 2.0 * mu)
     }
 
     /// The part that belongs to an element when the volume ratio is averaged around nodes; the rest
@@ -128,13 +125,19 @@ impl Moduli {
         Self { volumetric: 0.0, ..self }
     }
 
-    /// Hencky's law with the same moduli, and with a largest deviatoric stress, Pa.
-    pub(super) fn hencky(self, radius: f64) -> Hencky {
+    /// μ and κ at small strain, Pa.
+    pub(super) fn at_small_strain(self) -> (f64, f64) {
         let kappa = match self.law {
             Law::NeoHookean => self.volumetric,
             Law::NeoHookeanLog => self.volumetric + 2.0 / 3.0 * self.mu,
         };
-        Hencky { mu: self.mu, kappa, radius }
+        (self.mu, kappa)
+    }
+
+    /// Hencky's law with the same moduli, and with a largest deviatoric stress, Pa.
+    pub(super) fn hencky(self, radius: f64) -> Hencky {
+        let (mu, kappa) = self.at_small_strain();
+        Hencky { mu, kappa, radius }
     }
 
     /// Energy for each unit of volume at rest; infinite where the volume is gone.

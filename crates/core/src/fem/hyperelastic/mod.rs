@@ -14,6 +14,7 @@ mod positive_part;
 mod principal;
 mod principal_tangent;
 mod shrink;
+mod states;
 mod step_limit;
 mod summary;
 mod tangent;
