@@ -6,8 +6,8 @@ use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_core::model::{Element, Known, Model};
 use softgrasp_core::solve::{Loads, Method, Solution};
 use softgrasp_protocol::{
-    Ask, Body, DofValue, ElementChoice, ElementName, MeshData, MethodName, NodeChoice, Precision,
-    Question, UploadModel, Want,
+    Ask, Body, DofValue, ElementChoice, ElementName, MeshData, MethodName, NodeChoice, Question,
+    UploadModel, Want,
 };
 
 use crate::report::ReportError;
@@ -121,7 +121,7 @@ impl Pressed {
         Question {
             known: known.collect(),
             method: method.expect("the names of all methods can be sent"),
-            want: Want { nodes, reactions: false, precision: Precision::F64 },
+            want: Want { nodes, reactions: false, ..Want::default() },
             ..Question::default()
         }
     }

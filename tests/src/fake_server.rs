@@ -66,6 +66,7 @@ fn reply_to(request: &Request, displacements: &[[f64; 3]]) -> Option<Reply> {
                 displacements: Displacements::F64(wanted),
                 reactions: Vec::new(),
                 mask_forces: Vec::new(),
+                fields: Vec::new(),
                 cases: Vec::new(),
             })))
         }

@@ -3,7 +3,7 @@
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_protocol::{
     Ask, Body, DofValue, ElementChoice, ElementName, Material, MeshData, MethodName, ModelHash,
-    NodeChoice, Precision, Question, Request, UploadModel, Want,
+    NodeChoice, Question, Request, UploadModel, Want,
 };
 
 /// Names of all methods, slowest first.
@@ -78,7 +78,7 @@ pub fn question(known: Vec<DofValue>, method: &str) -> Question {
     Question {
         known,
         method: MethodName::try_new(method).expect("a method's name"),
-        want: Want { nodes: NodeChoice::All, reactions: true, precision: Precision::F64 },
+        want: Want { nodes: NodeChoice::All, reactions: true, ..Want::default() },
         ..Question::default()
     }
 }

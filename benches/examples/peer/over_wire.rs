@@ -5,7 +5,7 @@ use glove_client::ask::connection::{Host, LinkError, ServerChoice, ServerConnect
 use softgrasp_bench::sample::timed_ms;
 use softgrasp_protocol::{
     Answer, Ask, DofValue, ElementName, Material, MeshData, MethodName, ModelHash, NodeChoice,
-    Precision, Question, Reply, Request, UploadModel, Want,
+    Question, Reply, Request, UploadModel, Want,
 };
 
 use crate::problem::{POISSON, Problem, YOUNG};
@@ -37,7 +37,7 @@ pub fn run(problem: &Problem, method: &str, threads: usize) -> anyhow::Result<se
         let question = Question {
             known: known.map(|(&dof, &value)| DofValue { dof, value }).collect(),
             method: method.clone(),
-            want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+            want: Want { nodes: NodeChoice::All, reactions: false, ..Want::default() },
             ..Question::default()
         };
         frame(model, question)

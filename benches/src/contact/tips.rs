@@ -7,7 +7,7 @@ use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_core::model::{Element, Model};
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{
-    DofValue, ElementName, Masks, MeshData, MethodName, NodeChoice, Precision, Question,
+    DofValue, ElementName, FieldSet, Masks, MeshData, MethodName, NodeChoice, Precision, Question,
     UploadModel, Want,
 };
 
@@ -132,7 +132,7 @@ impl Tips {
     /// Surface displacements only, as a frame wants them.
     pub fn want_surface(&self) -> Want {
         let nodes = NodeChoice::Nodes(self.surface.nodes.clone());
-        Want { nodes, reactions: false, precision: Precision::F64 }
+        Want { nodes, reactions: false, ..Want::default() }
     }
 }
 
@@ -141,5 +141,9 @@ fn at_node(node: u32, u: [f64; 3], scale: f64) -> impl Iterator<Item = DofValue>
 }
 
 /// Everything, with forces.
-pub const WANT_ALL: Want =
-    Want { nodes: NodeChoice::All, reactions: true, precision: Precision::F64 };
+pub const WANT_ALL: Want = Want {
+    nodes: NodeChoice::All,
+    reactions: true,
+    precision: Precision::F64,
+    fields: FieldSet::NONE,
+};

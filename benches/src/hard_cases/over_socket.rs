@@ -8,7 +8,7 @@ use glove_client::ask::connection::{Host, LinkError, ServerConnection};
 use softgrasp_core::model::Element;
 use softgrasp_protocol::{
     Ask, Body, DofValue, ElementChoice, ElementName, Masks, Material, MeshData, MethodName,
-    NodeChoice, Precision, Question as Asked, Reply, Request, UploadModel, Want,
+    NodeChoice, Question as Asked, Reply, Request, UploadModel, Want,
 };
 
 use super::answer::{Answer, since};
@@ -110,7 +110,7 @@ fn asked(known: &[(u32, f64)], by_masks: bool) -> Result<Asked, Refusal> {
         masks,
         mask_displacements: masked.into_iter().map(|(_, mean)| mean).collect(),
         method,
-        want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+        want: Want { nodes: NodeChoice::All, reactions: false, ..Want::default() },
         ..Asked::default()
     })
 }

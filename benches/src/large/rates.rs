@@ -6,7 +6,7 @@ use glove_client::ask::connection::{Host, ServerChoice, ServerConnection};
 use softgrasp_core::mesh::{BuiltIn, Surface};
 use softgrasp_protocol::{
     Answer, Ask, ElementName, LargeAsk, LargeReport, Masks, Material, MeshData, ModelHash,
-    NodeChoice, Pace, PathChoice, Precision, Question, Request, UploadModel, Want,
+    NodeChoice, Pace, PathChoice, Question, Request, UploadModel, Want,
 };
 
 use super::squeeze::Squeeze;
@@ -109,7 +109,7 @@ fn question_of(squeeze: &Squeeze, surface: &[u32], share: f64) -> Question {
         want: Want {
             nodes: NodeChoice::Nodes(surface.to_vec()),
             reactions: false,
-            precision: Precision::F64,
+            ..Want::default()
         },
         max_error: Some(2e-3),
         ..Question::default()

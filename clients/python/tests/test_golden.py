@@ -35,7 +35,7 @@ from softgrasp.conversation import Conversation
 from softgrasp.framing import HEADER_LEN, Kind, encode_frame
 
 REQUESTS = ["Hello", "Ask", "Ask-model", "Ask-large", "Ask-cases", "HaveModel", "UploadModel"]
-REQUESTS += ["Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
+REQUESTS += ["Ask-fields", "Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
 NAME = bytes(0xA0 ^ k for k in range(32))
 POINTS = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0, 0, 0]]
 MATERIAL = Material(20_000.0, 0.45)
@@ -82,6 +82,12 @@ def requests() -> dict[str, calls.Call]:
     newest = Question(
         nodes=[0, 2, 3], precision="f32", max_error=0.01, report="short", newest_wins=True
     )
+    with_fields = Question(
+        nodes=[0, 2, 3],
+        precision="f32",
+        max_error=0.01,
+        fields=["elements.stress", "nodes.von_mises", "elements.energy"],
+    )
     plain = Model(Mesh(POINTS, [[0, 1, 2, 3]]), MATERIAL, "t10")
     cases = [[0.0, -0.001], [0.0, -0.002], [-0.0, 0.001]]
     return {
@@ -89,6 +95,7 @@ def requests() -> dict[str, calls.Call]:
         "Ask": calls.solve(labelled(), HELD, once),
         "Ask-model": calls.frame(NAME, MASKED, newest),
         "Ask-large": calls.large_frame(NAME, HELD, LARGE, frame),
+        "Ask-fields": calls.frame(NAME, MASKED, with_fields),
         "Ask-cases": calls.solve_several(labelled(), HELD, cases, False, once),
         "HaveModel": calls.have_model(NAME),
         "UploadModel": calls.upload_model(plain, plain.fixed_dofs([3])),
@@ -144,6 +151,19 @@ def test_answers_of_several_cases_are_read() -> None:
     assert first.displacements.tolist() == [[0.5, 0, 0]] * 3
     assert further.displacements.tolist() == [[1, -2, 0.25]] * 3
     assert further.reactions.dofs.tolist() == [2] and further.reactions.forces.tolist() == [4.5]
+
+
+def test_fields_of_each_case_are_read() -> None:
+    several = read_several_answers(golden_reader("Answer-fields"))
+    first, further = (case.fields for case in several.cases)
+    assert first is not None and further is not None
+    assert (first.energy, further.energy, first.stress_error_rel) == (0.5, 2.0, None)
+    assert first.elements.stress is not None and first.elements.stress.shape == (2, 6)
+    assert first.elements.stress[1].tolist() == [1.75, 2.0, 2.25, 2.5, 2.75, 3.0]
+    assert further.von_mises.tolist() == [-0.5, -1.0, -1.5]
+    assert further.elements.energy is not None
+    assert further.elements.energy.tolist() == [-0.5, -1.0]
+    assert first.nodes.stress is None and first.elements.von_mises is None
 
 
 def test_report_that_nobody_wanted_tells_nothing() -> None:

@@ -7,7 +7,7 @@ use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::equilibrium::NoEquilibrium;
 use softgrasp_core::solve::{Method, SolveError, UnknownMethod};
-use softgrasp_protocol::{DecodeError, ModelHash, RejectCode, Rejected, VERSION};
+use softgrasp_protocol::{DecodeError, Field, ModelHash, RejectCode, Rejected, VERSION};
 
 use crate::no_room::NoRoom;
 use crate::plan::PlanError;
@@ -45,6 +45,18 @@ pub(crate) enum Refusal {
          deformation"
     )]
     SeveralLarge,
+    #[error("{field} belong to contact frames; other questions have forces at masks and reactions")]
+    ContactFields { field: Field },
+    #[error(
+        "the fields asked for take {bytes} bytes, {free} are free (--memory-limit); ask for fewer of \
+         them, or for those of fewer nodes"
+    )]
+    FieldsMemory { bytes: u64, free: u64 },
+    #[error(
+        "the fields asked for are {bytes} bytes long, an answer holds {most} bytes of fields; ask for \
+         fewer of them at a time, or for those of nodes only"
+    )]
+    FieldsTooLarge { bytes: u64, most: u64 },
     #[error("a question about large deformation asks for linear elasticity: leave `large` out")]
     LargeLinear,
     #[error("the request was cancelled by its client")]
@@ -160,7 +172,10 @@ impl Refusal {
             Self::Plan(error) => code_of_plan(error),
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
-            Self::TooManyCases { .. } | Self::NoRoom(_) => RejectCode::MemoryLimit,
+            Self::TooManyCases { .. } | Self::FieldsMemory { .. } | Self::NoRoom(_) => {
+                RejectCode::MemoryLimit
+            }
+            Self::FieldsTooLarge { .. } => RejectCode::TooLarge,
             Self::Uncertain { .. } | Self::NoEquilibrium(_) => RejectCode::Uncertain,
             Self::Token | Self::Barred { .. } => RejectCode::NotAuthorised,
             Self::Internal => RejectCode::Internal,

@@ -12,7 +12,7 @@ use tokio::task::JoinHandle;
 
 use crate::answer::{
     PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases, answer_large_frame, is_finite,
-    prefetch, prove, readiness, solve_large, solve_once, solve_several, upload,
+    prefetch, prove, readiness, reserve_fields, solve_large, solve_once, solve_several, upload,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;
@@ -53,8 +53,8 @@ pub(crate) struct RequestHandler {
 }
 
 /// What this server can do, for `Welcome`.
-const CAPABILITIES: [&str; 6] =
-    ["large", "cases", "contact", "cancel", "newest-wins", "report-levels"];
+const CAPABILITIES: [&str; 7] =
+    ["large", "cases", "contact", "cancel", "newest-wins", "report-levels", "fields"];
 /// `Alive` is not sent more often.
 const ALIVE_MIN: Duration = Duration::from_millis(100);
 
@@ -175,6 +175,7 @@ impl RequestHandler {
         received: Reservation,
         clock: impl FnOnce() -> StageClock + Send + 'static,
     ) -> Result<Answer, Refusal> {
+        let _of_fields = reserve_fields(&self.server.resources, &ask)?;
         let Ask { subject, question, large, cases, without_estimate, .. } = ask;
         if large.is_some() && !cases.is_empty() {
             return Err(Refusal::SeveralLarge);

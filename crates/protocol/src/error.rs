@@ -72,6 +72,12 @@ pub enum DecodeError {
         /// Its number.
         kind: u32,
     },
+    /// An answer announces fields that nobody can have asked for here.
+    #[error("an answer announces the fields {bits:#x}, of which some are not known")]
+    UnknownFields {
+        /// One bit for each.
+        bits: u32,
+    },
     /// No message has this number.
     #[error("unknown message kind {kind:#06x}")]
     UnknownKind {

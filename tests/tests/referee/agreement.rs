@@ -40,7 +40,7 @@ pub struct Agreement {
 }
 
 impl Comparison {
-    fn of(pairs: &[(Printed, f64)]) -> Self {
+    pub fn of(pairs: &[(Printed, f64)]) -> Self {
         let largest = pairs.iter().map(|(p, _)| p.value.abs()).fold(0.0, f64::max);
         let off = |(printed, ours): &(Printed, f64)| (printed.value - ours).abs();
         let beyond = |p: &(Printed, f64)| (off(p) - p.0.half_unit).max(0.0);
@@ -55,7 +55,7 @@ impl Comparison {
     }
 
     /// Both: relative to the largest, and number by number.
-    fn holds(&self) -> bool {
+    pub fn holds(&self) -> bool {
         self.outside == 0 && self.difference_rel <= HALF_DIGIT + ROUNDING
     }
 

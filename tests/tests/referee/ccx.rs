@@ -139,7 +139,7 @@ fn read_block(text: &str, title: &str, system: &System) -> Option<Vec<[Printed; 
 
 impl Printed {
     /// Reads Fortran's form, which leaves the `E` out where the exponent has three digits.
-    fn parse(text: &str) -> Option<Self> {
+    pub fn parse(text: &str) -> Option<Self> {
         let split = match text.find(['E', 'e', 'D']) {
             Some(at) => (&text[..at], &text[at + 1..]),
             None => {

@@ -14,6 +14,7 @@ mod ccx;
 mod contact;
 mod contact_deck;
 mod deck;
+mod fields;
 mod object;
 mod question;
 mod solved;

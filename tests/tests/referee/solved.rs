@@ -11,7 +11,7 @@ use softgrasp_core::fem::{Element, Material};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{Loads, Method};
 use softgrasp_protocol::{
-    Ask, Body, DofValue, ElementChoice, MethodName, NodeChoice, Precision, Reply, Request, Want,
+    Ask, Body, DofValue, ElementChoice, MethodName, NodeChoice, Reply, Request, Want,
 };
 use softgrasp_tests::questions::mesh_data;
 
@@ -72,9 +72,13 @@ impl Asked {
         }
     }
 
+    /// A connection to the server.
+    pub fn connection(&self) -> ServerConnection {
+        ServerConnection::connect(&self.server.address().to_string()).unwrap()
+    }
+
     fn by_socket(&self, object: &Object, system: &System, question: &Question) -> Found {
-        let address = self.server.address().to_string();
-        let mut connection = ServerConnection::connect(&address).unwrap();
+        let mut connection = self.connection();
         let value = |&(dof, value): &(u32, f64)| DofValue { dof, value };
         let (element, method) = match system.element {
             Element::Tet4 => (ElementChoice::T4, "condensed"),
@@ -90,7 +94,7 @@ impl Asked {
             known: question.known.iter().map(value).collect(),
             forces: question.forces.iter().map(value).collect(),
             method: MethodName::try_new(method).unwrap(),
-            want: Want { nodes: NodeChoice::All, reactions: true, precision: Precision::F64 },
+            want: Want { nodes: NodeChoice::All, reactions: true, ..Want::default() },
             ..softgrasp_protocol::Question::default()
         };
         let reply = connection.ask(&Request::from(Ask::new(body, asked)));

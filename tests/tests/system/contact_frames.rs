@@ -4,8 +4,8 @@ use fea_server::RunningServer;
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh};
 use softgrasp_protocol::{
-    BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, Deformation, LawName,
-    ModelHash, NodeChoice, ObjectState, Precision, Reply, Request,
+    BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, Deformation, Field, FieldSet,
+    LawName, ModelHash, NodeChoice, ObjectState, Precision, Reply, Request,
 };
 use softgrasp_tests::questions::{object, upload};
 
@@ -19,6 +19,7 @@ struct Scene {
     surface: Surface,
     model: ModelHash,
     deformation: Option<Deformation>,
+    fields: FieldSet,
 }
 
 impl Scene {
@@ -29,7 +30,7 @@ impl Scene {
             Ok(Reply::ModelReady(ready)) => ready.model,
             other => panic!("the upload got {other:?}"),
         };
-        Self { mesh, surface, model, deformation: None }
+        Self { mesh, surface, model, deformation: None, fields: FieldSet::NONE }
     }
 
     fn frame(&self, state: ObjectState, step: u32) -> ContactFrame {
@@ -70,6 +71,7 @@ impl Scene {
             triangles,
             nodes: NodeChoice::Nodes(self.surface.nodes.clone()),
             precision: Precision::F64,
+            fields: self.fields,
         }
     }
 }
@@ -97,8 +99,17 @@ fn played_by(
     steps: u32,
     deformation: Option<Deformation>,
 ) -> Vec<ContactAnswer> {
+    played_with(server, steps, deformation, FieldSet::NONE)
+}
+
+fn played_with(
+    server: &RunningServer,
+    steps: u32,
+    deformation: Option<Deformation>,
+    fields: FieldSet,
+) -> Vec<ContactAnswer> {
     let mut connection = client(server);
-    let scene = Scene { deformation, ..Scene::new(&mut connection) };
+    let scene = Scene { deformation, fields, ..Scene::new(&mut connection) };
     let mut state = ObjectState::at_rest(STILL);
     let mut answers = Vec::new();
     for step in 0..steps {
@@ -273,4 +284,48 @@ fn huge_numbers_give_an_answer_of_finite_numbers_or_a_refusal() {
         }
     }
     advance(&mut connection, scene.frame(ObjectState::at_rest(STILL), 0));
+}
+
+#[test]
+fn fields_of_contact_frames_are_those_of_their_forces_and_change_nothing() {
+    let fields: FieldSet = Field::ALL.into_iter().collect();
+    for deformation in [None, Some(Deformation::Large)] {
+        let mut first: Option<Vec<String>> = None;
+        for threads in [1, 3] {
+            let server = server(threads);
+            let plain = played_by(&server, 12, deformation);
+            let found = played_with(&server, 12, deformation, fields);
+            for (plain, found) in plain.iter().zip(&found) {
+                assert!(plain.answer.fields.is_empty());
+                assert_eq!(plain.answer.displacements, found.answer.displacements);
+                assert_eq!(plain.state, found.state);
+                check_fields(found);
+            }
+            let found: Vec<String> = found.into_iter().map(bits).collect();
+            match &first {
+                None => first = Some(found),
+                Some(first) => assert!(*first == found, "{threads} threads"),
+            }
+        }
+    }
+}
+
+/// Forces at nodes add up to those of the bodies, and pressure is where they are.
+fn check_fields(step: &ContactAnswer) {
+    let [fields] = &step.answer.fields[..] else { panic!("{} fields", step.answer.fields.len()) };
+    let [_, _, _, w, x, y, z] = step.state.pose;
+    let turn = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
+    let forces = fields.get(Field::ContactForce).unwrap().as_chunks::<3>().0;
+    let sum: nalgebra::Vector3<f64> = forces.iter().map(|f| nalgebra::Vector3::from(*f)).sum();
+    let of_bodies: nalgebra::Vector3<f64> =
+        step.loads.iter().map(|load| nalgebra::Vector3::from(load.force)).sum();
+    let most = step.loads.iter().map(|load| load.normal_force).sum::<f64>();
+    assert!((turn * sum - of_bodies).norm() <= 1e-9 * most, "{sum} for {of_bodies}");
+    let pressure = fields.get(Field::ContactPressure).unwrap();
+    let touched = |force: &[f64; 3]| force.iter().any(|f| *f != 0.0);
+    assert!(forces.iter().zip(pressure).all(|(force, p)| touched(force) == (*p != 0.0)));
+    assert!(most == 0.0 || pressure.iter().any(|p| *p > 0.0));
+    assert!(fields.energy >= 0.0 && (most == 0.0 || fields.energy > 0.0));
+    let energies: f64 = fields.get(Field::ElementEnergy).unwrap().iter().sum();
+    assert!((energies - fields.energy).abs() <= 1e-12 * fields.energy);
 }

@@ -18,6 +18,7 @@ mod dent;
 mod directed;
 mod disturbed_links;
 mod engine;
+mod fields;
 mod forces;
 mod keep_shape;
 mod lift;

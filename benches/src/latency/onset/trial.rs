@@ -8,8 +8,8 @@ use glove_client::ask::connection::{Host, ServerConnection};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{FrontAnalysis, FrontFactor, Loads, Method};
 use softgrasp_protocol::{
-    Answer, Ask, MethodName, ModelHash, NodeChoice, Precision, Prefetch, Question, Reply, Request,
-    StageMs, Want,
+    Answer, Ask, MethodName, ModelHash, NodeChoice, Prefetch, Question, Reply, Request, StageMs,
+    Want,
 };
 
 use super::grips::Grip;
@@ -117,7 +117,7 @@ impl<'a> Toucher<'a> {
             want: Want {
                 nodes: NodeChoice::Nodes(self.scene.surface.nodes.clone()),
                 reactions: false,
-                precision: Precision::F64,
+                ..Want::default()
             },
             ..Question::default()
         }

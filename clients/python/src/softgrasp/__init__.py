@@ -43,6 +43,7 @@ from .errors import (
     UnknownModel,
     UnsupportedVersion,
 )
+from .field_values import FieldName, FieldValues, PlacedFields, WantedFields, matrices
 from .large import LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
@@ -77,6 +78,8 @@ __all__ = [
     "ContactStep",
     "DeadlineMissed",
     "Element",
+    "FieldName",
+    "FieldValues",
     "InternalFault",
     "KeptModel",
     "LargeAnswer",
@@ -95,6 +98,7 @@ __all__ = [
     "NotAuthorised",
     "NotPositiveDefinite",
     "ObjectState",
+    "PlacedFields",
     "Plane",
     "Pose",
     "Precision",
@@ -121,9 +125,11 @@ __all__ = [
     "UnknownMethod",
     "UnknownModel",
     "UnsupportedVersion",
+    "WantedFields",
     "WarningCode",
     "Welcome",
     "candidate_triangles",
+    "matrices",
 ]
 
 __version__ = "0.1.0"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import F32, Floats, Numbers, numbers
 from .errors import BadStream
+from .field_values import FieldsPart, FieldValues, read_field_values, read_fields_part
 from .fields import Fields
 from .payload import PayloadReader
 from .report import LargeReport, SolveReport, read_large_report, read_solve_report
@@ -61,6 +62,9 @@ class Answer:
     """Force of each mask on the body, N; shape (masks, 3)."""
     report: SolveReport
     """How the answer was found and how wrong it can be."""
+    fields: FieldValues | None
+    """Strain, stress and energy, where they were asked for; None too where the server does not know
+    them, which is an older one then."""
 
     @property
     def residual_rel(self) -> float:
@@ -102,6 +106,8 @@ class CaseAnswer:
     """Displacements from rest, m; shape (nodes, 3)."""
     reactions: Reactions
     """Forces at known degrees of freedom."""
+    fields: FieldValues | None = None
+    """Strain, stress and energy, where they were asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,11 +134,12 @@ class AnswerPart(NamedTuple):
     reaction_count: int
     mask_count: int
     case_count: int
+    fields: FieldsPart | None
 
 
 def read_answer(reader: PayloadReader) -> Answer:
     """Reads an answer to a linear question of one case."""
-    answer = read_answer_arrays(reader, read_answer_part(reader.part))
+    answer = read_whole_answer(reader, read_answer_part(reader.part))
     reader.finish()
     return answer
 
@@ -142,7 +149,7 @@ def read_large_answer(reader: PayloadReader) -> LargeAnswer:
     part = read_answer_part(reader.part)
     if part.large is None:
         raise BadStream("an answer to a question about large deformation does not speak of it")
-    answer = read_answer_arrays(reader, part)
+    answer = read_whole_answer(reader, part)
     reader.finish()
     return LargeAnswer(
         answer.nodes,
@@ -150,6 +157,7 @@ def read_large_answer(reader: PayloadReader) -> LargeAnswer:
         answer.reactions,
         answer.mask_forces,
         part.report,
+        answer.fields,
         part.large,
     )
 
@@ -162,12 +170,16 @@ def read_several_answers(reader: PayloadReader) -> SeveralAnswers:
     if case_count and not (part.node_count or part.reaction_count):
         # Cases without a number take no bytes, so any count of them would pass.
         case_count = reader.claimed(case_count, 0, "cases without a number")
-    cases = [CaseAnswer(first.displacements, first.reactions)]
+    of_cases = [(first.displacements, first.reactions)]
     limits = reader.limits
     for _ in range(reader.claimed(case_count, limits.dof_count_max, "cases")):
         displacements = reader.floats(part.node_count, limits.node_count_max, "nodes", 3)
         forces = reader.floats(part.reaction_count, limits.dof_count_max, "reactions")
-        cases.append(CaseAnswer(displacements, Reactions(first.reactions.dofs, forces)))
+        of_cases.append((displacements, Reactions(first.reactions.dofs, forces)))
+    cases = [
+        CaseAnswer(*of_case, read_field_values(reader, part.fields, part.node_count))
+        for of_case in of_cases
+    ]
     reader.finish()
     return SeveralAnswers(first.nodes, tuple(cases), part.report)
 
@@ -176,19 +188,33 @@ def read_answer_part(fields: Fields) -> AnswerPart:
     """Reads the fields of an answer."""
     report = read_solve_report(fields.block())
     large = fields.option_block()
-    listed, precision, *rest = fields.fields(_COUNTS)
+    listed, precision, scale, *counts = fields.fields(_COUNTS)
+    nodes, reactions, masks, cases = counts
     precision = fields.named(precision, ("f64", "f32"), "precision")
+    wanted = read_fields_part(fields.option_block())
     return AnswerPart(
         report,
         None if large is None else read_large_report(large),
         fields.truth(listed),
         precision == "f32",
-        *rest,
+        scale,
+        nodes,
+        reactions,
+        masks,
+        cases,
+        wanted,
     )
 
 
+def read_whole_answer(reader: PayloadReader, part: AnswerPart) -> Answer:
+    """Reads the arrays of an answer of one case, its fields among them."""
+    answer = read_answer_arrays(reader, part)
+    fields = read_field_values(reader, part.fields, part.node_count)
+    return answer if fields is None else replace(answer, fields=fields)
+
+
 def read_answer_arrays(reader: PayloadReader, part: AnswerPart) -> Answer:
-    """Reads the arrays of the first case."""
+    """Reads the arrays of the first case, without fields."""
     limits = reader.limits
     count = reader.claimed(part.node_count, limits.node_count_max, "answered nodes")
     nodes = reader.numbers(count, limits.node_count_max, "nodes") if part.listed else None
@@ -202,7 +228,7 @@ def read_answer_arrays(reader: PayloadReader, part: AnswerPart) -> Answer:
     dofs = reader.numbers(part.reaction_count, limits.dof_count_max, "reactions")
     forces = reader.floats(part.reaction_count, limits.dof_count_max, "reactions")
     mask_forces = reader.floats(part.mask_count, limits.dof_count_max, "forces of masks", 3)
-    return Answer(nodes, displacements, Reactions(dofs, forces), mask_forces, part.report)
+    return Answer(nodes, displacements, Reactions(dofs, forces), mask_forces, part.report, None)
 
 
 _COUNTS = struct.Struct("<BId4I")

@@ -18,6 +18,7 @@ from .body import Body
 from .calls import Call, ModelReady
 from .contact import ContactAnswer, ContactStep, ObjectState
 from .errors import UnknownModel
+from .field_values import WantedFields
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
@@ -206,11 +207,12 @@ class AsyncKeptModel(NamedModel):
         *,
         nodes: ArrayLike | None = None,
         precision: Precision = "f64",
+        fields: WantedFields = (),
     ) -> ContactAnswer:
         """As `KeptModel.contact_frame`."""
         mesh = self.model.mesh
         return await self._ask(
-            calls.contact_frame(self.hash, mesh, state, bodies, step, nodes, precision)
+            calls.contact_frame(self.hash, mesh, state, bodies, step, nodes, precision, fields)
         )
 
     async def prefetch(self, nodes: ArrayLike = (), masks: Sequence[Mask] = ()) -> None:

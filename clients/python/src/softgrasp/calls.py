@@ -29,6 +29,7 @@ from .contact import (
     read_contact_answer,
 )
 from .errors import BadStream
+from .field_values import WantedFields
 from .fields import Fields, Part
 from .framing import VERSION, Kind
 from .large import LargeDeformation
@@ -205,9 +206,10 @@ def contact_frame(
     step: ContactStep,
     nodes: ArrayLike | None,
     precision: Precision,
+    fields: WantedFields = (),
 ) -> Call[ContactAnswer]:
     """One step of a kept model that nothing holds, among rigid bodies."""
-    payload = contact_payload(model, mesh, state, bodies, step, nodes, precision)
+    payload = contact_payload(model, mesh, state, bodies, step, nodes, precision, fields)
 
     def read(reader: PayloadReader) -> ContactAnswer:
         return read_contact_answer(reader, mesh.node_count)

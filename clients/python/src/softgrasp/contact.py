@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .answer import Answer, read_answer_arrays, read_answer_part
+from .answer import Answer, read_answer_part, read_whole_answer
 from .arrays import U32, Floats, Numbers, numbers, positive, vector
 from .body import Body, body_arrays
 from .errors import BadStream
+from .field_values import WantedFields, field_bits
 from .fields import Part
 from .large import DEFORMATIONS, LAWS, Deformation, Law
 from .mesh import Mesh
@@ -186,6 +187,7 @@ def contact_payload(
     step: ContactStep,
     nodes: ArrayLike | None,
     precision: Precision,
+    fields: WantedFields = (),
 ) -> bytes:
     """The payload of a `ContactFrame`."""
     triangles, of_body = candidate_triangles(mesh, state, bodies, step)
@@ -195,7 +197,7 @@ def contact_payload(
     moved.fields("II", len(state.force_nodes), len(state.contact_names))
     part = Part().raw(model).block(step.part()).block(moved)
     part.fields("II?I", len(bodies), len(triangles), nodes is not None, len(wanted))
-    part.fields("I", PRECISIONS.index(precision))
+    part.fields("II", PRECISIONS.index(precision), field_bits(fields, with_contact=True))
     of_state = (state.force_nodes, state.forces, state.contact_names, state.contact_numbers)
     return payload_of(part, *of_state, *body_arrays(bodies), triangles, of_body, wanted)
 
@@ -206,7 +208,7 @@ def read_contact_answer(reader: PayloadReader, node_count: int) -> ContactAnswer
     contact = read_contact_report(reader.part.block())
     *motion, force_count, contact_count = reader.part.block().fields(_STATE)
     point_count, load_count = reader.part.fields(_COUNTS)
-    answer = read_answer_arrays(reader, part)
+    answer = read_whole_answer(reader, part)
     if answer.nodes is not None and len(answer.nodes) and int(answer.nodes.max()) >= node_count:
         reader.claimed(int(answer.nodes.max()), node_count - 1, "as the largest node")
     limits = reader.limits
@@ -236,6 +238,7 @@ def read_contact_answer(reader: PayloadReader, node_count: int) -> ContactAnswer
         answer.reactions,
         answer.mask_forces,
         part.report,
+        answer.fields,
         contact,
         state,
         _points(point_names, of_points),

@@ -8,6 +8,7 @@ from typing import Any, Literal, TypedDict, cast, get_args
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import NO_NUMBERS, Numbers, numbers, positive
+from .field_values import WantedFields, field_bits
 from .fields import Part
 from .load_case import LoadCase, mask_arrays
 
@@ -29,6 +30,7 @@ class Options(TypedDict, total=False):
     max_error: float | None
     deadline_ms: float | None
     report: Report
+    fields: WantedFields
 
 
 class FrameOptions(Options, total=False):
@@ -55,6 +57,8 @@ class Question:
     """Time after which the answer is of little use; a late answer has a warning."""
     report: Report = "full"
     """How much the report of the answer tells; less of it has fewer bytes."""
+    fields: WantedFields = ()
+    """Fields of strain, stress and energy that are wanted too, by name, or "all"."""
     newest_wins: bool = False
     """Of frames of one model: one that has not been begun when a newer one with `newest_wins` comes
     is refused as `Superseded`."""
@@ -64,6 +68,9 @@ class Question:
             raise ValueError(f"precision is one of {PRECISIONS}, not {self.precision!r}")
         if self.report not in REPORTS:
             raise ValueError(f"report is one of {REPORTS}, not {self.report!r}")
+        wanted = (self.fields,) if isinstance(self.fields, str) else tuple(self.fields)
+        object.__setattr__(self, "fields", wanted)
+        field_bits(wanted)
         if self.nodes is not None:
             object.__setattr__(self, "nodes", numbers(self.nodes, "wanted nodes"))
         for name in ("max_error", "deadline_ms"):
@@ -82,7 +89,7 @@ class Question:
         part.option(self.max_error).option(self.deadline_ms)
         mask_nodes = sum([len(mask.nodes) for mask in case.masks])
         counts = (len(case.known_dofs), len(case.force_dofs), len(case.masks), mask_nodes)
-        return part.fields("4I", *counts)
+        return part.fields("5I", *counts, field_bits(self.fields))
 
     def arrays(self, case: LoadCase) -> tuple[NDArray[Any], ...]:
         """The arrays of the question on the wire."""

@@ -17,6 +17,7 @@ from .calls import Call, ModelReady
 from .connection import Connection
 from .contact import ContactAnswer, ContactStep, ObjectState
 from .errors import UnknownModel
+from .field_values import WantedFields
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
@@ -235,6 +236,7 @@ class KeptModel(NamedModel):
         *,
         nodes: ArrayLike | None = None,
         precision: Precision = "f64",
+        fields: WantedFields = (),
     ) -> ContactAnswer:
         """Makes one step in time of the free object among rigid bodies, with friction.
 
@@ -245,7 +247,7 @@ class KeptModel(NamedModel):
         """
         mesh = self.model.mesh
         return self._ask(
-            calls.contact_frame(self.hash, mesh, state, bodies, step, nodes, precision)
+            calls.contact_frame(self.hash, mesh, state, bodies, step, nodes, precision, fields)
         )
 
     def prefetch(self, nodes: ArrayLike = (), masks: Sequence[Mask] = ()) -> None:

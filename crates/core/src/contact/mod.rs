@@ -3,6 +3,8 @@
 pub mod coulomb;
 mod mask;
 mod pressure;
+mod surface_load;
 
 pub use mask::{Mask, MaskError};
 pub use pressure::SurfaceStars;
+pub use surface_load::SurfaceLoad;

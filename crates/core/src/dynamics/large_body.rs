@@ -92,7 +92,8 @@ impl LargeBody {
         self.elements.summary(displacement)
     }
 
-    pub(super) fn elements(&self) -> &Elements {
+    /// Its elements, with their law.
+    pub fn elements(&self) -> &Arc<Elements> {
         &self.elements
     }
 

@@ -2,6 +2,7 @@
 
 mod assembly;
 mod element;
+pub mod fields;
 pub mod hyperelastic;
 mod material;
 mod nodal_patches;

@@ -51,6 +51,7 @@ pub use parse::parse;
 pub use sniff::{Sniffed, sniff};
 pub use surfaces::{SurfaceFile, SurfaceFormat, parse_surface, surface_format};
 pub use thesis_lists::{write_thesis_lists, write_thesis_lists_labelled};
-pub use write::WriteError;
-pub use write::{PointField, write_vtu, write_vtu_labelled};
-pub use write::{write_msh41, write_msh41_labelled};
+pub use write::{
+    PointField, VtuField, WriteError, write_msh41, write_msh41_labelled, write_vtu,
+    write_vtu_fields, write_vtu_labelled,
+};

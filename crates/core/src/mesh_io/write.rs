@@ -10,14 +10,14 @@ use crate::mesh::TetMesh;
 /// Data for a file that does not fit the mesh.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WriteError {
-    /// A field has not one vector per node.
-    #[error("field {field}: expected {expected} vectors, one per node, found {found}")]
+    /// A field has not one value per node or element.
+    #[error("field {field}: expected {expected} values, found {found}")]
     FieldLength {
         /// Name of the field.
         field: String,
-        /// Nodes of the mesh.
+        /// Nodes or elements of the mesh.
         expected: usize,
-        /// Vectors that were given.
+        /// Values given.
         found: usize,
     },
     /// A triangle of the display list names a node that is not there.
@@ -135,6 +135,19 @@ pub struct PointField<'a> {
     pub values: &'a [[f64; 3]],
 }
 
+/// Values at all nodes or in all elements, with the unit that viewers may show.
+#[derive(Clone, Copy, Debug)]
+pub struct VtuField<'a> {
+    /// Name shown by viewers.
+    pub name: &'a str,
+    /// Unit of the values; empty where nothing is known of it.
+    pub unit: &'a str,
+    /// Numbers of one value: 1, 3 for a vector, 6 for a symmetric tensor `xx yy zz xy yz zx`.
+    pub components: usize,
+    /// Numbers of all values, those of one behind the other.
+    pub values: &'a [f64],
+}
+
 /// The mesh as VTU; regions, if there are several, become the cell data `region`, by their labels
 /// where all of `labels` are whole numbers, else numbered from 0.
 ///
@@ -151,18 +164,14 @@ pub fn write_vtu_labelled(
     labels: &[String],
     fields: &[PointField],
 ) -> Result<Vec<u8>, WriteError> {
-    for field in fields {
-        if field.values.len() != mesh.node_count() {
-            return Err(WriteError::FieldLength {
-                field: field.name.to_owned(),
-                expected: mesh.node_count(),
-                found: field.values.len(),
-            });
-        }
-    }
-    let mut out = Vec::new();
-    write_document(&mut out, mesh, labels, fields).expect("writing to memory cannot fail");
-    Ok(out)
+    let of_nodes: Vec<VtuField<'_>> = fields
+        .iter()
+        .map(|&PointField { name, values }| {
+            let values = values.as_flattened();
+            VtuField { name, unit: "", components: 3, values }
+        })
+        .collect();
+    write_vtu_fields(mesh, labels, &of_nodes, &[])
 }
 
 /// Mesh and fields as VTK's XML (VTU), with regions numbered from 0.
@@ -173,11 +182,44 @@ pub fn write_vtu(mesh: &TetMesh, fields: &[PointField]) -> Result<Vec<u8>, Write
     write_vtu_labelled(mesh, &[], fields)
 }
 
+/// The mesh as VTU with fields of nodes and of elements; their units are written as VTK's
+/// `UNITS_LABEL`.
+///
+/// Shapes: `labels` empty or one per region; `of_nodes` a value per node, `of_elements` a value per
+/// element.
+///
+/// # Errors
+/// [`WriteError::FieldLength`] when a field has not one value per node or element.
+///
+/// Source: VTK user's guide, section "XML file formats".
+pub fn write_vtu_fields(
+    mesh: &TetMesh,
+    labels: &[String],
+    of_nodes: &[VtuField],
+    of_elements: &[VtuField],
+) -> Result<Vec<u8>, WriteError> {
+    for (fields, count) in [(of_nodes, mesh.node_count()), (of_elements, mesh.tets().len())] {
+        for field in fields {
+            if field.values.len() != field.components * count {
+                return Err(WriteError::FieldLength {
+                    field: field.name.to_owned(),
+                    expected: count,
+                    found: field.values.len() / field.components.max(1),
+                });
+            }
+        }
+    }
+    let mut out = Vec::new();
+    write_document(&mut out, mesh, labels, (of_nodes, of_elements))
+        .expect("writing to memory cannot fail");
+    Ok(out)
+}
+
 fn write_document(
     out: &mut Vec<u8>,
     mesh: &TetMesh,
     labels: &[String],
-    fields: &[PointField],
+    (of_nodes, of_elements): (&[VtuField], &[VtuField]),
 ) -> std::io::Result<()> {
     let (nodes, cells) = (mesh.node_count(), mesh.tets().len());
     writeln!(out, "<?xml version=\"1.0\"?>")?;
@@ -187,22 +229,14 @@ fn write_document(
          header_type=\"UInt64\">\n<UnstructuredGrid>"
     )?;
     writeln!(out, "<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{cells}\">\n<PointData>")?;
-    for field in fields {
-        let name = escaped(field.name);
-        write_array(
-            out,
-            "Float64",
-            &name,
-            3,
-            field.values.as_flattened().iter().map(|v| v.to_le_bytes()),
-        )?;
-    }
+    of_nodes.iter().try_for_each(|field| write_field(out, field))?;
     writeln!(out, "</PointData>\n<CellData>")?;
     if !mesh.regions().is_empty() {
         let numbers = RegionNumbers::new(mesh, labels);
         let labels = mesh.regions().iter().map(|&region| numbers.of(region).to_le_bytes());
         write_array(out, "Int64", "region", 1, labels)?;
     }
+    of_elements.iter().try_for_each(|field| write_field(out, field))?;
     writeln!(out, "</CellData>\n<Points>")?;
     let coordinates = mesh.vertices().iter().flat_map(|p| [p.x, p.y, p.z]);
     write_array(out, "Float64", "Points", 3, coordinates.map(f64::to_le_bytes))?;
@@ -216,6 +250,26 @@ fn write_document(
     writeln!(out, "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")
 }
 
+/// One field with the names of its components and its unit.
+fn write_field(out: &mut Vec<u8>, field: &VtuField) -> std::io::Result<()> {
+    let names: &[&str] = match field.components {
+        6 => &["XX", "YY", "ZZ", "XY", "YZ", "XZ"],
+        _ => &[],
+    };
+    let names = names.iter().enumerate();
+    let names: String = names.map(|(at, name)| format!("ComponentName{at}=\"{name}\" ")).collect();
+    write_head(out, "Float64", &escaped(field.name), field.components, &names)?;
+    write_values(out, field.values.iter().map(|value| value.to_le_bytes()));
+    if !field.unit.is_empty() {
+        let unit = escaped(field.unit);
+        write!(
+            out,
+            "\n<InformationKey name=\"UNITS_LABEL\" location=\"vtkDataArray\">{unit}</InformationKey>"
+        )?;
+    }
+    writeln!(out, "\n</DataArray>")
+}
+
 /// One inline array: length in bytes, then the values, as one base64 text.
 fn write_array<const N: usize>(
     out: &mut Vec<u8>,
@@ -224,14 +278,28 @@ fn write_array<const N: usize>(
     components: usize,
     values: impl Iterator<Item = [u8; N]>,
 ) -> std::io::Result<()> {
+    write_head(out, number_type, name, components, "")?;
+    write_values(out, values);
+    writeln!(out, "\n</DataArray>")
+}
+
+fn write_head(
+    out: &mut Vec<u8>,
+    number_type: &str,
+    name: &str,
+    components: usize,
+    further: &str,
+) -> std::io::Result<()> {
+    write!(out, "<DataArray type=\"{number_type}\" Name=\"{name}\" ")?;
+    writeln!(out, "NumberOfComponents=\"{components}\" {further}format=\"binary\">")
+}
+
+fn write_values<const N: usize>(out: &mut Vec<u8>, values: impl Iterator<Item = [u8; N]>) {
     let mut bytes = vec![0; 8];
     values.for_each(|value| bytes.extend_from_slice(&value));
     let length = bytes.len() as u64 - 8;
     bytes[..8].copy_from_slice(&length.to_le_bytes());
-    write!(out, "<DataArray type=\"{number_type}\" Name=\"{name}\" ")?;
-    writeln!(out, "NumberOfComponents=\"{components}\" format=\"binary\">")?;
     out.extend(encoding::encode(&bytes));
-    writeln!(out, "\n</DataArray>")
 }
 
 /// Text fit for an XML attribute.

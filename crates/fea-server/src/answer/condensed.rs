@@ -14,6 +14,7 @@ use softgrasp_protocol::{
     WarningCode,
 };
 
+use super::fields::{Shape, field_values};
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::{last_peak_rss_bytes, peak_rss_bytes};
@@ -161,6 +162,13 @@ impl Contacts {
             mask_forces = of_masks.to_vec();
         }
         let displacements = Displacements::of(displacement, question.want.precision);
+        let fields = match question.want.fields.is_empty() {
+            true => Vec::new(),
+            false => {
+                let all = set.full_displacement(base, &solved);
+                field_values(&stored.model, &Shape::Linear(&all), &question.want)
+            }
+        };
         stage_ms.encode = ms_since(start);
         let its_strain = match strain {
             StrainOf::ThisAnswer { .. } => {
@@ -188,8 +196,8 @@ impl Contacts {
             }
         }
         let nodes = question.want.nodes.clone();
-        let cases = Vec::new();
-        Ok(Answer { report, large: None, nodes, displacements, reactions, mask_forces, cases })
+        let (large, cases) = (None, Vec::new());
+        Ok(Answer { report, large, nodes, displacements, reactions, mask_forces, cases, fields })
     }
 
     fn report(

@@ -13,10 +13,11 @@ use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{Contact, Elasticity};
 use softgrasp_protocol::{
     Answer, BodyLoad as LoadMessage, ContactAnswer, ContactFrame, ContactPoint, ContactReport,
-    Deformation, Displacements, NodeChoice, Precision, SolveReport,
+    Deformation, Displacements, FieldSet, FieldValues, NodeChoice, Precision, SolveReport,
 };
 
 use super::contact_large::{LargeWish, Made, PressedSeat};
+use super::fields::{Shape, contact_field_values, reserve_contact_fields};
 use super::large::law_of;
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::last_peak_rss_bytes;
@@ -36,6 +37,7 @@ pub(crate) struct PosedContact {
     settings: StepSettings,
     nodes: NodeChoice,
     precision: Precision,
+    fields: FieldSet,
     /// What is asked of large deformation.
     large: Option<LargeWish>,
 }
@@ -59,6 +61,7 @@ impl PosedContact {
             triangle_bodies,
             nodes,
             precision,
+            fields,
         } = frame;
         let stored = resources.models.find(model).ok_or(Refusal::UnknownModel(model))?;
         let node_count = stored.model.mesh().node_count();
@@ -94,6 +97,7 @@ impl PosedContact {
             settings: settings_of(&ask),
             nodes,
             precision,
+            fields,
             large: ask.deformation.filter(|d| *d != Deformation::Linear).map(wish),
         })
     }
@@ -148,11 +152,15 @@ impl PosedContact {
             candidates: &self.candidates,
             settings: self.settings,
         };
+        let _of_fields =
+            reserve_contact_fields(resources, &self.stored.model, (self.fields, &self.nodes))?;
         let wanted = match &self.nodes {
+            // Fields need the displacements of all nodes.
+            _ if !self.fields.is_empty() => (0..mesh.node_count() as u32).collect(),
             NodeChoice::All => (0..mesh.node_count() as u32).collect(),
             NodeChoice::Nodes(nodes) => nodes.clone(),
         };
-        let made = match &self.large {
+        let mut made = match &self.large {
             Some(wish) => wish.advance(resources, &self.stored, &step, &self.state, &wanted)?,
             None => Made::linear(step.advance(&self.state, &wanted)?),
         };
@@ -160,13 +168,36 @@ impl PosedContact {
         resources.models.trim();
         let mut stage_ms = clock.finish();
         let start = Instant::now();
-        let mut answer = self.answered(made, computed);
+        let fields = self.field_values(&mut made);
+        let mut answer = self.answered(made, fields, computed);
         stage_ms.encode = ms_since(start);
         answer.answer.report.stage_ms = stage_ms;
         Ok(answer)
     }
 
-    fn answered(self, made: Made, computed: u64) -> ContactAnswer {
+    /// Fields that are wanted of a step, which has the displacements of all nodes then; those of the
+    /// wanted ones are left.
+    fn field_values(&self, made: &mut Made) -> Vec<FieldValues> {
+        if self.fields.is_empty() {
+            return Vec::new();
+        }
+        let (outcome, wanted) = (&mut made.outcome, (self.fields, &self.nodes));
+        let u = outcome.displacements.as_flattened();
+        let elements = self.large.as_ref().filter(|_| made.is_large).and_then(LargeWish::elements);
+        let shape = match &elements {
+            Some(elements) => Shape::Large(elements, u),
+            None => Shape::Linear(u),
+        };
+        let contacts = &outcome.state.contacts;
+        let values = contact_field_values(&self.stored.model, &shape, wanted, contacts);
+        if let NodeChoice::Nodes(nodes) = &self.nodes {
+            let of_node = |&node: &u32| outcome.displacements[node as usize];
+            outcome.displacements = nodes.iter().map(of_node).collect();
+        }
+        values
+    }
+
+    fn answered(self, made: Made, fields: Vec<FieldValues>, computed: u64) -> ContactAnswer {
         let Made { outcome, is_large, factors, summary } = made;
         let (method, factor_reused) = match is_large {
             false => ("condensed", computed == 0),
@@ -216,6 +247,7 @@ impl PosedContact {
                 reactions: Vec::new(),
                 mask_forces: Vec::new(),
                 cases: Vec::new(),
+                fields,
             },
             contact,
             state: state_message(&outcome.state),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use softgrasp_core::dynamics::{ContactStep, LargeBody, LargeStep, ObjectState, StepOutcome};
-use softgrasp_core::fem::hyperelastic::{LargeSummary, Law};
+use softgrasp_core::fem::hyperelastic::{Elements, LargeSummary, Law};
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::condensed::Base;
 use softgrasp_core::solve::memory::Need;
@@ -88,6 +88,11 @@ impl LargeWish {
     /// Whether the session keeps the object.
     pub fn goes_on(&self) -> bool {
         self.seat.with(|kept| kept.as_ref().is_some_and(|kept| self.is_of(kept)))
+    }
+
+    /// The elements of the object that the session keeps, with their law.
+    pub(super) fn elements(&self) -> Option<Arc<Elements>> {
+        self.seat.with(|kept| kept.as_ref().map(|kept| Arc::clone(kept.body.elements())))
     }
 
     fn is_of(&self, kept: &Pressed) -> bool {

@@ -6,10 +6,11 @@ use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{Certainty, Factored, Loads, Method, Solution};
 use softgrasp_protocol::{
-    Answer, CaseAnswer, Displacements, DofValue, ElementName, NodeChoice, Question, SolveReport,
-    Want,
+    Answer, CaseAnswer, Displacements, DofValue, ElementName, FieldValues, NodeChoice, Question,
+    SolveReport, Want,
 };
 
+use super::fields::{Shape, field_values};
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::peak_rss_bytes;
@@ -86,6 +87,9 @@ pub(super) fn answer_several(
     let residual_rel = worst(|solution| solution.residual_rel);
     let steps = solutions.iter().map(|solution| solution.refinement_steps).max();
     let further = solutions.split_off(1.min(solutions.len()));
+    let want = &posed.question.want;
+    let of_case = |case: &Solution| field_values(model, &Shape::Linear(&case.displacement), want);
+    let fields: Vec<FieldValues> = further.iter().flat_map(of_case).collect();
     let further = further
         .iter()
         .map(|solution| CaseAnswer {
@@ -101,6 +105,7 @@ pub(super) fn answer_several(
     answer.report.residual_rel = residual_rel;
     answer.report.refinement_steps = steps.unwrap_or(0);
     answer.cases = further;
+    answer.fields.extend(fields);
     Ok(answer)
 }
 
@@ -121,6 +126,7 @@ fn gather(
         true => reactions(known, solution),
         false => Vec::new(),
     };
+    let fields = field_values(model, &Shape::Linear(&solution.displacement), &question.want);
     stage_ms.encode = ms_since(start);
     let (precision, chosen_because) = match solution.fallback {
         None => (factored.method().precision(), chosen_because.clone()),
@@ -159,6 +165,7 @@ fn gather(
         reactions,
         mask_forces: Vec::new(),
         cases: Vec::new(),
+        fields,
     })
 }
 

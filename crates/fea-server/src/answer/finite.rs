@@ -23,7 +23,7 @@ pub(crate) fn is_finite(reply: &Reply) -> bool {
 
 /// Whether displacements, forces and errors of one answer, and of its cases, are finite.
 pub(super) fn answer_is_finite(answer: &Answer) -> bool {
-    let Answer { report, displacements, reactions, mask_forces, cases, .. } = answer;
+    let Answer { report, displacements, reactions, mask_forces, cases, fields, .. } = answer;
     let are_displacements = match displacements {
         Displacements::F64(values) => all(values.iter().flatten()),
         Displacements::F32Quantised { scale, values } => {
@@ -37,6 +37,9 @@ pub(super) fn answer_is_finite(answer: &Answer) -> bool {
         && all(mask_forces.iter().flatten())
         && all(errors.iter().flatten())
         && cases.iter().all(|case| all(case.displacements.iter().flatten()) && all(&case.reactions))
+        && fields.iter().all(|case| {
+            case.energy.is_finite() && case.arrays.iter().all(|(_, values)| all(values))
+        })
 }
 
 fn all<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
@@ -46,7 +49,7 @@ fn all<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use softgrasp_protocol::CaseAnswer;
+    use softgrasp_protocol::{CaseAnswer, Field, FieldValues};
 
     use super::*;
 
@@ -60,11 +63,18 @@ mod tests {
             reactions: vec![softgrasp_protocol::DofValue { dof: 0, value: -1e308 }; 3],
             mask_forces: vec![[0.0; 3]; 2],
             cases: vec![CaseAnswer { displacements: vec![[2.0; 3]; 40], reactions: vec![0.5; 3] }],
+            fields: vec![FieldValues {
+                energy: 0.5,
+                error_rel: f64::NAN,
+                arrays: vec![(Field::ElementEnergy, vec![0.25; 2])],
+            }],
         };
         let is_sound = |answer: &Answer| is_finite(&Reply::Answer(Box::new(answer.clone())));
         assert!(is_sound(&sound));
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            let damages: [fn(&mut Answer, f64); 9] = [
+            let damages: [fn(&mut Answer, f64); 11] = [
+                |answer, value| answer.fields[0].energy = value,
+                |answer, value| answer.fields[0].arrays[0].1[1] = value,
                 |answer, value| {
                     answer.displacements = Displacements::F64(vec![[0.0, 0.0, value]]);
                 },

@@ -71,6 +71,10 @@ fn kept_frame(
 ) -> Option<KeptFrame> {
     let QuestionMessage { known, masks, want, .. } = message;
     let NodeChoice::Nodes(nodes) = &want.nodes else { return None };
+    // Fields need the displacements of all nodes.
+    if !want.fields.is_empty() {
+        return None;
+    }
     // What cannot be small is not even copied for a look, on the thread that all sockets share.
     let forces = known.len() + 3 * masks.len();
     if forces > TOUCHED_MAX || 3 * nodes.len() * forces > SMALL_PRODUCTS {
@@ -140,6 +144,7 @@ pub(crate) fn answer_cases(
         report.error_bound_why = report.error_bound_why.take().or(case.report.error_bound_why);
         report.error_estimate_rel =
             larger(report.error_estimate_rel, case.report.error_estimate_rel);
+        answer.fields.extend(case.fields);
         answer.cases.push(CaseAnswer {
             displacements: case.displacements.into_f64(),
             reactions: case.reactions.iter().map(|reaction| reaction.value).collect(),

@@ -12,6 +12,7 @@ use softgrasp_protocol::{
     Question as QuestionMessage, SolveReport, Warning, WarningCode, WarningLevel,
 };
 
+use super::fields::{Shape, field_values};
 use super::warnings::add_late;
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::last_peak_rss_bytes;
@@ -161,6 +162,8 @@ impl Found<'_> {
             reactions = pairs.map(|(&dof, &value)| DofValue { dof, value }).collect();
             mask_forces = equilibrium.mask_forces.as_chunks().0.to_vec();
         }
+        let shape = Shape::Large(path.elements(), path.displacement());
+        let fields = field_values(model, &shape, &message.want);
         stage_ms.encode = ms_since(start);
         let known_dofs = question.known.dofs.len() + question.mask_q.len();
         let mut report = SolveReport {
@@ -187,7 +190,7 @@ impl Found<'_> {
         add_warnings(equilibrium, summary, question, &mut report);
         let nodes = message.want.nodes.clone();
         let (large, cases) = (Some(self.large_report()), Vec::new());
-        Answer { report, large, nodes, displacements, reactions, mask_forces, cases }
+        Answer { report, large, nodes, displacements, reactions, mask_forces, cases, fields }
     }
 
     fn large_report(&self) -> LargeReport {

@@ -11,6 +11,7 @@ use softgrasp_protocol::{
     Question as QuestionMessage, Want, Warning, WarningCode, WarningLevel,
 };
 
+use super::fields::{Shape, field_values};
 use super::frame::answer_frame;
 use super::large::{Found, FramePace, LINEAR_ERROR_REL, LargeQuestion, law_of};
 use super::large_once::{admit_path, linear_answer, promised_error};
@@ -130,7 +131,7 @@ impl Frame {
         let mut question = self.message.clone();
         question.max_error = None;
         question.want =
-            Want { nodes: NodeChoice::All, precision: Default::default(), ..question.want };
+            Want { nodes: NodeChoice::All, reactions: question.want.reactions, ..Want::default() };
         let mut answer = answer_frame(&self.resources, self.hash, question, clock.clone())?;
         let all = std::mem::replace(&mut answer.displacements, Displacements::F64(Vec::new()));
         let all = all.into_f64();
@@ -138,6 +139,8 @@ impl Frame {
             // Mid-edge nodes stay with the server: their strain is that of the report.
             return Ok(None);
         }
+        let shape = Shape::Linear(all.as_flattened());
+        answer.fields = field_values(&self.stored.model, &shape, &self.message.want);
         let strain = self.stored.model.strain(all.as_flattened(), &mut || {});
         let rows = match &self.message.want.nodes {
             NodeChoice::All => all,

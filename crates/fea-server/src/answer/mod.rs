@@ -5,6 +5,7 @@ mod contact_frame;
 mod contact_large;
 mod direct;
 mod factor;
+mod fields;
 mod finite;
 mod frame;
 mod large;
@@ -17,6 +18,7 @@ mod warnings;
 
 pub(crate) use contact_frame::PosedContact;
 pub(crate) use contact_large::PressedSeat;
+pub(crate) use fields::reserve_fields;
 pub(crate) use finite::is_finite;
 pub(crate) use frame::{PosedFrame, Readiness, answer_cases, readiness};
 pub(crate) use large_frame::answer_large_frame;

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use softgrasp_core::dynamics::{self, Candidate, MovingBody, near_triangles};
 use softgrasp_protocol::{
-    BodyMotion, BodyShape, ContactAsk, ContactFrame, ModelHash, NodeChoice, ObjectState, Pose,
-    Precision,
+    BodyMotion, BodyShape, ContactAsk, ContactFrame, FieldSet, ModelHash, NodeChoice, ObjectState,
+    Pose, Precision,
 };
 
 /// A body of a step, as core takes it for the search and as it travels.
@@ -70,6 +70,7 @@ impl StepObject<'_> {
             triangle_bodies: near.iter().map(|c| u32::from(c.body)).collect(),
             nodes: self.nodes.clone(),
             precision: Precision::F64,
+            fields: FieldSet::NONE,
         }
     }
 }

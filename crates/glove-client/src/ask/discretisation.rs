@@ -1,8 +1,7 @@
 //! Estimates the error that the mesh brings, by solving once more with the other element.
 
 use softgrasp_protocol::{
-    Answer, Ask, Body, ElementChoice, ElementName, MethodName, NodeChoice, Precision, Question,
-    Want,
+    Answer, Ask, Body, ElementChoice, ElementName, MethodName, NodeChoice, Question, Want,
 };
 
 use crate::ask::connection::ServerConnection;
@@ -44,7 +43,7 @@ impl DiscretisationEstimate {
             method: MethodName::auto(),
             max_error: Some(SECOND_ERROR_MAX),
             deadline_ms: None,
-            want: Want { nodes: NodeChoice::All, reactions: false, precision: Precision::F64 },
+            want: Want { nodes: NodeChoice::All, reactions: false, ..Want::default() },
             ..question.clone()
         };
         let second = match connection.answer(Ask::new(Body { element, ..body.clone() }, question)) {

@@ -12,6 +12,7 @@ pub mod devices;
 mod display_arguments;
 mod elasticity_arguments;
 pub mod emulate;
+mod field_arguments;
 pub mod fill;
 mod gestures;
 mod hand_files;

@@ -6,11 +6,11 @@ use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::Point3;
 use softgrasp_core::mesh::{Surface, TetMesh};
-use softgrasp_core::mesh_io::{PointField, write_vtu};
 use softgrasp_protocol::solve_report::SCHEMA;
 use softgrasp_protocol::{ContactAsk, Deformation, ElementName, LawName, Material, Reply, Request};
 
 use super::access_arguments::AccessArguments;
+use super::field_arguments::{FieldArguments, is_vtu};
 use super::numbers::{count, poisson, positive, speed, vector};
 use super::output::Progress;
 use super::output::{print, write_json};
@@ -18,12 +18,14 @@ use crate::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, un
 use crate::ask::contact_frame::isometry_of;
 use crate::ask::displacement_table::write_displacements;
 use crate::ask::model_upload::ModelUpload;
+use crate::object::field_writing::{NodeVectors, encode_fields};
 use crate::object::file_writing::write_file;
 use crate::object::object_file::{ObjectFile, read_object_file};
 use crate::object::scene::NODES_DEFAULT;
 use crate::press::bodies_file::{PressBodies, read_bodies};
 use crate::press::course::{Course, Step};
 use crate::press::report::{PressReport, StepReport};
+use crate::press::world_fields::in_world;
 
 /// Press rigid bodies against a soft object that nothing else holds, with friction and weight.
 #[derive(Args)]
@@ -81,6 +83,8 @@ pub struct PressCommand {
     /// Folder for the object at every step, as VTU files and a PVD file that ParaView plays.
     #[arg(long, value_name = "DIR")]
     series: Option<PathBuf>,
+    #[command(flatten)]
+    fields: FieldArguments,
     /// File for a JSON report of every step.
     #[arg(long, value_name = "R.json")]
     report: Option<PathBuf>,
@@ -129,6 +133,7 @@ impl PressCommand {
             friction: self.friction,
             ask: self.ask(),
             whole: self.series.is_some(),
+            fields: self.fields.of_contact(&mesh, self.has_fields_file())?,
         };
         let names: Vec<String> = bodies.bodies.iter().map(|body| body.name.clone()).collect();
         let mut steps = Vec::new();
@@ -173,6 +178,11 @@ impl PressCommand {
                 Ok(surface.filled.mesh)
             }
         }
+    }
+
+    /// Whether a file is written that can hold fields.
+    fn has_fields_file(&self) -> bool {
+        self.series.is_some() || self.out.as_ref().is_some_and(|path| is_vtu(path))
     }
 
     fn ask(&self) -> ContactAsk {
@@ -276,14 +286,17 @@ fn world_displacement(mesh: &TetMesh, step: &Step) -> Vec<[f64; 3]> {
 
 fn encode(path: &Path, mesh: &TetMesh, step: &Step) -> anyhow::Result<Vec<u8>> {
     let whole = world_displacement(mesh, step);
-    if path.extension().is_some_and(|e| e == "csv") {
+    if !is_vtu(path) {
         return Ok(write_displacements(&whole).into_bytes());
     }
-    let fields = [
-        PointField { name: "displacement", values: &whole },
-        PointField { name: "elastic_displacement", values: &step.displacement },
+    let vectors = [
+        NodeVectors { name: "displacement", unit: "m", values: &whole },
+        NodeVectors { name: "elastic_displacement", unit: "m", values: &step.displacement },
     ];
-    write_vtu(mesh, &fields).context("cannot form the VTU file")
+    let turn = isometry_of(&step.answer.state.pose).rotation;
+    let fields = step.answer.answer.fields.first().cloned();
+    let fields = fields.map(|fields| in_world(fields, &turn));
+    encode_fields(mesh, &[], &vectors, fields.as_ref()).context("cannot form the VTU file")
 }
 
 /// Files of all steps, and the file that names them with their times.

@@ -12,15 +12,16 @@ use softgrasp_core::mesh_io::MeshFile;
 use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::solve_report::{SCHEMA, SolveSummary};
 use softgrasp_protocol::{
-    Ask, Body, CaseAnswer, Deformation, Displacements, DofValue, ElementChoice, Material,
-    MethodName, NodeChoice, Pace, PathChoice, Precision, Question, Want, Warning, WarningCode,
+    Answer, Ask, Body, Deformation, Displacements, DofValue, ElementChoice, FieldValues, Material,
+    MethodName, NodeChoice, Pace, PathChoice, Question, Want, Warning, WarningCode,
 };
 
 use super::access_arguments::AccessArguments;
 use super::elasticity_arguments::ElasticityArguments;
+use super::field_arguments::FieldArguments;
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
-use super::solve_cases::{CaseFiles, read_values};
+use super::solve_cases::{CaseFiles, CaseMesh, CaseResult, read_values};
 use crate::ask::calculix_deck::CalculixDeck;
 use crate::ask::connection::{Host, ServerChoice};
 use crate::ask::discretisation::DiscretisationEstimate;
@@ -87,6 +88,8 @@ pub struct SolveCommand {
     /// One for each --known, in their order.
     #[arg(long, value_name = "U.csv|U.vtu", value_parser = parse_out, required = true)]
     out: Vec<PathBuf>,
+    #[command(flatten)]
+    fields: FieldArguments,
     /// File for the forces that hold the body: node,fx,fy,fz of every node with a known
     /// displacement, N; one for each --known, or none.
     #[arg(long, value_name = "R.csv")]
@@ -115,6 +118,12 @@ struct Report {
     discretisation_estimate_rel: Option<f64>,
     /// What the estimate is, or why there is none.
     discretisation_why: String,
+    /// Stored energy of the body, J, where fields were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strain_energy: Option<f64>,
+    /// Estimated error of the stress in the energy norm, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stress_error_rel: Option<f64>,
     out: String,
     /// Files of the displacements of all cases, where there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -131,6 +140,15 @@ struct MeshSummary {
     degenerate_dropped: usize,
     repeated_dropped: usize,
     orphans: usize,
+}
+
+impl Report {
+    /// Adds what the fields of the first case tell of the whole body.
+    fn add_fields(&mut self, fields: Option<&FieldValues>) {
+        self.strain_energy = fields.map(|fields| fields.energy);
+        self.stress_error_rel =
+            fields.map(|fields| fields.error_rel).filter(|error| error.is_finite());
+    }
 }
 
 fn parse_out(text: &str) -> Result<PathBuf, String> {
@@ -190,9 +208,7 @@ impl SolveCommand {
         let displacements =
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
         let displacements = displacements.into_f64();
-        self.cases().write(0, &file.mesh, &displacements, &answer.reactions)?;
-        let further = std::mem::take(&mut answer.cases);
-        self.write_further(&file.mesh, &answer.reactions, further)?;
+        self.write_cases(&file, &displacements, &answer)?;
         let discretisation = match again {
             Some((body, question)) => {
                 progress.now("solving again with the other element");
@@ -202,7 +218,9 @@ impl SolveCommand {
             None => DiscretisationEstimate::not_asked(),
         };
         if let Some(path) = &self.report {
-            write_json(path, &self.report(&file, &host, summary.clone(), discretisation.clone()))?;
+            let mut report = self.report(&file, &host, summary.clone(), discretisation.clone());
+            report.add_fields(answer.fields.first());
+            write_json(path, &report)?;
         }
         drop(progress);
         for warning in &summary.report.warnings {
@@ -230,20 +248,30 @@ impl SolveCommand {
         })
     }
 
-    /// Files of the cases after the first; reactions come in the order of the first's.
-    fn write_further(
+    /// Files of all cases; reactions of the further ones come in the order of the first's.
+    fn write_cases(
         &self,
-        mesh: &TetMesh,
-        known: &[DofValue],
-        further: Vec<CaseAnswer>,
+        file: &MeshFile,
+        displacements: &[[f64; 3]],
+        answer: &Answer,
     ) -> anyhow::Result<()> {
-        for (k, case) in further.into_iter().enumerate() {
-            let reactions: Vec<DofValue> = known
-                .iter()
-                .zip(case.reactions)
-                .map(|(known, value)| DofValue { dof: known.dof, value })
-                .collect();
-            self.cases().write(k + 1, mesh, &case.displacements, &reactions)?;
+        let mesh = CaseMesh { mesh: &file.mesh, labels: &file.findings.region_labels };
+        let fields = answer.fields.first();
+        if fields.is_none() && self.fields.are_wanted(&file.mesh, &self.out)? {
+            eprintln!("glove-client: the server is an older one and answers no fields");
+        }
+        let reactions = answer.reactions.as_slice();
+        self.cases().write(0, mesh, CaseResult { displacements, reactions, fields })?;
+        for (k, case) in answer.cases.iter().enumerate() {
+            let pairs = answer.reactions.iter().zip(&case.reactions);
+            let reactions: Vec<DofValue> =
+                pairs.map(|(known, &value)| DofValue { dof: known.dof, value }).collect();
+            let result = CaseResult {
+                displacements: &case.displacements,
+                reactions: &reactions,
+                fields: answer.fields.get(k + 1),
+            };
+            self.cases().write(k + 1, mesh, result)?;
         }
         Ok(())
     }
@@ -266,7 +294,8 @@ impl SolveCommand {
             want: Want {
                 nodes: NodeChoice::All,
                 reactions: !self.reactions.is_empty(),
-                precision: Precision::F64,
+                fields: self.fields.of_answer(mesh, &self.out)?,
+                ..Want::default()
             },
             max_error: self.max_error,
             deadline_ms: self.deadline,
@@ -355,6 +384,8 @@ impl SolveCommand {
             solve,
             discretisation_estimate_rel: discretisation.rel,
             discretisation_why: discretisation.why,
+            strain_energy: None,
+            stress_error_rel: None,
             out: self.out.first().map(|out| out.display().to_string()).unwrap_or_default(),
             outs: match self.out.len() {
                 1 => Vec::new(),

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_core::mesh_io::{PointField, write_vtu};
-use softgrasp_protocol::DofValue;
+use softgrasp_protocol::{DofValue, FieldValues};
 
 use crate::ask::displacement_table::{
     DISPLACEMENT_COLUMNS, read_table, write_displacements, write_reactions,
 };
+use crate::commands::field_arguments::is_vtu;
+use crate::object::field_writing::{NodeVectors, encode_fields};
 use crate::object::file_writing::write_file;
 
 /// Files of all cases, in the order of the command line.
@@ -19,6 +20,21 @@ pub(super) struct CaseFiles<'a> {
     pub known: &'a [PathBuf],
     pub out: &'a [PathBuf],
     pub reactions: &'a [PathBuf],
+}
+
+/// The mesh of all cases, and the names of its regions in the file that it came from.
+#[derive(Clone, Copy)]
+pub(super) struct CaseMesh<'a> {
+    pub mesh: &'a TetMesh,
+    pub labels: &'a [String],
+}
+
+/// What was answered of one case.
+#[derive(Clone, Copy)]
+pub(super) struct CaseResult<'a> {
+    pub displacements: &'a [[f64; 3]],
+    pub reactions: &'a [DofValue],
+    pub fields: Option<&'a FieldValues>,
 }
 
 impl CaseFiles<'_> {
@@ -69,15 +85,14 @@ impl CaseFiles<'_> {
     pub fn write(
         self,
         case: usize,
-        mesh: &TetMesh,
-        displacements: &[[f64; 3]],
-        reactions: &[DofValue],
+        mesh: CaseMesh<'_>,
+        result: CaseResult<'_>,
     ) -> anyhow::Result<()> {
         if let Some(path) = self.out.get(case) {
-            write_file(path, &encode(path, mesh, displacements)?)?;
+            write_file(path, &encode(path, mesh, result)?)?;
         }
         if let Some(path) = self.reactions.get(case) {
-            write_file(path, write_reactions(reactions).as_bytes())?;
+            write_file(path, write_reactions(result.reactions).as_bytes())?;
         }
         Ok(())
     }
@@ -106,12 +121,11 @@ pub(super) fn read_values(
     Ok(read_table(&name, &bytes, columns, node_count)?)
 }
 
-fn encode(path: &Path, mesh: &TetMesh, displacements: &[[f64; 3]]) -> anyhow::Result<Vec<u8>> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("vtu") => {
-            let field = PointField { name: "displacement", values: displacements };
-            write_vtu(mesh, &[field]).context("cannot form the VTU file")
-        }
-        _ => Ok(write_displacements(displacements).into_bytes()),
+fn encode(path: &Path, of: CaseMesh<'_>, result: CaseResult<'_>) -> anyhow::Result<Vec<u8>> {
+    let values = result.displacements;
+    if !is_vtu(path) {
+        return Ok(write_displacements(values).into_bytes());
     }
+    let vectors = [NodeVectors { name: "displacement", unit: "m", values }];
+    encode_fields(of.mesh, of.labels, &vectors, result.fields).context("cannot form the VTU file")
 }

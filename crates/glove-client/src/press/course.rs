@@ -5,7 +5,8 @@ use std::time::Instant;
 use softgrasp_core::dynamics::MovingBody;
 use softgrasp_core::mesh::{Surface, TetMesh};
 use softgrasp_protocol::{
-    ContactAnswer, ContactAsk, ModelHash, NodeChoice, ObjectState, Reply, Request,
+    ContactAnswer, ContactAsk, ContactFrame, FieldSet, ModelHash, NodeChoice, ObjectState, Reply,
+    Request,
 };
 
 use super::bodies_file::{PressBodies, PressBody};
@@ -28,6 +29,8 @@ pub struct Course<'a> {
     pub ask: ContactAsk,
     /// Whether the displacements of all nodes are wanted in every step.
     pub whole: bool,
+    /// Fields that are wanted of every such step, and of the last one.
+    pub fields: FieldSet,
 }
 
 /// One step that has been made.
@@ -60,9 +63,9 @@ impl Course<'_> {
         for step in 1..=steps {
             let next = self.bodies.end * step as f64 / steps as f64;
             // In the last step all nodes are wanted.
-            let nodes = match self.whole || step == steps {
-                true => NodeChoice::All,
-                false => NodeChoice::Nodes(self.surface.nodes.clone()),
+            let (nodes, fields) = match self.whole || step == steps {
+                true => (NodeChoice::All, self.fields),
+                false => (NodeChoice::Nodes(self.surface.nodes.clone()), FieldSet::NONE),
             };
             let object = StepObject {
                 model: self.model,
@@ -74,7 +77,7 @@ impl Course<'_> {
             let bodies: Vec<StepBody> =
                 self.bodies.bodies.iter().map(|body| self.body(body, time, next)).collect();
             let ask = ContactAsk { seconds: next - time, ..self.ask };
-            let frame = object.frame(state, &bodies, ask);
+            let frame = ContactFrame { fields, ..object.frame(state, &bodies, ask) };
             let start = Instant::now();
             let mut answer = match connection.ask(&Request::ContactFrame(Box::new(frame)))? {
                 Reply::ContactAnswer(answer) => *answer,

@@ -4,3 +4,4 @@ pub mod bodies_file;
 pub mod course;
 pub mod report;
 pub mod way;
+pub mod world_fields;

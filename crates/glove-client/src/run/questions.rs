@@ -8,8 +8,7 @@ use softgrasp_grasp::grasp::KnownNode;
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_hand::sent::RecordedAnswers;
 use softgrasp_protocol::{
-    Deformation, DofValue, LargeAsk, NodeChoice, Pace as FramePace, PathChoice, Precision,
-    Question, Want,
+    Deformation, DofValue, LargeAsk, NodeChoice, Pace as FramePace, PathChoice, Question, Want,
 };
 
 use crate::ask::digest::request_digest;
@@ -200,7 +199,7 @@ impl Questions {
             masks,
             mask_displacements: of_masks,
             method: self.settings.method.clone(),
-            want: Want { nodes, reactions: self.wishes.forces, precision: Precision::F64 },
+            want: Want { nodes, reactions: self.wishes.forces, ..Want::default() },
             max_error: self.wishes.max_error.or(self.settings.error_of_frames()),
             ..Question::default()
         }

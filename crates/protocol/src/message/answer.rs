@@ -3,6 +3,7 @@
 use wincode::{SchemaRead, SchemaWrite};
 
 use super::dof_value::DofValue;
+use super::fields::{FieldValues, FieldsPart, write_fields};
 use super::large::LargeReport;
 use super::question::{NodeChoice, Precision};
 use super::report::SolveReport;
@@ -42,6 +43,8 @@ pub struct Answer {
     pub mask_forces: Vec<[f64; 3]>,
     /// The further cases, in the order of the request.
     pub cases: Vec<CaseAnswer>,
+    /// Fields of the first case and of each further one; empty if none were asked for.
+    pub fields: Vec<FieldValues>,
 }
 
 /// Displacements and forces of one further case, always in double precision.
@@ -65,6 +68,7 @@ pub(super) struct AnswerPart {
     reaction_count: u32,
     mask_force_count: u32,
     case_count: u32,
+    fields: Option<Block>,
 }
 
 impl Displacements {
@@ -138,10 +142,12 @@ impl Answer {
             reaction_count: count_of(REACTIONS, self.reactions.len())?,
             mask_force_count: count_of(MASK_FORCES, self.mask_forces.len())?,
             case_count: count_of(CASES, self.cases.len())?,
+            fields: FieldsPart::of(&self.fields, expected, 1 + self.cases.len())?,
         })
     }
 
-    /// Arrays: nodes if listed, displacements, reactions, forces of masks, the cases one by one.
+    /// Arrays: nodes if listed, displacements, reactions, forces of masks, the cases one by one, the
+    /// fields case by case.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         if let NodeChoice::Nodes(nodes) = &self.nodes {
             writer.array(nodes);
@@ -156,6 +162,7 @@ impl Answer {
             writer.array(&case.displacements);
             writer.array(&case.reactions);
         }
+        write_fields(writer, &self.fields);
     }
 
     /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
@@ -166,6 +173,8 @@ impl Answer {
     ) -> Result<Self, DecodeError> {
         let report = SolveReport::read(&part.report, limits)?;
         let large = part.large.map(|block| block.read()).transpose()?;
+        let announced: Option<FieldsPart> = part.fields.map(|block| block.read()).transpose()?;
+        announced.iter().try_for_each(|fields| fields.check(limits))?;
         let count = part.node_count as usize;
         let nodes = if part.listed {
             NodeChoice::Nodes(reader.array("answered nodes", count)?)
@@ -194,7 +203,11 @@ impl Answer {
                 reactions: reader.array("reactions of a case", reactions.len())?,
             });
         }
-        Ok(Self { report, large, nodes, displacements, reactions, mask_forces, cases })
+        let fields = match announced {
+            Some(fields) => fields.read_arrays(reader, count, 1 + cases.len())?,
+            None => Vec::new(),
+        };
+        Ok(Self { report, large, nodes, displacements, reactions, mask_forces, cases, fields })
     }
 
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {

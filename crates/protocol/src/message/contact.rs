@@ -3,6 +3,7 @@
 use wincode::{SchemaRead, SchemaWrite};
 
 use super::answer::{Answer, AnswerPart};
+use super::fields::FieldSet;
 use super::large::{Deformation, LawName};
 use super::model::ModelHash;
 use super::object_state::{ObjectState, ObjectStatePart};
@@ -33,6 +34,8 @@ pub struct ContactFrame {
     pub nodes: NodeChoice,
     /// How displacements are to travel.
     pub precision: Precision,
+    /// Fields of strain, stress, energy and contact that are wanted too.
+    pub fields: FieldSet,
 }
 
 /// How a step is made.
@@ -149,6 +152,7 @@ struct ContactFramePart {
     listed: bool,
     node_count: u32,
     precision: Precision,
+    fields: FieldSet,
 }
 
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
@@ -188,6 +192,7 @@ impl ContactFrame {
             listed: matches!(self.nodes, NodeChoice::Nodes(_)),
             node_count: count_of(NODES, nodes.len())?,
             precision: self.precision,
+            fields: self.fields,
         })?;
         self.state.write_arrays(writer);
         write_bodies(writer, &self.bodies)?;
@@ -221,6 +226,7 @@ impl ContactFrame {
             triangle_bodies,
             nodes: if part.listed { NodeChoice::Nodes(nodes) } else { NodeChoice::All },
             precision: part.precision,
+            fields: part.fields,
         })
     }
 }

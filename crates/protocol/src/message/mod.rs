@@ -4,6 +4,7 @@ mod answer;
 mod ask;
 mod contact;
 mod dof_value;
+mod fields;
 mod large;
 mod masks;
 mod mesh;
@@ -22,6 +23,7 @@ pub use answer::{Answer, CaseAnswer, Displacements};
 pub use ask::{Ask, Body, Subject};
 pub use contact::{BodyLoad, ContactAnswer, ContactAsk, ContactFrame, ContactPoint, ContactReport};
 pub use dof_value::DofValue;
+pub use fields::{Field, FieldPlace, FieldSet, FieldValues};
 pub use large::{
     Deformation, DeformationError, LargeAsk, LargeReport, LawName, LawNameError, Pace, PathChoice,
 };

@@ -3,6 +3,7 @@
 use wincode::{SchemaRead, SchemaWrite};
 
 use super::dof_value::DofValue;
+use super::fields::FieldSet;
 use super::masks::{Masks, MasksPart};
 use super::names::MethodName;
 use crate::limits::check_count;
@@ -38,6 +39,8 @@ pub struct Want {
     pub reactions: bool,
     /// How displacements are to travel.
     pub precision: Precision,
+    /// Fields of strain, stress and energy that are wanted too.
+    pub fields: FieldSet,
 }
 
 /// Partition, load, and how well and how soon the answer is needed.
@@ -78,6 +81,7 @@ pub(super) struct QuestionPart {
     known_count: u32,
     force_count: u32,
     masks: MasksPart,
+    fields: FieldSet,
 }
 
 #[derive(Clone, Copy, Debug, SchemaRead, SchemaWrite)]
@@ -109,6 +113,7 @@ impl Question {
             known_count: count_of("known displacements", self.known.len())?,
             force_count: count_of("forces", self.forces.len())?,
             masks: self.masks.part()?,
+            fields: self.want.fields,
         })
     }
 
@@ -137,7 +142,8 @@ impl Question {
                 NodeChoice::Nodes(reader.array("wanted nodes", count as usize)?)
             }
         };
-        let want = Want { nodes, reactions: part.reactions, precision: part.precision };
+        let (reactions, precision, fields) = (part.reactions, part.precision, part.fields);
+        let want = Want { nodes, reactions, precision, fields };
         let masks = Masks::read_arrays(reader, part.masks)?;
         let mask_displacements = reader.array("displacements of masks", masks.len())?;
         let (max_error, deadline_ms) = (part.max_error, part.deadline_ms);

@@ -134,6 +134,26 @@ fn the_document_numbers_the_warnings() {
 }
 
 #[test]
+fn the_document_lists_every_field() {
+    let known: Vec<Vec<String>> = Field::ALL
+        .iter()
+        .map(|field| {
+            let place = match field.place() {
+                FieldPlace::Elements => "elements",
+                FieldPlace::Nodes => "nodes",
+            };
+            let name = format!("`{}`", field.name());
+            let numbers = field.components().to_string();
+            let cells = [&field.bit().to_string(), &name, place, &numbers, field.unit()];
+            cells.map(str::to_owned).to_vec()
+        })
+        .collect();
+    let written: Vec<Vec<String>> =
+        table("Fields").iter().take(known.len()).map(|row| row[..5].to_vec()).collect();
+    assert_eq!(written, known);
+}
+
+#[test]
 fn the_document_lists_the_default_limits() {
     let limits = Limits::default();
     let known = [

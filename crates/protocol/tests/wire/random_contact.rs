@@ -41,7 +41,18 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
         |(model, ask, state, bodies, candidates, nodes)| {
             let (triangles, triangle_bodies) = candidates.into_iter().unzip();
             let precision = Precision::F32Quantised;
-            ContactFrame { model, ask, state, bodies, triangles, triangle_bodies, nodes, precision }
+            let fields = FieldSet::from_bits(ask.rounds_max);
+            ContactFrame {
+                model,
+                ask,
+                state,
+                bodies,
+                triangles,
+                triangle_bodies,
+                nodes,
+                precision,
+                fields,
+            }
         },
     )
 }

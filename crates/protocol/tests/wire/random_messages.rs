@@ -121,8 +121,9 @@ pub fn answer() -> impl Strategy<Value = Answer> {
     let displacements = prop_oneof![double, single];
     let forces = (dof_values(), vec(point(), 0..4));
     let reports = (report(), option::of(large_report()));
-    let parts = (reports, displacements, any::<bool>(), forces, 0..4_usize);
-    parts.prop_map(|((report, large), displacements, all, (reactions, mask_forces), cases)| {
+    let parts = (reports, displacements, any::<[bool; 2]>(), forces, 0..4_usize);
+    parts.prop_map(|((report, large), displacements, [all, has_fields], forces, cases)| {
+        let (reactions, mask_forces) = forces;
         let count = u32::try_from(displacements.node_count()).unwrap();
         let nodes = if all {
             NodeChoice::All
@@ -134,9 +135,31 @@ pub fn answer() -> impl Strategy<Value = Answer> {
             reactions: vec![0.25 * k as f64; reactions.len()],
         };
         let cases = if displacements.node_count() + reactions.len() == 0 { 0 } else { cases };
-        let cases = (0..cases).map(case).collect();
-        Answer { report, large, nodes, displacements, reactions, mask_forces, cases }
+        let cases: Vec<CaseAnswer> = (0..cases).map(case).collect();
+        let fields = fields(has_fields, displacements.node_count(), 1 + cases.len());
+        Answer { report, large, nodes, displacements, reactions, mask_forces, cases, fields }
     })
+}
+
+/// Fields of so many cases with as many elements as nodes and one more.
+fn fields(are_there: bool, nodes: usize, cases: usize) -> Vec<FieldValues> {
+    if !are_there {
+        return Vec::new();
+    }
+    let count = |field: Field| match field.place() {
+        FieldPlace::Elements => nodes + 1,
+        FieldPlace::Nodes => nodes,
+    };
+    let wanted = |field: &Field| !(field.bit() as usize + nodes).is_multiple_of(3);
+    let array = |field: Field| {
+        (field, vec![0.5 * f64::from(field.bit()); field.components() * count(field)])
+    };
+    let case = |case: usize| FieldValues {
+        energy: case as f64,
+        error_rel: 0.25,
+        arrays: Field::ALL.into_iter().filter(wanted).map(array).collect(),
+    };
+    (0..cases).map(case).collect()
 }
 
 fn report() -> impl Strategy<Value = SolveReport> {
@@ -229,11 +252,10 @@ fn question() -> impl Strategy<Value = Question> {
     let nodes =
         prop_oneof![Just(NodeChoice::All), vec(any::<u32>(), 0..9).prop_map(NodeChoice::Nodes),];
     let precision = prop::sample::select(vec![Precision::F64, Precision::F32Quantised]);
-    let want = (nodes, any::<bool>(), precision).prop_map(|(nodes, reactions, precision)| Want {
-        nodes,
-        reactions,
-        precision,
-    });
+    let fields = any::<u32>().prop_map(FieldSet::from_bits);
+    let want = (nodes, any::<bool>(), precision, fields).prop_map(
+        |(nodes, reactions, precision, fields)| Want { nodes, reactions, precision, fields },
+    );
     let method = prop::sample::select(vec!["auto", "gauss-jordan", "pcg", "a_b-9"])
         .prop_map(|name| name.parse().unwrap());
     let bounds = (option::of(number()), option::of(number()));

@@ -63,6 +63,8 @@ pub fn variants() -> Vec<(&'static str, Message)> {
     let values = |factor: f64| ask.question.known.iter().map(|k| factor * k.value).collect();
     let of_cases =
         Ask { cases: vec![values(2.0), values(-1.0)], without_estimate: true, ..*ask.clone() };
+    let with_fields = Want { fields: asked_fields(), ..question().want };
+    let of_fields = Ask::new(hash(), Question { want: with_fields, ..question() });
     let case = CaseAnswer { displacements: vec![[1.0, -2.0, 0.25]; 3], reactions: vec![4.5] };
     let of_several = Answer {
         displacements: Displacements::F64(vec![[0.5, 0.0, 0.0]; 3]),
@@ -70,6 +72,8 @@ pub fn variants() -> Vec<(&'static str, Message)> {
         cases: vec![case],
         ..*answer.clone()
     };
+    let with_fields =
+        Answer { fields: vec![field_values(1.0), field_values(-2.0)], ..of_several.clone() };
     let untold = Answer { report: SolveReport::untold(), ..*answer };
     let request = |ask| Message::Request(1, Request::Ask(Box::new(ask)));
     let reply = |answer| Message::Reply(1, Reply::Answer(Box::new(answer)));
@@ -77,10 +81,31 @@ pub fn variants() -> Vec<(&'static str, Message)> {
         ("Ask-model", request(of_model)),
         ("Ask-large", request(of_large)),
         ("Ask-cases", request(of_cases)),
+        ("Ask-fields", request(of_fields)),
         ("Answer-large", reply(large_answer())),
         ("Answer-cases", reply(of_several)),
         ("Answer-untold", reply(untold)),
+        ("Answer-fields", reply(with_fields)),
     ]
+}
+
+/// Some fields, of elements and of nodes.
+fn asked_fields() -> FieldSet {
+    [Field::ElementStress, Field::NodeVonMises, Field::ElementEnergy].into_iter().collect()
+}
+
+/// Values of [`asked_fields`] for two elements and three nodes.
+fn field_values(factor: f64) -> FieldValues {
+    let values = |len: u32| (1..=len).map(|i| factor * f64::from(i) / 4.0).collect();
+    FieldValues {
+        energy: 0.5 * factor * factor,
+        error_rel: f64::NAN,
+        arrays: vec![
+            (Field::ElementStress, values(12)),
+            (Field::NodeVonMises, values(3)),
+            (Field::ElementEnergy, values(2)),
+        ],
+    }
 }
 
 /// The message of a kind in the conversation.
@@ -99,6 +124,7 @@ fn question() -> Question {
             nodes: NodeChoice::Nodes(vec![0, 2, 3]),
             reactions: true,
             precision: Precision::F32Quantised,
+            fields: FieldSet::NONE,
         },
         max_error: Some(0.01),
         deadline_ms: None,
@@ -185,6 +211,7 @@ fn replies() -> Vec<Message> {
         reactions: vec![DofValue { dof: 2, value: -1.25 }],
         mask_forces: vec![[0.0, -0.75, 0.125], [0.5, 0.0, 0.0]],
         cases: vec![],
+        fields: vec![],
     };
     let ready =
         ModelReady { model: hash(), unknown_dofs: 9, fixed_dofs: 3, reused: false, stage_ms };
@@ -255,6 +282,7 @@ fn large_answer() -> Answer {
         reactions: vec![],
         mask_forces: vec![],
         cases: vec![],
+        fields: vec![],
     }
 }
 
@@ -317,6 +345,7 @@ fn contact_frame() -> ContactFrame {
         triangle_bodies: vec![1, 0],
         nodes: NodeChoice::Nodes(vec![0, 3]),
         precision: Precision::F64,
+        fields: FieldSet::NONE,
     }
 }
 

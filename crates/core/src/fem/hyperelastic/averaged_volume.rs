@@ -60,6 +60,11 @@ impl<'a> AveragedVolume<'a> {
         0.25 * self.averaging.of_corners[tet].iter().map(of_patch).sum::<f64>()
     }
 
+    /// `J_a − 1` of the patches at the four corners of an element.
+    pub fn changes_at_corners(&self, tet: usize) -> [f64; 4] {
+        self.averaging.of_corners[tet].map(|patch| self.j_minus_one[patch as usize])
+    }
+
     /// Moduli of a patch, whose elements are all of one region.
     fn moduli(&self, patch: usize) -> Moduli {
         self.body.moduli.of(self.averaging.tets(patch)[0] as usize)

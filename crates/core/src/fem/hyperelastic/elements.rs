@@ -7,9 +7,11 @@ use super::body::{Body, Evaluated, Shape};
 use super::groups::Groups;
 use super::law::ModuliPart;
 use super::principal::Curvature;
+use super::states::States;
 use super::summary::{LargeSummary, gradient_change_max};
 use super::yielding::{Plastic, YieldError, Yielding};
 use super::{Law, step_limit, tangent};
+use crate::fem::fields::Fields;
 use crate::fem::{AssemblyError, Element, Material, QuadraticMesh, Stiffness, StiffnessPattern};
 use crate::mesh::TetMesh;
 
@@ -101,6 +103,20 @@ impl Elements {
         if let Some(plastic) = &mut self.plastic {
             plastic.commit(&self.body, u);
         }
+    }
+
+    /// Strain, stress and energy of a displacement field by the law of the elements, with the estimate
+    /// of the error if `is_judged`. Where elements yield, the strain is the whole one and the energy
+    /// what can be had back.
+    ///
+    /// Shapes: `mesh` the one the elements were made of; `u` 3N, mid-edge nodes included. Units: m.
+    ///
+    /// # Panics
+    /// If `u` does not hold 3N numbers.
+    pub fn fields(&self, mesh: &TetMesh, u: &[f64], is_judged: bool) -> Fields {
+        self.check(u);
+        let states = States { body: &self.body, plastic: self.plastic.as_ref() };
+        states.fields(mesh, u, is_judged)
     }
 
     fn check(&self, u: &[f64]) {

@@ -139,6 +139,11 @@ impl Moduli {
         Self { volumetric: 0.0, ..self }
     }
 
+    /// μ and κ at small strain, Pa.
+    pub(super) fn at_small_strain(self) -> (f64, f64) {
+        (self.mu, self.bulk())
+    }
+
     /// Energy for each unit of volume at rest; infinite where the volume is gone.
     ///
     /// Units: Pa.

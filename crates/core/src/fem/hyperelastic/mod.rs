@@ -11,6 +11,7 @@ mod law;
 mod plastic;
 mod principal;
 mod shrink;
+mod states;
 mod step_limit;
 mod summary;
 mod tangent;

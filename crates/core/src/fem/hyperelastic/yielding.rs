@@ -80,12 +80,12 @@ pub(super) struct Yielding<'a> {
 }
 
 impl Yielding<'_> {
-    fn hencky(&self, tet: usize) -> Hencky {
+    pub fn hencky(&self, tet: usize) -> Hencky {
         let moduli = self.body.moduli.of(tet);
         Hencky { mu: moduli.mu, kappa: moduli.bulk(), radius: self.plastic.radius }
     }
 
-    fn trial(&self, point: usize, deformed: &Deformed) -> Option<Trial<'_>> {
+    pub fn trial(&self, point: usize, deformed: &Deformed) -> Option<Trial<'_>> {
         Trial::new(&self.plastic.points[point], deformed)
     }
 
