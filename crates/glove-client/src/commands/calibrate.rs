@@ -126,8 +126,8 @@ impl CalibrateCommand {
             hand_size_m: Some([dimensions.hand_length, dimensions.hand_breadth]),
         };
         let text = match self.out.extension().is_some_and(|extension| extension == "toml") {
-            true => toml_text(&calibration)?,
-            false => virtual_hand_text(&calibration, &header),
+            true => toml_text(calibration)?,
+            false => virtual_hand_text(calibration, &header),
         };
         write_file(&self.out, text.as_bytes())?;
         // A device or a pipe cannot be read again; its text can.

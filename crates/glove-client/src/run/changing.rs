@@ -221,7 +221,7 @@ impl Changing {
     pub(crate) fn take_replacement(&mut self) -> Option<Replacement> {
         let replacement = self.replacement.take()?;
         match &replacement {
-            Replacement::EarlierShape => drop(self.history.pop()),
+            Replacement::EarlierShape => self.history.pop(),
             Replacement::FirstShape | Replacement::Other(_) => self.history.clear(),
             Replacement::OtherMaterial => {}
         }
