@@ -74,7 +74,7 @@ impl Asked {
 
     /// A connection to the server.
     pub fn connection(&self) -> ServerConnection {
-        ServerConnection::connect(&self.server.address().to_string()).unwrap()
+        ServerConnection::connect(self.server.address().to_string()).unwrap()
     }
 
     fn by_socket(&self, object: &Object, system: &System, question: &Question) -> Found {
