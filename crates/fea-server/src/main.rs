@@ -59,7 +59,7 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
         let (names, days) = (&access.make_certificate, access.certificate_days);
         return Ok(make_certificate(names, days, certificate, key)?);
     }
-    let Credentials { tokens, encryption } = Credentials::read(&access)?;
+    let Credentials { tokens, encryption } = Credentials::read(access)?;
     let config = arguments.config(tokens, encryption)?;
     let (stop, stopped) = watch::channel(false);
     let mut ends_in = arguments.drain + END_MAX;
