@@ -109,7 +109,7 @@ def test_large_deformation_has_cauchys_stress(server: Server, element: str) -> N
     assert fields is not None
     # One axis is pulled and the others are free: of the six numbers one is left, and it carries the
     # force over the area that is left of the end.
-    thickness = 1.0 + answer.displacements[bar.mesh.nodes_at(x=0.04), 1].max() / 0.02
+    thickness = 1.0 + answer.displacements[bar.mesh.nodes_at(x=0.04), 1].min() / 0.02
     area = (0.02 * thickness) ** 2
     force = answer.reactions.total(bar.mesh.nodes_at(x=0.04))[0]
     stress = fields.stress
@@ -131,7 +131,7 @@ def test_block_on_a_table_is_pressed_by_its_weight(server: Server) -> None:
     assert set(pressed) <= set(mesh.nodes_at(z=0.0).tolist()) and len(pressed) > 3
     assert fields.pressure.min() >= 0.0
     # The mean over the bottom; single nodes at its rim have a share of the sides too.
-    assert weight / (0.04 * 0.03) == pytest.approx(235.4, abs=0.1)
-    assert 0.2 * 235.4 < fields.pressure[pressed].mean() < 1.5 * 235.4
+    assert weight / (0.04 * 0.03) == pytest.approx(196.2, abs=0.1)
+    assert 0.2 * 196.2 < fields.pressure[pressed].mean() < 1.5 * 196.2
     assert fields.elements.stress is not None
     assert fields.elements.stress[:, 2].mean() == pytest.approx(-0.5 * 196.2, rel=0.05)
