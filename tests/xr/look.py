@@ -151,19 +151,20 @@ def flat(client, program, folder, pictures):
 def lift(browser):
     """Lets the tracked hand lift the strawberry. Where the machine is so busy that it slips, the menu of the
     board puts it home, the hand begins anew, and that is told."""
-    for attempt in range(LIFTS_MAX):
+    is_over = "window.fakeSession.seconds > window.fakeHand.length / 15"
+    status = "softgrasp.figures.status"
+    for _ in range(LIFTS_MAX):
         browser.value("window.fakeSession.seconds = 0; window.fakeHandMoves = true")
-        try:
-            browser.until("softgrasp.figures.status.state === 'squeezed'", 40)
-            browser.until("softgrasp.figures.status.height_mm > 15", 20)
+        # However slowly pictures come: the hand moves with them.
+        browser.until(f"{status}.state === 'squeezed' || {is_over}", 240)
+        browser.until(f"{status}.height_mm > 15 || {status}.state !== 'squeezed' || {is_over}", 240)
+        if browser.value(f"{status}.height_mm > 15"):
             return
-        except TimeoutError:
-            if attempt + 1 == LIFTS_MAX:
-                raise
-            say("the strawberry slipped; it is put home and lifted once more")
-            browser.value("window.fakeHandMoves = false; window.fakeSession.seconds = 0")
-            browser.value("softgrasp.headset.board.press('return-home')")
-            browser.until("Math.abs(softgrasp.figures.status.height_mm) < 4 && !softgrasp.figures.status.deforming", 30)
+        say("the strawberry slipped; it is put home and lifted once more")
+        browser.value("window.fakeHandMoves = false; window.fakeSession.seconds = 0")
+        browser.value("softgrasp.headset.board.press('return-home')")
+        browser.until(f"Math.abs({status}.height_mm) < 4 && !{status}.deforming", 30)
+    raise AssertionError(f"the strawberry slipped {LIFTS_MAX} times")
 
 
 def headset(client, program, folder, pictures):
