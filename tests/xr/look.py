@@ -195,7 +195,7 @@ def headset(client, program, folder, pictures):
             say(f"{name} eye: {lying[name]} lying, {lifted[name]} lifted")
             check(lying[name][0] > 0.001, f"the {name} eye sees no strawberry: {lying[name][0]:.5f} of it is red")
             check(lifted[name][0] > 0.0001, f"the {name} eye sees no lifted strawberry: {lifted[name][0]:.5f} of it is red")
-            check(lifted[name][1] < lying[name][1] - 0.003, f"the {name} eye does not see it rise: {lying[name]} {lifted[name]}")
+            check(lifted[name][1] < lying[name][1] - 0.001, f"the {name} eye does not see it rise: {lying[name]} {lifted[name]}")
         browser.value("window.fakeHandMoves = true")
         say("lost: the connection is cut")
         before = browser.value("softgrasp.stream.connections")
