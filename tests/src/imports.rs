@@ -259,7 +259,7 @@ fn implemented(code: &str) -> Vec<Vec<String>> {
     let headers = code.lines().filter_map(|line| line.strip_prefix("impl"));
     let types = headers.filter_map(|header| {
         let header = match header.strip_prefix('<') {
-            Some(_) => &header[closing_bracket(header)..],
+            Some(_) => &header[closing(header, ['<', '>'])..],
             None => header,
         };
         let name = header.trim_start().split(['<', ' ', '{']).next()?;
@@ -272,22 +272,6 @@ fn implemented(code: &str) -> Vec<Vec<String>> {
             .then(|| name.split("::").map(str::to_owned).collect())
     });
     types.collect()
-}
-
-/// Length of a text up to the bracket that closes its first one (of generics).
-fn closing_bracket(text: &str) -> usize {
-    let mut depth = 0;
-    for (at, c) in text.char_indices() {
-        match c {
-            '<' => depth += 1,
-            '>' => depth -= 1,
-            _ => {}
-        }
-        if depth == 0 {
-            return at + 1;
-        }
-    }
-    text.len()
 }
 
 /// Paths that stand in the code itself: words joined by `::`.
@@ -316,7 +300,7 @@ fn without_comments_and_tests(text: &str) -> String {
         let end = match (item.find(';'), item.find('{')) {
             (Some(semicolon), Some(brace)) if semicolon < brace => semicolon + 1,
             (Some(semicolon), None) => semicolon + 1,
-            (_, Some(brace)) => brace + closing(&item[brace..]),
+            (_, Some(brace)) => brace + closing(&item[brace..], ['{', '}']),
             (None, None) => item.len(),
         };
         code.replace_range(at..at + end, "");
@@ -324,14 +308,14 @@ fn without_comments_and_tests(text: &str) -> String {
     code
 }
 
-/// Length of a text up to the brace that closes its first one.
-fn closing(text: &str) -> usize {
+/// Length of a text up to the bracket that closes its first one.
+fn closing(text: &str, [opens, closes]: [char; 2]) -> usize {
     let mut depth = 0;
     for (at, c) in text.char_indices() {
-        match c {
-            '{' => depth += 1,
-            '}' => depth -= 1,
-            _ => {}
+        if c == opens {
+            depth += 1;
+        } else if c == closes {
+            depth -= 1;
         }
         if depth == 0 {
             return at + 1;

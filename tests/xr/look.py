@@ -92,10 +92,16 @@ def pixels(file):
 LIFTS_MAX = 4
 
 
+def is_red(pixel):
+    """Whether a pixel is as red as a strawberry."""
+    r, g, b = pixel
+    return r > 90 and r > 1.9 * g and r > 1.9 * b
+
+
 def share_of_red(rows, columns):
     """Share of the pixels of some columns that are as red as a strawberry."""
     seen = [pixel for row in rows[::3] for pixel in row[columns]]
-    return sum(r > 90 and r > 1.9 * g and r > 1.9 * b for r, g, b in seen) / len(seen)
+    return sum(map(is_red, seen)) / len(seen)
 
 
 def eyes(path):
@@ -103,7 +109,7 @@ def eyes(path):
     width, height, rows = pixels(path)
     found = {}
     for name, columns in (("left", slice(0, width // 2)), ("right", slice(width // 2, width))):
-        red = [row for row, line in enumerate(rows) for r, g, b in line[columns] if r > 90 and r > 1.9 * g and r > 1.9 * b]
+        red = [row for row, line in enumerate(rows) for pixel in line[columns] if is_red(pixel)]
         found[name] = (len(red) / (height * (width // 2)), sum(red) / max(len(red), 1) / height)
     return found
 

@@ -162,17 +162,16 @@ impl Contacts {
             mask_forces = of_masks.to_vec();
         }
         let displacements = Displacements::of(displacement, question.want.precision);
-        let fields = match question.want.fields.is_empty() {
-            true => Vec::new(),
-            false => {
-                let all = set.full_displacement(base, &solved);
-                field_values(&stored.model, &Shape::Linear(&all), &question.want)
-            }
-        };
+        let has_fields = !question.want.fields.is_empty();
+        let all = has_fields.then(|| set.full_displacement(base, &solved));
+        let fields = all.as_ref().map_or_else(Vec::new, |all| {
+            field_values(&stored.model, &Shape::Linear(all), &question.want)
+        });
         stage_ms.encode = ms_since(start);
         let its_strain = match strain {
             StrainOf::ThisAnswer { .. } => {
-                Some(stored.model.strain(&set.full_displacement(base, &solved), &mut || {}))
+                let all = all.unwrap_or_else(|| set.full_displacement(base, &solved));
+                Some(stored.model.strain(&all, &mut || {}))
             }
             StrainOf::Beside(_) => stored.strain_of(&self.touched, q),
         };

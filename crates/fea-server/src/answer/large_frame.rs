@@ -139,9 +139,13 @@ impl Frame {
             // Mid-edge nodes stay with the server: their strain is that of the report.
             return Ok(None);
         }
-        let shape = Shape::Linear(all.as_flattened());
-        answer.fields = field_values(&self.stored.model, &shape, &self.message.want);
         let strain = self.stored.model.strain(all.as_flattened(), &mut || {});
+        let promised = promised_error(strain.rotation_max, strain.strain_max);
+        // An answer that is too far off and that nobody waits for is not given: it needs no fields.
+        if promised <= self.allowed() || self.is_live() {
+            let shape = Shape::Linear(all.as_flattened());
+            answer.fields = field_values(&self.stored.model, &shape, &self.message.want);
+        }
         let rows = match &self.message.want.nodes {
             NodeChoice::All => all,
             NodeChoice::Nodes(nodes) => nodes.iter().map(|&n| all[n as usize]).collect(),
@@ -151,7 +155,7 @@ impl Frame {
         answer.report.max_rotation_deg = strain.rotation_max.to_degrees();
         answer.report.max_strain = strain.strain_max;
         answer.report.warnings.clear();
-        Ok(Some((answer, promised_error(strain.rotation_max, strain.strain_max))))
+        Ok(Some((answer, promised)))
     }
 
     /// The linear answer while the path is being made: it says that it is not what was wanted.

@@ -196,8 +196,7 @@ impl GraspLoop {
         self.meet_first_hand(&hand, now_s);
         self.object.take_work(&mut self.holding, &mut outcome);
         let command = self.object.allowed(sent.command, &mut self.holding, &mut outcome);
-        // In lockstep a shape is kept in the next tick, and the hand goes on.
-        let keeping = self.pace() == Pace::Free && self.object.changing.keep().is_wanted();
+        let keeping = self.is_keeping();
         if self.holding.friction().is_some() {
             let dimensions = &self.reader.setup().dimensions;
             let friction = FrictionTick { tick, now_s, hand: &hand, dimensions };
@@ -206,11 +205,16 @@ impl GraspLoop {
             outcome.seen.keeping = keeping;
         } else {
             self.tick_of_the_thesis(tick, &hand, command, &mut outcome)?;
-            outcome.seen.keeping =
-                self.pace() == Pace::Free && self.object.changing.keep().is_wanted();
+            outcome.seen.keeping = self.is_keeping();
         }
         self.hand = Some(hand);
         Ok(outcome)
+    }
+
+    /// Whether the hand waits until a shape is kept. In lockstep that is in the next tick, and the hand
+    /// goes on.
+    fn is_keeping(&self) -> bool {
+        self.pace() == Pace::Free && self.object.changing.keep().is_wanted()
     }
 
     /// Puts the object where the first hand closes, if that is wanted.
