@@ -1,7 +1,7 @@
 //! Random numbers of reports, the same in every run.
 
 /// A sequence of numbers that is the same in every run (splitmix64).
-pub(crate) struct Random(pub u64);
+pub struct Random(pub u64);
 
 impl Random {
     /// Evenly between zero and one.

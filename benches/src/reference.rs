@@ -134,14 +134,14 @@ fn exact_residual(stiffness: &Stiffness, given: &[f64], high: &[f64], low: &[f64
 }
 
 /// Rounded sum and what rounding lost.
-pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_seen = sum - a;
     (sum, (a - (sum - b_seen)) + (b - b_seen))
 }
 
 /// Rounded product and what rounding lost.
-pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     (product, a.mul_add(b, -product))
 }

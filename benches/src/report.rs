@@ -77,7 +77,7 @@ impl Report {
     }
 
     /// Notes the load at the end of the measurement, and how long it took.
-    pub fn end(&mut self) {
+    fn end(&mut self) {
         let minutes = self.begun.elapsed().as_secs_f64() / 60.0;
         self.head.push(("took", format!("{minutes:.1} min")));
         self.head.push(("load after", load_text()));
@@ -112,7 +112,7 @@ impl Report {
     ///
     /// # Errors
     /// [`ReportError::Failed`] naming the rows.
-    pub fn check_faults(&self) -> Result<(), ReportError> {
+    fn check_faults(&self) -> Result<(), ReportError> {
         match self.faults.is_empty() {
             true => Ok(()),
             false => Err(ReportError::Failed { rows: self.faults.clone() }),
@@ -162,6 +162,17 @@ impl Report {
             }
         }
         text
+    }
+
+    /// Ends the measurement and writes the files; their paths.
+    ///
+    /// # Errors
+    /// [`ReportError::Write`]; [`ReportError::Failed`] comes after the files are written.
+    pub fn finish(&mut self, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
+        self.end();
+        let files = self.write(folder)?;
+        self.check_faults()?;
+        Ok(files)
     }
 
     /// Writes the page, a CSV per table and an SVG per figure; the paths.

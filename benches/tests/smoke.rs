@@ -2,239 +2,126 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
-use std::path::Path;
+use softgrasp_bench::quick::Quick;
+use softgrasp_bench::{ReportName, measure};
 
-use softgrasp_bench::{Options, ReportName, run};
-
-/// Values of one column of a CSV file.
-fn column(folder: &Path, file: &str, name: &str) -> Vec<String> {
-    let text = std::fs::read_to_string(folder.join(file)).unwrap();
-    assert!(text.starts_with("# command: "), "{file} does not say how it was made");
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
-    let at = reader.headers().unwrap().iter().position(|h| h == name).unwrap();
-    reader.records().map(|row| row.unwrap()[at].to_owned()).collect()
-}
-
-fn numbers(folder: &Path, file: &str, name: &str) -> Vec<f64> {
-    column(folder, file, name).iter().map(|v| v.parse().unwrap()).collect()
-}
-
-/// Runs the small form of a report into a folder.
-fn run_quick(name: ReportName, folder: &Path) {
-    let options = Options {
-        is_quick: true,
-        out: folder.to_owned(),
-        command: "smoke test".to_owned(),
-        note: String::new(),
-        meshes: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
-    };
-    let (_, files) = run(name, &options).unwrap();
-    assert!(files.iter().all(|file| file.is_file()), "{files:?}");
-    let page = std::fs::read_to_string(folder.join(format!("{}.md", name.name()))).unwrap();
-    for part in [
-        "- command: ",
-        "- commit: ",
-        "- date: ",
-        "- processor: ",
-        "- processor maker: ",
-        "- threads: ",
-    ] {
-        assert!(page.contains(part), "{part} is not in the head of {}", name.name());
-    }
+fn quick(name: ReportName) -> Quick {
+    Quick::make(|options| measure(name, options))
 }
 
 #[test]
 fn collision_is_timed_and_nothing_is_missed() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Collision, folder.path());
-    let competitors = column(folder.path(), "collision.csv", "competitor");
+    let report = quick(ReportName::Collision);
+    let competitors = report.column("collision.csv", "competitor");
     assert!(competitors.iter().any(|c| c == "sphere tree"));
     assert!(competitors.iter().any(|c| c.starts_with("parry3d")));
-    assert!(numbers(folder.path(), "collision.csv", "missed").iter().all(|&m| m == 0.0));
+    assert!(report.numbers("collision.csv", "missed").iter().all(|&m| m == 0.0));
     // The check is worth something only if something was there to be missed.
-    let inside = column(folder.path(), "collision.csv", "inside_per_hand");
+    let inside = report.column("collision.csv", "inside_per_hand");
     assert!(inside.iter().filter(|v| !v.is_empty()).all(|v| v.parse::<f64>().unwrap() > 5.0));
     for file in ["collision-like.csv", "collision-triangles.csv"] {
-        let contacts = numbers(folder.path(), file, "contacts_checked");
+        let contacts = report.numbers(file, "contacts_checked");
         assert!(contacts.iter().all(|&c| c > 0.0), "{file}: {contacts:?}");
         // The peer answers the same questions, and as well.
-        let wrong = numbers(folder.path(), file, "missed_by_peer");
+        let wrong = report.numbers(file, "missed_by_peer");
         assert!(wrong.iter().all(|&m| m == 0.0), "{file}: {wrong:?}");
-        assert!(numbers(folder.path(), file, "ratio").iter().all(|&r| r > 0.0));
+        assert!(report.numbers(file, "ratio").iter().all(|&r| r > 0.0));
     }
-}
-
-#[test]
-fn bound_is_never_below_the_true_error_of_random_grips() {
-    let folder = tempfile::tempdir().unwrap();
-    // A bound below the true error fails the report.
-    run_quick(ReportName::Bound, folder.path());
-    let of = |name| column(folder.path(), "bound.csv", name);
-    let ratios: Vec<f64> = of("ratio_nearest").iter().filter_map(|r| r.parse().ok()).collect();
-    assert!(ratios.len() > 30 && ratios.iter().all(|&r| r >= 1.0), "{ratios:?}");
-    let grips: f64 = numbers(folder.path(), "bound.csv", "grips").iter().sum();
-    assert!(grips > 300.0, "{grips}");
-}
-
-#[test]
-fn every_element_comes_nearer_to_closed_forms_on_finer_meshes() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Accuracy, folder.path());
-    let of = |name| column(folder.path(), "accuracy.csv", name);
-    let (cases, elements, orders) = (of("case"), of("element"), of("order"));
-    let errors = numbers(folder.path(), "accuracy.csv", "error_rel");
-    for case in ["patch", "bar", "mirror"] {
-        let of_case = cases.iter().zip(&errors).filter(|(c, _)| *c == case);
-        let errors: Vec<f64> = of_case.map(|(_, e)| *e).collect();
-        assert!(errors.len() >= 4 && errors.iter().all(|&e| e < 1e-11), "{case}: {errors:?}");
-    }
-    for case in ["cantilever", "membrane", "thick sphere", "indentation", "waves"] {
-        for element in ["t4", "t10"] {
-            let rows = cases.iter().zip(&elements).zip(&orders);
-            let of_both = rows.filter(|((c, e), o)| *c == case && *e == element && !o.is_empty());
-            let orders: Vec<f64> = of_both.map(|(_, o)| o.parse().unwrap()).collect();
-            assert!(!orders.is_empty() && orders.iter().all(|&o| o > 0.0), "{case} {element}");
-        }
-    }
-    for figure in ["accuracy-waves.svg", "accuracy-sphere.svg", "accuracy-cases.svg"] {
-        assert!(folder.path().join(figure).is_file(), "{figure}");
-    }
-    large_deformation_is_beside_its_closed_forms(folder.path());
-}
-
-fn large_deformation_is_beside_its_closed_forms(folder: &Path) {
-    let of = |name| column(folder, "accuracy-large.csv", name);
-    let (cases, elements, errors) = (of("case"), of("element"), of("error_rel"));
-    let errors_of = |case: &str, element: &str| -> Vec<f64> {
-        let rows = cases.iter().zip(&elements).zip(&errors);
-        let of_both = rows.filter(|((c, e), _)| *c == case && *e == element);
-        of_both.map(|(_, error)| error.parse().unwrap()).collect()
-    };
-    for element in ["t4", "t4-anp", "t10"] {
-        for (case, rows, error_max) in [
-            ("uniaxial", 12, 1e-11),
-            ("equibiaxial", 4, 1e-11),
-            ("simple shear", 8, 1e-11),
-            ("turned", 8, 1e-13),
-        ] {
-            let errors = errors_of(case, element);
-            assert_eq!(errors.len(), rows, "{case} {element}");
-            assert!(errors.iter().all(|&e| e < error_max), "{case} {element}: {errors:?}");
-        }
-    }
-    for (case, error_max) in [
-        ("torsion", 0.1),
-        ("hollow sphere", 0.1),
-        ("elastica", 1e-3),
-        ("45° bend", 0.025),
-        ("Cook's membrane", 0.25),
-        ("compressed block", 0.25),
-    ] {
-        let errors = errors_of(case, "t10");
-        assert!(!errors.is_empty() && errors.iter().all(|&e| e < error_max), "{case}: {errors:?}");
-    }
-    let orders = column(folder, "accuracy-large-torsion.csv", "order");
-    let orders: Vec<f64> = orders.iter().filter_map(|o| o.parse().ok()).collect();
-    assert!(orders.len() == 4 && orders.iter().all(|&o| o > 0.3), "{orders:?}");
-    assert!(folder.join("accuracy-large.svg").is_file());
 }
 
 #[test]
 fn contacts_are_pressed_and_timed_with_small_errors() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Contact, folder.path());
-    let contacts = column(folder.path(), "contact.csv", "contact");
+    let report = quick(ReportName::Contact);
+    let contacts = report.column("contact.csv", "contact");
     assert_eq!(contacts, ["vertex", "vertex", "patch", "patch", "mask", "mask"]);
-    assert!(numbers(folder.path(), "contact.csv", "force_N").iter().all(|&force| force > 0.0));
+    assert!(report.numbers("contact.csv", "force_N").iter().all(|&force| force > 0.0));
     for file in ["contact.csv", "contact-frames.csv"] {
-        let errors = numbers(folder.path(), file, "error_rel");
+        let errors = report.numbers(file, "error_rel");
         assert!(errors.iter().all(|&e| e < 1e-9) && errors.len() >= 3, "{file}: {errors:?}");
     }
-    assert_eq!(column(folder.path(), "contact-frames.csv", "unknown_forces")[2], "15");
-    assert!(folder.path().join("contact.svg").is_file());
-    let phases = column(folder.path(), "contact-steps.csv", "phase");
+    assert_eq!(report.column("contact-frames.csv", "unknown_forces")[2], "15");
+    assert!(report.has("contact.svg"));
+    let phases = report.column("contact-steps.csv", "phase");
     assert_eq!(phases, ["settle", "pinch", "lift", "hold"].repeat(4));
 }
 
 /// Warm frames are timed beside their echo, with small errors.
-fn warm_frames(folder: &Path) {
+fn warm_frames(report: &Quick) {
     for (file, rows) in [("latency-frame.csv", 6), ("latency-frame-methods.csv", 18)] {
         for name in ["error_rel", "residual_rel"] {
-            let errors = numbers(folder, file, name);
+            let errors = report.numbers(file, name);
             assert!(errors.iter().all(|&e| e < 1e-11), "{file} {name}: {errors:?}");
             assert!(errors.len() >= rows, "{file}: {errors:?}");
         }
     }
-    assert_eq!(column(folder, "latency-frame.csv", "contact")[0], "mask");
+    assert_eq!(report.column("latency-frame.csv", "contact")[0], "mask");
     for name in ["alone_p50_ms", "echo_alone_p50_ms", "alone_over_echo_alone"] {
-        assert!(numbers(folder, "latency-frame.csv", name).iter().all(|&x| x > 0.0), "{name}");
+        assert!(report.numbers("latency-frame.csv", name).iter().all(|&x| x > 0.0), "{name}");
     }
     // Where an echo keeps a processor for itself, nothing takes turns with it.
-    let in_turn = column(folder, "latency-frame.csv", "frame_over_echo");
+    let in_turn = report.column("latency-frame.csv", "frame_over_echo");
     assert_eq!(in_turn.iter().filter(|ratio| ratio.is_empty()).count(), 2);
     // Warm frames reuse the factor of the first.
-    assert!(numbers(folder, "latency-frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
+    assert!(report.numbers("latency-frame-stages.csv", "factor_ms").iter().all(|&ms| ms == 0.0));
 }
 
 #[test]
 fn scaling_is_timed_fitted_and_drawn_with_small_errors() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Scaling, folder.path());
+    let report = quick(ReportName::Scaling);
     for file in
         ["scaling.csv", "scaling-shapes.csv", "scaling-procedures.csv", "scaling-stages.csv"]
     {
-        let errors = numbers(folder.path(), file, "error_rel");
+        let errors = report.numbers(file, "error_rel");
         assert!(errors.iter().all(|&e| e < 1e-11) && !errors.is_empty(), "{file}: {errors:?}");
     }
-    let vertices = std::fs::read_to_string(folder.path().join("scaling-vertices.svg")).unwrap();
+    let vertices = std::fs::read_to_string(report.folder().join("scaling-vertices.svg")).unwrap();
     assert!(vertices.contains("gauss-jordan") && vertices.contains("1998"));
 }
 
 #[test]
 fn frontier_marks_what_is_worth_its_time() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Frontier, folder.path());
-    let of = |name| numbers(folder.path(), "frontier.csv", name);
+    let report = quick(ReportName::Frontier);
+    let of = |name| report.numbers("frontier.csv", name);
     let (algebraic, total) = (of("algebraic_error_rel"), of("total_error_rel"));
     assert!(algebraic.len() > 80 && algebraic.iter().all(|&e| e < 2e-3), "{algebraic:?}");
     assert!(total.iter().all(|&e| e > 1e-3 && e < 0.5), "{total:?}");
     assert!(of("warm_ms").iter().chain(&of("cold_ms")).all(|&ms| ms > 0.0));
     for name in ["best_by_algebraic_error", "best_by_total_error"] {
-        let best = column(folder.path(), "frontier.csv", name);
+        let best = report.column("frontier.csv", name);
         for time in ["warm", "cold"] {
             assert!(best.iter().any(|b| b.contains(time)), "no row is best {time}, {name}");
         }
         assert!(best.iter().any(String::is_empty), "every row is best: {name}");
     }
-    let meshes = |name| numbers(folder.path(), "frontier-meshes.csv", name);
+    let meshes = |name| report.numbers("frontier-meshes.csv", name);
     for (t4, t10) in meshes("t4_error_rel").iter().zip(meshes("t10_error_rel")) {
         assert!(*t4 > 2.0 * t10, "{t4} {t10}");
     }
     for figure in ["frontier.svg", "frontier-cold.svg"] {
-        let svg = std::fs::read_to_string(folder.path().join(figure)).unwrap();
+        let svg = std::fs::read_to_string(report.folder().join(figure)).unwrap();
         assert!(svg.contains("condensed") && svg.contains("toothpaste"), "{figure}");
     }
 }
 
 /// First frames of grips are right, with and without prefetch.
-fn first_frames(folder: &Path) {
-    let of = |name| numbers(folder, "latency-onset.csv", name);
+fn first_frames(report: &Quick) {
+    let of = |name| report.numbers("latency-onset.csv", name);
     for name in ["error_rel", "residual_rel"] {
         assert!(of(name).iter().all(|&e| e < 1e-10) && of(name).len() == 4, "{:?}", of(name));
     }
     assert!(of("compared").iter().chain(&of("sparse_solve_ms")).all(|&x| x > 0.0));
-    assert!(folder.join("latency-onset.svg").is_file());
+    assert!(report.has("latency-onset.svg"));
 }
 
 /// A held pace is counted, and every answer compared.
-fn held_pace(folder: &Path) {
+fn held_pace(report: &Quick) {
     let (rights, asked) = ("real_time", "asked");
-    let of = |name| column(folder, "latency-hold.csv", name);
+    let of = |name| report.column("latency-hold.csv", name);
     // The server and nobody, with real-time rights where the system grants them, and without.
     assert_eq!(of(asked)[..2], ["the server", "nobody"]);
     assert_eq!(of(rights).last().map(String::as_str), Some("no"));
-    assert!(numbers(folder, "latency-hold.csv", "ticks").iter().all(|&ticks| ticks == 500.0));
-    let late = numbers(folder, "latency-hold.csv", "late_percent");
+    assert!(report.numbers("latency-hold.csv", "ticks").iter().all(|&ticks| ticks == 500.0));
+    let late = report.numbers("latency-hold.csv", "late_percent");
     assert!(late.iter().all(|late| (0.0..=100.0).contains(late)), "{late:?}");
     let of_answers = |name| {
         let all: Vec<String> = of(name).into_iter().step_by(2).collect();
@@ -252,13 +139,13 @@ fn held_pace(folder: &Path) {
 }
 
 /// A session of the real programs is read from its reports.
-fn session(folder: &Path) {
-    let of = |name| numbers(folder, "service-session.csv", name);
+fn session(report: &Quick) {
+    let of = |name| report.numbers("service-session.csv", name);
     assert_eq!(of("runs"), [1.0, 1.0, 2.0]);
     assert!(of("ticks").iter().all(|&ticks| ticks > 0.0), "{:?}", of("ticks"));
     // Every deforming tick is answered or has a reason, however slow the machine is.
-    let why = |name| column(folder, "service-session-unanswered.csv", name);
-    for (server, (deforming, answered)) in column(folder, "service-session.csv", "server")
+    let why = |name| report.column("service-session-unanswered.csv", name);
+    for (server, (deforming, answered)) in report.column("service-session.csv", "server")
         .iter()
         .zip(of("deforming").into_iter().zip(of("answered")))
     {
@@ -269,37 +156,37 @@ fn session(folder: &Path) {
     }
     assert!(of("residual_rel").iter().all(|&e| e < 1e-9));
     // What was answered is shown for a while, and nothing is shown that is not old.
-    let ages = column(folder, "service-session.csv", "age_max_ms");
+    let ages = report.column("service-session.csv", "age_max_ms");
     for (age, answered) in ages.iter().zip(of("answered")) {
         assert!(answered == 0.0 || age.parse::<f64>().unwrap() > 0.0, "{age}");
     }
-    let outcomes = column(folder, "service-session-large.csv", "outcome");
+    let outcomes = report.column("service-session-large.csv", "outcome");
     assert_eq!(outcomes[0], "answered");
-    assert!(numbers(folder, "service-session-large.csv", "nodes").iter().all(|&n| n > 900.0));
+    assert!(report.numbers("service-session-large.csv", "nodes").iter().all(|&n| n > 900.0));
 }
 
 /// Clients at an even pace get right answers; a wrong one fails the report.
-fn clients(folder: &Path) {
-    let answers = numbers(folder, "service-load.csv", "answers");
+fn clients(report: &Quick) {
+    let answers = report.numbers("service-load.csv", "answers");
     assert!(answers.iter().all(|&count| count > 20.0), "{answers:?}");
-    assert_eq!(numbers(folder, "service-load.csv", "clients"), [1.0, 2.0]);
+    assert_eq!(report.numbers("service-load.csv", "clients"), [1.0, 2.0]);
 }
 
 /// Questions beside long work are right, and a crowd that sends is counted.
-fn beside(folder: &Path) {
-    assert!(numbers(folder, "service-beside.csv", "asked").iter().all(|&asked| asked > 0.0));
-    let solves = numbers(folder, "service-pace.csv", "solves_beside");
+fn beside(report: &Quick) {
+    assert!(report.numbers("service-beside.csv", "asked").iter().all(|&asked| asked > 0.0));
+    let solves = report.numbers("service-pace.csv", "solves_beside");
     assert!(solves.iter().all(|&solves| solves >= 2.0), "{solves:?}");
-    let refused = numbers(folder, "service-receiving.csv", "refused");
-    let done = numbers(folder, "service-receiving.csv", "done");
+    let refused = report.numbers("service-receiving.csv", "refused");
+    let done = report.numbers("service-receiving.csv", "done");
     assert!(refused.iter().zip(&done).all(|(refused, done)| refused + done == 8.0));
 }
 
 /// Hostile connections and restarts cost no right answer.
-fn hostile(folder: &Path) {
+fn hostile(report: &Quick) {
     let (what, measured) = (
-        column(folder, "service-trust.csv", "what"),
-        numbers(folder, "service-trust.csv", "measured"),
+        report.column("service-trust.csv", "what"),
+        report.numbers("service-trust.csv", "measured"),
     );
     // Times and memory of so short a form say little; what is counted must be right.
     let counted = what.iter().zip(&measured).filter(|(what, _)| {
@@ -311,19 +198,17 @@ fn hostile(folder: &Path) {
 
 #[test]
 fn frames_are_timed_with_small_errors() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Latency, folder.path());
-    warm_frames(folder.path());
-    first_frames(folder.path());
-    held_pace(folder.path());
+    let report = quick(ReportName::Latency);
+    warm_frames(&report);
+    first_frames(&report);
+    held_pace(&report);
 }
 
 #[test]
 fn users_of_one_server_get_right_answers() {
-    let folder = tempfile::tempdir().unwrap();
-    run_quick(ReportName::Service, folder.path());
-    session(folder.path());
-    beside(folder.path());
-    clients(folder.path());
-    hostile(folder.path());
+    let report = quick(ReportName::Service);
+    session(&report);
+    beside(&report);
+    clients(&report);
+    hostile(&report);
 }

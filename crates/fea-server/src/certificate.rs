@@ -124,14 +124,21 @@ pub fn make_certificate(
     if !(1..=DAYS_MAX).contains(&days) {
         return Err(MakeError::Days(days));
     }
-    let now = SystemTime::now();
-    let (made, made_key) = self_signed(names, now - BEFORE, now + days * DAY)
-        .map_err(|e| MakeError::Names { names: names.join(","), reason: e.to_string() })?;
+    let (made, made_key) = self_signed_now(names, days)?;
     write_new(key, &made_key, 0o600)?;
     write_new(certificate, &made, 0o644)
 }
 
-/// A certificate and its key, PEM.
+/// A certificate and its key, PEM, that is made now, is written nowhere and lives for so many days.
+pub(crate) fn self_signed_now(
+    names: &[String],
+    days: u32,
+) -> Result<(String, String), MakeError> {
+    let now = SystemTime::now();
+    self_signed(names, now - BEFORE, now + days * DAY)
+        .map_err(|e| MakeError::Names { names: names.join(","), reason: e.to_string() })
+}
+
 fn self_signed(
     names: &[String],
     from: SystemTime,

@@ -10,7 +10,7 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::{self, crypto, version};
 
-use crate::certificate::{Validity, ValidityError};
+use crate::certificate::{MakeError, Validity, ValidityError, self_signed_now};
 use crate::lock::Lock;
 
 /// What a server encrypts with: TLS 1.3, its certificate and key. Clones are the same: those of a running
@@ -58,6 +58,9 @@ pub enum EncryptionError {
         /// Why.
         source: ValidityError,
     },
+    /// No certificate of its own could be made.
+    #[error(transparent)]
+    Made(#[from] MakeError),
 }
 
 impl Encryption {
@@ -82,17 +85,39 @@ impl Encryption {
         validity.check(SystemTime::now()).map_err(outdated)?;
         let private =
             PrivateKeyDer::from_pem_file(key).map_err(|e| wrong("key", key, e.to_string()))?;
+        Self::of(chain, private, validity).map_err(|e| EncryptionError::Pair {
+            certificate: certificate.to_owned(),
+            key: key.to_owned(),
+            reason: e.to_string(),
+        })
+    }
+
+    /// A self-signed certificate for hosts and addresses that is made now and written nowhere: for a page that a
+    /// person opens and trusts by hand. It lives for a year.
+    ///
+    /// # Errors
+    /// [`EncryptionError::Made`].
+    pub fn self_made(names: &[String]) -> Result<Self, EncryptionError> {
+        let unread = |reason: String| MakeError::Names { names: names.join(","), reason };
+        let (certificate, key) = self_signed_now(names, 365)?;
+        let certificate = CertificateDer::from_pem_slice(certificate.as_bytes())
+            .map_err(|e| unread(e.to_string()))?;
+        let key =
+            PrivateKeyDer::from_pem_slice(key.as_bytes()).map_err(|e| unread(e.to_string()))?;
+        let validity = Validity::of(&certificate).map_err(|e| unread(e.to_string()))?;
+        Ok(Self::of(vec![certificate], key, validity).map_err(|e| unread(e.to_string()))?)
+    }
+
+    fn of(
+        chain: Vec<CertificateDer<'static>>,
+        key: PrivateKeyDer<'static>,
+        validity: Validity,
+    ) -> Result<Self, rustls::Error> {
         let provider = Arc::new(crypto::ring::default_provider());
-        rustls::ServerConfig::builder_with_provider(provider)
+        let config = rustls::ServerConfig::builder_with_provider(provider)
             .with_protocol_versions(&[&version::TLS13])
-            .map(|builder| builder.with_no_client_auth())
-            .and_then(|builder| builder.with_single_cert(chain, private))
-            .map(|config| Self(Arc::new(Lock::new(Pair { config: Arc::new(config), validity }))))
-            .map_err(|e| EncryptionError::Pair {
-                certificate: certificate.to_owned(),
-                key: key.to_owned(),
-                reason: e.to_string(),
-            })
+            .and_then(|builder| builder.with_no_client_auth().with_single_cert(chain, key))?;
+        Ok(Self(Arc::new(Lock::new(Pair { config: Arc::new(config), validity }))))
     }
 
     /// Whoever connects from now on is shown this certificate; those who are connected stay.
@@ -106,7 +131,8 @@ impl Encryption {
         self.0.with(|pair| pair.validity)
     }
 
-    pub(crate) fn acceptor(&self) -> TlsAcceptor {
+    /// What accepts connections with it, as it is now.
+    pub fn acceptor(&self) -> TlsAcceptor {
         TlsAcceptor::from(self.0.with(|pair| Arc::clone(&pair.config)))
     }
 }

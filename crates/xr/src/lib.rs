@@ -7,7 +7,6 @@
 //! picture (`to_page`) and no other; what it sends is checked ([`from_page`]) and goes to the ticks
 //! as wishes (`wishes`) or as the joints of a hand (`headset`). The bytes are in `docs/xr.md`.
 
-mod encryption;
 pub mod from_page;
 mod headset;
 mod listening;
@@ -26,7 +25,6 @@ pub mod token;
 mod viewer;
 mod wishes;
 
-pub use encryption::{EncryptionError, PageEncryption};
 pub use headset::HandToPicture;
 pub use page::{Page, PageError, PageOptions};
 pub use painter::ShownRun;

@@ -12,8 +12,8 @@ use softgrasp_hand::joints::JointsFeed;
 use softgrasp_window::view::colour_map::ColourMap;
 use softgrasp_window::view::outlet::{Outlet, outlet};
 use tokio::sync::watch;
+use tokio_rustls::TlsAcceptor;
 
-use crate::encryption::PageEncryption;
 use crate::from_page::Ask;
 use crate::headset::{HandToPicture, Headset};
 use crate::listening::serve;
@@ -35,8 +35,9 @@ const GOODBYE: Duration = Duration::from_millis(300);
 pub struct PageOptions {
     /// Where it is served.
     pub address: SocketAddr,
-    /// What it is encrypted with, if it is.
-    pub encryption: Option<PageEncryption>,
+    /// What it is encrypted with, if it is: headsets track hands only on encrypted pages, or on those of their own
+    /// machine.
+    pub encryption: Option<TlsAcceptor>,
     /// Whether the run follows the hand of a headset.
     pub takes_hands: bool,
 }
@@ -107,10 +108,9 @@ impl Page {
             tokio::net::TcpListener::from_std(listener).map_err(listen)?
         };
         let (routes, over) = (routes(Arc::clone(&site)), site.over.subscribe());
-        let acceptor = encryption.map(|encryption| encryption.acceptor());
         let server = std::thread::Builder::new().name("page".to_owned()).spawn(move || {
             runtime.block_on(async {
-                serve(listener, acceptor, routes, over).await;
+                serve(listener, encryption, routes, over).await;
                 tokio::time::sleep(GOODBYE).await;
             });
             runtime.shutdown_background();

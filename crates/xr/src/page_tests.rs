@@ -4,6 +4,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
 
+use fea_server::Encryption;
 use tungstenite::{Message, WebSocket, connect};
 
 use super::*;
@@ -206,7 +207,7 @@ fn page_hears_that_the_run_is_over_and_a_taken_port_is_named() {
 #[test]
 fn page_with_a_pair_of_its_own_speaks_tls() {
     let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
-    let encryption = Some(PageEncryption::self_made(address.ip()).unwrap());
+    let encryption = Some(Encryption::self_made(&[address.ip().to_string()]).unwrap().acceptor());
     let page = Page::open(PageOptions { address, encryption, takes_hands: false }).unwrap();
     assert!(page.address().starts_with("https://127.0.0.1:"), "{}", page.address());
     let host = page.address().split('/').nth(2).unwrap();

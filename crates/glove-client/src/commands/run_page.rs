@@ -3,6 +3,7 @@
 use std::sync::mpsc::{Receiver, Sender};
 
 use anyhow::Context;
+use fea_server::Encryption;
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::joints::JointsFeed;
@@ -12,7 +13,7 @@ use softgrasp_window::view::control::Control;
 use softgrasp_window::view::frame::ViewFrame;
 use softgrasp_window::view::object_skin::Look;
 use softgrasp_window::view::outlet::Outlet;
-use softgrasp_xr::{Page, PageEncryption, PageOptions, ShownRun};
+use softgrasp_xr::{Page, PageOptions, ShownRun};
 
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_setup::load_beside;
@@ -48,10 +49,14 @@ impl RunPage {
         let Some(address) = arguments.page.xr else { return Ok(None) };
         let page = &arguments.page;
         let encryption = match (&page.xr_cert, &page.xr_key, page.xr_tls) {
-            (Some(certificate), Some(key), _) => Some(PageEncryption::read(certificate, key)?),
-            (_, _, true) => Some(PageEncryption::self_made(address.ip())?),
+            (Some(certificate), Some(key), _) => Some(Encryption::read(certificate, key)?),
+            (_, _, true) => {
+                let names = ["localhost", "127.0.0.1", &address.ip().to_string()];
+                Some(Encryption::self_made(&names.map(str::to_owned))?)
+            }
             _ => None,
         };
+        let encryption = encryption.map(|encryption| encryption.acceptor());
         let is_encrypted = encryption.is_some();
         let takes_hands = plan.takes_headset();
         let page = Page::open(PageOptions { address, encryption, takes_hands })?;

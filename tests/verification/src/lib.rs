@@ -1,0 +1,37 @@
+//! Verification in full, by a command: `cargo run --release --bin softgrasp-verify -- REPORT` writes every error
+//! into `reports/`, in the form of `softgrasp-bench`. Nothing here is timed.
+//!
+//! The short form of each report runs in `cargo test` (`tests/` of this package).
+
+pub mod accuracy;
+pub mod bound;
+pub mod flicker;
+pub mod hard_cases;
+
+use softgrasp_bench::{Options, Report, ReportError};
+
+/// A report by its name on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ReportName {
+    /// Every element against closed forms and published values.
+    Accuracy,
+    /// Random grips: the proven bound against the true error.
+    Bound,
+    /// Every way through hard cases, against what was promised.
+    HardCases,
+    /// Noise of the devices against the hysteresis of the grasp.
+    Flicker,
+}
+
+/// Makes one report.
+///
+/// # Errors
+/// [`ReportError`]; an answer that fails its check is one.
+pub fn measure(name: ReportName, options: &Options) -> Result<Report, ReportError> {
+    match name {
+        ReportName::Accuracy => accuracy::measure(options),
+        ReportName::Bound => bound::measure(options),
+        ReportName::HardCases => hard_cases::measure(options),
+        ReportName::Flicker => flicker::measure(options),
+    }
+}
