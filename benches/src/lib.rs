@@ -7,8 +7,8 @@
 //! What times nothing is verification and stands in `tests/verification`, in the same form.
 
 pub mod axis;
-pub mod command;
 pub mod collision;
+pub mod command;
 pub mod contact;
 pub mod echo;
 pub mod fit;

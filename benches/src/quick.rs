@@ -52,8 +52,7 @@ impl Quick {
         let text = std::fs::read_to_string(self.folder().join(file))
             .unwrap_or_else(|error| panic!("{file}: {error}"));
         assert!(text.starts_with("# command: "), "{file} does not say how it was made");
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
         let at = reader.headers().ok().and_then(|h| h.iter().position(|h| h == name));
         let at = at.unwrap_or_else(|| panic!("{file} has no column {name}"));
         let rows = reader.records().map(|row| row.expect("a row that can be read"));

@@ -145,7 +145,8 @@ fn session(report: &Quick) {
     assert!(of("ticks").iter().all(|&ticks| ticks > 0.0), "{:?}", of("ticks"));
     // Every deforming tick is answered or has a reason, however slow the machine is.
     let why = |name| report.column("service-session-unanswered.csv", name);
-    for (server, (deforming, answered)) in report.column("service-session.csv", "server")
+    for (server, (deforming, answered)) in report
+        .column("service-session.csv", "server")
         .iter()
         .zip(of("deforming").into_iter().zip(of("answered")))
     {

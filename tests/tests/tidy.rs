@@ -222,7 +222,8 @@ fn crates_depend_downwards_only() {
 #[test]
 fn no_file_imports_a_file_that_imports_it() {
     let folders = packages().into_iter().map(|folder| format!("{folder}/src"));
-    let folders = folders.chain(["benches/src", "tests/src", "tests/verification/src"].map(String::from));
+    let folders =
+        folders.chain(["benches/src", "tests/src", "tests/verification/src"].map(String::from));
     let mut faults = Vec::new();
     let mut files = 0;
     for folder in folders {

@@ -130,10 +130,7 @@ pub fn make_certificate(
 }
 
 /// A certificate and its key, PEM, that is made now, is written nowhere and lives for so many days.
-pub(crate) fn self_signed_now(
-    names: &[String],
-    days: u32,
-) -> Result<(String, String), MakeError> {
+pub(crate) fn self_signed_now(names: &[String], days: u32) -> Result<(String, String), MakeError> {
     let now = SystemTime::now();
     self_signed(names, now - BEFORE, now + days * DAY)
         .map_err(|e| MakeError::Names { names: names.join(","), reason: e.to_string() })

@@ -27,7 +27,8 @@ fn every_way_through_every_hard_case_has_its_stated_outcome() {
         let count = count(column, value);
         assert!(count >= least, "{column} {value}: {count} rows, at least {least} expected");
     }
-    let refused = of("outcome").into_iter().zip(of("note")).filter(|(o, _)| o == "refused with reason");
+    let refused =
+        of("outcome").into_iter().zip(of("note")).filter(|(o, _)| o == "refused with reason");
     assert!(refused.into_iter().all(|(_, note)| note.len() > 20));
     // Answers of `condensed` are below bounds that are proven.
     let bounds: Vec<f64> = of("error_bound_rel").iter().filter_map(|b| b.parse().ok()).collect();
