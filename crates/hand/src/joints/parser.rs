@@ -10,7 +10,7 @@ use super::record::JointsRecord;
 pub enum JointsEvent {
     /// The joints of one hand at one moment.
     Record(Box<JointsRecord>),
-    /// Something else.
+    /// Bytes that are no record.
     Fault(JointsFault),
 }
 
@@ -22,7 +22,7 @@ pub enum JointsEvent {
 #[derive(Clone, Debug, Default)]
 pub struct JointsParser {
     stream: LineCutter,
-    /// Apart from the stream: a datagram may come between two parts of a line.
+    /// Lines of datagrams, apart from the stream: a datagram may come between two parts of a line.
     datagram: LineCutter,
 }
 

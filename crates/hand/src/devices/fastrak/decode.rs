@@ -7,13 +7,13 @@ use super::record::{Attitude, Encoding, FastrakFormat, FastrakRecord, OutputList
 /// What the head of the stream is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Head {
-    /// Cannot be told yet.
+    /// More bytes are needed before the head can be told.
     NeedMore,
     /// A data record of the format's length.
     Record(FastrakRecord),
     /// A status, read-back or error record of this many bytes.
     Reply(usize),
-    /// Its first byte begins nothing.
+    /// The first byte begins neither a record nor a reply.
     Skip(FastrakFaultKind),
 }
 

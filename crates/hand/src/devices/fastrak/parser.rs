@@ -10,13 +10,13 @@ use crate::devices::inbox::feed_all;
 /// What the stream contained.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FastrakEvent {
-    /// A sample.
+    /// A record of the tracker.
     Record(FastrakRecord),
     /// The next record, of the same station, is about opposite to the one before it.
     HemisphereFlip(HemisphereFlip),
     /// A status, read-back or error record (starts with `2`), without its CR LF.
     Reply(String),
-    /// Something else.
+    /// Bytes that are neither a record nor a reply.
     Fault(FastrakFault),
 }
 
