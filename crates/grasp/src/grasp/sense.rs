@@ -14,7 +14,7 @@ pub struct FingerInput {
     pub clear: bool,
     /// Vertices the tip is inside of, nearest first; all `None` when it is outside.
     pub tip_hits: [Option<ContactHit>; TIP_HITS_MAX],
-    /// The contact point, m.
+    /// Contact point of the fingertip, m.
     pub tip_in_object: Point3<f64>,
 }
 
