@@ -9,7 +9,7 @@ use nalgebra::Point3;
 /// Units: m. Frame: the object's, at rest.
 #[derive(Clone)]
 pub(super) struct TubeProfile {
-    /// Ends along X.
+    /// Ends of the tube along X.
     pub(super) low: f64,
     pub(super) high: f64,
     /// Middle of the tube across.
