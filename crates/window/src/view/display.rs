@@ -18,7 +18,7 @@ pub enum Level {
     Full,
 }
 
-/// The text is not the name of a level, a shading or spheres.
+/// The text is not the name of a level.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{got}' is not {what}; there are {known}")]
 pub struct UnknownDisplay {
