@@ -4,8 +4,7 @@ use super::input::Digits;
 use crate::scripted::GraspPlan;
 
 /// Closing of each finger, thumb first: as it is wished for, and as it is now. See [`super::MouseInput`]
-/// for
-/// what the numbers mean.
+/// for what the numbers mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Grip {
     wished: [f64; 5],
@@ -48,8 +47,7 @@ impl Grip {
     }
 
     /// Moves the fingers for some time toward the closing wished for. Fingers that are wished as closed
-    /// as each
-    /// other arrive together, at the touch and at the full press.
+    /// as each other arrive together, at the touch and at the full press.
     ///
     /// Units: s.
     pub fn advance(&mut self, seconds: f64, plan: Option<&GraspPlan>) {

@@ -131,8 +131,7 @@ impl Recorder {
     }
 
     /// Records a tick that is over. `made` is what it made, but for what [`Recorder`] knows itself: the
-    /// command,
-    /// and what was done and taken since the tick before.
+    /// command, and what was done and taken since the tick before.
     pub fn tick(&mut self, sent: &Sent, news: TickNews, scene: Option<SceneSeen>, made: TickSeen) {
         let Between { interventions, news: mut all } = std::mem::take(&mut self.between);
         all.add(news);

@@ -35,8 +35,7 @@ const FINGERS: [(Key, Finger); 5] = [
 
 impl FingerKeys {
     /// Takes a key that went down or up; returns whether it went down and was not down before: a key that
-    /// is
-    /// held is reported again and again. Keys that are `typed` into a field move nothing.
+    /// is held is reported again and again. Keys that are `typed` into a field move nothing.
     pub fn take(&mut self, key: Key, press: Press, modifiers: Modifiers, typed: bool) -> bool {
         self.shift = modifiers.contains(Modifiers::Shift);
         if press == Press::Release {

@@ -70,8 +70,8 @@ fn rows(ui: &mut Ui, name: &str, rows: &[(&str, &str)]) {
     });
 }
 
-/// Shows what a newcomer has to know of a hand, and of an object that
-/// `is_lifted` by friction or glued to the fingertips.
+/// Shows what a newcomer has to know of a hand, and of an object that `is_lifted` by friction or glued to
+/// the fingertips.
 pub fn hint(ui: &mut Ui, hand: HandChoice, is_lifted: bool) {
     let first = match (hand, is_lifted) {
         (HandChoice::Mouse, true) => {

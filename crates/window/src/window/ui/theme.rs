@@ -63,8 +63,7 @@ pub fn card<R>(
 }
 
 /// Shows a card in the lower left corner, so far above the edge of the window. It is measured before it
-/// is put
-/// there, so that one that grows does not lie over what is below it for a picture.
+/// is put there, so that one that grows does not lie over what is below it for a picture.
 pub fn low_card(context: &Context, name: &str, above: f32, content: impl Fn(&mut Ui)) {
     let screen = context.content_rect();
     let measuring = UiBuilder::new().max_rect(screen).invisible();
@@ -86,8 +85,7 @@ pub fn dialog<R>(context: &Context, name: &str, content: impl FnOnce(&mut Ui) ->
 }
 
 /// Shows cards one below the other at a corner of the window, not larger than `size_max`; those that find
-/// no
-/// room are scrolled to.
+/// no room are scrolled to.
 pub fn column<R>(
     context: &Context,
     name: &str,
