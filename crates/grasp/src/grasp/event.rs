@@ -17,7 +17,7 @@ pub enum Command {
     ReturnHome,
 }
 
-/// One tick's measurements.
+/// Measurements of one tick: palm, segments, what each finger touches, and the command.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepInput {
     /// Measured palm pose.
@@ -60,7 +60,7 @@ pub struct KnownNode {
     pub displacement_in_object: Vector3<f64>,
 }
 
-/// One tick's outcome.
+/// Outcome of one tick: events, state, known displacements, and poses to display.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepOutput {
     /// Events of the tick, ascending in the order of [`GraspEvent`].

@@ -133,7 +133,8 @@ mod tests {
         })
     }
 
-    /// Feeds readings of one sensor, 100 a second; what it gives, and what is told.
+    /// Feeds readings of one sensor, 100 a second; returns the readings taken, the notices, and how many were
+    /// refused.
     fn feed(readings: impl IntoIterator<Item = u8>) -> (Vec<u8>, Vec<Notice>, u64) {
         let mut gate = SensorGate::default();
         let given = readings.into_iter().enumerate().map(|(at, value)| {

@@ -94,7 +94,7 @@ pub enum Intervention {
     Turn([f64; 4]),
     /// Took the last kept shape back.
     UndoKeepShape,
-    /// Something that a replay cannot repeat, in words.
+    /// Another change of the object, in words, which a replay cannot repeat.
     NotReplayed(String),
 }
 
@@ -150,7 +150,7 @@ pub struct AnswerSeen {
 /// Method of an answer of which it is recorded that there was no shape to spring back to.
 pub const SPRINGBACK_REFUSED: &str = "springback refused";
 
-/// Something that happened in a tick.
+/// An event that happened in a tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EventSeen {
     /// `grasp`, `shape`, `server` or `device`.

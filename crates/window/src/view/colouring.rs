@@ -73,7 +73,7 @@ impl Colouring {
             "waiting for an answer with the nodes inside".clone_into(&mut self.remark);
             return;
         }
-        // A frame whose displacements are another mesh's shows no colours.
+        // A tick whose displacements are those of another mesh shows no colours.
         if shaded.shade(shading, &object.displacement).is_err() {
             return;
         }

@@ -120,7 +120,7 @@ pub struct HandActs {
 /// State of the link to the server, and of what came over it.
 #[derive(Clone, Default)]
 pub struct ServerView {
-    /// Whether answers come.
+    /// State of the link: whether the server is there and answers in time.
     pub link: LinkHealth,
     /// Whether the server is preparing the model of a new rest shape.
     pub is_preparing: bool,
@@ -177,7 +177,7 @@ pub enum NewsKind {
     Grasp,
     /// The server, or a job that was done.
     Information,
-    /// Something that was asked for and cannot be.
+    /// A wish that cannot be carried out.
     Refusal,
 }
 
@@ -277,7 +277,7 @@ impl ViewFrame {
         let Self { mut news, mut timings, .. } = unseen;
         news.append(&mut self.news);
         timings.append(&mut self.timings);
-        // A window that is not drawn must not make the frames grow without end.
+        // A window that is not drawn must not let the news grow without end.
         news.drain(..news.len().saturating_sub(NEWS_MAX));
         timings.drain(..timings.len().saturating_sub(TIMINGS_MAX));
         (self.news, self.timings) = (news, timings);

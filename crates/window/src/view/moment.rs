@@ -8,7 +8,7 @@ use softgrasp_grasp::grasp::StateName;
 /// Moment of a run at which a picture is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
-    /// In this tick.
+    /// In the tick of this number.
     Tick(u64),
     /// In the last tick of the n-th visit to a state, counted from 1: the fingers have squeezed as
     /// far as they do.

@@ -42,7 +42,7 @@ impl Outlet {
         if let Some(kept_back) = self.kept_back.take() {
             frame.carry_over(*kept_back);
         }
-        // Poisoned or not, what is in it is a whole frame.
+        // Poisoned or not, the slot holds a whole view.
         let slot = match self.slot.0.try_lock() {
             Ok(slot) => Some(slot),
             Err(std::sync::TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),

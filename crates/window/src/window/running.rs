@@ -123,7 +123,7 @@ impl Running {
             }
             arrived.sentences.extend(frame.news.iter().filter_map(sentence));
             let frame = Arc::new(*frame);
-            // A frame that was on its way when the script began again is of the one before.
+            // A tick that was on its way when the script began again is of the script before.
             if frame.tick >= self.first_tick {
                 self.history.add(Arc::clone(&frame));
             }

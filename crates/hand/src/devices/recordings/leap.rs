@@ -130,7 +130,7 @@ fn number(record: &csv::StringRecord, column: usize, row: usize) -> Result<f64, 
 mod tests {
     use super::*;
 
-    /// A recording of one frame with joint coordinates 1, 2, 3, … mm.
+    /// A recording of one picture with joint coordinates 1, 2, 3, … mm.
     fn text() -> String {
         let mut header = "t_us,hand_type".to_owned();
         let mut row = "1000,right".to_owned();

@@ -15,11 +15,11 @@ pub enum Dialog {
     /// No dialog is open.
     #[default]
     Closed,
-    /// It asks which mesh is to be read.
+    /// The dialog that asks which mesh is to be read.
     Read(FileQuestion),
-    /// It asks under which name the object is to be saved.
+    /// The dialog that asks under which name the object is to be saved.
     Save(FileQuestion),
-    /// It asks whether this file is to be replaced.
+    /// The dialog that asks whether this file is to be replaced.
     Replace(PathBuf),
 }
 
