@@ -32,7 +32,7 @@ pub struct HandSetup {
     pub glove_options: RecordOptions,
     /// Format of the tracker's records.
     pub tracker: FastrakFormat,
-    /// Where the receiver sits on the arm.
+    /// Mount of the tracker's receiver: its place on the arm.
     pub mount: ReceiverMount,
     /// Where the transmitter stands: its Y-up frame (`docs/frames.md`) in the scene's world, m.
     pub world_from_stand: Isometry3<f64>,

@@ -26,7 +26,7 @@ pub enum HandRequest {
 }
 
 impl HandRequest {
-    /// Which kind of hand it is.
+    /// Kind of the hand that is asked for.
     pub fn choice(&self) -> HandChoice {
         match self {
             Self::Scripted(script) => HandChoice::Scripted(*script),
@@ -80,7 +80,7 @@ impl fmt::Display for HandRequest {
     }
 }
 
-/// Where the hand comes from.
+/// Kind of hand: where its motion comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HandChoice {
     /// A scripted hand, played by the program as device bytes.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use softgrasp_grasp::grasp::Command;
 
-/// What comes into one tick.
+/// Input of one tick: device bytes and a menu command.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sent {
     /// Bytes of the devices, in the order in which they came.

@@ -4,7 +4,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// What a fingertip holds.
+/// Contact model: which part of the surface a fingertip holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ContactModel {
     /// The single node that the fingertip touched, as in the thesis. Its force goes to zero as the mesh

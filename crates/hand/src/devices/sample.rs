@@ -27,7 +27,7 @@ pub struct TrackerReading {
     pub time_s: f64,
 }
 
-/// How old a reading is.
+/// Whether a reading is young enough to be used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Freshness {
     /// The reading is at most as old as is allowed.

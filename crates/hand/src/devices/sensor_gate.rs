@@ -16,7 +16,7 @@ pub struct SensorGate {
     news: Vec<Notice>,
 }
 
-/// What is known of one sensor.
+/// State of one sensor: readings taken and waiting, and what was told.
 #[derive(Clone, Copy, Debug, Default)]
 struct Watched {
     taken: Option<u8>,

@@ -76,7 +76,7 @@ pub(super) struct Misfit {
     pub(super) joints: usize,
 }
 
-/// What a way down to the minimum found.
+/// Result of a way down to the minimum: state, cost and number of steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Found {
     pub(super) state: HandState,

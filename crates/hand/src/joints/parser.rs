@@ -5,7 +5,7 @@ use super::decode::decode_line;
 use super::fault::{JointsFault, JointsFaultKind};
 use super::record::JointsRecord;
 
-/// What the stream contained.
+/// An event of the stream: a record of joints, or a fault.
 #[derive(Clone, Debug, PartialEq)]
 pub enum JointsEvent {
     /// The joints of one hand at one moment.

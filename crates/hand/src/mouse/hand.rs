@@ -51,7 +51,7 @@ struct Planned {
     turn: UnitQuaternion<f64>,
 }
 
-/// What the hand does by itself.
+/// Motion that the hand makes by itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Errand {
     Aim { elsewhere: bool },

@@ -17,7 +17,7 @@ use crate::sent::Arrival;
 /// A recording of a run, as it was read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// How the run was set up.
+    /// Set-up of the run: enough to play it again.
     pub setup: RecordedSetup,
     /// Ticks of the run, in order.
     pub ticks: Vec<RecordedTick>,
@@ -25,7 +25,7 @@ pub struct Recording {
     pub cut: Option<String>,
 }
 
-/// Why there is no recording.
+/// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file cannot be read.

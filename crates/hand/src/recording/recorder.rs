@@ -46,7 +46,7 @@ pub enum RecordError {
     },
 }
 
-/// What happened while no tick was played.
+/// Changes and answers that came while no tick was played.
 #[derive(Default)]
 struct Between {
     interventions: Vec<Intervention>,
@@ -66,7 +66,7 @@ pub struct TickNews {
     pub gave_up_step: bool,
 }
 
-/// What is written at once.
+/// One message to the thread that writes.
 enum Message {
     Setup(Box<RecordedSetup>),
     Tick(Box<TickMessage>),

@@ -18,7 +18,7 @@ pub struct ReplayCheck {
     pub difference: Option<Difference>,
 }
 
-/// Where a replay differs first.
+/// First tick and stage in which a replay differs from its recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Difference {
     /// Number of the tick.

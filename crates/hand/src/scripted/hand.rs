@@ -52,7 +52,7 @@ impl Moment {
     }
 }
 
-/// What has been played of a script.
+/// Outcome of the ticks of a script that were played.
 pub(super) struct Played {
     /// Fingers, posture and palm after the last tick that was played.
     pub(super) moment: Moment,

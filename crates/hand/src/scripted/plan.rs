@@ -36,7 +36,7 @@ const THUMB_ABDUCTIONS: [f64; 3] = [0.1, 0.4, 0.7];
 const TILTS_FEW: [f64; 2] = [0.0, 0.45];
 const TILTS_MANY: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 
-/// What a grasp is to be like.
+/// Requirements of a grasp that is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspWish {
     /// How far the tips move on after their touch, m.

@@ -97,7 +97,7 @@ pub struct Planner {
     abandoned: usize,
 }
 
-/// Where the planning is done.
+/// Whether the planning is done in the tick or on a thread beside it.
 enum Way {
     /// While the tick waits: the plan is there in the tick that asks for it.
     Waited(Option<Option<GraspPlan>>),

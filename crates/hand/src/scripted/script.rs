@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Which part of the story is played.
+/// Script of the scripted hand: how far it goes in grasping the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ScriptName {
     /// Reach for the object and go back.

@@ -56,7 +56,7 @@ pub(super) enum Ended {
     Silent,
 }
 
-/// What a driver's thread works with.
+/// The port, the queue and the state with which a driver's thread works.
 pub(super) struct DriverContext {
     device: Device,
     port: PortName,

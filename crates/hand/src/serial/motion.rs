@@ -100,7 +100,7 @@ impl Motion {
         setup.calibration.raw_from_angles(&angles, setup.sensors)
     }
 
-    /// Where the receiver is at a time, s.
+    /// Pose of the receiver at a time, s.
     ///
     /// Frame: stand, the transmitter's Y-up frame (`docs/frames.md`), m.
     pub fn stand_from_receiver(&self, time_s: f64) -> Isometry3<f64> {

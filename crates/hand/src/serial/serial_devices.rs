@@ -77,7 +77,7 @@ impl SerialDevices {
         Ok(devices)
     }
 
-    /// What the devices are set to.
+    /// Settings to which the devices are set.
     pub fn settings(&self) -> &SerialSettings {
         &self.settings
     }

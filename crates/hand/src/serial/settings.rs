@@ -22,7 +22,7 @@ pub enum GloveMode {
     },
 }
 
-/// How the glove is to be set up.
+/// Settings of the glove and its interface unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GloveSettings {
     /// Serial port of the glove.

@@ -55,7 +55,7 @@ impl FromStr for Level {
     }
 }
 
-/// Which spheres of the sphere tree are shown.
+/// Spheres of the sphere tree that are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spheres {
     /// No spheres are shown.

@@ -170,7 +170,7 @@ pub struct News {
     pub kind: NewsKind,
 }
 
-/// What a piece of news is about.
+/// Kind of a piece of news: what it is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NewsKind {
     /// The grasp: marked on the time line.
@@ -181,7 +181,7 @@ pub enum NewsKind {
     Refusal,
 }
 
-/// How long one answer took, ms.
+/// Times that one answer took, stage by stage, ms.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TickTiming {
     /// Number of the tick that asked.

@@ -31,7 +31,7 @@ pub enum Change {
     Hand(Receiver<Result<HandSource, String>>, HandChoice),
 }
 
-/// What has become of a change.
+/// Outcome of a change.
 pub enum Changed {
     /// The object is loaded, and is to be handed to the ticks.
     Object(Box<LoadedObject>, ObjectChoice),

@@ -8,7 +8,7 @@ use crate::view::control::Control;
 use crate::view::frame::ViewFrame;
 use crate::view::pointer::{PointedAt, pointed_at};
 
-/// What a drag of the mouse moves.
+/// Thing that a drag of the mouse moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grip {
     /// The view turns.

@@ -46,7 +46,7 @@ pub enum StandTilt {
     Free,
 }
 
-/// Where the transmitter stands.
+/// Pose of the transmitter in the world, as the alignment found it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandAlignment {
     /// Transmitter's Y-up frame in the world, m.

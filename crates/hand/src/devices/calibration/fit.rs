@@ -8,7 +8,7 @@ use super::thumb::{THUMB_ROOT, ThumbCoupling};
 use super::thumb_fit::{ThumbFit, ThumbRoot, fit_thumb};
 use crate::devices::cyberglove::{RawSensors, Sensor, SensorSet, is_rail};
 
-/// What a fit could say about one sensor.
+/// Outcome of a fit for one sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorFit {
     /// Offset and gain are new.
@@ -34,7 +34,7 @@ pub struct FitReport {
     pub outcomes: [SensorFit; 22],
     /// How well the gestures could be told apart by each sensor, in the same order.
     pub qualities: [SensorQuality; 22],
-    /// What became of the thumb's coupling.
+    /// Outcome of the fit for the coupling of the thumb's two sensors.
     pub thumb: ThumbFit,
 }
 

@@ -8,7 +8,7 @@ const MAX_NOISE_COUNTS: f64 = 4.0;
 /// A joint must move by this share of what an average glove shows.
 const MIN_SHARE: f64 = 0.25;
 
-/// What one sensor showed during the gestures.
+/// How far the readings of one sensor moved and scattered during the gestures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorQuality {
     /// Mean reading in the fist less that of the flat hand; 0 without readings.

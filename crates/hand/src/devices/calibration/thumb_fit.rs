@@ -6,7 +6,7 @@ use super::checks::check;
 use super::linear::Calibration;
 use super::thumb::{THUMB_ROOT, ThumbCoupling};
 
-/// What a fit could say about the thumb's coupling.
+/// Outcome of a fit for the coupling of the thumb's two sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ThumbFit {
     /// No third gesture: not coupled.

@@ -7,7 +7,7 @@ use super::sensor::SensorCount;
 use crate::devices::inbox::Inbox;
 use crate::devices::inbox::feed_all;
 
-/// What the interface unit complains about.
+/// Error that the interface unit reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GloveError {
     /// The unit replied `e?`: it does not know the command.
@@ -89,7 +89,7 @@ pub struct GloveFault {
     pub bytes_skipped: usize,
 }
 
-/// What the stream contained.
+/// An event of the stream: a record of the glove, or a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GloveEvent {
     /// A record of the glove.

@@ -4,7 +4,7 @@ use super::encode::NUMBER_LIMIT;
 use super::fault::FastrakFaultKind;
 use super::record::{Attitude, Encoding, FastrakFormat, FastrakRecord, OutputList, Station};
 
-/// What the head of the stream is.
+/// What the first bytes of the stream are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Head {
     /// More bytes are needed before the head can be told.

@@ -7,7 +7,7 @@ use super::record::{FastrakFormat, FastrakRecord};
 use crate::devices::inbox::Inbox;
 use crate::devices::inbox::feed_all;
 
-/// What the stream contained.
+/// An event of the stream: a record of the tracker, a flip, a reply, or a fault.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FastrakEvent {
     /// A record of the tracker.

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::view::texture::{Texture, texel};
 
-/// What a place of the surface looks like.
+/// Look of a place of the surface: colour and slope of the relief.
 #[derive(Clone, Copy)]
 pub(super) struct Paint {
     /// Red, green, blue as sRGB, 0 to 1.
