@@ -74,7 +74,7 @@ impl RecordingFile {
         self.writer.write_to_known_channel(&header, &data)
     }
 
-    /// Writes all messages so far to the disk: a program that ends abnormally loses only what comes after
+    /// Writes all messages so far to the file: a program that ends abnormally loses only what comes after
     /// them.
     ///
     /// # Errors

@@ -52,7 +52,7 @@ pub struct RecordedSetup {
     /// Whether the object was placed before the first hand.
     #[serde(default)]
     pub placed_in_hand: bool,
-    /// The hand that was asked for, as on the command line.
+    /// Name of the hand that acted, as in reports.
     pub hand: String,
     /// Real time from tick to tick, s.
     pub period_s: Option<f64>,
