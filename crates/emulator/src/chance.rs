@@ -17,13 +17,13 @@ impl Chance {
         z ^ (z >> 31)
     }
 
-    /// From 0 up to, but without, 1.
+    /// A random number from 0 up to, but without, 1.
     pub(super) fn share(&mut self) -> f64 {
         // 53 bits fill the mantissa.
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// From 0 up to, but without, `count`; 0 for none.
+    /// A random number from 0 up to, but without, `count`; 0 where `count` is 0.
     pub(super) fn below(&mut self, count: usize) -> usize {
         (self.share() * count as f64) as usize
     }

@@ -12,7 +12,7 @@ use softgrasp_hand::devices::fastrak::Station;
 use crate::{EmulatedGlove, EmulatedTracker};
 use softgrasp_hand::serial::motion::Motion;
 
-/// The port cannot be made.
+/// Why the pseudo-terminal of a device cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulateError {
     /// The system gives no pseudo-terminal.
@@ -21,15 +21,15 @@ pub enum EmulateError {
     /// The link cannot be made.
     #[error("the link {path} to the pseudo-terminal cannot be made")]
     Link {
-        /// Where it was to stand.
+        /// Path at which the link was to stand.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// Something else stands where the link was to stand.
     #[error("{path} is there already and is no link")]
     InTheWay {
-        /// Where the link was to stand.
+        /// Path at which the link was to stand.
         path: PathBuf,
     },
 }
@@ -67,7 +67,7 @@ impl PseudoTerminal {
         Ok(terminal)
     }
 
-    /// The name by which a client opens it: the link, if there is one.
+    /// Path by which a client opens the pseudo-terminal: that of the link, if there is one.
     pub fn path(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.name)
     }
@@ -77,7 +77,7 @@ impl PseudoTerminal {
         self.client_end.get_configuration().and_then(|settings| settings.get_baud_rate()).ok()
     }
 
-    /// What the client has sent; nothing if it has sent nothing.
+    /// Bytes that the client has sent since the last call; empty if it has sent none.
     pub fn read(&self) -> Vec<u8> {
         let mut all = Vec::new();
         let mut bytes = [0; 1024];
@@ -90,7 +90,7 @@ impl PseudoTerminal {
         all
     }
 
-    /// Sends to the client; what does not fit because nobody reads is lost, as on a real line.
+    /// Sends bytes to the client; what does not fit because nobody reads is lost, as on a real line.
     pub fn write(&self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             match self.device_end.write(bytes) {
@@ -127,17 +127,17 @@ fn garbled(bytes: &[u8]) -> Vec<u8> {
     bytes.iter().map(|byte| byte.rotate_left(3) ^ 0x5a).collect()
 }
 
-/// An emulated glove on a line.
+/// An emulated glove on a serial line.
 #[derive(Debug)]
 pub struct GloveLine {
-    /// The line.
+    /// The line, as a pseudo-terminal.
     pub terminal: PseudoTerminal,
-    /// The glove.
+    /// The emulated glove.
     pub glove: EmulatedGlove,
 }
 
 impl GloveLine {
-    /// Hears the client.
+    /// Lets the glove take the bytes that the client has sent.
     pub fn hear(&mut self, now_s: f64) {
         let heard = self.terminal.read();
         if !heard.is_empty() {
@@ -157,17 +157,17 @@ impl GloveLine {
     }
 }
 
-/// An emulated tracker on a line.
+/// An emulated tracker on a serial line.
 #[derive(Debug)]
 pub struct TrackerLine {
-    /// The line.
+    /// The line, as a pseudo-terminal.
     pub terminal: PseudoTerminal,
-    /// The tracker.
+    /// The emulated tracker.
     pub tracker: EmulatedTracker,
 }
 
 impl TrackerLine {
-    /// Hears the client.
+    /// Lets the tracker take the bytes that the client has sent.
     pub fn hear(&mut self, now_s: f64) {
         let heard = self.terminal.read();
         if !heard.is_empty() {
@@ -190,9 +190,9 @@ impl TrackerLine {
 /// Glove and tracker that feel the same motion, in real time.
 #[derive(Debug)]
 pub struct Emulation {
-    /// The glove.
+    /// The emulated glove on its line.
     pub glove: GloveLine,
-    /// The tracker.
+    /// The emulated tracker on its line.
     pub tracker: TrackerLine,
     motion: Motion,
     begun: Instant,
@@ -204,7 +204,7 @@ pub struct Emulation {
     records: u64,
 }
 
-/// The motion begins when both devices are asked for records, or so long after the first, s.
+/// Time after the first device was asked for records at which the motion begins without the other, s.
 const WAIT_FOR_OTHER_S: f64 = 5.0;
 
 impl Emulation {
@@ -222,7 +222,7 @@ impl Emulation {
         }
     }
 
-    /// Glove records so far.
+    /// Number of glove records sent so far.
     pub fn glove_records(&self) -> u64 {
         self.records
     }
@@ -232,7 +232,7 @@ impl Emulation {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// Hears and speaks what is due; to be called about every millisecond.
+    /// Takes and sends the bytes that are due; to be called about every millisecond.
     pub fn step(&mut self) {
         let now_s = self.on_for_s();
         self.glove.hear(now_s);

@@ -51,7 +51,7 @@ impl Fault {
         Self::Silence,
     ];
 
-    /// The name on the command line.
+    /// Name of the fault on the command line.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::DeadSensor => "dead-sensor",
@@ -69,7 +69,7 @@ impl Fault {
         }
     }
 
-    /// The share of records it hits, or begins at, where none is asked for.
+    /// Share of records that the fault hits, or begins at, where no rate is asked for.
     pub const fn default_rate(self) -> f64 {
         match self {
             Self::DeadSensor => 0.1,
@@ -90,25 +90,25 @@ impl fmt::Display for Fault {
 /// A fault that is switched on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultSetting {
-    /// What goes wrong.
+    /// The fault that is switched on.
     pub fault: Fault,
     /// Share of the records that it hits, 0 to 1; for a dead sensor, share of the sensors.
     pub rate: f64,
 }
 
-/// A text that is no fault.
+/// Why a text names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownFault {
     /// No fault has this name.
     #[error("no fault is called '{name}'; there are {}", names())]
     Name {
-        /// The name.
+        /// Name that was given.
         name: String,
     },
     /// The rate is not a share.
     #[error("the rate of a fault is a number from 0 to 1, not '{text}'")]
     Rate {
-        /// The text behind the colon.
+        /// Text behind the colon.
         text: String,
     },
 }
@@ -150,12 +150,12 @@ impl Faults {
         Self { settings: settings.to_vec(), chance: Chance::new(seed) }
     }
 
-    /// The rate of a fault that is on.
+    /// Rate of a fault, if it is on.
     pub(super) fn rate(&self, fault: Fault) -> Option<f64> {
         self.settings.iter().find(|on| on.fault == fault).map(|on| on.rate)
     }
 
-    /// Whether it hits the next record.
+    /// Whether a fault hits the next record.
     pub(super) fn hits(&mut self, fault: Fault) -> bool {
         self.rate(fault).is_some_and(|rate| self.chance.share() < rate)
     }

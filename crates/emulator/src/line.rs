@@ -4,15 +4,15 @@ use std::collections::VecDeque;
 
 use super::fault::{Fault, Faults};
 
-/// For how long a burst holds everything back, s.
+/// Time for which a burst holds everything back, s.
 const BURST_S: f64 = 0.15;
-/// How long a silence lasts, s.
+/// Duration of a silence, s.
 const SILENCE_S: f64 = 1.2;
 
 /// Bytes on their way out.
 #[derive(Clone, Debug)]
 pub(super) struct OutLine {
-    /// When they may begin to leave, s, and the bytes.
+    /// Bytes that wait, each with the time at which they may begin to leave, s.
     queue: VecDeque<(f64, Vec<u8>)>,
     /// Time at which the last byte that left had left, s.
     busy_until_s: f64,
@@ -36,17 +36,17 @@ impl OutLine {
         }
     }
 
-    /// How long so many bytes take, s.
+    /// Time that so many bytes take on the line, s.
     pub(super) fn duration_s(&self, bytes: usize) -> f64 {
         self.byte_s * bytes as f64
     }
 
-    /// Bytes that have not left yet.
+    /// Number of bytes that have not left yet.
     pub(super) fn waiting(&self) -> usize {
         self.queue.iter().map(|(_, bytes)| bytes.len()).sum()
     }
 
-    /// Whether the device neither hears nor speaks.
+    /// Whether the device neither hears nor speaks, because a silence lasts.
     pub(super) fn is_silent(&self, now_s: f64) -> bool {
         now_s < self.silent_until_s
     }
@@ -83,7 +83,7 @@ impl OutLine {
         self.send(record, time_s);
     }
 
-    /// Forgets what has not left yet.
+    /// Drops the bytes that have not left yet.
     pub(super) fn clear(&mut self) {
         self.queue.clear();
     }
@@ -97,7 +97,7 @@ impl OutLine {
         }
     }
 
-    /// Lets leave what leaves by now.
+    /// Lets the bytes leave that are due by now.
     pub(super) fn advance(&mut self, now_s: f64) {
         while let Some((not_before_s, bytes)) = self.queue.front_mut() {
             let begin_s = self.busy_until_s.max(*not_before_s);

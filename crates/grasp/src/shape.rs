@@ -9,7 +9,7 @@ use nalgebra::{Point3, Unit, Vector3};
 /// Source: thesis section 4.4.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
-    /// Centre of the lower end (`cl_z` of 4.4.2).
+    /// Centre of the lower end (`cl_z` of thesis 4.4.2).
     pub base: Point3<f64>,
     /// Unit direction from the lower to the upper end.
     pub axis: Unit<Vector3<f64>>,
@@ -23,8 +23,8 @@ pub struct Cylinder {
 /// its finger's cylinder, so the whole sphere is tested, as in thesis 4.4.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
-    /// Centre.
+    /// Centre of the sphere.
     pub centre: Point3<f64>,
-    /// Radius, ≥ 0.
+    /// Radius of the sphere, ≥ 0.
     pub radius: f64,
 }

@@ -27,7 +27,8 @@ fn moving(t: f64) -> (Isometry3<f64>, JointAngles) {
     (Isometry3::new(at, turn), angles)
 }
 
-/// Plays so many records of both devices, 100 a second, through `line`; what is told, and the reader.
+/// Plays so many records of both devices, 100 a second, through `line`; returns the reader. `seen` is called
+/// after each record.
 fn play(
     records: u32,
     mut line: impl FnMut(u32, &mut Vec<Arrival>),

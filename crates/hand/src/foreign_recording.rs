@@ -9,7 +9,7 @@ use crate::sent::Sent;
 use crate::sent::{Arrival, Device};
 use crate::serial::motion::Motion;
 
-/// A recording that is played in its own time.
+/// A recording that is played at its own speed.
 pub struct ForeignHand {
     source: Source,
     name: String,
@@ -30,30 +30,31 @@ pub enum ForeignError {
     /// The file cannot be read.
     #[error("cannot read {path}: {source}")]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// It is no trajectory.
+    /// The file is no trajectory of a tracker.
     #[error("{path}: {source}")]
     Trajectory {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with the trajectory.
         source: TrajError,
     },
-    /// It is no recording of a camera.
+    /// The file is no recording of a Leap camera.
     #[error("{path}: {source}")]
     Leap {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with the recording.
         source: LeapError,
     },
 }
 
-/// Whether a file is such a recording, by its name.
+/// Whether the ending of a file's name is that of a trajectory (`traj`) or of a camera's recording
+/// (`csv`).
 pub fn is_foreign(path: &Path) -> bool {
     has_ending(path, "traj") || has_ending(path, "csv")
 }
@@ -88,12 +89,12 @@ impl ForeignHand {
         Ok(Self { source, name: path.display().to_string(), tick_s, time_s: 0.0 })
     }
 
-    /// Its file.
+    /// Path of the recording's file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Begins again.
+    /// Goes back to the beginning of the recording.
     pub fn restart(&mut self) {
         self.time_s = 0.0;
         if let Source::Joints { next, .. } = &mut self.source {
@@ -101,7 +102,7 @@ impl ForeignHand {
         }
     }
 
-    /// Moves on by the time of so many ticks and says what came meanwhile.
+    /// Moves on by the time of so many ticks and returns the bytes that devices send in that time.
     pub fn next_after(&mut self, ticks: u64) -> Sent {
         self.time_s += ticks as f64 * self.tick_s;
         let time_s = self.time_s;

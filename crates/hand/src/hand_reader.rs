@@ -22,17 +22,17 @@ use crate::sent::{Arrival, Device};
 /// Everything that says how a hand, its glove and its tracker are set up.
 #[derive(Clone, Debug)]
 pub struct HandSetup {
-    /// Sizes of the hand.
+    /// Bone lengths, widths and side of the hand.
     pub dimensions: HandDimensions,
-    /// From raw sensor values to angles.
+    /// Calibration: from raw sensor values to joint angles.
     pub calibration: Calibration,
-    /// How many sensors the glove has.
+    /// Number of sensors of the glove.
     pub sensors: SensorCount,
-    /// What the glove's records hold besides.
+    /// What the glove's records hold besides the sensor values.
     pub glove_options: RecordOptions,
     /// Format of the tracker's records.
     pub tracker: FastrakFormat,
-    /// Where the receiver sits on the arm.
+    /// Mount of the tracker's receiver: its place on the arm.
     pub mount: ReceiverMount,
     /// Where the transmitter stands: its Y-up frame (`docs/frames.md`) in the scene's world, m.
     pub world_from_stand: Isometry3<f64>,
@@ -98,33 +98,33 @@ pub struct HandReader {
     health: SensorHealth,
     /// What keeps out readings that no hand brings about; `None` for devices without a line.
     gates: Option<Gates>,
-    /// Dead sensors that have been told.
+    /// Dead sensors of which the person has been told.
     dead: SensorSet,
-    /// When the first device spoke, s.
+    /// When the first bytes of a device came, s.
     first_s: Option<f64>,
     news: Vec<Notice>,
-    /// What came of glove and tracker.
+    /// What has come over the lines of glove and tracker.
     heard: [Heard; 2],
     faults: DeviceFaults,
-    /// The tracker takes the receiver for its mirror image through the transmitter.
+    /// Whether the tracker takes the receiver for its mirror image through the transmitter.
     is_flipped: bool,
 }
 
-/// Keeps out what a damaged line brings.
+/// The gates that keep out what a damaged line brings.
 #[derive(Default)]
 struct Gates {
     glove: SensorGate,
     tracker: PoseGate,
 }
 
-/// How often the devices' bytes were not good records.
+/// Counts of what the devices sent that was no good record, or was not taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DeviceFaults {
-    /// Faults of the glove's line.
+    /// Number of faults of the glove's line.
     pub glove: u64,
-    /// Faults of the tracker's line.
+    /// Number of faults of the tracker's line.
     pub tracker: u64,
-    /// Jumps of the tracker to the opposite side of its field.
+    /// Number of jumps of the tracker to the opposite side of its field.
     pub hemisphere_flips: u64,
     /// Readings of sensors that no finger can have brought about, and were not taken.
     pub glove_jumps: u64,
@@ -196,12 +196,12 @@ impl HandReader {
         }
     }
 
-    /// The set-up.
+    /// Set-up of hand, glove and tracker.
     pub fn setup(&self) -> &HandSetup {
         &self.setup
     }
 
-    /// Faults so far.
+    /// Counts of faults since the start.
     pub fn faults(&self) -> DeviceFaults {
         let gates = self.gates.as_ref();
         DeviceFaults {
@@ -212,7 +212,7 @@ impl HandReader {
         }
     }
 
-    /// How well the hand fits a sender's joints.
+    /// How well the kinematic hand fits a sender's joints.
     pub fn fit_errors(&self) -> FitErrors {
         self.joints.fit_errors()
     }

@@ -11,9 +11,9 @@ use crate::serial::SerialSource;
 /// A hand, and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HandRequest {
-    /// Played by the program.
+    /// A scripted hand, played by the program.
     Scripted(ScriptName),
-    /// Driven by mouse and keyboard, in a window.
+    /// A hand driven by mouse and keyboard, in a window.
     Mouse,
     /// A recording that is played again.
     Replay(PathBuf),
@@ -26,7 +26,7 @@ pub enum HandRequest {
 }
 
 impl HandRequest {
-    /// Which kind of hand it is.
+    /// Kind of the hand that is asked for.
     pub fn choice(&self) -> HandChoice {
         match self {
             Self::Scripted(script) => HandChoice::Scripted(*script),
@@ -38,7 +38,7 @@ impl HandRequest {
 }
 
 impl HandRequest {
-    /// Whether devices send what they will, when they will.
+    /// Whether live devices or senders determine what comes and when.
     pub fn is_live(&self) -> bool {
         matches!(self, Self::Serial(_) | Self::Joints(_) | Self::Xr)
     }
@@ -80,12 +80,12 @@ impl fmt::Display for HandRequest {
     }
 }
 
-/// Where the hand comes from.
+/// Kind of hand: where its motion comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HandChoice {
-    /// Played by the program, as device bytes.
+    /// A scripted hand, played by the program as device bytes.
     Scripted(ScriptName),
-    /// Driven by mouse and keyboard, in a window.
+    /// A hand driven by mouse and keyboard, in a window.
     Mouse,
     /// A person's own hand, through a glove and a tracker, or tracked otherwise.
     Live,
@@ -94,7 +94,7 @@ pub enum HandChoice {
 }
 
 impl HandChoice {
-    /// Whether it is played, so that it can be paused; a person cannot.
+    /// Whether the hand is played by the program, so that it can be paused; a person cannot.
     pub fn is_played(self) -> bool {
         matches!(self, Self::Scripted(_) | Self::Replay)
     }

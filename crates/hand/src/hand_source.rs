@@ -11,7 +11,7 @@ use crate::sent::Sent;
 
 /// A source of device bytes.
 pub enum HandSource {
-    /// A script that is played.
+    /// A scripted hand.
     Scripted(ScriptedHand),
     /// A person with a mouse.
     Mouse(MouseHand),
@@ -24,8 +24,8 @@ pub enum HandSource {
 }
 
 impl HandSource {
-    /// Moves on by the time of so many ticks and says what the devices send then. A recording moves
-    /// on by one tick, whatever was missed.
+    /// Moves on by the time of so many ticks and returns what the devices send then. A recording moves on
+    /// by one tick, whatever was missed.
     ///
     /// Units: `now_s` s on the client's clock, now.
     pub fn next_after(&mut self, ticks: u64, now_s: f64, seen: &Seen, object: &SoftObject) -> Sent {
@@ -41,7 +41,7 @@ impl HandSource {
         }
     }
 
-    /// Its name in reports.
+    /// Name of the hand in reports.
     pub fn name(&self) -> String {
         match self {
             Self::Scripted(hand) => format!("scripted:{}", hand.script()),
@@ -61,8 +61,8 @@ impl HandSource {
         }
     }
 
-    /// How it will grasp the object, where it has a plan. Frame: the object's, as if it were the
-    /// world's.
+    /// Plan of the hand to grasp the object, where it has one. Frame: that of the object, as if it were
+    /// the world's.
     pub fn plan(&self) -> Option<GraspPlan> {
         match self {
             Self::Scripted(hand) => Some(*hand.plan()),
@@ -71,7 +71,7 @@ impl HandSource {
         }
     }
 
-    /// Whether its script is over.
+    /// Whether the script of the hand is over.
     pub fn is_over(&self) -> bool {
         match self {
             Self::Scripted(hand) => hand.is_over(),
@@ -79,7 +79,7 @@ impl HandSource {
         }
     }
 
-    /// Whether it does something by itself that a person asked for, and takes no other wish.
+    /// Whether the hand does something by itself that a person asked for, and takes no other wish.
     pub fn is_on_its_way(&self) -> bool {
         match self {
             Self::Mouse(hand) => hand.is_on_its_way(),
@@ -87,12 +87,12 @@ impl HandSource {
         }
     }
 
-    /// Whether it is played, so that it can be paused; a person cannot.
+    /// Whether the hand is played by the program, so that it can be paused; a person cannot.
     pub fn is_played(&self) -> bool {
         matches!(self, Self::Scripted(_) | Self::Replay(_) | Self::Foreign(_))
     }
 
-    /// Whether it can go on without a window.
+    /// Whether the hand can go on only with a window.
     pub fn needs_window(&self) -> bool {
         matches!(self, Self::Mouse(_))
     }

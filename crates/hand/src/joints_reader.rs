@@ -26,10 +26,10 @@ pub struct JointsReader {
     first_s: Option<f64>,
 }
 
-/// How well the hand fits, over a run.
+/// How well the kinematic hand fits a sender's joints, over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FitErrors {
-    /// Records that were fitted.
+    /// Number of records that were fitted.
     pub records: u64,
     /// Root of the mean squared distance of joints, over all records, m.
     pub rms_m: f64,
@@ -37,9 +37,9 @@ pub struct FitErrors {
     pub most_m: f64,
 }
 
-/// A hand is measured by so many records, and is of the usual size before.
+/// Number of records by which a hand is measured; before these it has the usual size.
 const MEASURED: usize = 30;
-/// Who speaks is told after so many hands.
+/// Number of fitted records after which the sender is described to the person.
 const INTRODUCED_AFTER: u64 = 60;
 /// The first palm is placed here in the world, m: before the object, to the right of its middle.
 const FIRST_PALM_M: Vector3<f64> = Vector3::new(0.0, 0.08, 0.16);
@@ -64,7 +64,7 @@ impl JointsReader {
         }
     }
 
-    /// Takes bytes that came at a time, s; what there is to tell of the sender, once.
+    /// Takes bytes that came at a time, s; returns, once, a sentence that describes the sender.
     pub fn feed(&mut self, bytes: &[u8], is_datagram: bool, time_s: f64) -> Option<String> {
         let mut records = Vec::new();
         let mut faults = Vec::new();
@@ -86,7 +86,7 @@ impl JointsReader {
         told.collect::<Vec<_>>().pop()
     }
 
-    /// Bad lines, and records that no hand fits.
+    /// Number of bad lines and of records that no hand fits.
     pub fn faults(&self) -> u64 {
         self.faults
     }
@@ -96,7 +96,7 @@ impl JointsReader {
         self.doubts.sentence()
     }
 
-    /// What speaks, once there is a hand to tell it by: hand, unit, rate and fit.
+    /// The sentence that describes the sender, once enough records are fitted: hand, unit, rate and fit.
     fn introduction(&self, time_s: f64) -> Option<String> {
         let first_s = self.first_s?;
         let FitErrors { records, rms_m, .. } = self.fit_errors;
@@ -109,7 +109,7 @@ impl JointsReader {
         })
     }
 
-    /// How well the hand fits.
+    /// How well the kinematic hand fits the sender's joints.
     pub fn fit_errors(&self) -> FitErrors {
         self.fit_errors
     }
@@ -135,7 +135,7 @@ impl JointsReader {
         Some((fitted.angles, self.world_from_sender? * fitted.world_from_palm))
     }
 
-    /// Takes a record; once, what speaks.
+    /// Fits the hand to a record; returns, once, the sentence that describes the sender.
     fn follow(&mut self, record: &JointsRecord, time_s: f64) -> Option<String> {
         // Of a stream in another unit no joint is where it says.
         if !self.doubts.is_of_human_size(record) {

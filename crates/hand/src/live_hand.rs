@@ -20,27 +20,27 @@ enum Source {
 }
 
 impl LiveHand {
-    /// Glove and tracker; `name` stands in reports.
+    /// The hand that glove and tracker on serial ports measure; `name` stands in reports.
     pub fn serial(devices: SerialDevices, name: String) -> Self {
         Self { source: Source::Serial(Box::new(devices)), name }
     }
 
-    /// A stream of joints; `name` stands in reports.
+    /// The hand that a stream of joints shows; `name` stands in reports.
     pub fn joints(listener: JointsListener, name: String) -> Self {
         Self { source: Source::Joints(listener), name }
     }
 
-    /// Joints that another part of the program hands on; `name` stands in reports.
+    /// The hand whose joints another part of the program hands on; `name` stands in reports.
     pub fn fed(feed: JointsFeed, name: String) -> Self {
         Self { source: Source::Fed(feed), name }
     }
 
-    /// Its name in reports.
+    /// Name of the hand in reports.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What has come since the last call; never waits.
+    /// Bytes of the devices that have come since the last call; never waits.
     ///
     /// Units: `now_s` s on the client's clock, now.
     pub fn take(&mut self, now_s: f64) -> Vec<Arrival> {
@@ -63,7 +63,7 @@ impl LiveHand {
         }
     }
 
-    /// Pieces that were dropped because no tick took them in time.
+    /// Number of pieces that were dropped because no tick took them in time.
     pub fn dropped(&self) -> u64 {
         match &self.source {
             Source::Serial(devices) => devices.dropped(),
@@ -72,7 +72,7 @@ impl LiveHand {
         }
     }
 
-    /// What is wrong with its devices, or what they wait for, a sentence each; none while all talk.
+    /// What is wrong with the devices, or what they wait for, a sentence each; none while all talk.
     pub fn complaints(&self) -> Vec<Notice> {
         match &self.source {
             Source::Serial(devices) => {
@@ -112,7 +112,7 @@ fn joints(pieces: Vec<ArrivedBytes>, at: impl Fn(Instant) -> Option<f64>) -> Vec
     pieces.into_iter().map(arrival).collect()
 }
 
-/// What a person has to know of a device.
+/// The notice that a person needs about the state of a device; `None` while it works.
 fn complaint(device: Device, state: &DeviceState) -> Option<Notice> {
     let name = device.name();
     Some(match state {

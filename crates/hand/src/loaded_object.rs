@@ -7,28 +7,28 @@ use crate::scripted::{GraspPlan, NoGrasp};
 
 /// An object ready for the hand.
 pub struct LoadedObject {
-    /// What it is, for reports.
+    /// Name, size and origin of the object, for reports.
     pub summary: ObjectSummary,
     /// Longest extent that the mesh was brought to, m; `None` where it kept its own.
     pub brought_to_m: Option<f64>,
-    /// The object, at rest.
+    /// The object, in its rest shape.
     pub object: SoftObject,
-    /// How the hand grasps it, or why it cannot.
+    /// Plan of the hand to grasp the object, or why it cannot.
     pub plan: Result<GraspPlan, NoGrasp>,
 }
 
-/// What was grasped.
+/// Summary of an object, for reports.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObjectSummary {
-    /// Name or file.
+    /// Name of a built-in object, or its file.
     pub name: String,
-    /// Nodes.
+    /// Number of nodes of the mesh.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements of the mesh.
     pub tets: usize,
-    /// Longest extent, m.
+    /// Longest extent of the object, m.
     pub size_m: f64,
-    /// What was done to it.
+    /// What was done to the mesh when it was loaded, a note each.
     pub notes: Vec<String>,
 }
 
@@ -41,11 +41,11 @@ pub enum LoadStage {
     Tree,
     /// A good way to grasp it is looked for.
     Plan,
-    /// It is there.
+    /// The object is ready.
     Ready,
 }
 
 impl LoadStage {
-    /// All of them, in order.
+    /// All stages, in order.
     pub const ALL: [Self; 4] = [Self::Mesh, Self::Tree, Self::Plan, Self::Ready];
 }

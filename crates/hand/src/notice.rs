@@ -5,11 +5,11 @@
 pub struct Notice {
     /// The sentence: what happened, or what did not, why, and what to do.
     pub text: String,
-    /// What kind of news it is.
+    /// Whether what was asked for is done, waits or is refused.
     pub kind: NoticeKind,
 }
 
-/// Kinds of news.
+/// Kinds of notices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoticeKind {
     /// What was asked for is done.
@@ -21,17 +21,17 @@ pub enum NoticeKind {
 }
 
 impl Notice {
-    /// What was asked for is done.
+    /// A notice that what was asked for is done.
     pub fn done(text: impl Into<String>) -> Self {
         Self { text: text.into(), kind: NoticeKind::Done }
     }
 
-    /// What was asked for takes its time, or needs something first.
+    /// A notice that what was asked for takes its time, or needs something first.
     pub fn waits(text: impl Into<String>) -> Self {
         Self { text: text.into(), kind: NoticeKind::Waits }
     }
 
-    /// What was asked for is not done.
+    /// A notice that what was asked for is not done.
     pub fn refused(text: impl Into<String>) -> Self {
         Self { text: text.into(), kind: NoticeKind::Refused }
     }

@@ -3,14 +3,14 @@
 use serde::{Deserialize, Serialize};
 use softgrasp_grasp::grasp::Command;
 
-/// What comes into one tick.
+/// Input of one tick: device bytes and a menu command.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sent {
     /// Bytes of the devices, in the order in which they came.
     pub arrivals: Vec<Arrival>,
-    /// Menu command.
+    /// Menu command of the person, or of the script.
     pub command: Option<Command>,
-    /// The script is over; the hand rests.
+    /// Whether the script is over and the hand rests.
     pub over: bool,
     /// What the tick did with the server's answers when it was recorded; `None` unless it is played
     /// again.
@@ -20,21 +20,21 @@ pub struct Sent {
 /// What a tick that is played again has to wait for, and what it must not take yet.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordedAnswers {
-    /// Method that answered what it asked; `None` if no tick took an answer to it.
+    /// Method that answered the tick's request; `None` if no tick took an answer to it.
     pub answered_by: Option<String>,
     /// Whether that answer's path at large deformation began at rest.
     pub from_rest: bool,
-    /// Whether there was no shape that the object could spring back to.
+    /// Whether that answer said that there is no shape to which the object could spring back.
     pub springback_refused: bool,
-    /// Ticks whose answers it takes, in that order.
+    /// Numbers of the ticks whose answers this tick takes, in that order.
     pub taken: Vec<u64>,
-    /// Whether it takes a rest shape that was made beside the ticks.
+    /// Whether the tick takes a rest shape that was made beside the ticks.
     pub took_work: bool,
-    /// Whether it waits no longer for the step of a free object that an earlier tick asked for.
+    /// Whether the tick waits no longer for the step of a free object that an earlier tick asked for.
     pub gives_up_step: bool,
 }
 
-/// Where bytes come from.
+/// Device or sender from which bytes come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Device {
@@ -47,7 +47,7 @@ pub enum Device {
 }
 
 impl Device {
-    /// Its name in sentences.
+    /// Name of the device in sentences.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Glove => "glove",
@@ -57,17 +57,17 @@ impl Device {
     }
 }
 
-/// Bytes that came together.
+/// Bytes of one device that came together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrival {
-    /// Where they come from.
+    /// Device that sent the bytes.
     pub device: Device,
     /// When their first byte came, s on the client's clock; `None` stands for the tick that takes
     /// them: a hand that is played sends when it is looked at.
     pub at_s: Option<f64>,
-    /// They are a datagram: what follows does not go on where they end.
+    /// Whether the bytes are a datagram: what follows does not go on where they end.
     pub is_datagram: bool,
-    /// The bytes.
+    /// The bytes, as they came.
     pub bytes: Vec<u8>,
 }
 

@@ -20,7 +20,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Beside<Job, Done> {
     /// Starts the thread.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// The error of the operating system, when it starts no thread.
     pub fn start(
         name: &str,
         mut work: impl FnMut(Job) -> Done + Send + 'static,

@@ -10,7 +10,7 @@ pub fn thread_cpu_time() -> Option<Duration> {
     clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).ok().map(Duration::from)
 }
 
-/// See above; this system does not tell.
+/// Always `None`: this system does not tell how long a thread has computed.
 #[cfg(not(unix))]
 pub fn thread_cpu_time() -> Option<Duration> {
     None

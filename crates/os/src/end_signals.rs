@@ -10,21 +10,22 @@ use std::io;
 /// A signal that asked the program to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EndSignal {
-    /// As `SIGTERM`; `Ctrl-C` where the system has no signals.
+    /// Name of the signal, for example `SIGTERM`; `Ctrl-C` where the system has no signals.
     pub name: &'static str,
-    /// Exit code by which a shell knows a program that this signal ended: 128 and its number.
+    /// Exit code by which a shell knows a program that this signal ended: 128 plus the signal's number.
     pub exit_code: u8,
-    /// Whether it is that of a closed terminal, by which one also asks a server to read its files again.
+    /// Whether the signal is SIGHUP: its terminal was closed, or a server is asked to read its files
+    /// again.
     pub is_hang_up: bool,
 }
 
-/// Calls `react`, on a thread of its own, for every signal that asks the program to end: Ctrl-C,
-/// and that of `docker stop`; `hang_up` adds that of a closed terminal.
+/// Calls `react`, on a thread of its own, for every signal that asks the program to end: SIGINT (Ctrl-C)
+/// and SIGTERM (`docker stop`); `hang_up` adds SIGHUP (the terminal was closed).
 ///
-/// To be called before any other thread is started: threads inherit what is blocked.
+/// To be called before any other thread is started: threads inherit which signals are blocked.
 ///
 /// # Errors
-/// The system's, where signals cannot be blocked or the thread not be started.
+/// The error of the operating system, where signals cannot be blocked or the thread cannot be started.
 #[cfg(unix)]
 pub fn on_end_signal(
     hang_up: bool,
@@ -54,10 +55,11 @@ pub fn on_end_signal(
     waits.map(drop)
 }
 
-/// See above; only Ctrl-C and what the system counts as its like.
+/// Calls `react`, on a thread of its own, for Ctrl-C and what the system treats like it. `_hang_up` does
+/// nothing on this system.
 ///
 /// # Errors
-/// The system's, where no handler can be set.
+/// The error of the operating system, where no handler can be set.
 #[cfg(not(unix))]
 pub fn on_end_signal(
     _hang_up: bool,

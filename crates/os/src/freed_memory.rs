@@ -1,8 +1,8 @@
 //! Gives memory that the program has freed back to the system.
 
-/// Asks the allocator to give the pages back that hold nothing any more, in all its pools of memory. It
-/// keeps them otherwise, as holes between what is still held: the next large piece then lies beside the
-/// holes instead of in them. Takes some milliseconds for a gigabyte.
+/// Asks the allocator to give back to the system the pages that hold nothing any more, in all its pools
+/// of memory. Otherwise it keeps them, as holes between what is still held: the next large piece of
+/// memory then lies beside the holes instead of in them. Takes some milliseconds for a gigabyte.
 ///
 /// Does something with the C library of GNU only; other allocators have no such request.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]

@@ -15,7 +15,7 @@ pub fn others_can_read(path: &Path) -> bool {
     allows(&path, READ) && path.ancestors().skip(1).all(|folder| allows(folder, PASS))
 }
 
-/// See above; this system has no such modes.
+/// Always `false`: files have no such modes on this system.
 #[cfg(not(unix))]
 pub fn others_can_read(_path: &Path) -> bool {
     false

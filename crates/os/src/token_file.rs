@@ -5,18 +5,18 @@ use std::path::{Path, PathBuf};
 /// Why a file gives no token.
 #[derive(Debug, thiserror::Error)]
 pub enum TokenFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot read the token file {path}")]
     Read {
-        /// The file.
+        /// Path of the token file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Its first line is empty.
+    /// The first line of the file is empty.
     #[error("the token file {path} is empty")]
     Empty {
-        /// The file.
+        /// Path of the token file.
         path: PathBuf,
     },
 }

@@ -30,7 +30,7 @@ pub fn be_ordinary() {
     lower();
 }
 
-/// The least of the real-time priorities is above all that are none.
+/// Gives the calling thread the lowest real-time priority, which is above all ordinary priorities.
 #[cfg(unix)]
 fn raise() -> Result<(), Error> {
     use thread_priority::{

@@ -1,9 +1,9 @@
 //! What is seen of a run, and what a person asks of it.
 //!
 //! [`view`] is plain data: a copy of one tick, colours, camera, the skins of object and hand, and the
-//! wishes of the person. It knows no graphics card and is there without the feature `window`.
-//! `window` draws it with kiss3d and egui, on a screen or into pictures. How a run is played is the
-//! business of its owner: the window takes frames from an outlet and sends wishes into a channel.
+//! wishes of the person. It knows no graphics card and is there without the feature `window`. `window`
+//! draws it with kiss3d and egui, on a screen or into pictures. How a run is played is the business of
+//! its owner: the window takes views of ticks from an outlet and sends wishes into a channel.
 //!
 //! ```
 //! use nalgebra::{Point2, Point3};

@@ -1,17 +1,17 @@
 //! Cuts what the client sends to the glove into commands.
 
-/// What the interface unit is asked.
+/// A command of the client to the interface unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Command {
     /// `G` or `g`: one record, in text or not.
     Poll { text: bool },
     /// `S` or `s`: records until [`Command::Stop`].
     Stream { text: bool },
-    /// Ctrl-C.
+    /// Ctrl-C: ends a stream.
     Stop,
-    /// Ctrl-I.
+    /// Ctrl-I: initialises the unit again.
     Reinitialise,
-    /// Ctrl-R.
+    /// Ctrl-R: starts the firmware again.
     Restart,
     /// `?` and a letter, or a small letter and `?`.
     Query { letter: u8, small: bool },
@@ -19,9 +19,9 @@ pub(super) enum Command {
     SetBytes { letter: u8, bytes: Vec<u8> },
     /// A small letter and its decimal numbers.
     SetNumbers { letter: u8, numbers: Vec<u32> },
-    /// Nothing that it knows.
+    /// A command that the unit does not know.
     Unknown,
-    /// More numbers, or longer ones, than any command has.
+    /// A command with more numbers, or longer ones, than any has.
     TooManyNumbers,
     /// The end of a line that a command did not need.
     Nothing,

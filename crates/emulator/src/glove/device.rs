@@ -12,20 +12,20 @@ use super::unit::Unit;
 use crate::fault::{Fault, FaultSetting, Faults};
 use crate::line::OutLine;
 
-/// Which glove is emulated.
+/// Kind of the glove that is emulated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmulatedGloveKind {
-    /// Its sensors.
+    /// Number of sensors of the glove.
     pub sensors: SensorCount,
-    /// Its hand.
+    /// Hand that the glove is made for.
     pub hand: Handedness,
-    /// Speed of its line.
+    /// Speed of the serial line, bits per second.
     pub baud: u32,
     /// How long a restart (Ctrl-R) takes, s; 1.75 in the real one.
     pub restart_s: f64,
-    /// What goes wrong.
+    /// Faults that are switched on.
     pub faults: Vec<FaultSetting>,
-    /// Decides when it goes wrong.
+    /// Seed of the random numbers that decide when a fault occurs.
     pub seed: u64,
 }
 
@@ -53,11 +53,11 @@ pub struct EmulatedGlove {
     dead: SensorSet,
     line: OutLine,
     inbox: Vec<u8>,
-    /// Requests for one record: when, and whether in text.
+    /// Requests for one record: when each came, s, and whether the record is text.
     polls: VecDeque<(f64, bool)>,
     /// Time of the stream's next record, s, and whether it is text.
     stream: Option<(f64, bool)>,
-    /// Hears nothing before, s: it is restarting.
+    /// Time until which the unit hears nothing because it restarts, s.
     deaf_until_s: f64,
     clock_zero_s: f64,
 }
@@ -65,7 +65,7 @@ pub struct EmulatedGlove {
 /// Fastest sampling with and without the filter, 1/s.
 const FASTEST_FILTERED_HZ: f64 = 100.0;
 const FASTEST_HZ: f64 = 150.0;
-/// Records of a stream that nobody has asked to be sent for longer than this are not made up, s.
+/// A stream's records are not made up for if nobody has asked to be sent for longer than this, s.
 const BEHIND_MAX_S: f64 = 5.0;
 
 impl EmulatedGlove {
@@ -87,7 +87,7 @@ impl EmulatedGlove {
         }
     }
 
-    /// Which glove it is.
+    /// Kind of the glove.
     pub fn kind(&self) -> &EmulatedGloveKind {
         &self.kind
     }
@@ -97,7 +97,7 @@ impl EmulatedGlove {
         self.stream.is_some() || !self.polls.is_empty()
     }
 
-    /// Hears bytes of the client.
+    /// Takes bytes that the client has sent.
     pub fn receive(&mut self, bytes: &[u8], now_s: f64) {
         for &byte in bytes {
             if now_s < self.deaf_until_s || self.line.is_silent(now_s) {

@@ -9,7 +9,7 @@ use crate::FaultSetting;
 
 const COUNTS: [SensorCount; 2] = [SensorCount::Eighteen, SensorCount::TwentyTwo];
 
-/// Sensors that tell the time: hundredths of a second in base 250, from 1.
+/// Sensor values that tell the time: hundredths of a second in base 250, from 1.
 fn tagged(count: SensorCount, time_s: f64) -> RawSensors {
     let tag = (time_s * 100.0).round() as usize;
     RawSensors::from_fn(count, |sensor| match sensor {
@@ -23,7 +23,7 @@ fn glove(sensors: SensorCount) -> EmulatedGlove {
     EmulatedGlove::new(EmulatedGloveKind { sensors, ..EmulatedGloveKind::default() })
 }
 
-/// Everything that comes within `duration_s` of asking for something.
+/// All bytes that come within `duration_s` of a command.
 fn reply(glove: &mut EmulatedGlove, ask: &[u8], now_s: f64, duration_s: f64) -> Vec<u8> {
     let count = glove.kind().sensors;
     glove.receive(ask, now_s);
@@ -172,7 +172,7 @@ fn every_record_of_every_format_passes_the_parser_in_order() {
     }
 }
 
-/// Runs a faulty stream of 20 s; records whose values were sent, and faults.
+/// Runs a faulty stream of 20 s; returns the records whose values were sent, and the faults.
 fn faulty(fault: Fault, rate: f64) -> (Vec<usize>, Vec<GloveFaultKind>) {
     let count = SensorCount::TwentyTwo;
     let faults = vec![FaultSetting { fault, rate }];

@@ -3,7 +3,7 @@
 use softgrasp_grasp::hand::Handedness;
 use softgrasp_hand::devices::cyberglove::{Sensor, SensorCount};
 
-/// Settings of the unit, and the glove that hangs on it.
+/// Settings of the interface unit, and the glove that is plugged into it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Unit {
     pub(super) hardware: SensorCount,
@@ -17,14 +17,14 @@ pub(super) struct Unit {
     pub(super) quantised: bool,
     /// Slots that are sent, of 24.
     pub(super) mask: u32,
-    /// Sensors that are sent, the first of the mask.
+    /// Number of sensors that are sent: the first ones of the mask.
     pub(super) sent: usize,
     /// The two words of the stream's period.
     pub(super) period: [u16; 2],
 }
 
 impl Unit {
-    /// As after power-up.
+    /// The settings after power-up.
     pub(super) fn new(hardware: SensorCount, hand: Handedness) -> Self {
         Self {
             hardware,
@@ -93,7 +93,7 @@ impl Unit {
         ]
     }
 
-    /// Sets what a capital letter sets; whether there is such a setting.
+    /// Sets what a capital letter sets; returns whether there is such a setting.
     pub(super) fn set_bytes(&mut self, letter: u8, bytes: &[u8]) -> bool {
         match (letter, bytes) {
             (b'T', &[a, b, c, d]) => {
@@ -110,7 +110,7 @@ impl Unit {
         true
     }
 
-    /// Sets what a small letter sets; whether there is such a setting.
+    /// Sets what a small letter sets; returns whether there is such a setting.
     pub(super) fn set_numbers(&mut self, letter: u8, numbers: &[u32]) -> bool {
         match (letter, numbers) {
             (b't', &[first]) => self.period[0] = first.min(65_535) as u16,
@@ -161,7 +161,7 @@ fn slot(sensor: Sensor) -> usize {
     sensor.index() + usize::from(sensor.index() >= 7)
 }
 
-/// The slots that a glove has.
+/// Mask of the slots that a glove has.
 pub(super) fn hardware_mask(count: SensorCount) -> u32 {
     count.wire_order().fold(0, |mask, sensor| mask | 1 << slot(sensor))
 }

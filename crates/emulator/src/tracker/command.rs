@@ -1,6 +1,6 @@
 //! Cuts what the client sends to the tracker into commands.
 
-/// What the tracker is asked.
+/// A command of the client to the tracker.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Command {
     /// A letter or control character that stands alone.
@@ -9,7 +9,7 @@ pub(super) enum Command {
     Fields { letter: u8, fields: Vec<Field> },
     /// `X` and the text behind it.
     Text(String),
-    /// Nothing that it knows.
+    /// A letter that the tracker does not know as a command.
     Unknown(u8),
     /// The end of a line that a command did not need.
     Nothing,
@@ -18,16 +18,16 @@ pub(super) enum Command {
 /// One field between commas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Field {
-    /// Nothing stands there: the old value stays.
+    /// Nothing stands in the field: the old value stays.
     Omitted,
     /// A finite number.
     Number(f64),
-    /// Something else.
+    /// Text that is not a finite number.
     NotNumeric,
 }
 
 impl Field {
-    /// The number, if it is one.
+    /// The number, if the field holds one.
     pub(super) fn number(self) -> Option<f64> {
         match self {
             Self::Number(number) => Some(number),

@@ -11,23 +11,23 @@ use super::settings::{Refusal, Settings, error_record, station_index};
 use crate::fault::{Fault, FaultSetting, Faults};
 use crate::line::OutLine;
 
-/// Which tracker is emulated.
+/// Kind of the tracker that is emulated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmulatedTrackerKind {
-    /// Which receivers are plugged in.
+    /// Whether a receiver is plugged into each of the four sockets.
     pub plugged: [bool; 4],
-    /// Speed of its line.
+    /// Speed of the serial line, bits per second.
     pub baud: u32,
     /// How long re-initialisation (Ctrl-Y) takes, s; about 10 in the real one.
     pub restart_s: f64,
-    /// What goes wrong.
+    /// Faults that are switched on.
     pub faults: Vec<FaultSetting>,
-    /// Decides when it goes wrong.
+    /// Seed of the random numbers that decide when a fault occurs.
     pub seed: u64,
 }
 
 impl Default for EmulatedTrackerKind {
-    /// One receiver.
+    /// A tracker with one receiver.
     fn default() -> Self {
         Self {
             plugged: [true, false, false, false],
@@ -46,7 +46,7 @@ impl Default for EmulatedTrackerKind {
 pub struct EmulatedTracker {
     kind: EmulatedTrackerKind,
     settings: Settings,
-    /// What Ctrl-K has saved.
+    /// Settings that Ctrl-K has saved.
     saved: Settings,
     faults: Faults,
     line: OutLine,
@@ -55,11 +55,11 @@ pub struct EmulatedTracker {
     requests: VecDeque<(f64, Request)>,
     /// Time of the next record in continuous mode, s.
     next_s: f64,
-    /// Which of the active stations was measured last.
+    /// Position of the station that was measured last.
     turn: usize,
     suspended: bool,
     deaf_until_s: f64,
-    /// Records on the wrong side that are still to come.
+    /// Number of records on the wrong side that are still to come.
     flipped: u32,
     /// The side on which each receiver was last, where the tracker follows it.
     side: [Vector3<f64>; 4],
@@ -73,10 +73,9 @@ enum Request {
 
 /// Measurements per second, shared among the active stations.
 const RATE_HZ: f64 = 120.0;
-/// Records of a flip.
+/// Number of records that a flip lasts.
 const FLIP_RECORDS: u32 = 30;
-/// Records of continuous mode that nobody has asked to be sent for longer than this are not made
-/// up, s.
+/// Records of continuous mode are not made up for if nobody has asked to be sent for longer than this, s.
 const BEHIND_MAX_S: f64 = 5.0;
 /// Letters of failed self-tests that the fault shows.
 const ERROR_LETTERS: [u8; 5] = [b'a', b'j', b'k', b'x', b'y'];
@@ -102,7 +101,7 @@ impl EmulatedTracker {
         }
     }
 
-    /// Which tracker it is.
+    /// Kind of the tracker.
     pub fn kind(&self) -> &EmulatedTrackerKind {
         &self.kind
     }
@@ -112,7 +111,7 @@ impl EmulatedTracker {
         self.settings.continuous || !self.requests.is_empty()
     }
 
-    /// Hears bytes of the client.
+    /// Takes bytes that the client has sent.
     pub fn receive(&mut self, bytes: &[u8], now_s: f64) {
         for &byte in bytes {
             if now_s < self.deaf_until_s || self.line.is_silent(now_s) {

@@ -8,7 +8,7 @@ use softgrasp_hand::devices::fastrak::{
 use super::*;
 use crate::FaultSetting;
 
-/// A place that tells the time: 0.1 mm to the right for each hundredth of a second, 40 cm forward.
+/// A pose that tells the time: 0.1 mm to the right for each hundredth of a second, 40 cm forward.
 fn tagged(time_s: f64) -> Isometry3<f64> {
     let tag = (time_s * 120.0).round();
     Isometry3::from_parts(

@@ -5,18 +5,18 @@ use softgrasp_hand::devices::fastrak::{
     Attitude, Encoding, LengthUnit, OutputList, Station, push_number,
 };
 
-/// What can stand in a record.
+/// An item of a record, by its number in the output list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Item {
-    /// 0: a blank.
+    /// Item 0: a blank.
     Space,
-    /// 1: CR LF.
+    /// Item 1: CR LF.
     LineEnd,
-    /// 2: position.
+    /// Item 2: position.
     Position,
-    /// 4: azimuth, elevation, roll.
+    /// Item 4: azimuth, elevation, roll.
     Angles,
-    /// 11: quaternion, scalar first.
+    /// Item 11: quaternion, scalar first.
     Quaternion,
 }
 
@@ -38,12 +38,12 @@ impl Item {
     }
 }
 
-/// The columns of a record end here.
+/// Largest magnitude of a number that fits the columns of a record.
 const LARGEST: f64 = 999.99;
 
-/// One record.
+/// The bytes of one record.
 ///
-/// Frames: the pose is the receiver's in the transmitter's frame, m.
+/// Frames: `pose` is that of the receiver in the transmitter's frame, m.
 pub(super) fn record(
     station: Station,
     error: u8,

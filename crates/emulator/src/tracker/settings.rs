@@ -13,7 +13,7 @@ pub(super) struct StationSettings {
     pub(super) items: Vec<Item>,
     /// Points into the half of space where the receiver is; zero follows it.
     pub(super) hemisphere: Vector3<f64>,
-    /// Turns the attitude that was boresighted into none.
+    /// Rotation that turns the attitude that was boresighted into none.
     pub(super) boresight: UnitQuaternion<f64>,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Settings {
     pub(super) id: String,
 }
 
-/// What a command comes to when it is refused.
+/// Why a command is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refusal {
     MissingField = -1,
@@ -43,7 +43,7 @@ pub(super) enum Refusal {
 const FILTER: [f64; 4] = [0.2, 0.2, 0.8, 0.95];
 
 impl Settings {
-    /// As from the factory; the receivers that are plugged in are active.
+    /// The settings from the factory; the receivers that are plugged in are active.
     pub(super) fn factory(plugged: [bool; 4]) -> Self {
         Self {
             encoding: Encoding::Ascii,
@@ -86,7 +86,7 @@ impl Settings {
         format!("21S{word:03X}    F3{map:X}  {version:<6.6}{id:<32.32}\r\n").into_bytes()
     }
 
-    /// Obeys a command with fields; the reply, which most commands do not have.
+    /// Carries out a command with fields; returns the reply, which most commands do not have.
     pub(super) fn obey(&mut self, letter: u8, fields: &[Field]) -> Result<Vec<u8>, Refusal> {
         if fields.contains(&Field::NotNumeric) {
             return Err(Refusal::NotNumeric);
@@ -171,7 +171,7 @@ impl Settings {
     }
 }
 
-/// The place of the station that the first field names.
+/// Index of the station that the first field names.
 pub(super) fn station_index(fields: &[Field]) -> Result<usize, Refusal> {
     match fields.first().copied() {
         None | Some(Field::Omitted) => Err(Refusal::MissingField),
@@ -199,7 +199,7 @@ fn read_back_of_all(letter: u8, values: impl Iterator<Item = f64>, decimals: usi
     bytes
 }
 
-/// The error record.
+/// The error record about a command that was refused.
 pub(super) fn error_record(letter: u8, refusal: Refusal, station: u8) -> Vec<u8> {
     let shown = if letter.is_ascii_graphic() { char::from(letter) } else { '.' };
     let code = refusal as i32;

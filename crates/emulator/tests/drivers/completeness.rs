@@ -13,9 +13,9 @@ use super::served::{
     Served, glove_line, glove_settings, open_glove, open_tracker, port, tracker_line,
 };
 
-/// A device that was not served for so long has answered a question too late, s.
+/// Time without being served after which a device has answered a question too late, s.
 const LATE_S: f64 = 0.08;
-/// A device that was not served for so long may have been set up again, s.
+/// Time without being served after which a device may have been set up again, s.
 const BEGUN_ANEW_S: f64 = 0.7;
 
 /// A line holds what comes in so many seconds; what comes while nobody reads for longer is lost.

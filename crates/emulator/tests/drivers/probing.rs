@@ -10,7 +10,7 @@ use softgrasp_hand::serial::probe::{Found, probe};
 
 use super::served::{HANG, glove_line, tracker_line};
 
-/// What is found; a device that is not served in time is asked again.
+/// The device that is found on a port; one that is not served in time is asked again.
 fn find(path: &Path, wanted: impl Fn(&Found) -> bool) -> Option<Found> {
     let begun = Instant::now();
     loop {

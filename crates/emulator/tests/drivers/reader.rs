@@ -69,7 +69,7 @@ impl Reader {
         }
     }
 
-    /// Reads until something holds, or nothing has come for so long; whether it holds.
+    /// Reads until a condition holds, or nothing has come for so long; returns whether it holds.
     pub(super) fn within(&mut self, quiet: Duration, holds: impl Fn(&Self) -> bool) -> bool {
         let (mut pieces, mut since) = (self.pieces, Instant::now());
         loop {
@@ -87,7 +87,7 @@ impl Reader {
         }
     }
 
-    /// Reads until something holds.
+    /// Reads until a condition holds.
     pub(super) fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
         let begun = Instant::now();
         loop {

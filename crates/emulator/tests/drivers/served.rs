@@ -14,18 +14,18 @@ use softgrasp_hand::serial::{
     GloveMode, GloveSettings, PortName, SerialDevices, SerialSettings, TrackerSettings,
 };
 
-/// Only a hang takes so long.
+/// Time that only a hang takes.
 pub(super) const HANG: Duration = Duration::from_secs(120);
 
 /// A thread that serves a line until it is told to stop, and gives it back.
 pub(super) struct Served<Line> {
     pub(super) path: PathBuf,
     pub(super) stop: Arc<AtomicBool>,
-    /// Records made so far.
+    /// Number of records made so far.
     pub(super) made: Arc<AtomicUsize>,
     /// Longest time between two steps, s: how much the machine has stalled.
     pub(super) stall_s: Arc<Mutex<f64>>,
-    /// The line is not served for so long, once, ms.
+    /// Time for which the line is not served, once, ms.
     pub(super) pause_ms: Arc<AtomicU64>,
     pub(super) thread: JoinHandle<Line>,
 }
@@ -73,7 +73,7 @@ impl<Line: Send + 'static> Served<Line> {
     }
 }
 
-/// Sensors that carry the number of their record.
+/// Sensor values that carry the number of their record.
 pub(super) fn numbered(count: SensorCount, number: usize) -> RawSensors {
     RawSensors::from_fn(count, |sensor| match sensor {
         Sensor::ThumbRotation => (number % 250 + 1) as u8,
@@ -101,7 +101,7 @@ pub(super) fn glove_line(kind: EmulatedGloveKind, link: Option<&Path>) -> Served
     })
 }
 
-/// A place that carries the number of its record: so many millimetres to the right.
+/// A pose that carries the number of its record: so many millimetres to the right.
 pub(super) fn place(number: usize) -> Isometry3<f64> {
     Isometry3::translation(1e-3 * number as f64, 0.05, -0.4)
 }

@@ -13,11 +13,11 @@ pub enum Command {
     KeepShape,
     /// Let the object go where it is.
     Release,
-    /// Put the object back to its home pose.
+    /// Put the object back to its home pose, where it began.
     ReturnHome,
 }
 
-/// One tick's measurements.
+/// Measurements of one tick: palm, segments, what each finger touches, and the command.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepInput {
     /// Measured palm pose.
@@ -26,7 +26,7 @@ pub struct StepInput {
     pub world_from_segment: HandSegments,
     /// What each finger touches, thumb first (see [`super::sense`]).
     pub fingers: [FingerInput; 5],
-    /// The user's wish, if any.
+    /// The user's command, if there is one.
     pub command: Option<Command>,
 }
 
@@ -35,7 +35,7 @@ pub struct StepInput {
 pub enum GraspEvent {
     /// A measurement was not a finite number; the tick changed nothing.
     InputIgnored,
-    /// The command has no meaning in this state.
+    /// The command has no meaning in this state and is not carried out.
     Ignored(Command),
     /// The client now makes the deformed shape the rest shape and rebuilds the tree.
     ShapeKept,
@@ -54,16 +54,16 @@ pub enum GraspEvent {
 /// Known displacement of one node (`Q_k` of thesis (3.43a)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownNode {
-    /// Mesh node.
+    /// Number of the mesh node.
     pub node: u32,
-    /// How far the tip has moved since its contact, m, object frame.
+    /// Displacement of the tip since its contact, which the node takes over, m, object frame.
     pub displacement_in_object: Vector3<f64>,
 }
 
-/// One tick's outcome.
+/// Outcome of one tick: events, state, known displacements, and poses to display.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepOutput {
-    /// What happened, ascending in the order of [`GraspEvent`].
+    /// Events of the tick, ascending in the order of [`GraspEvent`].
     pub events: Vec<GraspEvent>,
     /// The state after the tick.
     pub state: StateName,

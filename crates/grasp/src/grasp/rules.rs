@@ -22,7 +22,7 @@ pub(super) fn recall(before: u8, finger: &FingerInput) -> u8 {
     }
 }
 
-/// Whether nothing of the finger is at or near the object.
+/// Whether no part of the finger is at or near the object.
 pub(super) fn is_clear(finger: &FingerInput) -> bool {
     finger.clear && penetration(finger) == 0
 }
@@ -97,7 +97,7 @@ pub(super) fn touch(
     events[first_new..].sort_unstable();
 }
 
-/// Whether any, and whether all, of index, middle and ring are held.
+/// Whether any, and whether all, of index, middle and ring finger are held.
 pub(super) fn grip(holds: &[Hold; 5]) -> (bool, bool) {
     let mut attaching = Finger::ALL.into_iter().filter(|f| f.attaches());
     let held = |f: Finger| holds[f.index()].contact().is_some();

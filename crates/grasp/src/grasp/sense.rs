@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::hand::HandColliders;
 use crate::sphere_tree::{Closeness, ContactHit, SphereTree, TIP_HITS_MAX, tip_hits};
 
-/// What one finger touches in one tick.
+/// What one finger touches in one tick, by its colliders and the sphere tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FingerInput {
     /// Whether each segment penetrates the object, from the palm outward.
@@ -14,7 +14,7 @@ pub struct FingerInput {
     pub clear: bool,
     /// Vertices the tip is inside of, nearest first; all `None` when it is outside.
     pub tip_hits: [Option<ContactHit>; TIP_HITS_MAX],
-    /// The contact point, m.
+    /// Contact point of the fingertip, m.
     pub tip_in_object: Point3<f64>,
 }
 

@@ -12,36 +12,37 @@ pub type HandSegments = [[Isometry3<f64>; 3]; 5];
 /// `recalled` counts, per finger, the segments from the palm that are shown there (0 to 3).
 #[derive(Clone, Debug, PartialEq)]
 pub enum GraspState {
-    /// Nothing touches.
+    /// No finger touches the object.
     Free {
-        /// Object from segment.
+        /// Last free poses of the segments in the object's frame, m.
         last_free: HandSegments,
     },
     /// Some finger penetrates the rigid object and is shown at its last free pose (thesis 4.5.3).
     Avoiding {
-        /// Object from segment.
+        /// Last free poses of the segments in the object's frame, m.
         last_free: HandSegments,
-        /// At least one is not 0.
+        /// Number of recalled segments of each finger, thumb first; at least one is not 0.
         recalled: [u8; 5],
     },
     /// The rigid object follows the palm (thesis 4.5.2).
     Attached {
-        /// Pose of the object kept since the attachment.
+        /// Pose of the object in the palm frame, kept since the attachment.
         palm_from_object: Isometry3<f64>,
-        /// At least one of index, middle and ring is held, and not all five are.
+        /// Whether each fingertip holds, thumb first: at least one of index, middle and ring finger, and
+        /// not all five.
         holds: [Hold; 5],
-        /// Object from segment.
+        /// Last free poses of the segments in the object's frame, m.
         last_free: HandSegments,
-        /// 3 for every held finger.
+        /// Number of recalled segments of each finger, thumb first; 3 for every held finger.
         recalled: [u8; 5],
     },
     /// All five tips hold, and their motion deforms the object (thesis 4.5.1).
     Deforming {
-        /// Pose of the object kept since the attachment.
+        /// Pose of the object in the palm frame, kept since the attachment.
         palm_from_object: Isometry3<f64>,
-        /// On five different nodes.
+        /// Contacts of the five tips, thumb first, on five different nodes.
         contacts: [Contact; 5],
-        /// Object from segment, as of the attachment.
+        /// Last free poses of the segments in the object's frame, m, as of the attachment.
         last_free: HandSegments,
     },
     /// Contacts are ignored until the hand is clear of the object.
@@ -51,42 +52,42 @@ pub enum GraspState {
 /// One fingertip in `Attached`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hold {
-    /// Touches as soon as the tip is inside.
+    /// The tip holds nothing, and touches as soon as it is inside the object.
     Open,
-    /// In contact.
+    /// The tip is in contact with a node.
     Held(Contact),
-    /// Left its contact; must be seen outside once before it can touch again.
+    /// The tip has left its contact; it must be seen outside once before it can touch again.
     Left,
 }
 
-/// A fingertip on a node.
+/// Contact of a fingertip with a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// Mesh node, no other finger's.
+    /// Number of the mesh node, which no other finger holds.
     pub node: u32,
-    /// Where the tip was when it touched; displacements count from here.
+    /// Contact point of the tip when it touched, m; displacements count from here.
     pub tip_at_contact_in_object: Point3<f64>,
-    /// Unit vertex normal there, outward.
+    /// Outward unit normal of the surface at the node.
     pub normal_in_object: Vector3<f64>,
 }
 
 /// The states by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StateName {
-    /// See [`GraspState::Free`].
+    /// State [`GraspState::Free`].
     Free,
-    /// See [`GraspState::Avoiding`].
+    /// State [`GraspState::Avoiding`].
     Avoiding,
-    /// See [`GraspState::Attached`].
+    /// State [`GraspState::Attached`].
     Attached,
-    /// See [`GraspState::Deforming`].
+    /// State [`GraspState::Deforming`].
     Deforming,
-    /// See [`GraspState::Detached`].
+    /// State [`GraspState::Detached`].
     Detached,
 }
 
 impl GraspState {
-    /// Its name.
+    /// Name of the state.
     pub fn name(&self) -> StateName {
         match self {
             Self::Free { .. } => StateName::Free,
@@ -97,7 +98,7 @@ impl GraspState {
         }
     }
 
-    /// What each fingertip holds, thumb first; nothing unless the object is attached.
+    /// Contact of each fingertip, thumb first; `None` for all of them unless the object is attached.
     pub fn contacts(&self) -> [Option<Contact>; 5] {
         match self {
             Self::Attached { holds, .. } => holds.map(|hold| hold.contact().copied()),
@@ -108,7 +109,7 @@ impl GraspState {
 }
 
 impl Hold {
-    /// The contact, if there is one.
+    /// The contact, if the tip holds a node.
     pub fn contact(&self) -> Option<&Contact> {
         match self {
             Self::Held(contact) => Some(contact),

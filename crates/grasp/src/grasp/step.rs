@@ -21,22 +21,23 @@ pub struct Grasp {
 /// Why a grasp cannot be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GraspError {
-    /// The margin is no distance.
+    /// The release margin is no distance.
     #[error("the release margin is {metres} m; it must be a finite number, at least 0")]
     Margin {
-        /// Margin given.
+        /// Release margin that was given.
         metres: f64,
     },
-    /// An object in the hand stays where the hand has it.
+    /// A hand holds the object, which stays where the hand has it.
     #[error("a hand holds the object; let it go first")]
     Held,
-    /// A pose with a number that is not finite.
+    /// The pose has a number that is not finite.
     #[error("the object's pose is not finite")]
     Pose,
 }
 
 impl Grasp {
-    /// Margin at which a tip lets go: three times the noise of one sensor count at a fingertip.
+    /// Usual release margin, at which a tip lets go: three times the noise of one sensor count at a
+    /// fingertip.
     pub const RELEASE_MARGIN_M: f64 = 0.003;
 
     /// A grasp of an object that rests at `home` (world from object).
@@ -57,12 +58,12 @@ impl Grasp {
         &self.state
     }
 
-    /// The margin, m; the same one is for [`super::sense`].
+    /// Release margin, m; [`super::sense`] takes it too.
     pub fn release_margin(&self) -> f64 {
         self.release_margin
     }
 
-    /// Where the object returns to (world from object).
+    /// Home pose, to which the object returns (world from object).
     pub fn home(&self) -> &Isometry3<f64> {
         &self.home
     }
@@ -109,17 +110,18 @@ impl Grasp {
         Ok(())
     }
 
-    /// Another home, where the object, which nothing holds, is put at once.
+    /// Sets another home pose, where the object, which nothing holds, is put at once.
     ///
     /// # Errors
-    /// As [`Grasp::place`].
+    /// Those of [`Grasp::place`].
     pub fn set_home(&mut self, world_from_home: Isometry3<f64>) -> Result<(), GraspError> {
         self.place(world_from_home)?;
         self.home = world_from_home;
         Ok(())
     }
 
-    /// Where the object is when the palm is at `world_from_palm`: it follows while it is attached.
+    /// Pose of the object when the palm is at `world_from_palm`: it follows the palm while it is
+    /// attached.
     ///
     /// Sense against this pose, then step with the same palm pose.
     pub fn world_from_object(&self, world_from_palm: &Isometry3<f64>) -> Isometry3<f64> {
@@ -160,7 +162,7 @@ impl Grasp {
         self.output(input, events)
     }
 
-    /// Carries out a command; false if there is none or it has no meaning in this state.
+    /// Carries out a command; returns false if there is none or it has no meaning in this state.
     fn obey(&mut self, command: Option<Command>, events: &mut Vec<GraspEvent>) -> bool {
         use GraspState::{Attached, Deforming};
         let Some(command) = command else { return false };
@@ -312,7 +314,7 @@ impl Grasp {
     }
 }
 
-/// What `Attached` and `Deforming` have in common.
+/// Data that the states `Attached` and `Deforming` have in common.
 struct Carried {
     palm_from_object: Isometry3<f64>,
     holds: [Hold; 5],

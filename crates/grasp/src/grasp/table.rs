@@ -32,9 +32,9 @@ pub fn transition_table() -> String {
 /// One kind of tick, in sets of fingers (bit 0 the thumb).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Case {
-    /// Tips inside the object.
+    /// Fingers whose tip is inside the object.
     pub(super) inside: u8,
-    /// Tips that have moved out by a centimetre since their contact.
+    /// Fingers whose tip has moved out by a centimetre since its contact.
     pub(super) out: u8,
     /// Fingers whose middle segment penetrates.
     pub(super) collide: u8,
@@ -106,7 +106,7 @@ const START_STATES: [StateName; 5] = [
     StateName::Detached,
 ];
 
-/// Index, middle and ring.
+/// The set of index, middle and ring finger.
 const THREE: u8 = 0b01110;
 const ALL: u8 = 0b11111;
 

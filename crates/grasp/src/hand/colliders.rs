@@ -7,14 +7,14 @@ use super::joints::Finger;
 use super::kinematics::{FingerPose, HandPose};
 use crate::shape::{Cylinder, Sphere};
 
-/// What one finger is to the collision search.
+/// Colliders of one finger: what the collision search sees of it.
 ///
 /// Units: m. Frame: whichever frame the hand was put into, the world at first.
 ///
 /// Source: thesis section 4.4.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FingerColliders {
-    /// Which finger.
+    /// Finger that the colliders belong to.
     pub finger: Finger,
     /// One cylinder per segment, palm to tip; the distal one ends at the tip sphere's centre.
     pub cylinders: [Cylinder; 3],
@@ -24,10 +24,10 @@ pub struct FingerColliders {
     pub contact_point: Point3<f64>,
 }
 
-/// What the hand is to the collision search; the palm is left out, as in the thesis.
+/// Colliders of a hand; the palm is left out, as in the thesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandColliders {
-    /// Thumb to little finger.
+    /// Colliders of each finger, thumb to little finger.
     pub fingers: [FingerColliders; 5],
 }
 
@@ -45,7 +45,7 @@ impl HandColliders {
         Self { fingers }
     }
 
-    /// The same colliders in another frame, for example an object's.
+    /// These colliders in another frame, for example an object's.
     #[must_use]
     pub fn in_frame(&self, frame_from_world: &Isometry3<f64>) -> Self {
         Self { fingers: self.fingers.map(|finger| finger.in_frame(frame_from_world)) }
@@ -58,7 +58,7 @@ impl HandColliders {
 }
 
 impl FingerColliders {
-    /// The same colliders in another frame.
+    /// These colliders in another frame.
     #[must_use]
     pub fn in_frame(&self, frame_from_world: &Isometry3<f64>) -> Self {
         let m = frame_from_world;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-/// Which hand; the left one is the mirror image of the right one across the palm's Y–Z plane.
+/// Right or left hand; the left one is the mirror image of the right one across the palm's Y–Z plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Handedness {
     /// Right hand.
@@ -13,7 +13,7 @@ pub enum Handedness {
 }
 
 impl Handedness {
-    /// `right` or `left`.
+    /// The word `right` or `left`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -31,7 +31,7 @@ impl Handedness {
     }
 }
 
-/// One of the four fingers.
+/// Dimensions of one of the four fingers.
 ///
 /// Units: m, rad. Frame: palm frame of a right hand (`docs/frames.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,7 @@ pub struct FingerDimensions {
     pub fan: f64,
     /// Share of the palm arch angle that this finger's metacarpal follows, 0 to 1.
     pub arch_share: f64,
-    /// Proximal, middle and distal segment; the distal one reaches the end of the pulp.
+    /// Lengths of proximal, middle and distal segment; the distal one reaches the end of the pulp.
     pub lengths: [f64; 3],
     /// Radii of the three segments at their thick (lower) end.
     pub radii: [f64; 3],
@@ -50,7 +50,7 @@ pub struct FingerDimensions {
     pub tip_radius: f64,
 }
 
-/// The thumb.
+/// Dimensions of the thumb.
 ///
 /// Units: m, rad. Frame: palm frame of a right hand (`docs/frames.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +62,7 @@ pub struct ThumbDimensions {
     /// Turn of the thumb about its own bone: how far the nail looks away from the back of the
     /// hand toward the outside.
     pub roll: f64,
-    /// Metacarpal, proximal and distal segment; the distal one reaches the end of the pulp.
+    /// Lengths of metacarpal, proximal and distal segment; the distal one reaches the end of the pulp.
     pub lengths: [f64; 3],
     /// Radii of the three segments at their thick (lower) end.
     pub radii: [f64; 3],
@@ -70,21 +70,21 @@ pub struct ThumbDimensions {
     pub tip_radius: f64,
 }
 
-/// Everything about a hand that does not move.
+/// Dimensions of a hand: all that does not change as it moves.
 ///
 /// Units: m. Invariant of [`HandDimensions::scaled`]: all lengths and radii are positive and each
 /// distal segment is longer than its tip radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandDimensions {
-    /// Which hand; the places below are for the right hand and mirrored on use.
+    /// Right or left hand; the places below are for the right hand and mirrored on use.
     pub handedness: Handedness,
     /// Wrist crease to the tip of the middle finger.
     pub hand_length: f64,
     /// Breadth across the knuckles.
     pub hand_breadth: f64,
-    /// Thumb.
+    /// Dimensions of the thumb.
     pub thumb: ThumbDimensions,
-    /// Index, middle, ring and little finger.
+    /// Dimensions of index, middle, ring and little finger.
     pub fingers: [FingerDimensions; 4],
 }
 
@@ -94,21 +94,21 @@ pub enum DimensionsError {
     /// Hand length is not a human one.
     #[error("hand length {length_m} m is outside 0.10 to 0.30 m")]
     Length {
-        /// Length given.
+        /// Length that was given, m.
         length_m: f64,
     },
     /// Hand breadth is not a human one.
     #[error("hand breadth {breadth_m} m is outside 0.04 to 0.16 m")]
     Breadth {
-        /// Breadth given.
+        /// Breadth that was given, m.
         breadth_m: f64,
     },
     /// The hand is so short and broad that a fingertip would be a ball longer than its bone.
     #[error("hand length {length_m} m is too short for breadth {breadth_m} m")]
     Proportion {
-        /// Length given.
+        /// Length that was given, m.
         length_m: f64,
-        /// Breadth given.
+        /// Breadth that was given, m.
         breadth_m: f64,
     },
 }
@@ -180,7 +180,7 @@ impl HandDimensions {
         Ok(hand)
     }
 
-    /// The same hand as a left or right one.
+    /// This hand as a left or right one.
     #[must_use]
     pub fn with_handedness(self, handedness: Handedness) -> Self {
         Self { handedness, ..self }

@@ -16,7 +16,7 @@ pub enum Finger {
 }
 
 impl Finger {
-    /// All five, thumb first.
+    /// All five digits, thumb first.
     pub const ALL: [Self; 5] = [Self::Thumb, Self::Index, Self::Middle, Self::Ring, Self::Little];
 
     /// Position in [`Finger::ALL`] and in every array with one entry per finger.
@@ -78,15 +78,15 @@ pub struct ThumbAngles {
 /// Source: thesis section 2.2.2 (which joints the glove has sensors for).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointAngles {
-    /// Thumb.
+    /// Joint angles of the thumb.
     pub thumb: ThumbAngles,
-    /// Index finger.
+    /// Joint angles of the index finger.
     pub index: FingerAngles,
-    /// Middle finger.
+    /// Joint angles of the middle finger.
     pub middle: FingerAngles,
-    /// Ring finger.
+    /// Joint angles of the ring finger.
     pub ring: FingerAngles,
-    /// Little finger.
+    /// Joint angles of the little finger.
     pub little: FingerAngles,
     /// Cupping of the palm at the little finger's side, positive = toward the palm.
     pub palm_arch: f64,
@@ -99,7 +99,7 @@ pub struct JointAngles {
 /// Number of angles in [`JointAngles`].
 pub const ANGLE_COUNT: usize = 23;
 
-/// Their names, in the order of [`JointAngles::to_array`].
+/// Names of the joint angles, in the order of [`JointAngles::to_array`].
 pub const ANGLE_NAMES: [&str; ANGLE_COUNT] = [
     "thumb rotation",
     "thumb mpj",
@@ -198,7 +198,7 @@ impl JointAngles {
         array
     }
 
-    /// The inverse of [`JointAngles::to_array`].
+    /// The joint angles of an array in the order of [`JointAngles::to_array`].
     pub fn from_array(a: &[f64; ANGLE_COUNT]) -> Self {
         let finger = |i: usize| FingerAngles {
             mcp_flexion: a[i],
@@ -223,7 +223,7 @@ impl JointAngles {
         }
     }
 
-    /// Joint by joint between `self` (`t` = 0) and `other` (`t` = 1).
+    /// Joint angles between those of `self` (`t` = 0) and of `other` (`t` = 1), each linear in `t`.
     pub fn lerp(&self, other: &Self, t: f64) -> Self {
         let (from, to) = (self.to_array(), other.to_array());
         let mut between = [0.0; ANGLE_COUNT];

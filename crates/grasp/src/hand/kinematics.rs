@@ -9,7 +9,7 @@ use super::joints::{Finger, FingerAngles, JointAngles, ThumbAngles};
 /// and straight out of the pulp (−Z), as a share of the tip radius on each axis.
 const CONTACT_SHARE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// One finger segment.
+/// Pose of one finger segment.
 ///
 /// Units: m. Frame: origin at the lower joint, +Y along the bone, +Z out of the back of the
 /// finger.
@@ -22,24 +22,24 @@ pub struct SegmentPose {
 }
 
 impl SegmentPose {
-    /// Lower joint, in the world.
+    /// Lower joint of the segment, in the world.
     pub fn start(&self) -> Point3<f64> {
         self.world_from_segment * Point3::origin()
     }
 
-    /// Upper joint, or for the distal segment the very end of the pulp, in the world.
+    /// Upper joint of the segment, or for the distal one the very end of the pulp, in the world.
     pub fn end(&self) -> Point3<f64> {
         self.world_from_segment * Point3::new(0.0, self.length, 0.0)
     }
 }
 
-/// One finger: its three segments and its tip.
+/// Pose of one finger: its three segments and its tip.
 ///
 /// Units: m. Frame: world. Segments: proximal, middle, distal; for the thumb metacarpal,
 /// proximal, distal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FingerPose {
-    /// Which finger.
+    /// Finger that the pose belongs to.
     pub finger: Finger,
     /// Segments from the palm to the tip.
     pub segments: [SegmentPose; 3],
@@ -50,23 +50,23 @@ pub struct FingerPose {
 }
 
 impl FingerPose {
-    /// End of the pulp.
+    /// End of the finger's pulp.
     pub fn tip(&self) -> Point3<f64> {
         self.segments[2].end()
     }
 }
 
-/// The whole hand in the world.
+/// Pose of the whole hand in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandPose {
     /// Palm frame in the world (`docs/frames.md`).
     pub world_from_palm: Isometry3<f64>,
-    /// Thumb to little finger.
+    /// Poses of thumb to little finger.
     pub fingers: [FingerPose; 5],
 }
 
 impl HandPose {
-    /// One finger of the hand.
+    /// Pose of one finger of the hand.
     pub fn finger(&self, finger: Finger) -> &FingerPose {
         &self.fingers[finger.index()]
     }

@@ -28,7 +28,7 @@ pub struct HandBody {
 }
 
 impl HandBody {
-    /// Its shape.
+    /// Shape of the body.
     pub fn shape(&self) -> RigidShape {
         RigidShape::Capsule { radius: self.radius, length: self.length }
     }
@@ -40,7 +40,7 @@ impl HandBody {
         [-0.5, 0.5].map(|share| self.world_from_body * Point3::new(0.0, 0.0, share * self.length))
     }
 
-    /// Distance of a point of the world from its surface, below 0 inside, m.
+    /// Distance of a point of the world from the body's surface, below 0 inside, m.
     pub fn distance(&self, point: &Point3<f64>) -> f64 {
         self.shape().distance(&self.world_from_body.inverse_transform_point(point)).distance
     }

@@ -6,12 +6,12 @@ use std::str::FromStr;
 
 use softgrasp_core::mesh::BuiltIn;
 
-/// Which object is grasped.
+/// Choice of the object that is grasped.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ObjectChoice {
-    /// Made here.
+    /// A built-in object, whose mesh the program generates.
     BuiltIn(BuiltIn),
-    /// Read from a mesh file.
+    /// An object that is read from a mesh file.
     File(PathBuf),
 }
 

@@ -4,15 +4,16 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// What a fingertip holds.
+/// Contact model: which part of the surface a fingertip holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ContactModel {
-    /// The single node it touched, as in the thesis. Its force goes to zero as the mesh is refined.
+    /// The single node that the fingertip touched, as in the thesis. Its force goes to zero as the mesh
+    /// is refined.
     Vertex,
-    /// Every surface node within the fingertip's radius of the one it touched.
+    /// Every surface node within the fingertip's radius of the node that it touched.
     Patch,
     /// The mean of the surface under the fingertip, weighted by its pressure, with one force. Its
-    /// force converges as the mesh is refined, and its frames cost what those of a vertex do
+    /// force converges as the mesh is refined, and its ticks cost the server what those of a vertex do
     /// (`reports/contact.md`).
     #[default]
     Mask,
@@ -21,7 +22,7 @@ pub enum ContactModel {
     Friction,
 }
 
-/// A name that is no contact model's.
+/// The text is not the name of a contact model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no contact model is called '{0}'; there are vertex, patch, mask and friction")]
 pub struct UnknownContact(String);

@@ -18,24 +18,24 @@ pub struct RestShape {
     normals: Vec<Vector3<f64>>,
 }
 
-/// An object that cannot be touched.
+/// Why an object cannot be touched, or a shape not be kept.
 #[derive(Debug, thiserror::Error)]
 pub enum ObjectError {
     /// The surface gives no tree or no normals.
     #[error("the object's surface cannot be searched: {0}")]
     Tree(#[from] TreeError),
-    /// A shape that is no mesh any more.
+    /// The shape's vertices make no mesh any more.
     #[error("the shape cannot be kept: {0}; let go and grasp again")]
     Shape(#[from] MeshError),
-    /// A shape with elements turned inside out.
+    /// The shape has elements that are turned inside out.
     #[error("the shape cannot be kept: {0}; open the hand a little and keep it then")]
     Inverted(Inversion),
-    /// An answer for another mesh.
+    /// The answer is for another mesh.
     #[error("the answer holds {got} displacements, {expected} nodes were asked for")]
     Count {
-        /// Displacements in the answer.
+        /// Number of displacements in the answer.
         got: usize,
-        /// Nodes of the object, or of its surface.
+        /// Number of nodes of the object, or of its surface.
         expected: usize,
     },
 }
@@ -54,7 +54,7 @@ impl RestShape {
         Ok(Self { mesh, surface, stars, tree, normals })
     }
 
-    /// The same object with a deformed shape as its rest shape (thesis 4.6, 6.1.2).
+    /// The rest shape that a deformed shape of this object makes (thesis 4.6, 6.1.2).
     ///
     /// Shapes: `vertices` one per node.
     ///
@@ -66,7 +66,7 @@ impl RestShape {
         Self::try_new(self.mesh.with_vertices(vertices)?)
     }
 
-    /// Whether a deformed shape could become the rest shape.
+    /// Checks whether a deformed shape could become the rest shape.
     ///
     /// # Errors
     /// [`ObjectError::Inverted`] says which elements are turned inside out and how far.
@@ -74,17 +74,17 @@ impl RestShape {
         Inversion::of(&self.mesh, vertices).map_or(Ok(()), |i| Err(ObjectError::Inverted(i)))
     }
 
-    /// The mesh.
+    /// The mesh at rest.
     pub fn mesh(&self) -> &TetMesh {
         &self.mesh
     }
 
-    /// Boundary triangles and nodes.
+    /// Boundary surface: triangles and nodes.
     pub fn surface(&self) -> &Surface {
         &self.surface
     }
 
-    /// Sphere tree over the surface.
+    /// Sphere tree over the nodes of the boundary surface.
     pub fn tree(&self) -> &SphereTree {
         &self.tree
     }
@@ -112,7 +112,7 @@ impl RestShape {
         nalgebra::center(&low, &high)
     }
 
-    /// Height of its lowest point, m: the height of the table that it lies on.
+    /// Height of the object's lowest point, m: the height of the table that it lies on.
     pub fn bottom(&self) -> f64 {
         self.mesh.bounds().0.y
     }

@@ -11,7 +11,7 @@ const ABOVE_OF_SIZE: f64 = 1e-9;
 /// Most turns over one edge or point. A ball of ten thousand facets rolls over some hundreds.
 const TURNS_MAX: usize = 20_000;
 
-/// The same mesh, turned so that it lies on a table, with the middle of its box where it was.
+/// A mesh turned so that it lies on a table, with the middle of its box where it was, and that rotation.
 ///
 /// A mesh that lies already is not turned.
 ///
@@ -51,7 +51,7 @@ pub fn resting_turn(points: &[Point3<f64>], centre: &Point3<f64>) -> UnitQuatern
 /// A body that is not above its support: it falls about a pivot.
 struct Fall {
     pivot: Vector3<f64>,
-    /// Horizontal, from the pivot to below the centre of mass.
+    /// Horizontal direction from the pivot to below the centre of mass.
     direction: Vector3<f64>,
 }
 
@@ -96,7 +96,7 @@ impl Fall {
     }
 }
 
-/// The corners of the convex hull, around it; one or two for what is a point or a line.
+/// The corners of the convex hull, around it; one or two for points that are one point or on a line.
 fn convex_hull(mut points: Vec<Vector2<f64>>) -> Vec<Vector2<f64>> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();

@@ -34,7 +34,7 @@ impl SoftObject {
         Ok(Self::at_rest(RestShape::try_new(mesh)?, 1))
     }
 
-    /// The same object with its `rest_shapes`-th rest shape, at rest in it.
+    /// An object at rest in its `rest_shapes`-th rest shape.
     pub fn at_rest(rest: impl Into<Arc<RestShape>>, rest_shapes: u64) -> Self {
         let rest = rest.into();
         let shape = rest.mesh().vertices().to_vec();
@@ -50,7 +50,7 @@ impl SoftObject {
         }
     }
 
-    /// The shape it returns to when nothing holds it, as a mesh.
+    /// Mesh of the rest shape, to which the object returns when nothing holds it.
     pub fn rest(&self) -> &TetMesh {
         self.rest.mesh()
     }
@@ -60,17 +60,17 @@ impl SoftObject {
         &self.rest
     }
 
-    /// Boundary triangles and nodes.
+    /// Boundary surface: triangles and nodes.
     pub fn surface(&self) -> &Surface {
         self.rest.surface()
     }
 
-    /// Vertices as they are now.
+    /// Positions of all vertices as they are now, m.
     pub fn shape(&self) -> &[Point3<f64>] {
         &self.shape
     }
 
-    /// Displacement of every node from the rest shape.
+    /// Displacement of every node from the rest shape, m.
     pub fn displacement(&self) -> &[[f64; 3]] {
         &self.displacement
     }
@@ -113,7 +113,7 @@ impl SoftObject {
     /// Shapes: `displacement` one per node of [`Surface::nodes`], in their order.
     ///
     /// # Errors
-    /// As [`SoftObject::apply`].
+    /// Those of [`SoftObject::apply`].
     pub fn apply_to_surface(&mut self, displacement: &[[f64; 3]]) -> Result<(), ObjectError> {
         let expected = self.surface().nodes.len();
         if displacement.len() != expected {
@@ -135,7 +135,7 @@ impl SoftObject {
         self.whole
     }
 
-    /// Back to the rest shape (the fingers have let go).
+    /// Takes the object back to its rest shape, when the fingers have let go.
     ///
     /// # Errors
     /// [`ObjectError::Tree`], not seen for a shape that once was good.

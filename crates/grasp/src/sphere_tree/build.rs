@@ -8,9 +8,9 @@ use crate::shape::Sphere;
 /// The spheres of a tree, breadth first, and the vertices in Morton order.
 pub(super) struct Cells {
     pub(super) nodes: Vec<TreeNode>,
-    /// Mesh node in each slot.
+    /// Number of the mesh node in each slot.
     pub(super) vertices: Vec<u32>,
-    /// Its position.
+    /// Position of the node in each slot.
     pub(super) points: Vec<Point3<f64>>,
 }
 
@@ -194,7 +194,7 @@ const LEVELS: u32 = 21;
 /// Node indices are 32 bits and there are fewer than two nodes per vertex.
 const VERTEX_COUNT_MAX: usize = 1 << 30;
 
-/// Covers the rounding of a distance.
+/// Factor that covers the rounding of a distance.
 const ROUND_UP: f64 = 1.0 + 8.0 * f64::EPSILON;
 
 /// Each step halves the size of the groups of bits that still lie together.

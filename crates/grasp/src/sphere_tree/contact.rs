@@ -12,15 +12,15 @@ use crate::shape::Sphere;
 /// A surface vertex a fingertip is in contact with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactHit {
-    /// Mesh node of the vertex.
+    /// Number of the mesh node.
     pub node: u32,
-    /// From the vertex to the fingertip's contact point (|D| of 4.10), m.
+    /// Distance from the vertex to the fingertip's contact point (|D| of 4.10), m.
     pub distance: f64,
     /// Unit vertex normal N of (4.10), in the frame of the tree.
     pub normal: Vector3<f64>,
 }
 
-/// Vertices offered per fingertip: five tips can always take five different ones.
+/// Most vertices that are offered per fingertip: five tips can always take five different ones.
 pub const TIP_HITS_MAX: usize = 5;
 
 /// Vertices a fingertip is inside of, nearest to its contact point first; empty when it is outside.

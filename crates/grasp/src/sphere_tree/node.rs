@@ -9,7 +9,7 @@ use crate::shape::Sphere;
 pub(super) struct TreeNode {
     pub(super) sphere: Sphere,
     pub(super) first_child: u32,
-    /// 0 for a leaf.
+    /// Number of children; 0 for a leaf.
     pub(super) children: u32,
     pub(super) first_slot: u32,
     pub(super) slots: u32,
@@ -31,26 +31,26 @@ pub enum TreeError {
     /// There is no surface vertex to enclose.
     #[error("a sphere tree needs at least one surface vertex")]
     NoVertices,
-    /// More vertices than a tree can index.
+    /// There are more vertices than a tree can index.
     #[error("{count} surface vertices, but a sphere tree holds at most {limit}")]
     TooMany {
-        /// Vertices given.
+        /// Number of vertices given.
         count: usize,
-        /// Largest number allowed.
+        /// Largest number of vertices that is allowed.
         limit: usize,
     },
     /// A surface vertex is not among the positions.
     #[error("surface node {node} is not among the {node_count} positions (0-based)")]
     IndexOutOfRange {
-        /// The offending node.
+        /// Node that is not among the positions.
         node: u32,
-        /// Positions given.
+        /// Number of positions given.
         node_count: usize,
     },
     /// A coordinate is NaN, infinite, or so large that its square is.
     #[error("node {node} has a coordinate that is not a finite number below 1e150")]
     NotFinite {
-        /// The offending node.
+        /// Node with this coordinate.
         node: u32,
     },
 }

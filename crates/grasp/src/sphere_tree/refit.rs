@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::node::{LeafRest, TreeNode};
 use crate::shape::Sphere;
 
-/// Moves the spheres after the points; back comes the search cost measure (see [`search_cost`]).
+/// Moves the spheres after the points; returns the search cost measure (see [`search_cost`]).
 ///
 /// A leaf's sphere travels with its vertex; a parent becomes a sphere around its children's.
 pub(super) fn refit_spheres(

@@ -31,7 +31,7 @@ use crate::shape::{Cylinder, Sphere};
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereTree {
     nodes: Vec<TreeNode>,
-    /// Mesh node in each slot.
+    /// Number of the mesh node in each slot.
     vertices: Vec<u32>,
     /// Position of the vertex in each slot, as of the last build or refit.
     points: Vec<Point3<f64>>,
@@ -47,24 +47,24 @@ pub struct SphereTree {
 /// How close a collider is to the surface vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Closeness {
-    /// No vertex within the margin.
+    /// No vertex is within the margin.
     Clear,
-    /// A vertex within the margin, none inside.
+    /// A vertex is within the margin, none inside the collider.
     Near,
-    /// A vertex inside: the collider penetrates the object.
+    /// A vertex is inside: the collider penetrates the object.
     Colliding,
 }
 
 /// A sphere that a search has compared with a part of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisitedSphere {
-    /// The sphere, in the frame of the tree.
+    /// The sphere of a tree node, in the frame of the tree.
     pub sphere: Sphere,
-    /// Level in the tree, the root's being 0.
+    /// Level of the node in the tree, the root's being 0.
     pub level: usize,
-    /// Whether it overlaps the part: only then its children are visited.
+    /// Whether the sphere overlaps the part: only then the node's children are visited.
     pub overlaps: bool,
-    /// Whether it has no children, so that an overlap is a vertex near the part.
+    /// Whether the node has no children, so that an overlap is a vertex near the part.
     pub is_leaf: bool,
 }
 
@@ -112,7 +112,7 @@ impl SphereTree {
         &self.vertices
     }
 
-    /// The vertices below a node and where they are.
+    /// The vertices below a node and their positions.
     pub(super) fn run(&self, node: &TreeNode) -> (&[u32], &[Point3<f64>]) {
         let slots = node.slot_range();
         (&self.vertices[slots.clone()], &self.points[slots])
@@ -192,7 +192,8 @@ impl SphereTree {
         self.visited(|sphere| cylinder_meets_sphere(cylinder, sphere))
     }
 
-    /// As [`SphereTree::visited_by_cylinder`], for a fingertip.
+    /// The spheres that the search for vertices near a fingertip visits; see
+    /// [`SphereTree::visited_by_cylinder`].
     pub fn visited_by_sphere(&self, tip: &Sphere) -> Vec<VisitedSphere> {
         self.visited(|sphere| sphere_meets_sphere(tip, sphere))
     }
@@ -233,7 +234,7 @@ impl SphereTree {
         );
     }
 
-    /// As [`SphereTree::search_cylinder`], for a fingertip.
+    /// Appends the vertices whose leaf sphere meets a fingertip; see [`SphereTree::search_cylinder`].
     pub fn search_sphere(&self, tip: &Sphere, out: &mut Vec<u32>) {
         self.collect(
             |sphere| sphere_meets_sphere(tip, sphere),
@@ -318,7 +319,7 @@ impl SphereTree {
         self.closeness(margin, |sphere| cylinder_meets_sphere(cylinder, sphere))
     }
 
-    /// As [`SphereTree::closeness_to_cylinder`], for a fingertip.
+    /// How close a fingertip is to the vertices; see [`SphereTree::closeness_to_cylinder`].
     pub fn closeness_to_sphere(&self, tip: &Sphere, margin: f64) -> Closeness {
         self.closeness(margin, |sphere| sphere_meets_sphere(tip, sphere))
     }

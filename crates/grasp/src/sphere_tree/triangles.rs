@@ -18,9 +18,9 @@ pub struct SearchedSurface<'a> {
     pub tree: &'a SphereTree,
     /// Triangles around each node.
     pub stars: &'a SurfaceStars,
-    /// Nodes of the triangles.
+    /// Three node numbers of each triangle.
     pub triangles: &'a [[u32; 3]],
-    /// Places of the nodes as they are now.
+    /// Positions of the nodes as they are now.
     pub places: &'a [Point3<f64>],
 }
 
@@ -60,7 +60,7 @@ pub fn triangles_near(
     near
 }
 
-/// Middle of a triangle and the distance of its farthest corner from there.
+/// Middle of a triangle and the distance of its farthest corner from the middle, m.
 struct Round {
     middle: Point3<f64>,
     reach: f64,

@@ -11,26 +11,26 @@ pub struct Detected<Parser> {
 #[derive(Clone, Debug)]
 struct Candidate<Parser> {
     parser: Parser,
-    /// Records in a row.
+    /// Good records that this parser has read in a row.
     records: u32,
 }
 
-/// A parser is kept when it has read so many records in a row.
+/// Good records in a row after which a parser is kept.
 const NEEDED: u32 = 3;
 
 impl<Parser> Detected<Parser> {
-    /// The form is known.
+    /// Keeps this parser from the beginning: the form of the records is known.
     pub fn known(parser: Parser) -> Self {
         Self::one_of([parser])
     }
 
-    /// It is one of these; where several fit, the first.
+    /// Keeps one of these parsers, as soon as it reads records well; where several do, the first.
     pub fn one_of(parsers: impl IntoIterator<Item = Parser>) -> Self {
         let candidate = |parser| Candidate { parser, records: 0 };
         Self { candidates: parsers.into_iter().map(candidate).collect() }
     }
 
-    /// Whether the form is known.
+    /// Whether the form of the records is known.
     pub fn is_known(&self) -> bool {
         self.candidates.len() <= 1
     }

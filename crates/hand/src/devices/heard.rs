@@ -6,17 +6,17 @@ use crate::devices::fastrak::{
 };
 use crate::sent::Device;
 
-/// What has been heard of a device.
+/// What has come over the serial line of one device: how many bytes and records, and the first bytes.
 #[derive(Clone, Debug, Default)]
 pub struct Heard {
     bytes: u64,
-    /// The first bytes, by which a stranger is told.
+    /// The first bytes, kept until a record comes: they tell which other device sends them.
     beginning: Vec<u8>,
     records: u64,
     first_record_s: Option<f64>,
 }
 
-/// Who else may speak on a line.
+/// Another device that may send on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stranger {
     Glove,
@@ -25,19 +25,19 @@ enum Stranger {
     Navigation,
 }
 
-/// A stranger is told by so many bytes.
+/// Most first bytes that are kept to recognise another device.
 const BEGINNING_MAX: usize = 4096;
-/// Before so many bytes without a record nothing is said: a device that is being set up answers.
+/// Bytes without a record before anything is said: a device that is being set up sends replies.
 const BYTES_MIN: u64 = 600;
-/// Records of another device that tell it.
+/// Records of another device by which it is recognised.
 const RECORDS_MIN: usize = 3;
-/// Bytes that are shown of what nobody knows.
+/// Bytes of an unknown device that the sentence shows.
 const SHOWN: usize = 24;
-/// Records are counted for so long before the rate is told, s.
+/// Time for which records are counted before their rate is told, s.
 const COUNTED_S: f64 = 2.0;
 
 impl Heard {
-    /// Bytes came.
+    /// Takes bytes that came over the line.
     pub fn bytes(&mut self, bytes: &[u8]) {
         self.bytes += bytes.len() as u64;
         if self.records == 0 {
@@ -46,7 +46,8 @@ impl Heard {
         }
     }
 
-    /// A good record came; the rate of records a second, once, when it is known.
+    /// Counts a good record that came at a time, s; the rate in records per second, once, when it is
+    /// known.
     pub fn record(&mut self, time_s: f64) -> Option<f64> {
         self.records += 1;
         self.beginning = Vec::new();
@@ -88,7 +89,7 @@ impl Heard {
     }
 }
 
-/// Who sends these bytes, if it is somebody known.
+/// The device that sends these bytes, if it is a known one.
 fn who_speaks(bytes: &[u8]) -> Option<Stranger> {
     let is_sentence = |six: &[u8]| {
         six[0] == b'$' && six[1..6].iter().all(u8::is_ascii_uppercase) && six[1..3] != *b"PX"

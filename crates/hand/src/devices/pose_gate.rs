@@ -18,13 +18,13 @@ struct Seen {
     time_s: f64,
 }
 
-/// A hand may move so fast, m/s, and a receiver's noise is smaller than this, m.
+/// Fastest motion of a hand, m/s, and a length that the receiver's noise does not exceed, m.
 const SPEED_MAX: f64 = 5.0;
 const STEP_M: f64 = 0.02;
-/// And turn so fast, rad/s, with so much noise, rad.
+/// Fastest turn of a hand, rad/s, and an angle that the receiver's noise does not exceed, rad.
 const TURN_RATE_MAX: f64 = 20.0;
 const TURN_RAD: f64 = 0.3;
-/// Records that come at once were made so far apart, s.
+/// Shortest time that is assumed between two records, s: several may be read at once.
 const RECORD_S: f64 = 1.0 / 120.0;
 
 impl PoseGate {
@@ -44,14 +44,14 @@ impl PoseGate {
         None
     }
 
-    /// Poses that were not taken.
+    /// Number of poses that were not taken.
     pub fn refused(&self) -> u64 {
         self.refused
     }
 }
 
 impl Seen {
-    /// Whether a hand can have come here from there.
+    /// Whether a hand can have come to this pose from the earlier one in the time between them.
     fn follows(&self, before: &Self) -> bool {
         let elapsed_s = (self.time_s - before.time_s).max(RECORD_S);
         let moved = before.pose.inverse() * self.pose;

@@ -19,7 +19,7 @@ pub struct GloveReading {
 /// Units: m. Frame: world, Y up (`docs/frames.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerReading {
-    /// Which receiver.
+    /// Station number of the receiver.
     pub station: Station,
     /// Receiver frame in the world.
     pub world_from_receiver: Isometry3<f64>,
@@ -27,17 +27,17 @@ pub struct TrackerReading {
     pub time_s: f64,
 }
 
-/// How old a reading is.
+/// Whether a reading is young enough to be used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Freshness {
-    /// Young enough.
+    /// The reading is at most as old as is allowed.
     Fresh,
-    /// Older than allowed.
+    /// The reading is older than is allowed.
     Stale {
-        /// Its age, s.
+        /// Age of the reading, s.
         age_s: f64,
     },
-    /// There has been none.
+    /// There has been no reading.
     Missing,
 }
 

@@ -16,32 +16,34 @@ pub struct SensorGate {
     news: Vec<Notice>,
 }
 
-/// What is known of one sensor.
+/// State of one sensor: readings taken and waiting, and what was told.
 #[derive(Clone, Copy, Debug, Default)]
 struct Watched {
     taken: Option<u8>,
     waiting: Option<u8>,
-    /// Readings in a row at an end of the range after a jump, and after a way there.
+    /// Readings in a row at an end of the range: `broken` after a jump there, `clipped` after a gradual
+    /// way there.
     broken: u32,
     clipped: u32,
-    /// It has shown more than an end of its range; one that has not may be dead, which is told elsewhere.
+    /// Whether the sensor has read a value inside its range; one that has not may be dead, which is told
+    /// elsewhere.
     has_read: bool,
     is_told_broken: bool,
     is_told_clipped: bool,
 }
 
-/// A finger may move a reading so fast, counts/s, and the noise is smaller than this, counts.
+/// Fastest change of a reading by a finger, counts/s, and a change that noise does not exceed, counts.
 const RATE_MAX: f64 = 1500.0;
 const STEP_COUNTS: f64 = 30.0;
-/// Readings that come at once were made so far apart, s.
+/// Shortest time that is assumed between two readings, s: several may be taken at once.
 const RECORD_S: f64 = 0.01;
-/// So many readings in a row at an end of the range are told: half a second.
+/// Readings in a row at an end of the range after which the person is told: half a second.
 const TOLD_AFTER: u32 = 50;
 
 impl SensorGate {
-    /// The reading with every sensor that jumped as it was before.
+    /// The reading, in which every sensor that jumped keeps its value from before.
     ///
-    /// Units: s.
+    /// Units: `time_s` s.
     pub fn take(&mut self, raw: &RawSensors, time_s: f64) -> RawSensors {
         let elapsed_s = self.last_s.map_or(0.0, |last_s| time_s - last_s).max(RECORD_S);
         self.last_s = Some(time_s);
@@ -57,7 +59,7 @@ impl SensorGate {
         })
     }
 
-    /// Readings of sensors that were not taken.
+    /// Number of readings of single sensors that were not taken.
     pub fn refused(&self) -> u64 {
         self.refused
     }
@@ -94,7 +96,7 @@ impl Watched {
         }
     }
 
-    /// What there is to tell of it now.
+    /// The notice about this sensor that is due now, if there is one.
     fn news(&mut self, sensor: Sensor, value: u8) -> Option<Notice> {
         let name = sensor_name(sensor);
         if self.broken >= TOLD_AFTER && !self.is_told_broken {
@@ -131,7 +133,8 @@ mod tests {
         })
     }
 
-    /// Feeds readings of one sensor, 100 a second; what it gives, and what is told.
+    /// Feeds readings of one sensor, 100 a second; returns the readings taken, the notices, and how many were
+    /// refused.
     fn feed(readings: impl IntoIterator<Item = u8>) -> (Vec<u8>, Vec<Notice>, u64) {
         let mut gate = SensorGate::default();
         let given = readings.into_iter().enumerate().map(|(at, value)| {

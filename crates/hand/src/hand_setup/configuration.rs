@@ -28,9 +28,9 @@ pub struct HandConfiguration {
     pub setup: HandSetup,
     /// The file of the calibration, as written: relative to the configuration's own folder.
     pub calibration_file: Option<PathBuf>,
-    /// The line to the glove.
+    /// Settings of the serial line to the glove.
     pub glove: GloveLine,
-    /// The line to the tracker.
+    /// Settings of the serial line to the tracker.
     pub tracker: TrackerLine,
 }
 

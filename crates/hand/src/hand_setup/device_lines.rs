@@ -22,7 +22,7 @@ pub enum GloveMode {
 }
 
 impl GloveMode {
-    /// Its word in the file.
+    /// Word of the mode in the configuration file.
     pub(super) const fn word(self) -> &'static str {
         match self {
             Self::Polled => "polled",
@@ -31,17 +31,17 @@ impl GloveMode {
     }
 }
 
-/// The line to the glove.
+/// Settings of the serial line to the glove.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GloveLine {
     /// Bits per second, one of [`GLOVE_BAUDS`].
     pub baud: u32,
-    /// Polled or streamed.
+    /// How the glove is asked for its readings.
     pub mode: GloveMode,
 }
 
 impl Default for GloveLine {
-    /// The later interface units' speed.
+    /// The speed of the later interface units, polled.
     fn default() -> Self {
         Self { baud: 115_200, mode: GloveMode::default() }
     }
@@ -54,18 +54,18 @@ impl Default for GloveLine {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hemisphere {
-    /// Before it, toward +X.
+    /// Before the transmitter, toward +X.
     #[default]
     Forward,
-    /// Behind it.
+    /// Behind the transmitter, toward −X.
     Back,
-    /// To its right, toward +Y.
+    /// To the right of the transmitter, toward +Y.
     Right,
-    /// To its left.
+    /// To the left of the transmitter, toward −Y.
     Left,
-    /// Below it, toward +Z.
+    /// Below the transmitter, toward +Z.
     Lower,
-    /// Above it.
+    /// Above the transmitter, toward −Z.
     Upper,
 }
 
@@ -82,7 +82,7 @@ impl Hemisphere {
         }
     }
 
-    /// Its word in the file.
+    /// Word of the hemisphere in the configuration file.
     pub(super) const fn word(self) -> &'static str {
         match self {
             Self::Forward => "forward",
@@ -95,12 +95,12 @@ impl Hemisphere {
     }
 }
 
-/// The line to the tracker.
+/// Settings of the serial line to the tracker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrackerLine {
     /// Bits per second, one of [`TRACKER_BAUDS`].
     pub baud: u32,
-    /// Socket of the receiver.
+    /// Station number: socket of the receiver.
     pub station: Station,
     /// Side of the transmitter on which the hand is.
     pub hemisphere: Hemisphere,

@@ -21,7 +21,7 @@ pub(super) struct HandText {
     pub(super) world_from_stand: Option<StandText>,
 }
 
-/// `[hand]`
+/// Table `[hand]`.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SizeText {
@@ -31,7 +31,7 @@ pub(super) struct SizeText {
     pub(super) calibration: Option<PathBuf>,
 }
 
-/// Which hand.
+/// Right or left hand.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Side {
@@ -39,7 +39,7 @@ pub(super) enum Side {
     Left,
 }
 
-/// `[glove]`
+/// Table `[glove]`.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GloveText {
@@ -48,7 +48,7 @@ pub(super) struct GloveText {
     pub(super) mode: Option<GloveMode>,
 }
 
-/// `[tracker]`
+/// Table `[tracker]`.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TrackerText {
@@ -84,7 +84,7 @@ pub(super) enum EncodingWord {
     Binary,
 }
 
-/// `[mount]`
+/// Table `[mount]`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MountText {
@@ -102,7 +102,7 @@ pub(super) enum PartWord {
     Forearm,
 }
 
-/// `[world_from_stand]`
+/// Table `[world_from_stand]`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StandText {

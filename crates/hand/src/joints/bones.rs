@@ -102,7 +102,7 @@ fn distance(record: &JointsRecord, from: usize, to: usize) -> Option<f64> {
     Some((to - from).norm())
 }
 
-/// The middle one of the values in order.
+/// Median of the values; `None` for an empty list.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()

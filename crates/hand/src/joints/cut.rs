@@ -6,7 +6,7 @@ pub const LINE_MAX: usize = 16 * 1024;
 /// Most bytes held at once: a whole line and as much again.
 const CAPACITY: usize = 2 * LINE_MAX;
 
-/// What the bytes were cut into.
+/// A piece of the bytes: a whole line, or a report that one is too long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Piece<'a> {
     /// A line without its LF.

@@ -12,11 +12,11 @@ use super::record::JointsRecord;
 pub struct Doubts {
     records: u64,
     faults: u64,
-    /// The first fault.
+    /// First fault of a line.
     fault: Option<JointsFaultKind>,
     /// Length of the first hand of no human size, since the last that was of one, m.
     odd_length_m: Option<f64>,
-    /// The last records that were fitted, and how well.
+    /// The last records that were fitted, each with its root mean square distance, m.
     fitted: Vec<(JointsRecord, f64)>,
     told: Option<String>,
 }
@@ -26,11 +26,11 @@ const LENGTHS_M: [f64; 2] = [0.10, 0.30];
 /// Units that a sender may use by mistake: how long one is, m, and their name.
 const UNITS: [(f64, &str); 4] =
     [(1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"), (0.3048, "feet")];
-/// Lines before anything is said of them.
+/// Lines that must have come before anything is said of them.
 const LINES_MIN: u64 = 30;
-/// Records that are kept for the other hand to be tried on.
+/// Records that are kept so that the other hand can be fitted to them.
 const KEPT: usize = 60;
-/// Of these every so many is tried.
+/// Step between the kept records that are tried: every sixth.
 const TRIED_EVERY: usize = 6;
 /// A hand that fits worse than this, root of the mean square, is doubted, m …
 const DOUBT_M: f64 = 0.009;
@@ -38,7 +38,7 @@ const DOUBT_M: f64 = 0.009;
 const BETTER: f64 = 0.6;
 
 impl Doubts {
-    /// A line that was no record.
+    /// Notes that a line was no record, and why.
     pub fn fault(&mut self, kind: &JointsFaultKind) {
         self.faults += 1;
         self.fault.get_or_insert_with(|| kind.clone());
@@ -56,7 +56,7 @@ impl Doubts {
         is_human
     }
 
-    /// A record that was followed, and how well.
+    /// Notes a record that was followed, and how well the hand fits it.
     pub fn fitted(&mut self, record: &JointsRecord, fitted: &FittedHand, hand: &HandDimensions) {
         if self.fitted.len() >= KEPT {
             self.judge_fit(hand);

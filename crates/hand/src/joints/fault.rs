@@ -12,12 +12,12 @@ pub enum JointsFaultKind {
     /// No LF where every possible line has ended.
     #[error("a line is longer than {LINE_MAX} bytes")]
     TooLong,
-    /// Not JSON.
+    /// The line is not JSON.
     #[error("not JSON at column {column}")]
     NotJson {
         /// Column of the line, from 1.
         column: usize,
-        /// Whether NaN or an infinity stands there.
+        /// Whether NaN or an infinity stands in that column.
         has_no_number: bool,
     },
     /// JSON, but not an object with the fields of a record.
@@ -29,39 +29,39 @@ pub enum JointsFaultKind {
     /// The list has another number of joints.
     #[error("{got} joints; there must be {JOINT_COUNT} (OpenXR) or {WEBXR_JOINT_COUNT} (WebXR)")]
     JointCount {
-        /// Joints of the line.
+        /// Number of joints in the line.
         got: usize,
     },
     /// A joint is a list of another length.
     #[error("joint {entry} has {got} numbers; there must be 3, 7 or 16")]
     EntryLength {
-        /// Which joint.
+        /// Entry of the joint.
         entry: usize,
-        /// Numbers it has.
+        /// Number of numbers in the entry.
         got: usize,
     },
     /// A joint is too far away.
     #[error("joint {entry} is farther than {RANGE_M} m from the origin")]
     Range {
-        /// Which joint.
+        /// Entry of the joint.
         entry: usize,
     },
     /// A quaternion is not near length one.
     #[error("the orientation of joint {entry} is not a unit quaternion")]
     Orientation {
-        /// Which joint.
+        /// Entry of the joint.
         entry: usize,
     },
     /// A matrix is not that of a rigid motion.
     #[error("the matrix of joint {entry} is not a rigid motion")]
     Matrix {
-        /// Which joint.
+        /// Entry of the joint.
         entry: usize,
     },
     /// A radius is negative or larger than one metre.
     #[error("the radius of joint {entry} is not between 0 and 1 m")]
     Radius {
-        /// Which joint.
+        /// Entry of the joint.
         entry: usize,
     },
 }
@@ -70,8 +70,8 @@ pub enum JointsFaultKind {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{kind} ({bytes_skipped} bytes skipped)")]
 pub struct JointsFault {
-    /// Why.
+    /// Why the bytes did not become a record.
     pub kind: JointsFaultKind,
-    /// How many, LF included.
+    /// Number of bytes thrown away, LF included.
     pub bytes_skipped: usize,
 }

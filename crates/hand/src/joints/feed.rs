@@ -7,9 +7,10 @@ use std::time::Instant;
 use super::queue::{ArrivedBytes, ArrivedQueue};
 use super::record::JointsRecord;
 
-/// A way from whoever has records to the hand that follows them; clones are the same way.
+/// Hands records of joints from another part of the program to the hand that follows them; clones share
+/// one queue.
 ///
-/// Bounded as the listener's: the oldest pieces are dropped where nobody takes them.
+/// The queue is bounded as that of the listener: the oldest pieces are dropped where nobody takes them.
 #[derive(Clone, Debug, Default)]
 pub struct JointsFeed(Arc<Shared>);
 
@@ -20,7 +21,7 @@ struct Shared {
 }
 
 impl JointsFeed {
-    /// Hands a record on as the line of joints that it is, as if it had come at this moment.
+    /// Adds a record to the queue as its line of joints; `arrived` is the time of its arrival.
     pub fn hand_on(&self, record: &JointsRecord, arrived: Instant) {
         let bytes = record.to_webxr_line().into_bytes();
         self.0.queue.push(ArrivedBytes { arrived, datagram: true, bytes });
@@ -31,17 +32,17 @@ impl JointsFeed {
         self.0.queue.take()
     }
 
-    /// Pieces that were thrown away because they were not taken in time.
+    /// Number of pieces that were thrown away because they were not taken in time.
     pub fn dropped(&self) -> u64 {
         self.0.queue.dropped()
     }
 
-    /// Says how many senders there are.
+    /// Sets the number of senders.
     pub fn set_senders(&self, senders: usize) {
         self.0.senders.store(senders, Ordering::Relaxed);
     }
 
-    /// How many senders there are.
+    /// Number of senders.
     pub fn senders(&self) -> usize {
         self.0.senders.load(Ordering::Relaxed)
     }

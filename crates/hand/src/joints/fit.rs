@@ -8,9 +8,9 @@ use super::limits::AngleLimits;
 use super::record::JointsRecord;
 use super::start::{PALM_JOINTS_NEEDED, PALM_SPREAD_NEEDED_M, PalmJoints, angles_of_bones};
 
-/// Steps of a fit that begins at the last one.
+/// Most steps of a fit that begins at the last fit.
 const WARM_TURNS_MAX: usize = 20;
-/// Steps of a fit that begins at nothing.
+/// Most steps of a fit that begins at the record alone.
 const COLD_TURNS_MAX: usize = 60;
 /// The last fit, moved to where the palm is now, is no start if it is farther from the joints than
 /// this, m: the hand was lost and found again.
@@ -32,13 +32,13 @@ pub struct FittedHand {
     pub angles: JointAngles,
     /// Root of the mean squared distance between joints of the hand and of the record, m.
     pub fit_error_rms_m: f64,
-    /// Largest such distance, m.
+    /// Largest distance between a joint of the hand and of the record, m.
     pub fit_error_max_m: f64,
-    /// Joints that were fitted, at most 21: wrist, and four of each digit.
+    /// Number of joints that were fitted, at most 21: wrist, and four of each digit.
     pub joints_used: usize,
-    /// Steps that were taken.
+    /// Number of steps that were taken.
     pub iterations: usize,
-    /// Whether the fit began at the last one.
+    /// Whether the fit began at the last fit.
     pub is_warm: bool,
 }
 
@@ -52,17 +52,17 @@ pub enum FitError {
          among them"
     )]
     NotEnoughJoints {
-        /// Tracked joints that are fixed to the palm.
+        /// Number of tracked joints that are fixed to the palm.
         tracked: usize,
-        /// How far they lie beside a straight line, m.
+        /// How far these joints lie beside a straight line, m.
         spread_m: f64,
     },
     /// The record is of the other hand.
     #[error("the record is of a {got:?} hand, the hand to be fitted is a {expected:?} one")]
     OtherHand {
-        /// The fitted hand.
+        /// Side of the hand to be fitted: right or left.
         expected: Handedness,
-        /// The record's hand.
+        /// Side of the record's hand: right or left.
         got: Handedness,
     },
 }
@@ -91,7 +91,7 @@ impl HandFit {
         Self { limits, ..self }
     }
 
-    /// Dimensions of the hand.
+    /// Dimensions of the hand that is fitted.
     pub const fn dimensions(&self) -> &HandDimensions {
         &self.dimensions
     }
@@ -101,7 +101,7 @@ impl HandFit {
         self.last.as_ref()
     }
 
-    /// Forgets the last fit, so that the next one begins at nothing.
+    /// Forgets the last fit, so that the next one begins at the record alone.
     pub fn forget(&mut self) {
         self.last = None;
     }

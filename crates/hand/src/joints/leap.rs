@@ -1,4 +1,4 @@
-//! Frames of a Leap recording as records of joints.
+//! Pictures of a Leap recording as records of joints.
 
 use softgrasp_grasp::hand::Finger;
 
@@ -6,7 +6,7 @@ use super::record::{JointSample, JointsRecord, digit_joints};
 use crate::devices::recordings::LeapFrame;
 
 impl From<&LeapFrame> for JointsRecord {
-    /// The 20 joints of a frame; wrist, palm and lower metacarpal ends are not tracked.
+    /// The 20 joints of a picture; wrist, palm and lower metacarpal ends are not tracked.
     ///
     /// The camera's frame (X right, Y up, Z toward the user) is taken as the world.
     fn from(frame: &LeapFrame) -> Self {

@@ -11,11 +11,11 @@ use super::slope::{PER_DIGIT, SHARED, digit_slopes};
 
 /// Slot of the palm arch in [`JointAngles::to_array`].
 const ARCH_SLOT: usize = 20;
-/// The wrist counts less: trackers do not agree on where it is.
+/// Weight of the wrist: less than one, because trackers do not agree on where it is.
 const WRIST_WEIGHT: f64 = 0.25;
-/// So does the thumb's first joint, the least certain place of the kinematic hand.
+/// Weight of the thumb's first joint, the least certain place of the kinematic hand.
 const TMJ_WEIGHT: f64 = 0.5;
-/// Fingertips count more: they are what grasps.
+/// Weight of the fingertips: more than one, because they are what grasps.
 const TIP_WEIGHT: f64 = 2.0;
 /// Damping at the start, and the least and the most that is tried.
 const DAMPING_START: f64 = 1e-3;
@@ -70,19 +70,19 @@ impl HandState {
 pub(super) struct Misfit {
     /// Root of the mean squared distance of all joints used, each counted alike.
     pub(super) rms_m: f64,
-    /// Largest distance.
+    /// Largest distance of a joint.
     pub(super) max_m: f64,
-    /// Joints used.
+    /// Number of joints used.
     pub(super) joints: usize,
 }
 
-/// What a way down to the minimum found.
+/// Result of a way down to the minimum: state, cost and number of steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Found {
     pub(super) state: HandState,
     /// Weighted sum of squared distances, m².
     pub(super) cost: f64,
-    /// Times that the equations were set up.
+    /// Number of times that the equations were set up.
     pub(super) turns: usize,
 }
 

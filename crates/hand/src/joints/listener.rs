@@ -14,11 +14,12 @@ use super::sender::LineBeginning;
 pub const DEFAULT_PORT: u16 = 7879;
 /// Connections that are held at once.
 const CONNECTIONS_MAX: usize = 8;
-/// Senders of datagrams that are told apart; those of further ones are read but not counted.
+/// Senders of datagrams that are told apart; datagrams of further senders are read, but these are not
+/// counted.
 const DATAGRAM_SENDERS_MAX: usize = 16;
 /// A connection that was silent for so long gives way to a new one when there are too many.
 const SILENT_AFTER: Duration = Duration::from_secs(10);
-/// A sender of datagrams counts as there for so long after each.
+/// A sender of datagrams counts as present for so long after each datagram.
 const PRESENT_FOR: Duration = Duration::from_secs(1);
 /// Pause between two looks while somebody sends; bytes wait that long at most.
 const PAUSE: Duration = Duration::from_micros(500);
@@ -26,36 +27,36 @@ const PAUSE: Duration = Duration::from_micros(500);
 const IDLE_PAUSE: Duration = Duration::from_millis(10);
 /// Datagrams read in one turn, so that they cannot keep connections waiting.
 const DATAGRAMS_A_TURN: usize = 64;
-/// More than the largest datagram.
+/// Size of the buffer for reading, bytes: more than the largest datagram.
 const READ_SIZE: usize = 1 << 16;
 /// Bytes read from a connection in one turn.
 const READ_A_TURN: usize = 1 << 14;
 /// Ports that are tried when the system is asked for any.
 const PORTS_TRIED: usize = 16;
 
-/// Why nothing listens.
+/// Why the listener for joints cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum JointsError {
     /// The TCP port cannot be had.
     #[error("cannot listen on TCP port {addr}")]
     Tcp {
-        /// Address asked for.
+        /// Address that was asked for.
         addr: SocketAddr,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The UDP port cannot be had.
     #[error("cannot listen on UDP port {addr}")]
     Udp {
-        /// Address asked for.
+        /// Address that was asked for.
         addr: SocketAddr,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// There is no thread for it.
+    /// The system starts no thread for the listener.
     #[error("no thread to listen for joints")]
     Thread {
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
@@ -111,17 +112,17 @@ impl JointsListener {
         self.shared.queue.take()
     }
 
-    /// The address with its port.
+    /// Address and port on which the listener listens.
     pub const fn local_addr(&self) -> SocketAddr {
         self.addr
     }
 
-    /// Connections, and addresses from which a datagram came within the last second.
+    /// Number of senders: connections, and addresses from which a datagram came within the last second.
     pub fn senders(&self) -> usize {
         self.shared.senders.load(Ordering::Relaxed)
     }
 
-    /// Pieces that were thrown away because they were not taken in time: the oldest go first.
+    /// Number of pieces that were thrown away because they were not taken in time: the oldest go first.
     pub fn dropped(&self) -> u64 {
         self.shared.queue.dropped()
     }
@@ -168,7 +169,7 @@ struct Turns {
     tcp: TcpListener,
     udp: UdpSocket,
     connections: Vec<Connection>,
-    /// Where datagrams came from, and when the last did.
+    /// Addresses from which datagrams came, each with the time of the last one.
     udp_senders: Vec<(SocketAddr, Instant)>,
     buffer: Vec<u8>,
     shared: Arc<Shared>,

@@ -15,7 +15,7 @@ fn listener() -> JointsListener {
     JointsListener::bind(SocketAddr::from(([127, 0, 0, 1], 0))).unwrap()
 }
 
-/// A line of a fist whose frame has this number.
+/// A line of joints of a fist with this record number.
 fn line(frame: u64) -> String {
     let hand = HandDimensions::default();
     let mut record = record_of_hand(&hand, &JointAngles::fist(), &Isometry3::identity());

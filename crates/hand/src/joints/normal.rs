@@ -17,18 +17,18 @@ const DAMPED_AT_LEAST: f64 = 1e-6;
 /// Which unknowns may not move, in the order of the steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Held {
-    /// The palm arch.
+    /// Whether the palm arch may not move.
     pub(super) arch: bool,
-    /// Angles of each digit.
+    /// Whether each angle of each digit may not move.
     pub(super) digits: [[bool; PER_DIGIT]; 5],
 }
 
 /// A change of all unknowns.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
-    /// Palm shift, palm turn, palm arch.
+    /// Changes of palm shift (m), palm turn (rad) and palm arch (rad).
     pub(super) shared: SharedVector,
-    /// Angles of each digit.
+    /// Changes of the angles of each digit, rad.
     pub(super) digits: [DigitVector; 5],
 }
 

@@ -5,12 +5,12 @@ use super::decode::decode_line;
 use super::fault::{JointsFault, JointsFaultKind};
 use super::record::JointsRecord;
 
-/// What the stream contained.
+/// An event of the stream: a record of joints, or a fault.
 #[derive(Clone, Debug, PartialEq)]
 pub enum JointsEvent {
     /// The joints of one hand at one moment.
     Record(Box<JointsRecord>),
-    /// Something else.
+    /// Bytes that are no record.
     Fault(JointsFault),
 }
 
@@ -22,7 +22,7 @@ pub enum JointsEvent {
 #[derive(Clone, Debug, Default)]
 pub struct JointsParser {
     stream: LineCutter,
-    /// Apart from the stream: a datagram may come between two parts of a line.
+    /// Lines of datagrams, apart from the stream: a datagram may come between two parts of a line.
     datagram: LineCutter,
 }
 

@@ -27,7 +27,7 @@ pub(super) fn mirrored(handedness: Handedness, point: Point3<f64>) -> Point3<f64
     }
 }
 
-/// Joint by joint where a hand has it that is posed: knuckle, two joints and tip of every digit.
+/// Places of the joints of a posed hand: knuckle, two joints and tip of every digit.
 ///
 /// Units: m. Frame: world. Shapes: thumb to little finger, each from the palm to the tip.
 pub(super) fn digit_places(pose: &HandPose) -> [[Point3<f64>; 4]; 5] {

@@ -12,9 +12,9 @@ const BYTES_MAX: usize = 4 << 20;
 /// Whole lines of one sender, as they came.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ArrivedBytes {
-    /// When the last of them was read.
+    /// When the last of these lines was read.
     pub arrived: Instant,
-    /// Whether they came as one datagram; else over a connection.
+    /// Whether the lines came as one datagram; otherwise they came over a connection.
     pub datagram: bool,
     /// One or more lines, each with its LF, which is added where the sender left it out.
     pub bytes: Vec<u8>,
@@ -55,7 +55,7 @@ impl ArrivedQueue {
         std::mem::take(&mut waiting.pieces).into()
     }
 
-    /// Pieces that were dropped since the start.
+    /// Number of pieces that were dropped since the start.
     pub(super) fn dropped(&self) -> u64 {
         self.lock().dropped
     }

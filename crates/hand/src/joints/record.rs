@@ -65,11 +65,11 @@ pub const fn digit_joints(finger: Finger) -> [usize; 4] {
 /// the fingertip, +Y out of the back of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSample {
-    /// Where the joint is.
+    /// Position of the joint.
     pub position: Point3<f64>,
-    /// How it is turned, where the sender says so.
+    /// Orientation of the joint, where the sender gives one.
     pub orientation: Option<UnitQuaternion<f64>>,
-    /// Distance from the joint to the skin, where the sender says so.
+    /// Distance from the joint to the skin, where the sender gives it.
     pub radius_m: Option<f64>,
 }
 
@@ -83,7 +83,7 @@ impl JointSample {
 /// All joints of one hand at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointsRecord {
-    /// Which hand.
+    /// Right or left hand.
     pub hand: Handedness,
     /// Time by the sender's clock, s.
     pub time_s: Option<f64>,
@@ -99,7 +99,7 @@ impl JointsRecord {
         Self { hand, time_s: None, frame: None, joints: [None; JOINT_COUNT] }
     }
 
-    /// Where a joint is, if it was tracked.
+    /// Position of a joint, if it was tracked.
     pub fn position(&self, joint: usize) -> Option<Point3<f64>> {
         self.joints.get(joint).copied().flatten().map(|sample| sample.position)
     }

@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// A point, where it is seen, and how much it counts.
+/// A point, the place where it is seen, and the weight of their distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pair {
-    /// In the moved frame, m.
+    /// The point in the moved frame, m.
     pub(super) from: Point3<f64>,
-    /// In the fixed frame, m.
+    /// The place where it is seen, in the fixed frame, m.
     pub(super) to: Point3<f64>,
     /// Weight of the squared distance, positive.
     pub(super) weight: f64,

@@ -16,11 +16,11 @@ pub(super) const PER_DIGIT: usize = 4;
 /// Units: m, m/rad. Frame: world. The derivative by a palm shift is the shift itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DigitSlope {
-    /// Where the joints are, from the palm to the tip.
+    /// Places of the joints, from the palm to the tip.
     pub(super) places: [Point3<f64>; 4],
-    /// By palm arch, for each joint.
+    /// Derivative of each joint's place by the palm arch.
     pub(super) by_arch: [Vector3<f64>; 4],
-    /// By the digit's own angles, for each joint.
+    /// Derivatives of each joint's place by the digit's own angles.
     pub(super) by_angle: [[Vector3<f64>; PER_DIGIT]; 4],
 }
 

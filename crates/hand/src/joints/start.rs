@@ -10,10 +10,10 @@ use super::rigid::{Pair, rigid_fit, spread_beside_a_line};
 
 /// Joints that a palm must have at least.
 pub(super) const PALM_JOINTS_NEEDED: usize = 3;
-/// They must lie beside a line by this much, m.
+/// Smallest spread of these joints beside a straight line, m.
 pub(super) const PALM_SPREAD_NEEDED_M: f64 = 0.01;
 
-/// What the joints that are fixed to the palm say.
+/// The tracked joints that are fixed to the palm, each with its place in the palm frame.
 #[derive(Clone, Debug)]
 pub(super) struct PalmJoints {
     pairs: Vec<Pair>,
@@ -49,25 +49,25 @@ impl PalmJoints {
         }
     }
 
-    /// How many of them are tracked.
+    /// Number of these joints that are tracked.
     pub(super) fn count(&self) -> usize {
         self.pairs.len()
     }
 
-    /// Whether they determine the palm.
+    /// Whether these joints determine the pose of the palm.
     pub(super) fn are_enough(&self) -> bool {
         self.has_wrist_or_thumb
             && self.count() >= PALM_JOINTS_NEEDED
             && self.spread() >= PALM_SPREAD_NEEDED_M
     }
 
-    /// How far they spread beside a line, m.
+    /// How far these joints spread beside a straight line, m.
     pub(super) fn spread(&self) -> f64 {
         let places: Vec<Point3<f64>> = self.pairs.iter().map(|pair| pair.to).collect();
         spread_beside_a_line(&places)
     }
 
-    /// The palm that fits them best.
+    /// Pose of the palm in the world that fits these joints best.
     pub(super) fn world_from_palm(&self) -> Option<Isometry3<f64>> {
         rigid_fit(&self.pairs)
     }
@@ -113,11 +113,11 @@ pub(super) fn angles_of_bones(
     limits.clamp(&angles)
 }
 
-/// Ways between the tracked joints of a digit, in the palm frame of a right hand, m.
+/// Vectors between the tracked joints of a digit, in the palm frame of a right hand, m.
 struct Ways {
-    /// From each joint to the next.
+    /// Vectors from each joint to the next.
     bones: [Option<Vector3<f64>>; 3],
-    /// From the first joint to the next one that is tracked.
+    /// Vector from the first joint to the next one that is tracked.
     ahead: Option<Vector3<f64>>,
 }
 

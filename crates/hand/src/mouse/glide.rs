@@ -19,15 +19,15 @@ pub struct Glide {
 /// Palm and posture at one end of a way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
-    /// The palm, by how it sees the object.
+    /// Pose of the palm, relative to the object.
     pub path: PalmPath,
-    /// How the hand is set.
+    /// Posture of the hand before its fingers close.
     pub posture: Posture,
 }
 
-/// Shortest time of a way, s.
+/// Shortest duration of a way, s.
 const LASTS_MIN_S: f64 = 0.7;
-/// Fastest moment of a gentle way, by its mean speed.
+/// Largest speed on a way over its mean speed.
 const PEAK: f64 = 1.5;
 
 impl Glide {
@@ -40,7 +40,7 @@ impl Glide {
         Self { from, to, centre, lasts_s: lasts_s.max(LASTS_MIN_S), at_s: 0.0 }
     }
 
-    /// Goes on; whether the end is reached.
+    /// Moves on by a time; returns whether the end of the way is reached.
     ///
     /// Units: s.
     pub fn advance(&mut self, seconds: f64) -> bool {
@@ -48,7 +48,7 @@ impl Glide {
         self.at_s >= self.lasts_s
     }
 
-    /// World from palm now.
+    /// Pose of the palm in the world now.
     pub fn world_from_palm(&self) -> Isometry3<f64> {
         let (from, to, share) = (&self.from.path, &self.to.path, self.share());
         let path = PalmPath {
@@ -62,7 +62,7 @@ impl Glide {
         path.world_from_palm(self.centre)
     }
 
-    /// Posture now.
+    /// Posture of the hand now.
     pub fn posture(&self) -> Posture {
         self.from.posture.toward(&self.to.posture, self.share())
     }

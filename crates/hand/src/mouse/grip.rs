@@ -3,32 +3,32 @@
 use super::input::Digits;
 use crate::scripted::GraspPlan;
 
-/// Closing of each finger: wished for, and as it is now. Thumb first; see [`super::MouseInput`] for
-/// what the numbers mean.
+/// Closing of each finger, thumb first: as it is wished for, and as it is now. See [`super::MouseInput`]
+/// for what the numbers mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Grip {
     wished: [f64; 5],
     closing: [f64; 5],
-    /// Closure of the joints, 0 open to 1 closed, as the scripted hand's.
+    /// Closure of each finger's joints, 0 open to 1 closed, as of the scripted hand.
     closure: [f64; 5],
 }
 
-/// Closing beyond which no finger goes: twice as deep as planned.
+/// Largest closing of a finger: twice as deep as planned.
 pub const CLOSING_MAX: f64 = 3.0;
 /// Closing per second, far from the touch and from shortly before it, where a tip that comes slowly
 /// is felt before it is deep.
 const FAST: f64 = 2.5;
 const SLOW: f64 = 0.6;
 const NEAR: f64 = 0.85;
-/// Closure of the joints per second at most, whatever changes: a new plan must not make a finger jump.
+/// Largest closure of the joints per second: a new plan must not make a finger jump.
 const CLOSURE_RATE: f64 = 2.5;
-/// Closure beyond which a finger would go through the palm.
+/// Largest closure of the joints; beyond it a finger would go through the palm.
 const CLOSURE_MAX: f64 = 1.15;
-/// Touch and press of a finger that has no plan.
+/// Closures at touch and at full press of a finger that has no plan.
 const UNPLANNED: (f64, f64) = (0.5, 0.65);
 
 impl Grip {
-    /// Closes by so much more, or less.
+    /// Closes the named fingers by so much more; a negative amount opens them.
     pub fn close_by(&mut self, digits: Digits, by: f64) {
         for (digit, wished) in self.wished.iter_mut().enumerate() {
             if digits.contain(digit) {
@@ -37,7 +37,7 @@ impl Grip {
         }
     }
 
-    /// Closes as far as this.
+    /// Sets how far the named fingers are to close.
     pub fn close_to(&mut self, digits: Digits, to: f64) {
         for (digit, wished) in self.wished.iter_mut().enumerate() {
             if digits.contain(digit) {
@@ -46,8 +46,8 @@ impl Grip {
         }
     }
 
-    /// Goes on for some time toward what is wished for. Fingers that are wished as closed as each
-    /// other arrive together, at the touch and at the full press.
+    /// Moves the fingers for some time toward the closing wished for. Fingers that are wished as closed
+    /// as each other arrive together, at the touch and at the full press.
     ///
     /// Units: s.
     pub fn advance(&mut self, seconds: f64, plan: Option<&GraspPlan>) {
@@ -60,12 +60,12 @@ impl Grip {
         }
     }
 
-    /// Closing wished for.
+    /// Closing that is wished for, of each finger, thumb first.
     pub fn wished(&self) -> [f64; 5] {
         self.wished
     }
 
-    /// Closure of the joints.
+    /// Closure of each finger's joints now, thumb first, 0 open to 1 closed.
     pub fn closure(&self) -> &[f64; 5] {
         &self.closure
     }

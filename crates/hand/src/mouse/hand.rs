@@ -25,15 +25,15 @@ pub struct MouseHand {
     planner: Planner,
     tick_s: f64,
     plan: Option<Planned>,
-    /// Rest shape for which a plan is being made.
+    /// Number of the rest shape for which a plan is being made, and the turn of the object.
     planning_for: Option<(u64, UnitQuaternion<f64>)>,
     errand: Option<Errand>,
     /// Ways still to go, the first one begun.
     ways: VecDeque<Glide>,
     world_from_palm: Isometry3<f64>,
-    /// Where the mouse wants the palm.
+    /// Pose of the palm in the world to which the mouse moves it.
     wished: Isometry3<f64>,
-    /// How fast the palm goes there, m/s.
+    /// Speed of the palm on its way there, m/s.
     speed: f64,
     posture: Posture,
     grip: Grip,
@@ -51,7 +51,7 @@ struct Planned {
     turn: UnitQuaternion<f64>,
 }
 
-/// What the hand does by itself.
+/// Motion that the hand makes by itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Errand {
     Aim { elsewhere: bool },
@@ -73,7 +73,7 @@ const REACH_MAX: f64 = 0.45;
 /// The person sees no more than so much of what the hand did at once, s: after a stop of the ticks
 /// it goes on from where it was.
 const STEP_MAX_S: f64 = 1.0 / 30.0;
-/// Where a hand without a plan has the object.
+/// Centre of the object in the palm frame for a hand without a plan, m.
 const BEFORE_THE_PALM: Vector3<f64> = Vector3::new(0.0, 0.10, -0.05);
 
 impl MouseHand {
@@ -103,13 +103,13 @@ impl MouseHand {
         }
     }
 
-    /// The same hand, whose approaches are planned for fingertips that hold this.
+    /// Sets what a fingertip holds, for the plans of the approaches.
     #[must_use]
     pub fn holding(self, contact: ContactModel) -> Self {
         Self { contact, ..self }
     }
 
-    /// The same hand, which begins where another one was.
+    /// Lets the hand begin where another hand was.
     ///
     /// Frame: world.
     #[must_use]
@@ -117,7 +117,7 @@ impl MouseHand {
         Self { world_from_palm, wished: world_from_palm, ..self }
     }
 
-    /// Takes a wish. Moving or turning ends what the hand does by itself.
+    /// Takes a wish of the person. Moving or turning ends what the hand does by itself.
     pub fn take(&mut self, input: MouseInput) {
         if !input.is_finite() {
             return;
@@ -152,7 +152,7 @@ impl MouseHand {
         self.begin(Errand::Aim { elsewhere: false });
     }
 
-    /// Moves on by the time of so many ticks and says what the devices send then.
+    /// Moves on by the time of so many ticks and returns what the devices send then.
     pub fn next_after(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Sent {
         let seconds = (ticks as f64 * self.tick_s).min(STEP_MAX_S);
         self.go_on(seen, object);
@@ -176,13 +176,13 @@ impl MouseHand {
         Sent { arrivals, ..Sent::default() }
     }
 
-    /// Closing of each finger that is wished for, thumb first, for a slider.
+    /// Closing of each finger that is wished for, thumb first, for the slider of the window.
     pub fn closing(&self) -> [f64; 5] {
         self.grip.wished()
     }
 
-    /// How the hand will grasp the object, once it knows. Frame: the object's, as if it were the
-    /// world's.
+    /// Plan of the hand to grasp the object, once it has one. Frame: that of the object, as if it were
+    /// the world's.
     pub fn plan(&self) -> Option<GraspPlan> {
         self.plan.as_ref().map(|planned| planned.plan)
     }
@@ -197,7 +197,7 @@ impl MouseHand {
         self.errand.is_some() || !self.ways.is_empty()
     }
 
-    /// What the hand has to say since the last call.
+    /// The hand's notices to the person since the last call.
     pub fn take_notices(&mut self) -> Vec<Notice> {
         std::mem::take(&mut self.notices)
     }
@@ -332,7 +332,7 @@ impl MouseHand {
         ways.collect()
     }
 
-    /// The palm as it is now, by how it sees the object.
+    /// Path of the palm that begins at its pose now: how it sees the object.
     fn path_from_here(&self, centre: Point3<f64>) -> PalmPath {
         PalmPath {
             world_from_palm_rotation: self.world_from_palm.rotation,
@@ -341,7 +341,7 @@ impl MouseHand {
     }
 }
 
-/// Palm down, fingers away from the viewer (`docs/frames.md`).
+/// Rotation of a palm that faces down with its fingers away from the viewer (`docs/frames.md`).
 fn palm_down() -> UnitQuaternion<f64> {
     let world_from_palm = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0);
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(world_from_palm))

@@ -3,16 +3,16 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use softgrasp_grasp::hand::Finger;
 
-/// Which fingers are meant.
+/// The fingers that a wish is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Digits {
-    /// All five.
+    /// All five fingers.
     All,
-    /// One.
+    /// One finger.
     One(Finger),
 }
 
-/// One wish. A number that is not finite is ignored.
+/// One wish of the person. A wish with a number that is not finite is ignored.
 ///
 /// The closing of a finger is 0 where it is open, 1 where the plan expects it to touch, 2 where it
 /// has pressed as deep as planned, and goes on to [`super::CLOSING_MAX`].
@@ -22,9 +22,9 @@ pub enum MouseInput {
     Move(Vector3<f64>),
     /// Turn the palm by a rotation in the world, about the place between its fingers.
     Turn(UnitQuaternion<f64>),
-    /// Close by so much more; less than 0 opens.
+    /// Close the fingers by so much more; less than 0 opens them.
     CloseBy(Digits, f64),
-    /// Close as far as this.
+    /// Close the fingers as far as this.
     CloseTo(Digits, f64),
     /// Open, and go where this object is grasped well, but a little way off.
     Aim,
@@ -37,7 +37,7 @@ pub enum MouseInput {
 }
 
 impl Digits {
-    /// Whether a finger is meant, by its index, thumb first.
+    /// Whether a finger is among these, by its index, thumb first.
     pub(super) fn contain(self, digit: usize) -> bool {
         match self {
             Self::All => true,
@@ -47,7 +47,7 @@ impl Digits {
 }
 
 impl MouseInput {
-    /// Whether its numbers are finite.
+    /// Whether the numbers of the wish are finite.
     pub(super) fn is_finite(&self) -> bool {
         match self {
             Self::Move(by) => by.iter().all(|c| c.is_finite()),

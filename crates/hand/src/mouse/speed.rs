@@ -11,7 +11,7 @@ pub const TURN_MAX_RAD_S: f64 = 5.0;
 /// Largest acceleration of the palm, m/s²: half as much as that of free fall, so that a pinch which holds an
 /// object twice over also lifts it.
 const ACCELERATION_MAX_M_S2: f64 = 5.0;
-/// A point of the hand is so far from where it turns about, m.
+/// Distance of a point of the hand from the point about which the palm turns, m.
 const ARM_M: f64 = 0.1;
 
 /// Part of the way from one palm pose to another, as far as the palm may go in this time. `speed` is how fast

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::foxglove;
 use crate::sent::Device;
 
-/// A channel.
+/// A channel of a recording: one topic in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// How the run was set up; one message, the first.
@@ -14,11 +14,11 @@ pub enum Channel {
     Device(Device),
     /// Pose of the hand, for other programs; a replay does not need it.
     Pose,
-    /// Something happened.
+    /// An event of the grasp, the shape, the server or a device.
     Event,
-    /// What the server was asked.
+    /// What the server was asked in a tick.
     Request,
-    /// What it answered.
+    /// An answer of the server, as a tick took it.
     Answer,
     /// Joint angles of the hand, for other programs.
     Angles,
@@ -26,7 +26,7 @@ pub enum Channel {
     Transforms,
     /// What hand and object look like, for other programs.
     Scene,
-    /// What happened, for other programs.
+    /// Events as lines of a log, for other programs.
     Log,
     /// A tick is over; what came since the one before belongs to it.
     Tick,
@@ -50,7 +50,7 @@ impl Channel {
         Self::Tick,
     ];
 
-    /// Its topic.
+    /// Topic of the channel in the file.
     pub const fn topic(self) -> &'static str {
         match self {
             Self::Setup => "/setup",
@@ -74,7 +74,7 @@ impl Channel {
         Self::ALL.into_iter().find(|channel| channel.topic() == topic)
     }
 
-    /// Name of its messages.
+    /// Name of the schema of the channel's messages.
     pub const fn schema_name(self) -> &'static str {
         match self {
             Self::Setup => "softgrasp.Setup",
@@ -91,7 +91,7 @@ impl Channel {
         }
     }
 
-    /// JSON Schema of its messages.
+    /// JSON Schema of the channel's messages.
     pub fn schema(self) -> Value {
         let number = json!({"type": "number"});
         let integer = json!({"type": "integer"});

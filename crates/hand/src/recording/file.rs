@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::channels::Channel;
 
-/// A file that is being written.
+/// A recording's file that is being written.
 pub struct RecordingFile {
     writer: Writer<BufWriter<File>>,
     /// Number of each channel in the file, in the order of [`Channel::ALL`].
@@ -22,12 +22,12 @@ pub struct RecordingFile {
 /// Bytes of a device, as a message.
 #[derive(Serialize, serde::Deserialize)]
 pub struct DeviceBytes {
-    /// When their first byte came, s; `None`: with the tick.
+    /// Arrival of the first byte, s; `None` stands for the time of the tick.
     pub at_s: Option<f64>,
-    /// Whether they are a datagram.
+    /// Whether the bytes are one datagram.
     #[serde(default)]
     pub datagram: bool,
-    /// The bytes, two digits each.
+    /// The bytes, two hexadecimal digits each.
     pub hex: String,
 }
 
@@ -35,7 +35,7 @@ impl RecordingFile {
     /// Begins a file; an older one of this name is replaced.
     ///
     /// # Errors
-    /// The system's, or the library's.
+    /// The error of the operating system or of the MCAP library.
     pub fn create(path: &Path) -> McapResult<Self> {
         let options = WriteOptions::new()
             .compression(None)
@@ -51,12 +51,12 @@ impl RecordingFile {
         Ok(Self { writer, ids, sequence: 0 })
     }
 
-    /// Writes a message.
+    /// Writes a message to a channel.
     ///
     /// Units: `at_s` s on the client's clock.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the operating system.
     pub fn write(
         &mut self,
         channel: Channel,
@@ -74,10 +74,11 @@ impl RecordingFile {
         self.writer.write_to_known_channel(&header, &data)
     }
 
-    /// Puts all so far into the file: a program that ends abnormally loses what comes after it only.
+    /// Writes all messages so far to the file: a program that ends abnormally loses only what comes after
+    /// them.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the operating system.
     pub fn flush(&mut self) -> McapResult<()> {
         self.writer.flush()
     }
@@ -85,20 +86,20 @@ impl RecordingFile {
     /// Ends the file with its index.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the operating system.
     pub fn finish(mut self) -> McapResult<()> {
         self.writer.finish().map(drop)
     }
 }
 
-/// Two digits for each byte.
+/// Two hexadecimal digits for each byte.
 pub fn hex_of(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 16] = b"0123456789abcdef";
     let digit = |value: u8| char::from(DIGITS[usize::from(value)]);
     bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
 }
 
-/// The bytes of two digits each; `None` for anything else.
+/// The bytes of a text of two hexadecimal digits each; `None` for any other text.
 pub fn bytes_of(hex: &str) -> Option<Vec<u8>> {
     let (pairs, rest) = hex.as_bytes().as_chunks::<2>();
     let digit = |c: u8| char::from(c).to_digit(16).map(|value| value as u8);

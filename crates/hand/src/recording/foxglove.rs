@@ -77,7 +77,7 @@ pub fn hand_scene(dimensions: &HandDimensions, at_s: f64) -> Value {
     json!({"deletions": [], "entities": std::iter::once(palm).chain(of_fingers).collect::<Vec<_>>()})
 }
 
-/// The deformed surface of the object, in the frame of the object.
+/// The deformed surface of the object, in the object's frame.
 pub fn object_scene(surface: &SurfaceSeen, at_s: f64) -> Value {
     let triangles = json!({
         "pose": pose(&Vector3::zeros(), &UnitQuaternion::identity()),

@@ -14,48 +14,48 @@ use super::file::{DeviceBytes, bytes_of};
 use super::tick::{AnswerSeen, RecordedSetup, RecordedTick, SPRINGBACK_REFUSED, TickSeen};
 use crate::sent::Arrival;
 
-/// A recording.
+/// A recording of a run, as it was read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// How the run was set up.
+    /// Set-up of the run: enough to play it again.
     pub setup: RecordedSetup,
-    /// Its ticks, in order.
+    /// Ticks of the run, in order.
     pub ticks: Vec<RecordedTick>,
     /// Why reading ended before the end of the file, if it did.
     pub cut: Option<String>,
 }
 
-/// Why there is no recording.
+/// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file cannot be read.
     #[error("cannot read the recording {path}: {source}")]
     Open {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// It is no MCAP file.
+    /// The file is no MCAP file.
     #[error("{path} is no recording: {source}")]
     NotMcap {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What was found.
+        /// What the MCAP library found.
         source: McapError,
     },
-    /// It does not say how the run was set up.
+    /// The file does not say how the run was set up.
     #[error("{path} is no recording of this program: it has no /setup message that can be read")]
     NoSetup {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// It was written by a newer program.
+    /// The file was written by a newer program.
     #[error("{path} is of version {found}; this program reads {VERSION}")]
     Version {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its version.
+        /// Version of the file's messages.
         found: u32,
     },
 }

@@ -21,7 +21,7 @@ pub struct Recorder {
     path: PathBuf,
     messages: Option<Sender<Message>>,
     thread: Option<JoinHandle<McapResult<()>>>,
-    /// What was taken between the ticks, and belongs to the next one.
+    /// Events and answers that were taken between the ticks, and belong to the next one.
     between: Between,
     /// When a surface was last recorded, s.
     surface_at_s: Option<f64>,
@@ -33,40 +33,40 @@ pub enum RecordError {
     /// The file cannot be written.
     #[error("cannot record to {path}: {source}")]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The reason.
+        /// Error of the operating system or of the MCAP library.
         source: McapError,
     },
     /// The thread that writes cannot be started, or ended abnormally.
     #[error("cannot record to {path}: the thread that writes is not there")]
     Thread {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
 }
 
-/// What happened while no tick was played.
+/// Changes and answers that came while no tick was played.
 #[derive(Default)]
 struct Between {
     interventions: Vec<Intervention>,
     news: TickNews,
 }
 
-/// What a tick took and told, or the time between two.
+/// Events, answers and results of one tick, or of the time between two ticks.
 #[derive(Clone, Debug, Default)]
 pub struct TickNews {
-    /// What happened.
+    /// Events that happened, in order.
     pub events: Vec<EventSeen>,
-    /// Answers that were taken, in that order.
+    /// Answers of the server that were taken, in that order.
     pub answers: Vec<AnswerSeen>,
     /// Whether a rest shape was taken that was made beside the ticks.
     pub took_work: bool,
-    /// Whether the step that had been asked for was given up.
+    /// Whether the step of a free object that had been asked for was given up.
     pub gave_up_step: bool,
 }
 
-/// What is written at once.
+/// One message to the thread that writes.
 enum Message {
     Setup(Box<RecordedSetup>),
     Tick(Box<TickMessage>),
@@ -81,11 +81,11 @@ struct TickMessage {
     seen: TickSeen,
 }
 
-/// The file is made readable so often: that much a crash loses.
+/// Time after which the file is made readable again: a crash loses what came within it.
 const FLUSH_EVERY: Duration = Duration::from_millis(250);
-/// The surface of the object is written so often, s …
+/// Time between two surfaces of the object in the file, s …
 const SURFACE_EVERY_S: f64 = 0.1;
-/// … if it has no more nodes than this: half a megabyte a time.
+/// … which has no surface of an object with more surface nodes than this: half a megabyte a time.
 const SURFACE_NODES_MAX: usize = 5000;
 
 impl Recorder {
@@ -107,12 +107,12 @@ impl Recorder {
         Ok(Self { path, messages, thread, between: Between::default(), surface_at_s: None })
     }
 
-    /// Something was done to the object.
+    /// Notes what a person did to the object between two ticks.
     pub fn intervene(&mut self, intervention: Intervention) {
         self.between.interventions.push(intervention);
     }
 
-    /// Something was taken while no tick was played.
+    /// Notes what was taken while no tick was played.
     pub fn idle(&mut self, news: TickNews) {
         self.between.news.add(news);
     }
@@ -130,8 +130,8 @@ impl Recorder {
         wants
     }
 
-    /// A tick is over. `made` is what it made, but for what [`Recorder`] knows itself: the command,
-    /// and what was done and taken since the tick before.
+    /// Records a tick that is over. `made` is what it made, but for what [`Recorder`] knows itself: the
+    /// command, and what was done and taken since the tick before.
     pub fn tick(&mut self, sent: &Sent, news: TickNews, scene: Option<SceneSeen>, made: TickSeen) {
         let Between { interventions, news: mut all } = std::mem::take(&mut self.between);
         all.add(news);

@@ -15,21 +15,21 @@ pub struct ReplayHand {
     recording: Arc<Recording>,
     name: String,
     next: usize,
-    /// What came out, held against the recording.
+    /// Comparison of what the replayed ticks made with what was recorded.
     pub check: ReplayCheck,
 }
 
 /// A tick that is played again.
 pub struct Replayed {
-    /// Its number.
+    /// Number of the tick.
     pub tick: u64,
-    /// Ticks before it that were not played.
+    /// Number of ticks before it that were not played.
     pub skipped: u64,
-    /// Time of the client's clock then, s.
+    /// Time of the tick on the client's clock when it was recorded, s.
     pub now_s: f64,
-    /// What was done to the object before it.
+    /// What a person did to the object before the tick.
     pub interventions: Vec<Intervention>,
-    /// What the devices sent.
+    /// Bytes that the devices sent, and the command.
     pub sent: Sent,
 }
 
@@ -39,12 +39,12 @@ impl ReplayHand {
         Self { recording, name, next: 0, check: ReplayCheck::default() }
     }
 
-    /// Its file.
+    /// Path of the recording's file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The recording.
+    /// The recording that is played.
     pub fn recording(&self) -> &Recording {
         &self.recording
     }
@@ -78,7 +78,7 @@ impl ReplayHand {
         })
     }
 
-    /// Holds what the tick made that was played last against the recording.
+    /// Compares what the tick that was played last has made with the recording.
     pub fn compare(&mut self, made: &StageDigests) {
         let last = self.next.checked_sub(1).and_then(|at| self.recording.ticks.get(at));
         if let Some(recorded) = last {
@@ -87,7 +87,7 @@ impl ReplayHand {
     }
 }
 
-/// The command of this name.
+/// The command of this name, if there is one.
 fn command(name: &str) -> Option<Command> {
     [Command::KeepShape, Command::Release, Command::ReturnHome]
         .into_iter()

@@ -10,25 +10,25 @@ use super::tick::TickSeen;
 /// How far a replay agrees with its recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReplayCheck {
-    /// Ticks that were compared.
+    /// Number of ticks that were compared.
     pub ticks: u64,
-    /// Ticks with known displacements among them.
+    /// Number of these ticks that had known displacements.
     pub requests: u64,
-    /// The first difference.
+    /// First difference between the replay and its recording.
     pub difference: Option<Difference>,
 }
 
-/// Where a replay differs first.
+/// First tick and stage in which a replay differs from its recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Difference {
-    /// Tick.
+    /// Number of the tick.
     pub tick: u64,
-    /// Stage.
+    /// Name of the stage of the tick.
     pub stage: String,
 }
 
 impl ReplayCheck {
-    /// Compares a tick.
+    /// Compares a replayed tick with the recorded one.
     pub fn add(&mut self, recorded: &TickSeen, replayed: &StageDigests) {
         self.ticks += 1;
         self.requests += u64::from(!recorded.stages.request.is_empty());

@@ -31,13 +31,13 @@ impl fmt::Display for Stage {
 /// 128 bits of a BLAKE3 hash over the exact bits of numbers; empty where the stage made nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StageDigests {
-    /// See [`Stage::Pose`].
+    /// Digest of [`Stage::Pose`].
     pub pose: String,
-    /// See [`Stage::Contacts`].
+    /// Digest of [`Stage::Contacts`].
     pub contacts: String,
-    /// See [`Stage::Request`].
+    /// Digest of [`Stage::Request`].
     pub request: String,
-    /// See [`Stage::Displacement`].
+    /// Digest of [`Stage::Displacement`].
     pub displacement: String,
 }
 

@@ -12,27 +12,27 @@ use crate::sent::Arrival;
 pub struct RecordedSetup {
     /// Version of the recording's messages.
     pub version: u32,
-    /// Program that wrote it.
+    /// Name and version of the program that wrote the recording.
     pub program: String,
-    /// Built-in object or mesh file.
+    /// Name of a built-in object, or its mesh file.
     pub object: String,
-    /// Nodes asked of a built-in object.
+    /// Number of nodes asked of a built-in object.
     pub nodes: usize,
     /// Longest extent that the object was brought to, m; `None` for one of its own size.
     pub size_m: Option<f64>,
-    /// Digest of its mesh.
+    /// Digest of the object's mesh.
     pub mesh: String,
     /// Young's modulus, Pa.
     pub young_pa: f64,
     /// Poisson's ratio.
     pub poisson: f64,
-    /// Finite element.
+    /// Name of the finite element.
     pub element: String,
-    /// Method asked for.
+    /// Name of the method that was asked for.
     pub method: String,
-    /// What a fingertip holds.
+    /// Name of the contact model: what a fingertip holds.
     pub contact: String,
-    /// Whether each tick asked for every node.
+    /// Whether each tick asked for the displacement of every node.
     pub whole: bool,
     /// Equations: `linear`, `large` or `auto`; recordings from before there was a choice are linear.
     #[serde(default = "linear")]
@@ -49,12 +49,12 @@ pub struct RecordedSetup {
     /// A grasp by contact with friction; `None` where the thesis's rules hold.
     #[serde(default)]
     pub friction: Option<RecordedFriction>,
-    /// Whether the object was put in front of the first hand.
+    /// Whether the object was placed before the first hand.
     #[serde(default)]
     pub placed_in_hand: bool,
-    /// Where the hand came from.
+    /// Name of the hand that acted, as in reports.
     pub hand: String,
-    /// From tick to tick in real time, s.
+    /// Real time from tick to tick, s.
     pub period_s: Option<f64>,
     /// Hand, glove, tracker and their places (TOML, `docs/devices.md`).
     pub hand_setup: String,
@@ -94,55 +94,55 @@ pub enum Intervention {
     Turn([f64; 4]),
     /// Took the last kept shape back.
     UndoKeepShape,
-    /// Something that a replay cannot repeat, in words.
+    /// Another change of the object, in words, which a replay cannot repeat.
     NotReplayed(String),
 }
 
 /// One tick, as it was played.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TickSeen {
-    /// Its number.
+    /// Number of the tick.
     pub tick: u64,
-    /// Ticks before it that were not played.
+    /// Number of ticks before it that were not played.
     pub skipped: u64,
     /// Time of the client's clock, s.
     pub now_s: f64,
-    /// Command of the menu.
+    /// Menu command of the person, by its name.
     pub command: Option<String>,
-    /// What was done to the object before it.
+    /// What a person did to the object before the tick.
     #[serde(default)]
     pub interventions: Vec<Intervention>,
-    /// Ticks whose answers it took, in that order.
+    /// Numbers of the ticks whose answers this tick took, in that order.
     pub answers: Vec<u64>,
-    /// Whether it took a rest shape that was made beside the ticks.
+    /// Whether the tick took a rest shape that was made beside the ticks.
     pub took_work: bool,
-    /// Whether it gave up the step of a free object that an earlier tick had asked for: the server was
-    /// lost, or refused it.
+    /// Whether the tick gave up the step of a free object that an earlier tick had asked for: the server
+    /// was lost, or refused it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub gave_up_step: bool,
-    /// State of the grasp after it.
+    /// State of the grasp after the tick.
     pub state: Option<String>,
     /// Node that each fingertip holds, thumb first.
     pub contacts: [Option<u32>; 5],
-    /// What its stages made.
+    /// Digests of what the stages of the tick made.
     pub stages: StageDigests,
 }
 
 /// An answer of the server, as a tick took it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnswerSeen {
-    /// Tick that asked.
+    /// Number of the tick that asked.
     pub tick: u64,
-    /// Method that answered.
+    /// Name of the method that answered.
     pub method: String,
-    /// Element that answered.
+    /// Name of the finite element that answered.
     pub element: String,
-    /// Relative residual.
+    /// Relative residual of the answer.
     pub residual_rel: f64,
-    /// From asking to taking, ms.
+    /// Time from the request to the tick that took the answer, ms.
     pub round_trip_ms: f64,
-    /// Whether its path at large deformation began at rest. A server that was started anew in the
-    /// middle of a grip begins there; a replay asks for the same.
+    /// Whether the answer's path at large deformation began at rest. A server that was started anew in
+    /// the middle of a grip begins there; a replay asks for the same.
     #[serde(default)]
     pub from_rest: bool,
 }
@@ -150,12 +150,12 @@ pub struct AnswerSeen {
 /// Method of an answer of which it is recorded that there was no shape to spring back to.
 pub const SPRINGBACK_REFUSED: &str = "springback refused";
 
-/// Something that happened in a tick.
+/// An event that happened in a tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EventSeen {
     /// `grasp`, `shape`, `server` or `device`.
     pub kind: &'static str,
-    /// What, in words.
+    /// What happened, in words.
     pub what: String,
 }
 
@@ -164,30 +164,30 @@ pub struct EventSeen {
 /// Units: m; quaternions x, y, z, w. Frame: the world.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PoseSeen {
-    /// The tick.
+    /// Number of the tick.
     pub tick: u64,
-    /// The palm.
+    /// Origin of the palm frame.
     pub palm_m: [f64; 3],
-    /// How it is turned.
+    /// Orientation of the palm.
     pub palm_xyzw: [f64; 4],
-    /// The fingertips, thumb first.
+    /// Ends of the fingertips, thumb first.
     pub fingertips_m: [[f64; 3]; 5],
-    /// The object.
+    /// Origin of the object's frame.
     pub object_m: [f64; 3],
-    /// How it is turned.
+    /// Orientation of the object.
     pub object_xyzw: [f64; 4],
 }
 
 /// Hand and object of a tick, for programs that draw them; a replay does not need it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneSeen {
-    /// Where they were.
+    /// Palm, fingertips and object, as numbers for other programs.
     pub pose: PoseSeen,
-    /// The hand.
+    /// Poses, angles and dimensions of the hand.
     pub hand: HandSeen,
-    /// Where the object was.
+    /// Pose of the object in the world.
     pub world_from_object: Isometry3<f64>,
-    /// Its surface, now and then.
+    /// Deformed surface of the object, in some of the ticks.
     pub surface: Option<SurfaceSeen>,
 }
 
@@ -196,13 +196,13 @@ pub struct SceneSeen {
 /// Units: m. Frame: world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandSeen {
-    /// The palm.
+    /// Pose of the palm.
     pub world_from_palm: Isometry3<f64>,
-    /// The segments, thumb first, from the palm outward, +Y along the bone.
+    /// Poses of the segments, thumb first, from the palm outward, +Y along the bone.
     pub world_from_segments: [[Isometry3<f64>; 3]; 5],
     /// Joint angles in the order of `JointAngles::to_array`, rad.
     pub angles_rad: [f64; ANGLE_COUNT],
-    /// Its size.
+    /// Dimensions of the hand.
     pub dimensions: HandDimensions,
 }
 
@@ -211,7 +211,7 @@ pub struct HandSeen {
 /// Units: m. Frame: the object's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceSeen {
-    /// Its nodes.
+    /// Nodes of the surface.
     pub points: Vec<Point3<f64>>,
     /// Three of these points each, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -220,14 +220,14 @@ pub struct SurfaceSeen {
 /// A tick of a recording, with the bytes that it took.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordedTick {
-    /// What was seen of it.
+    /// The tick as its message has it.
     pub seen: TickSeen,
-    /// The bytes, in the order in which they were taken.
+    /// Device bytes, in the order in which the tick took them.
     pub arrivals: Vec<Arrival>,
-    /// Method that answered what it asked; `None` if no tick took an answer to it.
+    /// Method that answered the tick's request; `None` if no tick took an answer to it.
     pub answered_by: Option<String>,
     /// Whether that answer's path at large deformation began at rest.
     pub from_rest: bool,
-    /// Whether it found that there was no shape that the object could spring back to.
+    /// Whether that answer said that there is no shape to which the object could spring back.
     pub springback_refused: bool,
 }

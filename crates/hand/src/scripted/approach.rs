@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 pub struct PalmPath {
     /// Orientation of the palm in the world.
     pub world_from_palm_rotation: UnitQuaternion<f64>,
-    /// The object's centre, seen from the palm.
+    /// Centre of the object, seen from the palm.
     pub object_in_palm: Vector3<f64>,
 }
 
@@ -28,7 +28,7 @@ impl PalmPath {
         )
     }
 
-    /// The same hand, further back: the object is moved out of the palm's side (−Z) by `distance`.
+    /// This path, further back: the object is moved out of the palm's side (−Z) by `distance`.
     #[must_use]
     pub fn backed_off(&self, distance: f64) -> Self {
         let object_in_palm = self.object_in_palm - Vector3::new(0.0, 0.0, distance);
@@ -50,7 +50,7 @@ impl PalmPath {
         }
     }
 
-    /// Direction the palm looks in the world.
+    /// Unit direction in the world in which the palm looks.
     pub fn gaze(&self) -> Vector3<f64> {
         self.world_from_palm_rotation * -Vector3::z()
     }

@@ -12,9 +12,9 @@ use crate::hand_reader::HandSetup;
 /// A palm pose and how far each finger closes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspPlan {
-    /// The palm while it holds.
+    /// Pose of the palm, relative to the object, while the hand holds it.
     pub path: PalmPath,
-    /// How the hand is set before it closes.
+    /// Posture of the hand before its fingers close.
     pub posture: Posture,
     /// Closure (0 open, 1 closed) at which each tip touches, thumb first.
     pub touch: [f64; 5],
@@ -29,7 +29,8 @@ impl GraspPlan {
         pose(&setup.dimensions, &angles, self.path.world_from_palm(centre))
     }
 
-    /// The same grasp told by another point of the object than its centre, which is so far from there.
+    /// This plan, relative to another point of the object than its centre; `shift` leads from the centre
+    /// to it.
     ///
     /// Units: m. Frame: world.
     #[must_use]

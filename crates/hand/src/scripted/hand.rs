@@ -20,45 +20,45 @@ use crate::sent::Sent;
 pub struct Seen {
     /// Whether each tip is inside the object, thumb first.
     pub inside: [bool; 5],
-    /// Where the object is.
+    /// Pose of the object in the world.
     pub world_from_object: Isometry3<f64>,
     /// State of the grasp, once there is one.
     pub state: Option<StateName>,
-    /// The shape is being kept beside the ticks; the hand holds still until it is.
+    /// Whether the shape is being kept beside the ticks; the hand holds still until it is.
     pub keeping: bool,
-    /// The object, which is free to move, lies still.
+    /// Whether the object, which is free to move, lies still.
     pub is_still: bool,
-    /// The object has not answered what the hand did before: a hand that lifts waits for it.
+    /// Whether the object has not answered what the hand did before: a hand that lifts waits for it.
     pub is_late: bool,
-    /// The object is being prepared and the person waits for it: the hand does not reach before.
+    /// Whether the object is being prepared and the person waits for it: the hand does not reach before.
     pub object_awaited: bool,
 }
 
-/// How the hand stands at one moment.
+/// Fingers, posture and palm of the hand at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
     /// How far each finger is closed, 0 to 1, thumb first.
     pub(super) closure: [f64; 5],
-    /// How the hand is set.
+    /// Posture of the hand.
     pub(super) posture: Posture,
-    /// The palm.
+    /// Pose of the palm in the world.
     pub(super) world_from_palm: Isometry3<f64>,
 }
 
 impl Moment {
-    /// The joint angles.
+    /// Joint angles of the hand at this moment.
     pub(super) fn angles(&self) -> JointAngles {
         angles(&self.closure, self.posture)
     }
 }
 
-/// What has been played of a script.
+/// Outcome of the ticks of a script that were played.
 pub(super) struct Played {
-    /// How the hand stands now.
+    /// Fingers, posture and palm after the last tick that was played.
     pub(super) moment: Moment,
-    /// Menu command.
+    /// Menu command that the script gives.
     pub(super) command: Option<Command>,
-    /// The script is over.
+    /// Whether the script is over.
     pub(super) over: bool,
 }
 
@@ -79,7 +79,7 @@ pub struct ScriptedHand {
     progress: f64,
     /// Ticks of holding still because the shape is being kept or the object is late.
     rested: u32,
-    /// How often longer it squeezes and holds.
+    /// How many times as long the hand squeezes and holds.
     squeeze_times: u32,
     plan: GraspPlan,
     /// Where the palm came from when the hand turns to the other side.
@@ -93,7 +93,7 @@ pub struct ScriptedHand {
     planned_for: Option<UnitQuaternion<f64>>,
 }
 
-/// The hand holds still for so many ticks at most while it waits.
+/// Most ticks for which the hand holds still while it waits.
 const REST_MAX: u32 = 200;
 /// How far the hand lifts the object while it squeezes, m.
 const LIFT: f64 = 0.03;
@@ -163,30 +163,30 @@ impl ScriptedHand {
         (self.came_for, self.planned_for) = (None, None);
     }
 
-    /// Which script it plays.
+    /// The script that the hand plays.
     pub fn script(&self) -> ScriptName {
         self.name
     }
 
-    /// The same hand with another place to plan its later approaches.
+    /// Sets the planner of the later approaches.
     #[must_use]
     pub fn with_planner(self, planner: Planner) -> Self {
         Self { planner, ..self }
     }
 
-    /// The same hand, whose later approaches are planned for fingertips that hold this.
+    /// Sets what a fingertip holds, for the plans of the later approaches.
     #[must_use]
     pub fn holding(self, contact: ContactModel) -> Self {
         Self { contact, ..self }
     }
 
-    /// The same hand, which squeezes and holds so many times as long.
+    /// Lets the hand squeeze and hold so many times as long.
     #[must_use]
     pub fn squeezing_longer(self, squeeze_times: u32) -> Self {
         Self { squeeze_times: squeeze_times.max(1), ..self }
     }
 
-    /// Whether its script is over.
+    /// Whether the script is over.
     pub fn is_over(&self) -> bool {
         self.at >= self.steps.len()
     }
@@ -201,12 +201,12 @@ impl ScriptedHand {
         self.planning
     }
 
-    /// Moves on by one tick and says what the devices send.
+    /// Moves on by one tick and returns what the devices send.
     pub fn next(&mut self, seen: &Seen, object: &SoftObject) -> Sent {
         self.next_after(1, seen, object)
     }
 
-    /// Moves on by the time of so many ticks, of which only the last is played, and says what the
+    /// Moves on by the time of so many ticks, of which only the last is played, and returns what the
     /// devices send then.
     pub fn next_after(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Sent {
         let Played { moment, command, over } = self.play(ticks, seen, object);
@@ -258,7 +258,7 @@ impl ScriptedHand {
         (1..=REST_MAX).contains(&self.rested)
     }
 
-    /// One tick of a step; whether the shape is to be kept.
+    /// Plays one tick of a step; returns whether the shape is to be kept.
     fn advance(&mut self, step: Step, seen: &Seen) -> bool {
         if self.step_tick == 0 {
             self.closure_before = self.closure;

@@ -27,7 +27,7 @@ const ALONG: f64 = 0.8;
 const GRIP_STRAIGHT_MIN: f64 = 0.85;
 /// The palm of a hand above a table looks up by no more than this (sine of the angle).
 const GAZE_UP_MAX: f64 = 0.3;
-/// Postures tried.
+/// Postures that are tried: how far the fingers are gathered, rotation and abduction of the thumb, rad.
 const GATHERS: [f64; 3] = [0.0, 0.5, 1.0];
 const THUMB_ROTATIONS: [f64; 4] = [0.4, 0.7, 1.0, 1.3];
 const THUMB_ABDUCTIONS: [f64; 3] = [0.1, 0.4, 0.7];
@@ -36,7 +36,7 @@ const THUMB_ABDUCTIONS: [f64; 3] = [0.1, 0.4, 0.7];
 const TILTS_FEW: [f64; 2] = [0.0, 0.45];
 const TILTS_MANY: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 
-/// What a grasp is to be like.
+/// Requirements of a grasp that is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspWish {
     /// How far the tips move on after their touch, m.
@@ -46,7 +46,7 @@ pub struct GraspWish {
     /// Height (y, world) of the table that the object lies on, m: no part of the hand goes below it, from
     /// the reach to the press.
     pub table_y: Option<f64>,
-    /// Only grasps that friction can hold.
+    /// Whether only grasps count that friction can hold.
     pub holds_well: bool,
 }
 

@@ -15,7 +15,7 @@ use crate::hand_reader::HandSetup;
 pub struct PlanRequest {
     /// The object as it stands before the hand.
     pub object: Arc<RestShape>,
-    /// The hand.
+    /// Set-up of the hand that is to grasp.
     pub setup: HandSetup,
     /// What a fingertip holds: how deep it may press.
     pub contact: ContactModel,
@@ -26,22 +26,22 @@ pub struct PlanRequest {
     pub turn: UnitQuaternion<f64>,
 }
 
-/// The hand found no way to grasp.
+/// Why the hand has no plan to grasp the object.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoGrasp {
-    /// No palm pose is good.
+    /// No palm pose that was tried lets the fingertips grasp the object.
     #[error(
         "the scripted hand found no palm pose from which all five fingertips reach this object \
          ({extent_m:.3} m long); try another --object-size"
     )]
     OutOfReach {
-        /// Longest extent of the object.
+        /// Longest extent of the object, m.
         extent_m: f64,
     },
     /// Five tips need five nodes.
     #[error("the object has {nodes} surface nodes; five fingertips need five different ones")]
     TooFewNodes {
-        /// Nodes on its surface.
+        /// Number of nodes on the object's surface.
         nodes: usize,
     },
 }
@@ -97,7 +97,7 @@ pub struct Planner {
     abandoned: usize,
 }
 
-/// Where the planning is done.
+/// Whether the planning is done in the tick or on a thread beside it.
 enum Way {
     /// While the tick waits: the plan is there in the tick that asks for it.
     Waited(Option<Option<GraspPlan>>),
@@ -114,7 +114,7 @@ impl Planner {
     /// A planner beside the ticks.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// The error of the operating system, when it starts no thread.
     pub fn beside() -> std::io::Result<Self> {
         Self::beside_by(|request: PlanRequest| request.plan())
     }
@@ -122,7 +122,7 @@ impl Planner {
     /// A planner on a thread of its own that plans by `plan`.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// The error of the operating system, when it starts no thread.
     pub fn beside_by(
         plan: impl FnMut(PlanRequest) -> Option<GraspPlan> + Send + 'static,
     ) -> std::io::Result<Self> {
@@ -139,7 +139,7 @@ impl Planner {
         }
     }
 
-    /// The plan that was asked for is not wanted any more.
+    /// Discards the plan that was asked for.
     pub fn abandon(&mut self) {
         self.abandoned += usize::from(self.asked);
         self.asked = false;

@@ -14,7 +14,7 @@ pub struct Posture {
 }
 
 impl Posture {
-    /// The open hand's.
+    /// Posture of the open hand.
     pub const OPEN: Self = Self { thumb_rotation: 0.1, thumb_abduction: 0.6, gather: 0.0 };
 
     /// Part of the way to another posture.

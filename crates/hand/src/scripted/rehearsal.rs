@@ -13,7 +13,7 @@ use crate::hand_reader::HandSetup;
 /// The motion of a script, one moment per tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rehearsal {
-    /// At least one.
+    /// Moments of the motion, one per tick, at least one.
     moments: Vec<Moment>,
     ticks_per_s: f64,
 }
@@ -22,7 +22,7 @@ pub struct Rehearsal {
 const TICKS_PER_S: f64 = 60.0;
 /// How much further than the expected touch a finger closes before it counts as touching.
 const BEYOND_TOUCH: f64 = 0.02;
-/// No script is longer.
+/// Most ticks of a script.
 const TICKS_MAX: usize = 5000;
 
 impl Rehearsal {
@@ -54,7 +54,7 @@ impl Rehearsal {
         Self { moments, ticks_per_s: TICKS_PER_S }
     }
 
-    /// How long it takes, s.
+    /// Duration of the motion, s.
     pub fn duration_s(&self) -> f64 {
         self.moments.len().saturating_sub(1) as f64 / self.ticks_per_s
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Which part of the story is played.
+/// Script of the scripted hand: how far it goes in grasping the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ScriptName {
     /// Reach for the object and go back.
@@ -22,7 +22,7 @@ pub enum ScriptName {
     Lift,
 }
 
-/// A name that is no script's.
+/// The text is not the name of a script.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "no script is called '{0}'; there are lift, approach, attach, squeeze, release and regrasp"
@@ -46,7 +46,7 @@ impl ScriptName {
         }
     }
 
-    /// What the hand does, in order.
+    /// Steps of the script, in order.
     pub(super) fn steps(self) -> Vec<Step> {
         use Step::{
             CloseOthers, CloseThree, Grip, Hold, Keep, Look, Lower, Open, Pinch, Press, Raise,
@@ -99,7 +99,7 @@ pub(super) enum Step {
     Look,
     /// All fingers close at once until they touch.
     Pinch,
-    /// They press as deep as was planned.
+    /// The fingers press as deep as was planned.
     Grip,
     /// The hand lifts what it holds.
     Raise,

@@ -10,7 +10,7 @@ use crate::sent::Device;
 /// Bytes of a device: a whole record or reply, or bytes that are none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Arrived {
-    /// Whose.
+    /// Device that sent the bytes.
     pub device: Device,
     /// When the first of the bytes arrived.
     pub arrived: Instant,
@@ -18,7 +18,7 @@ pub struct Arrived {
     pub bytes: Vec<u8>,
 }
 
-/// First-in-first-out, of both devices.
+/// Pieces of bytes of both devices, first in, first out.
 #[derive(Debug, Default)]
 pub(super) struct Arrivals {
     waiting: Mutex<VecDeque<Arrived>>,
@@ -26,10 +26,10 @@ pub(super) struct Arrivals {
 }
 
 impl Arrivals {
-    /// Most that wait: some half minute of both devices at their full rates.
+    /// Most pieces that wait: those of some half minute of both devices at their full rates.
     pub(super) const LIMIT: usize = 8192;
 
-    /// Adds one; when there are too many the oldest is dropped and counted.
+    /// Adds a piece; when there are too many the oldest is dropped and counted.
     pub(super) fn push(&self, arrived: Arrived) {
         let mut waiting = self.lock();
         if waiting.len() >= Self::LIMIT {
@@ -39,7 +39,7 @@ impl Arrivals {
         waiting.push_back(arrived);
     }
 
-    /// Takes everything, in order of arrival.
+    /// Takes all pieces, in order of arrival.
     pub(super) fn take(&self) -> Vec<Arrived> {
         let mut taken: Vec<Arrived> = std::mem::take(&mut *self.lock()).into();
         // A record is added when it is complete; one of the other device may have begun before it.
@@ -48,7 +48,7 @@ impl Arrivals {
         taken
     }
 
-    /// How many were dropped so far.
+    /// Number of pieces that were dropped so far.
     pub(super) fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }

@@ -11,33 +11,33 @@ use super::record_assembler::Piece;
 use super::source::PortName;
 use crate::sent::Device;
 
-/// How a device is.
+/// State of a device on a serial port.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DeviceState {
-    /// It was not asked for.
+    /// The device is not used.
     NotUsed,
-    /// Its port has not been there, or could not be opened, so far; it is tried again and again.
+    /// The device's port has not been there, or could not be opened, so far; it is tried again and again.
     Absent {
-        /// In words.
+        /// Reason, in words.
         why: String,
     },
-    /// Its port is open and it is being set up.
+    /// The device's port is open and the device is being set up.
     SettingUp,
-    /// Records arrive.
+    /// Records of the device arrive.
     Talking,
-    /// Its port is open and nothing arrives; it is asked and set up again and again.
+    /// The device's port is open and nothing arrives; it is asked and set up again and again.
     Silent {
-        /// For how long, s.
+        /// How long the silence has lasted, s.
         for_s: f64,
     },
-    /// Its port was open and is gone; it is opened again as soon as it is back.
+    /// The device's port was open and is gone; it is opened again as soon as it is back.
     Lost {
-        /// In words.
+        /// Reason, in words.
         why: String,
     },
 }
 
-/// The state as the thread knows it.
+/// State of the device, as the thread knows it.
 #[derive(Clone, Debug)]
 pub(super) enum Told {
     Absent(String),
@@ -50,13 +50,13 @@ pub(super) enum Told {
 /// Why a driver let go of its open port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ended {
-    /// It was asked to end.
+    /// The driver was asked to end.
     Stopped,
     /// Nothing arrives; perhaps another opening helps.
     Silent,
 }
 
-/// What a driver's thread works with.
+/// The port, the queue and the state with which a driver's thread works.
 pub(super) struct DriverContext {
     device: Device,
     port: PortName,
@@ -71,7 +71,7 @@ struct Shared {
 
 /// Time between two tries to open a port.
 const RETRY: Duration = Duration::from_millis(300);
-/// The thread looks this often whether it is to end.
+/// Time between two looks whether the thread is to end.
 const SLICE: Duration = Duration::from_millis(25);
 
 impl DriverContext {
@@ -80,7 +80,7 @@ impl DriverContext {
         self.shared.stop.load(Ordering::Relaxed)
     }
 
-    /// Waits, but not if the thread is to end.
+    /// Waits for a time, but not once the thread is to end.
     pub(super) fn pause(&self, duration: Duration) {
         let end = Instant::now() + duration;
         while !self.stopped() {
@@ -92,7 +92,7 @@ impl DriverContext {
         }
     }
 
-    /// Says how the device is.
+    /// Sets the state of the device.
     pub(super) fn tell(&self, told: Told) {
         let mut slot = self.shared.lock();
         let changed = std::mem::discriminant(&*slot) != std::mem::discriminant(&told);
@@ -102,7 +102,7 @@ impl DriverContext {
         *slot = told;
     }
 
-    /// The device is silent; how long ago that began stays as it was.
+    /// Sets the state to silent; the time since which it is silent stays if it was silent before.
     pub(super) fn tell_silent(&self, since: Instant) {
         let mut slot = self.shared.lock();
         if !matches!(*slot, Told::SilentSince(_)) {
@@ -119,7 +119,7 @@ impl DriverContext {
         &self.port
     }
 
-    /// Hands over bytes.
+    /// Hands a piece of bytes over to whoever takes the arrivals.
     pub(super) fn hand_over(&self, piece: Piece) {
         let Piece { bytes, arrived, .. } = piece;
         self.arrivals.push(Arrived { device: self.device, arrived, bytes });
@@ -164,7 +164,7 @@ impl DriverThread {
     /// Starts a driver that serves its open port.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// The error of the operating system, when it starts no thread.
     pub(super) fn start(
         device: Device,
         port: PortName,
@@ -181,7 +181,7 @@ impl DriverThread {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// How the device is now.
+    /// State of the device now.
     pub(super) fn state(&self) -> DeviceState {
         match self.shared.lock().clone() {
             Told::Absent(why) => DeviceState::Absent { why },

@@ -4,35 +4,35 @@ use softgrasp_grasp::hand::Handedness;
 
 use crate::devices::cyberglove::SensorCount;
 
-/// What the glove told; `None` where it did not answer.
+/// What the glove's interface unit answered; `None` where it did not answer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GloveFacts {
-    /// Its sensors (`?S`).
+    /// Number of sensors, 18 or 22 (`?S`).
     pub sensors: Option<SensorCount>,
-    /// Sensors it told that are neither 18 nor 22.
+    /// Number of sensors (`?S`), where it is neither 18 nor 22.
     pub other_sensors: Option<u8>,
-    /// Its hand (`?R`).
+    /// Hand that the glove is made for (`?R`).
     pub hand: Option<Handedness>,
-    /// Initialised, and a glove plugged in (`?G`).
+    /// Whether the unit is initialised and a glove is plugged in (`?G`).
     pub ready: Option<bool>,
-    /// Flags of its unit (`?P`).
+    /// Flags of the unit (`?P`).
     pub flags: Option<[u8; 3]>,
-    /// Slots that have a sensor (`?K`).
+    /// Mask of the slots that have a sensor (`?K`).
     pub hardware_mask: Option<u32>,
-    /// What it calls itself (`?i`).
+    /// Name by which the glove identifies itself (`?i`).
     pub identity: Option<String>,
-    /// Version of its firmware (`?v`).
+    /// Version of the unit's firmware (`?v`).
     pub firmware: Option<String>,
 }
 
-/// What the tracker told.
+/// What the tracker answered.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TrackerFacts {
-    /// Its status record, without CR LF; `None` where it did not answer.
+    /// Status record, without CR LF; `None` where the tracker did not answer.
     pub status: Option<String>,
-    /// Its complaints about what it was set to.
+    /// Error records that the tracker sent while it was set up.
     pub complaints: Vec<String>,
-    /// In what it is not as it was told to be, by its status after all orders; lengths are read in
-    /// the unit that it was told.
+    /// How the tracker's status after all commands differs from what was commanded; lengths are read in
+    /// the unit that was commanded.
     pub disobeys: Option<String>,
 }

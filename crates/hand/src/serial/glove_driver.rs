@@ -185,7 +185,7 @@ pub(super) enum Payload {
 /// The reply to a query.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Reply {
-    /// What it tells.
+    /// Bytes of the answer.
     Payload(Vec<u8>),
     /// The unit does not know the query.
     Refused,

@@ -9,7 +9,7 @@ use super::record_assembler::{Cut, RecordAssembler};
 /// A device that has to be asked for each record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Poll {
-    /// What asks.
+    /// Bytes that ask for one record.
     pub(super) request: &'static [u8],
     /// Time between two requests.
     pub(super) period: Duration,
@@ -24,13 +24,13 @@ pub(super) enum Heard {
     Nothing,
 }
 
-/// A request without a reply is repeated after this time.
+/// Time without a reply after which a request is repeated.
 const REPLY_MAX: Duration = Duration::from_millis(250);
-/// Nothing for so long is silence.
+/// Time without bytes after which the device is silent.
 const SILENT: Duration = Duration::from_millis(500);
-/// Nothing for so long, and the device is set up again.
+/// Time without bytes after which the device is set up again.
 const SET_UP_AGAIN: Duration = Duration::from_millis(900);
-/// So many times set up without a record, and the port is opened again.
+/// Number of times that a device is set up without a record before its port is opened again.
 const OPEN_AGAIN: u32 = 3;
 
 /// Sets a device up and listens, again and again.
@@ -59,7 +59,7 @@ pub(super) fn serve(
     }
 }
 
-/// Listens; counts what looks like a record.
+/// Hands over what arrives, and counts what looks like a record.
 fn listen(
     context: &DriverContext,
     port: &mut Port,

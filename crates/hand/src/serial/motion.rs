@@ -14,14 +14,14 @@ use crate::scripted::Rehearsal;
 pub enum Motion {
     /// A script.
     Script {
-        /// Its hand.
+        /// Set-up of the hand.
         setup: Box<HandSetup>,
-        /// Its motion.
+        /// Motion of the script, in time.
         rehearsal: Rehearsal,
     },
     /// A recording of the tracker; the hand stays flat.
     Trajectory {
-        /// Its hand.
+        /// Set-up of the hand.
         setup: Box<HandSetup>,
         /// Places of the receiver in the stand's frame, at [`Motion::TRAJECTORY_HZ`].
         stand_from_receiver: Vec<Isometry3<f64>>,
@@ -76,7 +76,7 @@ impl Motion {
         Some(Self::Recorded { raw, stand_from_receiver: poses })
     }
 
-    /// How long it takes, s.
+    /// Duration of the motion, s.
     pub fn duration_s(&self) -> f64 {
         match self {
             Self::Script { rehearsal, .. } => rehearsal.duration_s(),
@@ -100,7 +100,7 @@ impl Motion {
         setup.calibration.raw_from_angles(&angles, setup.sensors)
     }
 
-    /// Where the receiver is at a time, s.
+    /// Pose of the receiver at a time, s.
     ///
     /// Frame: stand, the transmitter's Y-up frame (`docs/frames.md`), m.
     pub fn stand_from_receiver(&self, time_s: f64) -> Isometry3<f64> {
@@ -124,7 +124,7 @@ impl Motion {
     }
 }
 
-/// The newest of a list at a time; before the first the first.
+/// Newest entry of a list at a time; before the first entry that entry.
 fn at<T>(list: &[(f64, T)], time_s: f64) -> Option<&T> {
     let after = list.partition_point(|(at_s, _)| *at_s <= time_s);
     list.get(after.saturating_sub(1)).map(|(_, value)| value)

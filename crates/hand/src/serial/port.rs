@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use serial2::SerialPort;
 
-/// The port is of no use any more.
+/// Why a port cannot be used any more.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{why}")]
 pub(super) struct Lost {
-    /// In words.
+    /// Reason, in words.
     pub(super) why: String,
 }
 

@@ -7,28 +7,28 @@ use super::glove_driver::{Payload, Reply, find_reply};
 use super::port::{Lost, Port};
 use super::tracker_driver::{find_status, refusals};
 
-/// What answers on a port.
+/// The device that answers on a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// A glove with so many sensors.
+    /// A glove.
     Glove {
-        /// Speed of the line.
+        /// Speed of the line, bits per second.
         baud: u32,
-        /// Sensors, if it told.
+        /// Number of sensors, if the glove told it.
         sensors: Option<u8>,
-        /// What it calls itself.
+        /// Name by which the glove identifies itself.
         identity: Option<String>,
     },
     /// A tracker.
     Tracker {
-        /// Speed of the line.
+        /// Speed of the line, bits per second.
         baud: u32,
-        /// Its status record.
+        /// Status record of the tracker.
         status: String,
     },
 }
 
-/// Speeds that are tried, the likely ones first.
+/// Speeds that are tried, bits per second, the likely ones first.
 pub const BAUDS: [u32; 5] = [115_200, 38_400, 9_600, 19_200, 57_600];
 /// How long a reply may take.
 const REPLY_MAX: Duration = Duration::from_millis(250);
@@ -36,7 +36,7 @@ const REPLY_MAX: Duration = Duration::from_millis(250);
 /// The serial ports of this machine, sorted by name.
 ///
 /// # Errors
-/// The system's, where it cannot list them.
+/// The error of the operating system, where it cannot list them.
 pub fn serial_ports() -> std::io::Result<Vec<PathBuf>> {
     let mut ports = serial2::SerialPort::available_ports()?;
     ports.sort();

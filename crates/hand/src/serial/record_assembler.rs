@@ -20,9 +20,9 @@ pub(super) enum Cut {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Piece {
     pub(super) bytes: Vec<u8>,
-    /// When its first byte arrived.
+    /// When the first byte of the piece arrived.
     pub(super) arrived: Instant,
-    /// Whether it looks like a record or a reply.
+    /// Whether the piece looks like a record or a reply.
     pub(super) whole: bool,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct RecordAssembler {
     marks: VecDeque<(usize, Instant)>,
 }
 
-/// Without an end by then, bytes are handed on as they are.
+/// Number of bytes without an end of record after which they are handed on as they are.
 const LIMIT: usize = 512;
 /// Longest reply of the tracker.
 const REPLY_LIMIT: usize = 128;
@@ -63,7 +63,7 @@ impl RecordAssembler {
         self.take(length, whole)
     }
 
-    /// Whatever is left.
+    /// The bytes that are left, as one piece.
     pub(super) fn rest(&mut self) -> Option<Piece> {
         self.take(self.waiting.len(), false)
     }

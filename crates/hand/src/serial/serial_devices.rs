@@ -10,18 +10,18 @@ use super::settings::{SerialSettings, SettingsError};
 use super::tracker_driver::serve_tracker;
 use crate::sent::Device;
 
-/// Why there are no drivers.
+/// Why the drivers cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
-    /// Nonsense was asked for.
+    /// The settings can never work.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// The system gives no thread.
+    /// The system starts no thread.
     #[error("the thread of the {device} cannot be started")]
     Thread {
-        /// Which.
+        /// `glove` or `tracker`.
         device: &'static str,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
@@ -77,7 +77,7 @@ impl SerialDevices {
         Ok(devices)
     }
 
-    /// What the devices are set to.
+    /// Settings to which the devices are set.
     pub fn settings(&self) -> &SerialSettings {
         &self.settings
     }
@@ -95,7 +95,7 @@ impl SerialDevices {
         self.arrivals.dropped()
     }
 
-    /// How glove and tracker are.
+    /// States of glove and tracker, in this order.
     pub fn states(&self) -> [DeviceState; 2] {
         [&self.glove, &self.tracker].map(|driver| match driver {
             Some(driver) => driver.state(),

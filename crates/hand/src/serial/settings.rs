@@ -17,25 +17,25 @@ pub enum GloveMode {
     },
     /// The glove sends by itself.
     Streamed {
-        /// Records per second.
+        /// Records per second that the glove is told to send.
         hz: f64,
     },
 }
 
-/// How the glove is to be set up.
+/// Settings of the glove and its interface unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GloveSettings {
-    /// Its port.
+    /// Serial port of the glove.
     pub port: PortName,
-    /// Polled or streamed.
+    /// How records are asked for: polled or streamed.
     pub mode: GloveMode,
-    /// Its sensors; `None` asks the glove.
+    /// Number of sensors; `None` asks the glove.
     pub sensors: Option<SensorCount>,
-    /// Bytes or lines of text.
+    /// Whether records are bytes or lines of text.
     pub encoding: GloveEncoding,
     /// Time stamp and status in its records; only in bytes.
     pub options: RecordOptions,
-    /// The filter of the interface unit; without it sampling is quicker and noisier.
+    /// Whether the filter of the interface unit is on; without it sampling is quicker and noisier.
     pub filter: bool,
     /// Whether the unit is restarted (some 2 s) when its port is opened.
     pub restart: bool,
@@ -74,9 +74,9 @@ pub enum TrackerMode {
 /// one the more the receiver moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TrackerFilter {
-    /// None.
+    /// The filter is off.
     Off,
-    /// On; all numbers from 0 to 1.
+    /// The filter is on; all numbers are from 0 to 1.
     On {
         /// How readily α follows motion.
         sensitivity: f64,
@@ -92,13 +92,14 @@ pub enum TrackerFilter {
 /// How the tracker is to be set up; everything is set, because what it was left with is not known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrackerSettings {
-    /// Its port.
+    /// Serial port of the tracker.
     pub port: PortName,
     /// The receiver on the hand; all others are switched off, which makes this one faster.
     pub station: Station,
-    /// Output list, text or floats, unit.
+    /// Output list of a record, text or floats, and unit of position.
     pub format: FastrakFormat,
-    /// Points from the transmitter into the half of space where the hand is; zero follows it.
+    /// Direction from the transmitter into the half of space where the hand is; zero lets the tracker
+    /// follow the receiver.
     ///
     /// Frame: transmitter (X forward, Y right, Z down).
     pub hemisphere: [f64; 3],
@@ -106,7 +107,7 @@ pub struct TrackerSettings {
     pub position_filter: TrackerFilter,
     /// Filter of attitude.
     pub attitude_filter: TrackerFilter,
-    /// Polled or continuous.
+    /// How records are asked for: polled or continuous.
     pub mode: TrackerMode,
 }
 
@@ -148,45 +149,45 @@ impl From<&SerialSource> for SerialSettings {
     }
 }
 
-/// Settings that can never work.
+/// Why settings can never work.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SettingsError {
     /// Neither glove nor tracker.
     #[error("neither a glove nor a tracker is named")]
     Nothing,
-    /// No path.
+    /// A device has no path.
     #[error("the {device} has no path")]
     NoPath {
-        /// Which.
+        /// `glove` or `tracker`.
         device: &'static str,
     },
-    /// Two devices on one line.
+    /// Both devices are on one port.
     #[error("glove and tracker cannot share the port {path}")]
     SamePort {
-        /// The port.
+        /// Path of the port.
         path: PathBuf,
     },
-    /// A speed that no line has.
+    /// A line cannot have this speed.
     #[error("{baud} baud is no speed of a serial line; there are 300 to 4000000")]
     Baud {
-        /// The speed.
+        /// Speed that was asked for, bits per second.
         baud: u32,
     },
-    /// A rate that no device has.
+    /// A device cannot send records at this rate.
     #[error("{hz} records per second cannot be asked of the {device}; there are 1 to 1000")]
     Rate {
-        /// Which.
+        /// `glove` or `tracker`.
         device: &'static str,
-        /// The rate.
+        /// Rate that was asked for, records per second.
         hz: f64,
     },
     /// Options that text records do not have.
     #[error("time stamps and status come in binary records of the glove only")]
     TextOptions,
-    /// Not a direction.
+    /// The hemisphere is not a direction.
     #[error("a hemisphere is three finite numbers below 1000")]
     Hemisphere,
-    /// Not shares.
+    /// A number of a filter is not from 0 to 1.
     #[error("the numbers of a tracker's filter are from 0 to 1")]
     Filter,
 }

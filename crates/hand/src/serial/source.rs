@@ -9,7 +9,7 @@ use std::str::FromStr;
 pub struct PortName {
     /// Device file; `COM3` and the like on Windows.
     pub path: PathBuf,
-    /// Bits per second.
+    /// Speed, bits per second.
     pub baud: u32,
 }
 
@@ -25,45 +25,45 @@ pub struct SerialSource {
     pub tracker: Option<PortName>,
 }
 
-/// A text that names no serial devices.
+/// Why a text names no serial devices.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SerialSourceError {
     /// A part is not `glove=…` or `tracker=…`.
     #[error("'{part}' is not glove=PATH[@BAUD] or tracker=PATH[@BAUD]")]
     Part {
-        /// The part.
+        /// The part of the text.
         part: String,
     },
     /// A device is named twice.
     #[error("the {device} is named twice")]
     Twice {
-        /// Which.
+        /// `glove` or `tracker`.
         device: &'static str,
     },
-    /// No path.
+    /// A device has no path.
     #[error("the {device} has no path")]
     NoPath {
-        /// Which.
+        /// `glove` or `tracker`.
         device: &'static str,
     },
-    /// A speed that no line has.
+    /// A line cannot have this speed.
     #[error("{text} baud is no speed of a serial line; there are 300 to 4000000")]
     Baud {
-        /// The digits.
+        /// Text of the speed.
         text: String,
     },
-    /// Two devices on one line.
+    /// Both devices are on one port.
     #[error("glove and tracker cannot share the port {path}")]
     SamePort {
-        /// The port.
+        /// Path of the port.
         path: PathBuf,
     },
 }
 
 impl PortName {
-    /// Speed where none is given.
+    /// Speed where none is given, bits per second.
     pub const BAUD_DEFAULT: u32 = 115_200;
-    /// Speeds that can be asked for.
+    /// Speeds that can be asked for, bits per second.
     pub const BAUDS: std::ops::RangeInclusive<u32> = 300..=4_000_000;
 
     fn parse(device: &'static str, text: &str) -> Result<Self, SerialSourceError> {

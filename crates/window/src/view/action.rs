@@ -7,7 +7,7 @@ use super::display::Level;
 use super::shading::Shading;
 use super::toggle::{Page, Toggle};
 
-/// One wish.
+/// One wish of the person, by menu, bar or key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Ask for a mesh file.
@@ -46,22 +46,22 @@ pub enum Action {
     Light(Level),
     /// Show the next quantity in colours.
     NextShading,
-    /// Show the next level of the sphere tree, and after the last one none.
+    /// Show the next level of the sphere tree, after the last one the spheres of a search, then none.
     NextSphereLevel,
     /// Show the level of the sphere tree before this one.
     LastSphereLevel,
     /// Look at the whole scene.
     FrameAll,
-    /// Go on, or stand still: hands that are played only.
+    /// Play on, or pause: hands that are played only.
     PlayOrPause,
-    /// One tick: hands that are played only.
+    /// Play one tick: hands that are played only.
     Step,
-    /// From the beginning: hands that are played only.
+    /// Play from the beginning: hands that are played only.
     Restart,
 }
 
 impl Action {
-    /// What the menu calls it.
+    /// Text of the wish in a menu.
     pub fn label(&self) -> String {
         match self {
             Self::ReadFile => "Read file …".to_owned(),
@@ -95,7 +95,7 @@ impl Action {
         }
     }
 
-    /// The key that does the same, as the menu shows it; empty where there is none.
+    /// Key that asks for the wish, as the menu shows it; empty where there is none.
     pub const fn key(&self) -> &'static str {
         match self {
             Self::ReadFile => "Ctrl+O",

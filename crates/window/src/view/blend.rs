@@ -1,4 +1,4 @@
-//! The way from one number or colour to another.
+//! Numbers and colours between two others.
 
 /// From 0 at `low` to 1 at `high` with level ends; constant beyond. `low` may be the larger.
 pub fn smooth_step(low: f64, high: f64, x: f64) -> f64 {

@@ -8,17 +8,17 @@ use softgrasp_grasp::hand::Handedness;
 /// Units: m, rad. Frame: world (Y up, the viewer on the side of +Z).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewCamera {
-    /// What it looks at.
+    /// Point at which the eye looks.
     pub target: Point3<f64>,
-    /// From the target to the eye.
+    /// Distance from the target to the eye.
     pub distance: f64,
-    /// Turn about the world's Y axis; 0 looks along −Z.
+    /// Turn of the eye about the world's Y axis; 0 looks along −Z.
     pub yaw: f64,
-    /// Height above the horizon.
+    /// Angle of the eye above the horizon.
     pub pitch: f64,
 }
 
-/// Whole angle of view from bottom to top.
+/// Whole angle of view from bottom to top of the picture, rad.
 pub const FIELD_OF_VIEW: f64 = 0.60;
 /// Straight up and down are left out: there is no up at the poles.
 const PITCH_MAX: f64 = 1.53;
@@ -62,7 +62,7 @@ impl ViewCamera {
         eye
     }
 
-    /// Part of the way to another eye, the shorter way around.
+    /// The eye at a share of the way to another one, the shorter way around.
     #[must_use]
     pub fn toward(&self, other: &Self, share: f64) -> Self {
         let pi = std::f64::consts::PI;
@@ -76,18 +76,18 @@ impl ViewCamera {
         }
     }
 
-    /// Where the eye is.
+    /// Position of the eye, m, world.
     pub fn eye(&self) -> Point3<f64> {
         self.target + self.world_from_eye_rotation() * Vector3::new(0.0, 0.0, self.distance)
     }
 
-    /// Directions of the picture's right and up, and from the target to the eye.
+    /// Unit directions of the picture's right and up, and from the target to the eye, in the world.
     pub fn axes(&self) -> [Vector3<f64>; 3] {
         let rotation = self.world_from_eye_rotation();
         [rotation * Vector3::x(), rotation * Vector3::y(), rotation * Vector3::z()]
     }
 
-    /// Turns around the target.
+    /// Turns the eye around the target.
     ///
     /// Units: rad; a positive `right` turns what is seen to the right.
     pub fn turn(&mut self, right: f64, down: f64) {
@@ -95,13 +95,13 @@ impl ViewCamera {
         self.pitch = (self.pitch + down).clamp(-PITCH_MAX, PITCH_MAX);
     }
 
-    /// Comes nearer (a positive number of steps) or goes away.
+    /// Brings the eye nearer (a positive number of steps) or further away.
     pub fn zoom(&mut self, steps: f64) {
         let factor = 0.9_f64.powf(steps.clamp(-20.0, 20.0));
         self.distance = (self.distance * factor).clamp(DISTANCE_RANGE.0, DISTANCE_RANGE.1);
     }
 
-    /// Moves what is seen by parts of the picture's height.
+    /// Moves what is seen by parts of the picture's height, to the right and down.
     pub fn pan(&mut self, right: f64, down: f64) {
         let [x, y, _] = self.axes();
         self.target += (y * down - x * right) * self.height_at_target();
@@ -112,14 +112,14 @@ impl ViewCamera {
         2.0 * self.distance * (0.5 * FIELD_OF_VIEW).tan()
     }
 
-    /// Looks at a ball so that it fills the picture well.
+    /// Places the eye so that a ball fills the picture well.
     pub fn frame(&mut self, centre: Point3<f64>, radius: f64) {
         self.target = centre;
         let fits = 1.25 * radius / (0.5 * FIELD_OF_VIEW).sin();
         self.distance = fits.clamp(DISTANCE_RANGE.0, DISTANCE_RANGE.1);
     }
 
-    /// Where a point of the world is in the picture: x from −aspect to aspect, y from −1 (bottom) to
+    /// Place of a point of the world in the picture: x from −aspect to aspect, y from −1 (bottom) to
     /// 1, and how far it is from the eye; `None` behind the eye.
     pub fn project(&self, point: &Point3<f64>, aspect: f64) -> Option<(Point2<f64>, f64)> {
         let p = self.eye_from_world() * point;

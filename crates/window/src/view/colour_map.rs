@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use super::texture::Texture;
 
-/// Colours of the ramp.
+/// Number of colours of the ramp.
 pub const COLOUR_COUNT: usize = 256;
 
 /// Lightness, chroma and hue in degrees (OKLCh) that the ramp passes through: the hue goes from
@@ -25,7 +25,7 @@ const ANCHORS: [[f64; 3]; 6] = [
 /// Straight pieces that each part of the curve between two anchors is measured by.
 const PIECES: usize = 64;
 
-/// Lightness, green to red, blue to yellow: distances are those that the eye sees.
+/// Lightness, green to red, blue to yellow of a colour: distances are those that the eye sees.
 type OkLab = [f64; 3];
 
 /// A sequential colour map of [`COLOUR_COUNT`] colours.

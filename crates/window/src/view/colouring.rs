@@ -1,4 +1,4 @@
-//! The colours of the object in a frame, with the legend that explains them.
+//! The colours of the object in a tick, with the legend that explains them.
 
 use std::sync::Arc;
 
@@ -10,14 +10,14 @@ use super::legend::Legend;
 use super::shaded_object::ShadedObject;
 use super::shading::Shading;
 
-/// Colours of an object, frame after frame.
+/// Colours of an object, tick after tick.
 pub struct Colouring {
     map: ColourMap,
     legend: Legend,
     shaded: Option<Shaded>,
     material: Material,
     shares: Vec<f64>,
-    /// What the legend has to say besides its numbers.
+    /// What the legend says besides its numbers.
     remark: String,
 }
 
@@ -45,15 +45,15 @@ impl Colouring {
         }
     }
 
-    /// From now on objects are of another material.
+    /// Sets the material of the objects from now on.
     pub fn set_material(&mut self, material: Material) {
         self.material = material;
         self.shaded = None;
     }
 
-    /// Works out the colours of a frame.
+    /// Works out the colours of the object in a tick.
     ///
-    /// Units: `now_s` s.
+    /// Units: `now_s` s on the clock of who looks.
     pub fn follow(&mut self, object: &ObjectView, shading: Shading, now_s: f64) {
         self.shares.clear();
         self.remark.clear();
@@ -73,7 +73,7 @@ impl Colouring {
             "waiting for an answer with the nodes inside".clone_into(&mut self.remark);
             return;
         }
-        // A frame whose displacements are another mesh's shows no colours.
+        // A tick whose displacements are those of another mesh shows no colours.
         if shaded.shade(shading, &object.displacement).is_err() {
             return;
         }
@@ -100,17 +100,17 @@ impl Colouring {
         &self.shares
     }
 
-    /// The colours.
+    /// The colour map.
     pub fn map(&self) -> &ColourMap {
         &self.map
     }
 
-    /// The legend.
+    /// The legend of the colours.
     pub fn legend(&self) -> &Legend {
         &self.legend
     }
 
-    /// What the legend has to say besides its numbers; empty if nothing.
+    /// What the legend says besides its numbers; empty if nothing.
     pub fn remark(&self) -> &str {
         &self.remark
     }

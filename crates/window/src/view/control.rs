@@ -42,9 +42,9 @@ pub enum Control {
     Mouse(MouseInput),
     /// Play the script again from its beginning.
     Restart,
-    /// Play no more ticks until told.
+    /// Play no more ticks until told to.
     Pause,
-    /// Go on.
+    /// Go on with the ticks after a pause.
     Resume,
     /// Play one tick of a run that is paused.
     Step,

@@ -40,18 +40,18 @@ const GLIDE_S: f64 = 1.2;
 const STAYS_M: f64 = 0.012;
 
 impl DirectedEye {
-    /// An eye that is left to the window unless the person chose one.
+    /// A directed eye; it is left to the window unless the person chose one.
     pub fn new(is_chosen: bool) -> Self {
         Self { is_chosen, ..Self::default() }
     }
 
-    /// The same eye, which sees all lower by a part of the picture's height: something lies over its top.
+    /// Lets the eye see everything lower by a part of the picture's height: something lies over its top.
     #[must_use]
     pub fn lowered(self, lowered: f64) -> Self {
         Self { lowered, ..self }
     }
 
-    /// From now on the person moves the eye.
+    /// Gives the eye to the person, who moves it from now on.
     pub fn is_chosen(&mut self) {
         self.is_chosen = true;
     }
@@ -61,7 +61,7 @@ impl DirectedEye {
         !self.is_chosen
     }
 
-    /// The eye for a frame, where it is to be another one than `now`: at once for the first squeeze,
+    /// The eye for a tick, where it is to be another one than `now`: at once for the first squeeze,
     /// gently for later ones, and with the object where that is carried.
     ///
     /// Units: `now_s` s on the clock of who looks.
@@ -105,7 +105,7 @@ impl PlacedEye {
         }
     }
 
-    /// The same eye beside the object where it is now.
+    /// This eye, moved along with the object to where that is now.
     fn carried_with(&self, object: &ObjectView) -> ViewCamera {
         let way = object.world_from_object * self.in_object - self.in_world;
         let beyond = (1.0 - STAYS_M / way.norm().max(STAYS_M)).max(0.0);

@@ -1,4 +1,4 @@
-//! What of a frame is to be shown, and how richly.
+//! What of the scene is shown, and how richly.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::shading::Shading;
 use super::toggle::Toggle;
 
-/// How much is spent on the light.
+/// Level of the light: how much is computed for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Level {
     /// No shadows, no smoothed edges: for machines that draw with the processor.
@@ -18,7 +18,7 @@ pub enum Level {
     Full,
 }
 
-/// A word that names no such thing.
+/// The text is not the name of a level.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{got}' is not {what}; there are {known}")]
 pub struct UnknownDisplay {
@@ -28,7 +28,7 @@ pub struct UnknownDisplay {
 }
 
 impl Level {
-    /// All of them.
+    /// All levels, the plainest first.
     pub const ALL: [Self; 3] = [Self::Plain, Self::Fair, Self::Full];
 }
 
@@ -55,38 +55,38 @@ impl FromStr for Level {
     }
 }
 
-/// Which spheres of the sphere tree are shown.
+/// Spheres of the sphere tree that are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spheres {
-    /// None.
+    /// No spheres are shown.
     #[default]
     Hidden,
-    /// Those of a level (thesis Figure 4.13); 0 is the one around everything.
+    /// The spheres of a level (thesis Figure 4.13); level 0 is the one around everything.
     Level(usize),
-    /// Those that the search for the index finger looks at (thesis Figure 4.21).
+    /// The spheres that the search for the index finger looks at (thesis Figure 4.21).
     Search,
 }
 
-/// What is shown.
+/// What of the scene is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Display {
-    /// How much is spent on the light.
+    /// Level of the light.
     pub level: Level,
-    /// What the colour of the object shows.
+    /// Quantity that the colour of the object shows.
     pub shading: Shading,
-    /// The edges of the elements on the surface.
+    /// Whether the edges of the elements on the surface are shown.
     pub wireframe: bool,
-    /// The rest shape as a ghost.
+    /// Whether the rest shape is shown as a ghost.
     pub ghost: bool,
-    /// The hand's skin.
+    /// Whether the hand's skin is shown.
     pub skin: bool,
-    /// Cylinders, spheres and contact points that the search uses.
+    /// Whether the colliders that the search uses are shown: cylinders, spheres and contact points.
     pub colliders: bool,
-    /// Where each fingertip holds.
+    /// Whether the node is marked that each fingertip holds.
     pub contacts: bool,
-    /// The force of each fingertip.
+    /// Whether the force of each fingertip is shown as an arrow.
     pub forces: bool,
-    /// Spheres of the sphere tree.
+    /// Spheres of the sphere tree that are shown.
     pub spheres: Spheres,
 }
 
@@ -119,7 +119,7 @@ impl Display {
         }
     }
 
-    /// Shows a part of the scene, or does not any more.
+    /// Shows a part of the scene, or hides it where it is shown.
     pub fn toggle(&mut self, toggle: Toggle) {
         let shown = match toggle {
             Toggle::Wireframe => &mut self.wireframe,
@@ -132,7 +132,7 @@ impl Display {
         *shown = !*shown;
     }
 
-    /// Shows the next level of a tree that has so many; after the last one the search, then none.
+    /// Shows the next level of a tree that has so many; after the last one the search, then no spheres.
     pub fn next_spheres(&mut self, levels: usize) {
         self.spheres = match self.spheres {
             Spheres::Hidden => Spheres::Level(0),

@@ -5,35 +5,35 @@ use nalgebra::Vector3;
 use super::camera::ViewCamera;
 use super::frame::ViewFrame;
 
-/// Whether the eye is still to be put beside the hand.
+/// Whether and when the eye is still to be placed beside the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EyePlace {
-    /// The eye is where it is to be; from now on the person moves it.
+    /// The eye is placed; from now on the person moves it.
     Taken,
-    /// As soon as there is a hand.
+    /// The eye is placed as soon as there is a hand.
     AtOnce,
-    /// As soon as the hand has gone to another object and rests there.
+    /// The eye is placed as soon as the hand has gone to another object and rests there.
     AtRest {
-        /// Rest shapes seen before the other object.
+        /// Number of rest shapes seen before the other object.
         rest_shapes: u64,
-        /// Place of the palm in the frame before, m, world frame.
+        /// Position of the palm in the tick before, m, world frame.
         palm_before: Option<Vector3<f64>>,
-        /// Whether the hand has moved since the other object is there.
+        /// Whether the hand has moved since the other object appeared.
         has_moved: bool,
     },
 }
 
-/// A palm that moves by less than this from picture to picture rests, m.
+/// Distance below which a palm rests from one tick to the next that is seen, m.
 const REST_M: f64 = 5e-4;
 
 impl EyePlace {
-    /// The eye is to be put anew when the object of this frame has been replaced.
+    /// Places the eye anew when the object of this tick has been replaced.
     pub fn after(frame: &ViewFrame) -> Self {
         let rest_shapes = frame.object.rest_shapes;
         Self::AtRest { rest_shapes, palm_before: None, has_moved: false }
     }
 
-    /// The eye that a frame asks for, once.
+    /// The eye for a tick, if the eye is to be placed then; once.
     pub fn eye(&mut self, frame: &ViewFrame) -> Option<ViewCamera> {
         let palm = frame.hand.as_ref()?.world_from_palm.translation.vector;
         match self {

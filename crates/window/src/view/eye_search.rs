@@ -19,10 +19,10 @@ const TRIANGLES_MAX: usize = 6000;
 const PLACES: usize = 40;
 /// The palm as a line from wrist to knuckles with a radius, m, in its own frame.
 const PALM: (f64, f64, f64) = (0.0, 0.085, 0.034);
-/// Radius of the ball around object and hand that the eye frames, m.
+/// Radius of the ball around object and hand that fills the picture, m.
 const SEEN_RADIUS_M: f64 = 0.068;
 
-/// What each thing that is seen is worth.
+/// Weights in the sum that the best eye maximises: what each thing that is seen is worth.
 const THUMB: f64 = 1.6;
 const FINGER: f64 = 1.0;
 const OPPOSED: f64 = 1.5;
@@ -57,11 +57,11 @@ pub fn eye_on_squeeze(
 struct Scene {
     middle: Point3<f64>,
     triangles: Vec<[Point3<f64>; 3]>,
-    /// Nails, thumb first.
+    /// Positions of the fingernails, thumb first, m.
     tips: [Point3<f64>; 5],
-    /// Places of the surface and their normals.
+    /// Positions on the object's surface, m, and their normals.
     places: Vec<(Point3<f64>, Vector3<f64>)>,
-    /// Segments of fingers and the palm: ends, radius, and the finger (5 is the palm).
+    /// Segments of fingers and the palm: both ends and radius, m, and the digit's number (5 is the palm).
     bones: Vec<(Point3<f64>, Point3<f64>, f64, usize)>,
 }
 

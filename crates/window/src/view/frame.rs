@@ -18,19 +18,19 @@ pub struct ViewFrame {
     pub tick: u64,
     /// Time of the tick on the client's clock, s.
     pub at_s: f64,
-    /// The object.
+    /// The object in this tick.
     pub object: ObjectView,
     /// The hand; `None` until both devices have spoken.
     pub hand: Option<HandView>,
-    /// The grasp.
+    /// State and contacts of the grasp.
     pub grasp: GraspView,
-    /// The server and its newest answer.
+    /// State of the server and its newest answer.
     pub server: ServerView,
     /// What the hand does by itself.
     pub acts: HandActs,
-    /// What happened since the frame before this one was seen, oldest first.
+    /// News since the tick that was seen before this one, oldest first.
     pub news: Vec<News>,
-    /// Times of the answers that came since the frame before this one was seen, oldest first.
+    /// Times of the answers that came since the tick that was seen before this one, oldest first.
     pub timings: Vec<TickTiming>,
 }
 
@@ -39,17 +39,17 @@ pub struct ViewFrame {
 /// Units: m. Frame: the object's own.
 #[derive(Clone)]
 pub struct ObjectView {
-    /// What it returns to when nothing holds it.
+    /// Rest shape, to which the object returns when nothing holds it.
     pub rest: Arc<RestShape>,
-    /// How many rest shapes there have been; another number is another shape.
+    /// Number of rest shapes so far; another number is another shape.
     pub rest_shapes: u64,
-    /// Rest shapes before this one that can be gone back to.
+    /// Number of rest shapes before this one that can be gone back to.
     pub kept: usize,
     /// Displacement of every node from the rest shape.
     pub displacement: Vec<[f64; 3]>,
     /// Whether the nodes inside have their displacement too, and not only the surface.
     pub whole: bool,
-    /// Where it is.
+    /// Pose of the object in the world.
     pub world_from_object: Isometry3<f64>,
     /// Height of the table that it can lie on, y of the world; `None` where it has no weight.
     pub table_y: Option<f64>,
@@ -58,11 +58,11 @@ pub struct ObjectView {
 /// The hand as it is shown: segments that may not enter the object stay outside it.
 #[derive(Clone)]
 pub struct HandView {
-    /// Its size.
+    /// Dimensions of the hand.
     pub dimensions: HandDimensions,
-    /// The palm, as measured.
+    /// Measured pose of the palm.
     pub world_from_palm: Isometry3<f64>,
-    /// The segments, as the grasp shows them.
+    /// Poses of the segments in the world, as the grasp shows them.
     pub world_from_segment: HandSegments,
     /// Number that a sender of joints gave the record which the hand follows.
     pub record: Option<u64>,
@@ -89,14 +89,14 @@ impl HandView {
     }
 }
 
-/// Who touches what.
+/// State of the grasp and what each fingertip holds.
 #[derive(Clone, Default)]
 pub struct GraspView {
-    /// State after the tick.
+    /// State of the grasp after the tick.
     pub state: Option<StateName>,
-    /// Which tips hold or touch, thumb first.
+    /// Whether each tip holds or touches, thumb first.
     pub tips: [bool; 5],
-    /// Where each tip holds.
+    /// Contact that each tip holds, thumb first.
     pub contacts: [Option<Contact>; 5],
     /// Force of each tip on the object, N, object frame; `None` where none is known.
     pub forces: Option<[Vector3<f64>; 5]>,
@@ -109,28 +109,28 @@ pub struct GraspView {
 /// What the hand does by itself.
 #[derive(Clone, Default)]
 pub struct HandActs {
-    /// Its script has come to its end.
+    /// Whether the script of the hand is over.
     pub story_is_over: bool,
-    /// It goes somewhere by itself, because a person asked for that, and takes no other wish.
+    /// Whether the hand goes somewhere because a person asked for that, and takes no other wish.
     pub is_on_its_way: bool,
     /// The hand as it will squeeze the object, where it has a plan; another one when it has another.
     pub squeezing: Option<Arc<HandView>>,
 }
 
-/// The link and what came over it.
+/// State of the link to the server, and of what came over it.
 #[derive(Clone, Default)]
 pub struct ServerView {
-    /// Whether answers come.
+    /// State of the link: whether the server is there and answers in time.
     pub link: LinkHealth,
-    /// Whether it is preparing the model of a new shape at rest.
+    /// Whether the server is preparing the model of a new rest shape.
     pub is_preparing: bool,
-    /// The newest answer.
+    /// Summary of the newest answer.
     pub solve: Option<SolveSummary>,
     /// Tick whose answer the object shows; `None` while it shows none of this grip.
     pub shown_tick: Option<u64>,
-    /// Ticks that came too late and were not played, so far.
+    /// Number of ticks that were due too late and were not played, so far.
     pub ticks_skipped: u64,
-    /// Bytes of glove and tracker that were no good records, so far.
+    /// Number of faults of glove and tracker, so far.
     pub device_faults: u64,
     /// What was heard of the server last, in its own words.
     pub said: Option<String>,
@@ -139,17 +139,17 @@ pub struct ServerView {
 /// Whether the server is there and keeps up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LinkHealth {
-    /// It has not been reached yet, or is being looked for again.
+    /// The server has not been reached yet, or is being looked for again.
     #[default]
     Reconnecting,
-    /// It is there, and what the object shows is as new as it can be.
+    /// The server is there, and what the object shows is as new as it can be.
     Connected,
-    /// It is there, but the object shows an answer that is more than a tick late.
+    /// The server is there, but the object shows an answer that is more than a tick late.
     Late,
 }
 
 impl LinkHealth {
-    /// In a word or two.
+    /// Name of the state, in a word or two.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reconnecting => "looking for the server",
@@ -159,49 +159,49 @@ impl LinkHealth {
     }
 }
 
-/// Something that happened.
+/// A piece of news: something that happened in a tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct News {
-    /// In which tick.
+    /// Number of the tick.
     pub tick: u64,
-    /// What, in words.
+    /// What happened, in words.
     pub text: String,
-    /// Of what kind.
+    /// Kind of the news.
     pub kind: NewsKind,
 }
 
-/// What a piece of news is about.
+/// Kind of a piece of news: what it is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NewsKind {
     /// The grasp: marked on the time line.
     Grasp,
-    /// The server, or a work that was done.
+    /// The server, or a job that was done.
     Information,
-    /// Something that was asked for and cannot be.
+    /// A wish that cannot be carried out.
     Refusal,
 }
 
-/// How long one answer took, ms.
+/// Times that one answer took, stage by stage, ms.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TickTiming {
-    /// Tick that asked.
+    /// Number of the tick that asked.
     pub tick: u64,
     /// From sending the request to having the answer, on the client.
     pub round_trip: f64,
-    /// Waiting for the server's threads.
+    /// Time that the request waited for the server's threads.
     pub queue: f64,
-    /// Assembling and ordering.
+    /// Time of assembling and ordering.
     pub prepare: f64,
-    /// Factor, or columns of a new grip.
+    /// Time of the factor, or of the columns of a new grip.
     pub factor: f64,
-    /// Solving.
+    /// Time of solving.
     pub solve: f64,
-    /// Decoding and encoding.
+    /// Time of decoding and encoding.
     pub codec: f64,
 }
 
 impl TickTiming {
-    /// From an answer.
+    /// The times of an answer.
     pub fn new(tick: u64, solve: &SolveSummary) -> Self {
         let ms = &solve.report.stage_ms;
         Self {
@@ -215,7 +215,7 @@ impl TickTiming {
         }
     }
 
-    /// What the round trip has besides the server's stages: the way there and back.
+    /// Time of the round trip besides the server's stages: the way there and back.
     pub fn way(&self) -> f64 {
         let stages = self.queue + self.prepare + self.factor + self.solve + self.codec;
         (self.round_trip - stages).max(0.0)
@@ -231,7 +231,7 @@ impl ViewFrame {
         (newtons >= GRIP_LEAST_N).then_some(newtons)
     }
 
-    /// Every vertex as it is shown.
+    /// Positions of all vertices as they are shown.
     ///
     /// Units: m. Frame: the object's.
     pub fn shape(&self) -> Vec<Point3<f64>> {
@@ -239,12 +239,12 @@ impl ViewFrame {
         rest.zip(&self.object.displacement).map(|(p, u)| p + Vector3::from(*u)).collect()
     }
 
-    /// Whether there is a deformed shape to be kept.
+    /// Whether there is a deformed shape that can be kept.
     pub fn can_keep(&self) -> bool {
         self.grasp.state == Some(StateName::Deforming) && !self.grasp.keeping
     }
 
-    /// Whether the object can be turned: nothing holds it.
+    /// Whether the object can be turned, because nothing holds it.
     pub fn can_be_turned(&self) -> bool {
         !matches!(self.grasp.state, Some(StateName::Attached | StateName::Deforming))
     }
@@ -256,7 +256,7 @@ impl ViewFrame {
         Some(ViewCamera::beside_hand(object, &hand.world_from_palm, hand.dimensions.handedness))
     }
 
-    /// How many ticks old the shape is that the object shows; `None` while nothing deforms it.
+    /// Age in ticks of the shape that the object shows; `None` while nothing deforms it.
     pub fn answer_age_ticks(&self) -> Option<u64> {
         let deforming = self.grasp.state == Some(StateName::Deforming);
         self.server.shown_tick.filter(|_| deforming).map(|shown| self.tick.saturating_sub(shown))
@@ -272,34 +272,34 @@ impl ViewFrame {
         }
     }
 
-    /// Brings what an older frame that nobody saw had to tell into this one.
+    /// Adds the news and times of an older tick that nobody saw to those of this one.
     pub fn carry_over(&mut self, unseen: Self) {
         let Self { mut news, mut timings, .. } = unseen;
         news.append(&mut self.news);
         timings.append(&mut self.timings);
-        // A window that is not drawn must not make the frames grow without end.
+        // A window that is not drawn must not let the news grow without end.
         news.drain(..news.len().saturating_sub(NEWS_MAX));
         timings.drain(..timings.len().saturating_sub(TIMINGS_MAX));
         (self.news, self.timings) = (news, timings);
     }
 }
 
-/// News that wait to be seen; the oldest go.
+/// Most news that wait to be seen; the oldest are dropped.
 const NEWS_MAX: usize = 256;
-/// A grip that would be told as 0.00 N is none, N.
+/// Smallest grip force that is shown, N: a smaller one would read 0.00 N.
 const GRIP_LEAST_N: f64 = 0.005;
-/// Timings that wait to be seen; the oldest go.
+/// Most times of answers that wait to be seen; the oldest are dropped.
 const TIMINGS_MAX: usize = 1024;
 
 #[cfg(test)]
 pub(crate) mod samples {
-    //! Frames for tests.
+    //! Views of ticks for tests.
 
     use softgrasp_core::mesh::{BuiltIn, generate};
 
     use super::*;
 
-    /// A frame of a small cube at rest in a tick.
+    /// A tick with a small cube at rest.
     pub fn frame(tick: u64) -> ViewFrame {
         let rest = RestShape::try_new(generate(BuiltIn::Cube, 27).unwrap()).unwrap();
         let displacement = vec![[0.0; 3]; rest.mesh().node_count()];
@@ -324,7 +324,7 @@ pub(crate) mod samples {
         }
     }
 
-    /// A picture's data with a piece of news.
+    /// A tick with a piece of news.
     pub fn frame_with_news(tick: u64, text: &str) -> ViewFrame {
         let news = vec![News { tick, text: text.to_owned(), kind: NewsKind::Grasp }];
         ViewFrame { news, ..frame(tick) }

@@ -9,7 +9,7 @@ pub const MAX_CAPSULES: usize = 12;
 /// Radius of the palm, m.
 const PALM_RADIUS_M: f64 = 0.026;
 
-/// A line with a radius; one that ends where it begins is a sphere.
+/// A capsule: a line with a radius; one that ends where it begins is a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     begin: Point3<f64>,
@@ -18,7 +18,7 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// Begin and radius, then the end, as they are drawn with so many units per metre.
+    /// Beginning and radius, then the end, as they are drawn with so many units per metre.
     ///
     /// Frame: world.
     pub fn scaled(&self, units_per_m: f32) -> [f32; 8] {
@@ -28,7 +28,7 @@ impl Capsule {
     }
 }
 
-/// Capsules around everything solid that a frame shows, at most [`MAX_CAPSULES`].
+/// Capsules around everything solid that is seen of a tick, at most [`MAX_CAPSULES`].
 ///
 /// Units: `shape` m, object frame. Frame of the capsules: world, m.
 pub fn capsules(frame: &ViewFrame, shape: &[Point3<f64>], hand_is_shown: bool) -> Vec<Capsule> {
@@ -57,7 +57,7 @@ fn around(world_from_object: &Isometry3<f64>, shape: &[Point3<f64>]) -> Option<C
     Some(Capsule { begin, end, radius })
 }
 
-/// The palm, and each finger in two straight pieces.
+/// Capsules of the palm, and of each finger in two straight pieces.
 fn of_hand(hand: &HandView) -> impl Iterator<Item = Capsule> {
     let fingers = hand.colliders().fingers;
     let knuckles = nalgebra::center(&fingers[1].cylinders[0].base, &fingers[4].cylinders[0].base);

@@ -1,10 +1,10 @@
-//! The frames that were seen, so that a run that is played can be scrubbed.
+//! The ticks that were seen, so that a run that is played can be scrubbed.
 
 use std::sync::Arc;
 
 use super::frame::{News, NewsKind, ViewFrame};
 
-/// Frames in the order of their ticks, within a limit of memory.
+/// Views of ticks in their order, within a limit of memory.
 #[derive(Default)]
 pub struct History {
     frames: Vec<Arc<ViewFrame>>,
@@ -12,13 +12,13 @@ pub struct History {
     bytes: usize,
 }
 
-/// Memory for frames; beyond it every second one of the older half goes.
+/// Memory for the ticks, bytes; beyond it every second one of the older half is dropped.
 const BYTES_MAX: usize = 256 << 20;
-/// Events that are marked; the oldest go.
+/// Most events that are marked; the oldest are dropped.
 const MARKS_MAX: usize = 4096;
 
 impl History {
-    /// Adds the newest frame. Frames of a run that began anew replace those before.
+    /// Adds the newest tick. Ticks of a run that began anew replace those before.
     pub fn add(&mut self, frame: Arc<ViewFrame>) {
         if self.frames.last().is_some_and(|last| last.tick > frame.tick) {
             *self = Self::default();
@@ -33,22 +33,22 @@ impl History {
         }
     }
 
-    /// Number of frames.
+    /// Number of ticks in the history.
     pub fn len(&self) -> usize {
         self.frames.len()
     }
 
-    /// Whether there is none.
+    /// Whether the history is empty.
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
 
-    /// First and last tick.
+    /// Numbers of the first and the last tick.
     pub fn ticks(&self) -> Option<(u64, u64)> {
         Some((self.frames.first()?.tick, self.frames.last()?.tick))
     }
 
-    /// The frame that was seen at a tick, or the last one before it.
+    /// The view of a tick, or of the last one before it that was seen.
     pub fn at(&self, tick: u64) -> Option<&Arc<ViewFrame>> {
         let after = self.frames.partition_point(|frame| frame.tick <= tick);
         self.frames.get(after.saturating_sub(1))
@@ -59,7 +59,7 @@ impl History {
         &self.marks
     }
 
-    /// The older a frame, the less it is missed.
+    /// Drops every second one of the older half: the older a tick, the less it is missed.
     fn thin_out(&mut self) {
         let half = self.frames.len() / 2;
         let mut place = 0;

@@ -1,4 +1,4 @@
-//! The range of the colours and its labels: nice numbers that do not flicker from frame to frame.
+//! The range of the colours and its labels: nice numbers that do not flicker from tick to tick.
 
 use super::shading::{DisplayUnit, Shading};
 use super::steady_range::SteadyRange;
@@ -13,9 +13,9 @@ pub struct Legend {
 /// A mark of the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
-    /// Where it is, from 0 to 1; also the place of its colour.
+    /// Place of the mark, from 0 to 1; also the place of its colour.
     pub fraction: f64,
-    /// Its value with its unit.
+    /// Value at the mark, with its unit.
     pub text: String,
 }
 
@@ -25,7 +25,7 @@ impl Legend {
         Self { shading, range: SteadyRange::new(shading.least_range()) }
     }
 
-    /// What it is the legend of.
+    /// Shading that the legend explains.
     pub fn shading(&self) -> Shading {
         self.shading
     }
@@ -40,21 +40,21 @@ impl Legend {
         self.shading.unit(self.most())
     }
 
-    /// Takes the largest value of a frame into account; what is no number changes nothing.
+    /// Takes the largest value of a tick into account; a value that is not a number changes nothing.
     ///
     /// Units: `largest` SI, `now_s` s on a clock that may be set back.
     pub fn follow(&mut self, largest: f64, now_s: f64) {
         self.range.follow(largest, now_s);
     }
 
-    /// Where a value lies in the range; above 1 beyond its end.
+    /// Place of a value in the range; above 1 beyond its end.
     ///
     /// Units: `value` SI.
     pub fn fraction(&self, value: f64) -> f64 {
         value / self.most()
     }
 
-    /// Five marks from zero to the end.
+    /// Five marks from zero to the end of the range.
     pub fn ticks(&self) -> [Tick; 5] {
         std::array::from_fn(|quarter| {
             let fraction = quarter as f64 / 4.0;

@@ -10,11 +10,11 @@ use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 /// The object that a person wants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectWish {
-    /// Which.
+    /// The object that is to be loaded.
     pub choice: ObjectChoice,
     /// Nodes of a built-in object, where another number than that of the run is wanted.
     pub nodes: Option<usize>,
-    /// Longest extent, m, where another one than that of the run is wanted.
+    /// Longest extent of the object, m, where another one than that of the run is wanted.
     pub size_m: Option<f64>,
 }
 
@@ -40,14 +40,14 @@ pub struct Loading {
     result: Receiver<Result<LoadedObject, String>>,
 }
 
-/// Nobody wants the object any more.
+/// Value of the stage that says that nobody wants the object any more.
 const CANCELLED: u8 = u8::MAX;
 
 impl Loading {
-    /// Begins. To be called from a thread without real-time priority.
+    /// Begins to load an object. To be called from a thread without real-time priority.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// The error of the operating system, when it starts no thread.
     pub fn start(load: LoadObject, wish: ObjectWish) -> std::io::Result<Self> {
         let stage = Arc::new(AtomicU8::new(0));
         let (sender, result) = channel();
@@ -65,13 +65,13 @@ impl Loading {
         Ok(Self { stage, result })
     }
 
-    /// What is being done.
+    /// Stage at which the loading is.
     pub fn stage(&self) -> LoadStage {
         let at = usize::from(self.stage.load(Ordering::Relaxed));
         LoadStage::ALL.get(at).copied().unwrap_or(LoadStage::Ready)
     }
 
-    /// The result, once it is there; never waits. It is there once.
+    /// The object, or why there is none, as soon as that is known; never waits. It can be taken once.
     pub fn take(&self) -> Option<Result<LoadedObject, String>> {
         match self.result.try_recv() {
             Ok(loaded) => Some(loaded),

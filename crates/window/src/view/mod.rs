@@ -1,4 +1,4 @@
-//! What a person sees, worked out without a window: frames of the run, the eye, skins, colours.
+//! What a person sees, worked out without a window: ticks of the run, the eye, skins, colours.
 
 pub mod action;
 pub mod blend;

@@ -5,17 +5,17 @@ use std::str::FromStr;
 
 use softgrasp_grasp::grasp::StateName;
 
-/// When a picture is taken.
+/// Moment of a run at which a picture is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
-    /// In this tick.
+    /// In the tick of this number.
     Tick(u64),
     /// In the last tick of the n-th visit to a state, counted from 1: the fingers have squeezed as
     /// far as they do.
     EndOf(StateName, u32),
 }
 
-/// A text that names no moment.
+/// The text is not the name of a moment.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "'{0}' is no moment; there are free, avoiding, attached, deforming, detached, each also with \
@@ -71,7 +71,7 @@ impl Watch {
         Self { moment, state: None, visits: 0 }
     }
 
-    /// Takes a tick in. Whether the moment may be this tick, so that it is worth keeping, and
+    /// Takes a tick in. Returns whether the moment may be this tick, so that it is worth keeping, and
     /// whether the one that was kept before it was the moment.
     pub fn see(&mut self, tick: u64, state: Option<StateName>) -> (bool, bool) {
         match self.moment {

@@ -1,48 +1,48 @@
-//! The way of the frames from the ticks to the window: the newest wins, and nobody waits.
+//! Hands views of ticks from the ticks to the window: the newest wins, and nobody waits.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::frame::ViewFrame;
 
-/// A place for one frame.
+/// Slot for the view of one tick.
 #[derive(Clone, Default)]
 struct Slot(Arc<Mutex<Option<Box<ViewFrame>>>>);
 
-/// The ticks' end.
+/// The end of the ticks, which offers views.
 pub struct Outlet {
     slot: Slot,
-    /// No more often than this: a display shows no more.
+    /// Shortest time between two offers: a display shows no more.
     every: Duration,
     published: Option<Instant>,
-    /// A frame for which the slot was being looked into; the next one carries its news.
+    /// View that could not be offered because the slot was in use; the next one carries its news.
     kept_back: Option<Box<ViewFrame>>,
 }
 
-/// The window's end.
+/// The end of the window, which takes views.
 pub struct Inlet {
     slot: Slot,
 }
 
-/// Both ends of a way on which frames are offered at most so often.
+/// Both ends of a way on which views of ticks are offered, no more often than after `every`.
 pub fn outlet(every: Duration) -> (Outlet, Inlet) {
     let slot = Slot::default();
     (Outlet { slot: slot.clone(), every, published: None, kept_back: None }, Inlet { slot })
 }
 
 impl Outlet {
-    /// Whether a frame should be offered now.
+    /// Whether a view should be offered now.
     pub fn is_due(&self) -> bool {
         self.published.is_none_or(|then| then.elapsed() >= self.every)
     }
 
-    /// Offers a frame in the place of the one before; never waits.
+    /// Offers the view of a tick in the place of the one before; never waits.
     pub fn publish(&mut self, mut frame: Box<ViewFrame>) {
         self.published = Some(Instant::now());
         if let Some(kept_back) = self.kept_back.take() {
             frame.carry_over(*kept_back);
         }
-        // Poisoned or not, what is in it is a whole frame.
+        // Poisoned or not, the slot holds a whole view.
         let slot = match self.slot.0.try_lock() {
             Ok(slot) => Some(slot),
             Err(std::sync::TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
@@ -61,7 +61,7 @@ impl Outlet {
 }
 
 impl Inlet {
-    /// The newest frame that has not been taken.
+    /// The newest view that has not been taken.
     pub fn take(&self) -> Option<Box<ViewFrame>> {
         self.slot.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }

@@ -6,14 +6,14 @@ use softgrasp_grasp::shape::Cylinder;
 use super::frame::{HandView, ViewFrame};
 use super::ray_hit::ray_hit;
 
-/// What lies under the pointer.
+/// What lies under the mouse pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointedAt {
-    /// The hand.
+    /// The hand lies there.
     Hand,
-    /// The object.
+    /// The object lies there.
     Object,
-    /// Neither.
+    /// Neither hand nor object lies there.
     Nothing,
 }
 
@@ -24,7 +24,7 @@ const PALM_RADIUS_M: f64 = 0.042;
 /// Middle of the palm from the wrist, in parts of the hand's length.
 const PALM_MIDDLE: f64 = 0.24;
 
-/// What a ray meets first.
+/// What a ray meets first: hand, object or nothing.
 ///
 /// Units: m. Frame: world; `direction` has length 1.
 pub fn pointed_at(frame: &ViewFrame, origin: &Point3<f64>, direction: &Vector3<f64>) -> PointedAt {

@@ -17,12 +17,12 @@ pub struct ShadedObject {
     material: Material,
     recovery: Option<StressRecovery>,
     values: Vec<f64>,
-    /// Estimated error of the whole, where that is what was asked for last.
+    /// Estimated error of the whole object, where the last shading was that of the error.
     error_of_whole: Option<f64>,
 }
 
 impl ShadedObject {
-    /// A rest shape of one material.
+    /// An object with this rest shape, of one material.
     pub fn new(rest: Arc<RestShape>, material: Material) -> Self {
         Self { rest, material, recovery: None, values: Vec::new(), error_of_whole: None }
     }
@@ -70,7 +70,7 @@ impl ShadedObject {
         work(recovery.get_or_insert_with(|| StressRecovery::new(rest.mesh(), material)), values)
     }
 
-    /// What the last shading shows, one per node.
+    /// Values of the last shading, one per node.
     pub fn values(&self) -> &[f64] {
         &self.values
     }

@@ -3,13 +3,13 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// What the colour of the object shows.
+/// Quantity that the colour of the object shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Shading {
-    /// The object as it would look.
+    /// No quantity: the object has its own look.
     #[default]
     Plain,
-    /// How far each node is from its place at rest.
+    /// Distance of each node from its place at rest.
     Displacement,
     /// Largest absolute principal strain.
     Strain,
@@ -22,13 +22,13 @@ pub enum Shading {
 /// A unit that values are shown in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DisplayUnit {
-    /// As written behind the number.
+    /// Symbol of the unit, as written behind a number.
     pub symbol: &'static str,
-    /// The unit in SI units.
+    /// Size of the unit in SI units.
     pub in_si: f64,
 }
 
-/// A name that is no shading's.
+/// The text is not the name of a shading.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no shading is called '{0}'; there are plain, displacement, strain, von-mises and error")]
 pub struct UnknownShading(String);
@@ -44,11 +44,11 @@ const OF_STRESS: [DisplayUnit; 3] = [
 ];
 
 impl Shading {
-    /// All of them, in the order of a menu.
+    /// All shadings, in the order of a menu.
     pub const ALL: [Self; 5] =
         [Self::Plain, Self::Displacement, Self::Strain, Self::VonMises, Self::Error];
 
-    /// Name on the command line.
+    /// Name of the shading on the command line.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Plain => "plain",
@@ -59,7 +59,7 @@ impl Shading {
         }
     }
 
-    /// Title of its legend, and name in a menu.
+    /// Title of the legend, and name in a menu.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Plain => "Plain",
@@ -75,7 +75,7 @@ impl Shading {
         matches!(self, Self::Strain | Self::VonMises | Self::Error)
     }
 
-    /// Smallest range of its legend, in SI units: what is less is not worth a colour.
+    /// Smallest range of the legend, in SI units: smaller values are not worth a colour.
     pub const fn least_range(self) -> f64 {
         match self {
             Self::Plain => 1.0,

@@ -1,4 +1,4 @@
-//! A range that does not flicker from frame to frame: it grows at once and falls late.
+//! A range that does not flicker from tick to tick: it grows at once and falls late.
 
 use super::nice_number::nice_above;
 
@@ -7,10 +7,10 @@ const HOLD_S: f64 = 2.0;
 /// Values below this part of the range let it fall.
 const LOW_PART: f64 = 1.0 / 3.0;
 
-/// From zero to a nice number above all values.
+/// A range from zero to a nice number above all values.
 ///
-/// It grows with the frame that needs it and falls only when all values stayed below a third of it
-/// for two seconds: what is looked at keeps its colour and its length.
+/// It grows with the tick that needs it and falls only when all values stayed below a third of it for two
+/// seconds: what is looked at keeps its colour and its length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SteadyRange {
     least: f64,
@@ -36,7 +36,7 @@ impl SteadyRange {
         self.most
     }
 
-    /// Takes the largest value of a frame into account; what is no number changes nothing.
+    /// Takes the largest value of a tick into account; a value that is not a number changes nothing.
     ///
     /// Units: `now_s` s on a clock that may be set back.
     pub fn follow(&mut self, largest: f64, now_s: f64) {

@@ -5,9 +5,9 @@
 pub struct Texture {
     /// Texels in a row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// `width` × `height` × 4 bytes.
+    /// Bytes of all texels: `width` × `height` × 4.
     pub rgba: Vec<u8>,
 }
 

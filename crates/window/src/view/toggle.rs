@@ -3,39 +3,39 @@
 /// A part of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Toggle {
-    /// The edges of the elements.
+    /// The edges of the elements on the surface.
     Wireframe,
-    /// The shape at rest.
+    /// The rest shape, as a ghost.
     Ghost,
     /// The hand's skin.
     Skin,
-    /// What the search takes the hand for.
+    /// The colliders: what the search takes the hand for.
     Colliders,
-    /// Where the tips hold.
+    /// Marks at the nodes that the fingertips hold.
     Contacts,
-    /// How hard they press.
+    /// Arrows of the forces of the fingertips.
     Forces,
 }
 
 /// A page over the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Page {
-    /// Explains keys and mouse.
+    /// Page that explains keys and mouse.
     Help,
-    /// Says what runs and where.
+    /// Page that says what runs and where.
     Information,
-    /// The graph of times.
+    /// Page with the graph of the times of answers.
     Timings,
-    /// How soft the object is.
+    /// Page with the sliders of how soft the object is.
     Softness,
 }
 
 impl Toggle {
-    /// All of them, in the order of a menu.
+    /// All parts of the scene, in the order of a menu.
     pub const ALL: [Self; 6] =
         [Self::Wireframe, Self::Ghost, Self::Skin, Self::Colliders, Self::Contacts, Self::Forces];
 
-    /// What the menu calls it.
+    /// Name of the part in a menu.
     pub const fn label(self) -> &'static str {
         match self {
             Self::Wireframe => "Elements",
@@ -47,7 +47,7 @@ impl Toggle {
         }
     }
 
-    /// Its key.
+    /// Key that shows and hides the part.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Wireframe => "W",
@@ -61,10 +61,10 @@ impl Toggle {
 }
 
 impl Page {
-    /// All of them, in the order of a menu.
+    /// All pages, in the order of a menu.
     pub const ALL: [Self; 4] = [Self::Help, Self::Information, Self::Timings, Self::Softness];
 
-    /// What the menu calls it.
+    /// Name of the page in a menu.
     pub const fn label(self) -> &'static str {
         match self {
             Self::Help => "Help",
@@ -74,7 +74,7 @@ impl Page {
         }
     }
 
-    /// Its key.
+    /// Key that shows and hides the page.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Help => "F1",

@@ -25,7 +25,7 @@ impl Animation {
     /// Units: `period_s` s from picture to picture, rounded to hundredths.
     ///
     /// # Errors
-    /// The encoder's, for pictures larger than a GIF can be.
+    /// The error of the encoder, for pictures larger than a GIF can be.
     pub fn encode(self, period_s: f64) -> Result<Vec<u8>, EncodingError> {
         let mut bytes = Vec::new();
         let Some(first) = self.pictures.first() else { return Ok(bytes) };
@@ -75,7 +75,7 @@ fn change(shown: &mut RgbImage, next: &RgbImage) -> Vec<u8> {
 /// A picture as PNG.
 ///
 /// # Errors
-/// The encoder's.
+/// The error of the encoder.
 pub fn png(picture: &RgbImage) -> ImageResult<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png)?;

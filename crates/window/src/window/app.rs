@@ -1,4 +1,4 @@
-//! The window: opens, shows picture after picture, and obeys who sits before it.
+//! The window: opens, shows picture after picture, and carries out the person's wishes.
 
 use std::time::{Duration, Instant};
 
@@ -27,7 +27,7 @@ pub struct App {
     seen_window: SeenWindow,
 }
 
-/// A window that nobody sees looks so often whether it is seen again.
+/// Time between two looks whether a window that nobody sees is to be seen again.
 const UNSEEN_EVERY: Duration = Duration::from_millis(100);
 /// After mouse or keys the picture is drawn as often as ever for so long.
 const LIVELY: Duration = Duration::from_secs(2);
@@ -76,7 +76,7 @@ impl App {
         })
     }
 
-    /// Shows the window until it is closed, and asks the run to end; whether one began. Where the
+    /// Shows the window until it is closed, and asks the run to end; returns whether one began. Where the
     /// display is lost, or the window fails, this does not return: the run goes on to the end of its
     /// script, its report is told, and the process ends.
     ///
@@ -107,7 +107,8 @@ impl App {
         lost_display::go_on_without(&lost.to_string())
     }
 
-    /// One picture; false when the window is closed. A window that is not to be seen is not drawn.
+    /// Draws one picture; returns false when the window is closed. A window that is not to be seen is not
+    /// drawn.
     fn picture(&mut self) -> anyhow::Result<bool> {
         let Self { window, input, run, pace, seen_window } = self;
         if !seen_window.is_seen() {

@@ -19,10 +19,10 @@ use crate::view::loading::{LoadObject, Loading, ObjectWish};
 /// A hand that a person watches squeezes and holds so many times as long.
 pub const SQUEEZE_TIMES: u32 = 3;
 
-/// A change on its way.
+/// A change that is under way beside window and ticks.
 #[derive(Default)]
 pub enum Change {
-    /// None.
+    /// No change is under way.
     #[default]
     None,
     /// An object that is being loaded.
@@ -31,13 +31,13 @@ pub enum Change {
     Hand(Receiver<Result<HandSource, String>>, HandChoice),
 }
 
-/// What has become of a change.
+/// Outcome of a change.
 pub enum Changed {
-    /// The object is there, and is to be handed to the ticks.
+    /// The object is loaded, and is to be handed to the ticks.
     Object(Box<LoadedObject>, ObjectChoice),
-    /// The hand is there.
+    /// The hand is made, and the control that puts it in the place of the old one.
     Hand(Control, HandChoice),
-    /// There is neither; why, in a sentence.
+    /// The change failed; why, in a sentence.
     Failed(String),
     /// The file gives no object; why, in a sentence.
     Refused(PathBuf, String),
@@ -85,7 +85,7 @@ impl Change {
         }
     }
 
-    /// What has become of it, once that is known.
+    /// What has become of the change, once that is known.
     pub fn take(&mut self) -> Option<Changed> {
         let changed = match self {
             Self::None => return None,

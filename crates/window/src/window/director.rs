@@ -10,7 +10,7 @@ use crate::view::directed_eye::DirectedEye;
 use crate::view::frame::ViewFrame;
 use crate::view::shading::Shading;
 
-/// What is left to the window.
+/// Chooses the eye and the colours that the person leaves to the window.
 pub struct Director {
     eye: DirectedEye,
     /// The person chose what the colours show.
@@ -24,18 +24,18 @@ const UNDER_CARDS: f64 = 0.07;
 const COLOURED_NODES_MAX: usize = 20_000;
 
 impl Director {
-    /// A director that is left what the person has not chosen.
+    /// A director for what the person has not chosen.
     pub fn new(eye_is_chosen: bool, shading_is_chosen: bool) -> Self {
         let eye = DirectedEye::new(eye_is_chosen).lowered(UNDER_CARDS);
         Self { eye, shading_is_chosen, begun: Instant::now() }
     }
 
-    /// From now on the person moves the eye.
+    /// Gives the eye to the person, who moves it from now on.
     pub fn eye_is_chosen(&mut self) {
         self.eye.is_chosen();
     }
 
-    /// From now on the person says what the colours show.
+    /// Gives the choice of the colours to the person from now on.
     pub fn shading_is_chosen(&mut self) {
         self.shading_is_chosen = true;
     }
@@ -45,12 +45,12 @@ impl Director {
         self.eye.is_directed()
     }
 
-    /// The eye for a frame, where it is to be another one than now.
+    /// The eye for a tick, where it is to be another one than now.
     pub fn eye(&mut self, frame: &ViewFrame, now: ViewCamera) -> Option<ViewCamera> {
         self.eye.eye(frame, now, self.begun.elapsed().as_secs_f64())
     }
 
-    /// What the colours of a frame show, where that is left to the window; `is_directed` if a script
+    /// What the colours show in a tick, where that is left to the window; `is_directed` if a script
     /// or the mouse moves the hand.
     pub fn shading(&self, frame: &ViewFrame, is_directed: bool) -> Option<Shading> {
         let squeezed = frame.grasp.state == Some(StateName::Deforming);

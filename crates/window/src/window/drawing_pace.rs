@@ -4,26 +4,27 @@ use std::time::{Duration, Instant};
 
 use super::graphics::Graphics;
 
-/// When the next picture is due.
+/// Says when the next picture is due.
 pub struct DrawingPace {
     last: Instant,
     /// Pictures a second, smoothed.
     fps: f64,
-    /// No more often than this.
+    /// Shortest time between two pictures.
     every: Duration,
     begun: Instant,
     pictures: u64,
 }
 
-/// Where the processor draws, the solver needs it too.
+/// Shortest time between two pictures where the processor draws: the solver needs it too.
 const EVERY_BY_SOFTWARE: Duration = Duration::from_millis(66);
-/// A picture that nobody sees, or that is the same as the one before, is drawn no more often.
+/// Shortest time between two pictures that nobody sees, or that are the same.
 const EVERY_STILL: Duration = Duration::from_millis(250);
-/// A card waits for its display by itself; this is for one that does not.
+/// Shortest time between two pictures on a graphics card; it waits for its display by itself, if that
+/// does.
 const EVERY: Duration = Duration::from_millis(4);
 
 impl DrawingPace {
-    /// The pace for what draws.
+    /// The pace that suits what draws.
     pub fn of(graphics: &Graphics) -> Self {
         let every = if graphics.is_software { EVERY_BY_SOFTWARE } else { EVERY };
         let now = Instant::now();
@@ -43,13 +44,13 @@ impl DrawingPace {
         tracing::debug!(target: "softgrasp_window::places", picture = self.pictures);
     }
 
-    /// Says in the log how many pictures were drawn.
+    /// Writes into the log how many pictures were drawn.
     pub fn tell(&self) {
         let seconds = self.begun.elapsed().as_secs_f64();
         tracing::info!(pictures = self.pictures, seconds, "the window is closed");
     }
 
-    /// Pictures a second.
+    /// Pictures a second, smoothed.
     pub fn fps(&self) -> f64 {
         self.fps
     }

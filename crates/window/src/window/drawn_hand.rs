@@ -21,7 +21,7 @@ pub struct DrawnHand {
 }
 
 impl DrawnHand {
-    /// A hand of a size, not seen before its first pose.
+    /// A hand of these dimensions, hidden before its first pose.
     pub fn new(scene: &mut SceneNode3d, hand: &HandView) -> Self {
         let skin = HandSkin::new(&hand.dimensions);
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
@@ -36,12 +36,12 @@ impl DrawnHand {
         Self { dimensions: hand.dimensions, skin, drawn, colliders, positions, normals }
     }
 
-    /// Whether it is a hand of this size.
+    /// Whether this hand is of the dimensions of another one.
     pub fn fits(&self, hand: &HandView) -> bool {
         self.dimensions == hand.dimensions
     }
 
-    /// Moves it as the frame says.
+    /// Moves the hand to the pose of a tick.
     pub fn follow(&mut self, hand: &HandView) {
         let Self { skin, positions, normals, .. } = self;
         skin.pose(&hand.world_from_palm, &hand.world_from_segment, positions, normals);
@@ -49,20 +49,20 @@ impl DrawnHand {
         self.colliders.follow(&hand.colliders());
     }
 
-    /// What of it is shown.
+    /// Shows skin and colliders, or hides them.
     pub fn show(&mut self, skin: bool, colliders: bool) {
         self.drawn.node().set_visible(skin);
         self.colliders.group.set_visible(colliders);
     }
 
-    /// Takes it out of the scene.
+    /// Takes the hand out of the scene.
     pub fn remove(mut self) {
         self.colliders.group.remove();
         self.drawn.remove();
     }
 }
 
-/// Cylinders and fingertip spheres, to be seen through.
+/// Cylinders and fingertip spheres of the colliders, transparent.
 struct DrawnColliders {
     group: SceneNode3d,
     cylinders: Vec<SceneNode3d>,

@@ -14,11 +14,11 @@ pub struct DrawnMarks {
     newtons: SteadyRange,
 }
 
-/// What belongs to one fingertip.
+/// The marks of one fingertip.
 struct Mark {
-    /// Where it holds.
+    /// Ball on the node that the tip holds.
     node: SceneNode3d,
-    /// What it covers.
+    /// Disc on what the tip covers.
     patch: SceneNode3d,
     shaft: SceneNode3d,
     head: SceneNode3d,
@@ -34,11 +34,11 @@ const HEAD_LENGTH_M: f64 = 0.006;
 const ARROW_M: f64 = 0.05;
 /// An arrow ends so many radii of the fingertip before the place: outside the finger.
 const OUTSIDE: f64 = 2.2;
-/// Forces that are all smaller have short arrows, N.
+/// Smallest force that an arrow of full length stands for, N.
 const LEAST_NEWTONS: f64 = 0.05;
 
 impl DrawnMarks {
-    /// Marks that are not seen before their first frame.
+    /// Marks that are hidden before the first tick is shown.
     pub fn new(scene: &mut SceneNode3d) -> Self {
         let mark = |_| {
             let mut node = scene.add_sphere(NODE_RADIUS_M * UNITS_PER_M);
@@ -61,7 +61,7 @@ impl DrawnMarks {
         self.newtons.most() / ARROW_M
     }
 
-    /// Follows a frame.
+    /// Shows the contacts and forces of a tick, as far as they are to be seen.
     ///
     /// Units: `shape` m, object frame.
     pub fn follow(
@@ -96,8 +96,8 @@ impl DrawnMarks {
     }
 }
 
-/// Where a fingertip presses: the node that it is glued to, or the foremost of it in the direction of its
-/// force.
+/// The place where a fingertip presses: the node that it is glued to, or the foremost point of the tip in
+/// the direction of its force.
 fn pressed_place(
     frame: &ViewFrame,
     finger: usize,

@@ -40,14 +40,14 @@ impl DrawnMesh {
         Self { node }
     }
 
-    /// Its node, for material and visibility.
+    /// The mesh's node in the scene, for material and visibility.
     pub fn node(&mut self) -> &mut SceneNode3d {
         &mut self.node
     }
 
     /// Moves the vertices.
     ///
-    /// Shapes: as in [`DrawnMesh::new`].
+    /// Shapes: those of [`DrawnMesh::new`].
     pub fn set(&mut self, positions: &[[f32; 3]], normals: &[[f32; 3]]) {
         self.node.modify_vertices(&mut |vertices| copy(positions, vertices));
         self.node.modify_normals(&mut |all| copy(normals, all));
@@ -72,7 +72,7 @@ fn copy(from: &[[f32; 3]], to: &mut Vec<Vec3>) {
     to.extend(from.iter().map(|v| Vec3::from_array(*v)));
 }
 
-/// Puts a picture on a mesh; the name says which picture it is.
+/// Puts a picture on a mesh; `name` distinguishes it from other pictures.
 ///
 /// Colours: sRGB.
 pub fn set_texture(node: &mut SceneNode3d, name: &str, picture: &Picture) {
@@ -89,7 +89,7 @@ pub fn remove_texture(node: &mut SceneNode3d) {
 
 /// Gives a mesh a fine relief by a picture of its slopes.
 ///
-/// Values: linear.
+/// Values of the picture: linear.
 pub fn set_relief(node: &mut SceneNode3d, name: &str, picture: &Picture) {
     if let Some(texture) = texture(name, picture, false) {
         node.set_normal_map(texture);

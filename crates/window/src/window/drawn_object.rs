@@ -23,15 +23,15 @@ pub struct DrawnObject {
     ghost: DrawnMesh,
     /// Rest shape that the ghost shows.
     ghost_of: u64,
-    /// Distinguishes the textures of one object from those of the next.
+    /// Name that distinguishes the textures of one object from those of the next.
     name: String,
     is_coloured: bool,
     world_from_object: Isometry3<f64>,
 }
 
-/// Dark lines on every colour of skin.
+/// Colour of the element edges: dark on every skin.
 const WIRE: Color = Color::new(0.05, 0.06, 0.08, 1.0);
-/// Lines lie so far outside the surface that they do not flicker in it, m.
+/// Distance of the lines from the surface, outside, m: they do not flicker in it.
 const WIRE_LIFT_M: f32 = 0.00012;
 
 impl DrawnObject {
@@ -56,7 +56,7 @@ impl DrawnObject {
         }
     }
 
-    /// Whether the object of a frame is this one, perhaps with another rest shape.
+    /// Whether the object of a tick is this one, perhaps with another rest shape.
     pub fn is(&mut self, object: &ObjectView) -> bool {
         let same = self.rest_shapes == object.rest_shapes
             || self.made_for.surface().triangles == object.rest.surface().triangles;
@@ -66,7 +66,7 @@ impl DrawnObject {
         same
     }
 
-    /// Moves it as the frame says.
+    /// Moves the object to the pose and shape of a tick.
     pub fn follow(&mut self, object: &ObjectView, shape: &[Point3<f64>]) {
         if self.ghost_of != object.rest_shapes {
             self.show_rest_as_ghost(&object.rest);
@@ -80,7 +80,7 @@ impl DrawnObject {
         self.group.set_pose(drawn_pose(&object.world_from_object));
     }
 
-    /// Shows the rest shape as a ghost, or not.
+    /// Shows the rest shape as a ghost, or hides it.
     pub fn show_ghost(&mut self, shown: bool) {
         self.ghost.node().set_visible(shown);
     }
@@ -123,7 +123,7 @@ impl DrawnObject {
         }
     }
 
-    /// Takes it out of the scene.
+    /// Takes the object out of the scene.
     pub fn remove(mut self) {
         self.group.remove();
     }
@@ -158,7 +158,7 @@ fn set_material(node: &mut SceneNode3d, object: &str, part: &str, material: &Sur
     }
 }
 
-/// The rest shape, to be seen through.
+/// The rest shape, drawn transparent.
 fn ghost(group: &mut SceneNode3d, skin: &ObjectSkin) -> DrawnMesh {
     let empty: (&[_], &[_], &[_], &[_]) = (&[], &[], &[], &[]);
     let (triangles, positions, normals, uvs) = skin.parts().first().map_or(empty, |body| {

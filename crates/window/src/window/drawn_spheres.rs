@@ -7,19 +7,19 @@ use softgrasp_grasp::shape::Sphere;
 use super::drawn_mesh::DrawnMesh;
 use super::units::drawn_pose;
 
-/// Spheres to be seen through, in two colours.
+/// Transparent spheres in two colours.
 pub struct DrawnSpheres {
     group: SceneNode3d,
     passed: Heap,
     entered: Heap,
 }
 
-/// Whether a sphere is passed by or looked into by a search.
+/// What a search does with a sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visit {
-    /// It is passed by.
+    /// The search passes the sphere by.
     Passed,
-    /// It is looked into.
+    /// The search looks into the sphere.
     Entered,
 }
 
@@ -27,13 +27,13 @@ const PASSED: Color = Color::new(0.16, 0.36, 0.80, 0.26);
 const ENTERED: Color = Color::new(0.95, 0.45, 0.10, 0.30);
 
 impl DrawnSpheres {
-    /// None yet.
+    /// A drawing without any sphere.
     pub fn new(scene: &mut SceneNode3d) -> Self {
         let group = scene.add_group();
         Self { group, passed: Heap::new(PASSED), entered: Heap::new(ENTERED) }
     }
 
-    /// Shows these; whether something new is drawn that has no material yet.
+    /// Shows these spheres; returns whether something new is drawn that has no material yet.
     ///
     /// Units: m. Frame: the object's.
     pub fn show(
@@ -60,7 +60,7 @@ impl DrawnSpheres {
 struct Heap {
     colour: Color,
     drawn: Option<DrawnMesh>,
-    /// Spheres that the mesh has room for; those that are not needed have no size.
+    /// Number of spheres that the mesh has room for; those that are not needed have no size.
     room: usize,
     ball: Ball,
     positions: Vec<[f32; 3]>,
@@ -73,7 +73,7 @@ impl Heap {
         Self { colour, drawn: None, room: 0, ball, positions: Vec::new(), normals: Vec::new() }
     }
 
-    /// Shows these; whether the mesh is a new one.
+    /// Shows these spheres; returns whether the mesh is a new one.
     fn show(&mut self, group: &mut SceneNode3d, spheres: &[Sphere]) -> bool {
         let is_new = spheres.len() > self.room;
         if is_new {

@@ -7,7 +7,7 @@ use crate::view::blend::smooth_step;
 use crate::view::light;
 use crate::view::light::{HORIZON, Lamp};
 
-/// Width of the picture of the surroundings; half of it is its height.
+/// Width of the picture of the surroundings, texels; its height is half of it.
 const WIDTH: u32 = 256;
 
 /// Surroundings as an equirectangular picture in linear light: a bright room whose wall meets the
@@ -38,7 +38,7 @@ fn radiance(azimuth: f64, elevation: f64) -> [f32; 3] {
     std::array::from_fn(|i| HORIZON[i] * shade as f32 + lamp as f32)
 }
 
-/// A lamp for the renderer.
+/// The renderer's light for a lamp.
 pub fn light(lamp: &Lamp) -> Light {
     let [red, green, blue] = lamp.colour;
     let colour = Color::new(red, green, blue, 1.0);

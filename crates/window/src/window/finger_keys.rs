@@ -17,12 +17,12 @@ pub struct FingerKeys {
     last: Option<Instant>,
 }
 
-/// Closing per second: from open to touching in about one.
+/// Closing of a finger per second: from open to touching in about one.
 const CLOSING_SPEED: f64 = 1.0;
 /// Speed of the hand, m/s, and of its turn, rad/s.
 const SPEED_M: f64 = 0.12;
 const TURN_SPEED: f64 = 1.2;
-/// A key that is held through a stall of the window does not count for all of it, s.
+/// Longest time that counts for a key that is held through a stall of the window, s.
 const PERIOD_MAX_S: f64 = 0.1;
 
 const FINGERS: [(Key, Finger); 5] = [
@@ -34,8 +34,8 @@ const FINGERS: [(Key, Finger); 5] = [
 ];
 
 impl FingerKeys {
-    /// Takes a key that went down or up; whether it went down and was not down before: a key that is
-    /// held is reported again and again. Keys that are `typed` into a field move nothing.
+    /// Takes a key that went down or up; returns whether it went down and was not down before: a key that
+    /// is held is reported again and again. Keys that are `typed` into a field move nothing.
     pub fn take(&mut self, key: Key, press: Press, modifiers: Modifiers, typed: bool) -> bool {
         self.shift = modifiers.contains(Modifiers::Shift);
         if press == Press::Release {
@@ -54,7 +54,7 @@ impl FingerKeys {
         is_first
     }
 
-    /// What the keys that are down ask of the hand since the last call.
+    /// Wishes to the mouse hand from the keys that were down since the last call.
     ///
     /// Frame: `axes` are right, up and towards the eye in the world.
     pub fn inputs(&mut self, axes: [Vector3<f64>; 3]) -> Vec<MouseInput> {

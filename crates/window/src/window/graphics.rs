@@ -1,4 +1,4 @@
-//! Whether this machine can draw, and with what.
+//! Whether this machine can draw, and with which graphics.
 
 use std::cell::Cell;
 use std::sync::Once;
@@ -7,12 +7,12 @@ use kiss3d::prelude::Context;
 
 use crate::view::display::Level;
 
-/// What draws.
+/// The graphics card or program that draws.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Graphics {
     /// Name of the graphics card or of the program that stands in for it.
     pub name: String,
-    /// Whether the processor draws.
+    /// Whether the processor draws, because there is no graphics card.
     pub is_software: bool,
 }
 
@@ -31,13 +31,13 @@ pub enum NoGraphics {
     /// The window could not be opened.
     #[error("the window cannot be shown: {reason}")]
     Window {
-        /// What the system said.
+        /// Reason that the system gave.
         reason: String,
     },
 }
 
 impl Graphics {
-    /// What would draw.
+    /// The graphics with which this machine would draw.
     ///
     /// # Errors
     /// [`NoGraphics::NoDriver`].
@@ -61,7 +61,7 @@ impl Graphics {
         }
     }
 
-    /// What draws in the window or picture that is open.
+    /// The graphics of the window or picture that is open.
     pub fn in_use() -> Self {
         Self::of(&Context::get().adapter.get_info())
     }
@@ -71,7 +71,8 @@ impl Graphics {
         Self { name: format!("{} ({})", info.name, info.backend), is_software }
     }
 
-    /// What a person who chooses this light should know of it here; nothing where it costs nothing.
+    /// What a person who chooses this level of light should know of its cost here; `None` where it costs
+    /// nothing.
     pub fn price_of(&self, light: Level) -> Option<&'static str> {
         (self.is_software && light != Level::Plain).then_some(
             "The processor draws here: this light is slow, and takes memory with every picture. \
@@ -93,11 +94,11 @@ pub fn check_display() -> Result<(), NoGraphics> {
     if names.iter().any(is_set) { Ok(()) } else { Err(NoGraphics::NoDisplay) }
 }
 
-/// Panics that become a sentence are not told besides.
+/// Sets the panic hook once: panics that become a sentence are not printed besides.
 static HOOK: Once = Once::new();
 
 thread_local! {
-    /// Whether this thread is in [`without_panic`].
+    /// Whether this thread runs work of [`without_panic`].
     static CAUGHT_HERE: Cell<bool> = const { Cell::new(false) };
 }
 

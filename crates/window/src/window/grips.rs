@@ -8,7 +8,7 @@ use crate::view::control::Control;
 use crate::view::frame::ViewFrame;
 use crate::view::pointer::{PointedAt, pointed_at};
 
-/// What is being dragged.
+/// Thing that a drag of the mouse moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grip {
     /// The view turns.
@@ -48,21 +48,21 @@ pub struct Grips {
     now: Option<Grip>,
 }
 
-/// A drag over the height of the window turns by so much, rad.
+/// Turn of a drag over the height of the window, rad.
 const TURN: f64 = 4.0;
 
 impl Grips {
-    /// A drag begins.
+    /// Begins a drag that moves this.
     pub fn begin(&mut self, grip: Grip) {
         self.now = Some(grip);
     }
 
-    /// It ends.
+    /// Ends the drag.
     pub fn end(&mut self) {
         self.now = None;
     }
 
-    /// Moves the camera, or says what is to be asked of the ticks.
+    /// Moves the camera by a drag, or returns what is to be asked of the ticks.
     ///
     /// Units: `by` in heights of the window, to the right and down.
     pub fn drag(&self, camera: &mut ViewCamera, by: Vector2<f64>, shift: bool) -> Option<Control> {

@@ -13,9 +13,9 @@ use crate::view::toggle::{Page, Toggle};
 pub enum Gesture {
     /// A button went down at a place; what lies there decides what a drag moves.
     Began(DragButton, Vector2<f64>),
-    /// It was dragged by so much, with Shift or without.
+    /// The mouse was dragged by so much, with Shift or without.
     Dragged(DragButton, Vector2<f64>, bool),
-    /// It went up.
+    /// The button went up.
     Ended,
     /// The right button was clicked.
     MenuAsked(Vector2<f64>),
@@ -25,16 +25,16 @@ pub enum Gesture {
     Scrolled(f64, Vector2<f64>),
 }
 
-/// Buttons that drag.
+/// Mouse buttons that drag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DragButton {
-    /// Turns.
+    /// The left button: it turns.
     Left,
-    /// Pans.
+    /// The middle button: it pans.
     Middle,
 }
 
-/// What the mouse is doing.
+/// State of the mouse: buttons that are down, and the last click.
 #[derive(Default)]
 pub struct Mouse {
     at: Vector2<f64>,
@@ -46,13 +46,14 @@ pub struct Mouse {
 
 /// Two clicks within this time are a double click.
 const DOUBLE_CLICK: Duration = Duration::from_millis(350);
-/// A click moves the mouse by less than this, pixels.
+/// Largest way of the mouse that is still a click, pixels.
 const CLICK_MOVES_MAX: f64 = 5.0;
-/// The window reports this much for one notch of the wheel.
+/// Amount that the window reports for one notch of the wheel.
 const NOTCH: f64 = 10.0;
 
 impl Mouse {
-    /// Takes an event in; `is_taken` if a menu or card lies under the pointer.
+    /// Takes an event of the window and returns its gesture; `is_taken` if a menu or card lies under the
+    /// pointer.
     pub fn take(&mut self, event: &WindowEvent, is_taken: bool) -> Option<Gesture> {
         match *event {
             WindowEvent::CursorPos(x, y, modifiers) => {

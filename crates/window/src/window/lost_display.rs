@@ -7,27 +7,27 @@
 
 use std::sync::Mutex;
 
-/// Why there is no window any more.
+/// Why the window has ended although nobody closed it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The display went.
+    /// The display is lost.
     DisplayLost,
-    /// It could not be drawn any more although its display is there; why, in a sentence.
+    /// The window could not be drawn any more although its display is there; why, in a sentence.
     Failed(String),
 }
 
-/// What is left to do; it does not return.
+/// Work that is left when the window has ended; it does not return.
 pub type Rest = Box<dyn FnOnce(End) + Send>;
 
-/// What is left to do when there is no window any more.
+/// Work that is left when the window has ended without being closed.
 static REST: Mutex<Option<Rest>> = Mutex::new(None);
 
-/// From now on this is done when there is no window any more; it ends the process.
+/// Sets the work that is left when the window ends without being closed; it ends the process.
 pub fn set_rest(rest: Rest) {
     *lock() = Some(rest);
 }
 
-/// Nothing is left to do any more.
+/// Clears that work: nothing is left to do.
 pub fn clear_rest() {
     *lock() = None;
 }
@@ -51,7 +51,7 @@ pub fn is_there() -> bool {
     }
 }
 
-/// Other systems have no Xlib.
+/// Always `true`: other systems have no Xlib.
 #[cfg(not(all(unix, not(target_os = "macos"))))]
 pub fn is_there() -> bool {
     true
@@ -66,7 +66,7 @@ pub fn hear() {
     unsafe { (xlib.XSetIOErrorHandler)(Some(display_is_lost)) };
 }
 
-/// Other systems have no Xlib.
+/// Does nothing: other systems have no Xlib.
 #[cfg(not(all(unix, not(target_os = "macos"))))]
 pub fn hear() {}
 

@@ -29,74 +29,74 @@ use crate::view::frame::ViewFrame;
 use crate::view::shading::Shading;
 use crate::view::toggle::Page;
 
-/// What lies over the scene, from picture to picture.
+/// Everything that lies over the scene, from picture to picture.
 #[derive(Default)]
 pub struct Panels {
     pop_up: PopUp,
-    /// The dialog that is open.
+    /// Dialog that is open.
     pub dialog: Dialog,
-    /// Sentences on the screen.
+    /// Sentences on the screen, for a while.
     pub notices: Notices,
-    /// The newest times.
+    /// Newest times of answers, for their graph.
     pub timings: Timings,
-    /// How far the fingers of the mouse hand are to be closed.
+    /// Sliders that close the fingers of the mouse hand.
     pub sliders: FingerSliders,
     help: bool,
     information: bool,
     shows_timings: bool,
     shows_softness: bool,
     softness: Softness,
-    /// The first-run hint, until it has been seen.
+    /// Whether the hint of the first run has been seen.
     hint_gone: bool,
     is_set_up: bool,
-    /// Since when the server has been preparing the object.
+    /// When the server began to prepare the object.
     pub(super) prepares_since: Option<Instant>,
 }
 
-/// What was asked for.
+/// What the person asked for on the panels.
 #[derive(Default)]
 pub struct Asked {
-    /// Wishes.
+    /// Wishes to the run and the window.
     pub actions: Vec<Action>,
     /// Wishes to the mouse hand.
     pub mouse: Vec<MouseInput>,
-    /// A file that was named.
+    /// File that was named in a dialog.
     pub file: Option<FileAnswer>,
-    /// A tick to look at.
+    /// Number of a tick to look at.
     pub look_at: Option<u64>,
-    /// The newest tick is to be looked at again.
+    /// Whether the newest tick is to be looked at again.
     pub newest: bool,
-    /// What is being loaded is not wanted any more.
+    /// Whether the object that is being loaded is not wanted any more.
     pub cancel: bool,
-    /// The person takes the hand of the script.
+    /// Whether the person takes the hand of the script.
     pub takes_hand: bool,
-    /// Another material, size or mesh of the object.
+    /// Another material, size or mesh of the object that is wanted.
     pub softness: Option<SoftnessWish>,
 }
 
-/// What the panels show.
+/// What the panels show in a picture.
 pub struct Seen<'a> {
-    /// The run, once it is there.
+    /// The run, once it has begun.
     pub running: Option<&'a Running>,
-    /// What is shown of the scene.
+    /// What of the scene is shown.
     pub display: &'a Display,
-    /// Colours and legend.
+    /// Colours of the object and their legend.
     pub colouring: &'a Colouring,
-    /// What is being changed.
+    /// Change that is under way.
     pub change: &'a Change,
-    /// What is being done before the run begins, and the name of the object.
+    /// Step of loading before the run begins, and the name of the object.
     pub starting: Option<(usize, &'a str)>,
-    /// What draws, and how many pictures a second.
+    /// Name of the graphics, and pictures a second.
     pub graphics: (&'a str, f64),
     /// Whether pictures are being written.
     pub is_recording: bool,
     /// Force that a metre of arrow stands for, N/m.
     pub newtons_per_m: f64,
-    /// How long it is until a script that is over begins anew.
+    /// Time until a script that is over begins anew.
     pub story_begins_in: Option<Duration>,
 }
 
-/// Names of the columns.
+/// Names of the columns of cards.
 const LEFT: &str = "left";
 const RIGHT: &str = "right";
 const TOP: &str = "top";
@@ -105,9 +105,9 @@ const LEFT_WIDTH: f32 = 222.0;
 /// Width of the column at the right, and where only the legend is there, points.
 const RIGHT_WIDTH: f32 = 366.0;
 const LEGEND_WIDTH: f32 = 176.0;
-/// What is told is at most so wide, points.
+/// Largest width of what is told at the top, points.
 const TOLD_WIDTH: f32 = 560.0;
-/// The hint goes after so many ticks of a hand that is played.
+/// Number of ticks of a hand that is played after which the hint goes.
 const HINT_TICKS: u64 = 900;
 
 impl Panels {
@@ -117,7 +117,7 @@ impl Panels {
         self.pop_up.open(egui::Pos2::new(at.x as f32 / scale, at.y as f32 / scale));
     }
 
-    /// Whether a page or dialog is open that Escape closes; closes it.
+    /// Closes the page or dialog that Escape closes; returns whether one was open.
     pub fn escape(&mut self) -> bool {
         let was_open = self.pop_up.is_open() || self.help || !self.dialog.is_closed();
         self.pop_up.close();
@@ -126,7 +126,7 @@ impl Panels {
         was_open
     }
 
-    /// Shows a page, or does not any more.
+    /// Shows a page, or hides it where it is shown.
     pub fn toggle(&mut self, page: Page) {
         match page {
             Page::Help => self.help = !self.help,
@@ -137,7 +137,7 @@ impl Panels {
         self.hint_gone |= page == Page::Help;
     }
 
-    /// The hint has been understood.
+    /// Hides the hint: it has been understood.
     pub fn hide_hint(&mut self) {
         self.hint_gone = true;
     }
@@ -199,7 +199,7 @@ impl Panels {
         }
     }
 
-    /// The hand of the mouse, below the bar.
+    /// Shows the card of the mouse hand, below the bar.
     fn show_left(&mut self, context: &Context, running: &Running, asked: &mut Asked) {
         if running.about.hand != HandChoice::Mouse {
             return;
@@ -214,7 +214,7 @@ impl Panels {
         self.hint_gone |= asked.mouse.iter().any(closes);
     }
 
-    /// Softness, legend, times and information, at the right.
+    /// Shows softness, legend, times and information, at the right.
     fn show_right(
         &mut self,
         context: &Context,
@@ -254,7 +254,7 @@ impl Panels {
         is_coloured || self.shows_timings || self.information || self.shows_softness
     }
 
-    /// What has to be told, between the left and the right.
+    /// Shows what has to be told, between the left and the right column.
     fn show_top(
         &mut self,
         context: &Context,
@@ -280,7 +280,7 @@ impl Panels {
         });
     }
 
-    /// The one thing that the person is to know now.
+    /// Shows the one thing that the person is to know now.
     fn tell(&mut self, ui: &mut Ui, seen: &Seen<'_>, running: &Running, asked: &mut Asked) {
         if seen.story_begins_in.is_some() {
             self.hint_gone = true;
@@ -293,7 +293,7 @@ impl Panels {
         }
     }
 
-    /// What a server that has prepared the object for a while is at.
+    /// What the card says of a server that has been preparing the object for a while.
     fn preparing<'a>(&mut self, running: &'a Running) -> Option<Preparing<'a>> {
         let frame = running.frame().filter(|frame| frame.server.is_preparing);
         let Some(frame) = frame else {

@@ -14,7 +14,7 @@ use crate::view::display::Display;
 use crate::view::frame::ViewFrame;
 use crate::view::object_skin::Look;
 
-/// Draws frames into memory. The scene goes before the window that it is part of.
+/// Draws ticks into memory. The scene is dropped before the window that it is part of.
 pub struct Pictures {
     scene: Scene,
     camera: OrbitCamera3d,
@@ -48,7 +48,7 @@ impl Pictures {
         Graphics::in_use().is_software
     }
 
-    /// The picture of a frame by tracing so many paths of light a pixel.
+    /// The picture of a tick by tracing so many paths of light a pixel.
     pub fn trace(
         &mut self,
         frame: &ViewFrame,
@@ -67,7 +67,7 @@ impl Pictures {
         window.snap_image()
     }
 
-    /// The picture of a frame.
+    /// The picture of a tick.
     pub fn draw(&mut self, frame: &ViewFrame, display: &Display, camera: &ViewCamera) -> RgbImage {
         self.follow(frame, display, camera);
         let Self { scene, camera, window, .. } = self;
@@ -75,7 +75,7 @@ impl Pictures {
         window.snap_image()
     }
 
-    /// Makes everything ready for the picture of a frame.
+    /// Makes everything ready for the picture of a tick.
     fn follow(&mut self, frame: &ViewFrame, display: &Display, camera: &ViewCamera) {
         self.colouring.follow(&frame.object, display.shading, frame.at_s);
         self.scene.follow(&mut self.window, frame, display, &self.colouring);

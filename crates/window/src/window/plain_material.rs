@@ -26,7 +26,7 @@ use crate::view::light::{FILL, FOG_M, KEY, WRAP};
 /// A material as scene nodes share it.
 pub type SharedMaterial = Rc<RefCell<Box<dyn Material3d>>>;
 
-/// What darkens the ground, shared between the scene that knows and the material that draws it.
+/// Capsules that darken the ground, shared between the scene that knows and the material that draws it.
 pub type SharedCapsules = Rc<RefCell<Vec<Capsule>>>;
 
 /// Numbers that one object's uniforms consist of; see `Drawn` in the shader.
@@ -34,7 +34,7 @@ const NUMBERS: usize = 3 * 16 + 10 * 4 + MAX_CAPSULES * 8;
 
 /// Light by formulas: one lamp, one fill, the surroundings; no shadows but those on the ground.
 pub struct PlainMaterial {
-    /// What darkens the surface, for the material of the ground.
+    /// Capsules that darken the surface, for the material of the ground.
     capsules: Option<SharedCapsules>,
     shader: wgpu::ShaderModule,
     bindings: wgpu::BindGroupLayout,
@@ -42,7 +42,7 @@ pub struct PlainMaterial {
     pipelines: BTreeMap<Way, wgpu::RenderPipeline>,
 }
 
-/// A way to draw: each has a pipeline.
+/// A kind of drawing; each has a pipeline.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Way {
     samples: u32,
@@ -50,7 +50,7 @@ struct Way {
     is_transparent: bool,
 }
 
-/// What one object has on the graphics card.
+/// Buffers and bindings of one object on the graphics card.
 struct PlainData {
     uniforms: wgpu::Buffer,
     /// The bindings, and the texture that they were made for.

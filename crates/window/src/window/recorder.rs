@@ -19,10 +19,10 @@ impl Recordings {
         self.recorder.is_some()
     }
 
-    /// Writes the picture that is shown now; says where.
+    /// Writes the picture that is shown now; returns a sentence that names the file.
     ///
     /// # Errors
-    /// In one line.
+    /// The error, in one line.
     pub fn snapshot(&self, window: &Window) -> anyhow::Result<String> {
         let path = free_path("softgrasp", "png");
         let saved = window.snap_image().save(&path);
@@ -30,10 +30,10 @@ impl Recordings {
         Ok(format!("picture written: {}", path.display()))
     }
 
-    /// Begins to write every picture, or ends it; says so.
+    /// Begins to write every picture, or ends it; returns a sentence that says so.
     ///
     /// # Errors
-    /// In one line.
+    /// The error, in one line.
     pub fn begin_or_end(&mut self) -> anyhow::Result<String> {
         if let Some(recorder) = self.recorder.take() {
             return recorder.end();
@@ -51,7 +51,7 @@ impl Recordings {
     }
 }
 
-/// A folder that fills with pictures.
+/// A folder into which every picture is written.
 struct Recorder {
     folder: PathBuf,
     writer: Beside<(PathBuf, RgbImage), Result<(), String>>,
@@ -63,7 +63,7 @@ impl Recorder {
     /// Makes the folder and starts the thread that writes.
     ///
     /// # Errors
-    /// The system's, in one line.
+    /// The error of the operating system, in one line.
     fn start(folder: &Path) -> anyhow::Result<Self> {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -76,7 +76,7 @@ impl Recorder {
         Ok(Self { folder: folder.to_owned(), writer, count: 0, failed: None })
     }
 
-    /// Adds a picture.
+    /// Adds a picture to those that are to be written.
     fn add(&mut self, picture: RgbImage) {
         let path = self.folder.join(format!("{:05}.png", self.count));
         self.count += 1;
@@ -86,7 +86,7 @@ impl Recorder {
         }
     }
 
-    /// Waits until all are written; says how many, or what went wrong first.
+    /// Waits until all pictures are written; returns how many, or what went wrong first.
     ///
     /// # Errors
     /// The first picture that could not be written.

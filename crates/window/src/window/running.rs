@@ -1,4 +1,4 @@
-//! The run behind the window: what it asks of the ticks, and the frames that come from them.
+//! The run behind the window: what it asks of the ticks, and the views of ticks that come from them.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,80 +15,80 @@ use crate::view::frame::{News, NewsKind, TickTiming, ViewFrame};
 use crate::view::history::History;
 use crate::view::outlet::Inlet;
 
-/// A run that is being played on a thread of its own.
+/// A run that is played on a thread of its own, as the window sees it.
 pub struct Running {
     ticks: Ticks,
     inlet: Inlet,
     history: History,
     newest: Option<Arc<ViewFrame>>,
-    /// The tick that is looked at, where it is not the newest.
+    /// Number of the tick that is looked at, where it is not the newest.
     looked_at: Option<u64>,
     is_paused: bool,
-    /// The script has come to its end, and stands still there.
+    /// Whether the script has come to its end, and the run is paused there.
     is_at_end: bool,
-    /// Ticks are told from this one on: the first of the script that is played.
+    /// Number of the tick from which the person counts: the first of the script that is played.
     first_tick: u64,
-    /// The script stands still until its first picture has been seen: making that takes its time.
+    /// Whether the script is paused until its first picture has been seen: making that takes its time.
     waits_for_picture: bool,
-    /// What can be said of it.
+    /// Facts of the run that the window shows.
     pub about: About,
 }
 
-/// What a window holds of the thread that plays the ticks.
+/// The window's ends of the channels to the thread that plays the ticks.
 pub struct Ticks {
-    /// Where wishes go; a run that is over does not hear them.
+    /// Channel of the person's wishes; a run that is over does not take them.
     pub controls: Sender<Control>,
-    /// Where sentences for the person come from.
+    /// Channel of the sentences for the person.
     pub notices: Receiver<Notice>,
     /// Whether the run is over.
     pub is_over: Box<dyn Fn() -> bool>,
-    /// What is left to do where the window ends although nobody closed it, which ends the process:
-    /// the run goes on to the end of its script, and its report is told.
+    /// Work that is left where the window ends although nobody closed it, which ends the process: the run
+    /// goes on to the end of its script, and its report is told.
     pub when_lost: Option<WhenLost>,
 }
 
-/// Work that can be done on any thread, and is told why.
+/// Work that is left when the window has ended; it is told why, and can be done on any thread.
 pub type WhenLost = Box<dyn FnOnce(End) + Send>;
 
-/// What a window says of a run.
+/// Facts of a run that the window shows.
 pub struct About {
     /// Name or file of the object.
     pub object: String,
-    /// Where it is solved.
+    /// Server that answers, as it is shown to a person.
     pub server: String,
-    /// What a fingertip holds.
+    /// Name of the contact model: what a fingertip holds.
     pub contact: String,
     /// Whether fingers press with friction, so that an object is pinched and lifted.
     pub is_lifted: bool,
-    /// Material.
+    /// Material of the object.
     pub material: Material,
     /// The hand that acts.
     pub hand: HandChoice,
-    /// Method asked for.
+    /// Name of the method that was asked for.
     pub method: String,
-    /// Error budget.
+    /// Largest relative error that was asked for; `None` leaves it to the method.
     pub max_error: Option<f64>,
-    /// From tick to tick, s.
+    /// Time from tick to tick, s.
     pub tick_s: f64,
-    /// Whether a script that is over stands still, and begins anew after a pause.
+    /// Whether a script that is over pauses, and begins anew after a while.
     pub begins_anew: bool,
-    /// What a server in this process is at, in a word.
+    /// Stage of a server in this process, in a word.
     pub server_stage: Box<dyn Fn() -> &'static str + Send>,
 }
 
-/// What has come from the ticks since the last look.
+/// What has come from the ticks since the last look at their channels.
 #[derive(Default)]
 pub struct Arrived {
     /// Times of answers.
     pub timings: Vec<TickTiming>,
     /// Sentences for the person, and whether each is a refusal.
     pub sentences: Vec<(String, bool)>,
-    /// Whether there is a newer frame.
+    /// Whether there is a newer view of a tick.
     pub is_new: bool,
 }
 
 impl Running {
-    /// A run whose frames come through an inlet.
+    /// A run whose views of ticks come through an inlet.
     pub fn new(ticks: Ticks, inlet: Inlet, about: About) -> Self {
         let waits_for_picture = about.hand.is_played();
         let running = Self {
@@ -109,7 +109,7 @@ impl Running {
         running
     }
 
-    /// Takes what has come.
+    /// Takes what has come from the ticks since the last call.
     pub fn look(&mut self) -> Arrived {
         let mut arrived = Arrived::default();
         while let Ok(Notice { text, kind }) = self.ticks.notices.try_recv() {
@@ -123,7 +123,7 @@ impl Running {
             }
             arrived.sentences.extend(frame.news.iter().filter_map(sentence));
             let frame = Arc::new(*frame);
-            // A frame that was on its way when the script began again is of the one before.
+            // A tick that was on its way when the script began again is of the script before.
             if frame.tick >= self.first_tick {
                 self.history.add(Arc::clone(&frame));
             }
@@ -132,7 +132,7 @@ impl Running {
         arrived
     }
 
-    /// The frame that is looked at.
+    /// View of the tick that is looked at.
     pub fn frame(&self) -> Option<&Arc<ViewFrame>> {
         match self.looked_at {
             Some(tick) => self.history.at(tick),
@@ -140,17 +140,17 @@ impl Running {
         }
     }
 
-    /// The newest frame.
+    /// View of the newest tick.
     pub fn newest(&self) -> Option<&Arc<ViewFrame>> {
         self.newest.as_ref()
     }
 
-    /// The frames so far.
+    /// Views of the ticks so far.
     pub fn history(&self) -> &History {
         &self.history
     }
 
-    /// A picture of it has been shown.
+    /// Notes that a picture of the run has been shown.
     pub fn was_seen(&mut self) {
         if self.newest.is_some() && std::mem::take(&mut self.waits_for_picture) {
             self.ask(Control::Resume);
@@ -162,23 +162,23 @@ impl Running {
         self.is_paused
     }
 
-    /// The tick that is looked at, where it is not the newest.
+    /// Number of the tick that is looked at, where it is not the newest.
     pub fn looked_at(&self) -> Option<u64> {
         self.looked_at
     }
 
-    /// Whether it is over.
+    /// Whether the run is over.
     pub fn is_over(&self) -> bool {
         (self.ticks.is_over)()
     }
 
-    /// Asks something of the ticks.
+    /// Sends a wish to the ticks.
     pub fn ask(&self, control: Control) {
         // A run that is over does not hear it.
         let _ = self.ticks.controls.send(control);
     }
 
-    /// Another object is there: its script is played from the beginning.
+    /// Notes that another object is there: its script is played from the beginning.
     pub fn object_is(&mut self, object: String) {
         self.about.object = object;
         self.looked_at = None;
@@ -187,7 +187,7 @@ impl Running {
         }
     }
 
-    /// Looks at a tick that was seen; the run stands still meanwhile.
+    /// Looks at a tick that was seen; the run is paused meanwhile.
     pub fn look_at(&mut self, tick: u64) {
         if !self.is_paused {
             self.play_or_pause();
@@ -200,17 +200,17 @@ impl Running {
         self.looked_at = None;
     }
 
-    /// The tick that a person counts from: the first of the script that is played.
+    /// Number of the tick from which a person counts: the first of the script that is played.
     pub fn first_tick(&self) -> u64 {
         self.first_tick
     }
 
-    /// Whether a frame is of the script before the one that is played now.
+    /// Whether a tick is of the script before the one that is played now.
     pub fn has_begun_anew(&self, frame: &ViewFrame) -> bool {
         frame.tick < self.first_tick
     }
 
-    /// Stands still because the script has come to its end.
+    /// Pauses the run because the script has come to its end.
     pub fn stand_at_end(&mut self) {
         if !self.is_paused {
             self.play_or_pause();
@@ -218,7 +218,7 @@ impl Running {
         self.is_at_end = true;
     }
 
-    /// Goes on, or stands still; a script that is over begins again.
+    /// Plays on, or pauses; a script that is over begins again.
     pub fn play_or_pause(&mut self) {
         if self.is_at_end {
             return self.restart();
@@ -242,7 +242,7 @@ impl Running {
         self.ask(Control::Restart);
     }
 
-    /// Another hand acts from now on.
+    /// Notes that another hand acts from now on.
     pub fn hand_is(&mut self, hand: HandChoice) {
         (self.is_paused, self.is_at_end, self.looked_at) = (false, false, None);
         self.about.hand = hand;
@@ -250,12 +250,12 @@ impl Running {
         self.ask(Control::Resume);
     }
 
-    /// Writes the object.
+    /// Asks the ticks to write the object to a file.
     pub fn save(&self, path: PathBuf) {
         self.ask(Control::Save(path));
     }
 
-    /// Solves by another method from now on.
+    /// Asks the ticks to solve by another method from now on.
     ///
     /// # Errors
     /// A sentence, for a name that no method has.
@@ -266,19 +266,20 @@ impl Running {
         Ok(())
     }
 
-    /// Accepts errors up to this from now on.
+    /// Asks the ticks to accept errors up to this from now on.
     pub fn set_max_error(&mut self, max_error: Option<f64>) {
         self.ask(Control::SetMaxError(max_error));
         self.about.max_error = max_error;
     }
 
-    /// What is left to do where the window ends although nobody closed it; it is there once.
+    /// The work that is left where the window ends although nobody closed it; it can be taken once.
     pub fn when_lost(&mut self) -> Option<WhenLost> {
         self.ticks.when_lost.take()
     }
 }
 
-/// What a person has to know of a piece of news; the status shows the rest.
+/// The sentence that a person has to read of a piece of news, and whether it is a refusal; the status
+/// shows the rest.
 fn sentence(news: &News) -> Option<(String, bool)> {
     match news.kind {
         NewsKind::Refusal => Some((news.text.clone(), true)),

@@ -1,4 +1,4 @@
-//! The scene: everything that a frame shows, and how it follows the next one.
+//! The scene: everything that is seen of a tick, and how it follows the next one.
 
 use kiss3d::prelude::{SceneNode3d, Window};
 use nalgebra::Point3;
@@ -29,7 +29,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A stage with nothing on it yet.
+    /// A scene with a stage and nothing on it.
     pub fn new(window: &mut Window) -> Self {
         let mut root = SceneNode3d::empty();
         let stage = Stage::new(window, &mut root);
@@ -37,12 +37,12 @@ impl Scene {
         Self { root, stage, object: None, hand: None, marks, spheres, look: Look::Imported }
     }
 
-    /// What the next object looks like.
+    /// Sets the look of the next object.
     pub fn set_look(&mut self, look: Look) {
         self.look = look;
     }
 
-    /// The node that everything hangs below.
+    /// Root node of the scene.
     pub fn root(&mut self) -> &mut SceneNode3d {
         &mut self.root
     }
@@ -52,7 +52,7 @@ impl Scene {
         self.marks.newtons_per_m()
     }
 
-    /// Shows a frame.
+    /// Shows a tick.
     pub fn follow(
         &mut self,
         window: &mut Window,
@@ -91,7 +91,7 @@ impl Scene {
         self.marks.follow(frame, &shape, display.contacts, display.forces);
     }
 
-    /// Whether it is another hand than before.
+    /// Moves the hand to a tick; returns whether it is another hand than before.
     fn follow_hand(&mut self, frame: &ViewFrame, display: &Display) -> bool {
         let Some(hand) = &frame.hand else { return false };
         let is_new = self.hand.as_ref().is_none_or(|drawn| !drawn.fits(hand));

@@ -1,4 +1,4 @@
-//! What mouse and keys do to scene, hand and window.
+//! Carries out what mouse and keys do to scene, hand and window.
 
 use std::time::Instant;
 
@@ -12,17 +12,17 @@ use super::grips::{Grip, Grips};
 use super::input::{DragButton, Gesture, Mouse, wish_of_key};
 use super::window_run::WindowRun;
 
-/// Mouse and keys, and what they hold.
+/// State of mouse and keys: what is held down, and when it was used last.
 pub(super) struct SceneInput {
     mouse: Mouse,
     keys: FingerKeys,
     grips: Grips,
-    /// When the person moved mouse or keys last.
+    /// Time at which the person moved mouse or keys last.
     touched: Instant,
 }
 
 impl SceneInput {
-    /// Nothing is held.
+    /// Mouse and keys of which nothing is held down.
     pub(super) fn new() -> Self {
         Self {
             mouse: Mouse::default(),
@@ -32,12 +32,12 @@ impl SceneInput {
         }
     }
 
-    /// When the person moved mouse or keys last.
+    /// Time at which the person moved mouse or keys last.
     pub(super) fn touched(&self) -> Instant {
         self.touched
     }
 
-    /// Takes mouse and keys.
+    /// Takes the events of mouse and keys.
     pub(super) fn take_events(&mut self, window: &mut Window, run: &mut WindowRun) {
         let mut events: Vec<WindowEvent> = Vec::new();
         let mut ctrl = [Key::LControl, Key::RControl]
@@ -95,7 +95,7 @@ impl SceneInput {
         }
     }
 
-    /// Does what the mouse did to the scene.
+    /// Carries out a gesture of the mouse.
     fn follow(&mut self, gesture: Gesture, window: &mut Window, run: &mut WindowRun) {
         match gesture {
             Gesture::MenuAsked(at) => {
@@ -141,7 +141,7 @@ fn take_key(key: Key, modifiers: Modifiers, window: &Window, run: &mut WindowRun
     }
 }
 
-/// What a drag that begins at a place in the window moves.
+/// What a drag moves that begins at a place in the window.
 fn grip_at(at: Vector2<f64>, window: &Window, run: &WindowRun) -> Grip {
     let moves_hand = run.hand() == Some(HandChoice::Mouse);
     match run.frame() {

@@ -13,7 +13,7 @@ pub struct SeenWindow {
     server: Option<x11::Server>,
 }
 
-/// So often the server is asked.
+/// Time between two questions to the X server.
 const LOOK_EVERY: Duration = Duration::from_millis(300);
 
 impl SeenWindow {
@@ -27,7 +27,7 @@ impl SeenWindow {
         }
     }
 
-    /// Whether it is to be seen.
+    /// Whether the window is to be seen.
     pub fn is_seen(&mut self) -> bool {
         if self.looked.is_none_or(|then| then.elapsed() >= LOOK_EVERY) {
             self.looked = Some(Instant::now());

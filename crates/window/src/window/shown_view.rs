@@ -15,7 +15,7 @@ use crate::view::eye_place::EyePlace;
 use crate::view::frame::ViewFrame;
 use crate::view::shading::Shading;
 
-/// What the pictures show.
+/// What the pictures show: scene, light, colours and eye.
 pub(super) struct ShownView {
     scene: Scene,
     drawn_camera: OrbitCamera3d,
@@ -65,7 +65,7 @@ impl ShownView {
         (self.scene.root(), &mut self.drawn_camera)
     }
 
-    /// Moves the eye as the person wishes, who has it from now on if it moves.
+    /// Moves the eye as the person wishes; if it moves, the person has it from now on.
     pub(super) fn move_eye<T>(&mut self, change: impl FnOnce(&mut ViewCamera) -> T) -> T {
         let before = self.camera;
         let changed = change(&mut self.camera);
@@ -75,7 +75,7 @@ impl ShownView {
         changed
     }
 
-    /// The eye sees all of the object of a frame.
+    /// Places the eye so that it sees all of the object of a tick.
     pub(super) fn frame_all(&mut self, frame: &ViewFrame) {
         let sphere = frame.object.rest.tree().bounding_sphere();
         let centre = frame.object.world_from_object * sphere.centre;
@@ -83,14 +83,14 @@ impl ShownView {
         self.camera.frame(centre, 1.7 * sphere.radius);
     }
 
-    /// Another object comes: the eye goes to where it will be, unless the person has it.
+    /// Prepares for another object: the eye goes to where it will be, unless the person has it.
     pub(super) fn meet_object(&mut self, newest: Option<&Arc<ViewFrame>>) {
         if let (Some(frame), true) = (newest, self.director.has_eye()) {
             self.eye_place = EyePlace::after(frame);
         }
     }
 
-    /// What the colours show, as the person chooses.
+    /// Sets the quantity that the colours show, as the person chooses.
     pub(super) fn shade(&mut self, shading: Option<Shading>) {
         match shading {
             Some(shading) => self.display.shading = shading,
@@ -99,8 +99,8 @@ impl ShownView {
         self.director.shading_is_chosen();
     }
 
-    /// Chooses eye and colours for a frame, as far as they are left to the window; whether answers are
-    /// to hold the nodes inside.
+    /// Chooses eye and colours for a tick, as far as they are left to the window; returns whether answers
+    /// are to hold the nodes inside.
     pub(super) fn direct(&mut self, frame: &ViewFrame, hand: Option<HandChoice>) -> bool {
         if frame.acts.squeezing.is_some() {
             self.eye_place = EyePlace::Taken;
@@ -116,7 +116,7 @@ impl ShownView {
         self.display.shading.needs_inside() || (is_directed && self.director.directs_colours(frame))
     }
 
-    /// Shows a frame.
+    /// Shows a tick.
     pub(super) fn follow(&mut self, window: &mut Window, frame: &ViewFrame) {
         self.colouring.follow(&frame.object, self.display.shading, frame.at_s);
         self.scene.follow(window, frame, &self.display, &self.colouring);

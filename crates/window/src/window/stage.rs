@@ -16,21 +16,22 @@ use crate::view::display::Level;
 use crate::view::ground_shade::Capsule;
 use crate::view::light::{FILL, FOG_M, GROUND, GROUND_M, GROUND_ROUGHNESS, HORIZON, KEY, SKY};
 
-/// Lights and ground.
+/// Lights and ground of the scene.
 pub struct Stage {
     ground: SceneNode3d,
-    /// Height of the ground, m.
+    /// Height of the ground, y of the world, m.
     ground_m: f64,
     level: Option<Level>,
     plain: SharedMaterial,
     plain_ground: SharedMaterial,
-    /// What darkens the ground at the plain level.
+    /// Capsules that darken the ground at the plain level.
     capsules: SharedCapsules,
 }
 
 /// Radius of the ground, m: far beyond what is seen sharply.
 const GROUND_RADIUS_M: f32 = 3.0;
-/// Cascades of the key light, the only one that casts shadows; the renderer would keep room for sixteen.
+/// Number of shadow cascades of the key light, the only one that casts shadows; the renderer would keep
+/// room for sixteen.
 const KEY_CASCADES: u32 = 4;
 
 impl Stage {
@@ -67,7 +68,7 @@ impl Stage {
         }
     }
 
-    /// Draws as much as the level says; whether that is another level than before.
+    /// Sets the level of the light; returns whether it is another one than before.
     pub fn set_level(&mut self, window: &mut Window, level: Level) -> bool {
         if self.level == Some(level) {
             return false;
@@ -98,13 +99,13 @@ impl Stage {
         }
     }
 
-    /// Darkens the ground below these, at the plain level.
+    /// Sets the capsules below which the ground is darker, at the plain level.
     pub fn shade_ground(&mut self, capsules: Vec<Capsule>) {
         self.capsules.replace(capsules);
     }
 }
 
-/// The renderer's eye; none of its own ways to move it are used.
+/// The renderer's camera; none of its own ways to move it are used.
 pub fn drawn_camera() -> OrbitCamera3d {
     let (near, far) = (0.01 * UNITS_PER_M, 12.0 * UNITS_PER_M);
     let mut camera = OrbitCamera3d::new_with_frustum(
@@ -122,7 +123,7 @@ pub fn drawn_camera() -> OrbitCamera3d {
     camera
 }
 
-/// Puts the renderer's eye where the viewer's is.
+/// Puts the renderer's camera where the viewer's eye is.
 pub fn place_camera(drawn: &mut OrbitCamera3d, view: &ViewCamera) {
     drawn.look_at(drawn_point(&view.eye()), drawn_point(&view.target));
 }

@@ -13,27 +13,27 @@ use crate::view::display::Display;
 use crate::view::loading::LoadObject;
 use crate::view::outlet::Inlet;
 
-/// A run that is ready.
+/// A run that is ready to be played.
 pub struct Started {
-    /// Starts its thread.
+    /// Starts the thread that plays the ticks.
     pub play: Box<dyn FnOnce() -> std::io::Result<Ticks> + Send>,
-    /// Where its frames come out.
+    /// Inlet from which the views of its ticks are taken.
     pub inlet: Inlet,
-    /// What can be said of it.
+    /// Facts of the run that the window shows.
     pub about: About,
 }
 
-/// A run that is about to begin.
+/// A run that is about to begin, on a thread of its own.
 pub struct Start {
     step: Arc<AtomicUsize>,
     result: Receiver<anyhow::Result<Started>>,
 }
 
 impl Start {
-    /// Begins on a thread of its own. `begin` says at which step of the loading card it is.
+    /// Begins a run on a thread of its own. `begin` says at which step of the loading card it is.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// The error of the operating system, when it starts no thread.
     pub fn begin(
         begin: impl FnOnce(&dyn Fn(usize)) -> anyhow::Result<Started> + Send + 'static,
     ) -> std::io::Result<Self> {
@@ -48,12 +48,12 @@ impl Start {
         Ok(Self { step, result })
     }
 
-    /// The step it is at.
+    /// Step of loading that the run is at.
     pub fn step(&self) -> usize {
         self.step.load(Ordering::Relaxed)
     }
 
-    /// The run, once it has begun.
+    /// The run, or why it could not begin, as soon as that is known.
     pub fn take(&self) -> Option<anyhow::Result<Started>> {
         match self.result.try_recv() {
             Ok(started) => Some(started),
@@ -65,24 +65,24 @@ impl Start {
     }
 }
 
-/// What a window is opened for.
+/// What a window opens with.
 pub struct Opening {
-    /// What is shown at first.
+    /// What of the scene is shown at first.
     pub display: Display,
-    /// Where the eye is at first.
+    /// Camera at the beginning.
     pub camera: ViewCamera,
-    /// Whether the person chose what the colours show; else a script shows strain while it squeezes.
+    /// Whether the person chose what the colours show; otherwise a script shows strain while it squeezes.
     pub shading_is_chosen: bool,
-    /// Whether the person chose where the eye is; else the first hand does.
+    /// Whether the person chose where the eye is; otherwise the first hand decides.
     pub eye_is_chosen: bool,
-    /// Whether the person chose the level of drawing; else the machine does.
+    /// Whether the person chose the level of the light; otherwise the machine decides.
     pub level_is_chosen: bool,
-    /// The object.
+    /// Choice of the object at the beginning.
     pub object: ObjectChoice,
-    /// What the fingertips of hands hold that the person chooses.
+    /// Contact model of the hands that the person chooses: what their fingertips hold.
     pub contact: ContactModel,
-    /// Loads another object in its place.
+    /// Function that loads another object.
     pub load: LoadObject,
-    /// Material of the object.
+    /// Material of the object at the beginning.
     pub material: Material,
 }

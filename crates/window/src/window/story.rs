@@ -3,17 +3,17 @@
 
 use std::time::{Duration, Instant};
 
-/// The end of a script, and how long it has been there.
+/// State of a script's end, and how long ago it was reached.
 #[derive(Default)]
 pub struct Story {
     over_since: Option<Instant>,
 }
 
-/// A script begins anew so long after its end, or after the person moved mouse or keys last.
+/// Time after its end, or after the person moved mouse or keys last, at which a script begins anew.
 pub const PAUSE: Duration = Duration::from_secs(9);
 
 impl Story {
-    /// Hears at each picture whether the script is over; whether it has just come to its end.
+    /// Takes, at each picture, whether the script is over; returns whether it has just come to its end.
     pub fn follow(&mut self, is_over: bool, now: Instant) -> bool {
         let was_over = self.over_since.is_some();
         match is_over {
@@ -23,14 +23,14 @@ impl Story {
         is_over && !was_over
     }
 
-    /// The person is there, and is not disturbed for a while.
+    /// Notes that the person is there, who is not disturbed for a while.
     pub fn was_touched(&mut self, now: Instant) {
         if let Some(since) = &mut self.over_since {
             *since = now;
         }
     }
 
-    /// How long it is until the script begins anew; `None` while it is not over.
+    /// Time until the script begins anew; `None` while it is not over.
     pub fn begins_in(&self, now: Instant) -> Option<Duration> {
         Some(PAUSE.saturating_sub(now.saturating_duration_since(self.over_since?)))
     }

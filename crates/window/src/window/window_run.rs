@@ -1,4 +1,4 @@
-//! The run in a window: what a person asked for by menu, panel or key is done to it.
+//! The run in a window: what a person asked for by menu, panel or key is carried out.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -29,7 +29,7 @@ use crate::view::frame::ViewFrame;
 use crate::view::loading::{LoadObject, ObjectWish};
 use crate::view::object_skin::Look;
 
-/// A hand that was asked to go somewhere is on its way within this time.
+/// Time within which a hand that was asked to go somewhere is on its way.
 const HEARD_WITHIN: Duration = Duration::from_secs(1);
 
 /// The run in a window, from its start on, and the panels that tell of it.
@@ -43,11 +43,11 @@ pub(super) struct WindowRun {
     graphics: Graphics,
     recordings: Recordings,
     story: Story,
-    /// Answers were asked to hold the nodes inside.
+    /// Whether answers were asked to hold the nodes inside.
     asked_whole: bool,
-    /// The hand that the person takes goes to the object at once.
+    /// Whether the hand that the person takes goes to the object at once.
     reaches: bool,
-    /// The hand was asked to go to the object, and nothing has been heard of it yet.
+    /// When the hand was asked to go to the object, as long as nothing has been heard of that.
     asked_to_reach: Option<Instant>,
     ends: bool,
     pub(super) panels: Panels,
@@ -55,7 +55,7 @@ pub(super) struct WindowRun {
 }
 
 impl WindowRun {
-    /// Nothing runs yet.
+    /// A window in which no run has begun yet.
     pub(super) fn new(
         view: ShownView,
         graphics: Graphics,
@@ -80,7 +80,7 @@ impl WindowRun {
         }
     }
 
-    /// What begins as soon as it is ready.
+    /// Sets the run that begins as soon as it is ready.
     pub(super) fn set_start(&mut self, start: Start) {
         self.start = Some(start);
     }
@@ -88,7 +88,7 @@ impl WindowRun {
     /// Begins the run as soon as it is ready.
     ///
     /// # Errors
-    /// Why it could not begin.
+    /// The reason why the run could not begin.
     pub(super) fn begin_when_ready(&mut self) -> anyhow::Result<()> {
         let Some(start) = &self.start else { return Ok(()) };
         let Some(started) = start.take() else { return Ok(()) };
@@ -104,7 +104,7 @@ impl WindowRun {
         Ok(())
     }
 
-    /// Asks the run to end; whether one began.
+    /// Asks the run to end; returns whether one began.
     pub(super) fn stop(&mut self) -> bool {
         let running = self.running.take();
         if let Some(running) = &running {
@@ -113,7 +113,7 @@ impl WindowRun {
         running.is_some()
     }
 
-    /// The window closes after this picture.
+    /// Lets the window close after this picture.
     pub(super) fn end(&mut self) {
         self.ends = true;
     }
@@ -122,12 +122,12 @@ impl WindowRun {
         self.ends
     }
 
-    /// What moves the hand, once the run has begun.
+    /// Kind of the hand that acts, once the run has begun.
     pub(super) fn hand(&self) -> Option<HandChoice> {
         self.running.as_ref().map(|running| running.about.hand)
     }
 
-    /// The frame that is shown.
+    /// View of the tick that is shown.
     pub(super) fn frame(&self) -> Option<&Arc<ViewFrame>> {
         self.running.as_ref().and_then(Running::frame)
     }
@@ -142,7 +142,7 @@ impl WindowRun {
         self.ask(Control::Mouse(input));
     }
 
-    /// The person has moved mouse or keys.
+    /// Notes that the person has moved mouse or keys.
     pub(super) fn was_touched(&mut self, now: Instant) {
         self.story.was_touched(now);
     }
@@ -153,7 +153,7 @@ impl WindowRun {
         moves || self.recordings.is_recording()
     }
 
-    /// The picture has been drawn.
+    /// Notes that the picture has been drawn.
     pub(super) fn was_seen(&mut self, window: &Window) {
         if let Some(running) = &mut self.running {
             running.was_seen();
@@ -214,7 +214,7 @@ impl WindowRun {
         self.view.follow(window, &frame);
     }
 
-    /// Draws the panels; what a person asks for on them comes back.
+    /// Draws the panels; returns what a person asks for on them.
     ///
     /// Units: `fps` pictures in a second.
     pub(super) fn draw_panels(&mut self, window: &mut Window, fps: f64) -> Asked {
@@ -236,7 +236,7 @@ impl WindowRun {
         asked
     }
 
-    /// Does what was asked for on the panels.
+    /// Carries out what was asked for on the panels.
     pub(super) fn obey(&mut self, asked: Asked, window: &Window) {
         for input in asked.mouse {
             self.move_hand(input);
@@ -276,7 +276,7 @@ impl WindowRun {
         }
     }
 
-    /// Does one thing that a person asked for.
+    /// Carries out one wish of the person.
     pub(super) fn act(&mut self, action: Action, window: &Window) {
         // For those who drive the window by a program: this was heard.
         tracing::debug!(target: "softgrasp_window::places", wish = action.label());
@@ -334,7 +334,7 @@ impl WindowRun {
         newest.map_or(1, |frame| frame.object.rest.tree().depth())
     }
 
-    /// What concerns the ticks.
+    /// Carries out a wish that concerns the ticks.
     fn act_on_run(&mut self, action: Action) {
         let Some(running) = &mut self.running else { return };
         match action {
@@ -367,7 +367,7 @@ impl WindowRun {
         }
     }
 
-    /// The person takes the hand of a script: it goes to the object at once.
+    /// Gives the hand of a script to the person: it goes to the object at once.
     pub(super) fn take_hand(&mut self, window: &Window) {
         if matches!(self.change, Change::None) {
             self.reaches = true;
@@ -375,7 +375,7 @@ impl WindowRun {
         }
     }
 
-    /// Does what a script that comes to its end asks for.
+    /// Carries out what a script that comes to its end asks for.
     fn follow_story(&mut self, frame: &ViewFrame) {
         let Some(running) = &mut self.running else { return };
         let now = Instant::now();

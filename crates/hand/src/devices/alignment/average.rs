@@ -11,24 +11,25 @@ use super::error::AlignmentError;
 pub struct AveragedPose {
     /// The mean pose.
     pub pose: Isometry3<f64>,
-    /// Records that were averaged.
+    /// Number of records that were averaged.
     pub used: usize,
-    /// Records that were left out.
+    /// Number of records that were left out.
     pub left_out: usize,
-    /// Largest way of an averaged record from the mean place.
+    /// Largest distance of an averaged record from the mean position.
     pub spread_m: f64,
-    /// Largest turn of an averaged record from the mean attitude.
+    /// Largest angle between an averaged record and the mean attitude.
     pub spread_rad: f64,
 }
 
-/// Records needed.
+/// Fewest records that are averaged.
 const NEEDED: usize = 10;
 /// A record this many times the median deviation away is left out.
 pub(super) const OUTLIER_MEDIANS: f64 = 3.0;
-/// But not below what the tracker's last digits make, m and rad.
+/// Distance and angle within which no record is left out: what the tracker's last digits amount to, m and
+/// rad.
 pub(super) const FLOOR_M: f64 = 3e-4;
 const FLOOR_RAD: f64 = 1e-3;
-/// A resting hand stays inside this.
+/// Largest distance and angle of a resting hand from its mean pose, m and rad.
 const MAX_SPREAD_M: f64 = 5e-3;
 const MAX_SPREAD_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
@@ -70,7 +71,7 @@ pub fn average_pose(poses: &[Isometry3<f64>]) -> Result<AveragedPose, AlignmentE
     Ok(AveragedPose { pose, used: near.len(), left_out, spread_m, spread_rad })
 }
 
-/// The poses whose numbers can be: anything else is no record of a tracker.
+/// The poses within 100 m whose quaternion is about of unit length; others are no records of a tracker.
 pub(super) fn sound(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
     let is_sound = |pose: &&Isometry3<f64>| {
         let length = pose.rotation.quaternion().norm();
@@ -79,7 +80,7 @@ pub(super) fn sound(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
     poses.iter().filter(is_sound).copied().collect()
 }
 
-/// Way and turn between two poses.
+/// Distance (m) and angle (rad) between two poses.
 fn deviation(from: &Isometry3<f64>, to: &Isometry3<f64>) -> [f64; 2] {
     let way = (to.translation.vector - from.translation.vector).norm();
     [way, to.rotation.angle_to(&from.rotation)]
@@ -90,7 +91,7 @@ fn middle_place(poses: &[Isometry3<f64>]) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| median(poses.iter().map(|p| p.translation.vector[axis]).collect()))
 }
 
-/// The middle value; 0 of none.
+/// Median of the values; 0 for an empty list.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)

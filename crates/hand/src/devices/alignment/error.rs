@@ -6,9 +6,9 @@ pub enum AlignmentError {
     /// Too few good records.
     #[error("{got} records of the tracker, {needed} are needed; record for longer")]
     TooFew {
-        /// Records.
+        /// Number of good records.
         got: usize,
-        /// At least these.
+        /// Fewest good records that are needed.
         needed: usize,
     },
     /// The hand was not held still.
@@ -19,9 +19,9 @@ pub enum AlignmentError {
         .spread_rad.to_degrees()
     )]
     Moved {
-        /// Largest way from the mean place, m.
+        /// Largest distance of a record from the mean position, m.
         spread_m: f64,
-        /// Largest turn from the mean attitude, rad.
+        /// Largest angle between a record and the mean attitude, rad.
         spread_rad: f64,
     },
     /// Too many records are far from the others.
@@ -30,9 +30,9 @@ pub enum AlignmentError {
          and try again"
     )]
     Scattered {
-        /// Records left out.
+        /// Number of records left out.
         left_out: usize,
-        /// All records.
+        /// Number of all records.
         of: usize,
     },
     /// The turns were too small, or all about one axis.
@@ -43,9 +43,9 @@ pub enum AlignmentError {
         .needed_rad.to_degrees()
     )]
     TurnedTooLittle {
-        /// Standard deviation in the weakest direction, rad.
+        /// Standard deviation of the turns in the weakest direction, rad.
         turned_rad: f64,
-        /// What is needed, rad.
+        /// Smallest standard deviation that is needed there, rad.
         needed_rad: f64,
     },
     /// The point that should rest did not.
@@ -55,7 +55,7 @@ pub enum AlignmentError {
         1e3 * .residual_m
     )]
     CreaseMoved {
-        /// Root mean square of its way, m.
+        /// Root mean square distance of the point from its mean position, m.
         residual_m: f64,
     },
     /// The fingers point up or down, so that they show no direction.
@@ -64,7 +64,7 @@ pub enum AlignmentError {
         .tilt_rad.to_degrees()
     )]
     FingersUpright {
-        /// Angle above or below the horizontal, rad.
+        /// Angle of the fingers above or below the horizontal, rad.
         tilt_rad: f64,
     },
 }

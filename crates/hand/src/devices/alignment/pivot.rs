@@ -14,23 +14,23 @@ pub struct Pivot {
     pub in_receiver: Point3<f64>,
     /// The point in the frame of the poses.
     pub in_stand: Point3<f64>,
-    /// Root mean square of the point's way over the poses that were used.
+    /// Root mean square distance of the point from `in_stand` over the poses that were used.
     pub residual_m: f64,
     /// Standard deviation of `in_receiver` in the least certain direction, from the residual.
     pub uncertainty_m: f64,
     /// Standard deviation of the receiver's turns in the weakest direction, rad.
     pub turned_rad: f64,
-    /// Poses that were used.
+    /// Number of poses that were used.
     pub used: usize,
-    /// Poses that were left out.
+    /// Number of poses that were left out.
     pub left_out: usize,
 }
 
-/// Poses needed.
+/// Fewest poses from which the point is found.
 const NEEDED: usize = 20;
 /// Turns needed in the weakest direction: a sweep of 15° to either side.
 const MIN_TURN_RAD: f64 = 0.15;
-/// The point may move by this much, root mean square.
+/// Largest root mean square distance of the point from its mean position, m.
 const MAX_RESIDUAL_M: f64 = 5e-3;
 
 /// Finds the fixed point p of the poses (R, t), the least squares solution of R p + t = q.
@@ -69,7 +69,7 @@ pub fn find_pivot(stand_from_receiver: &[Isometry3<f64>]) -> Result<Pivot, Align
     })
 }
 
-/// A least squares solution.
+/// The fixed point by least squares, in the receiver frame and in the frame of the poses.
 struct Solution {
     in_receiver: Point3<f64>,
     in_stand: Point3<f64>,
@@ -77,7 +77,7 @@ struct Solution {
 }
 
 impl Solution {
-    /// How far the point is from its place in one pose.
+    /// Distance of the point, as one pose has it, from its position in the frame of the poses, m.
     fn way(&self, pose: &Isometry3<f64>) -> f64 {
         (pose * self.in_receiver - self.in_stand).norm()
     }

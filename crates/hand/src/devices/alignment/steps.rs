@@ -13,7 +13,7 @@ pub struct FlatHand<'a> {
     pub stand_from_receiver: Isometry3<f64>,
     /// What the glove read meanwhile; only the wrist counts, for a receiver on the forearm.
     pub angles: &'a JointAngles,
-    /// Which hand.
+    /// Right or left hand.
     pub hand: Handedness,
 }
 
@@ -27,7 +27,7 @@ pub enum MountPart {
 }
 
 impl MountPart {
-    /// The part of a mount.
+    /// The part of the arm on which a receiver with this mount sits.
     pub const fn of(mount: &ReceiverMount) -> Self {
         match mount {
             ReceiverMount::Hand { .. } => Self::Hand,
@@ -46,7 +46,7 @@ pub enum StandTilt {
     Free,
 }
 
-/// Where the transmitter stands.
+/// Pose of the transmitter in the world, as the alignment found it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandAlignment {
     /// Transmitter's Y-up frame in the world, m.

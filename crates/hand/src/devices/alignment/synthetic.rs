@@ -17,7 +17,7 @@ impl Noise {
         Self { state: seed, place_m: 8e-4 * per_axis, turn_rad }
     }
 
-    /// None at all, only random turns.
+    /// A generator without noise: only the turns of the receiver are random.
     pub(super) fn none(seed: u64) -> Self {
         Self { state: seed, place_m: 0.0, turn_rad: 0.0 }
     }
@@ -40,7 +40,7 @@ impl Noise {
         Vector3::from_fn(|_, _| self.normal())
     }
 
-    /// A record of this pose.
+    /// A record of this pose, with noise.
     pub(super) fn around(&mut self, pose: &Isometry3<f64>) -> Isometry3<f64> {
         let shift = self.vector() * self.place_m;
         let turn = UnitQuaternion::from_scaled_axis(self.vector() * self.turn_rad);

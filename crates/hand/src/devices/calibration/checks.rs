@@ -6,46 +6,46 @@ use crate::devices::cyberglove::Sensor;
 /// Why a text is not a calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
-    /// Not TOML, or not with these fields.
+    /// The text is not TOML, or does not have the fields of a calibration.
     #[error("not a calibration: {0}")]
     Syntax(String),
-    /// None of the forms that are read.
+    /// The text is in none of the forms that are read.
     #[error(
         "not a calibration: it begins neither like TOML (`format = 1`), nor like a VirtualHand \
          file (`VHv…`), a list of points (`0.0:74 -0.4:98`), an XML list of joints \
          (`<Cyberglove_calibration>`) or a matrix of slopes (`20 24`)"
     )]
     UnknownForm,
-    /// Written by another version.
+    /// The file has a format number that this program does not read.
     #[error("calibration format {found}, this program reads {reads}")]
     Format {
-        /// The file's format.
+        /// Format number of the file.
         found: u32,
-        /// The format of this program.
+        /// Format number that this program reads.
         reads: u32,
     },
     /// A line does not hold what must stand there.
     #[error("line {line}: expected {expected}, found `{found}`")]
     Line {
-        /// Its number, from 1.
+        /// Number of the line, from 1.
         line: usize,
-        /// What must stand there.
+        /// What the form demands in this line.
         expected: &'static str,
-        /// What stands there, cut to some 40 characters.
+        /// Text of the line, cut to some 40 characters.
         found: String,
     },
     /// The text ends too early.
     #[error("the text ends where {expected} should follow")]
     Ends {
-        /// What must follow.
+        /// What the form demands next.
         expected: &'static str,
     },
-    /// What a line says is well written and cannot be.
+    /// A line is well formed, but what it says is impossible.
     #[error("line {line}: {error}")]
     At {
-        /// Its number, from 1.
+        /// Number of the line, from 1.
         line: usize,
-        /// What cannot be.
+        /// What is impossible.
         error: Box<CalibrationError>,
     },
     /// A sensor is listed twice.
@@ -57,11 +57,11 @@ pub enum CalibrationError {
     /// A number that no calibration can have.
     #[error("{field} of sensor {sensor:?} is {value}, which cannot be")]
     Value {
-        /// Whose line.
+        /// Sensor whose line holds the number.
         sensor: Sensor,
-        /// Which field.
+        /// Name of the field that holds the number.
         field: &'static str,
-        /// Its value.
+        /// Value of the field.
         value: f64,
     },
     /// The share of the middle finger is not between 0 and 1.
@@ -76,19 +76,19 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
-    /// The same error with the number of its line.
+    /// This error, with the number of the line that it is about.
     pub(super) fn at(self, line: usize) -> Self {
         Self::At { line, error: Box::new(self) }
     }
 
-    /// A line that does not hold what it should.
+    /// The error about a line that does not hold what it should.
     pub(super) fn line(line: usize, expected: &'static str, found: &str) -> Self {
         let first = found.trim().lines().next().unwrap_or_default();
         Self::Line { line, expected, found: first.chars().take(40).collect() }
     }
 }
 
-/// Whether a line can turn every raw value into a finite angle and back.
+/// Checks that one sensor's line turns every raw value into a finite angle and back.
 pub(super) fn check_sensor(line: &SensorCalibration) -> Result<(), CalibrationError> {
     let sensor = line.sensor;
     let [low, high] = line.limits_rad;
@@ -109,7 +109,7 @@ pub(super) fn check_sensor(line: &SensorCalibration) -> Result<(), CalibrationEr
     }
 }
 
-/// Whether a whole calibration can turn every reading into finite angles and back.
+/// Checks that a whole calibration turns every reading into finite angles and back.
 pub(super) fn check(calibration: &Calibration) -> Result<(), CalibrationError> {
     for line in &calibration.sensors {
         check_sensor(line)?;

@@ -11,7 +11,7 @@ use crate::devices::cyberglove::Sensor;
 /// Version of the text; raised when an old reader would misread a new file.
 const FORMAT: u32 = 1;
 
-/// The words of the file.
+/// Words for right and left hand in the file.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Hand {

@@ -8,7 +8,7 @@ use super::thumb::{THUMB_ROOT, ThumbCoupling};
 use super::thumb_fit::{ThumbFit, ThumbRoot, fit_thumb};
 use crate::devices::cyberglove::{RawSensors, Sensor, SensorSet, is_rail};
 
-/// What a fit could say about one sensor.
+/// Outcome of a fit for one sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorFit {
     /// Offset and gain are new.
@@ -28,13 +28,13 @@ pub enum SensorFit {
 /// A fitted calibration and how each sensor came out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitReport {
-    /// The calibration.
+    /// The fitted calibration.
     pub calibration: Calibration,
     /// One outcome per sensor, in the order of [`Sensor::ALL`].
     pub outcomes: [SensorFit; 22],
-    /// How well the gestures could be told apart, in the same order.
+    /// How well the gestures could be told apart by each sensor, in the same order.
     pub qualities: [SensorQuality; 22],
-    /// What became of the thumb's coupling.
+    /// Outcome of the fit for the coupling of the thumb's two sensors.
     pub thumb: ThumbFit,
 }
 
@@ -83,7 +83,7 @@ pub enum FitRefusal {
          and the fist were shown in the wrong order"
     )]
     Reversed {
-        /// How many.
+        /// Number of these sensors that went the wrong way.
         reversed: usize,
     },
     /// Too few fingers moved.
@@ -92,7 +92,7 @@ pub enum FitRefusal {
          the flat hand, then a tight fist"
     )]
     Unmoved {
-        /// How many moved.
+        /// Number of these sensors that moved as a fist moves them.
         moved: usize,
     },
 }
@@ -108,23 +108,24 @@ const KNUCKLES: [Sensor; 8] = [
     Sensor::LittleMcp,
     Sensor::LittlePip,
 ];
-/// So many of them must move: a glove may have dead sensors.
+/// Fewest of these sensors that must have moved: a glove may have dead sensors.
 const MOVED_MIN: usize = 5;
-/// So many that went the wrong way are no fault of the sensors.
+/// Number of these sensors with a reversed reading from which on the fit is refused: so many are no fault
+/// of the sensors.
 const REVERSED_MAX: usize = 3;
 
 /// A gesture that is held: the joint angles it is believed to have, and what the glove read.
 #[derive(Clone, Copy, Debug)]
 pub struct Gesture<'a> {
-    /// Angles, rad.
+    /// Joint angles that the hand is believed to have, rad.
     pub angles: &'a JointAngles,
-    /// Any number of readings, averaged.
+    /// Readings of the glove while the gesture is held, any number; they are averaged.
     pub readings: &'a [RawSensors],
 }
 
 /// Gestures must differ by this much at a joint before a gain is fitted, rad.
 const MIN_ANGLE: f64 = 0.15;
-/// And the mean readings by this much, counts.
+/// Mean readings of both gestures must differ by this much before a gain is fitted, counts.
 const MIN_COUNTS: f64 = 4.0;
 
 /// The third gesture, for the thumb: a flat hand whose straight thumb is swung in front of the

@@ -8,7 +8,7 @@ const MAX_NOISE_COUNTS: f64 = 4.0;
 /// A joint must move by this share of what an average glove shows.
 const MIN_SHARE: f64 = 0.25;
 
-/// What one sensor showed during the gestures.
+/// How far the readings of one sensor moved and scattered during the gestures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorQuality {
     /// Mean reading in the fist less that of the flat hand; 0 without readings.
@@ -32,7 +32,7 @@ impl SensorQuality {
         }
     }
 
-    /// What to say about this sensor, if anything.
+    /// The complaint about this sensor, if its readings are not good enough.
     pub(super) fn complaint(&self, sensor: Sensor) -> Option<Complaint> {
         let Self { span_counts, noise_counts, .. } = *self;
         if noise_counts > MAX_NOISE_COUNTS {
@@ -63,23 +63,23 @@ impl SensorQuality {
 pub enum Complaint {
     /// The readings of both gestures are nearly the same.
     Small {
-        /// Which sensor.
+        /// Sensor that moved too little.
         sensor: Sensor,
-        /// By how much it moved.
+        /// Its mean reading in the fist less that of the flat hand, counts.
         span_counts: f64,
     },
     /// The hand moved while a gesture was held.
     Unsteady {
-        /// Which sensor.
+        /// Sensor whose readings scattered.
         sensor: Sensor,
-        /// Standard deviation.
+        /// Standard deviation of its readings while a gesture was held, counts.
         noise_counts: f64,
     },
     /// The reading went the wrong way.
     Reversed {
-        /// Which sensor.
+        /// Sensor whose reading went the wrong way.
         sensor: Sensor,
-        /// It rose where it should fall.
+        /// Whether the reading rose where it should fall; otherwise it fell where it should rise.
         rises: bool,
     },
     /// The third gesture does not tell the thumb's two sensors apart.
@@ -130,7 +130,7 @@ fn bends(sensor: Sensor) -> bool {
     )
 }
 
-/// How to move this joint further.
+/// Advice to the person how to move the joint of this sensor further.
 fn advice(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::ThumbRotation | Sensor::ThumbMcp | Sensor::ThumbIp | Sensor::ThumbAbduction => {

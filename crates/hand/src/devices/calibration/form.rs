@@ -8,7 +8,7 @@ use super::point_list::{is_point_line, read_point_list};
 use super::slope_matrix::read_slope_matrix;
 use super::virtual_hand_reading::{TABLE_TITLE, read_virtual_hand};
 
-/// How a calibration was written.
+/// Form in which a calibration is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// This program's TOML.

@@ -34,7 +34,7 @@ const JOINT_NAMES: [&str; 22] = [
 /// The points of one joint are taken together; more than these no file has.
 const MAX_POINTS: usize = 1000;
 
-/// One `<…>` of the text.
+/// One XML tag of the text.
 struct Tag<'a> {
     line: usize,
     name: &'a str,

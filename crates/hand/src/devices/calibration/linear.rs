@@ -38,17 +38,17 @@ impl DipRule {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorCalibration {
-    /// Which sensor.
+    /// Sensor that the line belongs to.
     pub sensor: Sensor,
-    /// Raw value of the flat hand.
+    /// Raw value of the sensor in the flat hand.
     pub offset_counts: f64,
-    /// Slope; negative for a sensor whose value falls as its angle grows.
+    /// Slope of the line; negative for a sensor whose value falls as its angle grows.
     pub gain_rad_per_count: f64,
     /// Smallest and largest angle that is believed.
     pub limits_rad: [f64; 2],
-    /// Angle while the sensor is dead.
+    /// Angle of the joint while the sensor is dead.
     pub rest_rad: f64,
-    /// The sensor is known to be dead.
+    /// Whether the sensor is known to be dead.
     #[serde(default)]
     pub dead: bool,
 }
@@ -89,9 +89,9 @@ impl SensorCalibration {
 /// Source: thesis section 2.2.2 (gain and offset per sensor).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// Hand the glove is made for.
+    /// Right or left: hand that the glove is made for.
     pub hand: Handedness,
-    /// DIJ of a glove without distal sensors.
+    /// Rule for the DIJ angles of a glove without distal sensors.
     pub dip_rule: DipRule,
     /// Share of the difference of both spreads that turns the middle finger itself; one half
     /// keeps index and ring finger symmetric.

@@ -36,7 +36,7 @@ const LINES: [(Sensor, f64); 22] = [
     (Sensor::LittleDip, -1.0),
 ];
 
-/// What a line must be.
+/// Form of a line, for error messages.
 const EXPECTED: &str = "`angle_rad:reading angle_rad:reading`";
 
 /// Reads 22 lines of points; a line with one angle only keeps the default line of its sensor.
@@ -72,7 +72,7 @@ fn point(word: &str, sign: f64) -> Option<Point> {
     sound.then_some(Point { counts, angle_rad: sign * angle })
 }
 
-/// Whether a line looks like one of these.
+/// Whether a line looks like one of a point list.
 pub(super) fn is_point_line(line: &str) -> bool {
     line.split_whitespace().next().is_some_and(|word| point(word, 1.0).is_some())
 }

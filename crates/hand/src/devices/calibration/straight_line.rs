@@ -5,9 +5,9 @@ use super::linear::SensorCalibration;
 /// One measured point of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Point {
-    /// Reading.
+    /// Raw reading of the sensor.
     pub(super) counts: f64,
-    /// Angle in this program's convention.
+    /// Angle of the joint in this program's convention.
     pub(super) angle_rad: f64,
 }
 

@@ -22,12 +22,12 @@ pub struct ThumbCoupling {
 }
 
 impl ThumbCoupling {
-    /// Whether the two sensors do not touch each other.
+    /// Whether both terms are zero: the two sensors are not coupled.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Both terms: on the rotation, on the abduction.
+    /// Both terms, rad per count: `[c, d]`, on the rotation and on the abduction.
     pub(super) fn terms(&self) -> [f64; 2] {
         [self.rotation_rad_per_abduction_count, self.abduction_rad_per_rotation_count]
     }

@@ -6,7 +6,7 @@ use super::checks::check;
 use super::linear::Calibration;
 use super::thumb::{THUMB_ROOT, ThumbCoupling};
 
-/// What a fit could say about the thumb's coupling.
+/// Outcome of a fit for the coupling of the thumb's two sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ThumbFit {
     /// No third gesture: not coupled.
@@ -26,9 +26,9 @@ pub(super) struct ThumbRoot {
     pub(super) counts: [Option<f64>; 2],
 }
 
-/// Two gestures must stand this far apart from the flat hand, counts.
+/// Smallest distance of the readings of fist and third gesture from those of the flat hand, counts.
 const MIN_COUNTS: f64 = 10.0;
-/// And in directions that differ by this sine.
+/// Smallest sine of the angle between the directions of these two changes.
 const MIN_SINE: f64 = 0.2;
 
 /// Solves for the 2 × 2 matrix that turns the changes of the readings into those of the angles.

@@ -17,7 +17,7 @@ pub(super) enum Slot {
     /// The middle finger's abduction: the line holds the offset of the spread between middle and
     /// index finger, and in the place of the gain the share `middle_bias`.
     MiddleAbduction,
-    /// No joint.
+    /// The line belongs to no joint.
     Unused,
 }
 
@@ -124,7 +124,7 @@ fn numbers_of(calibration: &Calibration, slot: Slot) -> (f64, f64) {
     }
 }
 
-/// The lines for a person.
+/// Comment lines at the head of the file, for the person who reads it.
 fn header_lines(calibration: &Calibration, header: &CalibrationHeader<'_>) -> Vec<String> {
     let hand = calibration.hand.name();
     let mut lines = vec![

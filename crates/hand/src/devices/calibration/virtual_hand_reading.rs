@@ -32,7 +32,7 @@ struct Row {
     gain: f64,
 }
 
-/// Where the reader is.
+/// Section of the text in which the reader is.
 #[derive(Clone, Copy)]
 enum Place {
     /// Before the table.

@@ -7,22 +7,22 @@ use super::sensor::SensorCount;
 use crate::devices::inbox::Inbox;
 use crate::devices::inbox::feed_all;
 
-/// What the interface unit complains about.
+/// Error that the interface unit reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GloveError {
-    /// `e?`
+    /// The unit replied `e?`: it does not know the command.
     #[error("unknown command")]
     UnknownCommand,
-    /// `en`
+    /// The unit replied `en`: the command has too many numbers.
     #[error("too many numbers in a command")]
     TooManyNumbers,
-    /// `ey`
+    /// The unit replied `ey`: the synchronisation rate is too fast.
     #[error("synchronisation rate too fast")]
     SyncTooFast,
-    /// `eg`
+    /// The unit replied `eg`: no glove is plugged in.
     #[error("glove not plugged in")]
     NotPluggedIn,
-    /// `es`
+    /// The unit replied `es`: the sampling rate is too fast.
     #[error("sampling rate too fast")]
     SamplingTooFast,
 }
@@ -49,9 +49,9 @@ pub enum GloveFaultKind {
     /// A NUL came too early or too late: lost or inserted bytes, or a zero among the sensors.
     #[error("{got} bytes before the NUL, a record has {expected}")]
     WrongLength {
-        /// Bytes before the NUL.
+        /// Number of bytes before the NUL.
         got: usize,
-        /// Bytes a record has there.
+        /// Number of bytes that a record has there.
         expected: usize,
     },
     /// No NUL where every possible record has ended: wrong speed, or not a glove.
@@ -60,21 +60,21 @@ pub enum GloveFaultKind {
     /// The right length, but the first byte is neither `G` nor `S`.
     #[error("a record starts with byte {byte:#04x}")]
     UnknownStart {
-        /// The byte.
+        /// First byte of the piece.
         byte: u8,
     },
     /// A line whose numbers are too few, too many, or none that a sensor sends.
     #[error("a line of {got} numbers, {expected} from 1 to 255 are a record")]
     WrongNumbers {
-        /// Fields of the line.
+        /// Number of fields in the line.
         got: usize,
-        /// Sensors of the glove.
+        /// Number of sensors of the glove.
         expected: usize,
     },
     /// The status byte lacks its always-set bit.
     #[error("status byte {byte:#04x} lacks bit 7")]
     BadStatus {
-        /// The byte.
+        /// Status byte that was found.
         byte: u8,
     },
 }
@@ -83,18 +83,18 @@ pub enum GloveFaultKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{kind} ({bytes_skipped} bytes skipped)")]
 pub struct GloveFault {
-    /// Why.
+    /// Why the bytes did not become a record.
     pub kind: GloveFaultKind,
-    /// How many, NUL included; 0 when a good record came with the complaint.
+    /// Number of bytes thrown away, NUL included; 0 when a good record came with the complaint.
     pub bytes_skipped: usize,
 }
 
-/// What the stream contained.
+/// An event of the stream: a record of the glove, or a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GloveEvent {
-    /// A sample.
+    /// A record of the glove.
     Record(GloveRecord),
-    /// Something else.
+    /// Bytes that are no record, or a complaint of the unit.
     Fault(GloveFault),
 }
 
@@ -114,13 +114,13 @@ pub struct GloveParser {
     options: RecordOptions,
     encoding: GloveEncoding,
     inbox: Inbox,
-    /// Set while inside a frame that is already too long: bytes of it dropped since the last
+    /// Set while inside a piece that is already longer than a record: bytes of it dropped since the last
     /// fault.
     overlong: Option<usize>,
     pending: Option<GloveEvent>,
 }
 
-/// An overlong frame is reported at least this often.
+/// Bytes of a piece without NUL after which the next fault is reported.
 const REPORT_EVERY: usize = 1024;
 
 impl GloveParser {
@@ -158,7 +158,7 @@ impl GloveParser {
         }
     }
 
-    /// Drops up to `available` bytes of an overlong frame; `ends` if the last of them is its NUL.
+    /// Drops up to `available` bytes of an overlong piece; `ends` if the last of them is its NUL.
     fn drop_overlong(&mut self, available: usize, ends: bool) -> Option<GloveEvent> {
         let dropped = self.overlong.unwrap_or(0);
         let take = available.min(REPORT_EVERY - dropped);
@@ -207,7 +207,7 @@ impl Iterator for GloveParser {
     }
 }
 
-/// The meaning of the bytes between two NULs, and what follows it at once.
+/// The event that the bytes between two NULs mean, and a second event where they hold one.
 fn read_frame(
     frame: &[u8],
     count: SensorCount,
@@ -253,7 +253,7 @@ fn line_length_max(count: SensorCount) -> usize {
     1 + 4 * count.number() + 2 + 2
 }
 
-/// The meaning of a line of decimal numbers, and what follows it at once.
+/// The event that a line of decimal numbers means, and a second event where it holds one.
 fn read_line(line: &[u8], count: SensorCount) -> (GloveEvent, Option<GloveEvent>) {
     let bytes_skipped = line.len() + 1;
     let fault = |kind, bytes_skipped| GloveEvent::Fault(GloveFault { kind, bytes_skipped });

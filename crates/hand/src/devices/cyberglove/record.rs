@@ -131,7 +131,7 @@ impl GloveStatus {
 /// One sample of the glove.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GloveRecord {
-    /// Polled or streamed.
+    /// Whether the record was polled or streamed.
     pub kind: RecordKind,
     /// Raw sensor values.
     pub sensors: RawSensors,
@@ -141,7 +141,7 @@ pub struct GloveRecord {
     pub status: Option<GloveStatus>,
 }
 
-/// What is wrong with the inside of a frame of the right length.
+/// What is wrong with the content of a record that has the right length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RecordError {
     Letter(u8),
@@ -149,7 +149,7 @@ pub(super) enum RecordError {
     Status(u8),
 }
 
-/// Reads one frame, letter to last byte before the NUL.
+/// Reads one record, from its letter to the last byte before the NUL.
 ///
 /// Shapes: `frame` has [`RecordOptions::frame_length`] bytes.
 pub(super) fn decode_frame(
@@ -172,7 +172,7 @@ pub(super) fn decode_frame(
     Ok(GloveRecord { kind, sensors, timestamp, status })
 }
 
-/// Reads one line of decimal numbers, letter to last byte before the NUL.
+/// Reads one line of decimal numbers, from its letter to the last byte before the NUL.
 ///
 /// Shapes: a small letter and one number per sensor, separated by blanks, CR LF.
 pub(super) fn decode_line(line: &[u8], count: SensorCount) -> Result<GloveRecord, RecordError> {

@@ -55,7 +55,7 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    /// All 22, in wire order.
+    /// All 22 sensors, in wire order.
     pub const ALL: [Self; 22] = [
         Self::ThumbRotation,
         Self::ThumbMcp,
@@ -86,7 +86,7 @@ impl Sensor {
         self as usize
     }
 
-    /// Whether it measures a distal joint, which the 18-sensor glove leaves out.
+    /// Whether the sensor measures a distal joint, which the 18-sensor glove leaves out.
     pub const fn is_dip(self) -> bool {
         matches!(self, Self::IndexDip | Self::MiddleDip | Self::RingDip | Self::LittleDip)
     }
@@ -107,14 +107,14 @@ impl Sensor {
 /// Model of glove, by its number of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorCount {
-    /// Without the four distal joints.
+    /// Glove without sensors at the four distal joints.
     Eighteen,
-    /// All of [`Sensor::ALL`].
+    /// Glove with all of [`Sensor::ALL`].
     TwentyTwo,
 }
 
 impl SensorCount {
-    /// Sensor bytes per record.
+    /// Number of sensor bytes per record.
     pub const fn number(self) -> usize {
         match self {
             Self::Eighteen => 18,
@@ -143,9 +143,9 @@ pub enum RawSensorsError {
     /// Another number of values than the glove has sensors.
     #[error("{got} sensor values, the glove sends {expected}")]
     WrongCount {
-        /// Values given.
+        /// Number of values given.
         got: usize,
-        /// Sensors of the glove.
+        /// Number of sensors of the glove.
         expected: usize,
     },
     /// Zero ends a record, so it is never a sensor value.
@@ -203,7 +203,7 @@ impl RawSensors {
 pub struct SensorSet(u32);
 
 impl SensorSet {
-    /// No sensor.
+    /// The set without any sensor.
     pub const EMPTY: Self = Self(0);
 
     /// Adds one sensor.
@@ -221,7 +221,7 @@ impl SensorSet {
         self.0 == 0
     }
 
-    /// Its sensors in wire order.
+    /// Sensors of the set in wire order.
     pub fn iter(self) -> impl Iterator<Item = Sensor> {
         Sensor::ALL.into_iter().filter(move |&s| self.contains(s))
     }

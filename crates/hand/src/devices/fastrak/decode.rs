@@ -4,16 +4,16 @@ use super::encode::NUMBER_LIMIT;
 use super::fault::FastrakFaultKind;
 use super::record::{Attitude, Encoding, FastrakFormat, FastrakRecord, OutputList, Station};
 
-/// What the head of the stream is.
+/// What the first bytes of the stream are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Head {
-    /// Cannot be told yet.
+    /// More bytes are needed before the head can be told.
     NeedMore,
     /// A data record of the format's length.
     Record(FastrakRecord),
     /// A status, read-back or error record of this many bytes.
     Reply(usize),
-    /// Its first byte begins nothing.
+    /// The first byte begins neither a record nor a reply.
     Skip(FastrakFaultKind),
 }
 

@@ -10,7 +10,7 @@ pub enum EncodeError {
     OutOfRange {
         /// Position among the numbers of the record, from 0.
         index: usize,
-        /// The number.
+        /// Value of that number.
         value: f64,
     },
     /// The error byte is not a letter.

@@ -6,19 +6,19 @@ pub enum FastrakFaultKind {
     /// A record starts with `0`, a reply with `2`.
     #[error("byte {byte:#04x} starts neither a record nor a reply")]
     UnexpectedByte {
-        /// The byte.
+        /// Byte that was found.
         byte: u8,
     },
     /// The second byte is no station.
     #[error("station byte {byte:#04x} is not '1' to '4'")]
     BadStation {
-        /// The byte.
+        /// Byte that was found.
         byte: u8,
     },
     /// The third byte is neither blank nor a letter.
     #[error("error byte {byte:#04x} is neither blank nor a letter")]
     BadErrorByte {
-        /// The byte.
+        /// Byte that was found.
         byte: u8,
     },
     /// No CR LF at the end of the record.
@@ -39,8 +39,8 @@ pub enum FastrakFaultKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{kind} ({bytes_skipped} bytes skipped)")]
 pub struct FastrakFault {
-    /// Why.
+    /// Why the first of the bytes was thrown away.
     pub kind: FastrakFaultKind,
-    /// How many.
+    /// Number of bytes that were thrown away.
     pub bytes_skipped: usize,
 }

@@ -9,7 +9,7 @@ use super::record::Station;
 /// Units: m. Frame: transmitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HemisphereFlip {
-    /// Which receiver.
+    /// Station number of the receiver.
     pub station: Station,
     /// Position in the record before.
     pub before: Vector3<f64>,

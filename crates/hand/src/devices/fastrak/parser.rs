@@ -7,16 +7,16 @@ use super::record::{FastrakFormat, FastrakRecord};
 use crate::devices::inbox::Inbox;
 use crate::devices::inbox::feed_all;
 
-/// What the stream contained.
+/// An event of the stream: a record of the tracker, a flip, a reply, or a fault.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FastrakEvent {
-    /// A sample.
+    /// A record of the tracker.
     Record(FastrakRecord),
     /// The next record, of the same station, is about opposite to the one before it.
     HemisphereFlip(HemisphereFlip),
     /// A status, read-back or error record (starts with `2`), without its CR LF.
     Reply(String),
-    /// Something else.
+    /// Bytes that are neither a record nor a reply.
     Fault(FastrakFault),
 }
 

@@ -21,7 +21,7 @@ pub enum OutputList {
 }
 
 impl OutputList {
-    /// Numbers in a record.
+    /// How many numbers a record holds.
     pub const fn numbers(self) -> usize {
         match self {
             Self::PositionEuler => 6,
@@ -48,7 +48,7 @@ impl LengthUnit {
         }
     }
 
-    /// `inches` or `centimetres`.
+    /// Name of the unit: `inches` or `centimetres`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Inches => "inches",
@@ -60,11 +60,11 @@ impl LengthUnit {
 /// Everything a parser must know about how the tracker was set up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FastrakFormat {
-    /// Text or floats.
+    /// Whether a record is text or binary floats.
     pub encoding: Encoding,
-    /// Items of a record.
+    /// Items that a record holds.
     pub output: OutputList,
-    /// Unit of position.
+    /// Unit of the position in a record.
     pub units: LengthUnit,
 }
 
@@ -92,7 +92,7 @@ impl Station {
     /// The first receiver.
     pub const FIRST: Self = Self(1);
 
-    /// Checked constructor.
+    /// The station of this number.
     ///
     /// # Errors
     /// [`StationError`] for another number than 1 to 4.
@@ -175,7 +175,7 @@ impl Attitude {
         }
     }
 
-    /// Its numbers in the order of the record.
+    /// The attitude's numbers in the order of the record, and how many of the four are used.
     pub fn numbers(&self) -> ([f64; 4], usize) {
         match *self {
             Self::EulerDeg { azimuth_deg, elevation_deg, roll_deg } => {
@@ -191,7 +191,7 @@ impl Attitude {
 /// Source: thesis section 2.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FastrakRecord {
-    /// Which receiver.
+    /// Station number of the receiver.
     pub station: Station,
     /// Letter of a failed built-in test, for example `x` outside the position envelope.
     pub error: Option<u8>,

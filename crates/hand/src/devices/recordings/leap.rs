@@ -1,25 +1,25 @@
-//! Camera-tracked hands as CSV: four joint places per finger and frame.
+//! Camera-tracked hands as CSV: four joint places per finger and picture.
 
 use nalgebra::Point3;
 use softgrasp_grasp::hand::{Finger, Handedness};
 
-/// One frame of the recording.
+/// The joints of a hand in one picture of the camera.
 ///
 /// Units: m. Frame: the camera's, X right, Y up, Z toward the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeapFrame {
-    /// Time since the first frame, s.
+    /// Time since the first picture, s.
     pub time_s: f64,
-    /// Which hand.
+    /// Right or left hand.
     pub hand: Handedness,
     /// Thumb to little finger, each MPJ (thumb: TMJ), next joint, last joint, tip.
     pub joints: [[Point3<f64>; 4]; 5],
 }
 
-/// All frames, in the order of the file.
+/// All pictures of a recording, in the order of the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LeapRecording {
-    /// The frames.
+    /// The pictures, one per row of the file.
     pub frames: Vec<LeapFrame>,
 }
 
@@ -29,15 +29,15 @@ pub enum LeapError {
     /// A column is missing from the header.
     #[error("the header lacks column {column}")]
     Column {
-        /// Its name.
+        /// Name of the missing column.
         column: String,
     },
     /// A row cannot be read.
     #[error("row {row}: {reason}")]
     Row {
-        /// Row of the file.
+        /// Number of the row.
         row: usize,
-        /// What is wrong.
+        /// What is wrong with the row.
         reason: String,
     },
 }
@@ -130,7 +130,7 @@ fn number(record: &csv::StringRecord, column: usize, row: usize) -> Result<f64, 
 mod tests {
     use super::*;
 
-    /// A recording of one frame with joint coordinates 1, 2, 3, … mm.
+    /// A recording of one picture with joint coordinates 1, 2, 3, … mm.
     fn text() -> String {
         let mut header = "t_us,hand_type".to_owned();
         let mut row = "1000,right".to_owned();

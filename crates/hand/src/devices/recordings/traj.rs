@@ -17,7 +17,7 @@ pub enum TrajError {
     /// A row that is not four finite numbers.
     #[error("line {line}: a row must be four finite numbers")]
     Row {
-        /// Line of the file.
+        /// Number of the line.
         line: usize,
     },
     /// Another number of rows than four between blank lines.
@@ -25,13 +25,13 @@ pub enum TrajError {
     Rows {
         /// Last line of the pose.
         line: usize,
-        /// Rows it has.
+        /// Number of rows that the pose has.
         rows: usize,
     },
     /// The last row is not 0 0 0 1.
     #[error("line {line}: the last row of a pose must be 0 0 0 1")]
     LastRow {
-        /// Line of the file.
+        /// Number of the line.
         line: usize,
     },
     /// The rotation is sheared, scaled or mirrored.

@@ -15,7 +15,7 @@ const THUMB: [f64; 2] = [0.55, 0.10];
 /// Units: m. Frame: palm.
 #[derive(Clone, Debug)]
 pub(super) struct BindPose {
-    /// What the hand measures; right or left as its frames.
+    /// Dimensions of the hand; right or left as the frames below.
     pub dimensions: HandDimensions,
     /// Frames of all segments.
     pub palm_from_segment: [[Isometry3<f64>; 3]; 5],

@@ -12,9 +12,9 @@ use super::round_cone::smooth_union;
 /// Units: m. Frame: palm.
 #[derive(Clone, Debug)]
 pub(super) struct HandBody {
-    /// Everything but the digits.
+    /// Everything of the hand but the digits.
     pub palm: PalmBody,
-    /// Thumb to little finger.
+    /// Bodies of thumb to little finger.
     pub digits: [Loft; 5],
     /// One millimetre of the default hand.
     mm: f64,

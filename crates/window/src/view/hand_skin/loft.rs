@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 /// Units: m.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
-    /// Place on the line.
+    /// Place of the section on the line.
     pub along: f64,
     /// Half the width.
     pub half_width: f64,

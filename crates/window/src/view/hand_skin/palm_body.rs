@@ -43,7 +43,7 @@ impl PalmBody {
         }
     }
 
-    /// Signed distance to all of it but the sleeve.
+    /// Signed distance to all of the palm but the sleeve.
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
         let mm = self.fillet;
         let thumb = smooth_union(self.thenar_distance(p), self.thumb_web.distance(p), 9.0 * mm);

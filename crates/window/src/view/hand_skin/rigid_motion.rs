@@ -8,9 +8,9 @@ use nalgebra::{Isometry3, Quaternion, Vector3};
 /// A rigid motion, or a weighted sum of some.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RigidMotion {
-    /// The turn.
+    /// Quaternion of the turn.
     real: Quaternion<f64>,
-    /// Half of shift times turn.
+    /// Half of the shift times the turn.
     dual: Quaternion<f64>,
 }
 
@@ -22,7 +22,7 @@ impl RigidMotion {
         Self { real, dual: shift * real * 0.5 }
     }
 
-    /// Its eight numbers, x, y, z, w of either part.
+    /// The eight numbers of the dual quaternion, x, y, z, w of either part.
     pub fn numbers(&self) -> [f32; 8] {
         let (real, dual) = (&self.real.coords, &self.dual.coords);
         std::array::from_fn(|i| if i < 4 { real[i] } else { dual[i - 4] } as f32)
@@ -43,14 +43,14 @@ impl RigidMotion {
         Self { real: sum.real / length, dual: sum.dual / length }
     }
 
-    /// The moved vector of a point.
+    /// A point after the motion.
     pub fn move_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         let (turn, w) = (self.real.imag(), self.real.w);
         let shift = self.dual.imag() * w - turn * self.dual.w + turn.cross(&self.dual.imag());
         self.turn(point) + shift * 2.0
     }
 
-    /// The turned direction.
+    /// A direction after the motion, which turns it only.
     pub fn turn(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         let turn = self.real.imag();
         direction + turn.cross(&(turn.cross(direction) + direction * self.real.w)) * 2.0

@@ -9,12 +9,12 @@ use nalgebra::Point3;
 pub(super) struct RoundCone {
     /// Centres of the balls.
     pub ends: [Point3<f64>; 2],
-    /// Their radii.
+    /// Radii of the balls.
     pub radii: [f64; 2],
 }
 
 impl RoundCone {
-    /// Signed distance, negative inside.
+    /// Signed distance to the body, negative inside.
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
         let [a, b] = self.ends;
         let [ra, rb] = self.radii;
@@ -37,14 +37,14 @@ impl RoundCone {
 /// Units: m.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sheet {
-    /// Corners.
+    /// Corners of the triangle.
     pub corners: [Point3<f64>; 3],
-    /// Half the thickness.
+    /// Half the thickness of the sheet.
     pub radius: f64,
 }
 
 impl Sheet {
-    /// Signed distance, negative inside.
+    /// Signed distance to the sheet, negative inside.
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
         let [a, b, c] = self.corners;
         let normal = (b - a).cross(&(c - a));

@@ -32,7 +32,7 @@ pub struct HandSkin {
     segment_from_palm: [[Isometry3<f64>; 3]; 5],
     /// Vertices in the bind pose, palm frame.
     pub(super) places: Vec<Vector3<f64>>,
-    /// Their outward unit normals.
+    /// Outward unit normals of the vertices in the bind pose.
     pub(super) normals: Vec<Vector3<f64>>,
     weights: BoneWeights,
     triangles: Vec<[u32; 3]>,
@@ -75,7 +75,7 @@ impl HandSkin {
         &self.uvs
     }
 
-    /// Skin tones, nails and sleeve.
+    /// Picture of skin tones, nails and sleeve.
     pub fn texture() -> Texture {
         skin_texture()
     }
@@ -85,7 +85,7 @@ impl HandSkin {
         &self.places
     }
 
-    /// Outward unit normals in that pose.
+    /// Outward unit normals in the pose that the skin was made in. Frame: palm.
     pub fn normals(&self) -> &[Vector3<f64>] {
         &self.normals
     }

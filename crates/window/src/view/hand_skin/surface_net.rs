@@ -10,9 +10,9 @@ const NO_VERTEX: u32 = u32::MAX;
 /// Corners of the net and quadrilaterals between them, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SurfaceNet {
-    /// Units: m. Frame: the grid's.
+    /// Corners of the net. Units: m. Frame: the grid's.
     pub places: Vec<Point3<f64>>,
-    /// Four vertices each.
+    /// Quadrilaterals: four vertices each.
     pub quads: Vec<[u32; 4]>,
 }
 

@@ -1,4 +1,4 @@
-//! A place on the surface that something hangs on, and the frame it has there.
+//! A place on the surface on which something hangs, and the coordinate frame it has there.
 
 use nalgebra::{Point3, Vector3};
 
@@ -13,16 +13,16 @@ pub(super) struct Anchor {
     ahead: PlaceWeights,
 }
 
-/// Where an anchor is now: a point and three unit vectors, right-handed.
+/// The coordinate frame of an anchor now: a point and three unit vectors, right-handed.
 ///
 /// Units: m. Frame: the object's.
 pub(super) struct AnchorFrame {
     pub(super) origin: Vector3<f64>,
-    /// Out of the surface.
+    /// Direction out of the surface.
     pub(super) normal: Vector3<f64>,
-    /// Along the surface, where the anchor was told to look.
+    /// Direction along the surface, where the anchor was told to look.
     pub(super) ahead: Vector3<f64>,
-    /// `ahead` × `normal`.
+    /// Direction `ahead` × `normal`.
     pub(super) aside: Vector3<f64>,
 }
 
@@ -53,7 +53,7 @@ impl Anchor {
         })
     }
 
-    /// Where the anchor is on the surface as it is now.
+    /// The coordinate frame of the anchor on the surface as it is now.
     pub(super) fn frame(&self, surface: &CurvedSurface) -> AnchorFrame {
         let origin = surface.point(self.triangle, &self.at);
         let normal = surface.normal(self.triangle, &self.at);
@@ -71,7 +71,7 @@ impl AnchorFrame {
         self.aside * local.x + self.ahead * local.y + self.normal * local.z
     }
 
-    /// A point given the same way.
+    /// A point given by its parts aside, ahead and along the normal.
     pub(super) fn point(&self, local: &Vector3<f64>) -> Vector3<f64> {
         self.origin + self.direction(local)
     }

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::view::texture::{Texture, texel};
 
-/// What a place of the surface looks like.
+/// Look of a place of the surface: colour and slope of the relief.
 #[derive(Clone, Copy)]
 pub(super) struct Paint {
     /// Red, green, blue as sRGB, 0 to 1.
@@ -16,13 +16,13 @@ pub(super) struct Paint {
 /// A spread surface at rest: triangles with places in space and in the picture.
 pub(super) struct Spread<'a> {
     pub(super) triangles: &'a [[u32; 3]],
-    /// Units: m.
+    /// Positions of the vertices. Units: m.
     pub(super) positions: &'a [Point3<f64>],
-    /// From 0 to 1 over the picture.
+    /// Places of the vertices in the picture, each coordinate 0 to 1.
     pub(super) uvs: &'a [[f64; 2]],
 }
 
-/// Colours and relief, painted together.
+/// Pictures of colours and of the relief, painted together.
 pub(super) struct Baked {
     pub(super) colours: Texture,
     pub(super) relief: Texture,

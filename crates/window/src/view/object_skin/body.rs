@@ -32,7 +32,7 @@ pub(super) struct SpreadBody {
 impl Body {
     /// Curves and cuts the surface of a rest shape.
     ///
-    /// Units: rad.
+    /// Units: `crease_angle` rad.
     pub(super) fn new(rest: &RestShape, crease_angle: f64) -> Self {
         let (vertices, triangles) = (rest.mesh().vertices(), &rest.surface().triangles);
         let creased = CreasedSurface::new(vertices, triangles, crease_angle);
@@ -124,7 +124,7 @@ impl Body {
 }
 
 impl SpreadBody {
-    /// What a painter needs.
+    /// The places of the body and its triangles, as a painter takes them.
     pub(super) fn with<'a>(&'a self, triangles: &'a [[u32; 3]]) -> Spread<'a> {
         Spread { triangles, positions: &self.positions, uvs: &self.uvs }
     }

@@ -11,7 +11,7 @@ use crate::view::texture::Texture;
 
 /// Leaves and stalk, fixed to the skin below them.
 pub(super) struct Calyx {
-    /// Of each point of each leaf, and how far above the skin it is, m.
+    /// Anchor of each point of each leaf, and how far above the skin the point is, m.
     leaf_points: Vec<(Anchor, f64)>,
     /// Places of the leaf points in the picture of one leaf.
     leaf_uvs: Vec<[f32; 2]>,
@@ -164,9 +164,9 @@ impl Calyx {
 
 /// A point of a leaf seen from above.
 struct LeafPoint {
-    /// X and Z, m.
+    /// X and Z of the point, m.
     plan: [f64; 2],
-    /// Height above the skin, m.
+    /// Height of the point above the skin, m.
     lift: f64,
     uv: [f32; 2],
 }

@@ -11,7 +11,7 @@ pub(super) struct CreasedSurface {
     pub(super) corners: Vec<[u32; 3]>,
     /// Node of each corner.
     pub(super) corner_nodes: Vec<u32>,
-    /// Every edge once.
+    /// Every edge of the surface once.
     pub(super) edges: Vec<Edge>,
     /// Edges of each triangle: from its first corner to its second, and so on.
     pub(super) edges_of: Vec<[EdgeUse; 3]>,
@@ -19,13 +19,13 @@ pub(super) struct CreasedSurface {
 
 /// An edge between two nodes.
 pub(super) struct Edge {
-    /// Lower node, higher node.
+    /// Lower and higher node.
     pub(super) nodes: [u32; 2],
     /// Corners at these nodes, seen from the one side and from the other.
     pub(super) sides: [[u32; 2]; 2],
-    /// Both sides are one smooth surface.
+    /// Whether both sides are one smooth surface.
     pub(super) is_smooth: bool,
-    /// More than two triangles meet; such an edge stays straight.
+    /// Whether more than two triangles meet; such an edge stays straight.
     pub(super) is_overused: bool,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Edge {
 #[derive(Clone, Copy, Default)]
 pub(super) struct EdgeUse {
     pub(super) edge: u32,
-    /// From the higher node to the lower.
+    /// Whether the triangle runs from the higher node to the lower.
     pub(super) is_reversed: bool,
 }
 
@@ -56,7 +56,7 @@ impl HalfEdge {
 impl CreasedSurface {
     /// Cuts a surface where neighbouring faces of the rest shape meet at more than an angle.
     ///
-    /// Units: rad.
+    /// Units: `crease_angle` rad.
     pub(super) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]], crease_angle: f64) -> Self {
         let half_edges = sorted_half_edges(triangles);
         let normals: Vec<Vector3<f64>> =

@@ -21,16 +21,17 @@ pub(super) struct CurvedSurface {
 /// Control net of one curved triangle.
 #[derive(Clone, Copy)]
 struct Net {
-    /// Corners; then two along each side; then the middle. The order of [`cubic_weights`].
+    /// Control points: corners, then two along each side, then the middle. The order of
+    /// [`cubic_weights`].
     points: [Vector3<f64>; 10],
-    /// Corners, then the middles of the sides. The order of [`quadratic_weights`].
+    /// Control normals: corners, then the middles of the sides. The order of [`quadratic_weights`].
     normals: [Vector3<f64>; 6],
 }
 
 /// Weights of a place in a triangle: worked out once, used for every shape.
 #[derive(Clone, Copy)]
 pub(super) struct PlaceWeights {
-    /// Barycentric coordinates.
+    /// Barycentric coordinates of the place.
     pub(super) linear: [f64; 3],
     cubic: [f64; 10],
     quadratic: [f64; 6],

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// The looks there are: one for each built-in object, and one for every other mesh.
+/// Look of an object: one for each built-in object, and one for every other mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
     /// A ripe fruit with seeds, leaves and a stalk; the stalk's end is +Y.

@@ -8,17 +8,17 @@ use crate::view::texture::Texture;
 /// counter-clockwise seen from outside. Units: m. Frame: the object's.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// What it is, in a word.
+    /// Name of the part, in a word.
     pub name: &'static str,
-    /// Vertex indices.
+    /// Three vertex numbers of each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// Where the vertices are now.
+    /// Positions of the vertices now.
     pub positions: Vec<[f32; 3]>,
-    /// Unit normals, outward.
+    /// Outward unit normals of the vertices now.
     pub normals: Vec<[f32; 3]>,
     /// Places in the textures; (0, 0) is the first texel of the first row.
     pub uvs: Vec<[f32; 2]>,
-    /// What it is made of.
+    /// Material of the part.
     pub material: SurfaceMaterial,
 }
 
@@ -27,15 +27,15 @@ pub struct Part {
 pub struct SurfaceMaterial {
     /// Linear red, green, blue; multiplies the texture (white where there is one).
     pub colour: [f32; 3],
-    /// 0 is a mirror, 1 is chalk.
+    /// Roughness: 0 is a mirror, 1 is chalk.
     pub roughness: f32,
-    /// 0 is no metal.
+    /// Metallic share: 0 is no metal.
     pub metallic: f32,
-    /// Strength and roughness of a clear layer on top.
+    /// Strength and roughness of a clear layer on top, 0 to 1.
     pub clearcoat: (f32, f32),
     /// How much light comes through from behind, 0 to 1.
     pub subsurface: f32,
-    /// Colours, encoded as sRGB.
+    /// Picture of the colours, encoded as sRGB.
     pub texture: Option<Texture>,
     /// Slopes of a fine relief as a normal map: linear values, red along −u, green along +v.
     ///

@@ -18,7 +18,7 @@ pub(super) struct Source {
 pub(super) struct Tessellation {
     /// Pieces along each side of a triangle.
     pub(super) level: usize,
-    /// Of each drawn vertex.
+    /// Place of each drawn vertex on the curved surface.
     pub(super) sources: Vec<Source>,
     /// Drawn triangles, those of one curved triangle together.
     pub(super) triangles: Vec<[u32; 3]>,

@@ -9,7 +9,7 @@ use nalgebra::Point3;
 /// Units: m. Frame: the object's, at rest.
 #[derive(Clone)]
 pub(super) struct TubeProfile {
-    /// Ends along X.
+    /// Ends of the tube along X.
     pub(super) low: f64,
     pub(super) high: f64,
     /// Middle of the tube across.
@@ -71,7 +71,7 @@ impl TubeProfile {
         sum.map(|s| (s / weight_sum).max(1e-6))
     }
 
-    /// Where a point is on the tube.
+    /// Place of a point on the tube.
     pub(super) fn place(&self, p: &Point3<f64>) -> TubePlace {
         let half_extents = self.half_extents(p.x);
         let [height, width] = half_extents;

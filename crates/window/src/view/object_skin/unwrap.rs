@@ -12,18 +12,18 @@ use super::tube_profile::{TubePlace, TubeProfile};
 pub(super) enum Unwrap {
     /// Upper and lower half as two discs side by side, for what is round about its centre.
     Discs {
-        /// Where all rays start. Units: m.
+        /// Point where all rays start. Units: m.
         centre: Point3<f64>,
     },
     /// Front and back of a tube, one above the other.
     Sides(TubeProfile),
     /// Each face of a box fills the whole picture.
     Faces {
-        /// Corners of the box. Units: m.
+        /// Lower and upper corner of the box. Units: m.
         low: Point3<f64>,
         high: Point3<f64>,
     },
-    /// No picture.
+    /// The surface has no picture.
     Nothing,
 }
 
@@ -38,7 +38,7 @@ impl Unwrap {
         }
     }
 
-    /// Place of a point in the picture, 0 to 1 each.
+    /// Place of a point in the picture, both coordinates 0 to 1.
     pub(super) fn place(&self, chart: u8, p: &Point3<f64>) -> [f64; 2] {
         match self {
             Self::Discs { centre } => {

@@ -9,38 +9,38 @@ use egui::{Context, Key, RichText, TextEdit, Ui};
 use super::file_list::{Clicked, FileList};
 use super::{places, theme};
 
-/// The dialog that is open.
+/// Dialog that is open.
 #[derive(Default)]
 pub enum Dialog {
-    /// None.
+    /// No dialog is open.
     #[default]
     Closed,
-    /// Which mesh is to be read.
+    /// The dialog that asks which mesh is to be read.
     Read(FileQuestion),
-    /// Under which name the object is to be saved.
+    /// The dialog that asks under which name the object is to be saved.
     Save(FileQuestion),
-    /// Whether a file is to be replaced.
+    /// The dialog that asks whether this file is to be replaced.
     Replace(PathBuf),
 }
 
 /// A question for a file.
 pub struct FileQuestion {
     typed: String,
-    /// Meshes and folders.
+    /// Meshes and folders of the folder that is shown.
     list: FileList,
     /// The native dialog, while it is open, and since when.
     native: Option<(Receiver<Option<PathBuf>>, Instant)>,
-    /// Why the last answer was none, in a sentence.
+    /// Reason why the last answer could not be used, in a sentence.
     refusal: Option<String>,
     is_new: bool,
 }
 
-/// The answer.
+/// Answer of the person to a dialog.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileAnswer {
-    /// Read this.
+    /// Read this mesh file.
     Read(PathBuf),
-    /// Write this; it is not there yet, or may be replaced.
+    /// Save the object to this file, which is not there yet, or may be replaced.
     Save(PathBuf),
 }
 
@@ -51,7 +51,7 @@ const READ: [&str; 16] = [
     "msh", "vtu", "vtk", "mesh", "meshb", "txt", "node", "ele", "veg", "tet", "inp", "vol", "feb",
     "xdmf", "xmf", "gz",
 ];
-/// A system without a dialog of its own says so within this time; no person chooses so fast.
+/// Time within which a system without a dialog of its own says so; no person chooses so fast.
 const NO_PERSON: Duration = Duration::from_millis(400);
 
 impl Dialog {
@@ -60,7 +60,7 @@ impl Dialog {
         Self::Read(FileQuestion::new(String::new()))
     }
 
-    /// Asks again which mesh is to be read, because this one cannot be; why, in a sentence.
+    /// Asks again which mesh is to be read, because this file cannot be; `why` is a sentence.
     pub fn read_again(path: &Path, why: String) -> Self {
         let mut question = FileQuestion::new(path.to_string_lossy().into_owned());
         question.list = FileList::of(path.parent().unwrap_or(Path::new("")));
@@ -68,17 +68,17 @@ impl Dialog {
         Self::Read(question)
     }
 
-    /// Asks for a name, with a proposal.
+    /// Asks for a name under which the object is saved, with a proposal.
     pub fn save(object: &str) -> Self {
         Self::Save(FileQuestion::new(free_name(object)))
     }
 
-    /// Whether none is open.
+    /// Whether no dialog is open.
     pub fn is_closed(&self) -> bool {
         matches!(self, Self::Closed)
     }
 
-    /// Shows the dialog; the answer, once there is one.
+    /// Shows the dialog; returns the answer, once there is one.
     pub fn show(&mut self, context: &Context) -> Option<FileAnswer> {
         let (next, answer) = match std::mem::take(self) {
             Self::Closed => (Self::Closed, None),
@@ -104,7 +104,7 @@ impl Dialog {
     }
 }
 
-/// What has come of a look at a dialog.
+/// Result of a look at a dialog.
 enum Step {
     Stay,
     Close,
@@ -196,7 +196,7 @@ impl FileQuestion {
         (entered && !typed.is_empty()).then(|| PathBuf::from(typed))
     }
 
-    /// The formats as buttons: each sets the extension.
+    /// Shows the formats as buttons: each sets the extension.
     fn formats(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             ui.label(theme::quiet("format"));
@@ -218,7 +218,7 @@ impl FileQuestion {
         });
     }
 
-    /// Folders and meshes, to be clicked.
+    /// Shows folders and meshes, to be clicked.
     fn offers(&mut self, ui: &mut Ui) -> Option<PathBuf> {
         match self.list.show(ui, &self.typed)? {
             Clicked::Folder(folder) => self.list = FileList::of(&folder),
@@ -265,7 +265,7 @@ fn browse(is_save: bool, proposal: String) -> Receiver<Option<PathBuf>> {
     answered
 }
 
-/// A name that is not taken: the object's, with a number.
+/// A name that no file has: the object's, with a number.
 fn free_name(object: &str) -> String {
     let stem = Path::new(object).file_stem().map_or("object".into(), |s| s.to_string_lossy());
     let stem = stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '-');

@@ -9,33 +9,33 @@ use softgrasp_core::mesh_io::{Sniffed, sniff};
 
 use super::{places, theme};
 
-/// What a folder offers.
+/// The folders and the mesh files of a folder.
 pub struct FileList {
     folder: PathBuf,
     folders: Vec<String>,
     files: Vec<String>,
-    /// Entries that were not looked at, because there are too many.
+    /// Number of entries that were not looked at, because there are too many.
     left_out: usize,
 }
 
-/// What was clicked.
+/// Entry of the list that was clicked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Clicked {
-    /// Another folder.
+    /// Another folder was clicked.
     Folder(PathBuf),
-    /// A file, once.
+    /// A file was clicked once.
     File(PathBuf),
-    /// A file, twice: it is to be read.
+    /// A file was clicked twice: it is to be read.
     FileTwice(PathBuf),
 }
 
-/// Entries of a folder that are looked at.
+/// Most entries of a folder that are looked at.
 const ENTRIES_MAX: usize = 500;
-/// The format of a file is told by so many bytes of its beginning.
+/// Number of bytes at the beginning of a file by which its format is told.
 const LOOKED_AT: u64 = 1 << 16;
 
 impl FileList {
-    /// What a folder offers: its folders, and the files whose content a mesh can be read from,
+    /// The list of a folder: its folders, and the files whose content a mesh can be read from,
     /// whatever their names end with.
     pub fn of(folder: &Path) -> Self {
         let shown = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -56,7 +56,7 @@ impl FileList {
         Self { folder: folder.to_owned(), folders, files, left_out }
     }
 
-    /// Shows folders, then files; what was clicked.
+    /// Shows folders, then files; returns what was clicked.
     pub fn show(&self, ui: &mut Ui, typed: &str) -> Option<Clicked> {
         let mut clicked = None;
         if !self.folder.as_os_str().is_empty() {
@@ -96,7 +96,7 @@ impl FileList {
         clicked
     }
 
-    /// The folder above.
+    /// Path of the folder above.
     fn above(&self) -> PathBuf {
         match self.folder.file_name() {
             Some(_) => self.folder.parent().unwrap_or(Path::new("")).to_owned(),

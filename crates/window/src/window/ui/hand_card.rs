@@ -13,7 +13,7 @@ pub struct FingerSliders {
 }
 
 impl FingerSliders {
-    /// Follows fingers that were closed by keys.
+    /// Moves the sliders of fingers that were closed by keys.
     pub fn step(&mut self, digits: Digits, by: f64) {
         for finger in Finger::ALL {
             if matches!(digits, Digits::All) || digits == Digits::One(finger) {
@@ -23,7 +23,7 @@ impl FingerSliders {
         }
     }
 
-    /// All open: the hand goes somewhere else.
+    /// Sets all sliders to open: the hand goes somewhere else.
     pub fn open(&mut self) {
         *self = Self::default();
     }
@@ -32,7 +32,7 @@ impl FingerSliders {
         self.closing.iter().sum::<f64>() / 5.0
     }
 
-    /// Closes or opens all together: fingers that hold something keep their lead over those that do
+    /// Closes or opens all fingers together: those that hold something keep their lead over those that do
     /// not, until all are open or closed.
     fn shift_to(&mut self, mean: f64) {
         let by = mean - self.mean();
@@ -42,7 +42,7 @@ impl FingerSliders {
         }
     }
 
-    /// Shows the panel; what was asked for.
+    /// Shows the panel; returns what was asked for.
     pub fn show(&mut self, ui: &mut Ui) -> Vec<MouseInput> {
         let mut wishes = Vec::new();
         theme::sheet(ui, |ui| {
@@ -73,7 +73,7 @@ impl FingerSliders {
         wishes
     }
 
-    /// One slider for all fingers, which stands at their mean.
+    /// Shows one slider for all fingers, which stands at their mean.
     fn all(&mut self, ui: &mut Ui, wishes: &mut Vec<MouseInput>) {
         let mut mean = self.mean();
         if slider(ui, "close all", &mut mean) {

@@ -5,7 +5,7 @@ use softgrasp_hand::hand_request::HandChoice;
 
 use super::theme;
 
-/// What mouse and keys do whatever hand acts.
+/// What mouse and keys do with every hand.
 const ALWAYS: [(&str, &str); 13] = [
     ("right button", "menu"),
     ("drag", "turn the view; with a mouse hand, drag the object itself to turn it"),
@@ -22,7 +22,7 @@ const ALWAYS: [(&str, &str); 13] = [
     ("F1 F2 F3 F4", "this page, information, timings, softness and size"),
 ];
 
-/// What they do besides for a hand that is played.
+/// What they do besides with a hand that is played.
 const PLAYED: [(&str, &str); 4] = [
     ("Space (hold)", "take the hand yourself"),
     ("Enter", "play or pause"),
@@ -30,7 +30,7 @@ const PLAYED: [(&str, &str); 4] = [
     (", ", "from the beginning"),
 ];
 
-/// What they do besides for a hand that the mouse moves.
+/// What they do besides with a hand that the mouse moves.
 const MOUSE: [(&str, &str); 6] = [
     ("Space / X", "close / open all fingers (hold)"),
     ("1 … 5 (Shift)", "close (open) thumb, index, middle, ring, little finger"),
@@ -40,7 +40,7 @@ const MOUSE: [(&str, &str); 6] = [
     ("Tab", "aim from another side"),
 ];
 
-/// Shows the page.
+/// Shows the page of help.
 pub fn show(context: &Context, hand: HandChoice) {
     let height_max = context.content_rect().height() - 130.0;
     theme::dialog(context, "help", |ui| {
@@ -70,8 +70,8 @@ fn rows(ui: &mut Ui, name: &str, rows: &[(&str, &str)]) {
     });
 }
 
-/// What whoever sees the window for the first time has to know of a hand, and of an object that
-/// `is_lifted` by friction or glued to the fingertips.
+/// Shows what a newcomer has to know of a hand, and of an object that `is_lifted` by friction or glued to
+/// the fingertips.
 pub fn hint(ui: &mut Ui, hand: HandChoice, is_lifted: bool) {
     let first = match (hand, is_lifted) {
         (HandChoice::Mouse, true) => {

@@ -5,20 +5,20 @@ use egui::{Grid, RichText, Ui};
 use super::theme;
 use crate::view::frame::ViewFrame;
 
-/// What does not change from frame to frame.
+/// Facts of a run that do not change from tick to tick.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunFacts {
     /// Name or file of the object.
     pub object: String,
     /// Young's modulus, Pa, and Poisson's ratio.
     pub material: (f64, f64),
-    /// What a fingertip holds.
+    /// Name of the contact model: what a fingertip holds.
     pub contact: String,
-    /// Where it is solved.
+    /// Server that answers, as it is shown to a person.
     pub server: String,
-    /// The hand.
+    /// Kind of the hand that acts.
     pub hand: String,
-    /// What draws.
+    /// Name of the graphics that draw.
     pub graphics: String,
 }
 

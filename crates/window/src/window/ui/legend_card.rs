@@ -5,14 +5,14 @@ use egui::{Align2, Color32, Pos2, Rect, Sense, Ui, Vec2};
 use super::theme;
 use crate::view::colour_map::ColourMap;
 
-/// What the legend says.
+/// Text of the legend.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LegendText {
-    /// The quantity.
+    /// Name of the quantity that the colours show.
     pub title: String,
-    /// Share of the range and what is written there.
+    /// Labels: share of the range, and the text written there.
     pub labels: Vec<(f64, String)>,
-    /// What has to be said besides; empty if nothing.
+    /// A remark below the labels; empty if there is none.
     pub remark: String,
 }
 

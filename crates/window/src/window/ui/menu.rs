@@ -13,19 +13,19 @@ use crate::view::display::{Display, Level};
 use crate::view::shading::Shading;
 use crate::view::toggle::{Page, Toggle};
 
-/// What the menus have to know.
+/// What the menus have to know of the run.
 pub struct MenuFacts<'a> {
-    /// What is shown.
+    /// What of the scene is shown.
     pub display: &'a Display,
     /// The hand that acts.
     pub hand: HandChoice,
-    /// The object.
+    /// Name of the object.
     pub object: &'a str,
-    /// The method asked for.
+    /// Name of the method that was asked for.
     pub method: &'a str,
-    /// The method of the newest answer.
+    /// Name of the method of the newest answer.
     pub solved_by: Option<&'a str>,
-    /// The error budget.
+    /// Largest relative error that was asked for.
     pub max_error: Option<f64>,
     /// Whether there is a kept shape to go back from.
     pub can_undo: bool,
@@ -43,31 +43,31 @@ const BUDGETS: [Option<f64>; 4] = [None, Some(1e-2), Some(1e-4), Some(1e-6)];
 /// Width of a menu, points.
 const MENU_WIDTH: f32 = 215.0;
 
-/// The pop-up menu.
+/// The pop-up menu of the right mouse button.
 #[derive(Default)]
 pub struct PopUp {
     at: Option<Pos2>,
-    /// The click that opened it does not close it.
+    /// Whether the click that opened the menu is still to be ignored: it does not close it.
     is_new: bool,
 }
 
 impl PopUp {
-    /// Opens it at a place.
+    /// Opens the menu at a place.
     pub fn open(&mut self, at: Pos2) {
         (self.at, self.is_new) = (Some(at), true);
     }
 
-    /// Closes it.
+    /// Closes the menu.
     pub fn close(&mut self) {
         self.at = None;
     }
 
-    /// Whether it is open.
+    /// Whether the menu is open.
     pub fn is_open(&self) -> bool {
         self.at.is_some()
     }
 
-    /// Shows it, if it is open, and says what was chosen.
+    /// Shows the menu, if it is open, and returns what was chosen.
     pub fn show(&mut self, context: &Context, facts: &MenuFacts<'_>) -> Option<Action> {
         let at = self.at?;
         let mut chosen = None;
@@ -135,7 +135,7 @@ fn plain_entry(ui: &mut Ui, facts: &MenuFacts<'_>, action: &Action, enabled: boo
     response.clicked()
 }
 
-/// The bar at the top of the window; says what was chosen.
+/// Shows the bar at the top of the window and returns what was chosen.
 pub fn bar(context: &Context, facts: &MenuFacts<'_>) -> Option<Action> {
     let mut chosen = None;
     theme::card(context, "bar", Align2::LEFT_TOP, [theme::MARGIN; 2], |ui| {
@@ -172,7 +172,7 @@ fn choice(ui: &mut Ui, action: Action, is_chosen: bool) -> Option<Action> {
     is_wished.then_some(action)
 }
 
-/// What a method does, for a person who does not know its name.
+/// A sentence on what a method does, for a person who does not know its name.
 fn about_method(name: &str) -> &'static str {
     match name {
         "auto" => "the server chooses for each question, and F2 tells why",
@@ -213,7 +213,7 @@ fn hands(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     chosen
 }
 
-/// Method and accepted error.
+/// Shows the menu of methods and accepted errors; returns what was chosen.
 pub fn methods(ui: &mut Ui, facts: &MenuFacts<'_>) -> Option<Action> {
     let mut chosen = None;
     ui.label(theme::quiet("Method"));

@@ -12,9 +12,9 @@ pub struct Notices {
     shown: Vec<(Instant, String, bool)>,
 }
 
-/// A sentence is read in this time.
+/// Time for which a sentence stays.
 const STAYS: Duration = Duration::from_secs(7);
-/// More than this nobody reads.
+/// Most sentences that are shown at once.
 const SHOWN_MAX: usize = 4;
 
 impl Notices {
@@ -28,7 +28,7 @@ impl Notices {
         self.shown.drain(..too_many);
     }
 
-    /// Adds what has become of something.
+    /// Adds the sentence of a result: what was done, or why it failed.
     pub fn add_result(&mut self, result: anyhow::Result<String>) {
         match result {
             Ok(text) => self.add(text, false),
@@ -36,7 +36,7 @@ impl Notices {
         }
     }
 
-    /// Shows them; a click takes them away.
+    /// Shows the sentences; a click takes them away.
     pub fn show(&mut self, ui: &mut Ui) {
         self.shown.retain(|(since, _, _)| since.elapsed() < STAYS);
         if self.shown.is_empty() {

@@ -9,7 +9,7 @@ use egui::{Context, Id, Response};
 #[derive(Clone, Default)]
 struct Places(BTreeMap<String, ([i32; 4], u64)>);
 
-/// Tells where a thing is, when it has moved or was not there in the picture before:
+/// Writes into the log where a thing is, when it has moved or was not there in the picture before:
 /// `RUST_LOG=softgrasp_window::places=debug`.
 pub fn tell(context: &Context, name: &str, response: &Response) {
     // Tests have no subscriber, and ask `of`.
@@ -32,7 +32,7 @@ pub fn tell(context: &Context, name: &str, response: &Response) {
     }
 }
 
-/// Where a thing was last: its centre, width and height, pixels.
+/// Place of a thing in the last picture that had it: its centre, width and height, pixels.
 #[cfg(test)]
 pub fn of(context: &Context, name: &str) -> Option<[i32; 4]> {
     context.data(|data| data.get_temp::<Places>(Id::new("places"))?.0.get(name).map(|at| at.0))

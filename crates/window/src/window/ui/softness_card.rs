@@ -4,29 +4,29 @@ use egui::{Response, Slider, Ui};
 
 use super::{places, theme};
 
-/// What the sliders show.
+/// State of the card's sliders.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Softness {
-    /// Young's modulus, kPa.
+    /// Young's modulus on its slider, kPa.
     young_kpa: f64,
     poisson: f64,
-    /// Longest extent, mm.
+    /// Longest extent on its slider, mm.
     size_mm: f64,
     nodes: usize,
-    /// What the object is: the sliders follow it until the person draws one.
+    /// The object as the card saw it last: the sliders follow it until the person moves one.
     seen: Option<Is>,
 }
 
-/// What the object is.
+/// The object as it is now: material, size, mesh and grip force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Is {
     /// Young's modulus, Pa.
     pub young: f64,
     /// Poisson's ratio.
     pub poisson: f64,
-    /// Longest extent, m.
+    /// Longest extent of the object, m.
     pub size_m: f64,
-    /// Nodes of the mesh.
+    /// Number of nodes of the mesh.
     pub nodes: usize,
     /// Whether a mesh with another number of nodes can be made.
     pub can_be_refined: bool,
@@ -34,10 +34,10 @@ pub struct Is {
     pub grip_newtons: Option<f64>,
 }
 
-/// What the person wants.
+/// What the person wants of the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SoftnessWish {
-    /// Another material.
+    /// The object of another material.
     Material {
         /// Young's modulus, Pa.
         young: f64,
@@ -46,9 +46,9 @@ pub enum SoftnessWish {
     },
     /// The object anew, in another size or finer.
     Object {
-        /// Nodes, where they can be chosen.
+        /// Number of nodes, where it can be chosen.
         nodes: Option<usize>,
-        /// Longest extent, m.
+        /// Longest extent of the object, m.
         size_m: f64,
     },
 }
@@ -69,7 +69,7 @@ const SIZE_MM: (f64, f64) = (40.0, 120.0);
 const NODES: (usize, usize) = (200, 10_000);
 
 impl Softness {
-    /// Shows the card; what the person wants, once a slider is let go.
+    /// Shows the card; returns what the person wants, once a slider is let go.
     pub fn show(&mut self, ui: &mut Ui, is: &Is) -> Option<SoftnessWish> {
         self.follow(is);
         theme::sheet(ui, |ui| {
@@ -102,14 +102,15 @@ impl Softness {
         })
     }
 
-    /// Another material than the object has; a slider that only rounds what it shows wants none.
+    /// The wish for another material than the object has; a slider that only rounds what it shows wants
+    /// none.
     fn other_material(&self, is: &Is) -> Option<SoftnessWish> {
         let (young, poisson) = (1e3 * self.young_kpa, self.poisson);
         let differs = (young / is.young - 1.0).abs() > 5e-3 || (poisson - is.poisson).abs() > 5e-3;
         differs.then_some(SoftnessWish::Material { young, poisson })
     }
 
-    /// Another size or number of nodes than the object has.
+    /// The wish for another size or number of nodes than the object has.
     fn other_object(&self, is: &Is) -> Option<SoftnessWish> {
         let differs = (self.size_mm - 1e3 * is.size_m).abs() > 0.6 || self.nodes != is.nodes;
         differs.then(|| SoftnessWish::Object {
@@ -118,7 +119,7 @@ impl Softness {
         })
     }
 
-    /// Takes over what has changed elsewhere.
+    /// Sets the sliders to what has changed elsewhere.
     fn follow(&mut self, is: &Is) {
         let new = Is { grip_newtons: None, ..*is };
         if self.seen == Some(new) {
@@ -130,7 +131,7 @@ impl Softness {
     }
 }
 
-/// A slider with its name; whether it was let go after a change.
+/// Shows a slider with its name; returns whether it was let go after a change.
 fn line(ui: &mut Ui, name: &str, slider: Slider<'_>) -> bool {
     ui.horizontal(|ui| {
         ui.spacing_mut().slider_width = 110.0;
@@ -142,7 +143,7 @@ fn line(ui: &mut Ui, name: &str, slider: Slider<'_>) -> bool {
     .inner
 }
 
-/// While a slider is drawn, every value between would be asked for.
+/// Whether a slider was let go: while it is moved, every value between would be asked for.
 fn is_settled(response: &Response) -> bool {
     response.drag_stopped() || (response.changed() && !response.dragged())
 }

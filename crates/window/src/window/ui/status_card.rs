@@ -8,13 +8,13 @@ use softgrasp_grasp::hand::Finger;
 use super::theme::{self, ACCENT, BAD, CAUTION, GOOD, IDLE, QUIET};
 use crate::view::frame::{LinkHealth, ViewFrame};
 
-/// What the card tells besides the frame.
+/// What the card tells besides the tick.
 pub struct Told {
-    /// From tick to tick, s.
+    /// Time from tick to tick, s.
     pub tick_s: f64,
     /// Force that a metre of arrow stands for, N/m, where arrows are shown.
     pub newtons_per_m: Option<f64>,
-    /// Room that the time line takes below the card, points.
+    /// Height that the time line takes below the card, points.
     pub above: f32,
 }
 

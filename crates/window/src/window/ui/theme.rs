@@ -1,27 +1,27 @@
-//! Colours, letters and frames of everything that lies over the scene.
+//! Colours, letters and borders of everything that lies over the scene.
 
 use egui::{
     Align2, Area, Color32, Context, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Order,
     Pos2, RichText, ScrollArea, Shadow, Stroke, TextStyle, Ui, UiBuilder, Vec2, Visuals,
 };
 
-/// Good, on time.
+/// Colour of what is good or on time.
 pub const GOOD: Color32 = Color32::from_rgb(0x1B, 0x87, 0x4B);
-/// Late, or to be looked at.
+/// Colour of what is late, or to be looked at.
 pub const CAUTION: Color32 = Color32::from_rgb(0xB8, 0x6E, 0x00);
-/// Wrong, or old.
+/// Colour of what is wrong, or old.
 pub const BAD: Color32 = Color32::from_rgb(0xC6, 0x28, 0x28);
-/// What is chosen.
+/// Colour of what is chosen.
 pub const ACCENT: Color32 = Color32::from_rgb(0x1F, 0x5F, 0xBF);
-/// Letters that are not read first.
+/// Colour of letters that are not read first.
 pub const QUIET: Color32 = Color32::from_rgb(0x5B, 0x63, 0x6E);
-/// A fingertip that touches nothing.
+/// Colour of a fingertip that touches nothing.
 pub const IDLE: Color32 = Color32::from_rgb(0xC9, 0xCE, 0xD6);
 
 /// Distance of the cards from the edge of the window, points.
 pub const MARGIN: f32 = 12.0;
 
-/// Sets letters and colours once.
+/// Sets the style of letters and colours once.
 pub fn set_up(context: &Context) {
     // A field for letters is seen on a white card.
     let field = Some(Color32::from_gray(238));
@@ -47,7 +47,7 @@ pub fn set_up(context: &Context) {
 /// Height of the bar of menus with its margins, points: what lies below it begins here.
 pub const BELOW_BAR: f32 = 60.0;
 
-/// A card with content at an edge or corner of the window.
+/// Shows a card with content at an edge or corner of the window.
 pub fn card<R>(
     context: &Context,
     name: &str,
@@ -62,8 +62,8 @@ pub fn card<R>(
         .inner
 }
 
-/// A card in the lower left corner, so far above the edge of the window. It is measured before it is put
-/// there, so that one that grows does not lie over what is below it for a picture.
+/// Shows a card in the lower left corner, so far above the edge of the window. It is measured before it
+/// is put there, so that one that grows does not lie over what is below it for a picture.
 pub fn low_card(context: &Context, name: &str, above: f32, content: impl Fn(&mut Ui)) {
     let screen = context.content_rect();
     let measuring = UiBuilder::new().max_rect(screen).invisible();
@@ -75,7 +75,7 @@ pub fn low_card(context: &Context, name: &str, above: f32, content: impl Fn(&mut
         .show(context, |ui| card_frame().show(ui, content));
 }
 
-/// A card that waits for an answer: it lies over all others.
+/// Shows a card that waits for an answer: it lies over all others.
 pub fn dialog<R>(context: &Context, name: &str, content: impl FnOnce(&mut Ui) -> R) -> R {
     Area::new(Id::new(name))
         .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
@@ -84,8 +84,8 @@ pub fn dialog<R>(context: &Context, name: &str, content: impl FnOnce(&mut Ui) ->
         .inner
 }
 
-/// Cards one below the other at a corner of the window, not larger than `size_max`; those that find no
-/// room are scrolled to.
+/// Shows cards one below the other at a corner of the window, not larger than `size_max`; those that find
+/// no room are scrolled to.
 pub fn column<R>(
     context: &Context,
     name: &str,
@@ -107,12 +107,12 @@ pub fn column<R>(
         .inner
 }
 
-/// A card in a column.
+/// Shows a card in a column.
 pub fn sheet<R>(ui: &mut Ui, content: impl FnOnce(&mut Ui) -> R) -> R {
     card_frame().show(ui, content).inner
 }
 
-/// Where cards of a name were in the last picture; nothing where there were none.
+/// Size of the cards of a name in the last picture; zero where there were none.
 pub fn size_of(context: &Context, name: &str) -> Vec2 {
     let area = context.memory(|memory| memory.area_rect(Id::new(name)));
     // An area that has been named but not measured yet is nowhere.
@@ -120,7 +120,7 @@ pub fn size_of(context: &Context, name: &str) -> Vec2 {
     if size.is_finite() { size.max(Vec2::ZERO) } else { Vec2::ZERO }
 }
 
-/// The frame of a card.
+/// Border and background of a card.
 pub fn card_frame() -> Frame {
     Frame::new()
         .fill(Color32::from_rgba_unmultiplied(255, 255, 255, 236))
@@ -135,12 +135,12 @@ pub fn card_frame() -> Frame {
         })
 }
 
-/// Letters that are not read first.
+/// A text in the colour of letters that are not read first.
 pub fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(QUIET)
 }
 
-/// A word on a coloured ground.
+/// Shows a word on a coloured ground.
 pub fn chip(ui: &mut Ui, text: &str, ground: Color32) {
     Frame::new()
         .fill(ground)

@@ -7,34 +7,34 @@ use crate::view::action::Action;
 use crate::view::frame::News;
 use crate::view::history::History;
 
-/// What is played.
+/// State of the run that the time line shows.
 pub struct Playing {
-    /// Whether it stands still.
+    /// Whether the run is paused.
     pub is_paused: bool,
-    /// The tick that is looked at, where it is not the newest.
+    /// Number of the tick that is looked at, where it is not the newest.
     pub looked_at: Option<u64>,
-    /// The tick that a person counts from.
+    /// Number of the tick from which the person counts.
     pub first_tick: u64,
 }
 
-/// What was asked for on the time line.
+/// What the person asked for on the time line.
 pub enum TimelineWish {
-    /// An action.
+    /// An action, such as play, pause or one tick.
     Do(Action),
-    /// To look at a tick.
+    /// To look at the tick of this number.
     LookAt(u64),
     /// To look at the newest tick again.
     Newest,
 }
 
-/// Room that the card's own buttons take beside the track, points.
+/// Width that the card's own buttons take beside the track, points.
 const TAKEN: f32 = 340.0;
 /// Width of the number of the tick, points.
 const TICKS_WIDTH: f32 = 48.0;
 /// Height of the card with its margin, points: what stands at the bottom stands above it.
 pub const HEIGHT: f32 = 62.0;
 
-/// Shows the time line at the bottom.
+/// Shows the time line at the bottom; returns what the person asked for.
 pub fn show(context: &Context, history: &History, playing: &Playing) -> Option<TimelineWish> {
     let (first, last) = history.ticks()?;
     let offset = [0.0, -theme::MARGIN];
@@ -67,7 +67,7 @@ pub fn show(context: &Context, history: &History, playing: &Playing) -> Option<T
     })
 }
 
-/// The line with its marks; the tick that was dragged to.
+/// Shows the line with its marks; returns the tick that was dragged to.
 fn track(
     ui: &mut Ui,
     marks: &[News],
@@ -114,7 +114,7 @@ fn track(
     Some(first + (f64::from(share.clamp(0.0, 1.0)) * (last - first) as f64).round() as u64)
 }
 
-/// Entering a state, touching and leaving look different.
+/// Colour of a mark: entering a state, touching and leaving look different.
 fn colour(text: &str) -> Color32 {
     match text {
         _ if text.starts_with("entered") => theme::ACCENT,

@@ -8,13 +8,13 @@ use super::theme;
 use crate::view::frame::TickTiming;
 use crate::view::nice_number::nice_above;
 
-/// The newest times.
+/// The newest times of answers, and their graph.
 #[derive(Default)]
 pub struct Timings {
     newest: VecDeque<TickTiming>,
 }
 
-/// Answers in the graph.
+/// Number of answers in the graph.
 const KEPT: usize = 240;
 /// Colour and name of each stage, in the order in which they happen.
 const STAGES: [(Color32, &str); 6] = [
@@ -27,7 +27,7 @@ const STAGES: [(Color32, &str); 6] = [
 ];
 
 impl Timings {
-    /// Takes times in.
+    /// Adds the times of answers.
     pub fn add(&mut self, timings: &[TickTiming]) {
         self.newest.extend(timings);
         while self.newest.len() > KEPT {

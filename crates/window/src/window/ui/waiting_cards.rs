@@ -17,7 +17,7 @@ pub const STEPS: [&str; 6] = [
     "ready",
 ];
 
-/// Shows the card; whether it was called off.
+/// Shows the card of an object that is being loaded; returns whether it was called off.
 ///
 /// `step` counts in [`STEPS`].
 pub fn loading(context: &Context, name: &str, step: usize) -> bool {
@@ -44,24 +44,24 @@ pub fn loading(context: &Context, name: &str, step: usize) -> bool {
     })
 }
 
-/// What a card of a server that prepares says.
+/// What the card of a server that prepares an object says.
 pub struct Preparing<'a> {
-    /// The object.
+    /// Name of the object.
     pub object: &'a str,
-    /// Nodes of its mesh.
+    /// Number of nodes of its mesh.
     pub nodes: usize,
-    /// What the server is at, in a word.
+    /// Stage of the server's work, in a word.
     pub stage: &'a str,
-    /// How long it has been at it.
+    /// Time for which the server has been preparing.
     pub since: Duration,
-    /// Whether a script waits for it.
+    /// Whether a script waits for the object.
     pub is_awaited: bool,
 }
 
-/// A server that is done within this time is not told of.
+/// Time within which a server that prepares is not told of.
 pub const BRIEF: Duration = Duration::from_millis(700);
 
-/// Shows the card.
+/// Shows the card of a server that prepares an object.
 pub fn preparing(ui: &mut Ui, preparing: &Preparing<'_>) {
     let Preparing { object, nodes, stage, since, is_awaited } = preparing;
     theme::sheet(ui, |ui| {
@@ -80,8 +80,8 @@ pub fn preparing(ui: &mut Ui, preparing: &Preparing<'_>) {
     });
 }
 
-/// Shows the card; whether the person takes the hand. `begins_in` is how long it is until the script
-/// begins anew, where it does.
+/// Shows the card of the person's turn; returns whether the person takes the hand. `begins_in` is the
+/// time until the script begins anew, where it does.
 pub fn turn(ui: &mut Ui, object: &str, begins_in: Option<Duration>) -> bool {
     theme::sheet(ui, |ui| {
         ui.heading("Your turn");
