@@ -128,8 +128,7 @@ const READ_AHEAD_MAX: usize = 64 * 1024;
 
 impl<S> ClientConnection<S> {
     /// Connection over the stream of a client that has not introduced itself yet: that counts as done
-    /// with
-    /// its first message or, if a token is required, with the token; `limits` hold for what is read.
+    /// with its first message or, if a token is required, with the token; `limits` hold for what is read.
     pub fn new(
         stream: S,
         limits: Limits,
@@ -216,8 +215,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
     /// [`Patience`] counts.
     ///
     /// May be dropped at any await: bytes that have come stay. Time in which the server did not read,
-    /// because
-    /// it worked on a request, does not count against the client.
+    /// because it worked on a request, does not count against the client.
     ///
     /// # Errors
     /// [`SessionError`]: how the client was too slow, or what is wrong with the stream.
@@ -226,8 +224,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
     }
 
     /// Waits for the next frame of at most `len_max` bytes, header included; of a longer one the header
-    /// is
-    /// returned as soon as it has come.
+    /// is returned as soon as it has come.
     ///
     /// # Errors
     /// The same as those of [`Self::next_frame`].
@@ -362,8 +359,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
     }
 
     /// Time at which to look at the client again, and the error if it has not gone on by then; `None` for
-    /// a
-    /// client that may be silent.
+    /// a client that may be silent.
     fn deadline(&self, start: Instant) -> (Instant, Option<SessionError>) {
         let Patience { stall, greeting, idle, .. } = self.patience;
         let stream = self.connection.stream();

@@ -41,12 +41,10 @@ pub struct ServerConfig {
     /// Whether other machines may reach the server without token and encryption.
     pub is_insecure: bool,
     /// Whether the machine's rates are measured at the start, beside the first requests, and not by the
-    /// first
-    /// request that needs them.
+    /// first request that needs them.
     pub measure_at_start: bool,
     /// Whether the thread of the sockets asks for real-time scheduling, so that frame questions need not
-    /// wait
-    /// for other work on the machine.
+    /// wait for other work on the machine.
     pub real_time: bool,
     /// Longest time between two bytes inside a message, before the client is given up.
     pub stall_limit: Duration,
@@ -55,8 +53,7 @@ pub struct ServerConfig {
     /// Longest silence of a client between two messages, before it is given up; `None`: no limit.
     pub idle_limit: Option<Duration>,
     /// Longest time for a client to take its reply, and one second more for every 64 KiB of it, before it
-    /// is
-    /// given up.
+    /// is given up.
     pub reply_limit: Duration,
     /// Time for which sessions may go on after the server was asked to stop.
     pub drain: Duration,
@@ -108,8 +105,7 @@ pub enum ConfigError {
 
 const THREADS_MAX: usize = 1024;
 /// Bytes that a client may send in one frame before it has shown the token; without a token, a longer
-/// frame
-/// takes a session's place once its header has come.
+/// frame takes a session's place once its header has come.
 pub(crate) const STRANGER_PAYLOAD_MAX: u32 = 64 * 1024;
 
 impl Default for ServerConfig {

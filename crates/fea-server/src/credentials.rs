@@ -80,8 +80,7 @@ impl Renewal {
     }
 
     /// Reads all files again. New clients need the new credentials; present sessions go on. If one file
-    /// cannot
-    /// be used, none is.
+    /// cannot be used, none is.
     pub fn read_again(&self) {
         let read = match Credentials::read(&self.access) {
             Ok(read) => read,

@@ -93,8 +93,7 @@ impl Encryption {
     }
 
     /// Self-signed certificate for hosts and addresses, made now, of which no file is written: for a page
-    /// that
-    /// a person opens and trusts by hand. It is valid for a year.
+    /// that a person opens and trusts by hand. It is valid for a year.
     ///
     /// # Errors
     /// [`EncryptionError::Made`] if no certificate can be made for these names.

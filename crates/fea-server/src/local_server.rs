@@ -44,8 +44,7 @@ impl LocalServer {
     }
 
     /// Opens a session: the client's end of its pipe, and the future that serves it, to be spawned or
-    /// polled
-    /// beside the client. `None` if all places for sessions are taken.
+    /// polled beside the client. `None` if all places for sessions are taken.
     pub fn connect(&self) -> Option<(DuplexStream, impl Future<Output = ()> + Send + use<>)> {
         let place = self.server.places.take(PEER.ip()).ok()?;
         let (client, stream) = duplex(PIPE_BYTES);

@@ -26,8 +26,7 @@ const ORIGINS_MAX: usize = 4096;
 
 impl LogLines {
     /// Whether another line about this address may be written. If lines were left out before it, a line
-    /// with
-    /// their number is written first.
+    /// with their number is written first.
     pub fn has_room(&self, address: IpAddr) -> bool {
         let origin = Origin::of(address);
         let Some(left_out) = self.spend(origin, Instant::now()) else { return false };

@@ -5,8 +5,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes of memory that the process can take without harm to other programs: what the machine has
-/// available,
-/// or what a container's limit leaves, if that is less; `None` where the system does not tell.
+/// available, or what a container's limit leaves, if that is less; `None` where the system does not tell.
 pub fn available_bytes() -> Option<u64> {
     let machine = read_to_string("/proc/meminfo").ok();
     let machine = machine.and_then(|told| bytes_of_line(&told, "MemAvailable:", 1024));

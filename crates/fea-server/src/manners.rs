@@ -1,8 +1,7 @@
 //! Slows down clients that send many bad requests, or many requests without waiting for the replies.
 //!
 //! All sessions share one thread for their sockets. A client that waits for its replies, and whose
-//! requests
-//! are valid, is never slowed down.
+//! requests are valid, is never slowed down.
 
 use std::time::Duration;
 
@@ -38,8 +37,7 @@ impl Manners {
     }
 
     /// Pause before the next request, if one is due. `is_ahead`: that request has come already;
-    /// `is_quiet`: few
-    /// sessions are open.
+    /// `is_quiet`: few sessions are open.
     pub fn rest(&mut self, is_ahead: bool, is_quiet: bool) -> Option<Duration> {
         self.ahead = if is_ahead { self.ahead.saturating_add(1) } else { 0 };
         if std::mem::take(&mut self.is_nonsense) && self.nonsense > NONSENSE_FREE {

@@ -18,8 +18,7 @@ const ACCEPT_EVERY: Duration = Duration::from_millis(1);
 
 impl Pace {
     /// Pace at which connections are accepted, so that many short connections cannot take all the time of
-    /// the
-    /// sockets' thread.
+    /// the sockets' thread.
     pub fn of_connections(now: Instant) -> Self {
         Self::new(now, ACCEPTS_AT_ONCE, ACCEPT_EVERY)
     }

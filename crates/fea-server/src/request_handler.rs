@@ -59,8 +59,7 @@ const CAPABILITIES: [&str; 7] =
 const ALIVE_MIN: Duration = Duration::from_millis(100);
 
 /// Predicted cost in ms above which a frame question at large deformation does not run on the pool of
-/// frames:
-/// others would wait for it.
+/// frames: others would wait for it.
 const FRAME_MS_MAX: f64 = 50.0;
 /// Predicted time to decode a request, ms for each byte.
 const READ_BYTE_MS: f64 = 1e-6;
@@ -107,8 +106,7 @@ impl RequestHandler {
     }
 
     /// Reply to one request; `None` for messages that have no reply. May be dropped at any await: the
-    /// work then
-    /// ends with its stage. `received` is the memory that the request was received in.
+    /// work then ends with its stage. `received` is the memory that the request was received in.
     ///
     /// # Errors
     /// [`Refusal`]; the session lives on.
@@ -275,8 +273,7 @@ impl RequestHandler {
     }
 
     /// Answers a frame question: at once on the sockets' thread if all that it needs is kept and few
-    /// sessions
-    /// are open; else on the pool of frames, unless something has to be made first.
+    /// sessions are open; else on the pool of frames, unless something has to be made first.
     async fn frame(
         &mut self,
         model: ModelHash,

@@ -41,8 +41,7 @@ impl Room {
     }
 
     /// Changes the reservation to `bytes`, for a request that will have `whole` bytes at its end. Waits
-    /// for some
-    /// seconds if others hold too much.
+    /// for some seconds if others hold too much.
     ///
     /// May be dropped at any await.
     ///

@@ -33,13 +33,11 @@ pub(crate) struct ServerHandle {
 pub(crate) struct Grasping(Arc<AtomicUsize>);
 
 /// Largest number of connections that have not introduced themselves. At the pace at which connections
-/// are
-/// accepted, each of them has at least a fifth of a second, and longer if another address has more of
+/// are accepted, each of them has at least a fifth of a second, and longer if another address has more of
 /// them.
 const STRANGERS_MAX: usize = 256;
 /// Number of sessions with frame questions above which all frame questions go to the solving threads,
-/// however
-/// small they are.
+/// however small they are.
 const GRASPING_MAX: usize = 4;
 /// Number of sessions above which one session must not keep the sockets' thread from the others.
 const QUIET_MAX: usize = 4;

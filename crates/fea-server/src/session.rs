@@ -31,8 +31,7 @@ pub(crate) fn span(server: &ServerHandle, peer: SocketAddr) -> tracing::Span {
 }
 
 /// Serves one connection until the client goes, sends damaged bytes, or the server stops; one that has
-/// not
-/// introduced itself also until its time or its room ends.
+/// not introduced itself also until its time or its room ends.
 pub(crate) async fn serve<S>(stream: S, peer: SocketAddr, server: ServerHandle, standing: Standing)
 where
     S: AsyncRead + AsyncWrite + Unpin,
@@ -266,8 +265,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     }
 
     /// Decodes and answers one request. A bad request is refused and the session goes on; work for a
-    /// client that
-    /// has gone ends.
+    /// client that has gone ends.
     async fn handle(&mut self, frame: Frame, received: Reservation) -> Result<(), SessionError> {
         let (header, kind) = (frame.header, frame.kind());
         let kept_model = Ask::kept_model(&frame);
@@ -321,8 +319,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
 }
 
 /// Works on a request while the client is watched: the client may cancel it, and work for a client that
-/// has
-/// gone ends.
+/// has gone ends.
 ///
 /// # Errors
 /// [`SessionError`]: the client has gone, or does not take its reply.

@@ -29,8 +29,7 @@ pub(crate) struct Greeting {
 
 impl Greeting {
     /// Ends when the time is over or another connection needs the room; returns why the connection is
-    /// closed.
-    /// May be dropped at any await.
+    /// closed. May be dropped at any await.
     pub async fn ends(&self) -> SessionError {
         tokio::select! {
             () = sleep_until(self.until) => SessionError::Stranger(self.limit),

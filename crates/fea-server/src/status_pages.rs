@@ -1,8 +1,7 @@
 //! The pages about the server's state, by HTTP: `/metrics`, `/health`, `/ready`.
 //!
 //! For monitors and load balancers: one short request for each connection, of which only the first line
-//! is
-//! used.
+//! is used.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,8 +51,7 @@ impl StatusPages {
     }
 
     /// Serves the pages until it is dropped. A connection that sends or takes nothing is closed when
-    /// others need
-    /// its room.
+    /// others need its room.
     pub async fn serve(self, listener: TcpListener) {
         let mut pace = Pace::of_connections(Instant::now());
         loop {

@@ -1,8 +1,7 @@
 //! Connections that have not introduced themselves: a largest number, and the oldest one is closed first.
 //!
 //! They have room of their own, so that silent connections take no session's place. Every new connection
-//! is
-//! accepted; without room for it, the oldest connection of the owner that has most of them is closed.
+//! is accepted; without room for it, the oldest connection of the owner that has most of them is closed.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;

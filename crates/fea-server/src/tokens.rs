@@ -98,8 +98,7 @@ pub enum TokensError {
 /// Number of letters below which a token is refused.
 const LETTERS_MIN: usize = 4;
 /// Number of letters below which a token is warned of, because it may be guessed. 24 random bytes as
-/// base64
-/// are 32 letters.
+/// base64 are 32 letters.
 const LETTERS_GOOD: usize = 16;
 /// Largest number of letters of a token's name.
 const NAME_MAX: usize = 32;

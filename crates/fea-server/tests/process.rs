@@ -218,8 +218,7 @@ fn server_at_work_that_takes_minutes_ends_within_three_seconds() {
 }
 
 /// METIS, once used here, replaced the handler of SIGTERM while it ordered: a server that was stopped
-/// then
-/// died of SIGSEGV.
+/// then died of SIGSEGV.
 #[test]
 fn a_stop_while_equations_are_ordered_does_not_crash() {
     // Start-up measures this machine on cubes, which are ordered: the signals fall at other

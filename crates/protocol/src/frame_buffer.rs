@@ -129,8 +129,7 @@ impl FrameBuffer {
     }
 
     /// Gives up the frame whose header is at the front: its memory is freed at once, and its bytes that
-    /// are
-    /// still to come are dropped. The frame after it is read as usual.
+    /// are still to come are dropped. The frame after it is read as usual.
     pub fn pass_over(&mut self) {
         let Some(front) = self.front.take() else { return };
         let frame_len = front.header.frame_len();

@@ -61,8 +61,7 @@ impl Header {
     ///
     /// # Errors
     /// [`FrameError`] for another magic or version, a wrong checksum, reserved flags or a payload over
-    /// the
-    /// limit, in this order: another version may lay out the rest differently.
+    /// the limit, in this order: another version may lay out the rest differently.
     pub(crate) fn decode(
         raw: &[u8; HEADER_LEN],
         limits: &Limits,

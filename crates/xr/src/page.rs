@@ -36,8 +36,7 @@ pub struct PageOptions {
     /// Address that the page is served at.
     pub address: SocketAddr,
     /// Acceptor of TLS connections; `None`: no encryption. Browsers give hand tracking only to encrypted
-    /// pages,
-    /// and to those of their own machine.
+    /// pages, and to those of their own machine.
     pub encryption: Option<TlsAcceptor>,
     /// Whether the run follows the hand of a headset.
     pub takes_hands: bool,

@@ -36,8 +36,7 @@ impl Textures {
     }
 
     /// Packed texture: gzip of width and height as 32-bit numbers, then red, green, blue and alpha of
-    /// each
-    /// texel.
+    /// each texel.
     pub fn get(&self, number: u32) -> Option<Arc<Vec<u8>>> {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         kept.packed.get(&number).cloned()

@@ -91,8 +91,7 @@ impl Contacts {
     }
 
     /// Whether reaction forces are wanted at nodes that the model fixes; they take a product with the
-    /// whole
-    /// stiffness matrix.
+    /// whole stiffness matrix.
     pub fn has_large_product(&self, question: &Question) -> bool {
         question.want.reactions && !self.base.fixed().is_empty()
     }
@@ -236,8 +235,7 @@ impl Contacts {
     }
 
     /// Starts the second solve in the background, which sharpens the error bounds of these contacts, if
-    /// there
-    /// is memory for it.
+    /// there is memory for it.
     fn sharpen(&self, resources: &Resources, set: &Arc<ContactSet>) {
         if self.base.eigenvalue_min().is_none() || !set.begin_refining() {
             return;
@@ -255,8 +253,7 @@ impl Contacts {
     }
 
     /// Computes rotation and strain of an answer in the background, one answer at a time, on a thread
-    /// that
-    /// rests for nine tenths of the time.
+    /// that rests for nine tenths of the time.
     fn watch_strain(&self, workers: &Workers, set: Arc<ContactSet>, solved: ContactAnswer) {
         let Some(claimed) = self.stored.strain_under_way.take() else { return };
         let (stored, base) = (Arc::clone(&self.stored), Arc::clone(&self.base));

@@ -176,8 +176,7 @@ impl PosedContact {
     }
 
     /// Fields that are wanted for a step. `made` then has the displacements of all nodes, which are
-    /// reduced to
-    /// those of the wanted nodes.
+    /// reduced to those of the wanted nodes.
     fn field_values(&self, made: &mut Made) -> Vec<FieldValues> {
         if self.fields.is_empty() {
             return Vec::new();

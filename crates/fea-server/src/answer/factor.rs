@@ -111,8 +111,7 @@ impl FactorRequest<'_> {
     }
 
     /// Bytes that a factor may take. Where single precision is admitted and memory suffices for a factor
-    /// in
-    /// double precision beside it, both are reserved, in case single precision does not suffice.
+    /// in double precision beside it, both are reserved, in case single precision does not suffice.
     fn limit_with_fallback(&self, analysed: &Analysed, admitted: &Need) -> u64 {
         if !admitted.method.is_single() {
             return u64::MAX;

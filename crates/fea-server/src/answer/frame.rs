@@ -118,8 +118,7 @@ pub(crate) fn answer_frame(
 }
 
 /// Answers several cases of one frame question: other values of the same known displacements. The report
-/// is
-/// that of the first case, with the largest residual and estimate of all.
+/// is that of the first case, with the largest residual and estimate of all.
 ///
 /// # Errors
 /// [`Refusal`] if the request cannot be answered.
@@ -180,8 +179,7 @@ impl PosedFrame {
     }
 
     /// Whether the contact set or factor of the plan is kept. If so the answer takes a product or a
-    /// solve;
-    /// otherwise it takes as long as making the missing one.
+    /// solve; otherwise it takes as long as making the missing one.
     pub fn is_prepared(&self) -> bool {
         match self.plan.method {
             Method::Condensed => {

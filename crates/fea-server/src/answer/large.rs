@@ -66,8 +66,7 @@ impl LargeQuestion {
     }
 
     /// Moves the path of a live grasp to the prescribed displacements, until the answer is accurate
-    /// enough or
-    /// the deadline has passed.
+    /// enough or the deadline has passed.
     ///
     /// # Errors
     /// [`NoEquilibrium`]; the path is then unchanged.

@@ -33,8 +33,8 @@ pub(crate) struct Answered {
 }
 
 /// Answers one frame question from the shape of the session's last one. The first questions of a live
-/// grip
-/// are answered by linear elasticity while the path is made in the background, if `may_make` allows it.
+/// grip are answered by linear elasticity while the path is made in the background, if `may_make` allows
+/// it.
 ///
 /// # Errors
 /// [`Refusal`]; the path then stays unchanged.
@@ -123,8 +123,7 @@ impl Frame {
     }
 
     /// Linear answer, and the largest error that rotation and strain of the whole body promise; `None`
-    /// where
-    /// linear elasticity cannot answer.
+    /// where linear elasticity cannot answer.
     fn linear(&self, clock: &StageClock) -> Result<Option<(Answer, f64)>, Refusal> {
         if self.ask.yield_stress.is_some() {
             return Ok(None);

@@ -71,8 +71,7 @@ pub(super) fn stored(
 }
 
 /// Whether there is memory for the second factor that a proof takes, beside a model that only this
-/// request
-/// holds.
+/// request holds.
 pub(super) fn may_prove(reservation: &Reservation, stored: &StoredModel) -> bool {
     let proof = stored.base().map_or(0, |base| base.proof_bytes());
     let fits = reservation.reserve(stored.lasting_bytes().saturating_add(proof), 0);

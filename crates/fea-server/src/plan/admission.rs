@@ -45,8 +45,7 @@ impl Subject {
 }
 
 /// Reserves memory for the first of some needs that fits. To make room, drops kept data that is unused
-/// for
-/// longest. A prediction is refused only if the least that it can be is too much.
+/// for longest. A prediction is refused only if the least that it can be is too much.
 ///
 /// # Errors
 /// [`Shortage`] if none fits.

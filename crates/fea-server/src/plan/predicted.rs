@@ -55,8 +55,7 @@ pub(crate) fn factor_ms(model: &Model, method: Method, rates: &Rates) -> f64 {
 }
 
 /// Predicted time of a frame question at large deformation: one that continues a path takes some solves
-/// with
-/// an older factor, the first one about a model makes the factor.
+/// with an older factor, the first one about a model makes the factor.
 ///
 /// Units: ms.
 pub(crate) fn large_frame_ms(model: &Model, goes_on: bool, rates: &Rates) -> f64 {

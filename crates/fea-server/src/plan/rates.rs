@@ -33,8 +33,7 @@ const RUNS: usize = 2;
 
 impl MeasuredRates {
     /// Measured rates; measured now on the current pool if they are not. While another thread measures,
-    /// those
-    /// of a typical machine.
+    /// those of a typical machine.
     pub fn get(&self) -> Rates {
         let before = self.state.with(|state| {
             let before = *state;
@@ -69,8 +68,7 @@ impl MeasuredRates {
 }
 
 /// Rates of this machine with `threads` threads, for predictions without a server; takes some hundredths
-/// of
-/// a second. `None` if they cannot be measured.
+/// of a second. `None` if they cannot be measured.
 pub fn measure_rates(threads: usize) -> Option<Rates> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;
     pool.install(measure)

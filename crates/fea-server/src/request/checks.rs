@@ -7,8 +7,7 @@ use softgrasp_protocol::{DofValue, NodeChoice, Question, Want};
 use crate::refusal::Refusal;
 
 /// Largest number of unknown forces of a question with masks; above it the small system is too large, and
-/// no
-/// other method answers.
+/// no other method answers.
 const MASK_FORCES_MAX: usize = 600;
 
 /// Known displacements as pairs of degree of freedom and value, m.

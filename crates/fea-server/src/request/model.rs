@@ -93,8 +93,8 @@ fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
 }
 
 /// Region of each element as a position in the list of materials, which is in ascending order of the
-/// labels;
-/// empty if one material is for the whole body. Labels are any numbers, so nothing is allocated by them.
+/// labels; empty if one material is for the whole body. Labels are any numbers, so nothing is allocated
+/// by them.
 fn ranks(labels: &[u32], materials: usize) -> Result<Vec<u32>, Refusal> {
     if materials == 1 {
         return Ok(Vec::new());

@@ -13,8 +13,7 @@ use crate::refusal::Refusal;
 ///
 /// # Errors
 /// [`Refusal::Method`] for an unknown name of a method, [`Refusal::Wish`] for a deadline or an error
-/// budget
-/// that is no positive finite number.
+/// budget that is no positive finite number.
 pub(crate) fn question_of(
     message: &QuestionMessage,
     element: Option<Element>,

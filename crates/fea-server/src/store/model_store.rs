@@ -140,8 +140,7 @@ impl ModelStore {
 
 impl Kept {
     /// Drops factors and contact sets of other models, their columns, the other models, and at last what
-    /// can be
-    /// made again for the model `keep`, until at most `bound` bytes are left.
+    /// can be made again for the model `keep`, until at most `bound` bytes are left.
     fn trim_to(&mut self, bound: u64, keep: Option<ModelHash>) {
         let mut order: Vec<(u64, ModelHash)> =
             self.models.iter().map(|(&hash, entry)| (entry.last_use, hash)).collect();

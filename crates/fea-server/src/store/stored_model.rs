@@ -117,8 +117,7 @@ impl StoredModel {
     }
 
     /// The model as a free body, made now if no contact frame has asked for it before. Two threads may
-    /// both make
-    /// it, with the same bits; neither waits for the other.
+    /// both make it, with the same bits; neither waits for the other.
     ///
     /// # Errors
     /// [`CondensedError`] if the body has fixed nodes, or parts that move on their own.

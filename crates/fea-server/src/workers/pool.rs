@@ -62,8 +62,7 @@ pub(super) fn caught<T>(place: &str, work: impl FnOnce() -> T) -> Result<T, Ende
 }
 
 /// Makes a thread sleep so that it works for a tenth of its time, in pieces far shorter than the time
-/// slices
-/// of the system's scheduler: urgent work never waits for it.
+/// slices of the system's scheduler: urgent work never waits for it.
 pub(crate) struct Rest {
     worked_since: Instant,
 }

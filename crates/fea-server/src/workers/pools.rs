@@ -1,6 +1,5 @@
 //! Pools of a server: one for frame questions, a lane for requests of each size, and one with lower
-//! priority
-//! for background work.
+//! priority for background work.
 
 use std::sync::{Arc, mpsc};
 
@@ -93,8 +92,7 @@ impl Workers {
     }
 
     /// Runs `work` in the background; no request waits for it. Drops it if too many tasks wait: hints and
-    /// proofs
-    /// are not needed for an answer.
+    /// proofs are not needed for an answer.
     pub fn in_background(&self, work: impl FnOnce() + Send + 'static) {
         let Ok(place) = Arc::clone(&self.background.places).try_acquire_owned() else {
             tracing::debug!("a background task is dropped");
@@ -107,8 +105,7 @@ impl Workers {
     }
 
     /// Makes a factor on a thread of its own, one after the other, while frame questions are answered
-    /// with the
-    /// older one: on the pool they would wait behind its pieces.
+    /// with the older one: on the pool they would wait behind its pieces.
     pub fn factor_beside(&self, work: impl FnOnce() + Send + 'static) {
         self.factors.spawn(move || {
             let _ = caught("on a factor beside the frames", work);
@@ -116,8 +113,7 @@ impl Workers {
     }
 
     /// Runs `work` on a thread of its own, one piece after the other. For work that sleeps most of the
-    /// time
-    /// ([`super::Rest`]) and must keep neither the pool nor a core from frame questions.
+    /// time ([`super::Rest`]) and must keep neither the pool nor a core from frame questions.
     pub fn beside(&self, work: impl FnOnce() + Send + 'static) {
         if self.beside.send(Box::new(work)).is_err() {
             tracing::error!("the thread beside the frames has ended");
@@ -173,8 +169,7 @@ impl Workers {
     }
 
     /// Runs `work` at once on the calling thread of the sockets: for work that takes less time than
-    /// handing it
-    /// over, and that must not wait behind a factor.
+    /// handing it over, and that must not wait behind a factor.
     ///
     /// # Errors
     /// [`EndedAbnormally`] if the work panicked.

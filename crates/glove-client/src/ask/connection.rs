@@ -132,8 +132,7 @@ const WELCOME_MAX: Duration = Duration::from_secs(10);
 /// questions.
 const ALIVE_EVERY: Duration = Duration::from_secs(1);
 /// Time after which a machine that has confirmed nothing, though it was asked or sent something, is taken
-/// to
-/// be gone. Shorter pauses of the link are waited for.
+/// to be gone. Shorter pauses of the link are waited for.
 const ALIVE_MAX: Duration = Duration::from_secs(5);
 /// First byte of a TLS server's response to bytes that are not TLS.
 const TLS_ALERT: u8 = 0x15;
@@ -186,8 +185,7 @@ impl Host {
     }
 
     /// Name of the stage that the embedded server works on; empty while it has no request, and for a
-    /// server at an
-    /// address.
+    /// server at an address.
     pub fn stage(&self) -> impl Fn() -> &'static str + Send + Sync + Clone + 'static {
         let stage = self.stage.clone();
         move || stage.now()
@@ -252,8 +250,7 @@ impl ServerConnection {
     }
 
     /// Whether the server has closed the connection, or has sent a message without a request, as it does
-    /// before
-    /// it closes; never waits. To be called while no reply is awaited.
+    /// before it closes; never waits. To be called while no reply is awaited.
     pub fn is_closed(&mut self) -> bool {
         !self.connection.stream_mut().is_quiet()
     }
@@ -278,8 +275,7 @@ impl ServerConnection {
     }
 
     /// [`Self::ask`] for requests that are answered within a tick: looks for the reply without sleeping
-    /// for a
-    /// moment, because waking a thread takes as long as a frame question.
+    /// for a moment, because waking a thread takes as long as a frame question.
     ///
     /// # Errors
     /// The same as those of [`Self::ask`].
@@ -393,8 +389,7 @@ fn open_socket(address: &str) -> Result<TcpStream, LinkError> {
 }
 
 /// Sets the socket's options: bytes are sent at once, and a machine that is gone is noticed while a reply
-/// is
-/// awaited, however long that may take.
+/// is awaited, however long that may take.
 fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
     let socket = socket2::SockRef::from(stream);

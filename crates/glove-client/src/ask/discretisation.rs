@@ -30,8 +30,7 @@ impl DiscretisationEstimate {
     /// Shapes: `displacements` one per node of the request's mesh. Units: m.
     ///
     /// If the server refuses the second request or goes, there is no estimate, and the reason is told;
-    /// the first
-    /// answer is not affected.
+    /// the first answer is not affected.
     pub fn of(
         connection: &mut ServerConnection,
         (body, question): (&Body, &Question),

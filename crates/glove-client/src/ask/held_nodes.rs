@@ -32,8 +32,7 @@ impl HeldNodes {
     /// Displacements that the fingertips prescribe.
     ///
     /// Units: `tip_radii` and displacements m. Frame: the object's, at rest: a fingertip covers a part of
-    /// the rest
-    /// surface, which stays the same while the object deforms.
+    /// the rest surface, which stays the same while the object deforms.
     pub fn prescribed_displacements(
         &mut self,
         model: ContactModel,
@@ -72,12 +71,10 @@ impl HeldNodes {
     }
 
     /// Force of each fingertip on the object, thumb first, from an answer to the last prescribed
-    /// displacements;
-    /// `None` if the answer has no forces.
+    /// displacements; `None` if the answer has no forces.
     ///
     /// Shapes: `reactions` at any degrees of freedom, of which only held ones count; `mask_forces` one
-    /// for each
-    /// finger, or empty. Units: N. Frame: the object's.
+    /// for each finger, or empty. Units: N. Frame: the object's.
     pub fn fingertip_forces(
         &self,
         reactions: &[DofValue],

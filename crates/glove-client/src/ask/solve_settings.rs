@@ -24,8 +24,7 @@ pub struct SolveSettings {
     /// Equations and law of the deformation.
     pub elasticity: Elasticity,
     /// Largest relative error that is acceptable; `None` leaves it to the method, or takes
-    /// [`ERROR_OF_FRAMES`]
-    /// at large deformation.
+    /// [`ERROR_OF_FRAMES`] at large deformation.
     pub max_error: Option<f64>,
 }
 
@@ -38,8 +37,7 @@ impl SolveSettings {
 }
 
 /// Estimated error of an answer at large deformation, relative to the largest displacement, unless
-/// another
-/// one is asked for: a hundredth of the error of linear elasticity.
+/// another one is asked for: a hundredth of the error of linear elasticity.
 pub const ERROR_OF_FRAMES: f64 = 2e-3;
 
 /// Element for the ticks by Poisson's ratio: the cheapest that does not lock.

@@ -15,8 +15,7 @@ pub struct NodeVectors<'a> {
 }
 
 /// VTU file of the mesh at rest with vectors of its nodes and, where given, the fields of an answer about
-/// all
-/// its nodes.
+/// all its nodes.
 ///
 /// Shapes: `labels` empty or one for each region.
 ///

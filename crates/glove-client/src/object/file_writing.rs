@@ -25,8 +25,7 @@ pub enum FileWriteError {
 }
 
 /// Writes a file completely, or leaves an older file as it was: the bytes are written to a file beside
-/// it,
-/// synchronised to the disk, and renamed. A name that is a link leads to the same file afterwards.
+/// it, synchronised to the disk, and renamed. A name that is a link leads to the same file afterwards.
 ///
 /// # Errors
 /// [`FileWriteError`] with the path and the error of the operating system.

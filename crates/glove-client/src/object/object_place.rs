@@ -7,7 +7,6 @@ pub enum ObjectPlace {
     #[default]
     Home,
     /// Once, between thumb and fingers of the first hand that is measured, so that a hand whose place
-    /// nobody
-    /// chose need not look for the object.
+    /// nobody chose need not look for the object.
     Hand,
 }

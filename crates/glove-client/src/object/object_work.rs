@@ -136,8 +136,7 @@ impl ObjectWork {
     }
 
     /// Takes the next outcome, in the order of the jobs, if `is_due` accepts it; otherwise it stays the
-    /// next. Never
-    /// waits. Outcomes of background work are always taken.
+    /// next. Never waits. Outcomes of background work are always taken.
     pub fn take_if(&mut self, is_due: impl FnOnce(&ObjectDone) -> bool) -> Option<ObjectDone> {
         match self {
             Self::AtOnce(done) if done.front().is_some_and(is_due) => done.pop_front(),

@@ -121,8 +121,7 @@ impl SceneFile {
 }
 
 /// Longest extent of a built-in object that the hand grips best, m, if that is not its own: around a
-/// small
-/// strawberry the thumb would close beside the fingers and not opposite to them.
+/// small strawberry the thumb would close beside the fingers and not opposite to them.
 pub fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
     match object {
         ObjectChoice::BuiltIn(BuiltIn::Strawberry) => Some(0.08),

@@ -47,8 +47,7 @@ impl Schedule {
     }
 
     /// The tick to play at a moment, counted from the start: the newest whose time has come. Earlier ones
-    /// that were
-    /// not played are skipped.
+    /// that were not played are skipped.
     pub fn due(&mut self, elapsed: Duration) -> Due {
         let now = (elapsed.as_nanos() / self.period.as_nanos()) as u64;
         // A thread that wakes a moment too early plays the tick it was woken for.
@@ -68,8 +67,7 @@ impl Schedule {
 const AWAKE: Duration = Duration::from_micros(150);
 
 /// Asks for real-time scheduling of the calling thread; returns whether it was granted. The thread must
-/// start
-/// no other thread afterwards, and sleep most of the time.
+/// start no other thread afterwards, and sleep most of the time.
 pub fn be_urgent() -> bool {
     let asked = softgrasp_os::be_urgent();
     if let Err(error) = &asked {

@@ -14,8 +14,7 @@ pub enum Priority {
 }
 
 /// Measures the pieces of work of the calling thread, and takes its real-time priority away if they are
-/// too
-/// long for the other threads.
+/// too long for the other threads.
 ///
 /// Invariant: never `urgent` again once [`LONG_IN_A_ROW_MAX`] pieces in a row were over [`LIMIT`].
 #[derive(Debug)]

@@ -4,8 +4,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use softgrasp_protocol::{Field, FieldValues};
 
 /// Stress and contact force rotated into the axes of the world; strain stays in the axes of the object at
-/// rest,
-/// as its mesh does.
+/// rest, as its mesh does.
 pub fn in_world(mut fields: FieldValues, world_from_object: &UnitQuaternion<f64>) -> FieldValues {
     let turn = world_from_object.to_rotation_matrix();
     for (field, values) in &mut fields.arrays {

@@ -1,6 +1,5 @@
 //! Changes of the object besides the grasp: its next rest shape, another object, a file to be written.
-//! They
-//! are made in the background.
+//! They are made in the background.
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -147,8 +147,7 @@ impl Answer {
     }
 
     /// Writes the arrays: nodes if listed, displacements, reactions, forces of masks, the cases one by
-    /// one,
-    /// the fields case by case.
+    /// one, the fields case by case.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         if let NodeChoice::Nodes(nodes) = &self.nodes {
             writer.array(nodes);

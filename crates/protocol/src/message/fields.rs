@@ -192,8 +192,7 @@ pub struct FieldValues {
     /// asked for.
     pub error_rel: f64,
     /// Fields in the order of their bits, each with its values: the components of one element or node
-    /// stand
-    /// side by side.
+    /// stand side by side.
     pub arrays: Vec<(Field, Vec<f64>)>,
 }
 

@@ -40,8 +40,7 @@ pub enum ReportLevel {
 }
 
 /// Severity of the loss of digits by rounding, by the estimate of the error; a number, since a later
-/// version
-/// may have more levels.
+/// version may have more levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub struct WarningLevel(u32);
 
@@ -84,8 +83,7 @@ pub struct SolveReport {
     /// Number of steps of iterative refinement, or of conjugate gradients.
     pub refinement_steps: u32,
     /// Largest rotation of an element; linear elasticity is wrong where this is large. NaN where it was
-    /// not
-    /// computed for this answer.
+    /// not computed for this answer.
     pub max_rotation_deg: f64,
     /// Largest principal strain of an element in magnitude; NaN where `max_rotation_deg` is.
     pub max_strain: f64,

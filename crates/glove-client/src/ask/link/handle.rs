@@ -23,8 +23,7 @@ pub struct Link {
 
 impl Link {
     /// Starts the link to a server. Its thread has `priority` while it awaits the answer of a tick; it
-    /// connects
-    /// and sends the model with ordinary priority.
+    /// connects and sends the model with ordinary priority.
     ///
     /// # Errors
     /// Error of the operating system if it starts no thread.
@@ -49,18 +48,15 @@ impl Link {
     }
 
     /// Asks for the displacements of a tick; replaces a request that has not been sent yet. `grip` is the
-    /// tick in
-    /// which the grip began; at large deformation its first answer begins at the shape at rest, the
-    /// others where
-    /// the answer before ended.
+    /// tick in which the grip began; at large deformation its first answer begins at the shape at rest,
+    /// the others where the answer before ended.
     pub fn ask(&self, tick: u64, grip: u64, question: Question, large: Option<LargeAsk>) {
         let asked = TickQuestion::Held { question: Box::new(question), large };
         self.replace(TickRequest { tick, grip, asked });
     }
 
     /// Asks for a step of the free object; replaces a request that has not been sent yet. The link fills
-    /// in the
-    /// model. After a refusal the server is asked again only when `grip` changes.
+    /// in the model. After a refusal the server is asked again only when `grip` changes.
     pub fn ask_step(&self, tick: u64, grip: u64, frame: ContactFrame) {
         self.replace(TickRequest { tick, grip, asked: TickQuestion::Step(Box::new(frame)) });
     }
@@ -87,8 +83,7 @@ impl Link {
     }
 
     /// Waits until no request waits or is in flight, the server cannot be found, or the time is up;
-    /// returns
-    /// whether all requests were answered.
+    /// returns whether all requests were answered.
     pub fn wait_idle(&self, at_most: Duration) -> bool {
         let state = self.shared.lock();
         let losses = state.losses;

@@ -24,8 +24,7 @@ const PAUSE_MAX: Duration = Duration::from_millis(200);
 /// Longest pause if a server refuses the connection for now.
 const UNWANTED_PAUSE_MAX: Duration = Duration::from_secs(2);
 /// Longest silence of a server whose machine answers: while it prepares a model or the first answer of a
-/// grip,
-/// and within a grip. After it the server is taken to be lost.
+/// grip, and within a grip. After it the server is taken to be lost.
 const PREPARING_MAX: Duration = Duration::from_secs(1800);
 const SILENCE_MAX: Duration = Duration::from_secs(20);
 /// Largest number of characters of the line that tells of a refusal.
