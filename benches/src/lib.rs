@@ -55,14 +55,15 @@ pub enum ReportName {
     Collision,
     /// Large deformation: error against time of frames, and random walks of the hand.
     Large,
-    /// What users of one server get: in real time, beside others' long work, among many and hostile clients.
+    /// Service to the users of one server: in real time, beside other users' long work, among many and
+    /// hostile clients.
     Service,
 }
 
 /// Measures one report.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that fails its check is one.
+/// [`ReportError`], also for an answer that fails its check.
 pub fn measure(name: ReportName, options: &Options) -> Result<Report, ReportError> {
     match name {
         ReportName::Latency => latency::measure(options),

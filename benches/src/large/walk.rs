@@ -21,7 +21,7 @@ pub struct Walk {
     squeeze: Squeeze,
     path: Path,
     random: Random,
-    /// Present depth of each fingertip, relative to the size, and the depth it moves to.
+    /// Depth of each fingertip, relative to the size; then rotation of the hand, rad, and slide of each tip.
     depths: [f64; 5],
     turn: f64,
     slid: [Vector3<f64>; 5],
