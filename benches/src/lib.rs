@@ -55,8 +55,7 @@ pub enum ReportName {
     Collision,
     /// Large deformation: error against time of frames, and random walks of the hand.
     Large,
-    /// Service to the users of one server: in real time, beside other users' long work, among many and
-    /// hostile clients.
+    /// What users of one server get: in real time, beside others' long work, among many and hostile clients.
     Service,
 }
 
