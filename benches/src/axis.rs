@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-/// How an axis counts.
+/// Scale of an axis: linear or logarithmic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Equal distances are equal differences.
     Linear,
-    /// By factors of ten; values that are not positive are left out.
+    /// Equal distances are equal factors; values that are not positive are left out.
     Log,
 }
 
@@ -23,7 +23,7 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// Around some values, with room at both ends; `None` if there are none.
+    /// Axis around some values, with room at both ends; `None` if there are none.
     pub fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Option<Self> {
         let (low, high) = values
             .map(|v| scale.place(v))
@@ -32,7 +32,7 @@ impl Axis {
         (low <= high).then(|| Self::new(scale, low - room, high + room))
     }
 
-    /// Between two places.
+    /// Axis between two positions.
     fn new(scale: Scale, low: f64, high: f64) -> Self {
         Self { scale, low, high, ticks: scale.ticks((low, high)) }
     }
@@ -63,12 +63,12 @@ impl ValueFormatter<f64> for Axis {
 }
 
 impl Scale {
-    /// Whether a value has a place.
+    /// Whether a value has a position on the scale.
     pub fn holds(self, value: f64) -> bool {
         value.is_finite() && (self == Self::Linear || value > 0.0)
     }
 
-    /// Place along the axis: equal distances are equal differences of places.
+    /// Position along the axis: equal distances are equal differences of positions.
     fn place(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
@@ -76,7 +76,7 @@ impl Scale {
         }
     }
 
-    /// Value at a place.
+    /// Value at a position.
     fn value(self, place: f64) -> f64 {
         match self {
             Self::Linear => place,
@@ -84,7 +84,7 @@ impl Scale {
         }
     }
 
-    /// Places of the labelled lines: 1, 2, 5 times a power of ten.
+    /// Positions of the labelled lines: 1, 2, 5 times a power of ten.
     fn ticks(self, (low, high): (f64, f64)) -> Vec<f64> {
         match self {
             Self::Log => {

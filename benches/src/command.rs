@@ -28,13 +28,13 @@ struct Arguments<Name: ValueEnum + Clone + Send + Sync + 'static> {
     meshes: PathBuf,
 }
 
-/// Beside the repository.
+/// Folder of mesh files, beside the repository.
 const MESHES: &str = "../shared/meshes";
 
 /// Reads the command line of `program`, makes the report that it names by `measure`, writes its files and shows it.
 ///
 /// # Errors
-/// Of the measurement, and of the files.
+/// Errors of the measurement and of writing the files.
 pub fn main<Name: ValueEnum + Clone + Send + Sync + 'static>(
     program: &str,
     measure: impl FnOnce(Name, &Options) -> Result<Report, ReportError>,

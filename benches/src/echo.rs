@@ -11,30 +11,30 @@ use glove_client::pace::be_urgent;
 pub enum Waiting {
     /// The system wakes the thread when bytes have come.
     Asleep,
-    /// The thread looks again and again, and lets others run between two looks.
+    /// The thread looks repeatedly, and yields between two looks.
     Awake,
 }
 
 /// How both ends of a connection wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ends {
-    /// The end that asks.
+    /// The client's end.
     pub client: Waiting,
-    /// The end that answers.
+    /// The server's end.
     pub server: Waiting,
 }
 
 impl Ends {
     /// Both ends sleep.
     pub const ASLEEP: Self = Self { client: Waiting::Asleep, server: Waiting::Asleep };
-    /// As a client that stays awake and a `fea-server`, which always sleeps.
+    /// The client stays awake; the server sleeps, as `fea-server` always does.
     pub const CLIENT_AWAKE: Self = Self { client: Waiting::Awake, server: Waiting::Asleep };
-    /// Neither end sleeps: the shortest way there is, and it keeps two processors busy.
+    /// Neither end sleeps: the shortest round trip, which keeps two processors busy.
     pub const AWAKE: Self = Self { client: Waiting::Awake, server: Waiting::Awake };
 }
 
-/// A thread that answers every request on a loopback socket with the same bytes, and the client's
-/// side of it.
+/// Thread that answers every request on a loopback socket with the same bytes, and the client's side of
+/// it.
 pub struct Echo {
     stream: TcpStream,
     request: Vec<u8>,
@@ -44,11 +44,11 @@ pub struct Echo {
 }
 
 impl Echo {
-    /// Starts the thread and connects; both sides send at once (TCP_NODELAY), as the system does.
-    /// A thread that sleeps asks for real-time scheduling, as that of the server's sockets does.
+    /// Starts the thread and connects; both sides send at once (TCP_NODELAY), as client and server do. A
+    /// thread that sleeps asks for real-time scheduling, as that of the server's sockets does.
     ///
     /// # Errors
-    /// The system's.
+    /// Error of the operating system.
     pub fn start(request_bytes: usize, reply: &[u8], ends: Ends) -> std::io::Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", 0))?;
         let address = listener.local_addr()?;
@@ -71,10 +71,10 @@ impl Echo {
         })
     }
 
-    /// One round trip.
+    /// Makes one round trip.
     ///
     /// # Errors
-    /// The system's, or `InvalidData` if other bytes came back.
+    /// Error of the operating system, or `InvalidData` if other bytes came back.
     pub fn trip(&mut self) -> std::io::Result<()> {
         write_all(&mut self.stream, &self.request)?;
         read_exact(&mut self.stream, &mut self.received)?;
@@ -85,7 +85,7 @@ impl Echo {
     }
 }
 
-/// A stream that does not block is looked at again and again: its end stays awake.
+/// Sets a stream up: an end that stays awake does not block.
 fn prepare(stream: &TcpStream, waiting: Waiting) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_nonblocking(waiting == Waiting::Awake)
@@ -125,7 +125,7 @@ fn write_all(stream: &mut TcpStream, mut bytes: &[u8]) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Tries again while the system has nothing; a stream that blocks never says so.
+/// Repeats an attempt while the system has no bytes; a stream that blocks never reports this.
 fn awake(mut attempt: impl FnMut() -> std::io::Result<usize>) -> std::io::Result<usize> {
     loop {
         match attempt() {

@@ -9,15 +9,15 @@ use crate::report::ReportError;
 /// Source: thesis (6.1), Appendix B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLaw {
-    /// k, the time at N = 1.
+    /// Factor k: the time at N = 1.
     pub k: f64,
-    /// m.
+    /// Exponent m.
     pub m: f64,
-    /// Standard error of m.
+    /// Standard error of the exponent.
     pub m_error: f64,
     /// Standard deviation of ln T about the line: 0.1 is about 10 % of T.
     pub residual: f64,
-    /// Measurements.
+    /// Number of measurements.
     pub count: usize,
     log_k: f64,
     mean_x: f64,
@@ -27,16 +27,16 @@ pub struct PowerLaw {
 /// A predicted time with the range in which 95 % of further measurements fall if the law holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
-    /// Most likely value.
+    /// Most likely value of the time.
     pub value: f64,
-    /// Lower end.
+    /// Lower end of the range.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the range.
     pub high: f64,
 }
 
 impl PowerLaw {
-    /// Fits measurements (N, T); pairs that are not positive are left out.
+    /// Fits the law to measurements (N, T); pairs that are not positive are left out.
     ///
     /// # Errors
     /// [`ReportError::TooFew`] below three measurements or with one N only.
@@ -61,7 +61,7 @@ impl PowerLaw {
         Ok(Self { k: log_k.exp(), m, m_error, residual, count, log_k, mean_x, sum_squares_x })
     }
 
-    /// Time the law gives, and how far a further measurement may be from it.
+    /// Time that the law predicts, and the range of a further measurement.
     pub fn predict(&self, n: f64) -> Prediction {
         let x = n.ln();
         let centre = self.log_k + self.m * x;
@@ -75,10 +75,10 @@ impl PowerLaw {
     }
 }
 
-/// Value that a t-distributed number stays within, on both sides, 95 times of a hundred.
+/// Value that a t-distributed number exceeds in magnitude 5 times of a hundred.
 ///
 /// Source: printed tables below eleven degrees of freedom, then the expansion of Cornish and Fisher
-/// (below 3e-3 off).
+/// (error below 3e-3).
 fn t_quantile_95(freedom: usize) -> f64 {
     const FEW: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
     match freedom.checked_sub(1) {

@@ -62,7 +62,7 @@ pub enum ReportName {
 /// Measures one report.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that fails its check is one.
+/// [`ReportError`], also for an answer that fails its check.
 pub fn measure(name: ReportName, options: &Options) -> Result<Report, ReportError> {
     match name {
         ReportName::Latency => latency::measure(options),

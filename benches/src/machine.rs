@@ -1,18 +1,18 @@
-//! What a report was measured on: machine, compiler, commit, day.
+//! Machine, compiler, commit and day of a report.
 
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::threads::processors;
 
-/// Everything a reader needs to judge the figures of a report.
+/// Data that a reader needs to judge the figures of a report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
     /// Model name of the processor.
     pub cpu: String,
-    /// Who made it.
+    /// Maker of the processor.
     pub cpu_maker: String,
-    /// Processors this process may use.
+    /// Number of processors that this process may use.
     pub processors: usize,
     /// Main memory, GiB; 0 where the system does not tell.
     pub memory_gib: f64,
@@ -22,14 +22,14 @@ pub struct Machine {
     pub compiler: String,
     /// Commit of the working tree; `+ changes` if it differs from it outside `reports/`.
     pub commit: String,
-    /// Day the measurement began, UTC.
+    /// Day when the measurement began, UTC.
     pub date: String,
     /// Load when the measurement began, see [`load_text`].
     pub load_before: String,
 }
 
 impl Machine {
-    /// Looks at this machine. What cannot be found out is "unknown"; it never fails.
+    /// Data of this machine; what cannot be determined is "unknown".
     pub fn look() -> Self {
         let cpu_info = read("/proc/cpuinfo");
         let memory_kib = field(&read("/proc/meminfo"), "MemTotal")
@@ -49,7 +49,7 @@ impl Machine {
         }
     }
 
-    /// The same as pairs of name and value, in the order of the head of a report.
+    /// The data as pairs of name and value, in the order of a report's head.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let memory = format!("{:.0} GiB", self.memory_gib);
         vec![
@@ -68,8 +68,8 @@ impl Machine {
 
 const BUILD: &str = if cfg!(debug_assertions) { "not optimised for measuring" } else { "release" };
 
-/// Processes that were running or waiting in the last minute, on average. Before a measurement, what
-/// is above 0 are others at work; after it, the measurement's own threads are among them.
+/// Average number of processes that were running or waiting in the last minute. Before a measurement they
+/// are other work; after it, the measurement's own threads are among them.
 pub fn load_text() -> String {
     match read("/proc/loadavg").split_once(' ') {
         Some((load, _)) => load.to_owned(),
@@ -87,7 +87,7 @@ fn field(text: &str, name: &str) -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Plain name of a maker that the processor names in its own way.
+/// Plain name of a processor's maker.
 fn maker(vendor: Option<&str>) -> String {
     match vendor {
         Some("AuthenticAMD") => "AMD".to_owned(),

@@ -1,4 +1,4 @@
-//! Figures of a report: lines, measured points with their spread, and fits, as SVG.
+//! Figures of a report as SVG: lines, measured points with their spread, and fits.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -6,25 +6,25 @@ use plotters::prelude::*;
 use crate::axis::Axis;
 pub use crate::axis::Scale;
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// Measured points joined by a line.
     Line,
-    /// Points alone.
+    /// Points that are not joined.
     Points,
-    /// A fitted law or an extrapolation.
+    /// Dashed line of a fitted law or an extrapolation.
     Dashed,
 }
 
-/// A point and the range it was seen in.
+/// Point with the range of its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotPoint {
-    /// Place on the horizontal axis.
+    /// Value on the horizontal axis.
     pub x: f64,
-    /// Value.
+    /// Value on the vertical axis.
     pub y: f64,
-    /// Lower and upper end of its spread, if it has one.
+    /// Lower and upper end of the value's range, if it has one.
     pub spread: Option<(f64, f64)>,
 }
 
@@ -33,44 +33,44 @@ pub struct PlotPoint {
 pub struct Series {
     /// Name in the legend.
     pub label: String,
-    /// How it is drawn.
+    /// Style in which the series is drawn.
     pub mark: Mark,
-    /// Its points, in the order they are joined.
+    /// Points of the series, in the order in which they are joined.
     pub points: Vec<PlotPoint>,
 }
 
-/// A figure.
+/// Data of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// Title.
+    /// Title of the figure.
     pub title: String,
     /// Name and unit of the horizontal axis.
     pub x_label: String,
     /// Name and unit of the vertical axis.
     pub y_label: String,
-    /// How the horizontal axis counts.
+    /// Scale of the horizontal axis.
     pub x_scale: Scale,
-    /// How the vertical axis counts.
+    /// Scale of the vertical axis.
     pub y_scale: Scale,
-    /// What is drawn.
+    /// Series that are drawn.
     pub series: Vec<Series>,
 }
 
-/// A figure that cannot be drawn.
+/// Why a figure cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlotError {
-    /// Nothing to draw.
+    /// The figure has no point.
     #[error("figure {title:?} has no point that can be drawn")]
     Empty {
-        /// Its title.
+        /// Title of the figure.
         title: String,
     },
     /// The drawing library failed.
     #[error("figure {title:?} cannot be drawn: {text}")]
     Drawing {
-        /// Its title.
+        /// Title of the figure.
         title: String,
-        /// What the library says.
+        /// Error of the drawing library.
         text: String,
     },
 }
@@ -78,7 +78,7 @@ pub enum PlotError {
 const SIZE: (u32, u32) = (1040, 540);
 const LEGEND_WIDTH: u32 = 250;
 pub(crate) const FONT: &str = "sans-serif";
-/// Told apart with any kind of colour vision (Okabe and Ito).
+/// Colours of the series; people with any kind of colour vision can tell them apart (Okabe and Ito).
 pub(crate) const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -93,7 +93,7 @@ type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 pub(crate) type Drawn =
     Result<(), DrawingAreaErrorKind<<SVGBackend<'static> as DrawingBackend>::ErrorType>>;
 
-/// Dots are full; those of series whose colour has been used before are rings.
+/// Style of a dot: filled, or a ring if the series' colour has been used before.
 fn dot_style(index: usize) -> ShapeStyle {
     let colour = COLOURS[index % COLOURS.len()];
     match index < COLOURS.len() {
@@ -103,10 +103,10 @@ fn dot_style(index: usize) -> ShapeStyle {
 }
 
 impl Plot {
-    /// The figure as the text of an SVG file; equal data give equal text.
+    /// Figure as the text of an SVG file; equal data give equal text.
     ///
     /// # Errors
-    /// [`PlotError`].
+    /// [`PlotError`] if there is no point, or drawing fails.
     pub fn svg(&self) -> Result<String, PlotError> {
         let title = || self.title.clone();
         let x_axis = Axis::around(self.x_scale, self.shown().map(|(_, p)| p.x));
@@ -179,7 +179,7 @@ impl Plot {
         Ok(())
     }
 
-    /// Names of the series beside the plot, where they hide nothing.
+    /// Draws the names of the series beside the plot, where they cover nothing.
     fn draw_legend(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Drawn {
         let left = SIZE.0.saturating_sub(LEGEND_WIDTH) as i32;
         for (index, series) in self.series.iter().enumerate() {
@@ -202,7 +202,7 @@ impl Plot {
         Ok(())
     }
 
-    /// Points with a place on both axes, and the series they belong to.
+    /// Points that have a position on both axes, each with its series.
     fn shown(&self) -> impl Iterator<Item = (&Series, PlotPoint)> {
         let on_axes = |p: &PlotPoint| {
             let (low, high) = p.spread.unwrap_or((p.y, p.y));

@@ -8,22 +8,22 @@ use std::time::{Duration, Instant};
 
 use crate::report_error::ReportError;
 
-/// Where the programs are.
+/// Paths of the two programs.
 pub(crate) struct Programs {
     client: PathBuf,
     server: PathBuf,
 }
 
-/// A program that has not ended by then hangs.
+/// Time after which a program that has not ended is taken to hang.
 const RUN_MAX: Duration = Duration::from_secs(300);
-/// How often a running program is looked at; it is another process that must not be disturbed.
+/// Time between two looks at a running program, which must not be disturbed.
 const LOOK: Duration = Duration::from_millis(50);
 
 impl Programs {
-    /// Beside this program, or beside the folder of a test.
+    /// Finds the programs beside this one, or beside the folder of a test.
     ///
     /// # Errors
-    /// [`ReportError::NoProgram`] says how to build them.
+    /// [`ReportError::NoProgram`], which says how to build them.
     pub fn find() -> Result<Self, ReportError> {
         let this = std::env::current_exe()
             .map_err(|source| ReportError::Process { what: "this program".to_owned(), source })?;
@@ -39,11 +39,11 @@ impl Programs {
         Ok(Self { client: program("glove-client")?, server: program("fea-server")? })
     }
 
-    /// Starts a server on a free port of this machine; it asks for real-time scheduling, as an
-    /// embedded one does.
+    /// Starts a server on a free port of this machine; it asks for real-time scheduling, as an embedded
+    /// one does.
     ///
     /// # Errors
-    /// [`ReportError::Process`].
+    /// [`ReportError::Process`] if it cannot be started.
     pub fn serve(&self, threads: usize) -> Result<Server, ReportError> {
         let threads = threads.to_string();
         self.serve_as(&["--listen", "127.0.0.1:0", "--real-time", "--threads", &threads])
@@ -52,7 +52,7 @@ impl Programs {
     /// Starts a server with these arguments and waits until it listens.
     ///
     /// # Errors
-    /// [`ReportError::Process`], and [`ReportError::Ended`] where it does not listen.
+    /// [`ReportError::Process`], and [`ReportError::Ended`] if it does not listen.
     pub fn serve_as(&self, arguments: &[&str]) -> Result<Server, ReportError> {
         let mut command = Command::new(&self.server);
         command.args(arguments);
@@ -69,10 +69,10 @@ impl Programs {
         }
     }
 
-    /// Starts `glove-client` with these arguments; what it says is kept in a file of the folder.
+    /// Starts `glove-client` with these arguments; its output goes to a file of the folder.
     ///
     /// # Errors
-    /// [`ReportError::Process`].
+    /// [`ReportError::Process`] if it cannot be started.
     pub fn ask(
         &self,
         arguments: &[&OsStr],
@@ -90,7 +90,7 @@ impl Programs {
     }
 }
 
-/// A process that ends with its owner.
+/// Process that is killed when this is dropped.
 struct Process(Child);
 
 impl Drop for Process {
@@ -101,17 +101,17 @@ impl Drop for Process {
     }
 }
 
-/// A server that runs.
+/// Running server.
 pub(crate) struct Server {
     pub address: String,
     process: Process,
 }
 
-/// Ticks of a processor's time in `/proc`, 1/s.
+/// Unit of processor times in `/proc`, 1/s.
 const CLOCK_TICKS: f64 = 100.0;
 
 impl Server {
-    /// Processor time so far, s; `None` where the system does not tell.
+    /// Processor time that the server has used, s; `None` where the system does not tell.
     pub fn busy_s(&self) -> Option<f64> {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.process.0.id())).ok()?;
         // The name in brackets may hold spaces.
@@ -120,7 +120,7 @@ impl Server {
         Some((ticks(11)? + ticks(12)?) / CLOCK_TICKS)
     }
 
-    /// Resident memory, bytes; `None` where the system does not tell.
+    /// Resident memory of the server, bytes; `None` where the system does not tell.
     pub fn resident_bytes(&self) -> Option<f64> {
         let status =
             std::fs::read_to_string(format!("/proc/{}/status", self.process.0.id())).ok()?;
@@ -129,7 +129,7 @@ impl Server {
     }
 }
 
-/// A client that runs.
+/// Running client.
 pub(crate) struct Client {
     what: String,
     said: PathBuf,
@@ -138,10 +138,10 @@ pub(crate) struct Client {
 }
 
 impl Client {
-    /// Waits until it has ended; how long it ran, or what it said when it failed.
+    /// Waits until the client has ended; returns how long it ran, or its output if it failed.
     ///
     /// # Errors
-    /// [`ReportError::Process`], and [`ReportError::Ended`] when it hangs.
+    /// [`ReportError::Process`], and [`ReportError::Ended`] if it hangs.
     pub fn wait(mut self) -> Result<Result<Duration, String>, ReportError> {
         loop {
             let ended = self.process.0.try_wait();
@@ -160,10 +160,10 @@ impl Client {
         }
     }
 
-    /// The same for a client that must not fail.
+    /// Waits for a client that must not fail; returns how long it ran.
     ///
     /// # Errors
-    /// As [`Self::wait`], and [`ReportError::Ended`] with what it said.
+    /// The same as those of [`Self::wait`], and [`ReportError::Ended`] with its output.
     pub fn succeed(self) -> Result<Duration, ReportError> {
         let what = self.what.clone();
         self.wait()?.map_err(|said| ReportError::Ended { what, said })

@@ -1,19 +1,19 @@
-//! Small forms of reports, as tests run them: made in a folder of their own, and their files read again.
+//! Small forms of reports for tests: made in a folder of their own, and their files read again.
 
 use std::path::Path;
 
 use crate::report::{Options, Report, ReportError};
 
-/// A small form of a report, in a folder that goes with it.
+/// Small form of a report, in a folder that is removed with it.
 pub struct Quick {
     folder: tempfile::TempDir,
 }
 
 impl Quick {
-    /// Makes a report in its small form; its page has its whole head.
+    /// Makes a report in its small form, and checks that its page has the whole head.
     ///
     /// # Panics
-    /// On any error, naming it, and where a file or a line of the head is not there.
+    /// On any error, and if a file or a line of the head is missing.
     pub fn make(measure: impl FnOnce(&Options) -> Result<Report, ReportError>) -> Self {
         let folder = tempfile::tempdir().expect("a folder for the report");
         let options = Options {
@@ -34,7 +34,7 @@ impl Quick {
         Self { folder }
     }
 
-    /// Where its files are.
+    /// Folder of the report's files.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -47,7 +47,7 @@ impl Quick {
     /// Values of one column of a CSV file, as text.
     ///
     /// # Panics
-    /// Where the file or the column is not there, or the file does not say how it was made.
+    /// If the file or the column is missing, or the file does not say how it was made.
     pub fn column(&self, file: &str, name: &str) -> Vec<String> {
         let text = std::fs::read_to_string(self.folder().join(file))
             .unwrap_or_else(|error| panic!("{file}: {error}"));
@@ -62,7 +62,7 @@ impl Quick {
     /// Values of one column of a CSV file, all of which are numbers.
     ///
     /// # Panics
-    /// As [`Self::column`], and where a value is no number.
+    /// The same as those of [`Self::column`], and if a value is no number.
     pub fn numbers(&self, file: &str, name: &str) -> Vec<f64> {
         let number = |v: &String| v.parse().unwrap_or_else(|_| panic!("{file}: {name}: {v}"));
         self.column(file, name).iter().map(number).collect()

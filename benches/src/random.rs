@@ -1,10 +1,10 @@
 //! Random numbers of reports, the same in every run.
 
-/// A sequence of numbers that is the same in every run (splitmix64).
+/// Sequence of random numbers that is the same in every run (splitmix64).
 pub struct Random(pub u64);
 
 impl Random {
-    /// Evenly between zero and one.
+    /// Uniform random number between zero and one.
     pub fn share(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -13,7 +13,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Evenly among `0..count`.
+    /// Uniform random number of `0..count`.
     pub fn below(&mut self, count: usize) -> usize {
         (self.share() * count as f64) as usize
     }

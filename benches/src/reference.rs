@@ -1,4 +1,4 @@
-//! The right answer to compare with: refined with residuals in twice the working precision.
+//! Exact answer to compare with: refined with residuals in twice the working precision.
 
 use softgrasp_core::fem::Stiffness;
 use softgrasp_core::model::{Known, Model};
@@ -11,21 +11,21 @@ use crate::report::ReportError;
 /// Shapes: `displacement` 3N. Units: m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
-    /// Displacement of every degree of freedom.
+    /// Displacement of every degree of freedom, m.
     pub displacement: Vec<f64>,
-    /// Largest correction of the last step over the largest displacement: how settled it is.
+    /// Largest correction of the last step, relative to the largest displacement.
     pub last_correction_rel: f64,
 }
 
-/// Refinement ends when a step changes less than this, of the largest displacement.
+/// Change in a step, relative to the largest displacement, below which refinement ends.
 const SETTLED: f64 = 1e-18;
 const STEPS_MAX: usize = 12;
 
 impl Reference {
-    /// Solves by sparse Cholesky and refines: displacement and residual are sums of two doubles,
-    /// so the error falls by the factor's accuracy with every step, down to rounding.
+    /// Solves by sparse Cholesky and refines. Displacement and residual are sums of two doubles, so each
+    /// step reduces the error by the factor's accuracy, down to rounding.
     ///
-    /// The stiffness itself is taken as it was assembled.
+    /// The stiffness itself is used as it was assembled.
     ///
     /// # Errors
     /// [`ReportError::Model`], [`ReportError::Solve`].
@@ -37,7 +37,7 @@ impl Reference {
         Self::refined(model.stiffness(), &factored, loads)
     }
 
-    /// The same by a factor that is there already, for further loads of one partition.
+    /// Refines the answer of a factor that exists, for further load cases of one partition.
     ///
     /// # Errors
     /// [`ReportError::Solve`].
@@ -66,8 +66,8 @@ impl Reference {
         Ok(Self { displacement: high, last_correction_rel })
     }
 
-    /// Largest difference to an answer, relative to the largest displacement; infinite for NaN or
-    /// another number of degrees of freedom.
+    /// Largest difference to an answer, relative to the largest displacement; infinite for NaN or another
+    /// number of degrees of freedom.
     ///
     /// `scale` multiplies the reference (the problem is linear).
     pub fn error_of(&self, answer: impl ExactSizeIterator<Item = f64>, scale: f64) -> f64 {
@@ -78,7 +78,8 @@ impl Reference {
     }
 }
 
-/// Largest difference of pairs (answer, right) over the largest right value; infinite for NaN.
+/// Largest difference of pairs (answer, exact value), relative to the largest exact value; infinite for
+/// NaN.
 pub fn error_rel(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut difference, mut largest) = (0.0f64, 0.0f64);
     for (answer, right) in pairs {
@@ -91,8 +92,8 @@ pub fn error_rel(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     if largest > 0.0 { difference / largest } else { difference }
 }
 
-/// `K11⁻¹` of the residual of `high + low`, over all degrees of freedom; `given` forces are empty
-/// or one per degree of freedom.
+/// `K11⁻¹` times the residual of `high + low`, for all degrees of freedom; `given` forces are empty or
+/// one for each degree of freedom.
 fn correction(
     stiffness: &Stiffness,
     factored: &Factored,
@@ -133,14 +134,14 @@ fn exact_residual(stiffness: &Stiffness, given: &[f64], high: &[f64], low: &[f64
     residual
 }
 
-/// Rounded sum and what rounding lost.
+/// Rounded sum, and the part that rounding lost.
 pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_seen = sum - a;
     (sum, (a - (sum - b_seen)) + (b - b_seen))
 }
 
-/// Rounded product and what rounding lost.
+/// Rounded product, and the part that rounding lost.
 pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     (product, a.mul_add(b, -product))

@@ -1,4 +1,4 @@
-//! A report: its head, its text, tables and figures, and how it is written.
+//! Report: its head, text, tables and figures, and the files that are written.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -8,42 +8,42 @@ use crate::table::Table;
 
 pub use crate::report_error::ReportError;
 
-/// What is asked of a report.
+/// Options of a report.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// Small sizes and few rounds: to see that it works.
+    /// Whether to make the small form: small sizes and few rounds, to see that it works.
     pub is_quick: bool,
-    /// Folder for the files.
+    /// Folder for the report's files.
     pub out: PathBuf,
-    /// Command that makes the report, for its head.
+    /// Command line that makes the report, for its head.
     pub command: String,
-    /// Remark for the head; empty for none.
+    /// Remark for the head; may be empty.
     pub note: String,
-    /// Folder with mesh files of others; what is not there is left out, and the report says so.
+    /// Folder with mesh files of other authors; missing files are left out, and the report says so.
     pub meshes: PathBuf,
 }
 
 /// Part of a report, in the order of the page.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Section {
-    /// Markdown.
+    /// Text in Markdown.
     Text(String),
     /// A table, also written as CSV.
     Table(Table),
-    /// A table too long for the page: written as CSV, the page names it.
+    /// Table that is too long for the page: written as CSV, and named on the page.
     Records(Table),
     /// A figure, written as SVG.
     Figure {
         /// Name of its file, without `.svg`.
         stem: String,
-        /// What it shows.
+        /// Caption of the figure.
         caption: String,
-        /// The drawing.
+        /// Text of the SVG file.
         svg: String,
     },
 }
 
-/// A finished report.
+/// Report with its head and sections.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     stem: String,
@@ -55,7 +55,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// An empty report with its head; looks at the machine, so call it before measuring.
+    /// Report with its head; describes the machine, so it is to be called before measuring.
     pub fn begin(stem: &str, title: &str, threads: &str, options: &Options) -> Self {
         let mut head = vec![("command", options.command.clone())];
         head.extend(Machine::look().lines());
@@ -76,14 +76,14 @@ impl Report {
         }
     }
 
-    /// Notes the load at the end of the measurement, and how long it took.
+    /// Notes the load at the end of the measurement, and the time that it took.
     fn end(&mut self) {
         let minutes = self.begun.elapsed().as_secs_f64() / 60.0;
         self.head.push(("took", format!("{minutes:.1} min")));
         self.head.push(("load after", load_text()));
     }
 
-    /// Begins a chapter: what follows belongs below its heading.
+    /// Begins a chapter; what follows is below its heading.
     pub fn chapter(&mut self, heading: &str) {
         self.text(format!("## {heading}"));
     }
@@ -98,20 +98,20 @@ impl Report {
         self.sections.push(Section::Table(table));
     }
 
-    /// Adds a table that only its file shows.
+    /// Adds a table that only its file contains.
     pub fn records(&mut self, table: Table) {
         self.sections.push(Section::Records(table));
     }
 
-    /// Notes that a row did not keep what was promised: the report is written and then an error.
+    /// Notes that a row did not keep its limit; the report is written, and then an error follows.
     pub fn fault(&mut self, row: impl Into<String>) {
         self.faults.push(row.into());
     }
 
-    /// Makes sure that no row failed.
+    /// Checks that all rows kept their limits.
     ///
     /// # Errors
-    /// [`ReportError::Failed`] naming the rows.
+    /// [`ReportError::Failed`] with the rows.
     fn check_faults(&self) -> Result<(), ReportError> {
         match self.faults.is_empty() {
             true => Ok(()),
@@ -125,7 +125,7 @@ impl Report {
         self.sections.push(Section::Figure { stem, caption, svg });
     }
 
-    /// The tables, in order.
+    /// Tables of the report, in order.
     pub fn tables(&self) -> impl Iterator<Item = &Table> {
         self.sections.iter().filter_map(|section| match section {
             Section::Table(table) | Section::Records(table) => Some(table),
@@ -133,7 +133,7 @@ impl Report {
         })
     }
 
-    /// The page.
+    /// Text of the page.
     pub fn markdown(&self) -> String {
         let mut text = format!("# {}\n\n", self.title);
         for (name, value) in &self.head {
@@ -164,10 +164,10 @@ impl Report {
         text
     }
 
-    /// Ends the measurement and writes the files; their paths.
+    /// Ends the measurement and writes the files; returns their paths.
     ///
     /// # Errors
-    /// [`ReportError::Write`]; [`ReportError::Failed`] comes after the files are written.
+    /// [`ReportError::Write`]; [`ReportError::Failed`] after the files are written.
     pub fn finish(&mut self, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
         self.end();
         let files = self.write(folder)?;
@@ -175,10 +175,10 @@ impl Report {
         Ok(files)
     }
 
-    /// Writes the page, a CSV per table and an SVG per figure; the paths.
+    /// Writes the page, a CSV file for each table and an SVG file for each figure; returns the paths.
     ///
     /// # Errors
-    /// [`ReportError::Write`] names the file.
+    /// [`ReportError::Write`] with the file.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
         let write = |path: PathBuf, text: String| match std::fs::write(&path, text) {
             Ok(()) => Ok(path),
@@ -203,10 +203,10 @@ impl Report {
     }
 }
 
-/// Refuses an error above what is allowed, NaN too.
+/// Refuses an error above `allowed`, or NaN.
 ///
 /// # Errors
-/// [`ReportError::Wrong`].
+/// [`ReportError::Wrong`] if the error is refused.
 pub fn check(what: impl FnOnce() -> String, error: f64, allowed: f64) -> Result<(), ReportError> {
     if error <= allowed {
         return Ok(());
@@ -214,7 +214,7 @@ pub fn check(what: impl FnOnce() -> String, error: f64, allowed: f64) -> Result<
     Err(ReportError::Wrong { what: what(), error, allowed })
 }
 
-/// Says on standard error what is being measured, since a report takes minutes.
+/// Prints on standard error what is being measured, since a report takes minutes.
 pub fn progress(report: &str, what: &str) {
     eprintln!("{report}: {what}");
 }

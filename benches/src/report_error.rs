@@ -15,46 +15,46 @@ use softgrasp_grasp::sphere_tree::TreeError;
 
 use crate::plot::PlotError;
 
-/// Why there is no report.
+/// Why a report cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// An object could not be made.
+    /// An object could not be generated.
     #[error(transparent)]
     Generate(#[from] GenerateError),
-    /// Elements that make no mesh.
+    /// The elements make no mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A material that is none.
+    /// The numbers describe no material.
     #[error(transparent)]
     Material(#[from] MaterialError),
     /// A model could not be made or held.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A method failed.
+    /// A method found no solution.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// Nodes and weights that make no mask.
+    /// The nodes and weights make no mask.
     #[error(transparent)]
     Mask(#[from] MaskError),
-    /// Contacts that do not hold.
+    /// The contacts do not hold the body, or cannot be condensed.
     #[error(transparent)]
     Condensed(#[from] CondensedError),
     /// A step of a free object in contact could not be made.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// Known degrees of freedom that do not fit.
+    /// The known degrees of freedom do not fit the system.
     #[error(transparent)]
     Partition(#[from] PartitionError),
-    /// A factor.
+    /// A factor over fronts could not be made.
     #[error(transparent)]
     Front(#[from] FrontError),
-    /// An equilibrium that was not found.
+    /// No equilibrium was found.
     #[error(transparent)]
     NoEquilibrium(#[from] NoEquilibrium),
     /// A sphere tree could not be built or refitted.
     #[error(transparent)]
     Tree(#[from] TreeError),
-    /// Client and server did not come together.
+    /// The connection between client and server failed.
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The echo that frames are compared with failed.
@@ -68,66 +68,66 @@ pub enum ReportError {
     /// A hand could not be followed.
     #[error("{0:#}")]
     Hand(anyhow::Error),
-    /// No threads.
+    /// A pool of threads could not be started.
     #[error("no pool of {threads} threads: {source}")]
     Threads {
-        /// Threads asked for.
+        /// Number of threads asked for.
         threads: usize,
-        /// The system's reason.
+        /// Error of the thread pool.
         source: rayon::ThreadPoolBuildError,
     },
-    /// An answer failed its check, so its time means nothing.
+    /// An answer failed its check, so that its time means nothing.
     #[error("{what}: error {error:e}, allowed is {allowed:e}; its time is not reported")]
     Wrong {
-        /// What was checked.
+        /// Name of the check.
         what: String,
-        /// Its error.
+        /// Error of the answer.
         error: f64,
-        /// What is allowed.
+        /// Error that is allowed.
         allowed: f64,
     },
-    /// A program that is measured is not there.
+    /// A program to be measured is missing.
     #[error("there is no program {}; build all with `cargo build --release --workspace`", path.display())]
     NoProgram {
-        /// Where it was looked for.
+        /// Path at which it was looked for.
         path: PathBuf,
     },
-    /// The system did not start or show a process.
+    /// A process could not be started or observed.
     #[error("{what}: {source}")]
     Process {
-        /// The process.
+        /// Name of the process.
         what: String,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A process failed or hung.
     #[error("{what} failed: {}", said.trim())]
     Ended {
-        /// The process.
+        /// Name of the process.
         what: String,
-        /// What it said.
+        /// Output of the process.
         said: String,
     },
-    /// A file that a program wrote does not hold what is looked for.
+    /// A file that a program wrote does not contain what is expected.
     #[error("{} cannot be read: {why}", path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Reason why it cannot be used.
         why: String,
     },
-    /// Nothing to fit a law to.
+    /// There are too few measurements to fit a law.
     #[error("{what}: {count} measurements are too few for a fit")]
     TooFew {
-        /// What was to be fitted.
+        /// Name of the law.
         what: String,
-        /// Measurements there are.
+        /// Number of measurements.
         count: usize,
     },
-    /// Rows that did not keep what was promised; the files are written.
+    /// Some rows did not keep their limits; the files are written.
     #[error("{} of the report's rows failed:\n  {}", rows.len(), rows.join("\n  "))]
     Failed {
-        /// What failed, and how.
+        /// Rows that failed, each with its reason.
         rows: Vec<String>,
     },
     /// A figure could not be drawn.
@@ -136,9 +136,9 @@ pub enum ReportError {
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }

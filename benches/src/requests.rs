@@ -1,11 +1,11 @@
-//! The requests of all reports to a server: to keep a model and to answer frames.
+//! Requests of all reports to a server: to keep a model and to answer frame questions.
 
 use glove_client::ask::connection::{LinkError, ServerConnection, unexpected};
 use softgrasp_protocol::{Answer, Ask, Limits, ModelHash, Question, Reply, Request, UploadModel};
 
 use crate::report_error::ReportError;
 
-/// Gives a server a model to keep; the model's name.
+/// Uploads a model; returns the hash that names it.
 ///
 /// # Errors
 /// [`ReportError::Link`].
@@ -19,7 +19,7 @@ pub fn upload(
     }
 }
 
-/// The answer to a frame, out of the reply to it.
+/// Answer in the reply to a frame question.
 ///
 /// # Errors
 /// [`ReportError::Link`] for any other reply.
@@ -30,10 +30,10 @@ pub fn answer(reply: Result<Reply, LinkError>) -> Result<Answer, ReportError> {
     }
 }
 
-/// The bytes that ask for a frame.
+/// Bytes of a frame question.
 ///
 /// # Errors
-/// [`ReportError::Link`] for what cannot be sent.
+/// [`ReportError::Link`] if it cannot be encoded.
 pub fn encode_request(model: ModelHash, question: Question) -> Result<Vec<u8>, ReportError> {
     let mut bytes = Vec::new();
     Request::from(Ask::new(model, question))
@@ -42,10 +42,10 @@ pub fn encode_request(model: ModelHash, question: Question) -> Result<Vec<u8>, R
     Ok(bytes)
 }
 
-/// The bytes of an answer.
+/// Bytes of an answer.
 ///
 /// # Errors
-/// As [`encode_request`].
+/// The same as those of [`encode_request`].
 pub fn encode_reply(answer: Answer) -> Result<Vec<u8>, ReportError> {
     let mut bytes = Vec::new();
     Reply::Answer(Box::new(answer))
@@ -54,7 +54,7 @@ pub fn encode_reply(answer: Answer) -> Result<Vec<u8>, ReportError> {
     Ok(bytes)
 }
 
-/// Nodes that a question holds, one by one or by masks.
+/// Number of nodes that a question holds, one by one or by masks.
 pub fn held_nodes(question: &Question) -> usize {
     let of_masks: usize = question.masks.iter().map(|(nodes, _)| nodes.len()).sum();
     question.known.len() / 3 + of_masks

@@ -1,30 +1,30 @@
-//! Measures times in turns and takes medians, because no machine is quite quiet.
+//! Measures times in turns and takes medians, because other work disturbs a machine.
 
 use std::time::{Duration, Instant};
 
-/// How often competitors run.
+/// Number of rounds, and time for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Rounds that do not count (caches, page faults, clock rates).
+    /// Number of first rounds that do not count (caches, page faults, clock rates).
     pub warm_up_rounds: usize,
-    /// Rounds that are run in any case.
+    /// Least number of rounds.
     pub rounds_min: usize,
-    /// Rounds after which it is enough.
+    /// Largest number of rounds.
     pub rounds_max: usize,
-    /// No round begins after this time, once `rounds_min` have been run.
+    /// Time after which no round begins, once `rounds_min` have been run.
     pub budget: Duration,
 }
 
 /// One of several pieces of work that are compared; each call does it once.
 pub type Competitor<'a, T, E> = Box<dyn FnMut() -> Result<T, E> + 'a>;
 
-/// Lets competitors take turns; `results[competitor][round]`.
+/// Runs competitors in turn; the results by competitor and round.
 ///
-/// Each round runs every competitor once, and each round another one begins, so that what the
-/// machine does meanwhile (other processes, clock rates) falls on all alike and ratios hold.
+/// Each round runs every competitor once and begins with another one, so that disturbances of the machine
+/// affect all of them alike and ratios hold.
 ///
 /// # Errors
-/// The first error of a competitor.
+/// First error of a competitor.
 pub fn take_turns<T, E>(
     effort: &Effort,
     competitors: &mut [Competitor<'_, T, E>],
@@ -49,7 +49,7 @@ pub fn take_turns<T, E>(
     Ok(results)
 }
 
-/// Time of one call, ms, and what it returned.
+/// Result of one call, and its time, ms.
 pub fn timed_ms<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let result = work();
@@ -59,22 +59,22 @@ pub fn timed_ms<T>(work: impl FnOnce() -> T) -> (f64, T) {
 /// Median and extremes of a list of numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spread {
-    /// Middle value, or the mean of the two.
+    /// Middle value, or the mean of the two middle ones.
     pub median: f64,
-    /// Smallest.
+    /// Smallest value.
     pub min: f64,
-    /// Largest.
+    /// Largest value.
     pub max: f64,
     /// Value that about a tenth is below.
     pub p10: f64,
     /// Value that about a tenth is above.
     pub p90: f64,
-    /// How many there were.
+    /// Number of values.
     pub count: usize,
 }
 
 impl Spread {
-    /// Of some numbers; all zero for none.
+    /// Spread of some values; all zero for none.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_by(f64::total_cmp);
@@ -87,14 +87,14 @@ impl Spread {
         Self { median, min, max, p10, p90, count }
     }
 
-    /// Of the quotients of two competitors, round by round.
+    /// Spread of the quotients of two competitors, round by round.
     pub fn of_ratio(dividend: &[f64], divisor: &[f64]) -> Self {
         Self::of(dividend.iter().zip(divisor).map(|(a, b)| a / b))
     }
 }
 
-/// Smallest value that a share of all does not exceed; `None` if the list is too short to tell
-/// (fewer than one value beyond it is expected).
+/// Smallest value that a share of all does not exceed; `None` if the list is too short (fewer than one
+/// value is expected above it).
 ///
 /// Shapes: `sorted` ascending; `share` in 0..1.
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! The scene of every report: an object held and pressed by five fingertips.
+//! Scene of every report: an object held and pressed by five fingertips.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;
@@ -13,29 +13,29 @@ use softgrasp_protocol::{
 use crate::report::ReportError;
 use crate::stages::{StageTimes, StageWatch};
 
-/// An object with five known nodes: four on top pushed down, one below pushed up.
+/// Object with five known nodes: four on top pushed down, one below pushed up.
 ///
 /// Units: m, Pa. Frame: the object's.
 #[derive(Clone, Debug)]
 pub struct Pressed {
-    /// Which object.
+    /// Shape of the object.
     pub shape: BuiltIn,
-    /// Its mesh.
+    /// Mesh of the object.
     pub mesh: TetMesh,
-    /// Its boundary.
+    /// Boundary surface of the mesh.
     pub surface: Surface,
-    /// What it is made of.
+    /// Material of the object.
     pub material: Material,
-    /// Known displacements, by degree of freedom; fifteen of them.
+    /// Known displacements by degree of freedom, m; fifteen of them.
     pub pairs: Vec<(u32, f64)>,
 }
 
-/// Soft rubber.
+/// Young's modulus of soft rubber, Pa.
 const YOUNG: f64 = 1.0e5;
 const POISSON: f64 = 0.3;
 
-/// How far the tips press, as a share of the object's size, and where they touch: shares of half
-/// the extents of the bounding box.
+/// Displacement of each fingertip, relative to the object's size, and the point that it touches, relative
+/// to half the extents of the bounding box.
 pub(crate) const TOUCHES: [([f64; 3], [f64; 3]); 5] = [
     ([-0.5, 1.0, -0.5], [0.002, -0.02, 0.001]),
     ([0.5, 1.0, -0.5], [-0.002, -0.02, 0.001]),
@@ -44,16 +44,16 @@ pub(crate) const TOUCHES: [([f64; 3], [f64; 3]); 5] = [
     ([0.0, -1.0, 0.0], [0.0, 0.02, 0.0]),
 ];
 
-/// What every object is made of.
+/// Material of every object.
 ///
 /// # Errors
-/// [`ReportError::Material`].
+/// [`ReportError::Material`] if the constants describe none.
 pub(crate) fn rubber() -> Result<Material, ReportError> {
     Ok(Material::try_new(YOUNG, POISSON)?)
 }
 
 impl Pressed {
-    /// A built-in object of about `nodes` nodes, pressed as [`presses`] says.
+    /// Built-in object of about `nodes` nodes, pressed as [`presses`] says.
     ///
     /// # Errors
     /// [`ReportError::Generate`], [`ReportError::Material`].
@@ -81,8 +81,8 @@ impl Pressed {
         Ok((model, known))
     }
 
-    /// The whole finite element analysis by one method, from the mesh to the displacements, on the
-    /// current rayon pool.
+    /// Whole finite element analysis by one method, from the mesh to the displacements, on the current
+    /// rayon pool.
     ///
     /// # Errors
     /// [`ReportError::Model`], [`ReportError::Solve`].
@@ -100,21 +100,20 @@ impl Pressed {
         Ok((watch.finish(), solution))
     }
 
-    /// The same question for a server: mesh, material, partition and known displacements in one
-    /// (thesis 5.1.1).
+    /// Request to a server with mesh, material, partition and known displacements in one (thesis 5.1.1).
     pub fn whole_request(&self, method: Method) -> Ask {
         let (mesh, materials) = self.on_the_wire();
         let question = self.question(method.name(), 1.0, NodeChoice::All);
         Ask::new(Body { mesh, materials, element: ElementChoice::T4 }, question)
     }
 
-    /// The model for a server to keep.
+    /// Model for a server to keep.
     pub fn upload(&self) -> UploadModel {
         let (mesh, materials) = self.on_the_wire();
         UploadModel { mesh, materials, element: ElementName::T4, fixed: Vec::new() }
     }
 
-    /// Partition and known displacements, the latter times `scale`.
+    /// Partition and known displacements, these times `scale`.
     pub fn question(&self, method: &str, scale: f64, nodes: NodeChoice) -> Question {
         let known = self.pairs.iter().map(|&(dof, u)| DofValue { dof, value: scale * u });
         let method = MethodName::try_new(method);
@@ -144,8 +143,8 @@ impl Pressed {
 
 /// Known displacements of five fingertips on any object, by degree of freedom, ascending.
 ///
-/// Each tip takes the surface node nearest to its place that no other has; a surface of fewer than
-/// five nodes leaves tips out. Units: m.
+/// Each fingertip takes the nearest surface node that no other has; on a surface of fewer than five nodes
+/// there are fewer fingertips. Units: m.
 pub fn presses(mesh: &TetMesh, surface: &Surface) -> Vec<(u32, f64)> {
     let (low, high) = mesh.bounds();
     let (centre, half) = (nalgebra::center(&low, &high), (high - low) / 2.0);
@@ -161,7 +160,7 @@ pub fn presses(mesh: &TetMesh, surface: &Surface) -> Vec<(u32, f64)> {
     pairs
 }
 
-/// The surface node nearest to a place that is not among those taken.
+/// Surface node nearest to a position, those in `taken` left out.
 pub(crate) fn nearest(
     mesh: &TetMesh,
     surface: &Surface,

@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use softgrasp_core::solve::Stage;
 
-/// Milliseconds by stage; `total` also holds what no stage names (checks, copies).
+/// Time by stage, ms; `total` also contains the work of no stage (checks, copies).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
-    /// Stiffness from mesh and material.
+    /// Assembling the stiffness matrix.
     pub assemble: f64,
     /// Fill-reducing order and symbolic analysis.
     pub order: f64,
@@ -15,11 +15,11 @@ pub struct StageTimes {
     pub factor: f64,
     /// Right-hand side, substitution, refinement, reactions.
     pub solve: f64,
-    /// From beginning to end.
+    /// Time from the beginning to the end.
     pub total: f64,
 }
 
-/// A running clock over stages.
+/// Clock that measures stages.
 #[derive(Debug)]
 pub struct StageWatch {
     start: Instant,
@@ -28,7 +28,7 @@ pub struct StageWatch {
 }
 
 impl StageWatch {
-    /// Starts now, outside any stage.
+    /// Clock that starts now, outside any stage.
     pub fn start() -> Self {
         Self { start: Instant::now(), running: None, times: StageTimes::default() }
     }
@@ -53,7 +53,7 @@ impl StageWatch {
         }
     }
 
-    /// Ends everything.
+    /// Stops the clock; returns the times.
     pub fn finish(mut self) -> StageTimes {
         self.end();
         StageTimes { total: self.start.elapsed().as_secs_f64() * 1e3, ..self.times }

@@ -7,11 +7,11 @@ use std::fmt::Write;
 pub enum Cell {
     /// Words.
     Text(String),
-    /// A count, exact.
+    /// Exact count.
     Count(u64),
-    /// A measured number.
+    /// Measured number.
     Number(f64),
-    /// Nothing to say: not measured, or not applicable.
+    /// Empty: not measured, or not applicable.
     Blank,
 }
 
@@ -26,7 +26,7 @@ pub struct Table {
     pub title: String,
     /// Names of the columns, `name_unit`.
     pub columns: Vec<&'static str>,
-    /// Rows.
+    /// Rows of cells.
     pub rows: Vec<Vec<Cell>>,
 }
 
@@ -47,7 +47,7 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// As CSV: `#` lines of `head`, names of the columns, rows.
+    /// Table as CSV: `#` lines of `head`, names of the columns, rows.
     pub fn csv(&self, head: &[String]) -> String {
         let mut text: String = head.iter().map(|line| format!("# {line}\n")).collect();
         let lines = std::iter::once(self.columns.iter().map(|c| (*c).to_owned()).collect())
@@ -59,7 +59,7 @@ impl Table {
         text
     }
 
-    /// As a Markdown table under its title.
+    /// Table as Markdown under its title.
     pub fn markdown(&self) -> String {
         let mut text = format!("### {}\n\n|", self.title);
         for column in &self.columns {
@@ -138,7 +138,7 @@ impl From<Option<f64>> for Cell {
     }
 }
 
-/// A number with three digits that count; powers of ten outside 0.001 … 100 000.
+/// Number with three significant digits; with a power of ten outside 0.001 … 100 000.
 pub fn three_digits(x: f64) -> String {
     let size = x.abs();
     if x == 0.0 {

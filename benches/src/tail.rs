@@ -1,25 +1,25 @@
-//! The slowest answers: high quantiles, and the share that is slower than a given time.
+//! Slowest answers: high quantiles, and the share that is slower than a given time.
 
 use crate::plot::PlotPoint;
 use crate::sample::quantile;
 
-/// Quantiles of a list of times; those that so few times cannot show are `None`.
+/// Quantiles of a list of times; `None` for those that the list is too short to show.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tail {
-    /// Half are faster.
+    /// Time that half of them do not exceed.
     pub p50: Option<f64>,
-    /// 99 of 100 are faster.
+    /// Time that 99 of 100 do not exceed.
     pub p99: Option<f64>,
-    /// 999 of 1000 are faster.
+    /// Time that 999 of 1000 do not exceed.
     pub p999: Option<f64>,
-    /// 9999 of 10 000 are faster.
+    /// Time that 9999 of 10 000 do not exceed.
     pub p9999: Option<f64>,
-    /// The slowest.
+    /// Largest time.
     pub max: Option<f64>,
 }
 
 impl Tail {
-    /// Of times in any order.
+    /// Quantiles of times in any order.
     pub fn of(times: impl IntoIterator<Item = f64>) -> Self {
         let sorted = ascending(times);
         Self {
@@ -32,10 +32,10 @@ impl Tail {
     }
 }
 
-/// Points of the curve over a figure's width; more cannot be told apart.
+/// Largest number of points of the curve.
 const POINTS: usize = 200;
 
-/// Share of times that are longer, against the time: a steep curve is an even pace.
+/// Share of times that are longer, against the time: the steeper, the more even.
 ///
 /// Shapes: at most 200 points, evenly spread over the logarithm of the share. Units: those of the
 /// times; share 0 … 1.

@@ -1,17 +1,17 @@
 //! Figures of the 1998 system, as the thesis prints them, to set beside ours.
 
-/// A time the thesis gives.
+/// Time that the thesis gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThesisTime {
-    /// Vertices of the object.
+    /// Number of vertices of the object.
     pub nodes: usize,
-    /// Processors used.
+    /// Number of processors.
     pub processors: usize,
     /// Time of the finite element analysis, s.
     pub seconds: f64,
-    /// Machine.
+    /// Name of the machine.
     pub machine: &'static str,
-    /// Where it stands.
+    /// Place in the thesis.
     pub source: &'static str,
 }
 
@@ -42,7 +42,7 @@ pub const TIMES: [ThesisTime; 3] = [
     },
 ];
 
-/// Slopes m of T = k Nᵐ (6.1) as (vertices, m).
+/// Exponents m of T = k Nᵐ (6.1) as (vertices, m).
 ///
 /// The text of 6.4 prints 0.18, 1.5 and 0.9 without signs and calls m nearly zero for few vertices
 /// and negative above 100; the first is taken as about zero, the others as negative.

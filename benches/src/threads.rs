@@ -1,16 +1,16 @@
-//! Pools of exact size, and the sizes that are measured.
+//! Pools of exact size, and the numbers of threads that are measured.
 
 use crate::report_error::ReportError;
 
-/// Processors this process may use.
+/// Number of processors that this process may use.
 pub fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// A rayon pool of exactly so many threads.
+/// Rayon pool of exactly `threads` threads.
 ///
 /// # Errors
-/// [`ReportError::Threads`].
+/// [`ReportError::Threads`] if they cannot be started.
 pub fn pool(threads: usize) -> Result<rayon::ThreadPool, ReportError> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -18,7 +18,7 @@ pub fn pool(threads: usize) -> Result<rayon::ThreadPool, ReportError> {
         .map_err(|source| ReportError::Threads { threads, source })
 }
 
-/// Thread counts from 1 to all: every one up to eight, then doubling.
+/// Numbers of threads from 1 to all: every one up to eight, then doubling.
 pub fn thread_counts(all: usize) -> Vec<usize> {
     let mut counts: Vec<usize> = (1..=all.min(8)).collect();
     let mut next = 16;

@@ -1,4 +1,4 @@
-//! Clients that ask for a frame at an even pace, whatever the server does, and check every answer.
+//! Clients that ask frame questions at an even pace, whatever the server does, and check every answer.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -12,30 +12,30 @@ use crate::report_error::ReportError;
 use crate::requests::upload;
 use crate::scene::Pressed;
 
-/// What is asked in a frame.
+/// Kind of a frame question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Linear elasticity: the answers are known to the last bit.
     Linear,
-    /// Large deformation: the answers say how wrong they are.
+    /// Large deformation: the answers report their own error.
     Large,
 }
 
-/// An object, and what clients ask about it, one question after the other.
+/// Object, and the questions of clients about it, one after the other.
 pub(crate) struct Subject {
     kind: Kind,
     scene: Pressed,
     model: ModelHash,
     requests: Vec<Request>,
-    /// One number for all bits of each answer; empty for large deformation.
+    /// Hash of the bits of each answer; empty for large deformation.
     expected: Vec<u64>,
 }
 
-/// How far the fingers press in the questions, as a share of the full press: in and out again.
+/// Number of questions, which press in and out again by shares of the full press.
 const PRESSES: usize = 32;
 
 impl Subject {
-    /// An object of about so many nodes, and the answers of a server that nobody else asks.
+    /// Object of about `nodes` nodes, and the answers of a server without other clients.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -76,7 +76,7 @@ impl Subject {
         Ok(this)
     }
 
-    /// A client whose server has the model.
+    /// Client whose server keeps the model.
     ///
     /// # Errors
     /// [`ReportError::Link`].
@@ -89,7 +89,7 @@ impl Subject {
         Ok(connection)
     }
 
-    /// Asks one question and checks the answer; whether it is right.
+    /// Asks one question and checks the answer; returns whether it is right.
     ///
     /// # Errors
     /// [`ReportError::Link`].
@@ -116,7 +116,7 @@ impl Subject {
     }
 }
 
-/// One number for all bits.
+/// Hash of the bits of all displacements.
 fn hash(displacements: Vec<[f64; 3]>) -> u64 {
     displacements
         .iter()
@@ -127,19 +127,20 @@ fn hash(displacements: Vec<[f64; 3]>) -> u64 {
         })
 }
 
-/// What clients heard.
+/// Answers to the clients.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Heard {
-    /// From the moment a frame was due to its answer, ms; waiting for an earlier answer counts.
+    /// Times from the moment when a question was due to its answer, ms; waiting for an earlier answer
+    /// counts.
     pub latencies_ms: Vec<f64>,
-    /// Answers that are not right.
+    /// Number of wrong answers.
     pub wrong: usize,
-    /// Clients that were not served to the end, and why.
+    /// Reasons of clients that were not answered to the end.
     pub failed: Vec<String>,
 }
 
-/// Lets `clients` ask `rate_hz` times a second each, spread evenly, for so long; the first quarter of the
-/// time does not count.
+/// Runs `clients` clients that each ask `rate_hz` times a second, spread evenly, for the time `lasts`;
+/// the first quarter of the time does not count.
 pub(crate) fn visit(
     subject: &Subject,
     address: &str,

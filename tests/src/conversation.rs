@@ -1,4 +1,4 @@
-//! A conversation of one client with a server, which tests repeat under other conditions.
+//! Conversation of one client with a server, which tests repeat under other conditions.
 
 use std::net::SocketAddr;
 
@@ -13,24 +13,24 @@ use crate::heard::Heard;
 use crate::questions::{cube, frame, once, upload};
 use crate::raw_session::request_frame;
 
-/// Requests asked one after the other on one connection, after the Hello.
+/// Requests that one connection sends one after the other, after its `Hello`.
 #[derive(Clone, Debug)]
 pub struct Conversation {
     requests: Vec<Request>,
 }
 
-/// What came of a conversation.
+/// Replies of a conversation, and its error.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Replies in order, the Welcome first.
+    /// Replies in order, the `Welcome` first.
     pub heard: Vec<Heard>,
-    /// Why it ended early, if it did.
+    /// Error that ended the conversation early, if there was one.
     pub error: Option<LinkError>,
 }
 
 impl Conversation {
-    /// Every kind of request that has a reply, on a small cube: asks for the model, uploads it,
-    /// two frames (one quantised and for listed nodes), one self-contained solve, ping.
+    /// Every kind of request that has a reply, on a small cube: asks for the model, uploads it, two frame
+    /// questions (one quantised and for listed nodes), one request with its own mesh, `Ping`.
     pub fn small() -> Self {
         let mesh = cube(27);
         let upload = upload(&mesh);
@@ -49,12 +49,12 @@ impl Conversation {
         }
     }
 
-    /// Number of replies when nothing goes wrong, the Welcome counted.
+    /// Number of replies if nothing goes wrong, the `Welcome` included.
     pub fn reply_count(&self) -> usize {
         self.requests.len() + 1
     }
 
-    /// The requests after the Hello.
+    /// Requests after the `Hello`.
     pub fn requests(&self) -> &[Request] {
         &self.requests
     }
@@ -62,18 +62,18 @@ impl Conversation {
     /// The whole conversation with its Hello as frames, one after the other.
     ///
     /// # Panics
-    /// If one is too large to be sent.
+    /// If a message is too large to be sent.
     pub fn frames(&self) -> Vec<Vec<u8>> {
         let hello = Hello::new("a conversation", None);
         let all = [Request::Hello(hello)].into_iter().chain(self.requests.iter().cloned());
         (1..).zip(all).map(|(id, request)| request_frame(id, &request)).collect()
     }
 
-    /// Holds the conversation over any stream; what was heard, and whether it was cut short by an end
-    /// or an error of the stream.
+    /// Holds the conversation over any stream; returns the replies, and the error or end of the stream
+    /// that cut it short.
     ///
     /// # Panics
-    /// If a sound frame is no reply.
+    /// If an undamaged frame is no reply.
     pub async fn hold_over(
         &self,
         stream: impl AsyncRead + AsyncWrite + Unpin,
@@ -96,7 +96,7 @@ impl Conversation {
         (heard, None)
     }
 
-    /// Holds the conversation; a refusal is a reply, anything else that fails ends it.
+    /// Holds the conversation; a refusal is a reply, any other fault ends it.
     pub fn hold(&self, address: SocketAddr) -> Outcome {
         let mut heard = Vec::new();
         let mut connection = match ServerConnection::connect(address.to_string()) {
@@ -116,7 +116,7 @@ impl Conversation {
 }
 
 impl Outcome {
-    /// The replies of a conversation that must have gone well.
+    /// Replies of a conversation that must have been completed.
     ///
     /// # Panics
     /// If it ended early.
@@ -127,7 +127,7 @@ impl Outcome {
         }
     }
 
-    /// Whether the connection's end was told as such: not as a decoding fault, not as a wrong reply.
+    /// Whether the error is the end of the connection, not a decoding fault or a wrong reply.
     pub fn ended_cleanly(&self) -> bool {
         matches!(self.error, None | Some(LinkError::Closed | LinkError::Connection(_)))
     }

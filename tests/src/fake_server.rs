@@ -1,4 +1,4 @@
-//! A server that knows every model and answers every frame with displacements that the test made.
+//! Server that knows every model and answers every frame question with displacements that the test made.
 
 use std::net::{SocketAddr, TcpListener, TcpStream};
 
@@ -7,9 +7,9 @@ use softgrasp_protocol::{
     Answer, Displacements, Limits, NodeChoice, Reply, Request, SolveReport, Welcome,
 };
 
-/// Starts it on a free loopback port; it ends with the process.
+/// Starts the server on a free loopback port; it ends with the process.
 ///
-/// Shapes: `displacements` one per node.
+/// Shapes: `displacements` one for each node.
 ///
 /// # Panics
 /// If there is no port.

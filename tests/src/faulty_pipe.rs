@@ -1,4 +1,4 @@
-//! A link in memory that splits, delays, stalls, damages or cuts what passes, all of it by a seed.
+//! Link in memory that splits, delays, stalls, damages or cuts the bytes, all of it by a seed.
 
 use std::time::Duration;
 
@@ -7,38 +7,38 @@ use tokio::time::sleep;
 
 use crate::random::Random;
 
-/// What happens on one way of a link.
+/// Faults on one direction of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WayFaults {
-    /// Pieces have 1 to so many bytes; 0: as they come.
+    /// Largest length of a piece, bytes; 0: pieces as they come.
     pub piece_max: usize,
-    /// Some pieces wait for up to so long.
+    /// Largest delay of a piece.
     pub delay_max: Duration,
-    /// The one thing that goes wrong, before this byte.
+    /// The one fault of this direction, and the offset of the byte before which it occurs.
     pub fault: Option<(u64, PipeFault)>,
 }
 
-/// What goes wrong once.
+/// Fault that occurs once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PipeFault {
-    /// Both ways are cut.
+    /// Both directions are cut.
     Cut,
-    /// This way passes nothing for so long.
+    /// This direction passes nothing for this time.
     Stall(Duration),
-    /// A bit of the byte is turned over.
+    /// A bit of the byte is inverted.
     Flip,
 }
 
-/// How a way ended.
+/// How a direction ended.
 enum Ended {
-    /// Its sender ended it.
+    /// Its sender closed it.
     Finished,
-    /// The link is cut.
+    /// The link was cut.
     Cut,
 }
 
 impl WayFaults {
-    /// Draws what happens among the first `len` bytes: in every second case something goes wrong.
+    /// Draws faults among the first `len` bytes; on average every second direction has one.
     pub fn drawn(random: &mut Random, len: usize) -> Self {
         let piece_max = [0, 1, 7, 97, 4096][random.below(5)];
         let delay_max = Duration::from_millis([0, 0, 1, 40][random.below(4)]);
@@ -54,7 +54,8 @@ impl WayFaults {
     }
 }
 
-/// Passes on between `server` and the returned end, until both ways have ended or the link is cut.
+/// Passes bytes between `server` and the returned end, until both directions have ended or the link is
+/// cut.
 pub fn faulty_pipe(
     server: DuplexStream,
     to_server: WayFaults,

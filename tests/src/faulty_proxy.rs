@@ -1,4 +1,4 @@
-//! A loopback proxy that splits, delays, damages or cuts what passes through it.
+//! Loopback proxy that splits, delays, damages or cuts the bytes that pass.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -9,48 +9,48 @@ use std::time::Duration;
 
 use crate::random::Random;
 
-/// In which pieces bytes are passed on.
+/// Pieces in which bytes are passed on.
 #[derive(Clone, Debug, Default)]
 pub enum Pieces {
-    /// As they come.
+    /// Pieces as they come.
     #[default]
     Whole,
-    /// Cut before these offsets of the stream, ascending.
+    /// Pieces that end before these offsets of the stream, ascending.
     CutAt(Vec<u64>),
-    /// One byte in every write.
+    /// Pieces of one byte.
     OneByte,
-    /// Pieces of 1 to 97 bytes, by this seed.
+    /// Pieces of 1 to 97 bytes, drawn from this seed.
     Random(u64),
 }
 
-/// What happens to one direction of a connection.
+/// Faults on one direction of a connection.
 #[derive(Clone, Debug, Default)]
 pub struct Way {
-    /// How it is split.
+    /// Pieces in which the bytes are passed on.
     pub pieces: Pieces,
-    /// Wait before every piece.
+    /// Delay before every piece.
     pub delay: Option<Duration>,
-    /// The whole connection is closed once this many bytes have passed.
+    /// Number of bytes after which the whole connection is closed.
     pub close_after: Option<u64>,
-    /// The lowest bit of this byte is turned over.
+    /// Offset of the byte whose lowest bit is inverted.
     pub flip_at: Option<u64>,
 }
 
-/// What happens to a connection.
+/// Faults on both directions of a connection.
 #[derive(Clone, Debug, Default)]
 pub struct Faults {
-    /// From client to server.
+    /// Faults from client to server.
     pub to_server: Way,
-    /// From server to client.
+    /// Faults from server to client.
     pub to_client: Way,
 }
 
-/// The bytes that came in on both ways of one connection, before any fault.
+/// Bytes that came in on both directions of one connection, before any fault.
 #[derive(Clone, Debug, Default)]
 pub struct Recorded {
-    /// From the client.
+    /// Bytes from the client.
     pub to_server: Vec<u8>,
-    /// From the server.
+    /// Bytes from the server.
     pub to_client: Vec<u8>,
 }
 
@@ -61,20 +61,20 @@ struct State {
     stopping: AtomicBool,
 }
 
-/// A running proxy; dropping it ends it.
+/// Running proxy; dropping it ends it.
 ///
-/// One connection at a time is recorded: the last one accepted.
+/// The bytes of one connection are recorded: of the last one accepted.
 pub struct FaultyProxy {
     address: SocketAddr,
     state: Arc<State>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// A pump that hears nothing for this long looks whether its proxy has ended.
+/// Time without a byte after which a pump checks whether its proxy has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
 impl FaultyProxy {
-    /// Listens on loopback and passes on to `server`, at first without faults.
+    /// Listens on loopback and passes bytes to `server`, at first without faults.
     ///
     /// # Panics
     /// If the system gives no socket or no thread.
@@ -92,22 +92,22 @@ impl FaultyProxy {
         Self { address, state, thread: Some(thread) }
     }
 
-    /// Address for the client.
+    /// Address that clients connect to.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Sets what happens to the connections accepted from now on.
+    /// Sets the faults of the connections that are accepted from now on.
     pub fn set(&self, faults: Faults) {
         *lock(&self.state.faults) = faults;
     }
 
-    /// Passes on to another server from the next connection on.
+    /// Passes bytes to another server, from the next connection on.
     pub fn lead_to(&self, server: SocketAddr) {
         *lock(&self.state.server) = server;
     }
 
-    /// What has passed on the last connection so far.
+    /// Bytes that have passed on the last connection so far.
     pub fn recorded(&self) -> Recorded {
         lock(&self.state.recorded).clone()
     }
@@ -155,7 +155,7 @@ fn accept_all(listener: &TcpListener, state: &Arc<State>) {
     }
 }
 
-/// One direction of one connection.
+/// Passes bytes in one direction of one connection.
 struct Pump {
     from: TcpStream,
     to: TcpStream,
@@ -166,7 +166,7 @@ struct Pump {
 }
 
 impl Pump {
-    /// Passes bytes on until the sender ends or the connection is to be closed.
+    /// Runs until the sender ends or the connection is to be closed.
     fn run(&mut self) -> std::io::Result<()> {
         self.from.set_read_timeout(Some(LOOK_EVERY))?;
         self.to.set_nodelay(true)?;

@@ -1,36 +1,36 @@
-//! The part of a reply that must have the same bits every time: all but times and memory.
+//! Part of a reply that must have the same bits in every run: all except times and memory.
 
 use softgrasp_protocol::{
     Answer, Displacements, ModelHash, NodeChoice, RejectCode, Reply, SolveReport,
 };
 
-/// A reply without what may differ between runs.
+/// Reply without the parts that may differ between runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// The server introduced itself.
+    /// `Welcome` of the server.
     Welcome,
-    /// An answer, as bits.
+    /// Numbers of an answer, as bits.
     Answer(AnswerBits),
-    /// Whether a model was known; that depends on who was there before.
+    /// Reply to `HaveModel`; its content depends on earlier clients.
     ModelState,
-    /// A model was prepared.
+    /// Reply to an upload.
     ModelReady {
-        /// Its name.
+        /// Hash that names the model.
         model: ModelHash,
-        /// Degrees of freedom not fixed.
+        /// Number of degrees of freedom that are not fixed.
         unknown_dofs: u64,
-        /// Degrees of freedom fixed.
+        /// Number of degrees of freedom that are fixed.
         fixed_dofs: u64,
     },
-    /// A refusal.
+    /// Code and text of a refusal.
     Rejected(RejectCode, String),
-    /// The server is there.
+    /// `Alive` of the server.
     Alive,
-    /// The number of the `Ping`.
+    /// Number of the `Ping`.
     Pong(u64),
 }
 
-/// The numbers of an answer, as bits.
+/// Numbers of an answer, as bits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AnswerBits {
     method: String,
@@ -45,7 +45,7 @@ pub struct AnswerBits {
 }
 
 impl AnswerBits {
-    /// Takes the bits of an answer.
+    /// Bits of an answer.
     pub fn of(answer: &Answer) -> Self {
         let SolveReport { method, unknown_dofs, known_dofs, .. } = &answer.report;
         // With `condensed` both are found beside the frames, and are told where they are there.
@@ -64,7 +64,7 @@ impl AnswerBits {
     }
 }
 
-/// One number for all bits of the displacements: FNV-1a over them in order.
+/// Hash of all bits of the displacements: FNV-1a over them in order.
 pub fn displacement_hash(displacements: &Displacements) -> u64 {
     displacement_bits(displacements)
         .iter()
@@ -85,7 +85,7 @@ fn displacement_bits(displacements: &Displacements) -> Vec<u64> {
 }
 
 impl Heard {
-    /// Takes from a reply what must not differ.
+    /// Part of a reply that must not differ.
     pub fn of(reply: &Reply) -> Self {
         match reply {
             Reply::Welcome(_) => Self::Welcome,

@@ -17,13 +17,13 @@ pub struct Package {
 struct Module {
     /// Path of the file, from the folder given.
     file: String,
-    /// Every path that the file names, from its own module on.
+    /// Paths that the file names, from its own module on.
     paths: Vec<Vec<String>>,
-    /// What the file brings into its own scope: name, and the path behind it.
+    /// Names that the file brings into its own scope, each with the path behind it.
     names: BTreeMap<String, Vec<String>>,
-    /// Modules whose names it brings into its scope all at once.
+    /// Modules of which the file brings all names into its scope.
     globs: Vec<Vec<String>>,
-    /// The types that it gives methods to.
+    /// Types that the file gives methods to.
     implemented: Vec<Vec<String>>,
 }
 
@@ -31,7 +31,7 @@ impl Package {
     /// Reads the package whose root file is `lib.rs` or `main.rs` in `folder`.
     ///
     /// # Errors
-    /// The system's, where a file cannot be read.
+    /// Error of the operating system if a file cannot be read.
     pub fn read(folder: &Path) -> std::io::Result<Self> {
         let mut modules = BTreeMap::new();
         collect(folder, &[], &mut modules)?;
@@ -43,12 +43,12 @@ impl Package {
         self.modules.len()
     }
 
-    /// Whether no file was found.
+    /// Whether the package has no file.
     pub fn is_empty(&self) -> bool {
         self.modules.is_empty()
     }
 
-    /// The files that each file imports something from, or has methods from.
+    /// For each file, the files that it imports from or has methods from.
     pub fn imports(&self) -> BTreeMap<&str, BTreeSet<&str>> {
         let of_module = |(at, module): (&Vec<String>, &Module)| {
             let found = module.paths.iter().filter_map(|path| self.definition(at, path, 0));
@@ -68,7 +68,7 @@ impl Package {
         imports
     }
 
-    /// Files that import themselves around other files, one list for each circle.
+    /// Circles of files that import each other.
     pub fn circles(&self) -> Vec<Vec<&str>> {
         let imports = self.imports();
         let reached: BTreeMap<&str, BTreeSet<&str>> =
@@ -83,8 +83,7 @@ impl Package {
         circles.into_iter().collect()
     }
 
-    /// The file that defines what `path` names when it stands in the module `at`; `None` for other
-    /// packages.
+    /// File that defines what `path` names in the module `at`; `None` for other packages.
     fn definition(&self, at: &[String], path: &[String], depth: usize) -> Option<&str> {
         // Names that are handed on in a circle end here.
         if depth > 16 {
@@ -274,7 +273,7 @@ fn implemented(code: &str) -> Vec<Vec<String>> {
     types.collect()
 }
 
-/// Paths that stand in the code itself: words joined by `::`.
+/// Paths in the code itself: words joined by `::`.
 fn inline_paths(code: &str) -> Vec<Vec<String>> {
     let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
     let words = code.split(|c: char| !is_part(c)).filter(|word| word.contains("::"));
@@ -308,7 +307,7 @@ fn without_comments_and_tests(text: &str) -> String {
     code
 }
 
-/// Length of a text up to the bracket that closes its first one.
+/// Length of a text up to the bracket that closes the first one.
 fn closing(text: &str, [opens, closes]: [char; 2]) -> usize {
     let mut depth = 0;
     for (at, c) in text.char_indices() {

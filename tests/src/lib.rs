@@ -1,4 +1,4 @@
-//! Shared by the system tests: questions, clients, disturbed connections, checks of files.
+//! Shared by the system tests: questions, clients, faulty connections, checks of files.
 
 pub mod conversation;
 pub mod fake_server;

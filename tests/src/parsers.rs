@@ -1,7 +1,7 @@
-//! Everything that takes bytes from outside, as one list: what is fuzzed is also tested.
+//! List of all parsers of untrusted bytes: those that are fuzzed are also tested.
 //!
-//! Bytes may be refused, but they never panic, hang, or take memory that they only announce; and what is
-//! accepted stays the same when it is written and read again.
+//! Bytes may be refused, but must not cause a panic, a hang, or memory that is only announced; and what
+//! is accepted stays the same when it is written and read again.
 
 use glove_client::object::scene::SceneFile;
 use softgrasp_core::mesh_io::{parse, parse_surface, write_msh41};
@@ -18,16 +18,16 @@ use softgrasp_protocol::{EncodeError, Frame, FrameBuffer, Kind, Limits, Reply, R
 
 use crate::raw_session::raw_frame;
 
-/// Something that takes bytes from outside.
+/// Parser of untrusted bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parser {
-    /// Frames out of a stream; the first byte says how the rest is cut.
+    /// Frames in a stream; the first byte decides how the rest is cut into pieces.
     Frames,
     /// A request; the first byte chooses the kind.
     Request,
     /// A reply; the first byte chooses the kind.
     Reply,
-    /// A mesh file of any format; what follows a line `--companion--` is the other file it asks for.
+    /// Mesh file of any format; behind a line `--companion--` is the other file that it needs.
     Mesh,
     /// A surface file of any format.
     Surface,
@@ -35,23 +35,23 @@ pub enum Parser {
     Glove,
     /// Bytes of a tracker; the first one chooses the format.
     Tracker,
-    /// Lines of joints.
+    /// Lines of hand joints.
     Joints,
     /// A calibration of a glove in any of its forms.
     Calibration,
-    /// A hand's configuration.
+    /// Configuration of a hand.
     HandSetup,
-    /// A scene.
+    /// Scene file.
     Scene,
     /// Recordings of other programs.
     Recordings,
 }
 
-/// What separates a mesh file from its other half.
+/// Line between a mesh file and the other file that it needs.
 const COMPANION: &[u8] = b"--companion--\n";
 
 impl Parser {
-    /// All of them.
+    /// All parsers.
     pub const ALL: [Self; 12] = [
         Self::Frames,
         Self::Request,
@@ -67,7 +67,7 @@ impl Parser {
         Self::Recordings,
     ];
 
-    /// The name of its folder of seeds and of its fuzz target.
+    /// Name of the parser's folder of seeds and of its fuzz target.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Frames => "frames",
@@ -85,10 +85,10 @@ impl Parser {
         }
     }
 
-    /// Takes any bytes.
+    /// Parses any bytes and checks the result.
     ///
     /// # Panics
-    /// If the parser is broken.
+    /// If the parser has a fault.
     pub fn take(self, bytes: &[u8]) {
         match self {
             Self::Frames => frames(bytes),
@@ -111,7 +111,7 @@ impl Parser {
     }
 }
 
-/// Cut in pieces or not, the same frames come out and the same fault is found.
+/// Checks that the same frames and the same fault are found, in pieces or not.
 fn frames(bytes: &[u8]) {
     let Some((&cut, stream)) = bytes.split_first() else { return };
     let piece = usize::from(cut) + 1;
@@ -139,7 +139,7 @@ fn frames(bytes: &[u8]) {
     assert_eq!(whole.1.is_some(), cut.1.is_some());
 }
 
-/// The kind that a byte chooses among those of one side, and the payload as a sound frame.
+/// Kind of one side that the first byte chooses, with the payload, as an undamaged frame.
 fn sound_frame(bytes: &[u8], of_server: bool) -> Option<Frame> {
     let (&choice, payload) = bytes.split_first()?;
     let kinds: Vec<Kind> =
@@ -200,7 +200,7 @@ fn mesh(bytes: &[u8]) {
     assert_eq!(again.mesh.node_count(), count);
 }
 
-/// What can be read can be mended, and then has corners that are there.
+/// Checks that a surface that can be read can be mended, and then has valid corners.
 fn surface(bytes: &[u8]) {
     let Ok(read) = parse_surface("fuzzed", bytes, &mut |_| Some(bytes.to_vec())) else { return };
     let Ok(mended) = MendedSurface::new(&read.surface) else { return };

@@ -20,26 +20,26 @@ pub const METHODS: [&str; 10] = [
     "condensed",
 ];
 
-/// Rubber-like.
+/// Material similar to soft rubber.
 pub const MATERIAL: Material = Material { young: 1.0e5, poisson: 0.3 };
 
-/// A built-in object.
+/// Mesh of a built-in object.
 ///
 /// # Panics
-/// Outside the numbers of nodes it can have.
+/// If the object cannot have this number of nodes.
 pub fn object(shape: BuiltIn, nodes: usize) -> TetMesh {
     generate(shape, nodes).expect("a built-in object of this size")
 }
 
-/// A cube.
+/// Mesh of a cube.
 ///
 /// # Panics
-/// As [`object`].
+/// If a cube cannot have this number of nodes.
 pub fn cube(nodes: usize) -> TetMesh {
     object(BuiltIn::Cube, nodes)
 }
 
-/// A mesh as it travels.
+/// Mesh as it travels.
 pub fn mesh_data(mesh: &TetMesh) -> MeshData {
     MeshData {
         vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
@@ -48,8 +48,8 @@ pub fn mesh_data(mesh: &TetMesh) -> MeshData {
     }
 }
 
-/// Known displacements: the lowest tenth of the object is held, the highest tenth is pushed down
-/// and aside by a tenth of the height, more for a larger `push`.
+/// Known displacements: the lowest tenth of the object is held, the highest tenth is pushed down and
+/// aside by a tenth of the height times `push`.
 ///
 /// Units: m.
 pub fn squeeze(mesh: &TetMesh, push: f64) -> Vec<DofValue> {
@@ -70,7 +70,7 @@ pub fn squeeze(mesh: &TetMesh, push: f64) -> Vec<DofValue> {
     known
 }
 
-/// A question for all nodes, with reaction forces.
+/// Question about all nodes, with reaction forces.
 ///
 /// # Panics
 /// If `method` cannot be a method's name.
@@ -83,16 +83,16 @@ pub fn question(known: Vec<DofValue>, method: &str) -> Question {
     }
 }
 
-/// A linear question about a mesh that comes along.
+/// Linear question about a mesh that comes along.
 #[derive(Clone, Debug)]
 pub struct Once {
-    /// Nodes and elements.
+    /// Nodes and elements of the mesh.
     pub mesh: MeshData,
     /// One material, or one for each region.
     pub materials: Vec<Material>,
-    /// Which element.
+    /// Kind of element, or the choice of it left to the server.
     pub element: ElementChoice,
-    /// What is known and asked.
+    /// Known displacements and wanted results.
     pub question: Question,
 }
 
@@ -109,7 +109,7 @@ impl From<Once> for Request {
     }
 }
 
-/// One self-contained request: a squeezed object.
+/// Request with its own mesh: a squeezed object.
 pub fn once(mesh: &TetMesh, method: &str) -> Once {
     Once {
         mesh: mesh_data(mesh),
@@ -119,7 +119,7 @@ pub fn once(mesh: &TetMesh, method: &str) -> Once {
     }
 }
 
-/// A model to keep.
+/// Model to be kept.
 pub fn upload(mesh: &TetMesh) -> UploadModel {
     UploadModel {
         mesh: mesh_data(mesh),
@@ -129,7 +129,7 @@ pub fn upload(mesh: &TetMesh) -> UploadModel {
     }
 }
 
-/// One frame on a kept model: the object squeezed by `push`.
+/// Frame question about a kept model: the object squeezed by `push`.
 pub fn frame(mesh: &TetMesh, push: f64, method: &str) -> Ask {
     Ask::new(ModelHash::of(&upload(mesh)), question(squeeze(mesh, push), method))
 }

@@ -7,10 +7,10 @@ pub struct Random(u64);
 const USUAL_SEED: u64 = 1998;
 
 impl Random {
-    /// Source for one test; its seed is printed, so that a failure can be repeated.
+    /// Source for one test; prints its seed, so that a failure can be repeated.
     ///
     /// # Panics
-    /// If `SEED` is set to something that is no number.
+    /// If `SEED` is set to a text that is no number.
     pub fn from_environment(test: &str) -> Self {
         let seed = match std::env::var("SEED") {
             Ok(text) => text.parse().expect("SEED must be a whole number"),
@@ -25,7 +25,7 @@ impl Random {
         Self(seed)
     }
 
-    /// Any number.
+    /// Random number of 64 bits.
     pub fn number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -34,12 +34,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Number below `end`; 0 if `end` is 0.
+    /// Random number below `end`; 0 if `end` is 0.
     pub fn below(&mut self, end: usize) -> usize {
         (self.number() % (end.max(1) as u64)) as usize
     }
 
-    /// Bytes without meaning.
+    /// Random bytes.
     pub fn bytes(&mut self, len: usize) -> Vec<u8> {
         (0..len).map(|_| self.number() as u8).collect()
     }

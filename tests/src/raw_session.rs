@@ -1,4 +1,4 @@
-//! A client that sends any bytes, whether they make sense or not.
+//! Client that sends any bytes, valid or not.
 
 use std::io::Write;
 use std::net::{Shutdown, SocketAddr, TcpStream};
@@ -7,23 +7,23 @@ use std::time::Duration;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{ConnectionError, HEADER_LEN, Limits, Reply, Request, VERSION};
 
-/// A TCP connection on which nothing is checked before it is sent.
+/// TCP connection on which nothing is checked before it is sent.
 #[derive(Debug)]
 pub struct RawSession {
     connection: Connection<TcpStream>,
 }
 
-/// Longer than any reply to a small question takes, even on a busy machine.
+/// Longest wait for a reply: longer than a small question takes, even on a busy machine.
 const REPLY_MAX: Duration = Duration::from_secs(20);
 
-/// A server that reads takes the next bytes earlier than this.
+/// Time after which a server that takes no bytes counts as not reading.
 const FULL_AFTER: Duration = Duration::from_millis(500);
 
 impl RawSession {
-    /// Connects, without a Hello.
+    /// Connects, without a `Hello`.
     ///
     /// # Panics
-    /// If nobody listens there.
+    /// If no server listens there.
     pub fn open(address: SocketAddr) -> Self {
         let stream = TcpStream::connect(address).expect("a server listens there");
         stream.set_nodelay(true).expect("TCP_NODELAY");
@@ -32,23 +32,23 @@ impl RawSession {
         Self { connection: Connection::new(stream, Limits::default()) }
     }
 
-    /// Sends bytes; a server that has closed already is no error here.
+    /// Sends bytes; that the server has closed already is no error here.
     pub fn send(&mut self, bytes: &[u8]) {
         let mut stream = self.connection.stream();
         let _ = stream.write_all(bytes);
     }
 
-    /// Sends the same bytes again and again until the server takes no more of them.
+    /// Sends the same bytes again and again until the server takes no more.
     ///
     /// # Panics
-    /// If the socket takes no time limit.
+    /// If the socket refuses a time limit.
     pub fn send_until_full(&mut self, bytes: &[u8]) {
         let mut stream = self.connection.stream();
         stream.set_write_timeout(Some(FULL_AFTER)).expect("a write timeout");
         while stream.write_all(bytes).is_ok() {}
     }
 
-    /// Says that nothing more will come.
+    /// Closes the sending side.
     pub fn finish(&mut self) {
         let _ = self.connection.stream().shutdown(Shutdown::Write);
     }
@@ -56,7 +56,7 @@ impl RawSession {
     /// Next reply with its request id; `None` when the server has closed or reset the connection.
     ///
     /// # Panics
-    /// If nothing happens for a long time, and if what comes is no reply.
+    /// If nothing comes for a long time, or a frame that is no reply.
     pub fn reply(&mut self) -> Option<(u64, Reply)> {
         match self.connection.read_frame() {
             Ok(Some(frame)) => {
@@ -68,10 +68,10 @@ impl RawSession {
         }
     }
 
-    /// Sends a sound request and waits for the reply.
+    /// Sends a valid request and waits for the reply.
     ///
     /// # Panics
-    /// If the server closes instead, or answers another request.
+    /// If the server closes, or answers another request.
     pub fn ask(&mut self, request_id: u64, request: &Request) -> Reply {
         self.send(&request_frame(request_id, request));
         let (id, reply) = self.reply().expect("the session lives");
@@ -80,18 +80,18 @@ impl RawSession {
     }
 }
 
-/// A request as a frame.
+/// Request as a frame.
 ///
 /// # Panics
-/// If it is too large to be sent.
+/// If the request is too large to be sent.
 pub fn request_frame(request_id: u64, request: &Request) -> Vec<u8> {
     let mut bytes = Vec::new();
     request.encode_into(request_id, &Limits::default(), &mut bytes).expect("small enough");
     bytes
 }
 
-/// A header with sound checksums around any claims; `payload` is what the second checksum covers,
-/// `payload_len` what is announced.
+/// Header with right checksums and any content; `payload` is covered by the second checksum,
+/// `payload_len` is the announced length.
 pub fn raw_header(
     version: u16,
     kind: u16,
@@ -112,10 +112,10 @@ pub fn raw_header(
     raw
 }
 
-/// A frame with sound checksums around any payload.
+/// Frame with right checksums around any payload.
 ///
 /// # Panics
-/// If the payload is longer than 32 bits count.
+/// If the length of the payload needs more than 32 bits.
 pub fn raw_frame(kind: u16, request_id: u64, payload: &[u8]) -> Vec<u8> {
     let payload_len = u32::try_from(payload.len()).expect("a short payload");
     let mut bytes = raw_header(VERSION, kind, request_id, payload_len, payload).to_vec();

@@ -1,7 +1,7 @@
 //! A server in a process of its own, which a test can kill as a power cut would.
 //!
-//! The process is the test's own program, started again to run one test that serves: so it is never
-//! older than the test.
+//! The process is the test's own program, started again to run one test that serves, so it is never older
+//! than the test.
 
 use std::io::{BufRead, BufReader, Read};
 use std::net::SocketAddr;
@@ -9,22 +9,22 @@ use std::process::{Child, Command, Stdio};
 
 use fea_server::ServerConfig;
 
-/// A running server; killed when dropped.
+/// Running server; killed when dropped.
 #[derive(Debug)]
 pub struct ServerProcess {
     child: Child,
     address: SocketAddr,
 }
 
-/// Tells the program that it is to serve, and where.
+/// Environment variable that makes the program serve, with the address.
 const ADDRESS: &str = "SOFTGRASP_TEST_SERVER";
-/// What it says when it listens.
+/// Beginning of the line that the server prints when it listens.
 const LISTENING: &str = "test server listens on ";
 
-/// The body of the test that serves; returns at once where the program was not started for that.
+/// Body of the test that serves; returns at once if the program was not started for that.
 ///
 /// # Panics
-/// If it cannot listen.
+/// If the server cannot listen.
 pub fn serve_if_asked() {
     let Ok(address) = std::env::var(ADDRESS) else { return };
     let listen = address.parse().expect("an address");
@@ -38,11 +38,11 @@ pub fn serve_if_asked() {
 }
 
 impl ServerProcess {
-    /// Starts a server at an address, port 0 for a free one; `test` is the whole name of the test of
-    /// this program that calls [`serve_if_asked`].
+    /// Starts a server at an address (port 0 for a free one); `test` is the whole name of this program's
+    /// test that calls [`serve_if_asked`].
     ///
     /// # Panics
-    /// If it does not start.
+    /// If the server does not start.
     pub fn start(test: &str, address: SocketAddr) -> Self {
         let program = std::env::current_exe().expect("this program");
         let mut child = Command::new(program)
@@ -59,12 +59,12 @@ impl ServerProcess {
         Self { child, address: address.expect("it listens") }
     }
 
-    /// Address it listens on.
+    /// Address that the server listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Ends it at once, whatever it is doing.
+    /// Kills the server, whatever it is doing.
     pub fn kill(self) {
         drop(self);
     }

@@ -1,9 +1,9 @@
-//! Meshes and recordings of others, which lie beside the repository and are not part of it.
+//! Meshes and recordings of other authors, which are beside the repository and no part of it.
 
 use std::path::{Path, PathBuf};
 
-/// A folder of shared data, in the folder that `SOFTGRASP_SHARED` names or in `shared` beside a folder above.
-/// `None`, and a line that says so, where it is not there: the test is skipped.
+/// Folder of shared data, in the folder that `SOFTGRASP_SHARED` names or in `shared` beside a folder
+/// above. `None`, with a line that the test is skipped, if it does not exist.
 #[expect(clippy::print_stdout, reason = "whoever runs the test is told that it was skipped")]
 pub fn shared(name: &str) -> Option<PathBuf> {
     let named = std::env::var_os("SOFTGRASP_SHARED").map(PathBuf::from);

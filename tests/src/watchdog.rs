@@ -1,12 +1,12 @@
-//! A time limit on work that must not hang.
+//! Time limit on work that must not hang.
 
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Runs `work` on a thread of its own; hands its outcome or its panic on.
+/// Runs `work` on a thread of its own; passes on its outcome or its panic.
 ///
 /// # Panics
-/// If the limit passes first, and if the work does.
+/// If the limit passes first, or if the work panics.
 pub fn within<T: Send + 'static>(
     limit: Duration,
     what: &str,
@@ -27,10 +27,10 @@ pub fn within<T: Send + 'static>(
     }
 }
 
-/// Asks again and again until `ready` says yes.
+/// Calls `ready` again and again until it returns true.
 ///
 /// # Panics
-/// If it does not within `limit`.
+/// If that takes longer than `limit`.
 pub fn until(limit: Duration, what: &str, mut ready: impl FnMut() -> bool) {
     let start = Instant::now();
     while !ready() {

@@ -8,10 +8,10 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// What `deny.toml` allows.
+/// Licences that `deny.toml` allows.
 struct Allowed {
     all: BTreeSet<String>,
-    /// Of single packages, beside those.
+    /// Licences that it allows for single packages besides.
     exceptions: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -31,7 +31,7 @@ impl Allowed {
         Self { all: texts(&licences["allow"]), exceptions: exceptions.collect() }
     }
 
-    /// The allowed licences by which a package can be used, or what is wrong with it.
+    /// Allowed licences by which a package can be used, or the reason why it cannot.
     fn of(&self, package: &Package) -> Result<BTreeSet<String>, String> {
         let Package { name, version, licence } = package;
         let expression = spdx::Expression::parse_mode(licence, spdx::ParseMode::LAX)
@@ -54,7 +54,7 @@ impl Allowed {
     }
 }
 
-/// A package of the lock file.
+/// Package of the lock file.
 struct Package {
     name: String,
     version: String,
@@ -70,8 +70,8 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(root().join(path)).expect(path)
 }
 
-/// What cargo tells of the packages, asked with these arguments; `None` where it cannot, because some of
-/// them are not on this machine.
+/// Packages that cargo lists with these arguments; `None` if it cannot, because some are not on this
+/// machine.
 fn packages(arguments: &[&str]) -> Option<Vec<Package>> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let output = Command::new(cargo)
@@ -90,7 +90,7 @@ fn packages(arguments: &[&str]) -> Option<Vec<Package>> {
     Some(packages.collect())
 }
 
-/// All packages, or those of this machine's platform where the others cannot be had; whether it is all.
+/// All packages, or those of this machine's platform if the others are missing; and whether it is all.
 fn packages_that_are_there() -> (Vec<Package>, bool) {
     if let Some(packages) = packages(&[]) {
         return (packages, true);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use softgrasp_tests::quoting::{Figure, faults, figures, item_faults, items};
 
-/// The section whose figures must all have a source.
+/// Heading of the section whose figures must all have a source.
 const SECTION: &str = "Numbers";
 
 fn root() -> PathBuf {
@@ -17,13 +17,13 @@ fn readme() -> String {
     fs::read_to_string(root().join("README.md")).expect("README.md can be read")
 }
 
-/// The page in the folder of reports, with its links as from the root.
+/// Page in the folder of reports, with its links counted from the root.
 fn page_of_reports() -> String {
     let page = report("README.md").expect("reports/README.md can be read");
     page.replace("](", "](reports/")
 }
 
-/// A committed file of a report.
+/// Text of a committed file of a report.
 fn report(name: &str) -> Option<String> {
     fs::read_to_string(root().join("reports").join(name)).ok()
 }
@@ -42,7 +42,7 @@ fn readme_is_a_page_and_a_half() {
     assert!(bytes <= 8192, "README.md has {bytes} bytes");
 }
 
-/// One more in the last digit, written as the figure is.
+/// Figure with its last digit one larger, in the same form.
 fn changed(figure: &Figure) -> String {
     let (digits, exponent) = match figure.written.split_once('e') {
         Some((digits, exponent)) => (digits, format!("e{exponent}")),

@@ -1,5 +1,5 @@
-//! Reports that README quotes are of a clean commit, and who reads them is told which are older than the code
-//! that they measure.
+//! Reports that README quotes are of a clean commit, and the reports' page lists those that are older
+//! than the code that they measure. that they measure.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -8,7 +8,7 @@ use std::process::Command;
 
 use softgrasp_tests::quoting::items;
 
-/// The code that a report measures, by the beginning of the name of its file.
+/// Code that a report measures, by the beginning of its file's name.
 const MEASURED: [(&str, &[&str]); 7] = [
     ("latency-frame", &["crates/core/src/solve/condensed", "crates/protocol/src", ANSWERS]),
     ("latency-hold", &["crates/core/src/solve/condensed", "crates/protocol/src", ANSWERS]),
@@ -19,7 +19,7 @@ const MEASURED: [(&str, &[&str]); 7] = [
     ("collision", &["crates/grasp/src/sphere_tree"]),
 ];
 const ANSWERS: &str = "crates/fea-server/src/answer";
-/// The section of the reports' page that lists the reports that are older than what they measure.
+/// Heading of the section that lists the reports older than the code they measure.
 const OLDER: &str = "Older than the code they measure";
 
 fn root() -> PathBuf {
@@ -38,14 +38,14 @@ fn quoted() -> BTreeSet<String> {
     comments.filter_map(|c| Some(c.split(" |").next()?.trim().to_owned())).collect()
 }
 
-/// The commit in the head of a report's file.
+/// Commit in the head of a report's file.
 fn commit(file: &str) -> String {
     let text = text(&format!("reports/{file}"));
     let line = text.lines().find_map(|line| line.strip_prefix("# commit: "));
     line.unwrap_or_else(|| panic!("{file} does not say of which commit it is")).to_owned()
 }
 
-/// Commits since one that changed some paths; `None` where there is no history to ask.
+/// Number of commits since one that changed some paths; `None` if there is no history.
 fn commits_since(commit: &str, paths: &[&str]) -> Option<usize> {
     let range = format!("{commit}..HEAD");
     let asked = ["rev-list", "--count", "--no-merges", &range, "--"];

@@ -34,7 +34,7 @@ struct Arguments {
     run: RunCommand,
 }
 
-/// Plays a run with these flags and returns its report.
+/// Plays a run with these flags; returns its report.
 fn play(flags: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let report = folder.path().join("r.json");
@@ -60,7 +60,7 @@ fn check_events(name: &str, report: &Value) {
     assert!(events == golden, "{name}: events differ from {}:\n{events}", path.display());
 }
 
-/// What every whole story must show, whatever the object.
+/// Checks what every whole story must show, for any object.
 fn check_story(name: &str, report: &Value) {
     assert_eq!(report["ticks"], 600, "{name}");
     for state in ["Free", "Avoiding", "Attached", "Deforming", "Detached"] {
@@ -146,7 +146,7 @@ fn key_frames_are_written_and_can_be_grasped_in_turn() {
     assert_eq!(report["object"]["nodes"], 300.0_f64 as u64);
 }
 
-/// The parts of a run, for a test that decides when the server dies.
+/// Parts of a run, for a test that decides when the server is killed.
 struct Bench {
     grasp_loop: GraspLoop,
     hand: ScriptedHand,
@@ -184,7 +184,7 @@ impl Bench {
         outcome
     }
 
-    /// Ticks until the condition holds; a minute is far more than any machine needs.
+    /// Plays ticks until the condition holds; gives up after a minute.
     fn tick_until(&mut self, what: &str, mut done: impl FnMut(&TickOutcome) -> bool) {
         let start = Instant::now();
         loop {

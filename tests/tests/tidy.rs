@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use softgrasp_tests::imports::Package;
 
-/// Lines a source file may have.
+/// Largest number of lines of a source file.
 const LINES_MAX: usize = 500;
 /// Longer files, each with its reason; there is none.
 const LONGER_FILES: [(&str, &str); 0] = [];
-/// Folders that hold no sources of ours.
+/// Folders without sources of this repository.
 const SKIPPED: [&str; 4] = ["target", "out", "node_modules", "proptest-regressions"];
 
-/// One text file of the repository.
+/// Text file of the repository.
 struct TextFile {
     /// Path from the root, with `/`.
     path: String,
@@ -25,7 +25,7 @@ impl TextFile {
         self.path.ends_with(".rs")
     }
 
-    /// Code that ships: no test file, and nothing behind the test module's attribute.
+    /// Lines of the code that ships: no test file, and nothing behind the attribute of the test module.
     fn shipped_code(&self) -> impl Iterator<Item = (usize, &str)> {
         let is_test = self.path.starts_with("tests/")
             || self.path.contains("/tests")
@@ -74,7 +74,7 @@ fn collect(folder: &Path, prefix: &str, files: &mut Vec<TextFile>) {
     }
 }
 
-/// Fails with one line per fault.
+/// Fails with one line for each fault.
 fn assert_none(rule: &str, faults: Vec<String>) {
     assert!(faults.is_empty(), "{rule}:\n  {}", faults.join("\n  "));
 }
@@ -315,7 +315,7 @@ fn quoted(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// Whether a quoted text is meant to be a path of this repository.
+/// Whether a quoted text looks like a path of this repository.
 fn looks_like_a_path(quote: &str) -> bool {
     let plain = quote.chars().all(|c| c.is_ascii_alphanumeric() || "._-/".contains(c));
     let folders = ["crates/", "tests/", "benches/", "docs/", "scenes/", "reports/", ".ci/"];

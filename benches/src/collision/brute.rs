@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use softgrasp_grasp::hand::{FingerColliders, HandColliders};
 use softgrasp_grasp::shape::{Cylinder, Sphere};
 
-/// What really is inside a hand.
+/// Vertices that are inside a hand, found by testing all.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Inside {
     /// Vertices inside each of the fifteen cylinders and then the five tips, ascending.
@@ -14,7 +14,7 @@ pub(super) struct Inside {
 }
 
 impl Inside {
-    /// Looks at every vertex, once a collider.
+    /// Tests every vertex against every collider.
     ///
     /// Frame: that of the points.
     pub fn of(hand: &HandColliders, points: &[Point3<f64>], normals: &[Vector3<f64>]) -> Self {
@@ -33,13 +33,13 @@ impl Inside {
         Self { by_collider, contacts }
     }
 
-    /// Whether each segment of a finger has a vertex inside; the last is its cylinder and its tip.
+    /// Whether each segment of a finger contains a vertex; the last counts its cylinder and its tip.
     pub fn collide(&self, finger: usize) -> [bool; 3] {
         let has = |collider: usize| !self.by_collider[collider].is_empty();
         [has(3 * finger), has(3 * finger + 1), has(3 * finger + 2) || has(15 + finger)]
     }
 
-    /// Pairs of collider and vertex inside it.
+    /// Number of pairs of a collider and a vertex inside it.
     pub fn count(&self) -> usize {
         self.by_collider.iter().map(Vec::len).sum()
     }

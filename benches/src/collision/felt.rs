@@ -1,4 +1,4 @@
-//! Finds what a hand touches in a tick, by the sphere tree and by the peer.
+//! Finds the contacts of a hand in a tick, by the sphere tree and by the peer.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::bounding_volume::Aabb;
@@ -12,14 +12,14 @@ use softgrasp_grasp::sphere_tree::{
 use super::brute::Inside;
 use super::peer::{Leaf, Peer, cylinder_box, sphere_box};
 
-/// What one finger feels.
+/// Contacts of one finger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Felt {
-    /// Whether each segment has a vertex inside, from the palm outward; the last with its tip.
+    /// Whether each segment contains a vertex, from the palm outward; the last counts its tip too.
     pub collide: [bool; 3],
-    /// Whether no vertex is within the release margin and the tip touches none.
+    /// Whether no vertex is within the release margin and the tip touches no vertex.
     pub clear: bool,
-    /// The vertex that the tip touches.
+    /// Vertex that the fingertip touches.
     pub contact: Option<u32>,
 }
 
@@ -33,10 +33,10 @@ pub(super) struct SurfaceOf<'a> {
     pub triangles: &'a [[u32; 3]],
 }
 
-/// Colliders of a hand are nearer than this to a vertex, or the finger is clear, m.
+/// Distance to a vertex below which a finger does not count as clear, m.
 const MARGIN: f64 = Grasp::RELEASE_MARGIN_M;
 
-/// The whole question, as the grasp asks it: `sense` of the core.
+/// Contacts of all fingers by the sphere tree: `sense`, as the grasp calls it.
 pub(super) fn by_tree(
     tree: &SphereTree,
     surface: SurfaceOf<'_>,
@@ -49,7 +49,7 @@ pub(super) fn by_tree(
     })
 }
 
-/// The part of it that finds contacts: `tip_hits` of the five tips.
+/// Contacts of the five fingertips by the sphere tree: `tip_hits`.
 pub(super) fn contacts_by_tree(
     tree: &SphereTree,
     surface: SurfaceOf<'_>,
@@ -61,7 +61,7 @@ pub(super) fn contacts_by_tree(
     })
 }
 
-/// The whole question put to the peer: boxes find leaves, the same exact tests decide.
+/// Contacts of all fingers by the peer: its boxes find leaves, and the same exact tests decide.
 pub(super) fn by_peer(peer: &Peer, surface: SurfaceOf<'_>, hand: &HandColliders) -> [Felt; 5] {
     hand.fingers.map(|finger| {
         let mut closeness =
@@ -76,7 +76,7 @@ pub(super) fn by_peer(peer: &Peer, surface: SurfaceOf<'_>, hand: &HandColliders)
     })
 }
 
-/// The contacts alone, by the peer.
+/// Contacts of the five fingertips by the peer.
 pub(super) fn contacts_by_peer(
     peer: &Peer,
     surface: SurfaceOf<'_>,
@@ -85,7 +85,7 @@ pub(super) fn contacts_by_peer(
     hand.fingers.map(|finger| contact_by_peer(peer, surface, &finger))
 }
 
-/// Answers that brute force contradicts: segments, and contacts that are certain.
+/// Number of results that brute force contradicts: segments, and contacts that are certain.
 pub(super) fn wrong(felt: &[Felt; 5], inside: &Inside) -> usize {
     let mut wrong = 0;
     for (finger, felt) in felt.iter().enumerate() {
@@ -96,7 +96,7 @@ pub(super) fn wrong(felt: &[Felt; 5], inside: &Inside) -> usize {
     wrong + wrong_contacts(&felt.map(|felt| felt.contact), inside)
 }
 
-/// Contacts that are certain and not found.
+/// Number of certain contacts that were not found.
 pub(super) fn wrong_contacts(found: &[Option<u32>; 5], inside: &Inside) -> usize {
     let both = inside.contacts.iter().zip(found);
     both.filter(|(right, got)| right.is_some() && right != got).count()
@@ -132,7 +132,7 @@ fn tip_closeness(peer: &Peer, surface: SurfaceOf<'_>, tip: &Sphere) -> Closeness
     closeness(peer, surface, &aabb, |sphere| sphere_meets_sphere(tip, sphere))
 }
 
-/// As the sphere tree answers it: the first vertex inside ends the search.
+/// Closeness to a collider, as the sphere tree defines it: the first vertex inside ends the search.
 fn closeness(
     peer: &Peer,
     surface: SurfaceOf<'_>,

@@ -8,17 +8,17 @@ use super::brute::contact;
 /// Colliders of a hand in one pose, in the object's frame.
 pub(super) type Poses = Vec<HandColliders>;
 
-/// Where the object's centre may be in the palm's frame: so far along the fingers, so far in front
-/// of the palm; farthest first.
+/// Positions of the object's centre in the palm's frame, m: distance along the fingers and in front of
+/// the palm; farthest first.
 const ALONG: [f64; 5] = [0.12, 0.11, 0.10, 0.09, 0.08];
 const IN_FRONT: [f64; 5] = [0.055, 0.05, 0.045, 0.04, 0.035];
-/// Sides the object is grasped from.
+/// Number of sides from which the object is grasped.
 const SIDES: usize = 4;
-/// Steps from a flat hand to a fist; about 2 mm at a fingertip.
+/// Number of steps from a flat hand to a fist; about 2 mm each at a fingertip.
 const STEPS: usize = 40;
-/// Poses of each side: so many steps before every fingertip's contact, or behind it.
+/// Poses of each side, in steps from the contact of every fingertip; negative before the contact.
 const FROM_CONTACT: [f64; 8] = [-6.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0];
-/// A finger that finds no contact stays as open as this.
+/// Closure of a finger that finds no contact.
 const OPEN: f64 = 0.3;
 
 /// Thirty-two poses: from four sides, each finger from before its contact to some steps behind it.
@@ -49,7 +49,7 @@ pub(super) fn poses(points: &[Point3<f64>], normals: &[Vector3<f64>]) -> Poses {
     poses
 }
 
-/// Closure at which each tip first touches, thumb first.
+/// Closure at which each fingertip first touches, thumb first.
 fn touches(
     object_from_palm: Isometry3<f64>,
     points: &[Point3<f64>],
@@ -80,7 +80,7 @@ fn side(index: usize, object_in_palm: [f64; 3]) -> Isometry3<f64> {
     )
 }
 
-/// A hand whose fingers have closed by these shares, thumb first.
+/// Hand whose fingers have closed by these shares, thumb first.
 fn closed_hand(object_from_palm: Isometry3<f64>, closure: &[f64; 5]) -> HandColliders {
     let dimensions = HandDimensions::default();
     let at = |digit: usize| JointAngles::flat().lerp(&JointAngles::fist(), closure[digit]);

@@ -7,16 +7,16 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use softgrasp_grasp::hand::HandColliders;
 use softgrasp_grasp::shape::{Cylinder, Sphere};
 
-/// What the peer's leaves are boxes of.
+/// Kind of primitive in the peer's leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Leaf {
-    /// Triangles, as a user of parry3d would have them.
+    /// Boxes of triangles, as usual with parry3d.
     Triangle,
-    /// Vertices, as ours are.
+    /// Boxes of vertices, as in the sphere tree.
     Vertex,
 }
 
-/// Surface in the peer's numbers; made beforehand, so conversion is not on its account.
+/// Surface in the peer's number type; converted before the times are measured.
 pub(super) type PeerPoints = Vec<Vector>;
 
 /// The peer's tree over one surface.
@@ -74,7 +74,7 @@ impl Peer {
         out.extend(self.bvh.intersect_aabb(collider));
     }
 
-    /// What the leaves are boxes of.
+    /// Kind of primitive in the leaves.
     pub fn leaf(&self) -> Leaf {
         self.leaf
     }
@@ -127,7 +127,7 @@ pub(super) fn cylinder_box(cylinder: &Cylinder, margin: f64) -> Aabb {
     aabb(&centre, half.into())
 }
 
-/// The same of a sphere.
+/// Box of a sphere and all that is nearer to it than `margin`, m.
 pub(super) fn sphere_box(sphere: &Sphere, margin: f64) -> Aabb {
     aabb(&sphere.centre, [sphere.radius + margin; 3])
 }

@@ -1,4 +1,4 @@
-//! Writes the page: the ratios of like with like first, every one of them, then the times.
+//! Writes the page: first the ratios of comparable operations, then the times.
 
 use softgrasp_core::mesh::BuiltIn;
 
@@ -7,8 +7,8 @@ use crate::report::{Options, Report, ReportError, progress};
 use crate::sample::Spread;
 use crate::table::{Cell, Table};
 
-/// What a ratio over the peer with triangles may be, and from how many vertices on it counts
-/// (objects come near 10 000).
+/// Largest ratio to the peer with triangles, and the number of vertices from which on it counts (objects
+/// have up to about 10 000).
 const BAR: f64 = 0.5;
 const BAR_VERTICES: usize = 9000;
 
@@ -48,10 +48,10 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     Ok(report)
 }
 
-/// What a run took for one operation, µs; `None` where a competitor has no such operation.
+/// Time of one operation in a run, µs; `None` if a competitor has no such operation.
 type Of = fn(&Run) -> Option<f64>;
 
-/// Rows for the times: every operation, every competitor.
+/// Adds the times of every operation and competitor.
 fn add_times(table: &mut Table, task: &Task, runs: &[Vec<Run>]) {
     let operations: [(&str, Of); 6] = [
         ("build", |r| Some(r.build)),
@@ -87,7 +87,7 @@ fn add_times(table: &mut Table, task: &Task, runs: &[Vec<Run>]) {
     }
 }
 
-/// Rows for the ratios over one peer: every operation.
+/// Adds the ratios to one peer for every operation.
 fn add_ratios(table: &mut Table, task: &Task, runs: &[Vec<Run>], peer: usize) {
     // The faster of the peer's two ways to refit.
     let operations: [(&str, Of, bool); 8] = [

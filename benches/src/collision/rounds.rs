@@ -20,10 +20,10 @@ use crate::sample::{Competitor, Effort, take_turns, timed_ms};
 /// Names of the competitors, in the order of their runs.
 pub(super) const NAMES: [&str; 4] =
     ["sphere tree", "parry3d Bvh, vertices", "parry3d Bvh, triangles", "brute force"];
-/// Deformed shapes, taken in turn.
+/// Number of deformed shapes, which take turns.
 const DEFORMED: usize = 5;
 
-/// A shape of the surface, and what is inside every pose of the hand then.
+/// Shape of the surface, and the vertices inside each pose of the hand.
 struct Frame {
     points: Vec<Point3<f64>>,
     peer_points: PeerPoints,
@@ -31,7 +31,7 @@ struct Frame {
     inside: Vec<Inside>,
 }
 
-/// A surface at rest (first) and deformed (the others), and the hands that search it.
+/// Surface at rest (first) and deformed (the others), and the hands that search it.
 pub(super) struct Task {
     pub skin: Skin,
     poses: Poses,
@@ -39,33 +39,34 @@ pub(super) struct Task {
     frames: Vec<Frame>,
 }
 
-/// One round of one competitor; times in µs, those of searches per pose of the hand.
+/// One round of one competitor; times in µs, those of searches for each pose of the hand.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Run {
     pub build: f64,
     pub refit: f64,
-    /// The peer's other way to refit.
+    /// Time of the peer's other way to refit, µs.
     pub refit_in_place: Option<f64>,
     pub search: Search,
-    /// Vertices inside a collider that were not reported, and wrong answers to the grasp.
+    /// Number of vertices inside a collider that were not reported, and of wrong results.
     pub missed: usize,
 }
 
 /// Times of the searches of one pose, µs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Search {
-    /// All that the grasp asks about a hand in a tick.
+    /// Time of the whole search for a hand in a tick.
     pub grasp: f64,
-    /// The part of it that finds contacts of the tips.
+    /// Time of the search for contacts of the fingertips only.
     pub tips: f64,
-    /// Vertices near each segment and tip, as the thesis collects them.
+    /// Time of collecting the vertices near each segment and tip, as the thesis does.
     pub near: f64,
-    /// Leaves or vertices that the last of them reports.
+    /// Number of leaves or vertices that the last search reports.
     pub reported: f64,
 }
 
 impl Task {
-    /// A surface of about so many vertices, its deformed shapes, and what is inside every hand.
+    /// Task on a surface of about `vertices` vertices, with deformed shapes and the vertices inside every
+    /// hand.
     pub fn try_new(shape: BuiltIn, vertices: usize) -> Result<Self, ReportError> {
         let skin = Skin::try_new(shape, vertices)?;
         let mut normals = Vec::new();
@@ -89,7 +90,7 @@ impl Task {
         all.map(Inside::count).sum::<usize>() as f64 / (DEFORMED * self.poses.len()) as f64
     }
 
-    /// Contacts that are certain, over the deformed shapes.
+    /// Number of certain contacts over the deformed shapes.
     pub fn contacts(&self) -> usize {
         let all = self.frames[1..].iter().flat_map(|f| &f.inside);
         all.map(|inside| inside.contacts.iter().flatten().count()).sum()
@@ -100,7 +101,7 @@ impl Task {
         SurfaceOf { points: &frame.points, normals: &frame.normals, triangles }
     }
 
-    /// Build on the rest shape, refit to a deformed one, search it with every pose.
+    /// Builds the tree on the rest shape, refits it to a deformed one, and searches it with every pose.
     fn run_sphere_tree(&self, round: usize) -> Result<Run, ReportError> {
         let (rest, frame) = (&self.frames[0], &self.frames[1 + round % DEFORMED]);
         let nodes: Vec<u32> = (0..).take(rest.points.len()).collect();
@@ -183,7 +184,7 @@ impl Task {
         Search { grasp, tips, near, reported: reported as f64 / poses }
     }
 
-    /// Vertices inside a collider that its search does not report, and answers to the grasp that
+    /// Number of vertices inside a collider that the sphere tree does not report, and of results that
     /// brute force contradicts.
     fn missed_by_tree(&self, tree: &SphereTree, frame: &Frame) -> usize {
         let surface = self.surface(frame);
@@ -201,7 +202,7 @@ impl Task {
         missed
     }
 
-    /// The same for the peer.
+    /// Number of vertices that the peer does not report, and of its results that brute force contradicts.
     fn missed_by_peer(&self, peer: &Peer, frame: &Frame) -> usize {
         let surface = self.surface(frame);
         let mut missed = 0;
@@ -219,14 +220,14 @@ impl Task {
     }
 }
 
-/// How many of the expected vertices were not reported.
+/// Number of expected vertices that were not reported.
 fn not_among(expected: &[u32], mut reported: Vec<u32>) -> usize {
     reported.sort_unstable();
     expected.iter().filter(|v| reported.binary_search(v).is_err()).count()
 }
 
-/// Searches with the fifteen cylinders and then the five tips; `ended` hears the length of `found`
-/// after each.
+/// Searches with the fifteen cylinders and then the five tips; `ended` gets the length of `found` after
+/// each.
 fn search_hand(
     tree: &SphereTree,
     hand: &HandColliders,
@@ -243,7 +244,7 @@ fn search_hand(
     }
 }
 
-/// All competitors in turn, in the order of [`NAMES`].
+/// Runs all competitors in turn, in the order of [`NAMES`].
 ///
 /// # Errors
 /// [`ReportError::Wrong`] for a miss of the sphere tree.

@@ -16,9 +16,9 @@ pub(super) struct Skin {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A surface may have this share more or fewer vertices than asked for.
+/// Relative deviation of the number of vertices that is accepted.
 const NEAR_ENOUGH: f64 = 0.03;
-/// Meshes made while looking for the number of vertices.
+/// Number of meshes made to find one with the right number of vertices.
 const TRIES_MAX: usize = 6;
 
 impl Skin {
@@ -26,7 +26,7 @@ impl Skin {
     /// surface has as many.
     ///
     /// # Errors
-    /// [`ReportError::Generate`].
+    /// [`ReportError::Generate`] if the object cannot be generated.
     pub fn try_new(shape: BuiltIn, vertices: usize) -> Result<Self, ReportError> {
         let wanted = vertices as f64;
         // Between a cube's six faces of n² and its n³ nodes.
@@ -62,7 +62,7 @@ impl Skin {
         Ok(Self { shape, points, triangles })
     }
 
-    /// The vertices squeezed, twisted and bent, the more the larger `amount` (1: some per cent).
+    /// Vertices squeezed, twisted and bent; `amount` 1 means strains of some per cent.
     pub fn deformed(&self, amount: f64) -> Vec<Point3<f64>> {
         let bend = |p: &Point3<f64>| {
             let twist = Rotation3::from_axis_angle(&Vector3::y_axis(), 4.0 * amount * p.y);

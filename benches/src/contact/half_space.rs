@@ -1,4 +1,4 @@
-//! The same press on an elastic half-space, in closed form.
+//! Force of the same press on an elastic half-space, in closed form.
 
 /// Force that presses the mean of a half-space's surface down, the mean and the pressure both
 /// weighted by `1 − (d/r)²` on a disc.

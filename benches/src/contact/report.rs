@@ -22,10 +22,10 @@ use crate::threads::processors;
 /// Largest error, relative to a direct solve, with which a figure is reported.
 const ERROR_ALLOWED: f64 = 1e-9;
 const CONTACTS: [ContactModel; 3] = [ContactModel::Vertex, ContactModel::Patch, ContactModel::Mask];
-/// The bar of a warm frame: so many times an echo of the same bytes.
+/// Largest time of a warm frame, as a multiple of an echo of the same bytes.
 const ECHOES_MAX: f64 = 3.0;
 
-/// One contact model on one mesh.
+/// Press by one contact model on one mesh.
 struct Pressing {
     contact: ContactModel,
     nodes: usize,
@@ -76,7 +76,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     Ok(report)
 }
 
-/// A client of one object.
+/// Client that asks about one object.
 struct Asker<'a> {
     tips: &'a Tips,
     model: ModelHash,
@@ -96,7 +96,7 @@ impl<'a> Asker<'a> {
         Ok((ms, answer(reply)?))
     }
 
-    /// The press by one contact model: its force, once the answer is seen to be right.
+    /// Force of the press by one contact model, after its answer was checked.
     fn press(&mut self, contact: ContactModel) -> Result<Pressing, ReportError> {
         let question = self.tips.question(contact, 1.0, WANT_ALL);
         let (_, answer) = self.ask(question.clone())?;
@@ -114,7 +114,7 @@ impl<'a> Asker<'a> {
         })
     }
 
-    /// Frames and echoes in turn, as a row of the table.
+    /// Measures frames and echoes in turn; a row of the table.
     fn frames(mut self, contact: ContactModel, quick: bool) -> Result<[Cell; 10], ReportError> {
         let want = self.tips.want_surface();
         let question = self.tips.question(contact, 1.0, want.clone());
@@ -235,7 +235,7 @@ fn figure(pressings: &[Pressing]) -> Result<String, ReportError> {
     Ok(plot.svg()?)
 }
 
-/// Force on a half-space of the same material.
+/// Force on a half-space of the same material, N.
 fn exact() -> f64 {
     half_space::force(DEPTH, RADIUS, super::tips::YOUNG, super::tips::POISSON)
 }

@@ -1,5 +1,5 @@
-//! Steps of an object that five fingers pinch, lift and hold by friction: time by phase, beside how well the law
-//! of contact is met.
+//! Steps of an object that five fingers pinch, lift and hold by friction: time by phase, and the residual
+//! of the law of contact. of contact is met.
 
 use std::sync::Arc;
 
@@ -20,26 +20,26 @@ use crate::sample::timed_ms;
 use crate::table::{Cell, Table};
 use crate::tail::Tail;
 
-/// Diameter of the ball, m, and what it is made of.
+/// Diameter of the ball, m, and its material.
 const SIZE: f64 = 0.07;
 const YOUNG: f64 = 5.0e4;
 const POISSON: f64 = 0.4;
-/// Radius of a fingertip, m, how deep it presses, and how high it lifts.
+/// Radius of a fingertip, m, depth of its press, and height of the lift.
 const TIP: f64 = 0.008;
 const DEPTH: f64 = 0.008;
 const LIFT: f64 = 0.04;
 const FRICTION: f64 = 0.8;
-/// Steps a second, as in a run.
+/// Steps per second, as in a run.
 const RATE_HZ: f64 = 60.0;
-/// Steps of each phase: it settles, is pinched, lifted, and held.
+/// Steps of each phase: the ball settles, is pinched, lifted, and held.
 const SETTLE: u32 = 30;
 const PINCH: u32 = 60;
 const RAISE: u32 = 60;
 const HOLD: u32 = 300;
-/// Forces on the held ball add up to its weight to this, relative.
+/// Largest relative difference between the sum of the forces on the held ball and its weight.
 const BALANCE_ALLOWED: f64 = 1e-3;
 
-/// The ball with all that a step needs.
+/// Ball, and all that its steps need.
 struct Ball {
     model: Model,
     surface: Surface,
@@ -55,17 +55,17 @@ struct Way {
     residual_rel: f64,
 }
 
-/// As a run asks, less exactly, and at large deformation.
+/// Ways of a step: as a run asks, with less accuracy, and at large deformation.
 const WAYS: [Way; 4] = [
     Way { is_large: false, residual_rel: 1e-6 },
     Way { is_large: false, residual_rel: 1e-4 },
     Way { is_large: true, residual_rel: 1e-6 },
     Way { is_large: true, residual_rel: 1e-4 },
 ];
-/// A larger ball at large deformation is a matter of seconds a step.
+/// Number of nodes above which a step at large deformation takes seconds.
 const LARGE_NODES_MAX: usize = 4000;
 
-/// What the steps of a phase took and how well they met the law.
+/// Times of the steps of a phase, and how well they met the law of contact.
 #[derive(Default)]
 struct Phase {
     times_ms: Vec<f64>,
@@ -92,13 +92,13 @@ impl Ball {
         Ok(Self { model, surface, base, body, columns: Columns::new(usize::MAX) })
     }
 
-    /// The ball at large deformation, at rest.
+    /// Ball at large deformation, at rest.
     fn large(&self) -> Result<LargeBody, ReportError> {
         let elements = Arc::new(self.model.hyperelastic(Law::NeoHookean)?);
         Ok(LargeBody::at_rest(elements, Arc::clone(self.model.stiffness().pattern())))
     }
 
-    /// A step, and the time that it took without the search for triangles near the fingers.
+    /// Makes a step; its time is measured without the search for triangles near the fingers.
     fn step(
         &self,
         state: &ObjectState,
@@ -138,7 +138,7 @@ impl Ball {
         Ok((ms, found?))
     }
 
-    /// The table and five fingertips, a thumb and four fingers opposite, on their way in a step.
+    /// Bodies of a step: the table and five fingertips, a thumb opposite four fingers.
     fn bodies(step: u32) -> Vec<MovingBody> {
         let share = |step: u32, from: u32, lasts: u32| {
             let t = (f64::from(step) - f64::from(from)) / f64::from(lasts);
@@ -215,10 +215,10 @@ impl Phase {
     }
 }
 
-/// The table of steps.
+/// Measures the table of steps.
 ///
 /// # Errors
-/// A ball that is not lifted, or whose forces do not add up to its weight, is one.
+/// [`ReportError`], also for a ball that is not lifted, or whose forces do not balance its weight.
 pub(super) fn table(is_quick: bool) -> Result<Table, ReportError> {
     let sizes: &[usize] = if is_quick { &[300] } else { &[1000, 4000, 10_648] };
     let title = "Steps of a ball that five fingers pinch, lift and hold by friction";
@@ -235,7 +235,7 @@ pub(super) fn table(is_quick: bool) -> Result<Table, ReportError> {
     Ok(table)
 }
 
-/// A row for each phase of one ball.
+/// Adds a row for each phase of one ball.
 fn play(ball: &Ball, way: Way, table: &mut Table) -> Result<(), ReportError> {
     let nodes = ball.model.mesh().node_count();
     let weight = 9.81 * 1000.0 * ball.body.volume();
@@ -290,7 +290,7 @@ const COLUMNS: [&str; 16] = [
     "balance_error_rel",
 ];
 
-/// What the table says.
+/// Text below the table.
 pub(super) const TEXT: &str = "\
 The steps are those of `run --grasp contact`, sixty a second: a ball of 70 mm (50 kPa, Poisson's ratio 0.4, \
 1000 kg/m³) settles on a table, is pinched by a thumb and four fingers opposite, which close 8 mm beyond the \

@@ -1,4 +1,4 @@
-//! Tips that touch an object, and what each contact model asks for them.
+//! Fingertips that touch an object, and the question of each contact model about them.
 
 use nalgebra::Point3;
 use softgrasp_core::contact::SurfaceStars;
@@ -14,7 +14,7 @@ use softgrasp_protocol::{
 use crate::report::ReportError;
 use crate::scene::Pressed;
 
-/// An object, the nodes that tips of one radius touch, and the degrees of freedom that stay put.
+/// Object, nodes that fingertips of one radius touch, and fixed degrees of freedom.
 ///
 /// Units: m, Pa. Frame: the object's.
 pub struct Tips {
@@ -28,14 +28,14 @@ pub struct Tips {
 
 /// A fingertip's radius, m.
 pub const RADIUS: f64 = 0.008;
-/// How deep the one tip presses, m.
+/// Depth of the press by one fingertip, m.
 pub const DEPTH: f64 = 1e-3;
-/// A soft fruit, far from incompressible so that elements do not lock.
+/// Young's modulus of a soft fruit, Pa; Poisson's ratio is so small that elements do not lock.
 pub const YOUNG: f64 = 2.0e4;
 pub const POISSON: f64 = 0.3;
 
 impl Tips {
-    /// A cube with its bottom held, and one tip in the middle of its top.
+    /// Cube with its bottom fixed, and one fingertip in the middle of its top.
     pub fn press(nodes: usize) -> Result<Self, ReportError> {
         let mesh = generate(BuiltIn::Cube, nodes)?;
         let (low, high) = mesh.bounds();
@@ -51,7 +51,7 @@ impl Tips {
         Ok(Self::new(mesh, material, fixed, vec![(tip, [0.0, -DEPTH, 0.0])]))
     }
 
-    /// The free cube of the frame report, with its five tips.
+    /// The free cube of the frame report, with five fingertips.
     pub fn grip(nodes: usize) -> Result<Self, ReportError> {
         let scene = Pressed::try_new(BuiltIn::Cube, nodes)?;
         let touch = |three: &[(u32, f64)]| match three {
@@ -73,7 +73,7 @@ impl Tips {
         Self { mesh, surface, stars, material, fixed, touches }
     }
 
-    /// The model for a server to keep.
+    /// Model for a server to keep.
     pub fn upload(&self) -> UploadModel {
         let mesh = MeshData {
             vertices: self.mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
@@ -85,13 +85,13 @@ impl Tips {
         UploadModel { mesh, materials, element: ElementName::T4, fixed: self.fixed.clone() }
     }
 
-    /// The model here.
+    /// Model in this process.
     pub fn model(&self) -> Result<Model, ReportError> {
         let (mesh, fixed) = (self.mesh.clone(), self.fixed.clone());
         Ok(Model::try_new(mesh, Element::Tet4, &[self.material], fixed, &mut |_| {})?)
     }
 
-    /// What a contact model asks, the pushes times `scale`.
+    /// Question by a contact model, with the displacements of the tips times `scale`.
     pub fn question(&self, contact: ContactModel, scale: f64, want: Want) -> Question {
         let mut question = Question { method: MethodName::auto(), want, ..Question::default() };
         match contact {
@@ -121,7 +121,7 @@ impl Tips {
         question
     }
 
-    /// Push of the nearest tip that covers a node.
+    /// Displacement of the nearest fingertip that covers a node, m.
     fn nearest_tip(&self, node: u32) -> Option<[f64; 3]> {
         let at = |n: u32| self.mesh.vertices()[n as usize];
         let distance = |touch: &&(u32, [f64; 3])| (at(node) - at(touch.0)).norm();
@@ -129,7 +129,7 @@ impl Tips {
         covering.min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|touch| touch.1)
     }
 
-    /// Surface displacements only, as a frame wants them.
+    /// Results that a frame question wants: surface displacements only.
     pub fn want_surface(&self) -> Want {
         let nodes = NodeChoice::Nodes(self.surface.nodes.clone());
         Want { nodes, reactions: false, ..Want::default() }
@@ -140,7 +140,7 @@ fn at_node(node: u32, u: [f64; 3], scale: f64) -> impl Iterator<Item = DofValue>
     (0u32..).zip(u).map(move |(axis, u)| DofValue { dof: 3 * node + axis, value: scale * u })
 }
 
-/// Everything, with forces.
+/// All results: displacements of all nodes, and forces.
 pub const WANT_ALL: Want = Want {
     nodes: NodeChoice::All,
     reactions: true,

@@ -1,4 +1,4 @@
-//! Checks the answer to a press: forces balance, nodes and masks move as prescribed.
+//! Checks the answer to a press: forces balance, nodes and masks have the prescribed displacements.
 
 use softgrasp_core::solve::{Loads, Method};
 use softgrasp_protocol::{Answer, Question};
@@ -14,7 +14,7 @@ use crate::report::{ReportError, check};
 /// Shapes: `answer` with the displacements of all nodes and, for masks, their forces.
 ///
 /// # Errors
-/// [`ReportError::Wrong`] if the answer is further off than `allowed`.
+/// [`ReportError::Wrong`] if the error of the answer is above `allowed`.
 pub fn verify(
     tips: &Tips,
     question: &Question,

@@ -12,41 +12,41 @@ use crate::reference::error_rel;
 use crate::report::{ReportError, check, progress};
 use crate::sample::{Competitor, Effort, Spread, take_turns, timed_ms};
 
-/// How an answer is come by.
+/// Method by which an answer is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Way {
     Direct { method: Method, residual_rel: f64 },
     Condensed,
 }
 
-/// What one way costs on one system, and how wrong it is.
+/// Times and errors of one method on one system.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outcome {
     pub way: Way,
-    /// From the mesh to the first answer, ms.
+    /// Time from the mesh to the first answer, ms.
     pub cold: Spread,
-    /// One answer more, with other displacements of the same patches, ms.
+    /// Time of one more answer, with other displacements of the same patches, ms.
     pub warm: Spread,
     pub residual_rel: f64,
-    /// Largest difference to the answer of the same system, over the largest displacement.
+    /// Largest difference to the exact answer of the same system, over the largest displacement.
     pub algebraic_rel: f64,
-    /// Root mean square of the difference to the answer on the finest mesh, over that answer's.
+    /// Root mean square of the difference to the answer on the finest mesh, relative to that answer.
     pub total_rel: f64,
 }
 
-/// Residuals at which conjugate gradients stop.
+/// Relative residuals at which conjugate gradients stop.
 const TOLERANCES: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
-/// A dense matrix that is larger is left out.
+/// Size in bytes above which a dense matrix is left out.
 const DENSE_BYTES_MAX: u64 = 512 << 20;
-/// Above so many unknowns an elimination takes minutes; every cold start makes one.
+/// Number of unknowns above which an elimination takes minutes; every cold start makes one.
 const GAUSS_JORDAN_DOFS_MAX: usize = 3500;
-/// The same for the small form of the report.
+/// Number of unknowns above which eliminations are left out of the small form of the report.
 const GAUSS_JORDAN_DOFS_QUICK: usize = 500;
 /// Largest algebraic error of a method that promises an exact answer.
 const EXACT: f64 = 1e-8;
 
 impl Way {
-    /// Every way that fits the memory.
+    /// Every method that fits in memory.
     fn all(element: Element, unknown_dofs: usize, is_quick: bool) -> Vec<Self> {
         let eliminated = if is_quick { GAUSS_JORDAN_DOFS_QUICK } else { GAUSS_JORDAN_DOFS_MAX };
         let fits = |m: &Method| {
@@ -75,7 +75,7 @@ impl Way {
         }
     }
 
-    /// Residual it may stop at, if it may.
+    /// Residual at which the method may stop, if it is iterative.
     pub fn tolerance(self) -> Option<f64> {
         match self {
             Self::Direct { residual_rel, .. } if residual_rel > 0.0 => Some(residual_rel),
@@ -84,13 +84,13 @@ impl Way {
     }
 }
 
-/// Whatever a way keeps between answers.
+/// Factor, or other data, that a method keeps between answers.
 enum Kept {
     Direct(Box<Factored>),
     Condensed { base: Box<Base>, set: Box<ContactSet> },
 }
 
-/// Displacements of the watched nodes, 3 per node, and the residual as told with them.
+/// Displacements of the watched nodes (3 for each node, m), and the residual that the method reports.
 type Answer = (Vec<f64>, f64);
 
 impl Kept {
@@ -140,7 +140,7 @@ impl Kept {
     }
 }
 
-/// One timed answer and its errors.
+/// One answer with its time and errors.
 struct Timed {
     ms: f64,
     residual_rel: f64,
@@ -148,7 +148,7 @@ struct Timed {
     total_rel: f64,
 }
 
-/// Compares an answer for `scale` times the known displacements.
+/// Compares an answer to `scale` times the known displacements.
 fn compared(
     system: &System,
     finest: &[f64],
@@ -171,12 +171,12 @@ fn compared(
     Ok(Timed { ms, residual_rel, algebraic_rel, total_rel: rms_rel(&at_one, finest) })
 }
 
-/// Every way on one system, on the current rayon pool.
+/// Runs every method on one system, on the current rayon pool.
 ///
-/// Shapes: `finest` displacements of the watched nodes on the finest mesh, 3 per node, m.
+/// Shapes: `finest` displacements of the watched nodes on the finest mesh, 3 for each node, m.
 ///
 /// # Errors
-/// [`ReportError`]; an answer further from the right one than its way promises is one.
+/// [`ReportError`], also for an answer whose error is above what its method promises.
 pub(super) fn contest(
     object: &str,
     system: &System,

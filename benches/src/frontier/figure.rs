@@ -1,4 +1,4 @@
-//! The figure: for every object time against both errors; rows that no other beats are strong.
+//! Figure of time against both errors for every object; rows that no other beats are drawn strong.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -9,16 +9,16 @@ use super::system::Discretisation;
 use crate::axis::{Axis, Scale};
 use crate::plot::{COLOURS, Drawn, FONT, PlotError};
 
-/// Which time is drawn.
+/// Time that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Time {
-    /// One answer more.
+    /// Time of one more answer.
     Warm,
-    /// From the mesh to the first answer.
+    /// Time from the mesh to the first answer.
     Cold,
 }
 
-/// Which error is drawn.
+/// Error that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Error {
     Algebraic,
@@ -29,13 +29,13 @@ const PANEL: (u32, u32) = (440, 300);
 const LEGEND_WIDTH: u32 = 190;
 const TITLE_HEIGHT: u32 = 34;
 const METHODS_LEFT: i32 = 12;
-/// How strong a point is drawn that another one beats.
+/// Opacity of a point that another one beats.
 const FAINT: f64 = 0.3;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Panel<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 
-/// A point to draw.
+/// Point of a figure.
 struct Point {
     at: (f64, f64),
     colour: RGBColor,
@@ -43,10 +43,10 @@ struct Point {
     is_best: bool,
 }
 
-/// One row of panels per object, algebraic error at the left, total error at the right.
+/// Figure with one row of panels for each object: algebraic error at the left, total error at the right.
 ///
 /// # Errors
-/// [`PlotError`].
+/// [`PlotError`] if there is nothing to draw, or drawing fails.
 pub(super) fn figure(rows: &[Row], time: Time) -> Result<String, PlotError> {
     let title = match time {
         Time::Warm => "Warm frame: time against error",
@@ -120,7 +120,7 @@ fn point(row: &Row, methods: &[&str], time: Time, error: Error) -> Point {
     Point { at: (x, y), colour, discretisation, is_best }
 }
 
-/// Faint black would be grey: methods beyond six coloured ones get brown and violet.
+/// Colours of further methods: grey would be faint black.
 const FURTHER: [RGBColor; 2] = [RGBColor(128, 64, 0), RGBColor(80, 40, 160)];
 
 fn colour(place: usize) -> RGBColor {
@@ -170,7 +170,7 @@ fn draw_panel(cell: &Area<'_>, object: &str, error: Error, points: &[Point]) -> 
     Ok(())
 }
 
-/// From the most exact to the fastest: level to the next error, then down to its time.
+/// Draws the steps from the most exact answer to the fastest one.
 fn draw_staircase(chart: &mut Panel<'_>, mut best: Vec<(f64, f64)>) -> Drawn {
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
     let corners = best.windows(2).flat_map(|w| [w[0], (w[1].0, w[0].1)]);

@@ -10,20 +10,20 @@ use super::pads::PaddedMesh;
 use super::system::assembled;
 use crate::report::{Options, ReportError};
 
-/// An object with its patches.
+/// Object with its patches.
 pub(super) struct Object {
     pub name: String,
     pub padded: PaddedMesh,
 }
 
-/// Built-in objects, and about how many nodes they have.
+/// Built-in objects, and their approximate numbers of nodes.
 const BUILT_IN: [BuiltIn; 3] = [BuiltIn::Cube, BuiltIn::Strawberry, BuiltIn::Toothpaste];
 const NODES: usize = 1000;
 const NODES_QUICK: usize = 64;
-/// Files of others: a small organ of few elements, and an animal with thin limbs.
+/// Files of other authors: a small organ of few elements, and an animal with thin limbs.
 const FILES: [&str; 2] = ["liver.msh1.msh", "armadillo_4k.node"];
 
-/// All objects that can be had, and a line for each that cannot.
+/// All objects that are available, and a line for each file that is not.
 ///
 /// # Errors
 /// [`ReportError`] for built-in objects only.
@@ -45,7 +45,7 @@ pub(super) fn objects(options: &Options) -> Result<(Vec<Object>, Vec<String>), R
     Ok((objects, left_out))
 }
 
-/// A file with its patches, if it holds one body that the patches hold.
+/// Object from a file, with its patches, if it is one body that the patches hold.
 fn imported(folder: &Path, file: &str) -> Result<Object, String> {
     let path = folder.join(file);
     if !path.is_file() {

@@ -21,7 +21,7 @@ const RADIUS_SHARE: f64 = 0.35;
 pub(super) struct Pad {
     /// Triangles of the surface that it consists of.
     pub triangles: Vec<[u32; 3]>,
-    /// How far it is pushed.
+    /// Displacement of the patch, m.
     pub push: [f64; 3],
 }
 
@@ -98,7 +98,7 @@ impl PaddedMesh {
         self.pairs(nodes)
     }
 
-    /// The same with the nodes in the middle of the patches' edges, for ten-node elements.
+    /// Displacements of the corners and mid-edge nodes of all patches, for ten-node elements.
     ///
     /// # Errors
     /// [`ReportError::Model`] if there are too many edges.

@@ -1,6 +1,6 @@
 //! Finds the answers that no other answer beats in both time and error.
 
-/// Marks those that no other one beats: faster, and with an error no more than `same` times as
+/// Marks the answers that no other one beats: one that is faster, with an error at most `same` times as
 /// large.
 ///
 /// Shapes: (time, error) pairs; one mark each. `same` ≥ 1: errors within this factor of each other

@@ -1,4 +1,4 @@
-//! Writes the page: every object in turn, its finest mesh, its rows.
+//! Writes the page: each object with its finest mesh and its rows.
 
 use super::contest::contest;
 use super::figure::{Time, figure};
@@ -10,7 +10,7 @@ use crate::report::{Options, Report, ReportError, progress};
 use crate::table::{Cell, Table};
 use crate::threads::{pool, processors};
 
-/// A reference whose factor would take more is made on the mesh itself.
+/// Size in bytes of a factor above which the reference is made on the mesh itself.
 const BYTES_MAX: usize = 9 << 30;
 
 /// Measures time against error on all objects.
@@ -37,7 +37,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     Ok(report)
 }
 
-/// All rows of one object, marked; its line in the table of meshes.
+/// Measures all rows of one object and marks them; adds its line to the table of meshes.
 fn one_object(
     object: &Object,
     is_quick: bool,
@@ -81,7 +81,7 @@ fn one_object(
     Ok(rows)
 }
 
-/// The answer that the total error is measured against.
+/// Answer on the finest mesh, against which the total error is measured.
 struct Finest {
     name: String,
     /// Displacements of the watched nodes, m.

@@ -5,7 +5,7 @@ use super::pareto::marks;
 use super::system::Discretisation;
 use crate::table::{Cell, Table};
 
-/// What one way on one system of one object costs, and where it stands among the others.
+/// Times and errors of one method on one system of one object, and whether other rows beat it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Row {
     pub object: String,
@@ -16,22 +16,22 @@ pub(super) struct Row {
     pub best: Best,
 }
 
-/// For which question no other row beats this one.
+/// Comparisons in which no other row beats this one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Best {
-    /// Warm frames against the algebraic error.
+    /// Time of a warm frame against the algebraic error.
     pub warm_algebraic: bool,
-    /// Warm frames against the error of mesh, element and arithmetic together.
+    /// Time of a warm frame against the error of mesh, element and arithmetic together.
     pub warm_total: bool,
-    /// Cold starts against the algebraic error.
+    /// Time of a cold start against the algebraic error.
     pub cold_algebraic: bool,
-    /// Cold starts against the error of all together.
+    /// Time of a cold start against the error of mesh, element and arithmetic together.
     pub cold_total: bool,
 }
 
-/// Algebraic errors within this factor are rounding, which another order of summation changes.
+/// Factor within which algebraic errors count as equal, since another order of summation changes them.
 const SAME_ALGEBRAIC: f64 = 10.0;
-/// Total errors within this factor are the same mesh and element.
+/// Factor within which total errors count as those of the same mesh and element.
 const SAME_TOTAL: f64 = 1.01;
 
 /// Marks the rows of one object: algebraic errors among equal systems, total ones among all.
@@ -60,7 +60,7 @@ pub(super) fn mark(rows: &mut [Row]) {
     }
 }
 
-/// All rows, as they are written.
+/// Table of all rows.
 pub(super) fn table(rows: &[Row]) -> Table {
     let title = "Time of a warm frame and of a cold start against error";
     let mut table = Table::new("frontier", title, &COLUMNS);

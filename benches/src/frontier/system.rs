@@ -1,4 +1,4 @@
-//! One system of equations: an object, its element, and the right answer.
+//! One system of equations: an object, its element, and the exact answer.
 
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::model::{Element, Known, Model, ModelError};
@@ -9,7 +9,7 @@ use crate::reference::Reference;
 use crate::report::ReportError;
 use crate::scene::rubber;
 
-/// Which elements an answer is made with.
+/// Mesh and element of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Discretisation {
     /// Linear elements of the mesh.
@@ -43,24 +43,24 @@ impl Discretisation {
     }
 }
 
-/// A model with known patches, and its answer to the last bits.
+/// Model with known patches, and its answer to the last bits.
 pub(super) struct System {
     pub discretisation: Discretisation,
     pub model: Model,
     pub known: Known,
     /// Nodes whose displacements are compared.
     pub watched: Vec<u32>,
-    /// Displacements of the watched nodes, 3 per node, m.
+    /// Displacements of the watched nodes in the exact answer, 3 for each node, m.
     pub right: Vec<f64>,
 }
 
-/// Fields of the watched nodes from a field of all.
+/// Displacements of some nodes, from those of all.
 pub(super) fn at_nodes(displacement: &[f64], nodes: &[u32]) -> Vec<f64> {
     let first = |&n: &u32| 3 * n as usize;
     nodes.iter().flat_map(|n| &displacement[first(n)..first(n) + 3]).copied().collect()
 }
 
-/// Difference of two fields as root mean square, over that of the second.
+/// Root mean square of the difference of two fields, relative to that of the second.
 pub(super) fn rms_rel(answer: &[f64], right: &[f64]) -> f64 {
     let squares: f64 = answer.iter().zip(right).map(|(a, b)| (a - b).powi(2)).sum();
     let size: f64 = right.iter().map(|b| b * b).sum();
@@ -68,7 +68,7 @@ pub(super) fn rms_rel(answer: &[f64], right: &[f64]) -> f64 {
 }
 
 impl System {
-    /// Assembles, and solves to the last bits.
+    /// Assembles the system, and solves it to the last bits.
     ///
     /// # Errors
     /// [`ReportError::Model`] also where the patches do not hold the body.
@@ -93,12 +93,12 @@ pub(super) fn assembled(mesh: TetMesh, element: Element) -> Result<Model, Report
     Ok(Model::try_new(mesh, element, &[rubber()?], Vec::new(), &mut |_| {})?)
 }
 
-/// Which nodes of the patches are held.
+/// Nodes of the patches that are held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Held {
-    /// The nodes of the mesh, as a request can name them.
+    /// Nodes of the mesh, as a request can name them.
     Corners,
-    /// The nodes in the middle of the patches' edges too: the patch moves as a whole.
+    /// Also the mid-edge nodes of the patches: the patch moves as a whole.
     Whole,
 }
 
@@ -116,8 +116,8 @@ fn known(model: &Model, padded: &PaddedMesh, held: Held) -> Result<Known, Report
     }
 }
 
-/// Displacements of the watched nodes by ten-node elements, 3 per node, m; if that would take more
-/// than `bytes_max`, what it would take.
+/// Displacements of the watched nodes by ten-node elements, 3 for each node, m; if that takes more than
+/// `bytes_max` bytes, the number of bytes that it takes.
 ///
 /// # Errors
 /// [`ReportError::Model`], [`ReportError::Solve`].

@@ -1,40 +1,40 @@
-//! Sets the estimated error of frames beside the true one, over random squeezes.
+//! Compares the estimated error of frames with the true one, over random squeezes.
 
 use softgrasp_core::solve::equilibrium::{Goal, Path, Wish};
 
 use super::trial::Trial;
 use crate::report::ReportError;
 
-/// Difference of two settled shapes, over the largest displacement, above which they are two
+/// Difference of two settled shapes, relative to the largest displacement, above which they are two
 /// equilibria.
 const ELSEWHERE: f64 = 1e-6;
-/// Estimates below this are rounding.
+/// Estimate below which only rounding is left.
 const ROUNDING: f64 = 1e-11;
 
-/// What frames of one budget came to, added up over squeezes.
+/// Totals of the frames of one error budget over squeezes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Judged {
     pub frames: usize,
-    /// Frames of which no equilibrium was found, or that came after such a one.
+    /// Number of frames without an equilibrium, and of those after such a one.
     pub refused: usize,
-    /// Frames while the body snaps, which are not judged.
+    /// Number of frames while the body snaps, which are not judged.
     pub snaps: usize,
-    /// Judged frames whose true error is above the estimate.
+    /// Number of judged frames whose true error is above the estimate.
     pub above: usize,
-    /// Above twice the estimate.
+    /// Number of judged frames whose true error is above twice the estimate.
     pub above_twice: usize,
-    /// Judged frames whose estimate is above the budget.
+    /// Number of judged frames whose estimate is above the budget.
     pub over_budget: usize,
     pub solves: usize,
-    /// Factors made while they were waited for, and beside the frames.
+    /// Number of factors made while a frame waited, and in the background.
     pub factors: usize,
     pub renewals: usize,
-    /// True error over estimate of every judged frame.
+    /// Ratio of the true error to the estimate of every judged frame.
     pub ratios: Vec<f64>,
 }
 
 impl Judged {
-    /// Adds others.
+    /// Adds the totals of other squeezes.
     pub fn append(&mut self, mut other: Self) {
         self.frames += other.frames;
         self.refused += other.refused;
@@ -49,14 +49,14 @@ impl Judged {
     }
 }
 
-/// The right shapes of a squeeze, and in which frames it snaps.
+/// Exact shapes of a squeeze, and the frames in which it snaps.
 pub(super) struct Reference {
     shapes: Vec<(Vec<f64>, bool)>,
 }
 
 impl Reference {
-    /// Follows the squeeze in double precision until every residual is rounding, as far as there
-    /// are equilibria.
+    /// Follows the squeeze in double precision until every residual is at rounding, as far as there are
+    /// equilibria.
     ///
     /// # Errors
     /// [`ReportError`] where the object cannot be held.
@@ -75,14 +75,15 @@ impl Reference {
         Ok(Self { shapes })
     }
 
-    /// Frames that have an equilibrium.
+    /// Number of frames that have an equilibrium.
     pub fn len(&self) -> usize {
         self.shapes.len()
     }
 }
 
-/// Plays a squeeze with a budget, factors being made between the frames as they are beside them in a
-/// run, and sets each frame's estimate beside its way to the equilibrium that it settles to.
+/// Plays a squeeze with an error budget, and compares each frame's estimate with its distance to the
+/// equilibrium that it settles to. Factors are made between the frames, as a run makes them in the
+/// background.
 ///
 /// # Errors
 /// [`ReportError`] where the object cannot be held.
@@ -128,8 +129,8 @@ fn goal(mask_q: &[f64]) -> Goal<'_> {
     Goal { q_known: &[], mask_q, forces: &[] }
 }
 
-/// Way of the shape to the equilibrium that it settles to by itself, over the largest displacement,
-/// and whether that is another one than the right one.
+/// Distance of the shape to the equilibrium that it settles to, relative to the largest displacement, and
+/// whether that is another one than the exact shape.
 fn true_error(
     trial: &Trial,
     path: &Path,
@@ -152,7 +153,7 @@ fn true_error(
     }
 }
 
-/// Largest error of a shape over the largest displacement of the right one.
+/// Largest error of a shape, relative to the largest displacement of the exact one.
 fn largest_error(shape: &[f64], right: &[f64]) -> f64 {
     let length = |u: &[f64]| u.iter().map(|x| x * x).sum::<f64>();
     let (mut off, mut most) = (0.0f64, 0.0f64);

@@ -1,4 +1,4 @@
-//! Frames of one squeeze with one budget: time, solves, estimated and true error of each.
+//! Frames of one squeeze with one error budget: time, solves, estimated and true error of each.
 
 use std::sync::Arc;
 
@@ -10,14 +10,14 @@ use super::squeeze::Squeeze;
 use crate::report::ReportError;
 use crate::sample::{Spread, timed_ms};
 
-/// A squeeze in so many frames, and the right shape after each.
+/// Squeeze in a number of frames, and the exact shape after each.
 pub(super) struct Truth {
     pub frames: usize,
     shapes: Vec<Vec<f64>>,
 }
 
 impl Truth {
-    /// Follows the squeeze in double precision until every residual is rounding.
+    /// Follows the squeeze in double precision until every residual is at rounding.
     ///
     /// # Errors
     /// [`ReportError`] where a frame has no equilibrium.
@@ -36,13 +36,13 @@ impl Truth {
         Ok(Self { frames, shapes })
     }
 
-    /// Largest error of a shape over the largest displacement.
+    /// Largest error of a shape, relative to the largest displacement.
     fn error(&self, frame: usize, shape: &[f64]) -> f64 {
         largest_error(shape, &self.shapes[frame])
     }
 }
 
-/// Largest error of a shape over the largest displacement of the right one.
+/// Largest error of a shape, relative to the largest displacement of the exact one.
 fn largest_error(shape: &[f64], right: &[f64]) -> f64 {
     let length = |u: &[f64]| u.iter().map(|x| x * x).sum::<f64>();
     let (mut off, mut most) = (0.0f64, 0.0f64);
@@ -54,39 +54,38 @@ fn largest_error(shape: &[f64], right: &[f64]) -> f64 {
     (off / most).sqrt()
 }
 
-/// The equilibrium that a shape settles to by itself, in double precision, until its residual is
-/// rounding.
+/// Equilibrium that a shape settles to, in double precision, until its residual is at rounding.
 ///
 /// # Errors
-/// [`ReportError`] where there is none.
+/// [`ReportError`] if there is none.
 fn settled(squeeze: &Squeeze, shape: &[f64], goal: &Goal<'_>) -> Result<Vec<f64>, ReportError> {
     let mut path = squeeze.path_from(shape.to_vec(), false)?;
     path.advance(goal, &Wish::EXACT)?;
     Ok(path.displacement().to_vec())
 }
 
-/// Difference of two settled shapes, over the largest displacement, above which they are two
+/// Difference of two settled shapes, relative to the largest displacement, above which they are two
 /// equilibria.
 const ELSEWHERE: f64 = 1e-6;
 
-/// What frames with one budget came to.
+/// Times and errors of the frames with one error budget.
 pub(super) struct Measured {
-    /// Time of a frame, ms, without the factors made beside the frames.
+    /// Time of a frame, ms, without the factors made in the background.
     pub ms: Spread,
-    /// Time of a solve by `front` in single precision, in turn with the frames, ms.
+    /// Time of a solve by `front` in single precision, measured in turn with the frames, ms.
     pub solve_ms: Spread,
-    /// Frame over solve, in turn.
+    /// Ratio of the time of a frame to that of the solve beside it.
     pub ratio: Spread,
     pub solves: Spread,
     pub error: Spread,
     pub estimate_max: f64,
-    /// Largest true error over its estimate.
+    /// Largest ratio of a true error to its estimate.
     pub error_over_estimate: f64,
-    /// Frames whose true error is more than twice its estimate.
+    /// Number of frames whose true error is more than twice its estimate.
     pub over_twice: usize,
-    /// Frames that are on another branch of equilibria than the path in double precision.
+    /// Number of frames on another branch of equilibria than the path in double precision.
     pub elsewhere: usize,
-    /// Frames for which no equilibrium was found; the shape stayed.
+    /// Number of frames without an equilibrium; the shape stayed.
     pub refused: usize,
     pub factors: usize,
     pub factor_ms: f64,
@@ -94,8 +93,8 @@ pub(super) struct Measured {
     pub model_bytes: usize,
 }
 
-/// Plays the squeeze with a budget; after the first frame, which makes the first factor, every frame
-/// is timed, and factors are made between the frames as they are beside them in a run.
+/// Plays the squeeze with an error budget. Every frame after the first one, which makes the first factor,
+/// is timed; further factors are made between the frames, as a run makes them in the background.
 ///
 /// # Errors
 /// [`ReportError`] where the object cannot be held.
@@ -167,7 +166,7 @@ pub(super) fn play(squeeze: &Squeeze, truth: &Truth, budget: f64) -> Result<Meas
     })
 }
 
-/// Degrees of freedom of two nodes under each tip: they hold a body for a factor to compare with.
+/// Degrees of freedom of two nodes under each tip; they hold the body for a factor to compare with.
 fn touched_dofs(squeeze: &Squeeze) -> Vec<u32> {
     let entries = squeeze.masks.iter().flat_map(|mask| mask.entries().iter().take(2));
     let mut nodes: Vec<u32> = entries.map(|entry| entry.0).collect();
@@ -176,15 +175,15 @@ fn touched_dofs(squeeze: &Squeeze) -> Vec<u32> {
     nodes.iter().flat_map(|n| (0..3).map(move |axis| 3 * n + axis)).collect()
 }
 
-/// Linear answers to every frame.
+/// Linear answers to every frame, with times and errors.
 pub(super) struct Linear {
     pub ms: Spread,
     pub error: Spread,
-    /// What is kept between frames beside the model: factor and columns.
+    /// Size of the data that is kept between frames beside the model (factor and columns), bytes.
     pub bytes: usize,
 }
 
-/// The linear answer to each frame by the method that frames have otherwise: its true error and time.
+/// Linear answer to each frame by the method that frames otherwise have: its true error and time.
 ///
 /// # Errors
 /// [`ReportError`].

@@ -1,4 +1,4 @@
-//! Frames of a moving hand over a socket, at a rate: how late the answers are and how far off.
+//! Frames of a moving hand over a socket, at a rate: delay and error of the answers.
 
 use std::time::{Duration, Instant};
 
@@ -14,22 +14,22 @@ use crate::report::ReportError;
 use crate::requests::upload;
 use crate::sample::{Spread, quantile};
 
-/// What a hand that moves at a rate saw.
+/// Answers to a hand that moves at a rate.
 pub(super) struct Held {
     pub nodes: usize,
     pub rate_hz: f64,
     pub frames: usize,
-    /// From sending a frame to having its answer, ms, of all frames but the first.
+    /// Time from sending a frame question to having its answer, ms, of all but the first.
     pub ms: Spread,
     pub p99_ms: f64,
-    /// The first frame of the grip, which orders and makes the first factor, ms.
+    /// Time of the first frame of the grip, which orders and makes the first factor, ms.
     pub first_ms: f64,
     pub estimate_max: f64,
     pub factor_age_max: u32,
     pub solves: Spread,
 }
 
-/// Squeezes in and out at a rate, several times, for so many frames.
+/// Squeezes in and out at a rate, several times, for a number of frames.
 ///
 /// # Errors
 /// [`ReportError`], also for a frame without equilibrium.

@@ -12,7 +12,7 @@ use crate::report::{Options, Report, ReportError, progress};
 use crate::table::{Cell, Table, three_digits};
 use crate::threads::{pool, processors};
 
-/// Budgets of the table of budgets.
+/// Error budgets of the table of budgets.
 const BUDGETS: [f64; 10] = [1e-1, 3e-2, 1e-2, 5e-3, 2e-3, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10];
 /// Objects of the table of objects, with their Poisson's ratios.
 const OBJECTS: [(BuiltIn, f64); 5] = [
@@ -22,7 +22,8 @@ const OBJECTS: [(BuiltIn, f64); 5] = [
     (BuiltIn::Toothpaste, 0.4),
     (BuiltIn::Strawberry, 0.45),
 ];
-/// The bars: a frame costs at most so many solves of `front` in single precision.
+/// Error budgets, each with the largest time of a frame as a multiple of a solve by `front` in single
+/// precision.
 const BARS: [(f64, f64); 2] = [(2e-3, 6.0), (1e-8, 16.0)];
 
 const COLUMNS: [&str; 21] = [
@@ -92,7 +93,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     Ok(report)
 }
 
-/// Every budget on four sizes of one object.
+/// Measures every error budget on four sizes of one object.
 fn by_budget(options: &Options, report: &mut Report) -> Result<(Table, Vec<Series>), ReportError> {
     let sizes: &[usize] = if options.is_quick { &[125] } else { &[216, 1000, 3375, 10_648] };
     let mut table = Table::new("large", "Frames by budget, strawberry", &COLUMNS);
@@ -136,7 +137,7 @@ fn by_budget(options: &Options, report: &mut Report) -> Result<(Table, Vec<Serie
     Ok((table, series))
 }
 
-/// Two budgets on five objects and three speeds of the hand.
+/// Measures two error budgets on five objects and at three speeds of the hand.
 fn by_object(options: &Options) -> Result<Table, ReportError> {
     let (nodes, speeds): (usize, &[usize]) =
         if options.is_quick { (125, &[20]) } else { (1000, &[20, 60, 200]) };

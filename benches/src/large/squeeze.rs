@@ -1,4 +1,4 @@
-//! Five fingertips press an object, which turns a little: the hand of report `large`.
+//! Five fingertips that press an object and turn a little: the hand of report `large`.
 
 use std::sync::Arc;
 
@@ -12,29 +12,29 @@ use softgrasp_core::solve::equilibrium::{Hold, Path};
 
 use crate::report::ReportError;
 
-/// How deep the tips press at the end, as a share of the object's size, and at most as a share of its
-/// smallest extent.
+/// Depth of the press at the end, relative to the object's size, and its limit relative to the smallest
+/// extent.
 const DEPTH: f64 = 0.08;
 const DEPTH_OF_SMALLEST: f64 = 0.15;
-/// How far the hand turns meanwhile, rad.
+/// Rotation of the hand meanwhile, rad.
 const TURN: f64 = 0.2;
-/// Radius of what a tip holds, as a share of the object's size.
+/// Radius of the patch that a fingertip holds, relative to the object's size.
 const RADIUS: f64 = 0.12;
 
-/// An object and where five tips hold it.
+/// Object, and the masks that five fingertips hold.
 pub(super) struct Squeeze {
     pub model: Model,
     pub masks: Vec<Mask>,
-    /// Mean place of each mask at rest.
+    /// Weighted mean position of each mask at rest, m.
     centres: Vec<Point3<f64>>,
     inward: Vec<Vector3<f64>>,
     size: f64,
-    /// Depth at the end, as a share of the size.
+    /// Depth at the end, relative to the size.
     depth: f64,
 }
 
 impl Squeeze {
-    /// Five tips round an object of a built-in shape.
+    /// Squeeze of a built-in shape by five fingertips.
     ///
     /// Units: Young's modulus 20 kPa.
     ///
@@ -79,12 +79,12 @@ impl Squeeze {
         Ok(Self { model, masks, centres, inward, size, depth })
     }
 
-    /// Means of the masks at a share of the whole squeeze, m.
+    /// Mean displacements of the masks at a share of the whole squeeze, m.
     pub fn at(&self, share: f64) -> Vec<f64> {
         self.posed(self.depth * share, TURN * share)
     }
 
-    /// Means of the masks pressed in by a share of the size and turned by an angle.
+    /// Mean displacements of the masks pressed in by `depth` of the size and rotated by `turn` rad.
     pub fn posed(&self, depth: f64, turn: f64) -> Vec<f64> {
         let turn = Rotation3::new(Vector3::new(0.2, 0.3, 1.0).normalize() * turn);
         let moved = |(centre, inward): (&Point3<f64>, &Vector3<f64>)| {
@@ -99,7 +99,7 @@ impl Squeeze {
         Self { depth: 0.5 * self.depth, ..self }
     }
 
-    /// Deepest press of the squeeze, as a share of the size.
+    /// Largest depth of the squeeze, relative to the size.
     pub fn depth(&self) -> f64 {
         self.depth
     }
@@ -109,7 +109,7 @@ impl Squeeze {
         self.size
     }
 
-    /// A path at rest, held by the tips.
+    /// Path that begins at rest, held by the fingertips.
     ///
     /// # Errors
     /// [`ReportError`] where the tips do not hold the object.
@@ -117,7 +117,7 @@ impl Squeeze {
         self.path_from(vec![0.0; 3 * self.model.system_node_count()], is_single)
     }
 
-    /// A path from a shape on, 3N displacements of the system, m.
+    /// Path that begins at a shape (3N displacements of the system, m).
     ///
     /// # Errors
     /// [`ReportError`] where the tips do not hold the object.

@@ -1,4 +1,4 @@
-//! Random squeezes of any mesh: patches, material, depth, turn and slide drawn from a seed.
+//! Random squeezes of any mesh: patches, material, depth, rotation and slide, drawn from a seed.
 
 use std::sync::Arc;
 
@@ -13,20 +13,20 @@ use softgrasp_core::solve::equilibrium::Path;
 use crate::random::Random;
 use crate::report::ReportError;
 
-/// Deepest press, as a share of the object's size and of its smallest extent.
+/// Largest depth of the press, relative to the object's size and to its smallest extent.
 const DEPTH: (f64, f64) = (0.25, 0.5);
-/// Largest turn of the hand, rad.
+/// Largest rotation of the hand, rad.
 const TURN: f64 = 0.8;
-/// How often patches are drawn again where they do not hold the object.
+/// Number of draws of patches, if they do not hold the object.
 const DRAWS: usize = 20;
 
-/// An object, where tips hold it, and how they move.
+/// Object, the patches that fingertips hold, and their motion.
 pub(super) struct Trial {
     pub model: Model,
     pub frames: usize,
     law: Law,
     masks: Vec<Mask>,
-    /// Mean place of each mask at rest, and its way at the end without the turn, m.
+    /// Mean position of each mask at rest, and its displacement at the end without the rotation, m.
     ways: Vec<(Point3<f64>, Vector3<f64>)>,
     axis: Vector3<f64>,
     turn: f64,
@@ -63,7 +63,7 @@ impl Trial {
         Ok(Self { model, frames, law, masks, ways, axis, turn, slide })
     }
 
-    /// Means of the masks at a share of the whole squeeze, m.
+    /// Mean displacements of the masks at a share of the whole squeeze, m.
     pub fn at(&self, share: f64) -> Vec<f64> {
         let turn = Rotation3::new(self.axis * (self.turn * share));
         let moved = |(centre, way): &(Point3<f64>, Vector3<f64>)| {
@@ -72,7 +72,7 @@ impl Trial {
         self.ways.iter().flat_map(moved).collect()
     }
 
-    /// A path at rest.
+    /// Path that begins at rest.
     ///
     /// # Errors
     /// [`ReportError`] where the tips do not hold the object.
@@ -80,7 +80,7 @@ impl Trial {
         self.path_from(vec![0.0; 3 * self.model.system_node_count()], is_single)
     }
 
-    /// A path from a shape on, 3N displacements of the system, m.
+    /// Path that begins at a shape (3N displacements of the system, m).
     ///
     /// # Errors
     /// [`ReportError`] where the tips do not hold the object.
@@ -91,8 +91,7 @@ impl Trial {
     }
 }
 
-/// A generated object of about so many nodes: one of the built-in shapes drawn out, flattened, bent
-/// and twisted.
+/// Generated object of about `nodes` nodes: a built-in shape, stretched, flattened, bent and twisted.
 ///
 /// # Errors
 /// [`ReportError`] where the mesh cannot be made.
@@ -117,7 +116,7 @@ pub(super) fn drawn_object(seed: u64, nodes: usize) -> Result<(String, TetMesh),
     Ok((format!("drawn-out {name}"), mesh))
 }
 
-/// Masks, and the place and the way of each.
+/// Masks, and position and displacement of each.
 type Patches = (Vec<Mask>, Vec<(Point3<f64>, Vector3<f64>)>);
 
 /// Three to five round patches of the surface, each pressed inward.

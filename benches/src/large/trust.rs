@@ -1,4 +1,5 @@
-//! How far estimates can be trusted: random squeezes of real and generated objects, every budget.
+//! Reliability of error estimates: random squeezes of real and generated objects, with every error
+//! budget.
 
 use glove_client::object::mesh_file::read_mesh_file;
 use softgrasp_core::mesh::TetMesh;
@@ -8,7 +9,7 @@ use super::trial::{Trial, drawn_object};
 use crate::report::{Options, ReportError, progress};
 use crate::table::{Cell, Table};
 
-/// Files of others, those with slivers and thin limbs among them.
+/// Files of other authors, also with slivers and thin limbs.
 const FILES: [&str; 9] = [
     "armadillo_4k.node",
     "banana.vtk",
@@ -22,9 +23,9 @@ const FILES: [&str; 9] = [
 ];
 /// Budgets of the estimated error.
 const BUDGETS: [f64; 4] = [1e-2, 2e-3, 1e-6, 1e-8];
-/// Generated objects, and about how many nodes they have.
+/// Approximate numbers of nodes of the generated objects.
 const DRAWN: [usize; 5] = [700, 400, 700, 400, 700];
-/// Squeezes of each object.
+/// Number of squeezes of each object.
 const ROUNDS: u64 = 2;
 
 const COLUMNS: [&str; 14] = [
@@ -44,7 +45,7 @@ const COLUMNS: [&str; 14] = [
     "factors_waited_for",
 ];
 
-/// The table of all budgets, and a line for each file that is not there.
+/// Table of all error budgets, and a line for each file that is not available.
 ///
 /// # Errors
 /// [`ReportError`] for generated objects only.
@@ -99,7 +100,7 @@ fn row(budget: f64, squeezes: u64, mut judged: Judged) -> [Cell; 14] {
     ]
 }
 
-/// Names and meshes.
+/// Names and meshes of objects.
 type Objects = Vec<(String, TetMesh)>;
 
 fn objects(options: &Options) -> Result<(Objects, Vec<String>), ReportError> {
@@ -142,7 +143,7 @@ mod tests {
     }
 
     /// Near its end a branch is soft, and one short correction among long ones was taken for the last:
-    /// errors were 1.2 and 2.5 times what was told.
+    /// errors were 1.2 and 2.5 times the estimates.
     #[test]
     fn a_correction_that_is_short_by_chance_near_the_end_of_a_branch_is_not_taken_for_the_last() {
         let (_, mesh) = drawn_object(2, 400).unwrap();

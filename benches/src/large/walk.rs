@@ -1,4 +1,4 @@
-//! Random walks of a hand: it squeezes, turns, slides, lets go and takes hold again.
+//! Random walks of a hand: it squeezes, rotates, slides, lets go and takes hold again.
 
 use std::sync::Arc;
 
@@ -11,90 +11,90 @@ use super::squeeze::Squeeze;
 use crate::random::Random;
 use crate::report::ReportError;
 
-/// Deepest press of a walk over that of a squeeze: 30 % of the size of a compact object.
+/// Largest depth of a walk, relative to that of a squeeze: 30 % of the size of a compact object.
 const DEPTH_OVER_SQUEEZE: f64 = 0.3 / 0.08;
-/// Estimated error that an answer of a walk may have.
+/// Largest estimated error of an answer of a walk, relative.
 const BUDGET: f64 = 2e-3;
 
-/// A hand that walks at random round one object.
+/// Hand that walks at random around one object.
 pub struct Walk {
     squeeze: Squeeze,
     path: Path,
     random: Random,
-    /// Where each tip is, as a share of the size, and where it goes.
+    /// Depth of each fingertip, relative to the size; then rotation of the hand, rad, and slide of each tip.
     depths: [f64; 5],
     turn: f64,
     slid: [Vector3<f64>; 5],
-    /// The hold before, while the hand has taken hold elsewhere and no equilibrium was found yet.
+    /// Earlier hold, while no equilibrium has been found for the present one.
     let_go_of: Option<Arc<Hold>>,
-    /// What came of the steps so far.
+    /// Totals of the steps so far.
     pub count: WalkCount,
 }
 
-/// What came of the steps of a walk.
+/// Totals of the steps of a walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WalkCount {
-    /// Steps.
+    /// Number of steps.
     pub steps: u64,
-    /// Steps for which no equilibrium was found; the shape stayed.
+    /// Number of steps without an equilibrium; the shape stayed.
     pub refused: u64,
-    /// Equilibria that jumped.
+    /// Number of equilibria that jumped to another shape.
     pub jumps: u64,
-    /// Times the hand took hold elsewhere.
+    /// Number of times that the hand took hold elsewhere.
     pub regrasps: u64,
-    /// Smallest volume ratio of an answer.
+    /// Smallest ratio of an element's volume to that at rest.
     pub jacobian_min: f64,
-    /// Most solves of a step.
+    /// Largest number of solves of a step.
     pub solves_max: u32,
-    /// The bits of all shapes, folded into one number.
+    /// Hash of the bits of all shapes.
     pub digest: u64,
 }
 
-/// What must never be.
+/// Faults that must never occur in a walk.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WalkFault {
-    /// An answer with an element inside out.
+    /// An answer has an element that is inside out.
     #[error("step {step}: an element has the volume ratio {jacobian}")]
     InsideOut {
-        /// Step of the walk.
+        /// Number of the step.
         step: u64,
-        /// Smallest volume ratio.
+        /// Smallest ratio of an element's volume to that at rest.
         jacobian: f64,
     },
-    /// An answer that is no number.
+    /// An answer is not a finite number.
     #[error("step {step}: a displacement is not a finite number")]
     NotFinite {
-        /// Step of the walk.
+        /// Number of the step.
         step: u64,
     },
-    /// An answer whose estimated error is above its budget.
+    /// The estimated error of an answer is above its budget.
     #[error("step {step}: the estimated error is {estimate}")]
     OverBudget {
-        /// Step of the walk.
+        /// Number of the step.
         step: u64,
-        /// Estimated error.
+        /// Estimated relative error.
         estimate: f64,
     },
-    /// Energy rose while the hand rested.
+    /// The energy rose while the hand did not move.
     #[error("step {step}: at rest the energy rose from {before} J to {after} J")]
     EnergyRose {
-        /// Step of the walk.
+        /// Number of the step.
         step: u64,
-        /// Before.
+        /// Energy before the step, J.
         before: f64,
-        /// After.
+        /// Energy after the step, J.
         after: f64,
     },
-    /// The shape changed though its step was refused.
+    /// The shape changed although its step was refused.
     #[error("step {step}: it was refused and the shape changed")]
     Changed {
-        /// Step of the walk.
+        /// Number of the step.
         step: u64,
     },
 }
 
 impl Walk {
-    /// A walk round a built-in object.
+    /// Walk around a built-in object.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -114,10 +114,10 @@ impl Walk {
         })
     }
 
-    /// One step, and what it must hold.
+    /// Makes one step and checks its answer.
     ///
     /// # Errors
-    /// [`WalkFault`].
+    /// [`WalkFault`] if the check fails.
     pub fn step(&mut self) -> Result<(), WalkFault> {
         let step = self.count.steps;
         self.count.steps += 1;
@@ -175,7 +175,7 @@ impl Walk {
         Ok(())
     }
 
-    /// Presses or eases every tip, turns, slides; now and then lets go and takes hold again.
+    /// Moves the hand at random: depth of every tip, rotation, slide; now and then another hold.
     fn move_on(&mut self) {
         let regrasps = self.random.share() < 0.02;
         if regrasps {
@@ -201,7 +201,7 @@ impl Walk {
         }
     }
 
-    /// The hand takes hold with smaller masks in the same places.
+    /// Takes hold with smaller masks at the same positions.
     fn let_go(&mut self) {
         let smaller = |mask: &Mask| {
             let keep = 3 + (self.count.regrasps as usize) % mask.entries().len().max(1);
@@ -218,7 +218,7 @@ impl Walk {
         }
     }
 
-    /// Means of the masks where the tips are now, m.
+    /// Mean displacements of the masks at the present positions of the fingertips, m.
     fn mask_q(&self) -> Vec<f64> {
         let mut q = Vec::with_capacity(15);
         for (tip, depth) in self.depths.iter().enumerate() {

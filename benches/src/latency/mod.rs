@@ -1,4 +1,4 @@
-//! Report `latency`: how soon frames are answered: warm ones, the first of a grip, one each millisecond.
+//! Report `latency`: times of frame questions: warm ones, the first of a grip, one each millisecond.
 
 mod frame;
 mod hold;
@@ -10,7 +10,7 @@ use crate::threads::processors;
 /// Measures the report.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that differs from the right one is one.
+/// [`ReportError`], also for an answer that differs from the exact one.
 pub fn measure(options: &Options) -> Result<Report, ReportError> {
     let title = "Latency: how soon a frame is answered";
     let mut report = Report::begin("latency", title, &processors().to_string(), options);

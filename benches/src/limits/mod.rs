@@ -1,4 +1,4 @@
-//! Report `limits`: the factor over fronts against what the machine can do at most.
+//! Report `limits`: rate of the factor over fronts against the largest rate of the machine.
 
 mod one_size;
 mod product;

@@ -8,21 +8,21 @@ use crate::report::ReportError;
 use crate::sample::Spread;
 use crate::table::{Cell, Table};
 
-/// Requests of a fresh process, and rounds of many right-hand sides.
+/// Number of requests of a fresh process, and of rounds of many right-hand sides.
 const ROUNDS: usize = 5;
 
-/// Rounds of the size in question: f64 on one thread and on all, f32 the same.
+/// Rounds of one size: f64 on one thread and on all, then f32.
 pub struct Rounds<'a> {
     pub doubles: [&'a [Round]; 2],
     pub singles: [&'a [Round]; 2],
 }
 
-/// Each stage of this size.
+/// Table of the times of each stage at this size.
 ///
-/// Units: ms, but for the rates.
+/// Units: ms, except for the rates.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that is wrong is one.
+/// [`ReportError`], also for a wrong answer.
 pub fn table(problem: &Problem, rounds: &Rounds<'_>, is_quick: bool) -> Result<Table, ReportError> {
     let mut table = Table::new("limits", "One cube by stage", &COLUMNS);
     let mut row = |what: &str, of: Spread| {

@@ -1,17 +1,17 @@
-//! The rate of a matrix product: what a processor can do at most.
+//! Rate of a matrix product: the largest rate of a processor in practice.
 
 use std::time::Instant;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 
-/// Side of the square matrices: large enough that no start counts, small enough for a third cache.
+/// Side of the square matrices: so large that the start does not count, and within a level-3 cache.
 const SIDE: usize = 1500;
 
-/// Products of which the fastest counts, after one that touches the memory.
+/// Number of products, of which the fastest counts, after one that touches the memory.
 const PRODUCTS: usize = 5;
 
-/// Operations a nanosecond of faer's product of square matrices on so many threads, at best.
+/// Largest rate of faer's product of square matrices on `threads` threads.
 ///
 /// Units: GFlop/s.
 pub fn product_rate<T: faer::traits::RealField + From<f32>>(threads: usize) -> f64 {

@@ -1,4 +1,4 @@
-//! Writes the page: rate of the factor over the rate of a product, against the size.
+//! Writes the page: rate of the factor relative to the rate of a product, against the size.
 
 use softgrasp_core::solve::Real;
 
@@ -10,19 +10,19 @@ use crate::sample::Spread;
 use crate::table::{Cell, Table};
 use crate::threads::{pool, processors};
 
-/// Nodes of the cubes.
+/// Numbers of nodes of the cubes.
 const NODES: [usize; 7] = [1000, 3375, 10_648, 21_952, 46_656, 97_336, 157_464];
-/// Nodes above which a round is long enough to be taken once only.
+/// Number of nodes above which a round is long enough to be made once only.
 const LARGE: usize = 40_000;
-/// Nodes of the cube that is looked at in detail.
+/// Number of nodes of the cube that is measured in detail.
 const IN_DETAIL: usize = 10_648;
-/// Nodes above which one thread alone would take minutes.
+/// Number of nodes above which one thread alone would take minutes.
 const ALL_THREADS: usize = 60_000;
 
 /// Factors cubes of growing size.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that is wrong is one.
+/// [`ReportError`], also for a wrong answer.
 pub fn measure(options: &Options) -> Result<Report, ReportError> {
     let sizes = if options.is_quick { &NODES[..1] } else { &NODES[..] };
     let all = processors();
@@ -88,7 +88,7 @@ fn round<T: Real + faer::traits::RealField + From<f32>>(
     pool(threads)?.install(|| Round::take::<T>(problem, threads, residual_allowed))
 }
 
-/// One row, and one point of the figure.
+/// Adds one row, and one point of the figure.
 fn add<T: Real>(
     table: &mut Table,
     series: &mut Vec<Series>,

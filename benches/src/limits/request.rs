@@ -1,4 +1,4 @@
-//! One request in a fresh process: what a person waits for who types `glove-client solve`.
+//! One request in a fresh process: the wait of a person who types `glove-client solve`.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use super::round::Problem;
 use crate::programs::Programs;
 use crate::report::{ReportError, check};
 
-/// A mesh and known displacements in files.
+/// Mesh and known displacements in files.
 pub struct Files {
     folder: TempDir,
     mesh: PathBuf,
     known: PathBuf,
 }
 
-/// Milliseconds by stage of one request.
+/// Time of each stage of one request, ms.
 pub struct Stages {
     pub assemble: f64,
     pub order: f64,
@@ -27,15 +27,17 @@ pub struct Stages {
 }
 
 impl Stages {
-    /// All four.
+    /// Sum of all four stages, ms.
     pub fn all(&self) -> f64 {
         self.assemble + self.order + self.factor + self.solve
     }
 }
 
 impl Files {
+    /// Writes the files.
+    ///
     /// # Errors
-    /// Where they cannot be written.
+    /// [`ReportError`] if they cannot be written.
     pub fn of(problem: &Problem) -> Result<Self, ReportError> {
         let folder = tempfile::tempdir().map_err(failed)?;
         let (mesh, known) = (folder.path().join("cube.msh"), folder.path().join("known.csv"));
@@ -48,10 +50,10 @@ impl Files {
         Ok(Self { folder, mesh, known })
     }
 
-    /// Solves them by `front` in a process of its own.
+    /// Solves the files' problem by `front` in a process of its own.
     ///
     /// # Errors
-    /// Where the client fails, or its residual is large.
+    /// [`ReportError`] if the client fails, or the residual is large.
     pub fn solve(&self, programs: &Programs, estimate: bool) -> Result<Stages, ReportError> {
         let (out, report) = (self.folder.path().join("u.csv"), self.folder.path().join("r.json"));
         let mut arguments: Vec<&OsStr> =

@@ -1,4 +1,4 @@
-//! One factor of one problem on some threads, and how right it is.
+//! One factor of one problem on some threads, and the residual of its answer.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::product::product_rate;
 use crate::report::{ReportError, check};
 use crate::sample::timed_ms;
 
-/// A cube with five known nodes and what its factor needs.
+/// Cube with five known nodes, and all that its factor needs.
 pub struct Problem {
     pub nodes: usize,
     pub model: Model,
@@ -22,8 +22,10 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// Cube of about `nodes` nodes.
+    ///
     /// # Errors
-    /// Those of mesh, model and partition.
+    /// [`ReportError`] of mesh, model or partition.
     pub fn try_new(nodes: usize) -> Result<Self, ReportError> {
         let mesh = generate(BuiltIn::Cube, nodes)?;
         let nodes = mesh.node_count();
@@ -46,7 +48,7 @@ impl Problem {
         self.model.stiffness()
     }
 
-    /// `‖K11 x − b‖ / ‖b‖`.
+    /// Relative residual `‖K11 x − b‖ / ‖b‖`.
     fn residual(&self, x: &[f64]) -> f64 {
         let mut q = vec![0.0; self.partition.dof_count()];
         for (&dof, &x) in self.partition.unknown().iter().zip(x) {
@@ -71,10 +73,10 @@ pub struct Round {
 }
 
 impl Round {
-    /// Measures on the current rayon pool of `threads`.
+    /// Measures on the current rayon pool of `threads` threads.
     ///
     /// # Errors
-    /// [`ReportError`] where there is no factor, or its answer is wrong.
+    /// [`ReportError`] if there is no factor, or its answer is wrong.
     pub fn take<T: Real + faer::traits::RealField + From<f32>>(
         problem: &Problem,
         threads: usize,

@@ -6,20 +6,22 @@ use super::round::Problem;
 use crate::report::{ReportError, check};
 use crate::sample::timed_ms;
 
-/// Right-hand sides: seven contacts with three directions each.
+/// Number of right-hand sides: seven contacts with three directions each.
 const LOADS: usize = 21;
 
-/// Factors of both precisions of one problem.
+/// Factors of one problem in both precisions.
 pub struct Several {
     front: Factored,
     mixed: Factored,
-    /// Known displacements of each load.
+    /// Known displacements of each load case, m.
     q_known: Vec<Vec<f64>>,
 }
 
 impl Several {
+    /// Factors of a problem in both precisions.
+    ///
     /// # Errors
-    /// Where there is no factor.
+    /// [`ReportError`] if there is no factor.
     pub fn try_new(problem: &Problem) -> Result<Self, ReportError> {
         let factored = |method| {
             let partition = problem.partition.clone();
@@ -31,10 +33,10 @@ impl Several {
         Ok(Self { front: factored(Method::Front)?, mixed: factored(Method::FrontMixed)?, q_known })
     }
 
-    /// Milliseconds for all loads by `front` and by `front-mixed`.
+    /// Times for all load cases by `front` and by `front-mixed`, ms.
     ///
     /// # Errors
-    /// Where answers of the two differ.
+    /// [`ReportError`] if the answers of the two differ.
     pub fn round(&self, problem: &Problem) -> Result<[f64; 2], ReportError> {
         let stiffness = problem.model.stiffness();
         let loads: Vec<Loads<'_>> =

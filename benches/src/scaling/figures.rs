@@ -7,7 +7,7 @@ use crate::fit::PowerLaw;
 use crate::plot::{Mark, Plot, PlotError, PlotPoint, Scale, Series as Line};
 use crate::thesis::{SLOPES, TIMES};
 
-/// A fitted law T = k Nᵐ over processors at one size.
+/// Fitted law T = k Nᵐ over processors at one size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SizeLaw {
     pub method: Method,
@@ -15,7 +15,7 @@ pub(super) struct SizeLaw {
     pub law: PowerLaw,
 }
 
-/// The thesis extrapolates to as many processors.
+/// Number of processors that the thesis extrapolates to.
 pub(super) const PROCESSORS_1998: usize = 27;
 
 fn point(x: f64, y: f64, spread: Option<(f64, f64)>) -> PlotPoint {
@@ -77,7 +77,7 @@ pub(super) fn processors(series: &[Series], laws: &[SizeLaw]) -> Result<String, 
     plot(title, "processors", "seconds", Scale::Log, lines)
 }
 
-/// Figure 6.16: slopes of the laws against vertices, two standard errors each way.
+/// Figure 6.16: exponents of the laws against vertices, with two standard errors each way.
 pub(super) fn slopes(laws: &[SizeLaw]) -> Result<String, PlotError> {
     let mut lines: Vec<Line> = METHODS
         .iter()

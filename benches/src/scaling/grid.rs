@@ -21,13 +21,13 @@ pub(super) struct Series {
     pub threads: usize,
     /// Time of the whole analysis in each round, s.
     pub seconds: Vec<f64>,
-    /// Worst error of all rounds against the reference.
+    /// Largest error of all rounds against the exact answer.
     pub error_rel: f64,
 }
 
 /// The thesis's method, the dense one that replaces it, and the sparse one that replaces both.
 pub(super) const METHODS: [Method; 3] = [Method::GaussJordan, Method::DenseInverse, Method::Front];
-/// From so many nodes on a round takes so long that what the first one warms up does not show.
+/// Number of nodes from which on a round is so long that warming up does not show.
 const LONG_NODES: usize = 700;
 const ERROR_ALLOWED: f64 = 1e-9;
 

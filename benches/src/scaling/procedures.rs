@@ -34,7 +34,7 @@ struct Round {
 const ROUNDS: Effort =
     Effort { warm_up_rounds: 2, rounds_min: 5, rounds_max: 40, budget: Duration::from_secs(20) };
 
-/// Figure 5.1 again: one request of the thesis's kind at 267 nodes, and what is around it.
+/// Figure 5.1 measured again: one request as in the thesis at 267 nodes, and the client's work around it.
 ///
 /// # Errors
 /// [`ReportError`].
@@ -70,7 +70,7 @@ pub(super) fn procedures(nodes: usize, threads: usize) -> Result<Table, ReportEr
     Ok(table)
 }
 
-/// The same request over and over through an embedded server, and the client's work around it.
+/// Rounds of the same request to an embedded server, and of the client's work around it.
 fn rounds(scene: &Pressed, method: Method, threads: usize) -> Result<Vec<Round>, ReportError> {
     let (model, known) = scene.model()?;
     let reference = Reference::of(&model, &known)?;
@@ -119,7 +119,7 @@ fn rounds(scene: &Pressed, method: Method, threads: usize) -> Result<Vec<Round>,
     Ok(take_turns(&ROUNDS, &mut only)?.remove(0))
 }
 
-/// A half closed hand over the object.
+/// Half closed hand over the object.
 fn closing_hand() -> HandColliders {
     let dimensions = HandDimensions::default();
     let angles = JointAngles::flat().lerp(&JointAngles::fist(), 0.5);
@@ -127,7 +127,7 @@ fn closing_hand() -> HandColliders {
     HandColliders::new(&dimensions, &pose(&dimensions, &angles, object_from_palm))
 }
 
-/// Figure 5.2 again: stages of the analysis by Gauss–Jordan elimination, on one processor and on
+/// Figure 5.2 measured again: stages of the analysis by Gauss–Jordan elimination, on one processor and on
 /// all.
 ///
 /// # Errors

@@ -99,7 +99,7 @@ fn times(series: &[Series]) -> Table {
     table
 }
 
-/// T = k Vᵖ over vertices, for the sizes of interest: small ones are all overhead.
+/// Laws T = k Vᵖ over vertices, for larger sizes: small ones are mostly overhead.
 fn vertex_laws(series: &[Series], counts: &[usize]) -> Result<Table, ReportError> {
     let largest = series.iter().map(|s| s.nodes).max().unwrap_or(0);
     let from = if largest >= 1000 { 216 } else { 0 };
@@ -152,7 +152,7 @@ fn processor_laws(series: &[Series], laws: &[SizeLaw]) -> Table {
     table
 }
 
-/// What the fits say about the thesis's extrapolation.
+/// Comparison of the fits with the thesis's extrapolation.
 fn on_twenty_seven(series: &[Series], laws: &[SizeLaw]) -> String {
     let mut text = format!(
         "### What the fits say about {PROCESSORS_1998} processors\n\n\
@@ -196,7 +196,7 @@ fn on_twenty_seven(series: &[Series], laws: &[SizeLaw]) -> String {
     text
 }
 
-/// The same extrapolation by Amdahl's law: a serial share that stays.
+/// Extrapolation by Amdahl's law, with a constant serial share.
 fn amdahl(one: f64, all: f64, processors: usize) -> String {
     let n = processors as f64;
     let serial = ((all / one * n - 1.0) / (n - 1.0)).clamp(0.0, 1.0);
@@ -275,7 +275,7 @@ fn beside_1998(series: &[Series]) -> Table {
     table
 }
 
-/// Slopes m of the thesis (6.4), each beside ours at the nearest number of vertices.
+/// Exponents m of the thesis (6.4), each beside ours at the nearest number of vertices.
 fn slopes_beside_1998(series: &[Series], laws: &[SizeLaw]) -> Table {
     let title = "Slopes m of T = k Nᵐ: the 1998 figures beside ours";
     let mut table = Table::new("scaling-slopes-1998", title, &SLOPE_COLUMNS);

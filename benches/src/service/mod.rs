@@ -12,7 +12,7 @@ use crate::threads::processors;
 /// Measures the report.
 ///
 /// # Errors
-/// [`ReportError`]; a run that hangs, and an answer that is wrong, are some.
+/// [`ReportError`], also for a run that hangs and for a wrong answer.
 pub fn measure(options: &Options) -> Result<Report, ReportError> {
     let title = "Service: what the users of one server get";
     let mut report = Report::begin("service", title, &processors().to_string(), options);

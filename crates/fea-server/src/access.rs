@@ -15,37 +15,37 @@ pub(crate) struct Access {
     wrong: Lock<BTreeMap<Origin, Wrong>>,
 }
 
-/// Wrong tokens of one owner.
+/// How often one owner has shown a wrong token, and when last.
 #[derive(Clone, Copy)]
 struct Wrong {
     count: u32,
     newest: Instant,
 }
 
-/// Wrong tokens after which an address is barred.
+/// Number of wrong tokens after which an address is barred.
 const WRONG_MAX: u32 = 5;
-/// For how long after its newest wrong token.
+/// Time for which an address is barred after its newest wrong token.
 const BARRED_FOR: Duration = Duration::from_secs(30);
-/// Addresses that are remembered; with more, the one that was wrong longest ago is forgotten.
+/// Number of addresses remembered; with more, the one whose wrong token is oldest is forgotten.
 const ADDRESSES_MAX: usize = 4096;
 
 impl Access {
-    /// Access for all (`None`) or for those who show one of the tokens.
+    /// Access for everybody (`None`) or for those who show one of the tokens.
     pub fn new(tokens: Option<Tokens>) -> Self {
         Self { tokens, wrong: Lock::default() }
     }
 
-    /// Whether a token is wanted.
+    /// Whether a client must show a token.
     pub fn wants_token(&self) -> bool {
         self.tokens.is_some()
     }
 
-    /// What has been counted of each token that has a name.
+    /// Sessions and requests counted for each token that has a name.
     pub fn numbers(&self) -> Vec<TokenNumbers> {
         self.tokens.as_ref().map(Tokens::numbers).unwrap_or_default()
     }
 
-    /// Lets in who shows a right token, and tells whose it is; `None` where none is wanted.
+    /// Lets a client in that shows a right token, and returns the token's bearer; `None` without tokens.
     ///
     /// # Errors
     /// [`Refusal::Token`] for a wrong or missing token, [`Refusal::Barred`] for an address that showed

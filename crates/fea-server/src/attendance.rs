@@ -1,5 +1,5 @@
-//! A connection that has just been accepted, until it is a session: encrypted if the server is, within
-//! the time for a greeting, and sent away when others need its room.
+//! An accepted connection until it becomes a session: it is encrypted if the server is, must introduce
+//! itself in time, and is closed if its room is needed.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -13,12 +13,12 @@ use crate::server_handle::{ServerHandle, stopped};
 use crate::session;
 use crate::standing::{Greeting, Standing};
 
-/// A silent peer is asked whether it is there after this long, and again so often; the system gives it
-/// up after some questions without an answer.
+/// Time of silence after which the system asks the peer's machine whether it is there, and between such
+/// questions; after some questions without an answer it gives the connection up.
 const ALIVE_AFTER: Duration = Duration::from_secs(30);
 const ALIVE_EVERY: Duration = Duration::from_secs(10);
 
-/// A frame is sent at once, and a peer that is gone without a word is noticed.
+/// Sets the socket's options: bytes are sent at once, and a machine that is gone is noticed.
 pub(crate) fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
     let alive = socket2::TcpKeepalive::new().with_time(ALIVE_AFTER).with_interval(ALIVE_EVERY);

@@ -1,14 +1,14 @@
-//! Whether anybody still waits for the answer to a request; its work ends where nobody does.
+//! Whether a client still waits for the answer to a request; work for a client that has gone ends.
 
 use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Held by whoever waits for an answer; the work knows when it is dropped.
+/// Held by the session that waits for an answer; dropping it tells the work.
 #[derive(Default)]
 pub(crate) struct Waiting(Awaited);
 
-/// The work's side: whether somebody waits.
+/// Held by the work: tells whether a session still waits.
 #[derive(Clone, Default)]
 pub(crate) struct Awaited {
     is_over: Arc<AtomicBool>,
@@ -18,7 +18,7 @@ pub(crate) struct Awaited {
 pub(crate) struct Abandoned;
 
 impl Waiting {
-    /// For the work.
+    /// The counterpart that the work holds.
     pub fn awaited(&self) -> Awaited {
         self.0.clone()
     }
@@ -32,8 +32,7 @@ impl Drop for Waiting {
 
 impl Awaited {
     /// Returns if the client still waits for the answer. Otherwise the work unwinds with the payload
-    /// [`Abandoned`], which gives back all that it holds and is told from a fault by whoever began it. The
-    /// panic hook is not called.
+    /// [`Abandoned`], which frees all that it holds and is no fault. The panic hook is not called.
     pub fn go_on(&self) {
         if self.is_over.load(Ordering::Relaxed) {
             resume_unwind(Box::new(Abandoned));

@@ -8,7 +8,7 @@ use tokio::sync::futures::Notified;
 
 use crate::lock::Lock;
 
-/// Memory that the server may take, and what of it is reserved for requests under way.
+/// Memory that the server may take, and the part that is reserved for requests under way.
 ///
 /// Invariant: what is kept between requests plus what is reserved ≤ `limit`; the store of models
 /// keeps its part by [`Budget::left_for_kept`].
@@ -21,7 +21,7 @@ pub(crate) struct Budget {
     freed: Arc<Notify>,
 }
 
-/// What one request has reserved; given back when dropped.
+/// Memory reserved for one request, bytes; given back when dropped.
 #[derive(Debug)]
 pub(crate) struct Reservation {
     budget: Budget,
@@ -29,22 +29,24 @@ pub(crate) struct Reservation {
 }
 
 impl Budget {
+    /// Budget of `limit` bytes of which nothing is reserved.
+    ///
     /// Units: `limit` bytes.
     pub fn new(limit: u64) -> Self {
         Self { limit, reserved: Arc::default(), freed: Arc::default() }
     }
 
-    /// A reservation for one request, empty at first.
+    /// Reservation for one request, 0 bytes at first.
     pub fn reservation(&self) -> Reservation {
         Reservation { budget: self.clone(), own: AtomicU64::new(0) }
     }
 
-    /// All of it, bytes.
+    /// The whole budget, bytes.
     pub fn limit(&self) -> u64 {
         self.limit
     }
 
-    /// Ends when something that was reserved is given back.
+    /// Future that ends when reserved memory is given back.
     pub fn freed(&self) -> Notified<'_> {
         self.freed.notified()
     }
@@ -56,22 +58,22 @@ impl Budget {
 }
 
 impl Reservation {
-    /// Bytes of the whole budget.
+    /// The whole budget, bytes.
     pub fn limit(&self) -> u64 {
         self.budget.limit
     }
 
-    /// Bytes that others have reserved.
+    /// Bytes reserved for other requests.
     pub fn of_others(&self) -> u64 {
         self.budget.reserved.with(|reserved| reserved.saturating_sub(self.own.load(Relaxed)))
     }
 
-    /// Bytes that others have not reserved.
+    /// Bytes of the budget that are not reserved for other requests.
     pub fn free(&self) -> u64 {
         self.budget.limit.saturating_sub(self.of_others())
     }
 
-    /// Makes what was reserved before what is held now, even if that is more.
+    /// Changes the reservation to the memory that is held now, even if this is more than the budget.
     pub fn settle(&self, bytes: u64) {
         self.budget.reserved.with(|reserved| self.replace(reserved, bytes));
     }

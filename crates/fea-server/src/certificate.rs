@@ -1,4 +1,4 @@
-//! Certificates: for how long one is valid, and a self-made one for a lab that has no authority.
+//! Certificates: their validity, and self-signed ones for a lab that has no authority.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -8,28 +8,28 @@ use x509_parser::prelude::FromDer;
 use x509_parser::time::ASN1Time;
 
 const DAY: Duration = Duration::from_secs(86_400);
-/// A certificate that was made holds from so long before, for clients whose clock is late.
+/// Time before now from which a made certificate is valid, for clients whose clock is late.
 const BEFORE: Duration = DAY;
-/// Days that a certificate may be made for: a hundred years are surely enough.
+/// Largest number of days for which a certificate is made: a hundred years.
 const DAYS_MAX: u32 = 36_500;
 
-/// The time in which a certificate is valid.
+/// Time span in which a certificate is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Validity {
     from: ASN1Time,
     to: ASN1Time,
 }
 
-/// Why a certificate is of no use.
+/// Why a certificate cannot be used.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ValidityError {
-    /// It is not read.
+    /// The certificate cannot be decoded.
     #[error("it is no X.509 certificate ({0})")]
     NotRead(String),
-    /// Its time is over.
+    /// The certificate has expired.
     #[error("it expired on {0}, and no client will trust it; replace it")]
     Expired(ASN1Time),
-    /// Its time has not begun.
+    /// The certificate is not valid yet.
     #[error("it is valid from {0} only; replace it, or set the clock of this machine")]
     NotYet(ASN1Time),
 }
@@ -37,34 +37,34 @@ pub enum ValidityError {
 /// Why no certificate was made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
-    /// Names for which no certificate can be made.
+    /// The names are none that a certificate can be made for.
     #[error(
         "no certificate can be made for {names}: {reason}; name hosts or addresses, as in lab.example,192.168.1.5"
     )]
     Names {
-        /// As given.
+        /// The names as they were given.
         names: String,
-        /// What the library says.
+        /// Reason given by the TLS library.
         reason: String,
     },
-    /// A file that cannot be written.
+    /// A file cannot be written.
     #[error("cannot write {path}: {source}")]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A life of no length, or of centuries.
+    /// The number of days is 0 or too large.
     #[error("a certificate is made for 1 to {DAYS_MAX} days, not for {0}")]
     Days(u32),
 }
 
 impl Validity {
-    /// That of a certificate.
+    /// Validity of a certificate in DER form.
     ///
     /// # Errors
-    /// [`ValidityError::NotRead`].
+    /// [`ValidityError::NotRead`] if it cannot be decoded.
     pub fn of(der: &[u8]) -> Result<Self, ValidityError> {
         let (_, certificate) = X509Certificate::from_der(der)
             .map_err(|error| ValidityError::NotRead(error.to_string()))?;
@@ -72,10 +72,10 @@ impl Validity {
         Ok(Self { from: validity.not_before, to: validity.not_after })
     }
 
-    /// Whether a client with the right time trusts it now.
+    /// Checks that a client whose clock is right trusts the certificate at this time.
     ///
     /// # Errors
-    /// [`ValidityError`].
+    /// [`ValidityError`] if the certificate has expired or is not valid yet.
     pub fn check(&self, now: SystemTime) -> Result<(), ValidityError> {
         let now = unix_seconds(now);
         if now > self.to.timestamp() {
@@ -87,17 +87,17 @@ impl Validity {
         }
     }
 
-    /// The last second of its life, as Unix time.
+    /// Last second of the validity, as Unix time, s.
     pub fn expires_s(&self) -> i64 {
         self.to.timestamp()
     }
 
-    /// The end of its life, for people.
+    /// End of the validity as a text for people.
     pub fn expires_on(&self) -> String {
         self.to.to_string()
     }
 
-    /// Whole days until then; none once it is over.
+    /// Whole days until the validity ends; 0 once it is over.
     pub fn days_left(&self, now: SystemTime) -> u64 {
         let seconds = self.to.timestamp().saturating_sub(unix_seconds(now));
         u64::try_from(seconds).unwrap_or(0) / DAY.as_secs()
@@ -109,12 +109,12 @@ fn unix_seconds(time: SystemTime) -> i64 {
     i64::try_from(since.as_secs()).unwrap_or(i64::MAX)
 }
 
-/// Makes a self-signed certificate for hosts and addresses that is valid for so many days, from a day
-/// before today on, and writes it with its key; the certificate is also what clients trust (`--tls-ca`).
-/// The key can be read by its owner only.
+/// Makes a self-signed certificate for hosts and addresses that is valid from a day before now for `days`
+/// days, and writes it with its key. The certificate is also what clients trust (`--tls-ca`). Only its
+/// owner can read the key.
 ///
 /// # Errors
-/// [`MakeError`]; a file that is there already is not overwritten.
+/// [`MakeError`]; an existing file is not overwritten.
 pub fn make_certificate(
     names: &[String],
     days: u32,
@@ -129,7 +129,7 @@ pub fn make_certificate(
     write_new(certificate, &made, 0o644)
 }
 
-/// A certificate and its key, PEM, that is made now, is written nowhere and lives for so many days.
+/// Self-signed certificate and its key as PEM texts, valid for `days` days; no file is written.
 pub(crate) fn self_signed_now(names: &[String], days: u32) -> Result<(String, String), MakeError> {
     let now = SystemTime::now();
     self_signed(names, now - BEFORE, now + days * DAY)

@@ -1,4 +1,4 @@
-//! A client's connection: frames may come with any pause between them, but not with a long one inside.
+//! A client's connection: any pause may lie between two messages, but no long one inside a message.
 
 use std::collections::VecDeque;
 use std::io;
@@ -19,22 +19,22 @@ use crate::no_room::NoRoom;
 use crate::places::NoPlace;
 use crate::room::Room;
 
-/// Frames from and bytes to one client, each with a limit on how long the client may hold it up.
+/// Reads messages from one client and writes bytes to it, each within a time limit.
 pub(crate) struct ClientConnection<S> {
     connection: Connection<TimedStream<S>>,
     room: Room,
     patience: Patience,
-    /// When a client that has not introduced itself yet is given up.
+    /// Time at which a client that has not introduced itself yet is given up.
     stranger_until: Option<Instant>,
-    /// Whether it is known only after it has shown a token.
+    /// Whether the client counts as introduced only after it has shown a token.
     wants_token: bool,
     /// Requests that came while another one was worked on, oldest first.
     ahead: VecDeque<Ahead>,
-    /// Bytes of what came while the present request is worked on.
+    /// Bytes of the requests that came while the present one is worked on.
     ahead_bytes: usize,
-    /// Since when the next request is waited for.
+    /// Time since which the next request is waited for.
     waiting_since: Option<Instant>,
-    /// How long the server may be silent towards this client.
+    /// Silence of the server after which this client wants an `Alive`.
     alive_every: Option<Duration>,
     last_sent: Instant,
 }
@@ -46,49 +46,50 @@ struct Ahead {
     is_cancelled: bool,
 }
 
-/// What comes from a client.
+/// What the next read from a client brought.
 #[derive(Debug)]
 pub(crate) enum Incoming {
     /// A request, with the memory that it was received in.
     Request { frame: Frame, received: Reservation },
-    /// A request for which there is no memory; the rest of its bytes is passed over as they come.
+    /// A request for which there is no memory; the rest of its bytes is skipped as they come.
     NoRoom { header: Header, why: NoRoom },
     /// A request that its client has cancelled before its turn came.
     Cancelled { header: Header },
-    /// The server has said nothing for as long as the client wants to wait.
+    /// The server has been silent for as long as the client accepts: an `Alive` is due.
     Silent,
-    /// A frame longer than it may be has begun; it is read on when it may.
+    /// The header of a frame that is longer than allowed; reading goes on once it is allowed.
     Longer,
-    /// The client has closed between two frames.
+    /// The client has closed the connection between two frames.
     End,
 }
 
-/// What a client does while its request is worked on.
+/// What a client did while its request was worked on.
 #[derive(Debug)]
 pub(crate) enum Watched {
-    /// It does not want the answer any more.
+    /// The client has cancelled the request.
     Cancelled,
-    /// The server has said nothing for as long as the client wants to wait.
+    /// The server has been silent for as long as the client accepts: an `Alive` is due.
     Silent,
-    /// It has gone.
+    /// The client has gone.
     Gone(SessionError),
 }
 
-/// How long a client is waited for.
+/// Time limits that a client must keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Patience {
-    /// After its last byte, inside a frame.
+    /// Longest time between two bytes inside a frame.
     pub stall: Duration,
-    /// For its first request from the beginning, and for a whole header from its first byte.
+    /// Longest time for the first request, from the beginning, and for a whole header from its first
+    /// byte.
     pub greeting: Duration,
-    /// For its next request; `None`: for ever.
+    /// Longest time until the next request; `None`: no limit.
     pub idle: Option<Duration>,
-    /// For it to take a reply, and a second more for every [`REPLY_BYTES_PER_S`].
+    /// Time to take a reply, and one second more for every [`REPLY_BYTES_PER_S`] of it.
     pub reply: Duration,
 }
 
 impl Patience {
-    /// That of a server.
+    /// Time limits from a server's settings.
     pub fn of(config: &ServerConfig) -> Self {
         let ServerConfig { stall_limit, greeting_limit, idle_limit, reply_limit, .. } = *config;
         Self { stall: stall_limit, greeting: greeting_limit, idle: idle_limit, reply: reply_limit }
@@ -118,16 +119,16 @@ pub(crate) enum SessionError {
     Gone,
 }
 
-/// A client takes its replies at least as fast.
+/// Rate at which a client must at least take its replies, bytes per second.
 const REPLY_BYTES_PER_S: u64 = 64 * 1024;
-/// A client that has closed its sending side may still wait for its reply, but not longer.
+/// Longest time that a client which has closed its sending side may wait for its reply.
 const HALF_CLOSED_MAX: Duration = Duration::from_secs(10);
-/// Bytes that are taken from a client whose request is worked on, to see whether it goes.
+/// Bytes read from a client whose request is worked on, to notice whether it goes.
 const READ_AHEAD_MAX: usize = 64 * 1024;
 
 impl<S> ClientConnection<S> {
-    /// Wraps the stream of a client that is not known yet, until it has spoken or, if a token is
-    /// wanted, has shown it; `limits` hold for what is read from it.
+    /// Connection over the stream of a client that has not introduced itself yet: that counts as done
+    /// with its first message or, if a token is required, with the token; `limits` hold for what is read.
     pub fn new(
         stream: S,
         limits: Limits,
@@ -153,7 +154,7 @@ impl<S> ClientConnection<S> {
         }
     }
 
-    /// How long the server may be silent towards this client; `None`: for ever.
+    /// Sets the longest silence of the server towards this client; `None`: no limit.
     pub fn set_alive(&mut self, every: Option<Duration>) {
         self.alive_every = every;
     }
@@ -162,7 +163,8 @@ impl<S> ClientConnection<S> {
         self.alive_every.map(|every| self.last_sent + every)
     }
 
-    /// The client has introduced itself: it may rest as long as it likes, and send what `limits` allow.
+    /// Marks the client as introduced: it may be silent for as long as it likes, and send what `limits`
+    /// allow.
     pub fn make_known(&mut self, limits: Limits) {
         if self.stranger_until.take().is_some() {
             self.connection.set_limits(limits);
@@ -171,12 +173,12 @@ impl<S> ClientConnection<S> {
 }
 
 impl<S> ClientConnection<S> {
-    /// Whether bytes of the next request are there already.
+    /// Whether bytes of the next request have come.
     pub fn is_inside_frame(&self) -> bool {
         !self.ahead.is_empty() || self.connection.is_inside_frame()
     }
 
-    /// Takes the whole requests that have come; whether they cancel the one that is worked on.
+    /// Collects the whole requests that have come; returns whether they cancel the `current` one.
     fn collect(&mut self, current: Option<u64>) -> bool {
         let mut is_cancelled = false;
         while self.ahead_bytes < READ_AHEAD_MAX {
@@ -197,7 +199,7 @@ impl<S> ClientConnection<S> {
     }
 }
 
-/// The request that a frame cancels.
+/// Id of the request that a `Cancel` frame names; `None` for other frames.
 fn cancelled_id(frame: &Frame) -> Option<u64> {
     if frame.kind() != Some(Kind::Cancel) {
         return None;
@@ -209,11 +211,11 @@ fn cancelled_id(frame: &Frame) -> Option<u64> {
 }
 
 impl<S: AsyncRead + Unpin> ClientConnection<S> {
-    /// Waits for ever between frames of a client that is known, and inside one for as long as its
-    /// patience says.
+    /// Waits for the next message. Between two messages a known client has no time limit; inside one its
+    /// [`Patience`] counts.
     ///
     /// May be dropped at any await: bytes that have come stay. Time in which the server did not read,
-    /// because it worked on a request, is not held against the client.
+    /// because it worked on a request, does not count against the client.
     ///
     /// # Errors
     /// [`SessionError`]: how the client was too slow, or what is wrong with the stream.
@@ -221,11 +223,11 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         self.next_frame_up_to(usize::MAX).await
     }
 
-    /// Waits for the next frame of at most `len_max` bytes, header included; a longer one is told when
-    /// its header is there.
+    /// Waits for the next frame of at most `len_max` bytes, header included; of a longer one the header
+    /// is returned as soon as it has come.
     ///
     /// # Errors
-    /// As [`Self::next_frame`].
+    /// The same as those of [`Self::next_frame`].
     pub async fn next_frame_up_to(&mut self, len_max: usize) -> Result<Incoming, SessionError> {
         if let Some(Ahead { frame, received, is_cancelled }) = self.ahead.pop_front() {
             self.ahead_bytes = self.ahead.iter().map(|one| one.frame.header.frame_len()).sum();
@@ -294,8 +296,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         }
     }
 
-    /// Reserves the memory that the next read takes; what must wait for it is not held against the
-    /// client.
+    /// Reserves the memory that the next read takes; waiting for it does not count against the client.
     async fn make_room(&mut self) -> Result<(), (Header, NoRoom)> {
         let Some(header) = self.connection.header() else { return Ok(()) };
         let whole = header.frame_len();
@@ -311,8 +312,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
     }
 
     /// Ends when the client has cancelled the request that is worked on, or has gone: its connection is
-    /// broken, or it has sent nothing more for so long after it has closed its side. Takes a little of
-    /// what it sends meanwhile.
+    /// broken, or it has closed its side for too long. Meanwhile reads a little of what it sends.
     ///
     /// May be dropped at any await: bytes that have come stay.
     pub async fn watch(&mut self, request_id: u64) -> Watched {
@@ -342,7 +342,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
         }
     }
 
-    /// Whether a request has come that makes one about this model needless.
+    /// Whether a newer request has come that supersedes one about this model.
     pub async fn has_newer(&mut self, model: ModelHash) -> bool {
         if self.connection.received() < READ_AHEAD_MAX {
             // What lies in the socket, without waiting for more.
@@ -358,8 +358,8 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
             .any(|one| !one.is_cancelled && Ask::kept_model(&one.frame) == Some((model, true)))
     }
 
-    /// When to look at the client again, and what it is if it has not gone on by then; `None` for one
-    /// that may rest.
+    /// Time at which to look at the client again, and the error if it has not gone on by then; `None` for
+    /// a client that may be silent.
     fn deadline(&self, start: Instant) -> (Instant, Option<SessionError>) {
         let Patience { stall, greeting, idle, .. } = self.patience;
         let stream = self.connection.stream();
@@ -387,7 +387,7 @@ impl<S: AsyncRead + Unpin> ClientConnection<S> {
 }
 
 impl<S: AsyncWrite + Unpin> ClientConnection<S> {
-    /// Writes all bytes of one or more frames.
+    /// Writes all bytes of one or more frames within the time limit.
     ///
     /// # Errors
     /// [`SessionError`]; the session is to be given up, for a part may have been written.
@@ -402,17 +402,17 @@ impl<S: AsyncWrite + Unpin> ClientConnection<S> {
     }
 }
 
-/// A stream that knows when bytes came.
+/// Stream that records when bytes came.
 struct TimedStream<S> {
     stream: S,
-    /// First read since it was last set to `None`.
+    /// Time of the first read since this was last set to `None`.
     first_read: Option<Instant>,
     last_read: Instant,
-    /// Bytes since other sessions were let in.
+    /// Bytes read since other sessions could run.
     since_rest: usize,
 }
 
-/// A client that sends without a pause is left for others after so many bytes.
+/// Bytes after which a client that sends without a pause is interrupted, so that other sessions can run.
 const REST_EVERY: usize = 128 * 1024;
 
 impl<S: AsyncRead + Unpin> AsyncRead for TimedStream<S> {

@@ -9,12 +9,12 @@ use softgrasp_protocol::StageMs;
 
 use crate::awaited::Awaited;
 
-/// The stage that the newest request is in, to be looked at from outside.
+/// Stage of the newest request, to be read from outside the server.
 #[derive(Clone, Debug, Default)]
 pub struct StageWatch(Arc<AtomicU8>);
 
 impl StageWatch {
-    /// What is being done, in a word; empty while nothing is.
+    /// Name of the present stage; empty while no request is worked on.
     pub fn now(&self) -> &'static str {
         match self.0.load(Ordering::Relaxed) {
             1 => "assembling",
@@ -37,7 +37,7 @@ impl StageWatch {
     }
 }
 
-/// Takes the time between the stages that the core announces, and ends work that nobody waits for.
+/// Measures the stages that the core announces, and ends work whose client has gone.
 #[derive(Clone)]
 pub(crate) struct StageClock {
     decoded: Instant,
@@ -48,14 +48,14 @@ pub(crate) struct StageClock {
 }
 
 impl StageClock {
-    /// Starts with what was measured before the core was called.
+    /// Clock that starts with the times measured before the core was called.
     pub fn new(decode_ms: f64, queued: Instant, watch: StageWatch, awaited: Awaited) -> Self {
         let queue = ms_since(queued);
         let stage_ms = StageMs { decode: decode_ms, queue, ..StageMs::default() };
         Self { decoded: queued, stage_ms, running: None, watch, awaited }
     }
 
-    /// Ends the running stage and begins another, or ends the work if nobody waits for it any more.
+    /// Ends the running stage and begins another; unwinds if no client waits any more.
     pub fn begin(&mut self, stage: Stage) {
         self.end();
         self.awaited.go_on();
@@ -82,7 +82,7 @@ impl StageClock {
         self.stage_ms.decode + ms_since(self.decoded)
     }
 
-    /// The times so far.
+    /// Times of all stages.
     pub fn finish(mut self) -> StageMs {
         self.end();
         self.stage_ms

@@ -14,98 +14,98 @@ use crate::tokens::Tokens;
 pub struct ServerConfig {
     /// Address to listen on; port 0 picks a free one.
     pub listen: SocketAddr,
-    /// Threads that solve; exactly as many.
+    /// Number of threads that solve.
     pub threads: usize,
     /// Largest number of nodes of a mesh.
     pub max_nodes: u32,
     /// Largest number of elements of a mesh.
     pub max_elements: u32,
-    /// Bytes of the largest message.
+    /// Length of the largest message, bytes.
     pub max_frame: u32,
-    /// Sessions at the same time; one more is turned away.
+    /// Largest number of sessions at the same time; further clients are turned away.
     pub max_sessions: usize,
-    /// Sessions at the same time from one address that is not this machine's own.
+    /// Largest number of sessions at the same time from one address other than this machine's own.
     pub max_sessions_per_address: usize,
-    /// Requests of all sessions that wait or are worked on; one more waits in its connection.
+    /// Largest number of requests of all sessions that wait or are worked on; others wait unread.
     pub max_queue: usize,
-    /// Bytes that all that is kept between requests and all that requests under way make may take.
+    /// Memory for all kept models and all requests under way, bytes.
     pub memory_limit: u64,
-    /// A model that no session holds and nobody has used for this long is forgotten.
+    /// Time after which a model that no session holds and no request has used is forgotten.
     pub model_idle_limit: Duration,
-    /// Bytes of compliance columns kept per model.
+    /// Memory for the compliance columns kept for each model, bytes.
     pub column_cache: u64,
-    /// Tokens of which a client must show one, if any.
+    /// Tokens of which a client must show one; `None`: no token is required.
     pub tokens: Option<Tokens>,
-    /// What sessions are encrypted with, if at all.
+    /// Certificate and key that sessions are encrypted with; `None`: no encryption.
     pub encryption: Option<Encryption>,
-    /// Whether the server may be reached from other machines without token and encryption.
+    /// Whether other machines may reach the server without token and encryption.
     pub is_insecure: bool,
-    /// Whether the machine's speed is measured at once, beside the first requests, and not by the
-    /// first request that needs it.
+    /// Whether the machine's rates are measured at the start, beside the first requests, and not by the
+    /// first request that needs them.
     pub measure_at_start: bool,
-    /// Whether the thread of the sockets asks for real-time scheduling, so that frames need not wait
-    /// for other work on the machine.
+    /// Whether the thread of the sockets asks for real-time scheduling, so that frame questions need not
+    /// wait for other work on the machine.
     pub real_time: bool,
-    /// A client that stops inside a frame for this long is given up.
+    /// Longest time between two bytes inside a message, before the client is given up.
     pub stall_limit: Duration,
-    /// A client whose header, whose first request or whose handshake is not there by then is given up.
+    /// Longest time for a handshake, a first request or a header, before the client is given up.
     pub greeting_limit: Duration,
-    /// A client that sends nothing for this long is given up; `None`: it may rest for ever.
+    /// Longest silence of a client between two messages, before it is given up; `None`: no limit.
     pub idle_limit: Option<Duration>,
-    /// A client that has not taken its reply by then, and a second more for every 64 KiB of it, is given
-    /// up.
+    /// Longest time for a client to take its reply, and one second more for every 64 KiB of it, before it
+    /// is given up.
     pub reply_limit: Duration,
-    /// After a stop the sessions may go on for this long.
+    /// Time for which sessions may go on after the server was asked to stop.
     pub drain: Duration,
-    /// Address of the pages about the server's state, if they are wanted; port 0 picks a free one.
+    /// Address of the pages about the server's state; port 0 picks a free one; `None`: no pages.
     pub metrics: Option<SocketAddr>,
-    /// Where the stage of the newest request can be read, for whoever started the server.
+    /// Stage of the newest request, for the program that started the server.
     pub stage: StageWatch,
 }
 
-/// Settings that make no sense.
+/// Why settings are refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
-    /// No thread to solve with.
+    /// The number of solving threads is 0.
     #[error("--threads is 0; at least one thread must solve")]
     NoThreads,
-    /// More threads than any machine has.
+    /// More threads than are accepted.
     #[error("--threads is {threads}; more than {max} is surely a slip")]
     TooManyThreads {
-        /// Threads asked for.
+        /// Number of threads asked for.
         threads: usize,
-        /// Most that are accepted.
+        /// Largest number that is accepted.
         max: usize,
     },
-    /// Nothing could be served.
+    /// A limit is 0, so that nothing could be served.
     #[error("{option} is 0; nothing could be served")]
     Zero {
-        /// The option's name.
+        /// Name of the option on the command line.
         option: &'static str,
     },
-    /// Everybody who reaches the address could use the server.
+    /// The address can be reached from other machines, and neither token nor encryption protects it.
     #[error(
         "{address} can be reached from other machines: give --token-file and --tls-cert with --tls-key \
          (--make-certificate makes a pair), or say --insecure if everybody there is trusted"
     )]
     Open {
-        /// The address.
+        /// Address to listen on.
         address: SocketAddr,
     },
-    /// Everybody who reaches the address could read the server's state.
+    /// The address of the status pages can be reached from other machines.
     #[error(
         "--metrics {address} can be reached from other machines, and its pages are neither encrypted \
          nor guarded: take a loopback address, or say --insecure if everybody there is trusted"
     )]
     OpenMetrics {
-        /// The address.
+        /// Address of the status pages.
         address: SocketAddr,
     },
 }
 
 const THREADS_MAX: usize = 1024;
-/// Bytes that a client may send in one frame before it has shown the token; without a token a longer
-/// frame takes the place of a session when its header is there.
+/// Bytes that a client may send in one frame before it has shown the token; without a token, a longer
+/// frame takes a session's place once its header has come.
 pub(crate) const STRANGER_PAYLOAD_MAX: u32 = 64 * 1024;
 
 impl Default for ServerConfig {
@@ -139,10 +139,10 @@ impl Default for ServerConfig {
 }
 
 impl ServerConfig {
-    /// Checks the numbers.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// [`ConfigError`] names the option.
+    /// [`ConfigError`] that names the option.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.threads == 0 {
             return Err(ConfigError::NoThreads);

@@ -7,26 +7,26 @@ use fea_server::{Encryption, ServerConfig, Tokens};
 
 use crate::arguments::AccessArguments;
 
-/// Tokens, and certificate with key, as far as they are wanted.
+/// Tokens, and certificate with key, as far as the options ask for them.
 pub struct Credentials {
     pub tokens: Option<Tokens>,
     pub encryption: Option<Encryption>,
 }
 
-/// The credentials of a running server, and where they came from.
+/// Credentials of a running server, and the options that name their files.
 pub struct Renewal {
     access: AccessArguments,
     in_use: Credentials,
 }
 
-/// A certificate with fewer days left is warned of.
+/// Days of validity left, below which a certificate is warned of.
 const DAYS_LEFT_MIN: u64 = 30;
 
 impl Credentials {
-    /// Reads the files, and warns of what is weak in them.
+    /// Reads the files, and warns of weak tokens, readable files and certificates that end soon.
     ///
     /// # Errors
-    /// What cannot be read or used, with the file.
+    /// The file that cannot be read or used, with the reason.
     pub fn read(access: &AccessArguments) -> anyhow::Result<Self> {
         let tokens = access.token_file.as_deref().map(Tokens::read).transpose()?;
         let encryption = match (&access.tls_cert, &access.tls_key) {
@@ -71,7 +71,7 @@ fn warn_if_others_read(what: &str, file: &Path) {
 }
 
 impl Renewal {
-    /// Of a server with these settings; `None` where it uses no files that could be read again.
+    /// Renewal for a server with these settings; `None` if it uses no files that could be read again.
     pub fn of(access: &AccessArguments, config: &ServerConfig) -> Option<Self> {
         let in_use =
             Credentials { tokens: config.tokens.clone(), encryption: config.encryption.clone() };
@@ -79,8 +79,8 @@ impl Renewal {
         is_any.then(|| Self { access: access.clone(), in_use })
     }
 
-    /// Reads all files again. New clients need what is in them; sessions live on. Of files that cannot be
-    /// used none is.
+    /// Reads all files again. New clients need the new credentials; present sessions go on. If one file
+    /// cannot be used, none is.
     pub fn read_again(&self) {
         let read = match Credentials::read(&self.access) {
             Ok(read) => read,

@@ -13,12 +13,12 @@ use tokio_rustls::rustls::{self, crypto, version};
 use crate::certificate::{MakeError, Validity, ValidityError, self_signed_now};
 use crate::lock::Lock;
 
-/// What a server encrypts with: TLS 1.3, its certificate and key. Clones are the same: those of a running
-/// server can be replaced.
+/// TLS 1.3 with the server's certificate and key. Clones share them, and those of a running server can be
+/// replaced.
 #[derive(Clone)]
 pub struct Encryption(Arc<Lock<Pair>>);
 
-/// A certificate with its key, and how long it is valid.
+/// Certificate with its key, and its validity.
 #[derive(Clone)]
 struct Pair {
     config: Arc<rustls::ServerConfig>,
@@ -28,37 +28,37 @@ struct Pair {
 /// Why there is no encryption.
 #[derive(Debug, thiserror::Error)]
 pub enum EncryptionError {
-    /// A file that is no PEM of the right kind.
+    /// A file is not a PEM of the expected kind.
     #[error(
         "{what} {path} cannot be used: {reason}; PEM is expected, as --make-certificate writes it"
     )]
     File {
-        /// `certificate` or `key`.
+        /// Kind of the file: `certificate` or `key`.
         what: &'static str,
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the reader says.
+        /// Reason given by the PEM reader.
         reason: String,
     },
     /// Certificate and key do not make a pair that can be served.
     #[error("certificate {certificate} and key {key} cannot be used together: {reason}")]
     Pair {
-        /// The certificate's file.
+        /// Path of the certificate's file.
         certificate: PathBuf,
-        /// The key's file.
+        /// Path of the key's file.
         key: PathBuf,
-        /// What the library says.
+        /// Reason given by the TLS library.
         reason: String,
     },
-    /// A certificate that no client trusts at this time.
+    /// The certificate has expired or is not valid yet.
     #[error("certificate {path} cannot be used: {source}")]
     Validity {
-        /// The certificate's file.
+        /// Path of the certificate's file.
         path: PathBuf,
-        /// Why.
+        /// How the validity differs from the present time.
         source: ValidityError,
     },
-    /// No certificate of its own could be made.
+    /// No self-signed certificate could be made.
     #[error(transparent)]
     Made(#[from] MakeError),
 }
@@ -92,11 +92,11 @@ impl Encryption {
         })
     }
 
-    /// A self-signed certificate for hosts and addresses that is made now and written nowhere: for a page that a
-    /// person opens and trusts by hand. It lives for a year.
+    /// Self-signed certificate for hosts and addresses, made now, of which no file is written: for a page
+    /// that a person opens and trusts by hand. It is valid for a year.
     ///
     /// # Errors
-    /// [`EncryptionError::Made`].
+    /// [`EncryptionError::Made`] if no certificate can be made for these names.
     pub fn self_made(names: &[String]) -> Result<Self, EncryptionError> {
         let unread = |reason: String| MakeError::Names { names: names.join(","), reason };
         let (certificate, key) = self_signed_now(names, 365)?;
@@ -120,18 +120,18 @@ impl Encryption {
         Ok(Self(Arc::new(Lock::new(Pair { config: Arc::new(config), validity }))))
     }
 
-    /// Whoever connects from now on is shown this certificate; those who are connected stay.
+    /// Replaces certificate and key for new connections; present connections go on.
     pub fn renew(&self, by: &Self) {
         let new = by.0.with(|pair| pair.clone());
         self.0.with(|pair| *pair = new);
     }
 
-    /// For how long the certificate is valid.
+    /// Validity of the certificate.
     pub fn validity(&self) -> Validity {
         self.0.with(|pair| pair.validity)
     }
 
-    /// What accepts connections with it, as it is now.
+    /// Acceptor of TLS connections with the present certificate and key.
     pub fn acceptor(&self) -> TlsAcceptor {
         TlsAcceptor::from(self.0.with(|pair| Arc::clone(&pair.config)))
     }

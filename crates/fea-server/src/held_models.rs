@@ -14,12 +14,12 @@ pub(crate) struct HeldModels {
 }
 
 impl HeldModels {
-    /// None.
+    /// No model held yet.
     pub fn new(resources: Arc<Resources>) -> Self {
         Self { resources, held: BTreeSet::new() }
     }
 
-    /// Holds a model if it is kept, and says whether it is.
+    /// Holds a model if the server keeps it; returns whether it does.
     pub fn hold(&mut self, model: ModelHash) -> bool {
         let models = &self.resources.models;
         match self.held.contains(&model) {
@@ -34,7 +34,7 @@ impl HeldModels {
         }
     }
 
-    /// Releases a model that this session holds; it is forgotten unless another session holds it.
+    /// Releases a model that this session holds; the server forgets it unless another session holds it.
     pub fn drop_model(&mut self, model: ModelHash) {
         if self.held.remove(&model) {
             self.resources.models.release(model);

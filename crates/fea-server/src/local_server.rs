@@ -24,9 +24,9 @@ pub struct LocalServer {
     _stop: watch::Sender<bool>,
 }
 
-/// Bytes that lie in a pipe at most.
+/// Largest number of bytes in a pipe.
 const PIPE_BYTES: usize = 64 * 1024;
-/// As whom sessions count.
+/// Address that all sessions count for.
 const PEER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
 impl LocalServer {
@@ -43,8 +43,8 @@ impl LocalServer {
         Ok(Self { server: ServerHandle::new(config, workers, stopped), _stop: stop })
     }
 
-    /// A new session: the client's end of its pipe, and what serves it, to be spawned or polled beside
-    /// the client. `None` where all sessions are taken.
+    /// Opens a session: the client's end of its pipe, and the future that serves it, to be spawned or
+    /// polled beside the client. `None` if all places for sessions are taken.
     pub fn connect(&self) -> Option<(DuplexStream, impl Future<Output = ()> + Send + use<>)> {
         let place = self.server.places.take(PEER.ip()).ok()?;
         let (client, stream) = duplex(PIPE_BYTES);
@@ -59,7 +59,7 @@ impl LocalServer {
         Some((client, serves.instrument(span)))
     }
 
-    /// What the page `/metrics` of a server tells.
+    /// Text of the page `/metrics`.
     pub fn metrics(&self) -> String {
         self.server.resources.metrics.text(&gauges(&self.server, true))
     }

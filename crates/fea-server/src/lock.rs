@@ -9,23 +9,23 @@ use std::cell::Cell;
 use std::sync::{Mutex, PoisonError};
 
 thread_local! {
-    /// Locks that this thread holds.
+    /// Number of locks that this thread holds.
     static HELD: Cell<usize> = const { Cell::new(0) };
 }
 
-/// A mutex whose content is seen by closures only.
+/// Mutex whose value only closures can reach.
 #[derive(Debug, Default)]
 pub(crate) struct Lock<T>(Mutex<T>);
 
 impl<T> Lock<T> {
-    /// Guards a value.
+    /// Lock that guards `value`.
     pub fn new(value: T) -> Self {
         Self(Mutex::new(value))
     }
 
-    /// Calls `look` with the value; `look` must not start parallel work.
+    /// Calls `look` with the guarded value; `look` must not start parallel work.
     ///
-    /// A panic elsewhere does not close the lock: what it guards is replaced whole, never half.
+    /// A panic in another closure does not close the lock: values are replaced whole, never in part.
     pub fn with<R>(&self, look: impl FnOnce(&mut T) -> R) -> R {
         let mut value = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let _held = Held::new();
@@ -33,7 +33,7 @@ impl<T> Lock<T> {
     }
 }
 
-/// Counts one lock while it lives, a panic included.
+/// Counts one held lock while it exists, also through a panic.
 struct Held;
 
 impl Held {
@@ -49,7 +49,7 @@ impl Drop for Held {
     }
 }
 
-/// Called where work begins on a thread.
+/// To be called where work begins on a thread.
 ///
 /// # Panics
 /// If the thread holds a lock: it waits in parallel work under a lock and has taken this work meanwhile.

@@ -1,4 +1,4 @@
-//! What others bring about in the log: text of theirs is short and harmless, and lines are not too many.
+//! Keeps log lines about clients few, and text from clients in them short and harmless.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -8,7 +8,7 @@ use crate::lock::Lock;
 use crate::origin::Origin;
 use crate::pace::Pace;
 
-/// Lines of the log that the connections of one owner may still bring about.
+/// Number of log lines that the connections of one owner may still cause.
 #[derive(Default)]
 pub(crate) struct LogLines(Lock<BTreeMap<Origin, Spent>>);
 
@@ -17,16 +17,16 @@ struct Spent {
     left_out: u64,
 }
 
-/// Lines about one owner's connections at once, and the time between two further ones: 10 in a second
-/// are a few kilobytes.
+/// Log lines that one owner's connections may cause at once, and the time between further ones: 10 lines
+/// a second are a few kilobytes.
 const LINES_AT_ONCE: u32 = 200;
 const LINE_EVERY: Duration = Duration::from_millis(100);
-/// Owners that are remembered.
+/// Number of owners that are remembered.
 const ORIGINS_MAX: usize = 4096;
 
 impl LogLines {
-    /// Whether another line about this address may be written. The first one after some that may not is
-    /// preceded by one that counts them.
+    /// Whether another line about this address may be written. If lines were left out before it, a line
+    /// with their number is written first.
     pub fn has_room(&self, address: IpAddr) -> bool {
         let origin = Origin::of(address);
         let Some(left_out) = self.spend(origin, Instant::now()) else { return false };
@@ -36,7 +36,8 @@ impl LogLines {
         true
     }
 
-    /// Takes the room for a line, if there is any: how many were left out before it.
+    /// Takes the room for one line; returns how many were left out before it, or `None` if there is no
+    /// room.
     fn spend(&self, origin: Origin, now: Instant) -> Option<u64> {
         self.0.with(|origins| {
             if origins.len() >= ORIGINS_MAX && !origins.contains_key(&origin) {
@@ -57,23 +58,23 @@ impl LogLines {
     }
 }
 
-/// Characters of a name that somebody else chose.
+/// Largest number of characters of a name that a client chose.
 const NAME_MAX: usize = 64;
-/// Characters of a sentence of ours that may hold somebody else's words.
+/// Largest number of characters of a server's sentence that may contain a client's text.
 const SENTENCE_MAX: usize = 400;
 
-/// A name that somebody else chose, as it may be logged.
+/// Name that a client chose, shortened and made harmless for the log.
 pub(crate) fn foreign_name(text: &str) -> String {
     harmless(text, NAME_MAX)
 }
 
-/// A sentence that may hold somebody else's words, as it may be logged.
+/// Sentence that may contain a client's text, shortened and made harmless for the log.
 pub(crate) fn foreign_sentence(text: impl std::fmt::Display) -> String {
     harmless(&text.to_string(), SENTENCE_MAX)
 }
 
-/// At most `max` characters of a text; what cannot be seen, or turns the direction of writing, is named
-/// by its number, as `<U+202E>`.
+/// At most `max` characters of a text; invisible characters, and those that change the writing direction,
+/// are replaced by their number, as `<U+202E>`.
 fn harmless(text: &str, max: usize) -> String {
     let mut shown = String::new();
     for (at, character) in text.chars().enumerate() {

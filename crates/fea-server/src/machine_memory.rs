@@ -4,8 +4,8 @@ use std::fs::read_to_string;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes that can be had without ending somebody's program: what the machine has available, or what
-/// a container's limit leaves, if that is less; `None` where the system does not tell.
+/// Bytes of memory that the process can take without harm to other programs: what the machine has
+/// available, or what a container's limit leaves, if that is less; `None` where the system does not tell.
 pub fn available_bytes() -> Option<u64> {
     let machine = read_to_string("/proc/meminfo").ok();
     let machine = machine.and_then(|told| bytes_of_line(&told, "MemAvailable:", 1024));
@@ -17,7 +17,7 @@ pub fn available_bytes() -> Option<u64> {
     }
 }
 
-/// What the limits leave of the group that `/proc/self/cgroup` names, and of all groups around it.
+/// Least bytes left by the limits of the group that `/proc/self/cgroup` names and of all groups above it.
 fn left_above(root: &Path, own: &str) -> Option<u64> {
     // The line of version 2: `0::/system.slice/fea-server.service`.
     let path = own.lines().find_map(|line| line.strip_prefix("0::/")).unwrap_or_default();
@@ -25,7 +25,7 @@ fn left_above(root: &Path, own: &str) -> Option<u64> {
     group.ancestors().take_while(|group| group.starts_with(root)).filter_map(left_in).min()
 }
 
-/// What the limit of a control group (version 2) leaves; pages of files count as free.
+/// Bytes left by the limit of a control group (version 2); cached pages of files count as free.
 fn left_in(group: &Path) -> Option<u64> {
     let number = |name: &str| read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
     let (max, current) = (number("memory.max")?, number("memory.current")?);
@@ -34,7 +34,7 @@ fn left_in(group: &Path) -> Option<u64> {
     Some(max.saturating_sub(current.saturating_sub(files)))
 }
 
-/// The number behind a word at the beginning of a line.
+/// Number behind a word at the beginning of a line, in bytes.
 fn bytes_of_line(text: &str, word: &str, unit: u64) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(word))?;
     rest.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(unit)
@@ -46,7 +46,7 @@ pub(crate) fn resident_bytes() -> Option<u64> {
     bytes_of_line(&status, "VmRSS:", 1024)
 }
 
-/// Largest resident set as last read; reading it takes as long as a small frame.
+/// Largest resident set as last read, bytes; reading it takes as long as a small frame question.
 static PEAK_RSS: AtomicU64 = AtomicU64::new(0);
 
 /// Largest resident set of this process so far, bytes; 0 where the system does not tell.
@@ -59,7 +59,7 @@ pub(crate) fn peak_rss_bytes() -> u64 {
     bytes
 }
 
-/// Largest resident memory as it was last read: good enough for a frame that allocates next to nothing.
+/// Largest resident set as last read, bytes; accurate enough for an answer that allocates almost nothing.
 pub(crate) fn last_peak_rss_bytes() -> u64 {
     PEAK_RSS.load(Ordering::Relaxed)
 }

@@ -14,9 +14,9 @@ use credentials::{Credentials, Renewal};
 use fea_server::{Listening, StartError, make_certificate};
 use tokio::sync::watch;
 
-/// The server has ended so long after it was asked to and has drained, whatever its threads are at.
+/// Time from the request to end, without the draining, after which the process ends in any case.
 const END_MAX: Duration = Duration::from_millis(2700);
-/// Exit code for options that make no sense, as clap's own.
+/// Exit code for invalid options, the same as clap's.
 const WRONG_USAGE: u8 = 2;
 
 fn main() -> ExitCode {
@@ -86,7 +86,7 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The contract's first line on standard output, and where the pages are, if there are any.
+/// Prints the line that tells the address listened on, and that of the status pages, if there are any.
 fn announce(listening: Listening) {
     let Listening { address, metrics } = listening;
     let mut out = std::io::stdout();

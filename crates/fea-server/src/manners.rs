@@ -1,34 +1,34 @@
-//! How a client behaves: whoever sends nonsense, or a flood that it does not wait for, is served slowly.
+//! Slows down clients that send many bad requests, or many requests without waiting for the replies.
 //!
-//! All sessions share one thread for their sockets. A client that waits for its replies, and asks what
-//! can be answered, never rests here.
+//! All sessions share one thread for their sockets. A client that waits for its replies, and whose
+//! requests are valid, is never slowed down.
 
 use std::time::Duration;
 
 use softgrasp_protocol::RejectCode;
 
-/// What a session remembers of its client.
+/// Counts of a client's bad requests and of those sent ahead of replies.
 #[derive(Debug, Default)]
 pub(crate) struct Manners {
-    /// Requests without sense so far.
+    /// Number of bad requests so far.
     nonsense: u32,
-    /// Requests in a row that were there before the reply to the one before was written.
+    /// Number of requests in a row that had come before the reply to the previous one was written.
     ahead: u32,
-    /// The newest request made no sense.
+    /// Whether the newest request was a bad one.
     is_nonsense: bool,
 }
 
-/// Requests without sense for which nobody rests: a person tries things out.
+/// Number of bad requests without consequence: a person tries things out.
 const NONSENSE_FREE: u32 = 50;
-/// Rest after every further one.
+/// Pause after every further bad request.
 const NONSENSE_REST: Duration = Duration::from_millis(20);
-/// Requests in a row that a client may send ahead of its replies, where many sessions share the server.
+/// Number of requests in a row that a client may send ahead of its replies, if many sessions are open.
 const AHEAD_FREE: u32 = 32;
-/// Rest before every further one: five hundred a second are left.
+/// Pause before every further such request: five hundred a second are left.
 const AHEAD_REST: Duration = Duration::from_millis(2);
 
 impl Manners {
-    /// A request was refused.
+    /// Counts the refusal of a request.
     pub fn refused(&mut self, code: RejectCode) {
         if code == RejectCode::BadRequest {
             self.nonsense += 1;
@@ -36,8 +36,8 @@ impl Manners {
         }
     }
 
-    /// How long to rest before the next request, which is there already or not; `None`: not at all.
-    /// `is_quiet`: few sessions share the server.
+    /// Pause before the next request, if one is due. `is_ahead`: that request has come already;
+    /// `is_quiet`: few sessions are open.
     pub fn rest(&mut self, is_ahead: bool, is_quiet: bool) -> Option<Duration> {
         self.ahead = if is_ahead { self.ahead.saturating_add(1) } else { 0 };
         if std::mem::take(&mut self.is_nonsense) && self.nonsense > NONSENSE_FREE {

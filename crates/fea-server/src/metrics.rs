@@ -1,4 +1,4 @@
-//! What the server counts of its work, as text for Prometheus.
+//! Counters of the server's work, as text for Prometheus.
 //!
 //! Format: the text exposition format 0.0.4 (prometheus.io, "Exposition formats").
 
@@ -10,7 +10,7 @@ use softgrasp_protocol::{Kind, RejectCode};
 
 use crate::tokens::TokenNumbers;
 
-/// Counters of one server; they only grow.
+/// Counters of one server; their values only grow.
 #[derive(Default)]
 pub(crate) struct Metrics {
     sessions: AtomicU64,
@@ -20,89 +20,89 @@ pub(crate) struct Metrics {
     abandoned: AtomicU64,
     bytes_received: AtomicU64,
     bytes_sent: AtomicU64,
-    /// By kind, in the order of [`Kind::ALL`].
+    /// Durations of requests by kind, in the order of [`Kind::ALL`].
     requests: [Durations; Kind::ALL.len()],
-    /// Requests about kept models, which are not among those of [`Kind::Ask`].
+    /// Durations of frame questions, which are not among those of [`Kind::Ask`].
     frames: Durations,
-    /// By code, in the order of [`RejectCode::ALL`].
+    /// Number of refusals by code, in the order of [`RejectCode::ALL`].
     refused: [AtomicU64; RejectCode::ALL.len()],
 }
 
-/// How long requests of one kind took, from the last byte of the request to the reply.
+/// Distribution of the times from the last byte of a request to its reply.
 #[derive(Default)]
 struct Durations {
-    /// In each of [`BOUNDS_S`], and above them.
+    /// Number of durations in each range of [`BOUNDS_S`], and above all of them.
     counts: [AtomicU64; BOUNDS_S.len() + 1],
     sum_us: AtomicU64,
 }
 
-/// Upper ends of the ranges that durations are counted in, s.
+/// Upper ends of the ranges in which durations are counted, s.
 const BOUNDS_S: [f64; 12] =
     [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.016, 0.05, 0.25, 1.0, 10.0];
 
-/// What is read when somebody asks.
+/// Values that are read when the page is asked for.
 pub(crate) struct Gauges {
-    /// Sessions that are there.
+    /// Number of sessions.
     pub sessions: usize,
-    /// Connections that have not introduced themselves.
+    /// Number of connections that have not introduced themselves.
     pub strangers: usize,
-    /// Requests that wait or are worked on.
+    /// Number of requests that wait or are worked on.
     pub queued: usize,
-    /// Models that are kept.
+    /// Number of kept models.
     pub models: usize,
-    /// Bytes of the models and of what is kept for them.
+    /// Memory of the kept models, with factors, columns and contact sets, bytes.
     pub models_bytes: u64,
-    /// Bytes reserved for requests under way.
+    /// Memory reserved for requests under way, bytes.
     pub reserved_bytes: u64,
-    /// Bytes that both may take together.
+    /// Limit of both together, bytes.
     pub limit_bytes: u64,
     /// Resident set of the process, bytes; `None` where the system does not tell.
     pub resident_bytes: Option<u64>,
-    /// Whether new sessions are taken.
+    /// Whether the server accepts new sessions.
     pub is_ready: bool,
-    /// The last second of the certificate's life, as Unix time; `None` without encryption.
+    /// Last second of the certificate's validity, as Unix time, s; `None` without encryption.
     pub certificate_expires_s: Option<i64>,
-    /// What has been counted of each token that has a name.
+    /// Sessions and requests counted for each token that has a name.
     pub tokens: Vec<TokenNumbers>,
 }
 
 impl Metrics {
-    /// A session has begun.
+    /// Counts a session that has begun.
     pub fn session_began(&self) {
         self.sessions.fetch_add(1, Relaxed);
     }
 
-    /// A connection ended before it had introduced itself.
+    /// Counts a connection that ended before it had introduced itself.
     pub fn not_introduced(&self) {
         self.not_introduced.fetch_add(1, Relaxed);
     }
 
-    /// A client was turned away: all places were taken.
+    /// Counts a client that was turned away because all places were taken.
     pub fn turned_away(&self) {
         self.turned_away.fetch_add(1, Relaxed);
     }
 
-    /// A session was given up: bad bytes, too slow, or broken.
+    /// Counts a session that was given up: bad bytes, too slow, or broken.
     pub fn given_up(&self) {
         self.given_up.fetch_add(1, Relaxed);
     }
 
-    /// A request whose client has gone.
+    /// Counts a request whose client has gone.
     pub fn abandoned(&self) {
         self.abandoned.fetch_add(1, Relaxed);
     }
 
-    /// A whole request has come.
+    /// Counts a whole request of `bytes` bytes.
     pub fn received(&self, bytes: usize) {
         self.bytes_received.fetch_add(bytes as u64, Relaxed);
     }
 
-    /// A reply was written.
+    /// Counts a reply of `bytes` bytes that was written.
     pub fn sent(&self, bytes: usize) {
         self.bytes_sent.fetch_add(bytes as u64, Relaxed);
     }
 
-    /// A request has been answered, or refused for a reason; `is_frame` if it is about a kept model.
+    /// Counts a request that was answered, or refused with a code; `is_frame` for a frame question.
     pub fn answered(
         &self,
         (kind, is_frame): (Option<Kind>, bool),
@@ -120,7 +120,7 @@ impl Metrics {
         }
     }
 
-    /// Everything as text.
+    /// Text of the page: counters and gauges.
     pub fn text(&self, gauges: &Gauges) -> String {
         let mut page = Page(String::new());
         self.write_counters(&mut page);
@@ -257,7 +257,7 @@ impl Gauges {
     }
 }
 
-/// A text under way; a text takes everything that is written to it.
+/// Text of the page while it is being written; writing to it never fails.
 struct Page(String);
 
 impl Page {

@@ -1,6 +1,6 @@
 //! Why a request is not received.
 
-/// There is no memory for a request.
+/// The server has no memory to receive a request.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum NoRoom {
     #[error(

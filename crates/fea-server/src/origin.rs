@@ -1,4 +1,4 @@
-//! Whom a connection is counted for: this machine, an address, or a network that one owner has.
+//! Owner that a connection counts for: this machine, an IPv4 address, or an IPv6 network.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -17,7 +17,7 @@ pub(crate) enum Origin {
 }
 
 impl Origin {
-    /// That of an address.
+    /// Owner of an address.
     pub fn of(address: IpAddr) -> Self {
         let address = address.to_canonical();
         if address.is_loopback() {

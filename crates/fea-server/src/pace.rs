@@ -1,44 +1,44 @@
-//! A pace that a crowd without end must keep: so many at once after a pause, then one at a time.
+//! Limits how often something may happen: so many times at once after a pause, then at an even rate.
 
 use std::time::{Duration, Instant};
 
-/// When the next one may come.
+/// Time of the next permitted event.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
-    /// The next one may come then, or [`Self::at_once`] earlier ones' worth before.
+    /// The next event is permitted at this time, or the time of `at_once` events earlier.
     due: Instant,
     at_once: u32,
     every: Duration,
 }
 
-/// Connections that are accepted at once after a pause.
+/// Number of connections that are accepted at once after a pause.
 const ACCEPTS_AT_ONCE: u32 = 64;
-/// Time between two connections after those.
+/// Time between further connections.
 const ACCEPT_EVERY: Duration = Duration::from_millis(1);
 
 impl Pace {
-    /// That at which connections are accepted: those who come and go without end must not take the
-    /// sockets' thread from those who are there.
+    /// Pace at which connections are accepted, so that many short connections cannot take all the time of
+    /// the sockets' thread.
     pub fn of_connections(now: Instant) -> Self {
         Self::new(now, ACCEPTS_AT_ONCE, ACCEPT_EVERY)
     }
 
-    /// At which nobody has come yet: `at_once` after a pause, then one in each `every`.
+    /// Pace before the first event: `at_once` events after a pause, then one in each `every`.
     pub fn new(now: Instant, at_once: u32, every: Duration) -> Self {
         Self { due: now, at_once, every }
     }
 
-    /// When the next one may come.
+    /// Time at which the next event is permitted.
     pub fn next(&self) -> Instant {
         self.due.checked_sub(self.at_once * self.every).unwrap_or(self.due)
     }
 
-    /// One has come.
+    /// Counts an event.
     pub fn came(&mut self, now: Instant) {
         self.due = self.due.max(now) + self.every;
     }
 
-    /// Whether nobody has come for so long that it is as good as new.
+    /// Whether there was no event for so long that the pace equals a new one.
     pub fn has_rested(&self, now: Instant) -> bool {
         self.due <= now
     }

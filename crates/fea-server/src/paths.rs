@@ -10,80 +10,80 @@ use crate::budget::Reservation;
 use crate::lock::Lock;
 use crate::refusal::Refusal;
 
-/// Where a session keeps the path of one model; empty before the first frame and while a frame is
-/// worked on.
+/// Place where a session keeps the path of one model; empty before the first frame question and while one
+/// is worked on.
 pub(crate) type Seat = Arc<Lock<Option<Seated>>>;
 
-/// What a session keeps of a path between two frames.
+/// Content of a seat between two frame questions.
 pub(crate) enum Seated {
-    /// The path.
+    /// A path that is ready.
     Path(Box<ModelPath>),
-    /// A path that is being made beside the frames, which linear elasticity answers meanwhile.
+    /// A path that is made in the background; linear elasticity answers meanwhile.
     Coming(Coming),
 }
 
-/// Where a path will lie that is being made; its clones are the same place.
+/// Place for a path that is being made; its clones are the same place.
 #[derive(Clone, Default)]
 pub(crate) struct Coming(Arc<Lock<Option<MadePath>>>);
 
-/// A path that was made, or why there is none.
+/// A path that was made, or the reason why there is none.
 type MadePath = Result<Box<ModelPath>, Refusal>;
 
 impl Coming {
-    /// The path is there, or it is refused.
+    /// Puts the path, or the refusal, into the place.
     pub fn arrive(&self, made: MadePath) {
         self.0.with(|place| *place = Some(made));
     }
 
-    /// The path, once it is there.
+    /// Takes the path, if it has been made.
     pub fn take(&self) -> Option<MadePath> {
         self.0.with(Option::take)
     }
 
-    /// Whether nobody else holds the place: it is made no more, or waited for no more.
+    /// Whether nobody else holds the place: the maker or the session has given it up.
     pub fn is_alone(&self) -> bool {
         Arc::strong_count(&self.0) == 1
     }
 }
 
-/// A path with all that belongs to it between two frames.
+/// Path of the equilibria of one model, with its factor under way, between two frame questions.
 pub(crate) struct ModelPath {
     pub law: Law,
     pub yield_stress: Option<f64>,
     pub path: Path,
-    /// Memory of the path, given back with it.
+    /// Memory reserved for the path, given back with it.
     pub reservation: Reservation,
-    /// A factor that is being made beside the frames.
+    /// Factor that is being made in the background.
     pub under_way: Option<UnderWay>,
-    /// How long the last factor made beside the frames took, ms.
+    /// Time that the last factor made in the background took, ms.
     pub factor_ms: Option<f64>,
-    /// How long rotation and stretches took to work out last, ms.
+    /// Time that computing rotation and stretches took last, ms.
     pub summary_ms: Option<f64>,
 }
 
-/// A factor that is being made beside the frames.
+/// Factor that is being made in the background.
 pub(crate) struct UnderWay {
-    /// Where it will lie, with how long it took, ms.
+    /// Place for the factor, with the time that it took, ms.
     pub made: Arc<Lock<Option<MadeFactor>>>,
-    /// Frames since it was begun.
+    /// Number of frame questions since the factor was begun.
     pub frames: u32,
 }
 
-/// A factor that was made beside the frames, and how long it took, ms.
+/// Factor that was made in the background, and the time that it took, ms.
 pub(crate) type MadeFactor = (Result<Renewed, FactorError>, f64);
 
 /// The paths of one session.
 #[derive(Default)]
 pub(crate) struct Paths {
-    /// The one used last stands last.
+    /// Seat of each model, in the order of last use.
     seats: Vec<(ModelHash, Seat)>,
 }
 
-/// Paths that a session may follow; the one unused for longest goes.
+/// Largest number of paths that a session follows; the one unused for longest is dropped.
 const PATHS_MAX: usize = 4;
 
 impl Paths {
-    /// The seat of a model, new where the session has none.
+    /// Seat of a model; a new one if the session has none.
     pub fn seat(&mut self, model: ModelHash) -> Seat {
         let seat = match self.seats.iter().position(|(of, _)| *of == model) {
             Some(at) => self.seats.remove(at).1,
@@ -96,7 +96,7 @@ impl Paths {
         seat
     }
 
-    /// Leaves the path of a model: the next frame begins at rest.
+    /// Leaves the path of a model: its next frame question begins at rest.
     pub fn leave(&mut self, model: ModelHash) {
         self.seats.retain(|(of, _)| *of != model);
     }

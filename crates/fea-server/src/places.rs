@@ -1,4 +1,4 @@
-//! Places for sessions: so many at the same time, and so many of them for one owner.
+//! Places for sessions: a largest number in all, and one for each owner.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::lock::Lock;
 use crate::origin::Origin;
 
-/// Places for sessions that are taken and given back.
+/// Places for sessions, taken and given back.
 #[derive(Clone)]
 pub(crate) struct Places {
     taken: Arc<Lock<Taken>>,
@@ -21,7 +21,7 @@ struct Taken {
     by_origin: BTreeMap<Origin, usize>,
 }
 
-/// A place that is taken until it is dropped.
+/// Place of a session; given back when dropped.
 pub(crate) struct Place {
     places: Places,
     origin: Origin,
@@ -51,7 +51,7 @@ impl Places {
     /// Takes a place. Programs on the server's own machine share all places.
     ///
     /// # Errors
-    /// [`NoPlace`].
+    /// [`NoPlace`] if all places of the server or of the address are taken.
     pub fn take(&self, address: IpAddr) -> Result<Place, NoPlace> {
         let origin = Origin::of(address);
         self.taken.with(|taken| {
@@ -68,7 +68,7 @@ impl Places {
         })
     }
 
-    /// Places taken now.
+    /// Number of places that are taken.
     pub fn taken(&self) -> usize {
         self.taken.with(|taken| taken.all)
     }

@@ -13,7 +13,7 @@ use crate::no_room::NoRoom;
 use crate::plan::PlanError;
 use crate::workers::EndedAbnormally;
 
-/// Why a request is refused, before it becomes a message.
+/// Reason for which a request is refused, before it becomes a message.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Refusal {
     #[error("the request cannot be decoded: {0}")]
@@ -136,7 +136,7 @@ pub(crate) enum Refusal {
     Internal,
 }
 
-/// When to ask again where memory was missing at the moment.
+/// Time in ms after which to ask again if memory was missing only at the moment.
 const NO_ROOM_MS: u32 = 1000;
 
 impl From<DecodeError> for Refusal {
@@ -164,7 +164,7 @@ impl From<EndedAbnormally> for Refusal {
 }
 
 impl Refusal {
-    /// Why, for the program.
+    /// Code of the refusal, for the client's program.
     pub fn code(&self) -> RejectCode {
         match self {
             Self::UnknownModel(_) => RejectCode::UnknownModel,
@@ -187,7 +187,7 @@ impl Refusal {
         }
     }
 
-    /// The message for the client.
+    /// Message that tells the client of the refusal.
     pub fn to_message(&self) -> Rejected {
         let detail = match self {
             Self::Plan(PlanError::Memory(shortage)) => shortage.detail(),

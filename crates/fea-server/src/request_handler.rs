@@ -1,4 +1,4 @@
-//! Answers the requests of one session, one after the other, with what the session holds.
+//! Answers the requests of one session, one after the other, with the session's models and paths.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -27,45 +27,45 @@ use crate::server_handle::{Grasping, ServerHandle};
 use crate::tokens::Bearer;
 use crate::workers::{Asker, Turn, Workers};
 
-/// What one session holds, and the server that works for it.
+/// State of one session, and the server that works for it.
 pub(crate) struct RequestHandler {
     server: ServerHandle,
     peer: SocketAddr,
-    /// Whose turn its work takes.
+    /// Identity of the session in the fair queue.
     asker: Asker,
     limits: Limits,
     is_authorised: bool,
-    /// Whose token it has shown, if one is wanted.
+    /// Bearer of the token that the client has shown, if tokens are required.
     bearer: Option<Bearer>,
-    /// Whether it has said what it is.
+    /// Whether the client has sent `Hello`.
     is_introduced: bool,
     held: HeldModels,
     /// The equilibria that this session follows.
     paths: Paths,
     /// The object that this session presses at large deformation.
     pressed: PressedSeat,
-    /// A path that is made beside the frames of this session.
+    /// Task that makes a path in the background of this session.
     making: Option<JoinHandle<()>>,
-    /// Counts this session from its first frame on.
+    /// Counts this session among those that ask frame questions, from its first one on.
     grasping: Option<Grasping>,
-    /// How often the client wants to hear that the server is there.
+    /// Silence of the server after which the client wants an `Alive`.
     alive_every: Option<Duration>,
 }
 
-/// What this server can do, for `Welcome`.
+/// Names of this server's capabilities, for `Welcome`.
 const CAPABILITIES: [&str; 7] =
     ["large", "cases", "contact", "cancel", "newest-wins", "report-levels", "fields"];
-/// `Alive` is not sent more often.
+/// Shortest time between two `Alive`.
 const ALIVE_MIN: Duration = Duration::from_millis(100);
 
-/// Predicted cost above which a frame at large deformation is not one among the frames: others would
-/// wait for it.
+/// Predicted cost in ms above which a frame question at large deformation does not run on the pool of
+/// frames: others would wait for it.
 const FRAME_MS_MAX: f64 = 50.0;
-/// Reading a request out of its bytes, ms per byte: a tenth of what memory does.
+/// Predicted time to decode a request, ms for each byte.
 const READ_BYTE_MS: f64 = 1e-6;
 
 impl RequestHandler {
-    /// For a session that has not said anything yet.
+    /// Handler of a session that has not sent anything yet.
     pub fn new(server: ServerHandle, peer: SocketAddr) -> Self {
         let resources = &server.resources;
         Self {
@@ -85,28 +85,28 @@ impl RequestHandler {
         }
     }
 
-    /// What is read from a client that is known.
+    /// Limits on what is read from a client that has introduced itself.
     pub fn limits(&self) -> Limits {
         self.limits
     }
 
-    /// How long the server may be silent, where the client wants to hear that it is there.
+    /// Silence of the server after which the client wants an `Alive`; `None` if it wants none.
     pub fn alive_every(&self) -> Option<Duration> {
         self.alive_every
     }
 
-    /// Whether the client has shown the token, or none is wanted.
+    /// Whether the client has shown a right token, or none is required.
     pub fn is_authorised(&self) -> bool {
         self.is_authorised
     }
 
-    /// Whose token the client has shown.
+    /// Bearer of the token that the client has shown.
     pub fn bearer(&self) -> Option<&Bearer> {
         self.bearer.as_ref()
     }
 
-    /// The reply to one request; `None` to a hint. May be dropped at any await: the work then ends when
-    /// its stage does. `received` is the memory that the request was received in.
+    /// Reply to one request; `None` for messages that have no reply. May be dropped at any await: the
+    /// work then ends with its stage. `received` is the memory that the request was received in.
     ///
     /// # Errors
     /// [`Refusal`]; the session lives on.
@@ -222,13 +222,13 @@ impl RequestHandler {
         workers.run(turn, work).await?
     }
 
-    /// The turn of work that is predicted to cost so much.
+    /// Turn of this session's work in the fair queue, with its predicted cost.
     fn turn(&self, cost_ms: f64) -> Turn {
         Turn { asker: self.asker, cost_ms }
     }
 
-    /// Reads a request out of its bytes; a large one on a solving thread, for all sessions share that of
-    /// the sockets.
+    /// Decodes a request; a large one on a solving thread, since all sessions share the thread of the
+    /// sockets.
     async fn read(&self, frame: Frame, received: &Reservation) -> Result<Request, Refusal> {
         let bytes = frame.payload.len();
         if bytes <= OWN_BYTES {
@@ -272,8 +272,8 @@ impl RequestHandler {
         Ok(ready)
     }
 
-    /// Answers a frame: at once, on the sockets' thread, where all that it needs is there and few
-    /// sessions share the server; else among the frames, unless something has to be made first.
+    /// Answers a frame question: at once on the sockets' thread if all that it needs is kept and few
+    /// sessions are open; else on the pool of frames, unless something has to be made first.
     async fn frame(
         &mut self,
         model: ModelHash,
@@ -339,8 +339,8 @@ impl RequestHandler {
         Ok(answered.answer)
     }
 
-    /// Answers a contact frame: among the frames where its columns are there, else by what computing
-    /// them is predicted to cost.
+    /// Answers a contact frame: on the pool of frames if its columns are cached, else in the lane of the
+    /// predicted cost of computing them.
     async fn contact_frame(
         &mut self,
         frame: ContactFrame,
@@ -366,7 +366,7 @@ impl RequestHandler {
         }
     }
 
-    /// The first time; whoever says it again and again is not worth a line.
+    /// Logs the client's first introduction; later ones are not logged.
     fn log_introduction(&mut self, client: &str) {
         let is_first = !std::mem::replace(&mut self.is_introduced, true);
         if is_first && self.server.resources.log_lines.has_room(self.peer.ip()) {

@@ -9,7 +9,7 @@ use crate::plan::MeasuredRates;
 use crate::store::ModelStore;
 use crate::workers::Workers;
 
-/// Settings, kept models, memory, solving threads and their speed, what is counted and logged.
+/// Settings, kept models, memory budget, solving threads, their measured rates, counters and log limits.
 pub(crate) struct Resources {
     pub config: ServerConfig,
     pub access: Access,
@@ -22,7 +22,7 @@ pub(crate) struct Resources {
 }
 
 impl Resources {
-    /// Those of a server that has just started.
+    /// Resources of a server that has just started.
     pub fn new(config: ServerConfig, workers: Workers) -> Self {
         let budget = Budget::new(config.memory_limit);
         let models = ModelStore::new(budget.clone());

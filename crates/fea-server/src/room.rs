@@ -1,4 +1,4 @@
-//! Memory for requests that are being received: taken from the limit as their bytes come.
+//! Memory for requests that are being received: reserved from the budget as their bytes come.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,26 +12,26 @@ use crate::resources::Resources;
 /// The memory that one session takes for the request that it receives.
 pub(crate) struct Room {
     resources: Arc<Resources>,
-    /// For what has come of the next request.
+    /// Memory reserved for the bytes of the next request that have come.
     reserved: Reservation,
 }
 
-/// Memory for which a session reserves nothing: every session may hold so much.
+/// Bytes that every session may hold without a reservation.
 pub(crate) const OWN_BYTES: usize = 256 * 1024;
-/// How long a request waits for memory, with its client's bytes left in the network meanwhile.
+/// Longest time that a request waits for memory; its connection is not read meanwhile.
 const WAIT_MAX: Duration = Duration::from_secs(5);
 
 impl Room {
-    /// Nothing at first.
+    /// Room of a session, with nothing reserved.
     pub fn new(resources: Arc<Resources>) -> Self {
         let reserved = resources.budget.reservation();
         Self { resources, reserved }
     }
 
-    /// Whether a request of so many bytes can be received and read at all.
+    /// Checks that a request of `bytes` bytes can be received and read at all.
     ///
     /// # Errors
-    /// [`NoRoom::Never`].
+    /// [`NoRoom::Never`] if it would exceed the budget.
     pub fn check(&self, bytes: usize) -> Result<(), NoRoom> {
         let (bytes, limit) = (bytes as u64, self.reserved.limit());
         match bytes > OWN_BYTES as u64 && bytes.saturating_mul(2) > limit {
@@ -40,13 +40,13 @@ impl Room {
         }
     }
 
-    /// Makes the reserved memory `bytes`, of a request that will have `whole` at last. Waits a while
-    /// where others hold too much.
+    /// Changes the reservation to `bytes`, for a request that will have `whole` bytes at its end. Waits
+    /// for some seconds if others hold too much.
     ///
     /// May be dropped at any await.
     ///
     /// # Errors
-    /// [`NoRoom::Now`].
+    /// [`NoRoom::Now`] if no memory was freed in time.
     pub async fn grow(&self, bytes: usize, whole: usize) -> Result<(), NoRoom> {
         if bytes <= OWN_BYTES {
             return Ok(());
@@ -75,22 +75,21 @@ impl Room {
         Err(NoRoom::Now { bytes: whole as u64, limit, taken })
     }
 
-    /// The memory of a request that is whole, to go along with it.
+    /// Reservation of a request that is complete, to go with it.
     pub fn hand_over(&mut self) -> Reservation {
         std::mem::replace(&mut self.reserved, self.resources.budget.reservation())
     }
 
-    /// Gives back what was reserved for a request that is not received any further.
+    /// Gives back the reservation of a request whose remaining bytes are skipped.
     pub fn give_up(&self) {
         self.reserved.settle(0);
     }
 }
 
-/// Reserves what reading a request of so many bytes takes for the moment: the bytes and what is made
-/// of them.
+/// Reserves the memory that decoding a request of `bytes` bytes takes: the bytes and the message.
 ///
 /// # Errors
-/// [`NoRoom::Now`].
+/// [`NoRoom::Now`] if others hold too much.
 pub(crate) fn reserve_for_reading(received: &Reservation, bytes: usize) -> Result<(), NoRoom> {
     let bytes = bytes as u64;
     match bytes <= OWN_BYTES as u64 || received.reserve(2 * bytes, 0) {

@@ -17,10 +17,10 @@ use crate::server_handle::{ServerHandle, stopped};
 use crate::status_pages::StatusPages;
 use crate::workers::Workers;
 
-/// Why a server did not start.
+/// Why a server could not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// Settings make no sense.
+    /// The settings are refused.
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// The address cannot be listened on.
@@ -28,35 +28,35 @@ pub enum StartError {
         "cannot listen on {address}: {source}; is another server running there? (--listen HOST:PORT, port 0 picks a free one)"
     )]
     Listen {
-        /// The address.
+        /// Address to listen on.
         address: SocketAddr,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The address of the pages about the server's state cannot be listened on.
+    /// The address of the status pages cannot be listened on.
     #[error("cannot listen on {address}: {source} (--metrics HOST:PORT, port 0 picks a free one)")]
     Metrics {
-        /// The address.
+        /// Address of the status pages.
         address: SocketAddr,
         /// The system's reason.
         source: std::io::Error,
     },
-    /// No threads.
+    /// The solving threads cannot be started.
     #[error("cannot start {threads} solving threads: {source}")]
     Threads {
-        /// Threads asked for.
+        /// Number of threads asked for.
         threads: usize,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// No runtime.
+    /// The runtime of the sockets cannot be started.
     #[error("cannot start the server's sockets: {0}")]
     Runtime(std::io::Error),
 }
 
-/// Sessions that are still at work this long after a stop are cut off.
+/// Time after a stop, after which sessions that are still at work are cut off.
 const STOP_GRACE: Duration = Duration::from_secs(2);
-/// Unused models are looked for this often: a quarter of their time, within these bounds.
+/// Bounds on the time between two searches for unused models, which is a quarter of their time limit.
 const FORGET_EVERY_MIN: Duration = Duration::from_millis(100);
 const FORGET_EVERY_MAX: Duration = Duration::from_secs(60);
 /// Pause after a failed accept, so that a process out of file descriptors does not spin.
@@ -65,17 +65,17 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 /// Addresses that a server listens on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Listening {
-    /// For clients.
+    /// Address for clients.
     pub address: SocketAddr,
-    /// For the pages about its state.
+    /// Address of the status pages, if there are any.
     pub metrics: Option<SocketAddr>,
 }
 
-/// Listens and serves until `stop` holds true and its sessions have drained; `on_ready` hears the
-/// addresses listened on.
+/// Listens and serves until `stop` is true and the sessions have drained; calls `on_ready` with the
+/// addresses once it listens.
 ///
 /// # Errors
-/// [`StartError`] if it cannot start; once it listens it does not fail.
+/// [`StartError`] if the server cannot start; once it listens it does not fail.
 pub async fn serve(
     config: ServerConfig,
     on_ready: impl FnOnce(Listening),
@@ -118,7 +118,7 @@ pub async fn serve(
     Ok(())
 }
 
-/// The sockets that a server listens on, and their addresses.
+/// Sockets that a server listens on, and their addresses.
 struct Listeners {
     clients: TcpListener,
     pages: Option<TcpListener>,
@@ -145,13 +145,13 @@ impl Listeners {
     }
 }
 
-/// Waits for all sessions to end, but not longer; whether they have.
+/// Waits for all sessions to end, for at most `limit`; returns whether they have.
 async fn all_end_within(sessions: &mut JoinSet<()>, limit: Duration) -> bool {
     let all_end = async { while sessions.join_next().await.is_some() {} };
     tokio::time::timeout(limit, all_end).await.is_ok()
 }
 
-/// Forgets models that no session holds, again and again.
+/// Forgets, at intervals, the models that no session holds.
 async fn forget_unused_models(resources: Arc<Resources>) {
     let limit = resources.config.model_idle_limit;
     loop {
@@ -197,11 +197,11 @@ async fn accept_until_stopped(
     }
 }
 
-/// The runtime a server's sockets live on: one thread, which rests unless there is something to
-/// read, write or answer at once, and then is not to wait for the threads that solve.
+/// Runtime of a server's sockets: one thread, which sleeps unless there is something to read, write or
+/// answer at once, and then must not wait for the solving threads.
 ///
 /// # Errors
-/// The system's, when it gives no thread.
+/// Error of the operating system if it starts no thread.
 pub fn sockets_runtime(config: &ServerConfig) -> std::io::Result<tokio::runtime::Runtime> {
     let real_time = config.real_time;
     tokio::runtime::Builder::new_multi_thread()
@@ -253,17 +253,17 @@ pub fn start(config: ServerConfig) -> Result<RunningServer, StartError> {
 }
 
 impl RunningServer {
-    /// Address it listens on.
+    /// Address that the server listens on.
     pub fn address(&self) -> SocketAddr {
         self.listening.address
     }
 
-    /// Address of the pages about its state, if it has them.
+    /// Address of the status pages, if there are any.
     pub fn metrics(&self) -> Option<SocketAddr> {
         self.listening.metrics
     }
 
-    /// Stops it and waits until its sessions have ended.
+    /// Stops the server and waits until its sessions have ended.
     pub fn stop(mut self) {
         self.stop_and_join();
     }

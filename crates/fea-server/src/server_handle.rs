@@ -1,4 +1,4 @@
-//! What every session needs of its server.
+//! Parts of the server that every session needs.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -12,7 +12,7 @@ use crate::strangers::Strangers;
 use crate::uploads::Uploads;
 use crate::workers::Workers;
 
-/// What a session needs of its server.
+/// Parts of the server that a session needs.
 #[derive(Clone)]
 pub(crate) struct ServerHandle {
     pub resources: Arc<Resources>,
@@ -21,29 +21,29 @@ pub(crate) struct ServerHandle {
     pub places: Places,
     /// Room for connections that have not introduced themselves.
     pub strangers: Strangers,
-    /// Connections so far.
+    /// Number of connections so far.
     connections: Arc<AtomicU64>,
-    /// Sessions that have asked for a frame.
+    /// Number of open sessions that have asked a frame question.
     grasping: Arc<AtomicUsize>,
-    /// Whether the sessions are to end.
+    /// True once the sessions are to end.
     pub stop: watch::Receiver<bool>,
 }
 
-/// A session that has asked for a frame; counted until it is dropped.
+/// Counts one session that has asked a frame question, until it is dropped.
 pub(crate) struct Grasping(Arc<AtomicUsize>);
 
-/// Connections that may be there without having introduced themselves. At the pace at which connections
-/// are accepted each of them has a fifth of a second, however large the crowd, and longer if another
-/// address has more of them.
+/// Largest number of connections that have not introduced themselves. At the pace at which connections
+/// are accepted, each of them has at least a fifth of a second, and longer if another address has more of
+/// them.
 const STRANGERS_MAX: usize = 256;
-/// With more sessions that ask for frames, these are shared out among the solving threads however small
-/// they are.
+/// Number of sessions with frame questions above which all frame questions go to the solving threads,
+/// however small they are.
 const GRASPING_MAX: usize = 4;
-/// With more sessions, one must not keep the sockets' thread from the others.
+/// Number of sessions above which one session must not keep the sockets' thread from the others.
 const QUIET_MAX: usize = 4;
 
 impl ServerHandle {
-    /// That of a server that has just started.
+    /// Handle of a server that has just started.
     pub fn new(config: ServerConfig, workers: Workers, stop: watch::Receiver<bool>) -> Self {
         let places = Places::new(config.max_sessions, config.max_sessions_per_address);
         let resources = Arc::new(Resources::new(config, workers));
@@ -52,23 +52,23 @@ impl ServerHandle {
         Self { resources, uploads, places, strangers, connections, grasping, stop }
     }
 
-    /// A number that no other connection of this server has.
+    /// Number of a new connection, different from all others of this server.
     pub fn next_connection(&self) -> u64 {
         self.connections.fetch_add(1, Ordering::Relaxed) + 1
     }
 
-    /// Counts a session that asks for its first frame.
+    /// Counts a session that asks its first frame question.
     pub fn grasping(&self) -> Grasping {
         self.grasping.fetch_add(1, Ordering::Relaxed);
         Grasping(Arc::clone(&self.grasping))
     }
 
-    /// Whether so few sessions ask for frames that one may use the sockets' thread for a moment.
+    /// Whether so few sessions ask frame questions that one may be answered on the sockets' thread.
     pub fn has_few_frames(&self) -> bool {
         self.grasping.load(Ordering::Relaxed) <= GRASPING_MAX
     }
 
-    /// Whether few sessions are there.
+    /// Whether few sessions are open.
     pub fn is_quiet(&self) -> bool {
         self.places.taken() <= QUIET_MAX
     }
@@ -80,7 +80,7 @@ impl Drop for Grasping {
     }
 }
 
-/// Ends when something is to stop, or when nobody is left who could say so.
+/// Ends when `stop` becomes true, or when its sender has gone.
 pub(crate) async fn stopped(stop: &mut watch::Receiver<bool>) {
     let _ = stop.wait_for(|stop| *stop).await;
 }

@@ -24,14 +24,14 @@ use crate::server_handle::{ServerHandle, stopped};
 use crate::standing::Standing;
 use crate::tokens::Bearer;
 
-/// What every line of the log about a connection bears: its number and its peer.
+/// Span of all log lines about a connection: its number and its peer.
 pub(crate) fn span(server: &ServerHandle, peer: SocketAddr) -> tracing::Span {
     // Of the highest level, so that no filter takes it from a line that passes.
     tracing::error_span!("session", id = server.next_connection(), %peer)
 }
 
-/// Serves one connection until the client goes, sends bytes that are no frames, or the server
-/// stops; a stranger until it is to go, too.
+/// Serves one connection until the client goes, sends damaged bytes, or the server stops; one that has
+/// not introduced itself also until its time or its room ends.
 pub(crate) async fn serve<S>(stream: S, peer: SocketAddr, server: ServerHandle, standing: Standing)
 where
     S: AsyncRead + AsyncWrite + Unpin,
@@ -68,21 +68,20 @@ struct Session<S> {
     server: ServerHandle,
     peer: SocketAddr,
     standing: Standing,
-    /// Encoded reply, kept so that its memory is reused.
+    /// Encoded reply; kept so that its memory is reused.
     out: Vec<u8>,
-    /// Requests that were refused.
+    /// Number of requests that were refused.
     refused: usize,
     manners: Manners,
 }
 
-/// Refusals of one session that are logged; a client that sends nonsense without end must not fill a
-/// disk.
+/// Number of refusals of one session that are logged, so that bad requests cannot fill a disk.
 const REFUSALS_LOGGED: usize = 20;
 
-/// When to come again to a server that is full or stopping.
+/// Time in ms after which a client may try again, if the server is full or stopping.
 const AGAIN_AFTER_MS: u32 = 1000;
 
-/// Memory for replies that a session keeps while it rests, bytes.
+/// Bytes of the reply's buffer that an idle session keeps.
 const OUT_KEPT: usize = 1 << 20;
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
@@ -129,7 +128,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         }
     }
 
-    /// The client has introduced itself: it gets a session's place, or is told that there is none.
+    /// Gives a client that has introduced itself a session's place, or tells it that there is none.
     async fn introduced(&mut self) -> Result<(), SessionError> {
         if !self.standing.is_stranger() {
             return Ok(());
@@ -184,7 +183,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         self.server.resources.log_lines.has_room(self.peer.ip())
     }
 
-    /// Last words to a client whose bytes make no sense; whether they arrive is of no matter.
+    /// Sends a last `Rejected` to a client whose bytes are damaged or foreign; it need not arrive.
     async fn answer_bad_stream(&mut self, error: &FrameError) {
         let code = match error {
             FrameError::Version { found } => {
@@ -237,7 +236,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         written
     }
 
-    /// Lets other sessions be served before the next request, and rests for a client without manners.
+    /// Lets other sessions run before the next request, and pauses for a client that [`Manners`] slows
+    /// down.
     async fn give_way(&mut self) {
         let is_ahead = self.connection.is_inside_frame();
         match self.manners.rest(is_ahead, self.server.is_quiet()) {
@@ -264,8 +264,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         }
     }
 
-    /// One request: decoded, worked on, answered. A bad request is answered and the session lives; a
-    /// client that goes is not worked for any longer.
+    /// Decodes and answers one request. A bad request is refused and the session goes on; work for a
+    /// client that has gone ends.
     async fn handle(&mut self, frame: Frame, received: Reservation) -> Result<(), SessionError> {
         let (header, kind) = (frame.header, frame.kind());
         let kept_model = Ask::kept_model(&frame);
@@ -302,7 +302,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         }
     }
 
-    /// Tells a client why its request is refused; hints have no reply.
+    /// Tells a client why its request is refused; nothing for messages that have no reply.
     async fn refuse(&mut self, refusal: &Refusal, header: &Header) -> Result<(), SessionError> {
         // What the client has wanted itself is no news.
         if !matches!(refusal, Refusal::Cancelled | Refusal::Superseded) {
@@ -318,11 +318,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     }
 }
 
-/// The reply to a request, while the client is watched: it may cancel, and a client that goes is not
-/// worked for any longer.
+/// Works on a request while the client is watched: the client may cancel it, and work for a client that
+/// has gone ends.
 ///
 /// # Errors
-/// [`SessionError`]: the client has gone, or takes nothing.
+/// [`SessionError`]: the client has gone, or does not take its reply.
 async fn work<S: AsyncRead + AsyncWrite + Unpin>(
     handler: &mut RequestHandler,
     connection: &mut ClientConnection<S>,
@@ -345,7 +345,7 @@ async fn work<S: AsyncRead + AsyncWrite + Unpin>(
     }
 }
 
-/// Tells a client that the server is there.
+/// Sends `Alive` to a client.
 async fn say_alive<S: AsyncWrite + Unpin>(
     connection: &mut ClientConnection<S>,
 ) -> Result<(), SessionError> {
@@ -359,7 +359,7 @@ async fn say_alive<S: AsyncWrite + Unpin>(
     }
 }
 
-/// What comes next from a client; of a stranger's longer frames the header is enough.
+/// Next message of a client; of a client not introduced yet, only the header if the frame is long.
 async fn next<S: AsyncRead + Unpin>(
     connection: &mut ClientConnection<S>,
     standing: &Standing,

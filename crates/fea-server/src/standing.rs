@@ -1,4 +1,4 @@
-//! What a connection is to the server: a stranger that may have to go, or a session with a place.
+//! Standing of a connection: not introduced yet, or a session with a place.
 
 use std::time::Duration;
 
@@ -9,27 +9,27 @@ use crate::places::Place;
 use crate::strangers::Guest;
 use crate::tokens::BearerPlace;
 
-/// What a connection is to the server.
+/// Standing of a connection.
 pub(crate) enum Standing {
-    /// It has not introduced itself.
+    /// The client has not introduced itself.
     Stranger(Greeting),
-    /// It has, and has a session's place.
+    /// The client has introduced itself and has a session's place.
     Known { _place: Place, _of_token: Option<BearerPlace> },
 }
 
-/// The time and the room that a connection has to introduce itself.
+/// Time and room that a connection has to introduce itself.
 pub(crate) struct Greeting {
-    /// Its room.
+    /// Room among the connections that have not introduced themselves.
     pub guest: Guest,
-    /// The end of its time.
+    /// End of the time.
     pub until: Instant,
-    /// How long it was.
+    /// Length of the time.
     pub limit: Duration,
 }
 
 impl Greeting {
-    /// Ends when the time is over or somebody else needs the room: why the connection is closed. May be
-    /// dropped at any await.
+    /// Ends when the time is over or another connection needs the room; returns why the connection is
+    /// closed. May be dropped at any await.
     pub async fn ends(&self) -> SessionError {
         tokio::select! {
             () = sleep_until(self.until) => SessionError::Stranger(self.limit),
@@ -39,7 +39,7 @@ impl Greeting {
 }
 
 impl Standing {
-    /// Whether it has not introduced itself.
+    /// Whether the client has not introduced itself.
     pub fn is_stranger(&self) -> bool {
         matches!(self, Self::Stranger(_))
     }

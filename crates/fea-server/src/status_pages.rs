@@ -1,7 +1,7 @@
 //! The pages about the server's state, by HTTP: `/metrics`, `/health`, `/ready`.
 //!
-//! Asked by monitors and balancers of the same machine: one short request for each connection, of which
-//! the first line is all that is read for its meaning.
+//! For monitors and load balancers: one short request for each connection, of which only the first line
+//! is used.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,26 +18,26 @@ use crate::resources::Resources;
 use crate::server_handle::ServerHandle;
 use crate::strangers::Strangers;
 
-/// What the pages are about.
+/// Server that the pages tell of.
 #[derive(Clone)]
 pub(crate) struct StatusPages {
     server: ServerHandle,
-    /// Whether the server is to stop, and takes no more sessions.
+    /// Whether the server is stopping and accepts no more sessions.
     is_stopping: Arc<AtomicBool>,
-    /// Those who have not asked, or not taken their page yet.
+    /// Connections that have not sent their request yet, or not taken their page.
     readers: Strangers,
 }
 
-/// A request's head has at most so many bytes.
+/// Largest length of a request's head, bytes.
 const HEAD_MAX: usize = 8 * 1024;
-/// A request has come and its page is taken within this time.
+/// Longest time for the request to come and its page to be taken.
 const PAGE_MAX: Duration = Duration::from_secs(5);
-/// Connections at the same time; one more takes the place of the oldest.
+/// Largest number of connections; a further one takes the room of the oldest.
 const READERS_MAX: usize = 64;
-/// Pause after a failed accept.
+/// Pause after a failed `accept`.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
-/// A page: status line and text.
+/// Status line and text of a page.
 #[derive(Debug, PartialEq, Eq)]
 struct Page {
     status: &'static str,
@@ -45,13 +45,13 @@ struct Page {
 }
 
 impl StatusPages {
-    /// Those of a server.
+    /// Pages of a server.
     pub fn new(server: ServerHandle, is_stopping: Arc<AtomicBool>) -> Self {
         Self { server, is_stopping, readers: Strangers::new(READERS_MAX) }
     }
 
-    /// Answers until it is dropped. Nobody waits for somebody else: a connection that says nothing, or
-    /// takes nothing, is closed when others need its room.
+    /// Serves the pages until it is dropped. A connection that sends or takes nothing is closed when
+    /// others need its room.
     pub async fn serve(self, listener: TcpListener) {
         let mut pace = Pace::of_connections(Instant::now());
         loop {
@@ -111,7 +111,7 @@ impl StatusPages {
         }
     }
 
-    /// Why no new session would be taken; `None` where one would.
+    /// Why no new session would be accepted; `None` if one would.
     fn not_ready(&self) -> Option<&'static str> {
         let max = self.server.resources.config.max_sessions;
         match self.is_stopping.load(Ordering::Relaxed) {
@@ -121,7 +121,7 @@ impl StatusPages {
     }
 }
 
-/// What is read of a server when somebody asks.
+/// Present values of the gauges of a server.
 pub(crate) fn gauges(server: &ServerHandle, is_ready: bool) -> Gauges {
     let ServerHandle { resources, places, strangers, .. } = server;
     let Resources { models, budget, workers, .. } = &**resources;
@@ -145,7 +145,7 @@ pub(crate) fn gauges(server: &ServerHandle, is_ready: bool) -> Gauges {
     }
 }
 
-/// Bytes up to the empty line after a request's head, or as many as are read.
+/// Bytes up to the empty line after a request's head, or as many as are read at most.
 async fn read_head(stream: &mut (impl AsyncRead + Unpin)) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
     let mut piece = [0; 1024];

@@ -1,8 +1,7 @@
-//! Connections of which nothing is known yet: so many at the same time, and the oldest one goes first.
+//! Connections that have not introduced themselves: a largest number, and the oldest one is closed first.
 //!
-//! They have room of their own, so that those who say nothing take no session's place and keep nobody
-//! out: whoever comes is let in, and while there is no room for it, the oldest connection of the owner
-//! that has most of them is sent away.
+//! They have room of their own, so that silent connections take no session's place. Every new connection
+//! is accepted; without room for it, the oldest connection of the owner that has most of them is closed.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -33,7 +32,7 @@ struct Stranger {
     is_to_go: Arc<Notify>,
 }
 
-/// A stranger's room, until it is dropped.
+/// Room of one connection; given back when dropped.
 pub(crate) struct Guest {
     strangers: Strangers,
     arrival: u64,
@@ -41,12 +40,13 @@ pub(crate) struct Guest {
 }
 
 impl Strangers {
-    /// Room for `max` strangers.
+    /// Room for `max` connections.
     pub fn new(max: usize) -> Self {
         Self { there: Arc::default(), max }
     }
 
-    /// Lets a stranger in; without room the oldest one of the origin that has most has to go.
+    /// Gives a new connection room; without room, the oldest one of the owner that has most is to be
+    /// closed.
     pub fn let_in(&self, address: IpAddr) -> Guest {
         let origin = Origin::of(address);
         let is_to_go = Arc::new(Notify::new());
@@ -61,12 +61,12 @@ impl Strangers {
         Guest { strangers: self.clone(), arrival, is_to_go }
     }
 
-    /// Sends one away, as if somebody came without room; whether there was one.
+    /// Has one connection closed, as if another one needed its room; returns whether there was one.
     pub fn send_one_away(&self) -> bool {
         self.there.with(There::send_away)
     }
 
-    /// Strangers that are there now.
+    /// Number of connections that have room now.
     pub fn count(&self) -> usize {
         self.there.with(|there| there.by_arrival.len())
     }
@@ -99,7 +99,7 @@ impl There {
 }
 
 impl Guest {
-    /// Ends when somebody else needs the room. May be dropped at any await.
+    /// Ends when another connection needs the room. May be dropped at any await.
     pub async fn is_to_go(&self) {
         self.is_to_go.notified().await;
         // Whoever asks again hears the same.

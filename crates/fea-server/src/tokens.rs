@@ -1,4 +1,4 @@
-//! The tokens that let clients in: one for all, or one for each name, with so many sessions.
+//! Tokens that let clients in: one for all, or one for each name, with a number of sessions.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 use crate::lock::Lock;
 use crate::places::NoPlace;
 
-/// The tokens of a server. Clones are the same tokens: those of a running server can be replaced.
+/// Tokens of a server. Clones share them, and those of a running server can be replaced.
 #[derive(Clone)]
 pub struct Tokens(Arc<Lock<Vec<Token>>>);
 
@@ -18,16 +18,16 @@ struct Token {
     bearer: Bearer,
 }
 
-/// Whoever shows a token.
+/// Holder of a token: its name, number of sessions and counters.
 #[derive(Clone)]
 pub(crate) struct Bearer {
-    /// `None` for a token that has no name.
+    /// Name of the token; `None` for a token without one.
     pub name: Option<Arc<str>>,
     sessions_max: Option<usize>,
     counts: Arc<Counts>,
 }
 
-/// What the bearers of one token do; goes on when the tokens are read again.
+/// Counters for the bearers of one token; kept when the tokens are read again.
 #[derive(Default)]
 struct Counts {
     sessions: AtomicUsize,
@@ -36,75 +36,75 @@ struct Counts {
     refused: AtomicU64,
 }
 
-/// What has been counted of a token with a name.
+/// Sessions and requests counted for a token with a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct TokenNumbers {
-    /// The token's name.
+    /// Name of the token.
     pub name: Arc<str>,
-    /// Sessions that are there.
+    /// Number of open sessions.
     pub sessions: u64,
-    /// Sessions that have begun.
+    /// Number of sessions that have begun.
     pub sessions_total: u64,
-    /// Requests that have been answered or refused.
+    /// Number of requests that have been answered or refused.
     pub requests: u64,
-    /// Those of them that were refused.
+    /// Number of requests that have been refused.
     pub refused: u64,
 }
 
-/// A session of a token's bearer, until it is dropped.
+/// Session of a token's bearer; counted until it is dropped.
 pub(crate) struct BearerPlace(Arc<Counts>);
 
-/// Why a file gives no tokens. What it holds is never part of the text.
+/// Why a file gives no tokens. The file's content is never part of the text.
 #[derive(Debug, thiserror::Error)]
 pub enum TokensError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot read the token file {path}")]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Its first line is empty.
+    /// The first line of the file is empty.
     #[error("the token file {path} is empty")]
     Empty {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A line has another form than those of named tokens.
+    /// A line does not have the form of a named token.
     #[error(
         "line {line} of the token file {path}: {reason}; write name=NAME token=TOKEN, and \
          sessions=N to limit its sessions"
     )]
     Line {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Counted from 1.
+        /// Number of the line, counted from 1.
         line: usize,
-        /// What is wrong.
+        /// Fault of the line.
         reason: &'static str,
     },
-    /// A token that is guessed in minutes.
+    /// A token is so short that it is guessed in minutes.
     #[error(
         "a token in {path} has fewer than {LETTERS_MIN} letters and is soon guessed; make one with \
          head -c 24 /dev/urandom | base64"
     )]
     Short {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
 }
 
-/// A token with fewer letters is refused.
+/// Number of letters below which a token is refused.
 const LETTERS_MIN: usize = 4;
-/// A token with fewer letters may be guessed if it is a word: it is warned of. 24 random bytes as base64
-/// are 32.
+/// Number of letters below which a token is warned of, because it may be guessed. 24 random bytes as
+/// base64 are 32 letters.
 const LETTERS_GOOD: usize = 16;
-/// Letters of a token's name.
+/// Largest number of letters of a token's name.
 const NAME_MAX: usize = 32;
 
 impl Tokens {
-    /// One token, which has no name, for all.
+    /// One token without a name, for all clients.
     pub fn of(token: &str) -> Self {
         Self(Arc::new(Lock::new(vec![Token::new(token, None, None)])))
     }
@@ -138,7 +138,7 @@ impl Tokens {
         Ok(Self(Arc::new(Lock::new(tokens.into_iter().map(|(_, token)| token).collect()))))
     }
 
-    /// From now on these tokens let clients in, and no others; what has been counted of a name goes on.
+    /// Replaces the tokens; the counters of a name go on.
     pub fn renew(&self, by: &Self) {
         let mut tokens = by.0.with(std::mem::take);
         self.0.with(|old| {
@@ -152,18 +152,18 @@ impl Tokens {
         });
     }
 
-    /// How many there are.
+    /// Number of tokens.
     pub fn count(&self) -> usize {
         self.0.with(|tokens| tokens.len())
     }
 
-    /// How many have so few letters that they may be guessed.
+    /// Number of tokens that are so short that they may be guessed.
     pub fn count_short(&self) -> usize {
         self.0.with(|tokens| tokens.iter().filter(|token| token.is_short).count())
     }
 
-    /// Whose token this is. The time it takes tells nothing of the tokens: digests are compared, all of
-    /// their bytes, and all of them.
+    /// Bearer of the token that was shown. The time it takes tells nothing of the tokens: all digests are
+    /// compared, all of their bytes.
     pub(crate) fn bearer(&self, shown: &str) -> Option<Bearer> {
         let digest = blake3::hash(shown.as_bytes());
         self.0.with(|tokens| {
@@ -174,7 +174,7 @@ impl Tokens {
         })
     }
 
-    /// What has been counted of each name, in the order of the file.
+    /// Counters of each name, in the order of the file.
     pub(crate) fn numbers(&self) -> Vec<TokenNumbers> {
         self.0.with(|tokens| tokens.iter().filter_map(|token| token.bearer.numbers()).collect())
     }
@@ -196,7 +196,7 @@ impl Token {
 }
 
 impl Bearer {
-    /// One more session.
+    /// Takes the place of one more session.
     ///
     /// # Errors
     /// [`NoPlace::Token`] if all of its sessions are taken.
@@ -208,7 +208,7 @@ impl Bearer {
         Ok(BearerPlace(Arc::clone(&self.counts)))
     }
 
-    /// A request was answered or refused.
+    /// Counts a request that was answered or refused.
     pub fn count(&self, is_refused: bool) {
         self.counts.requests.fetch_add(1, Relaxed);
         self.counts.refused.fetch_add(u64::from(is_refused), Relaxed);
@@ -232,7 +232,7 @@ impl Drop for BearerPlace {
     }
 }
 
-/// Tokens of lines, each with its text, or the first line that is wrong and why.
+/// Tokens of named lines, each with its text, or the number of the first wrong line and its fault.
 fn named<'a>(
     lines: impl Iterator<Item = (usize, &'a str)>,
 ) -> Result<Vec<(&'a str, Token)>, (usize, &'static str)> {

@@ -8,13 +8,13 @@ use tokio::sync::{Mutex, OwnedMutexGuard};
 
 use crate::lock::Lock;
 
-/// One turn at a time for each model.
+/// For each model, the right to make it, which one upload has at a time.
 #[derive(Clone, Default)]
 pub(crate) struct Uploads(Arc<Lock<Turns>>);
 
 type Turns = BTreeMap<ModelHash, Arc<Mutex<()>>>;
 
-/// The right to make a model; given on when dropped.
+/// The right to make a model; passed on when dropped.
 pub(crate) struct Turn {
     uploads: Uploads,
     model: ModelHash,
@@ -22,7 +22,7 @@ pub(crate) struct Turn {
 }
 
 impl Uploads {
-    /// Waits, without a thread and without a lock, until nobody else makes this model.
+    /// Waits, without a thread and without a lock, until no other upload makes this model.
     pub async fn turn(&self, model: ModelHash) -> Turn {
         let of_model = self.0.with(|turns| Arc::clone(turns.entry(model).or_default()));
         Turn { uploads: self.clone(), model, _right: of_model.lock_owned().await }

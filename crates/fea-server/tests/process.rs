@@ -24,7 +24,7 @@ use softgrasp_protocol::{
 };
 
 const MIB: u64 = 1 << 20;
-/// A process that has not ended by then hangs.
+/// Time after which a process that has not ended is taken to hang.
 const END_MAX: Duration = Duration::from_secs(30);
 
 fn command() -> Command {
@@ -33,7 +33,7 @@ fn command() -> Command {
     command
 }
 
-/// Runs to the end.
+/// Runs the program to its end.
 fn run(arguments: &[&str]) -> Output {
     command().args(arguments).output().unwrap()
 }
@@ -136,7 +136,7 @@ impl Client {
     }
 }
 
-/// What the server counts for a request before it makes the factor.
+/// Memory that the server counts for a request before it makes the factor.
 fn counted(request: &Ask, method: Method) -> Need {
     let Subject::Mesh(body) = &request.subject else { panic!("a mesh comes along") };
     let vertices = body.mesh.vertices.iter().copied().map(Into::into).collect();
@@ -195,7 +195,7 @@ fn first_line_names_the_address_and_both_signals_end_with_exit_code_0() {
     }
 }
 
-/// An order to end is kept within three seconds; the rest is for a busy machine.
+/// Longest time that a stop may take: three seconds, and the rest for a busy machine.
 const STOP_MAX: Duration = Duration::from_millis(4500);
 
 #[test]
@@ -217,8 +217,8 @@ fn server_at_work_that_takes_minutes_ends_within_three_seconds() {
     }
 }
 
-/// METIS, once used here, took SIGTERM over while it ordered: a server that was stopped then died of
-/// SIGSEGV.
+/// METIS, once used here, replaced the handler of SIGTERM while it ordered: a server that was stopped
+/// then died of SIGSEGV.
 #[test]
 fn a_stop_while_equations_are_ordered_does_not_crash() {
     // Start-up measures this machine on cubes, which are ordered: the signals fall at other

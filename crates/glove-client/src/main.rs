@@ -75,12 +75,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// Whose warnings are shown.
+/// Log filter by default: warnings, but not those of the window's libraries.
 const WARNINGS: &str = "warn,winit=off,wgpu=off,wgpu_core=off,wgpu_hal=off,naga=off,kiss3d=off,\
                         egui=off,rfd=off,ashpd=off,zbus=off,sctk=off";
 
-/// Warnings on standard error, in colour on a terminal only; `RUST_LOG` shows more. The libraries of
-/// the window warn of displays and drivers that work all the same.
+/// Starts the log: warnings on standard error, in colour on a terminal only; `RUST_LOG` shows more. The
+/// window's libraries warn of displays and drivers that work all the same.
 fn start_log() {
     let is_terminal = std::io::stderr().is_terminal();
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()

@@ -17,22 +17,22 @@ pub struct Connection<S> {
 }
 
 impl<S> Connection<S> {
-    /// Wraps a stream; `limits` hold for what is read.
+    /// Connection over `stream`, which is open already; `limits` hold for the frames that are read.
     pub fn new(stream: S, limits: Limits) -> Self {
         Self { stream, buffer: FrameBuffer::new(limits) }
     }
 
-    /// The stream below.
+    /// The underlying stream.
     pub fn stream(&self) -> &S {
         &self.stream
     }
 
-    /// The stream below, to shut it down.
+    /// The underlying stream for changes: to shut it down.
     pub fn stream_mut(&mut self) -> &mut S {
         &mut self.stream
     }
 
-    /// Other limits on what is read, from the next header on.
+    /// Sets the limits on frames that are read, from the next header on.
     pub fn set_limits(&mut self, limits: Limits) {
         self.buffer.set_limits(limits);
     }
@@ -53,21 +53,20 @@ impl<S> Connection<S> {
         self.buffer.header()
     }
 
-    /// Gives up the unfinished frame at the front, see [`FrameBuffer::pass_over`].
+    /// Gives up the unfinished frame at the front; see [`FrameBuffer::pass_over`].
     pub fn pass_over(&mut self) {
         self.buffer.pass_over();
     }
 
-    /// The next frame if all of it has come; `None` means "not yet".
+    /// The next frame if all its bytes have come; `Ok(None)` means "not yet".
     ///
     /// # Errors
-    /// [`FrameError`] for bad bytes: give the stream up.
+    /// [`FrameError`] for damaged or foreign bytes: the stream is to be given up.
     pub fn frame_received(&mut self) -> Result<Option<Frame>, FrameError> {
         self.buffer.next_frame()
     }
 
-    /// What the end of the stream means, once [`frame_received`](Self::frame_received) has said
-    /// `Ok(None)`.
+    /// Judges the end of the stream, once [`frame_received`](Self::frame_received) has said `Ok(None)`.
     ///
     /// # Errors
     /// [`FrameError::Truncated`] inside a frame.
@@ -120,7 +119,7 @@ impl<S: AsyncRead + Unpin> Connection<S> {
     /// May be dropped at any await: bytes that have come stay in the buffer.
     ///
     /// # Errors
-    /// That of the stream: the peer has gone.
+    /// [`ConnectionError`] of the stream: the peer has gone.
     pub async fn read_ahead(&mut self) -> Result<bool, ConnectionError> {
         let count = self.stream.read(read_room(&mut self.buffer)).await?;
         self.buffer.advance(count);
@@ -155,7 +154,8 @@ impl<S: AsyncWrite + Unpin> Connection<S> {
     }
 }
 
-/// Bytes that one read takes at most: a peer that sends as fast as it can is left for others now and then.
+/// Bytes that one read takes at most, so that a peer that sends without a pause leaves time for other
+/// peers.
 const READ_LEN_MAX: usize = 64 * 1024;
 
 fn read_room(buffer: &mut FrameBuffer) -> &mut [u8] {
@@ -164,7 +164,7 @@ fn read_room(buffer: &mut FrameBuffer) -> &mut [u8] {
     &mut room[..len]
 }
 
-/// Whether a failed write is to be tried again at once.
+/// `Ok` if a failed write is to be tried again at once, else the error with the `written` bytes.
 fn keep_writing(error: std::io::Error, written: usize) -> Result<(), ConnectionError> {
     match error.kind() {
         ErrorKind::Interrupted => Ok(()),

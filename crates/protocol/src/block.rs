@@ -21,7 +21,7 @@ pub(crate) struct Block(Vec<u8>);
 const MISSING_LEN_MAX: usize = 1024;
 
 impl Block {
-    /// Fields of a structure.
+    /// Block with the encoded fields of a structure.
     ///
     /// # Errors
     /// [`EncodeError::Part`] for a text or list that is too long.
@@ -35,10 +35,10 @@ impl Block {
         Ok(Self(bytes))
     }
 
-    /// Structure that the bytes hold.
+    /// Structure that the block holds.
     ///
     /// # Errors
-    /// [`DecodeError::Part`] for a value that does not exist.
+    /// [`DecodeError::Part`] for a value that does not exist, as an unknown enum tag.
     pub(crate) fn read<T>(&self) -> Result<T, DecodeError>
     where
         T: SchemaReadOwned<PartFormat> + for<'a> SchemaRead<'a, PartFormat, Dst = T>,
@@ -46,7 +46,7 @@ impl Block {
         read_fields(&self.0)
     }
 
-    /// Whether it holds no field at all.
+    /// Whether the block holds no field at all.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -55,7 +55,7 @@ impl Block {
 /// Structure whose fields `bytes` begin with; shorter bytes are read as if zeros followed.
 ///
 /// # Errors
-/// [`DecodeError::Part`] for a value that does not exist.
+/// [`DecodeError::Part`] for a value that does not exist, as an unknown enum tag.
 pub(crate) fn read_fields<T>(bytes: &[u8]) -> Result<T, DecodeError>
 where
     T: for<'a> SchemaRead<'a, PartFormat, Dst = T>,

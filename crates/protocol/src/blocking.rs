@@ -6,9 +6,9 @@ use crate::{ConnectionError, Frame, FrameBuffer, Limits};
 
 /// A stream that frames are read from and written to.
 ///
-/// Knows nothing of the format: what comes goes into a [`FrameBuffer`], what goes is bytes. The
-/// stream's own timeouts (`TcpStream::set_read_timeout` and `set_write_timeout`) come out as errors
-/// of their own.
+/// Knows nothing of the format: bytes that come go into a [`FrameBuffer`], and bytes go out as they are
+/// given. The stream's own timeouts (`TcpStream::set_read_timeout` and `set_write_timeout`) end as
+/// [`ConnectionError::ReadTimedOut`] and [`ConnectionError::WriteTimedOut`].
 #[derive(Debug)]
 pub struct Connection<S> {
     stream: S,
@@ -16,17 +16,17 @@ pub struct Connection<S> {
 }
 
 impl<S> Connection<S> {
-    /// Wraps a stream; `limits` hold for what is read.
+    /// Connection over `stream`, which is open already; `limits` hold for the frames that are read.
     pub fn new(stream: S, limits: Limits) -> Self {
         Self { stream, buffer: FrameBuffer::new(limits) }
     }
 
-    /// The stream below, to set timeouts or shut it down.
+    /// The underlying stream, to set timeouts or to shut it down.
     pub fn stream(&self) -> &S {
         &self.stream
     }
 
-    /// The stream below, to look whether something has come.
+    /// The underlying stream for changes: to look whether bytes have come.
     pub fn stream_mut(&mut self) -> &mut S {
         &mut self.stream
     }
@@ -41,7 +41,7 @@ impl<S: Read> Connection<S> {
     /// Next frame, waiting for it; `None` when the peer has closed between two frames.
     ///
     /// # Errors
-    /// [`ConnectionError::Frame`] for bad or cut bytes: give the stream up.
+    /// [`ConnectionError::Frame`] for damaged, foreign or cut bytes: the stream is to be given up.
     /// [`ConnectionError::ReadTimedOut`]: call again, nothing is lost.
     pub fn read_frame(&mut self) -> Result<Option<Frame>, ConnectionError> {
         loop {
@@ -99,7 +99,7 @@ fn is_dead(error: &std::io::Error) -> bool {
     cfg!(unix) && error.kind() == ErrorKind::TimedOut && error.raw_os_error().is_some()
 }
 
-/// Whether a failed write is to be tried again at once.
+/// `Ok` if a failed write is to be tried again at once, else the error with the `written` bytes.
 fn keep_writing(error: std::io::Error, written: usize) -> Result<(), ConnectionError> {
     match error.kind() {
         ErrorKind::Interrupted => Ok(()),

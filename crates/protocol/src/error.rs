@@ -8,10 +8,10 @@ use crate::{HEADER_LEN, Kind, MethodNameError, VERSION};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// The peer speaks something else.
+    /// The first bytes are not this protocol's magic: the peer speaks another protocol.
     #[error("a frame starts with {found:02x?}, not with \"SGRP\"")]
     Magic {
-        /// The first bytes of the frame, as many as were needed to see it.
+        /// The first bytes of the frame, up to the one that differs from the magic.
         found: Vec<u8>,
     },
     /// The peer speaks another version of this protocol.
@@ -19,37 +19,37 @@ pub enum FrameError {
         "the peer speaks protocol version {found}, this side speaks {VERSION}; bring the older one up to date"
     )]
     Version {
-        /// The peer's version.
+        /// Version in the peer's header.
         found: u16,
     },
     /// The first 24 bytes of the header were damaged.
     #[error("header checksum is {stated:#010x} but its bytes give {computed:#010x}")]
     HeaderChecksum {
-        /// CRC-32C in the header.
+        /// CRC-32C stated in the header.
         stated: u32,
-        /// CRC-32C of the bytes that came.
+        /// CRC-32C computed of the bytes that came.
         computed: u32,
     },
     /// A flag is set that this version does not define.
     #[error("reserved header flags are set: {flags:#010x}")]
     ReservedFlags {
-        /// The whole flags word.
+        /// The flags word of the header.
         flags: u32,
     },
     /// The announced payload is over the limit; known before any of it has arrived.
     #[error("a payload of {payload_len} bytes is announced, the limit is {payload_len_max}")]
     PayloadTooLong {
-        /// Announced bytes.
+        /// Payload length that the header announces, bytes.
         payload_len: u32,
-        /// Allowed bytes.
+        /// Payload length that the limits allow, bytes.
         payload_len_max: u32,
     },
     /// Header or payload were damaged.
     #[error("frame checksum is {stated:#010x} but its bytes give {computed:#010x}")]
     Checksum {
-        /// CRC-32C in the header.
+        /// CRC-32C stated in the header.
         stated: u32,
-        /// CRC-32C of the bytes that came.
+        /// CRC-32C computed of the bytes that came.
         computed: u32,
     },
     /// The stream ended inside a frame.
@@ -66,50 +66,50 @@ pub enum FrameError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeError {
-    /// A rigid body of a shape that this version does not know.
+    /// The number of a rigid body's shape is not one that this version knows.
     #[error("a rigid body has the shape number {kind}; there are 0 to 4")]
     UnknownShape {
-        /// Its number.
+        /// Number of the shape in the payload.
         kind: u32,
     },
-    /// An answer announces fields that nobody can have asked for here.
+    /// An answer announces fields (of strain, stress, …) that do not exist for this kind of answer.
     #[error("an answer announces the fields {bits:#x}, of which some are not known")]
     UnknownFields {
-        /// One bit for each.
+        /// The fields in question, one bit for each; see [`Field::bit`](crate::Field::bit).
         bits: u32,
     },
-    /// No message has this number.
+    /// The kind in the header is the number of no message.
     #[error("unknown message kind {kind:#06x}")]
     UnknownKind {
-        /// Number in the header.
+        /// Number of the kind in the header.
         kind: u16,
     },
     /// A client's message where a server's is expected, or the other way round.
     #[error("{kind} travels in the other direction")]
     WrongDirection {
-        /// What came.
+        /// Kind of the message that came.
         kind: Kind,
     },
     /// The part holds a value that does not exist (enum tag, boolean, text that is not UTF-8).
     #[error("the small part of the payload cannot be read: {source}")]
     Part {
-        /// The decoder's own words.
+        /// Error of the bincode decoder.
         source: wincode::ReadError,
     },
     /// The part is over [`PART_LEN_MAX`](crate::PART_LEN_MAX).
     #[error("the small part of the payload has {len} bytes, the limit is {}", crate::PART_LEN_MAX)]
     PartTooLong {
-        /// Its bytes.
+        /// Announced length of the part, bytes.
         len: u64,
     },
     /// A text is longer than allowed.
     #[error("{what} has {len} bytes, the limit is {len_max}")]
     TextTooLong {
-        /// Which text.
+        /// Name of the text's field.
         what: &'static str,
-        /// Its bytes.
+        /// Length of the text, bytes.
         len: usize,
-        /// Allowed bytes.
+        /// Length that the limits allow, bytes.
         len_max: u32,
     },
     /// A method's name holds other characters than it may.
@@ -118,41 +118,41 @@ pub enum DecodeError {
     /// An array announces more entries than allowed.
     #[error("{count} {what} are announced, the limit is {count_max}")]
     TooMany {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// Announced entries.
+        /// Entries that the part announces.
         count: u32,
-        /// Allowed entries.
+        /// Entries that the limits allow.
         count_max: u32,
     },
     /// An array announces more entries than there are bytes.
     #[error("{what} need {needed} bytes, {there} are there")]
     ArrayCut {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// Bytes announced.
+        /// Length of the announced entries, bytes.
         needed: u64,
         /// Bytes left in the payload.
         there: usize,
     },
-    /// Masks announce other lengths than there are nodes in all of them.
+    /// The lengths of the masks do not add up to the announced number of nodes of all masks.
     #[error("the masks are {lens_sum} nodes long in all, {entry_count} are announced")]
     MaskLengths {
-        /// Sum of their lengths.
+        /// Sum of the lengths of the masks, in nodes.
         lens_sum: u64,
-        /// Announced nodes of all masks.
+        /// Announced number of nodes of all masks together.
         entry_count: u32,
     },
-    /// The bytes that fill up to the next multiple of eight are not zero.
+    /// Padding bytes, which fill an array up to the next multiple of eight, are not zero.
     #[error("padding before byte {position} of the payload is not zero")]
     Padding {
-        /// Offset of the end of the padding.
+        /// Offset of the end of the padding in the payload, bytes.
         position: usize,
     },
     /// Bytes are left after the last array.
     #[error("{count} bytes are left over at the end of the payload")]
     LeftOver {
-        /// How many.
+        /// Number of bytes behind the last array.
         count: usize,
     },
 }
@@ -164,39 +164,39 @@ pub enum EncodeError {
     /// A text or list in the bincode part is over [`PART_LEN_MAX`](crate::PART_LEN_MAX) by itself.
     #[error("the small part cannot be written: {source}")]
     Part {
-        /// The encoder's own words.
+        /// Error of the bincode encoder.
         source: wincode::WriteError,
     },
     /// The bincode part (texts, mostly) is too long.
     #[error("the small part has {len} bytes, the limit is {}", crate::PART_LEN_MAX)]
     PartTooLong {
-        /// Its bytes.
+        /// Length of the part, bytes.
         len: usize,
     },
     /// More payload than the limits of this message allow, or than 32 bits count.
     #[error("the payload has {len} bytes, the limit is {len_max}")]
     PayloadTooLong {
-        /// Its bytes.
+        /// Length of the payload, bytes.
         len: usize,
-        /// Allowed bytes.
+        /// Length that the limits allow, bytes.
         len_max: u32,
     },
     /// More entries than 32 bits count.
     #[error("{count} {what} are more than 32 bits count")]
     TooMany {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// Entries given.
+        /// Number of entries of the array.
         count: usize,
     },
     /// Two lists that belong together differ in length.
     #[error("{count} {what} where {expected} are needed")]
     CountMismatch {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// Entries given.
+        /// Number of entries of the array.
         count: usize,
-        /// Entries needed.
+        /// Number of entries that the other list requires.
         expected: usize,
     },
 }
@@ -205,28 +205,28 @@ pub enum EncodeError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConnectionError {
-    /// What came is not this protocol, or was damaged or cut.
+    /// The bytes that came are not this protocol, or were damaged or cut.
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// The stream's read timeout passed; what has come is kept, reading may go on.
     #[error("no bytes within the read timeout, {received} bytes into a frame")]
     ReadTimedOut {
-        /// Bytes of the unfinished frame so far.
+        /// Bytes of the unfinished frame that have come so far.
         received: usize,
     },
     /// The stream's write timeout passed; go on with `bytes[written..]` or give the stream up.
     #[error("the peer took no bytes within the write timeout, after {written} bytes")]
     WriteTimedOut {
-        /// Bytes the stream has taken.
+        /// Number of bytes that the stream has taken.
         written: usize,
     },
     /// The peer closed while bytes were still to be written.
     #[error("the peer closed the stream after {written} bytes")]
     Closed {
-        /// Bytes the stream has taken.
+        /// Number of bytes that the stream has taken.
         written: usize,
     },
-    /// Anything else the operating system says.
+    /// Any other error of the operating system.
     #[error("the stream failed: {0}")]
     Io(#[from] io::Error),
 }

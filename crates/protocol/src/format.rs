@@ -2,12 +2,12 @@
 
 use wincode::{SchemaRead, SchemaWrite};
 
-/// Versions of the wire that one side reads and writes.
+/// Range of versions of the wire that one side reads and writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, SchemaRead, SchemaWrite)]
 pub struct VersionRange {
-    /// The oldest.
+    /// Oldest version of the range.
     pub lowest: u16,
-    /// The newest.
+    /// Newest version of the range.
     pub highest: u16,
 }
 
@@ -15,16 +15,16 @@ pub struct VersionRange {
 pub const MAGIC: [u8; 4] = *b"SGRP";
 /// Version of the format this crate reads and writes.
 pub const VERSION: u16 = 4;
-/// Lowest and highest version that this crate reads and writes; of those that both sides know they
-/// take the highest.
+/// Versions of the wire that this crate reads and writes. Two sides use the highest version that both
+/// know.
 pub const VERSIONS: VersionRange = VersionRange { lowest: VERSION, highest: VERSION };
 /// Bytes of a header.
 pub const HEADER_LEN: usize = 32;
-/// Most bytes the part of a payload may take; part of the format.
+/// Most bytes that the part of a payload may take; fixed by the format.
 pub const PART_LEN_MAX: usize = 64 * 1024;
 
 impl VersionRange {
-    /// The highest version that both sides speak.
+    /// The highest version that both ranges contain, if there is one.
     pub fn common(self, other: Self) -> Option<u16> {
         let highest = self.highest.min(other.highest);
         (highest >= self.lowest.max(other.lowest)).then_some(highest)

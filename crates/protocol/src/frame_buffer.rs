@@ -8,7 +8,7 @@ use crate::{FrameError, HEADER_LEN, Header, Kind, Limits};
 /// One whole, undamaged frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// What the header said.
+    /// Decoded header of the frame.
     pub header: Header,
     /// The bytes after the header; shared, so passing a frame on copies nothing.
     pub payload: Bytes,
@@ -38,7 +38,7 @@ impl Frame {
 #[derive(Debug)]
 pub struct FrameBuffer {
     limits: Limits,
-    /// Initialised bytes; the first `received` came from the peer, the rest is room.
+    /// Initialised bytes; the first `received` came from the peer, the rest is free.
     storage: BytesMut,
     received: usize,
     /// Header of the frame at the front and the checksum over its first `summed` bytes.
@@ -57,7 +57,7 @@ struct Front {
 }
 
 impl FrameBuffer {
-    /// Empty buffer; takes memory when bytes come.
+    /// Empty buffer, which takes memory only when bytes come.
     pub fn new(limits: Limits) -> Self {
         Self {
             limits,
@@ -69,7 +69,7 @@ impl FrameBuffer {
         }
     }
 
-    /// Other limits from the next header on.
+    /// Sets the limits, which hold from the next header on.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits;
     }
@@ -123,13 +123,13 @@ impl FrameBuffer {
         self.received += count - dropped;
     }
 
-    /// Header of the frame at the front, once it is there and only a part of the frame.
+    /// Header of the frame at the front, if the header is complete and the frame is not.
     pub fn header(&self) -> Option<Header> {
         self.front.map(|front| front.header)
     }
 
-    /// Gives up the frame whose header is at the front: its memory goes at once, and what is still to
-    /// come of it is passed over unseen. The next frame is whole again.
+    /// Gives up the frame whose header is at the front: its memory is freed at once, and its bytes that
+    /// are still to come are dropped. The frame after it is read as usual.
     pub fn pass_over(&mut self) {
         let Some(front) = self.front.take() else { return };
         let frame_len = front.header.frame_len();
@@ -159,10 +159,10 @@ impl FrameBuffer {
         result
     }
 
-    /// What the end of the stream means, once [`next_frame`](Self::next_frame) has said `Ok(None)`.
+    /// Judges the end of the stream, once [`next_frame`](Self::next_frame) has said `Ok(None)`.
     ///
     /// # Errors
-    /// [`FrameError::Truncated`] inside a frame, or the error that was found before.
+    /// [`FrameError::Truncated`] if the stream ends inside a frame, or the error that was found before.
     pub fn finish(&self) -> Result<(), FrameError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
@@ -174,17 +174,17 @@ impl FrameBuffer {
         Err(FrameError::Truncated { received: self.received, frame_len })
     }
 
-    /// Bytes that have come of frames not taken yet.
+    /// Number of bytes that have come of frames not taken yet.
     pub fn received(&self) -> usize {
         self.received
     }
 
-    /// Whether the stream stands between two frames.
+    /// Whether the stream stands between two frames: no byte of an unfinished frame has come.
     pub fn is_at_border(&self) -> bool {
         self.received == 0 && self.passed_over == 0
     }
 
-    /// Bytes of memory held.
+    /// Bytes of memory that the buffer holds.
     pub fn capacity(&self) -> usize {
         self.storage.capacity()
     }
@@ -226,11 +226,11 @@ impl FrameBuffer {
     }
 }
 
-/// Chosen: below this a read call costs more than growing.
+/// Chosen: least free bytes for one read; with fewer a read call costs more than growing the buffer.
 const SPARE_LEN_MIN: usize = 4 * 1024;
-/// Chosen: the usual size of a socket's buffer.
+/// Chosen: least step, in bytes, by which the buffer grows; the usual size of a socket's buffer.
 const STEP_LEN_MIN: usize = 64 * 1024;
-/// Chosen: room that an idle connection may keep.
+/// Chosen: bytes of memory that the buffer of an idle connection may keep.
 const KEPT_LEN_MAX: usize = 256 * 1024;
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 use crate::format::{HEADER_LEN, MAGIC, VERSION};
 use crate::{FrameError, Limits};
 
-/// What the header of a frame says; the kind stays a number, since an unknown kind in a sound
-/// frame is a bad request and not a bad stream.
+/// Decoded header of a frame. The kind stays a number, since an unknown kind in a sound frame is a bad
+/// request and not a bad stream.
 ///
 /// Layout, little-endian: `0` magic, `4` version u16, `6` kind u16, `8` flags u32 (all reserved,
 /// zero), `12` payload length u32, `16` request id u64, `24` CRC-32C of bytes 0..24, `28` CRC-32C
@@ -12,18 +12,19 @@ use crate::{FrameError, Limits};
 /// the second one alone the reader would wait for bytes that never come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Number of the message, see [`Kind`](crate::Kind).
+    /// Number of the kind of message, see [`Kind`](crate::Kind).
     pub kind: u16,
-    /// Chosen by the client, repeated in the reply; 0 where the server speaks first.
+    /// Request id: chosen by the client, repeated in the reply; 0 where the server speaks without a
+    /// request.
     pub request_id: u64,
-    /// Bytes that follow the header.
+    /// Length of the payload behind the header, bytes.
     pub payload_len: u32,
     /// CRC-32C of bytes 0..28 and the payload.
     pub frame_crc: u32,
 }
 
 impl Header {
-    /// Header bytes of a payload.
+    /// The 32 bytes of the header that precede `payload`.
     ///
     /// Shapes: `payload_len` is the length of `payload`, which the caller has checked to fit.
     pub(crate) fn encode(
@@ -35,7 +36,7 @@ impl Header {
         Self::encode_as(VERSION, kind, request_id, payload_len, payload)
     }
 
-    /// Header bytes of a payload in another version, whose header is the same.
+    /// Header bytes in another version of the format, whose header has the same layout.
     pub(crate) fn encode_as(
         version: u16,
         kind: u16,
@@ -56,11 +57,11 @@ impl Header {
         raw
     }
 
-    /// Header from its bytes, and the CRC-32C of bytes 0..28 to go on with over the payload.
+    /// Decodes a header; also the CRC-32C of bytes 0..28, to be continued over the payload.
     ///
     /// # Errors
-    /// [`FrameError`] for another magic or version, damage, reserved flags or a payload over the
-    /// limit, in this order: another version may lay out the rest differently.
+    /// [`FrameError`] for another magic or version, a wrong checksum, reserved flags or a payload over
+    /// the limit, in this order: another version may lay out the rest differently.
     pub(crate) fn decode(
         raw: &[u8; HEADER_LEN],
         limits: &Limits,
@@ -93,13 +94,13 @@ impl Header {
         Ok((header, crc32c::crc32c(&raw[..28])))
     }
 
-    /// Bytes of the whole frame.
+    /// Length of the whole frame, header included, bytes.
     pub fn frame_len(&self) -> usize {
         HEADER_LEN + self.payload_len as usize
     }
 }
 
-/// Whether the first bytes of a frame, however few have come, can still become the magic.
+/// `Ok` if the first bytes of a frame, however few have come, agree with the magic.
 ///
 /// # Errors
 /// [`FrameError::Magic`] at the first byte that differs.

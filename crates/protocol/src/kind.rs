@@ -2,43 +2,44 @@
 
 use std::fmt;
 
-/// What a frame carries; the high bit says who sends it (0 client, 1 server).
+/// Kind of message that a frame carries; the high bit of its number says who sends it (0 client, 1
+/// server).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u16)]
 pub enum Kind {
-    /// Client introduces itself.
+    /// The client introduces itself.
     Hello = 0x0001,
     /// A question about a mesh that comes along, or about a kept model.
     Ask = 0x0002,
-    /// Is this model known?
+    /// Question whether the server keeps a model of this name.
     HaveModel = 0x0003,
-    /// Mesh, material and fixed degrees of freedom to keep.
+    /// Mesh, material and fixed degrees of freedom that the server shall keep as a model.
     UploadModel = 0x0004,
-    /// A request is not wanted any more; never answered itself.
+    /// Cancels an earlier request, which the client does not want any more; never answered itself.
     Cancel = 0x0005,
-    /// Hint which nodes will be asked about soon; never answered.
+    /// Hint which nodes and masks will be asked about soon; never answered.
     Prefetch = 0x0006,
-    /// The model is not needed any more; never answered.
+    /// The client does not need a kept model any more; never answered.
     Drop = 0x0007,
-    /// Are you there?
+    /// Question whether the server still answers.
     Ping = 0x0008,
     /// One step of a free object among rigid bodies, with contact and friction.
     ContactFrame = 0x0009,
-    /// Server introduces itself.
+    /// The server introduces itself.
     Welcome = 0x8001,
-    /// Displacements and what they cost.
+    /// Displacements, forces and the report of the solve.
     Answer = 0x8002,
-    /// Whether a model is known.
+    /// Answer to `HaveModel`: whether the server keeps the model.
     ModelState = 0x8003,
-    /// An uploaded model can be used.
+    /// Answer to `UploadModel`: the uploaded model can be used.
     ModelReady = 0x8004,
-    /// The request was understood but not granted, or not understood.
+    /// Refusal: the request was understood but not granted, or not understood.
     Rejected = 0x8005,
-    /// The server works, or rests, and is there.
+    /// Sign that the server is there, whether it works or is idle.
     Alive = 0x8006,
-    /// I am here.
+    /// Answer to `Ping`.
     Pong = 0x8008,
-    /// State, contacts and displacements at the end of a step.
+    /// Answer to `ContactFrame`: state, contacts and displacements at the end of the step.
     ContactAnswer = 0x8009,
 }
 
@@ -64,17 +65,17 @@ impl Kind {
         Self::ContactAnswer,
     ];
 
-    /// Number in the header.
+    /// Number of the kind in the header.
     pub const fn number(self) -> u16 {
         self as u16
     }
 
-    /// Kind with this number, if there is one.
+    /// Kind with this number, if one exists.
     pub fn from_number(number: u16) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.number() == number)
     }
 
-    /// Whether the server sends it.
+    /// Whether the server sends this kind of message.
     pub const fn is_reply(self) -> bool {
         self.number() & 0x8000 != 0
     }

@@ -4,23 +4,23 @@ use wincode::{SchemaRead, SchemaWrite};
 
 use crate::DecodeError;
 
-/// Limits one side puts on what it reads; the server tells its own in `Welcome`.
+/// Limits that one side puts on what it reads; the server sends its own in `Welcome`.
 ///
 /// Units: bytes for `…_len_max`, entries for `…_count_max`. Announced counts are compared with
 /// these and with the bytes that are really there before memory is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, SchemaRead, SchemaWrite)]
 pub struct Limits {
-    /// Bytes of one payload.
+    /// Length of one payload, bytes.
     pub payload_len_max: u32,
-    /// Vertices of a mesh, nodes asked for, nodes answered.
+    /// Number of vertices of a mesh, of nodes asked for, and of nodes answered.
     pub node_count_max: u32,
-    /// Tetrahedra of a mesh.
+    /// Number of tetrahedra of a mesh.
     pub tet_count_max: u32,
-    /// Entries of one list of degrees of freedom (known, forces, fixed, reactions).
+    /// Number of entries of one list of degrees of freedom (known, forces, fixed, reactions).
     pub dof_count_max: u32,
-    /// Entries of the material table.
+    /// Number of entries of the material table.
     pub material_count_max: u32,
-    /// Bytes of one text.
+    /// Length of one text, bytes.
     pub text_len_max: u32,
 }
 
@@ -39,10 +39,10 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// A text within `text_len_max`.
+    /// Checks that a text is not longer than `text_len_max`.
     ///
     /// # Errors
-    /// [`DecodeError::TextTooLong`] naming the text.
+    /// [`DecodeError::TextTooLong`] with the name of the text.
     pub(crate) fn check_text(&self, what: &'static str, text: &str) -> Result<(), DecodeError> {
         let (len, len_max) = (text.len(), self.text_len_max);
         if len > len_max as usize {
@@ -55,7 +55,7 @@ impl Limits {
 /// `count` as an array length, if it is within `count_max`.
 ///
 /// # Errors
-/// [`DecodeError::TooMany`] naming the array.
+/// [`DecodeError::TooMany`] with the name of the array.
 pub(crate) fn check_count(
     what: &'static str,
     count: u32,

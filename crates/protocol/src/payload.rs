@@ -6,12 +6,12 @@ use wincode::{SchemaRead, SchemaWrite};
 use crate::block::{PartFormat, read_fields};
 use crate::{DecodeError, DofValue, EncodeError, HEADER_LEN, Header, Kind, Limits, PART_LEN_MAX};
 
-/// Bytes of the length before a part.
+/// Length of the number that states the part's length, bytes.
 const LENGTH_LEN: usize = 8;
 
-/// An array element: scalars of one width, one behind the other.
+/// Element of an array: scalars of one width, one behind the other.
 pub(crate) trait Flat: bytemuck::Pod {
-    /// Bytes of one scalar.
+    /// Length of one scalar, bytes.
     const SCALAR_LEN: usize;
 }
 
@@ -39,10 +39,10 @@ impl Flat for [f64; 3] {
     const SCALAR_LEN: usize = 8;
 }
 
-/// Appends the frame of one message to `out`.
+/// Appends the frame of one message to `out`; `fill` writes the payload.
 ///
 /// # Errors
-/// [`EncodeError`] if it is too large; `out` is then as before.
+/// [`EncodeError`] if the frame is too large; `out` is then unchanged.
 pub(crate) fn encode_frame(
     kind: Kind,
     request_id: u64,
@@ -88,7 +88,7 @@ pub(crate) struct PayloadWriter<'a> {
 }
 
 impl PayloadWriter<'_> {
-    /// The part behind its length, as a block; comes first.
+    /// Writes the part as a block, its length first; to be called before any array.
     ///
     /// # Errors
     /// [`EncodeError::Part`] or [`EncodeError::PartTooLong`].
@@ -111,7 +111,7 @@ impl PayloadWriter<'_> {
         Ok(())
     }
 
-    /// One raw array.
+    /// Writes one raw array.
     pub(crate) fn array<T: Flat>(&mut self, values: &[T]) {
         let before = self.out.len();
         self.out.extend_from_slice(bytemuck::cast_slice(values));
@@ -121,7 +121,7 @@ impl PayloadWriter<'_> {
         self.pad();
     }
 
-    /// Two raw arrays: numbers of the degrees of freedom, then their values.
+    /// Writes two raw arrays: numbers of the degrees of freedom, then their values.
     pub(crate) fn dof_values(&mut self, entries: &[DofValue]) {
         self.out.reserve(12 * entries.len() + 8);
         for entry in entries {
@@ -139,10 +139,10 @@ impl PayloadWriter<'_> {
     }
 }
 
-/// `len` entries as the number that announces them.
+/// `len` as the number of entries that announces an array.
 ///
 /// # Errors
-/// [`EncodeError::TooMany`] beyond 32 bits.
+/// [`EncodeError::TooMany`] if 32 bits do not suffice.
 pub(crate) fn count_of(what: &'static str, len: usize) -> Result<u32, EncodeError> {
     u32::try_from(len).map_err(|_| EncodeError::TooMany { what, count: len })
 }
@@ -160,7 +160,7 @@ impl<'a> PayloadReader<'a> {
         Self { payload, position: 0 }
     }
 
-    /// The part; comes first. Fields behind those that are known are skipped, missing ones are zero.
+    /// Reads the part, to be called first. Unknown fields at its end are skipped, missing ones are zero.
     ///
     /// # Errors
     /// [`DecodeError::ArrayCut`] if bytes are missing, [`DecodeError::PartTooLong`], and
@@ -179,10 +179,10 @@ impl<'a> PayloadReader<'a> {
         Ok(part)
     }
 
-    /// One raw array of `count` entries; memory is taken only once the bytes are seen to be there.
+    /// Reads one raw array of `count` entries; memory is taken only if its bytes are there.
     ///
     /// # Errors
-    /// [`DecodeError::ArrayCut`] naming the array.
+    /// [`DecodeError::ArrayCut`] with the name of the array.
     pub(crate) fn array<T: Flat>(
         &mut self,
         what: &'static str,
@@ -199,10 +199,10 @@ impl<'a> PayloadReader<'a> {
         Ok(values)
     }
 
-    /// Two raw arrays of `count` entries: numbers of the degrees of freedom, then their values.
+    /// Reads two raw arrays of `count` entries: numbers of the degrees of freedom, then their values.
     ///
     /// # Errors
-    /// [`DecodeError::ArrayCut`] naming the list.
+    /// [`DecodeError::ArrayCut`] with the name of the list.
     pub(crate) fn dof_values(
         &mut self,
         what: &'static str,
@@ -220,10 +220,10 @@ impl<'a> PayloadReader<'a> {
         Ok(dofs.iter().zip(values).map(entry).collect())
     }
 
-    /// Says that the payload must be used up.
+    /// Checks that the payload has been read to its end.
     ///
     /// # Errors
-    /// [`DecodeError::LeftOver`].
+    /// [`DecodeError::LeftOver`] if bytes are left.
     pub(crate) fn finish(self) -> Result<(), DecodeError> {
         match self.payload.len() - self.position {
             0 => Ok(()),
@@ -245,7 +245,7 @@ impl<'a> PayloadReader<'a> {
         Ok(bytes)
     }
 
-    /// Goes on to the next multiple of eight; the last border may be the payload's end.
+    /// Skips zero bytes up to the next multiple of eight; the last multiple may be the payload's end.
     fn skip_padding(&mut self) -> Result<(), DecodeError> {
         let position = self.position.next_multiple_of(8);
         match self.payload.get(self.position..position) {
@@ -258,7 +258,7 @@ impl<'a> PayloadReader<'a> {
     }
 }
 
-/// Turns each scalar's bytes round, which is all that big-endian hosts need.
+/// Reverses the bytes of each scalar, for big-endian hosts.
 fn reverse_scalars(bytes: &mut [u8], scalar_len: usize) {
     for scalar in bytes.chunks_exact_mut(scalar_len) {
         scalar.reverse();

@@ -1,42 +1,42 @@
-//! What a page sends: bytes of a stranger, which are checked before anything is done with them.
+//! Messages that a page sends: untrusted bytes, which are checked before anything is done with them.
 
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
 use serde::Deserialize;
 use softgrasp_grasp::hand::Handedness;
 use softgrasp_hand::joints::{JointSample, JointsRecord, RANGE_M, WEBXR_JOINT_COUNT, WRIST};
 
-/// Longest message, bytes.
+/// Length of the longest message, bytes.
 pub const MESSAGE_MAX: usize = 2048;
-/// Bytes of an acknowledgement.
+/// Length of an acknowledgement, bytes.
 pub const ACK_BYTES: usize = 24;
-/// Bytes of a hand.
+/// Length of a tracked hand, bytes.
 pub const JOINTS_BYTES: usize = 16 + 28 * WEBXR_JOINT_COUNT;
 /// First byte of an acknowledgement.
 pub const ACK: u8 = 0x81;
-/// First byte of a hand.
+/// First byte of a tracked hand.
 pub const JOINTS: u8 = 0x82;
 
-/// A binary message.
+/// Binary message of a page.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FromPage {
-    /// A picture has been drawn.
+    /// Acknowledges a picture that has been drawn.
     Ack(Ack),
-    /// A tracked hand.
+    /// Joints of a tracked hand.
     Joints(Box<JointsRecord>),
 }
 
-/// A picture has been drawn.
+/// Acknowledgement of a picture that has been drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ack {
-    /// Number of the picture.
+    /// Number of the picture that was drawn.
     pub number: u32,
-    /// When, by the page's clock, ms; it is echoed with the next picture.
+    /// Time of drawing by the page's clock, ms; repeated in the next picture's message.
     pub stamp_ms: f64,
-    /// From the tracked hand to the picture that shows it, ms, where that was the first to do so.
+    /// Time from the tracked hand to the first picture that shows it, ms; `None` for other pictures.
     pub hand_to_picture_ms: Option<f32>,
 }
 
-/// What a page asks of the run: its menu.
+/// Wish that a person chose in the page's menu.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Ask {
@@ -50,56 +50,56 @@ pub enum Ask {
     ReturnHome,
     /// Take another object: a built-in one, or a file of the run's folder.
     Read {
-        /// Its name.
+        /// Name of a built-in object, or of a file.
         name: String,
     },
     /// Write the object into the run's folder.
     Save {
-        /// A name without a folder, whose end is the format.
+        /// File name without a folder; its extension gives the format.
         name: String,
     },
     /// Show a quantity in colours.
     Shade {
-        /// As on the command line.
+        /// Name of the quantity, as on the command line.
         what: String,
     },
     /// Play a script from its beginning.
     Restart,
-    /// Stand still, or go on.
+    /// Pause the run, or go on.
     Pause {
-        /// Which.
+        /// Whether the run is to pause.
         stands: bool,
     },
     /// End the run.
     Exit,
 }
 
-/// Why bytes are no message.
+/// Why bytes from a page are no message.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FromPageError {
-    /// No such message.
+    /// The first byte is the kind of no message.
     #[error("no message begins with {0}")]
     Kind(u8),
-    /// Too short or too long.
+    /// The message is too short or too long.
     #[error("a message of this kind has {expected} bytes, not {got}")]
     Length {
-        /// What it would have.
+        /// Length that this kind of message has, bytes.
         expected: usize,
-        /// What came.
+        /// Length of the message that came, bytes.
         got: usize,
     },
-    /// Not a hand.
+    /// The counts in the message are not those of a tracked hand.
     #[error("a hand is 0 (left) or 1 (right) with 25 joints, not {0} with {1}")]
     Hand(u8, u16),
-    /// A number that cannot be.
+    /// A joint has an impossible number.
     #[error("joint {joint}: {what}")]
     Joint {
-        /// Which.
+        /// Number of the joint.
         joint: usize,
-        /// What is wrong.
+        /// Fault of the joint.
         what: &'static str,
     },
-    /// Not one of the things that can be asked for.
+    /// The text is none of the wishes.
     #[error("nothing that can be asked for: {0}")]
     Ask(String),
 }
@@ -108,7 +108,7 @@ impl FromPage {
     /// Reads a binary message.
     ///
     /// # Errors
-    /// [`FromPageError`]; nothing of the message counts then.
+    /// [`FromPageError`]; nothing of the message is then used.
     pub fn read(bytes: &[u8]) -> Result<Self, FromPageError> {
         match bytes.first().copied().unwrap_or(0) {
             ACK => Ok(Self::Ack(read_ack(of_length(bytes, ACK_BYTES)?))),
@@ -122,7 +122,7 @@ impl Ask {
     /// Reads a text message.
     ///
     /// # Errors
-    /// [`FromPageError::Ask`] with what is wrong.
+    /// [`FromPageError::Ask`] with the fault.
     pub fn read(text: &str) -> Result<Self, FromPageError> {
         serde_json::from_str(text).map_err(|error| FromPageError::Ask(error.to_string()))
     }
@@ -133,7 +133,7 @@ fn of_length(bytes: &[u8], expected: usize) -> Result<&[u8], FromPageError> {
     (got == expected).then_some(bytes).ok_or(FromPageError::Length { expected, got })
 }
 
-/// Bytes at a place; zeros beyond the end, which no message of the right length has.
+/// `N` bytes from position `at`; zeros beyond the end, which no message of the right length has.
 fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     let piece = bytes.get(at..at + N).and_then(|piece| piece.try_into().ok());
     piece.unwrap_or([0; N])
@@ -174,7 +174,7 @@ fn read_joints(bytes: &[u8]) -> Result<JointsRecord, FromPageError> {
     Ok(record)
 }
 
-/// A joint; `None` where it is not tracked, which a NaN says.
+/// Pose of a joint; `None` where it is not tracked, which the page says by NaN.
 fn read_joint(joint: usize, numbers: [f64; 7]) -> Result<Option<JointSample>, FromPageError> {
     if numbers.iter().any(|number| number.is_nan()) {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! Tests of what a page sends: hands, acknowledgements, wishes, and what is none of them.
+//! Tests of messages that a page sends: hands, acknowledgements, wishes, and bytes that are none of them.
 
 use proptest::prelude::*;
 

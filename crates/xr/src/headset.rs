@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use softgrasp_grasp::hand::Handedness;
 use softgrasp_hand::joints::{JointsFeed, JointsRecord};
 
-/// One hand is followed: that of the page which sent first, until it falls silent.
+/// Tracked hand of a headset: that of the page which sent first, until this page falls silent.
 #[derive(Default)]
 pub struct Headset {
     feed: JointsFeed,
@@ -16,40 +16,40 @@ pub struct Headset {
 #[derive(Default)]
 struct State {
     driver: Option<Driver>,
-    /// The hand of the whole run: it was measured.
+    /// Side (left or right) of the hand whose size the run has measured.
     side: Option<Handedness>,
     latencies: Latencies,
 }
 
-/// The page whose hand is followed.
+/// Page whose hand is followed.
 struct Driver {
     viewer: u64,
     heard: Instant,
 }
 
-/// From the tracked hand to the picture that shows it, over a run.
+/// Times from the tracked hand to the picture that shows it, over a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandToPicture {
-    /// Pictures that were the first to show a newer hand.
+    /// Number of pictures that were the first to show a newer hand.
     pub pictures: u64,
-    /// Half of them took no longer, ms.
+    /// Median of the times, ms.
     pub p50_ms: u32,
-    /// 99 of 100 took no longer, ms.
+    /// Time that 99 of 100 pictures did not exceed, ms.
     pub p99_ms: u32,
 }
 
-/// A page that sends no hand for so long gives way to another.
+/// Time of silence after which another page's hand is followed.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
-/// Latencies are counted by whole milliseconds up to this; longer ones count as this.
+/// Upper end of the counted latencies, ms; longer ones count as this.
 const LATENCY_MAX_MS: usize = 2000;
 
 impl Headset {
-    /// Where the hand goes.
+    /// Feed that carries the hand's joints to the run.
     pub fn feed(&self) -> JointsFeed {
         self.feed.clone()
     }
 
-    /// Takes a hand of a page; whether it is followed.
+    /// Takes a hand from a page; returns whether this page is followed.
     pub fn take(&self, viewer: u64, record: &JointsRecord, now: Instant) -> bool {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let holds = |driver: &Driver| {
@@ -68,7 +68,7 @@ impl Headset {
         true
     }
 
-    /// A page has gone.
+    /// Tells that a page has gone.
     pub fn gone(&self, viewer: u64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.driver.as_ref().is_some_and(|driver| driver.viewer == viewer) {
@@ -77,20 +77,20 @@ impl Headset {
         }
     }
 
-    /// Books how long a hand took to a picture.
+    /// Counts the time that a hand took to a picture, ms.
     pub fn took(&self, ms: f32) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.latencies.add(ms);
     }
 
-    /// How long hands took to pictures; `None` where none was tracked.
+    /// Times from hands to pictures; `None` where no hand was tracked.
     pub fn hand_to_picture(&self) -> Option<HandToPicture> {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.latencies.summary()
     }
 }
 
-/// Counts of latencies by whole milliseconds.
+/// Number of latencies for each whole millisecond.
 struct Latencies(Vec<u64>);
 
 impl Default for Latencies {

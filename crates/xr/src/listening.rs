@@ -1,4 +1,5 @@
-//! Takes connections for the page: so many at once, each in its time, encrypted or not.
+//! Accepts connections for the page: at most so many at a time, each within a time limit, encrypted or
+//! not.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,11 +14,11 @@ use tokio::sync::{Semaphore, watch};
 use tokio::time::timeout;
 use tokio_rustls::TlsAcceptor;
 
-/// Connections that ask for files at once; pages that look are not among them.
+/// Largest number of connections that ask for files at a time; streams of open pages are not among them.
 const CONNECTIONS_MAX: usize = 48;
-/// A request has come within this time, and so has the greeting of TLS.
+/// Longest time for a request, and for the TLS handshake.
 const REQUEST_MAX: Duration = Duration::from_secs(10);
-/// Pause after a failed accept.
+/// Pause after a failed `accept`.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
 /// Serves until the run is over.

@@ -24,39 +24,39 @@ use crate::status::Hello;
 use crate::textures::Textures;
 use crate::token::{NoRandomNumbers, Token};
 
-/// Frames are offered to the painter so often.
+/// Time between two frames that are offered to the painter.
 const FRAMES_EVERY: Duration = Duration::from_millis(8);
-/// Wishes that wait at most.
+/// Largest number of wishes that wait.
 const ASKS_MAX: usize = 16;
-/// Pages are told that the run is over within this time.
+/// Longest time for telling the pages that the run is over.
 const GOODBYE: Duration = Duration::from_millis(300);
 
-/// How a page is opened.
+/// Settings of a page.
 pub struct PageOptions {
-    /// Where it is served.
+    /// Address that the page is served at.
     pub address: SocketAddr,
-    /// What it is encrypted with, if it is: headsets track hands only on encrypted pages, or on those of their own
-    /// machine.
+    /// Acceptor of TLS connections; `None`: no encryption. Browsers give hand tracking only to encrypted
+    /// pages, and to those of their own machine.
     pub encryption: Option<TlsAcceptor>,
     /// Whether the run follows the hand of a headset.
     pub takes_hands: bool,
 }
 
-/// Why there is no page.
+/// Why a page cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum PageError {
-    /// The port cannot be had.
+    /// The port cannot be opened.
     #[error("cannot serve the page at {address}")]
     Listen {
-        /// As asked for.
+        /// Address as it was given.
         address: SocketAddr,
-        /// The system's reason.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// There is no thread for it.
+    /// The page's threads cannot be started.
     #[error("cannot start a thread for the page")]
     Thread(#[source] io::Error),
-    /// No token.
+    /// No random token can be made.
     #[error(transparent)]
     Token(#[from] NoRandomNumbers),
 }
@@ -74,7 +74,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// Serves the page; nothing is to be seen before [`Page::begin`].
+    /// Serves the page; a run is shown only after [`Page::begin`].
     ///
     /// # Errors
     /// [`PageError`], above all for a port that is taken.
@@ -130,20 +130,20 @@ impl Page {
         &self.address
     }
 
-    /// Where the hand of a headset comes from.
+    /// Feed of the joints of a headset's hand.
     pub fn joints(&self) -> JointsFeed {
         self.site.headset.feed()
     }
 
-    /// How long hands took to pictures; `None` where no headset sent any.
+    /// Times from tracked hands to pictures; `None` if no headset sent a hand.
     pub fn hand_to_picture(&self) -> Option<HandToPicture> {
         self.site.headset.hand_to_picture()
     }
 
-    /// Shows a run from now on; the ticks offer what there is to see to what comes back.
+    /// Shows a run from now on; the ticks offer their frames to the returned outlet.
     ///
     /// # Errors
-    /// The system's, when it gives no thread; or where a run has begun already.
+    /// Error of the operating system if it starts no thread, or if a run has begun already.
     pub fn begin(&mut self, run: ShownRun) -> io::Result<Outlet> {
         let Some(asked) = self.asked.take() else {
             return Err(io::Error::other("the page shows a run already"));
@@ -180,7 +180,7 @@ impl Drop for Page {
     }
 }
 
-/// The address that others reach where a page listens on all of this machine's.
+/// Address by which other machines reach a page that listens on all addresses of this one.
 fn reachable(ip: IpAddr) -> IpAddr {
     if !ip.is_unspecified() {
         return ip;

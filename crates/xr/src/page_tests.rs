@@ -1,4 +1,4 @@
-//! Tests of the page over real sockets: who is let in, what a slow page gets, what bad bytes cost.
+//! Tests of the page over real sockets: access, slow pages, damaged bytes.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -20,7 +20,7 @@ fn page() -> Page {
     Page::open(PageOptions { address, encryption: None, takes_hands: true }).unwrap()
 }
 
-/// The answer to a request for a path.
+/// Response to an HTTP request for a path.
 fn answer(page: &Page, path: &str) -> String {
     let host = page.address().split('/').nth(2).unwrap();
     let mut stream = TcpStream::connect(host).unwrap();
@@ -40,7 +40,7 @@ fn opened(page: &Page) -> Socket {
     socket
 }
 
-/// The next binary message of a kind.
+/// Next binary message of a kind.
 fn next(socket: &mut Socket, kind: u8) -> Vec<u8> {
     loop {
         if let Message::Binary(bytes) = socket.read().unwrap()

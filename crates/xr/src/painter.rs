@@ -1,4 +1,4 @@
-//! The thread beside the ticks that makes pictures for the pages of what the ticks offer.
+//! Thread beside the ticks that makes pictures for the pages from the frames that the ticks offer.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -30,51 +30,51 @@ use crate::status::{Sentences, status_text};
 use crate::textures::Textures;
 use crate::wishes::{Granted, Wishes};
 
-/// A run that pages are to see.
+/// Run that pages show, and the channels between both.
 pub struct ShownRun {
-    /// What the object looks like.
+    /// Look of the object: its skin.
     pub look: Look,
-    /// What the object is made of, for the colours.
+    /// Material of the object, from which stresses for the colours are computed.
     pub material: Material,
-    /// What the colours show; `None` shows strain while a script squeezes.
+    /// Quantity that the colours show; `None` shows strain while a script squeezes.
     pub shading: Option<Shading>,
     /// Whether a script moves the hand, so that colours are left to the page.
     pub is_directed: bool,
-    /// Whether a script that is over begins anew after a pause.
+    /// Whether a script begins anew after its end and a pause.
     pub begins_anew: bool,
-    /// Whether a window shows the run too, and asks for what it needs.
+    /// Whether a window shows the run too, and itself asks for the fields it needs.
     pub has_window: bool,
-    /// Where wishes go.
+    /// Channel for wishes to the ticks.
     pub controls: Sender<Control>,
-    /// Sentences for the person.
+    /// Channel of sentences for the person.
     pub notices: Receiver<Notice>,
-    /// Reads other objects; `None` where that is not the page's business.
+    /// Reads other objects; `None` where the page may not.
     pub load: Option<LoadObject>,
 }
 
-/// What the painter shares with the pages.
+/// State that the painter shares with the pages.
 pub struct Easel {
-    /// The newest picture.
+    /// Newest picture.
     pub pictures: watch::Sender<Option<Arc<Picture>>>,
     /// Wishes of the pages.
     pub asked: Receiver<Ask>,
-    /// How many pages look.
+    /// Number of open pages.
     pub viewers: Arc<AtomicUsize>,
-    /// Pictures of surfaces.
+    /// Textures of object and hand.
     pub textures: Textures,
     /// Whether the painter is to end.
     pub stop: Arc<AtomicBool>,
 }
 
-/// The ticks are looked at so often.
+/// Time between two looks at the ticks' outlet.
 const LOOK_EVERY: Duration = Duration::from_millis(3);
-/// What is told changes no more often than this.
+/// Shortest time between two changes of the status text.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
-/// A script begins anew so long after its end.
+/// Time after the end of a script until it begins anew.
 const PAUSE: Duration = Duration::from_secs(9);
-/// Part of the picture's height by which the scene is seen lower: the menu lies above it.
+/// Share of the picture's height by which the scene is moved down, because the menu is above it.
 const UNDER_MENU: f64 = 0.07;
-/// Strain needs all nodes of an answer: of a larger mesh they take too long to send.
+/// Number of nodes above which strain is not shown unasked: it needs all nodes of every answer.
 const COLOURED_NODES_MAX: usize = 20_000;
 
 /// Makes pictures until it is told to stop.
@@ -102,7 +102,7 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// A painter of what comes through an inlet.
+    /// Painter of the frames that come through an inlet.
     pub fn new(run: ShownRun, easel: Easel, inlet: Inlet) -> Self {
         let wishes = Wishes::new(run.controls.clone(), run.load.clone());
         Self {
@@ -158,7 +158,7 @@ impl Painter {
         }
     }
 
-    /// Does what pages ask, and hears what the ticks say.
+    /// Carries out wishes of the pages, and takes the news of the ticks.
     fn hear(&mut self) {
         while let Ok(Notice { text, kind }) = self.run.notices.try_recv() {
             self.sentences.say(text, kind == NoticeKind::Refused);
@@ -195,7 +195,7 @@ impl Painter {
         }
     }
 
-    /// What the colours show now; asks for what they need.
+    /// Quantity that the colours show now; asks for the nodes that it needs.
     fn shading(&mut self, frame: &ViewFrame) -> Shading {
         let may_direct = self.run.is_directed
             && self.run.shading.is_none()
@@ -283,7 +283,7 @@ impl Painter {
     }
 }
 
-/// The numbers of all places: in the box that there is, or in a new one where they have left it.
+/// Vertices in counts of a box: the present one, or a new one if a vertex has left it.
 fn counted(
     space: Option<QuantisedBox>,
     places: &[[f32; 3]],

@@ -1,4 +1,4 @@
-//! What there is to see at one moment, in the numbers that go to the pages.
+//! Picture of one moment, in the numbers that go to the pages.
 
 use std::sync::Arc;
 
@@ -6,41 +6,41 @@ use softgrasp_window::view::hand_skin::BONE_COUNT;
 
 use crate::quantised::QuantisedBox;
 
-/// One moment; shared by all pages that look.
+/// One moment of the run; shared by all pages.
 ///
 /// Shapes: `numbers` and `normals` one per vertex of the object, `shares` too or empty.
 pub struct Picture {
     /// Number of the tick.
     pub tick: u64,
-    /// The object.
+    /// Unmoving part of the object.
     pub object: Arc<ObjectMesh>,
-    /// The hand, and how its bones move.
+    /// Unmoving part of the hand, and the motion of its bones.
     pub hand: Option<PosedHand>,
-    /// Number that a headset gave the record which the hand follows.
+    /// Number that the headset gave to the record of joints which the hand follows.
     pub record: Option<u32>,
-    /// Where the object is: translation in m, then x, y, z, w of the turn.
+    /// Pose of the object in the world: translation in m, then quaternion x, y, z, w.
     pub world_from_object: [f32; 7],
     /// Height of the ground, m.
     pub ground_y: f32,
-    /// What darkens the ground: begin and radius, end and nothing, m, world.
+    /// Capsules that darken the ground: start and radius, end and 0; m, in the world frame.
     pub capsules: Vec<[f32; 8]>,
-    /// The box that vertices are counted in.
+    /// Box in whose steps the vertices are counted.
     pub space: QuantisedBox,
-    /// Where the vertices are.
+    /// Position of each vertex, in counts of the box.
     pub numbers: Vec<[u16; 3]>,
-    /// Where they look to.
+    /// Normal of each vertex, folded into two numbers.
     pub normals: Vec<[i16; 2]>,
-    /// Colours: shares of the legend's range.
+    /// Colour of each vertex, as a share of the legend's range; empty without colours.
     pub shares: Vec<u8>,
-    /// What is told beside it.
+    /// Status text beside the picture, as JSON.
     pub status: Arc<str>,
 }
 
-/// A hand, and how its bones move, as dual quaternions.
+/// Unmoving part of the hand, and the motion of its bones as dual quaternions.
 pub type PosedHand = (Arc<HandMesh>, [[f32; 8]; BONE_COUNT]);
 
 impl Picture {
-    /// Whether a page that has drawn the other one needs only what differs.
+    /// Whether a page that has drawn `before` needs only the differences.
     pub fn goes_on_from(&self, before: &Self) -> bool {
         self.object.version == before.object.version
             && self.space == before.space
@@ -50,18 +50,18 @@ impl Picture {
     }
 }
 
-/// The message that brings the unmoving part of an object to a page.
+/// Message that brings the unmoving part of an object to a page.
 pub struct ObjectMesh {
-    /// Another number is another object.
+    /// Version of the object; another number means another object.
     pub version: u32,
-    /// The message.
+    /// Bytes of the message.
     pub message: Vec<u8>,
 }
 
-/// The message that brings the unmoving part of a hand to a page.
+/// Message that brings the unmoving part of a hand to a page.
 pub struct HandMesh {
-    /// Another number is another hand.
+    /// Version of the hand; another number means another hand.
     pub version: u32,
-    /// The message.
+    /// Bytes of the message.
     pub message: Vec<u8>,
 }

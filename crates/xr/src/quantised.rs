@@ -1,27 +1,27 @@
-//! Places as 16-bit numbers within a box, and directions as two, with errors that are stated.
+//! Positions as 16-bit counts within a box, and directions as two such numbers, with stated errors.
 
-/// A box whose places are counted in equal steps along each axis.
+/// Box in which positions are counted in equal steps along each axis.
 ///
 /// Units: m. The numbers are those that go over the wire, so both ends compute with the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuantisedBox {
-    /// The lowest corner.
+    /// Lowest corner of the box, m.
     pub origin: [f32; 3],
-    /// From one number to the next.
+    /// Length of one step, m.
     pub step: f32,
-    /// No coordinate of a place comes back further off than this.
+    /// Largest error of a coordinate, m.
     pub error: f32,
 }
 
-/// Steps are no shorter, m: 5 µm off is less than a screen shows, and what does not move stays the same.
+/// Shortest step, m: an error of 5 µm is less than a screen shows, and what does not move stays the same.
 const STEP_MIN_M: f64 = 1e-5;
-/// Steps that a box spans at most: a few fewer than there are numbers.
+/// Largest number of steps that a box spans: somewhat fewer than 16 bits count.
 const STEPS_MAX: f64 = 65_500.0;
-/// Room around what a box is made for, as a share of its longest extent: an object gives way.
+/// Room around the positions that a box is made for, as a share of their longest extent.
 const ROOM: f64 = 0.5;
 
 impl QuantisedBox {
-    /// A box around some places, with room; `None` where there is none or one is not finite.
+    /// Box around some positions, with room; `None` if there is no position or one is not finite.
     pub fn around(places: &[[f32; 3]]) -> Option<Self> {
         let first = places.first()?;
         let (mut low, mut high) = (first.map(f64::from), first.map(f64::from));
@@ -46,7 +46,7 @@ impl QuantisedBox {
         sound.then_some(Self { origin, step, error })
     }
 
-    /// The numbers of a place; `None` outside the box.
+    /// Counts of a position; `None` outside the box.
     pub fn numbers(&self, place: [f32; 3]) -> Option<[u16; 3]> {
         let mut numbers = [0; 3];
         for axis in 0..3 {
@@ -60,16 +60,16 @@ impl QuantisedBox {
         Some(numbers)
     }
 
-    /// The place that the page draws for some numbers, in its own arithmetic.
+    /// Position that the page draws for some counts, in its own arithmetic.
     pub fn place(&self, numbers: [u16; 3]) -> [f32; 3] {
         std::array::from_fn(|axis| self.origin[axis] + f32::from(numbers[axis]) * self.step)
     }
 }
 
-/// No direction comes back further off than this, rad.
+/// Largest error of a direction, rad.
 pub const DIRECTION_ERROR: f64 = 1e-4;
 
-/// A direction as a place on an octahedron that is unfolded into a square; what has no length points up.
+/// Direction as a point of an octahedron that is unfolded into a square; a zero vector points up.
 pub fn folded(direction: [f32; 3]) -> [i16; 2] {
     let [x, y, z] = direction.map(f64::from);
     let sum = x.abs() + y.abs() + z.abs();

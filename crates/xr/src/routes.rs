@@ -1,4 +1,4 @@
-//! The addresses of the page: its files, the pictures of surfaces, and the stream.
+//! Addresses of the page: its files, the textures, and the stream.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -15,15 +15,15 @@ use crate::from_page::MESSAGE_MAX;
 use crate::site::Site;
 use crate::viewer::attend;
 
-/// Pages that look at once.
+/// Largest number of open pages.
 const VIEWERS_MAX: usize = 8;
 
-/// What a browser may do with the page: run its own scripts, speak with its own server.
+/// Content security policy: the page may run its own scripts and connect to its own server.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
                       img-src 'self' data:; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
 
-/// The files of the page with their types.
+/// Files of the page: name, content type, text.
 const FILES: [(&str, &str, &str); 10] = [
     ("index.html", "text/html; charset=utf-8", include_str!("../page/index.html")),
     ("style.css", "text/css; charset=utf-8", include_str!("../page/style.css")),
@@ -38,7 +38,7 @@ const FILES: [(&str, &str, &str); 10] = [
 ];
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// The way from addresses to answers.
+/// Router from addresses to responses.
 pub fn routes(site: Arc<Site>) -> Router {
     Router::new()
         .route("/{token}", get(without_slash))
@@ -128,7 +128,7 @@ async fn stream(
         .on_upgrade(move |socket| attend(socket, site, number))
 }
 
-/// Whether a page of another origin speaks.
+/// Whether the request comes from a page of another origin.
 fn is_from_elsewhere(headers: &HeaderMap) -> bool {
     let text = |name| headers.get(name).and_then(|value: &header::HeaderValue| value.to_str().ok());
     let Some(origin) = text(header::ORIGIN) else { return false };

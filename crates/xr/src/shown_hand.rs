@@ -11,15 +11,15 @@ use crate::picture::HandMesh;
 use crate::textures::Textures;
 use crate::to_page::{HandVertex, hand_message};
 
-/// The skin of one hand.
+/// Skin of one hand.
 pub struct ShownHand {
     dimensions: HandDimensions,
     skin: HandSkin,
-    /// What a page needs once.
+    /// Message that a page needs once.
     pub mesh: Arc<HandMesh>,
 }
 
-/// Bones that a vertex follows on a page; the others have so little weight that nobody sees it.
+/// Number of bones that a vertex follows on a page; the others have too little weight to be seen.
 pub const BONES_A_VERTEX: usize = 4;
 
 impl ShownHand {
@@ -33,18 +33,18 @@ impl ShownHand {
         Self { dimensions: hand.dimensions, skin, mesh }
     }
 
-    /// Packs the picture of every hand's skin; its number.
+    /// Packs the texture of every hand's skin; returns its number.
     pub fn texture(textures: &Textures) -> u32 {
         let texture: Texture = HandSkin::texture();
         textures.add(&texture)
     }
 
-    /// Whether it is a hand of this size.
+    /// Whether the skin belongs to a hand of this size.
     pub fn fits(&self, hand: &HandView) -> bool {
         self.dimensions == hand.dimensions
     }
 
-    /// How its bones move, as dual quaternions.
+    /// Motion of the bones, as dual quaternions.
     pub fn bones(&self, hand: &HandView) -> [[f32; 8]; BONE_COUNT] {
         self.skin.bones(&hand.world_from_palm, &hand.world_from_segment)
     }

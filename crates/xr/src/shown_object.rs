@@ -1,4 +1,4 @@
-//! The object as pages draw it: what of it stays the same from picture to picture.
+//! The object as pages draw it: the part that stays the same from picture to picture.
 
 use std::sync::Arc;
 
@@ -10,17 +10,17 @@ use crate::picture::ObjectMesh;
 use crate::textures::Textures;
 use crate::to_page::{ObjectPart, object_message};
 
-/// The skin of one object, and the message that brings it to a page.
+/// Skin of one object, and the message that brings it to a page.
 pub struct ShownObject {
     rest: Arc<RestShape>,
     rest_shapes: u64,
     skin: ObjectSkin,
-    /// What a page needs once.
+    /// Message that a page needs once.
     pub mesh: Arc<ObjectMesh>,
 }
 
 impl ShownObject {
-    /// Dresses an object; takes some tenths of a second.
+    /// Makes the skin of an object; takes some tenths of a second.
     pub fn new(version: u32, look: Look, object: &ObjectView, textures: &Textures) -> Self {
         let skin = ObjectSkin::new(look, &object.rest);
         let message = message(version, skin.parts(), textures);
@@ -42,7 +42,7 @@ impl ShownObject {
         same
     }
 
-    /// Moves the skin to a shape: places and normals of all vertices, part after part.
+    /// Moves the skin to a shape: positions and normals of all vertices, part after part.
     ///
     /// Units: m. Frame: the object's.
     pub fn follow(

@@ -1,4 +1,4 @@
-//! What all pages of a run share.
+//! State that all pages of a run share.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize};
@@ -12,26 +12,26 @@ use crate::picture::Picture;
 use crate::textures::Textures;
 use crate::token::Token;
 
-/// What all pages share.
+/// State that all pages of a run share.
 pub struct Site {
-    /// Who does not know it is refused.
+    /// Token that a request must show.
     pub token: Token,
-    /// What a page is told first.
+    /// First message to a page.
     pub hello: String,
     /// Whether the run follows a headset's hand.
     pub takes_hands: bool,
-    /// The newest picture.
+    /// Newest picture.
     pub pictures: watch::Sender<Option<Arc<Picture>>>,
-    /// Changes when the run is over.
+    /// True once the run is over.
     pub over: watch::Sender<bool>,
-    /// Wishes on their way to the painter.
+    /// Channel for wishes to the painter.
     pub asks: SyncSender<Ask>,
     /// The hand of a headset.
     pub headset: Headset,
-    /// Pictures of surfaces.
+    /// Textures of object and hand.
     pub textures: Textures,
-    /// How many pages look.
+    /// Number of open pages.
     pub viewers: Arc<AtomicUsize>,
-    /// Pages so far.
+    /// Number of pages that were ever opened, from which each gets its own number.
     pub numbers: AtomicU64,
 }

@@ -1,4 +1,4 @@
-//! What is told beside the picture, as JSON: the state of grasp and server, legend, eye, sentences.
+//! Status text beside the picture, as JSON: state of grasp and server, legend, view, sentences.
 
 use std::collections::VecDeque;
 
@@ -12,11 +12,11 @@ use softgrasp_window::view::shading::Shading;
 
 use crate::to_page::FORMAT;
 
-/// What a page needs once, before anything else.
+/// First message to a page: colours, shapes and light of the run.
 #[derive(Serialize)]
 pub struct Hello {
     hello: u32,
-    /// Colours of the legend from zero to the most: red, green, blue, alpha of each.
+    /// Colours of the legend from zero to the largest value: red, green, blue, alpha of each.
     ramp: Vec<u8>,
     light: LightNumbers,
     /// Names of objects that can be read without a file.
@@ -25,7 +25,7 @@ pub struct Hello {
     takes_hands: bool,
 }
 
-/// The stage, as the window lights it.
+/// Light and ground, as the window shows them.
 #[derive(Serialize)]
 struct LightNumbers {
     key_direction: [f32; 3],
@@ -41,7 +41,7 @@ struct LightNumbers {
 }
 
 impl Hello {
-    /// For a run that takes hands from a headset or does not.
+    /// First message of a run that takes hands from a headset or does not.
     pub fn new(ramp: Vec<u8>, takes_hands: bool) -> Self {
         let light = LightNumbers {
             key_direction: light::KEY.direction,
@@ -59,7 +59,7 @@ impl Hello {
         Self { hello: FORMAT, ramp, light, shapes, takes_hands }
     }
 
-    /// As it goes over.
+    /// The message as JSON.
     pub fn text(&self) -> String {
         // Plain numbers and words can be written.
         serde_json::to_string(self).unwrap_or_default()
@@ -73,7 +73,7 @@ pub struct Sentences {
     kept: VecDeque<Sentence>,
 }
 
-/// One sentence.
+/// Sentence for the person, with its number.
 #[derive(Clone, Serialize)]
 pub struct Sentence {
     number: u64,
@@ -81,11 +81,11 @@ pub struct Sentence {
     refused: bool,
 }
 
-/// So many sentences wait for those who come later.
+/// Number of sentences that are kept for pages that open later.
 const SENTENCES_MAX: usize = 6;
 
 impl Sentences {
-    /// Says something.
+    /// Adds a sentence; `refused` marks a wish that was refused.
     pub fn say(&mut self, text: String, refused: bool) {
         self.last += 1;
         self.kept.push_back(Sentence { number: self.last, text, refused });
@@ -95,7 +95,7 @@ impl Sentences {
     }
 }
 
-/// The state of a run.
+/// Content of the status text.
 #[derive(Serialize)]
 struct Status<'a> {
     tick: u64,
@@ -124,7 +124,7 @@ struct LegendText {
     remark: String,
 }
 
-/// An eye as the page keeps it: m, rad.
+/// View of the page: target and distance in m, angles in rad.
 #[derive(Clone, Copy, PartialEq, Serialize)]
 struct EyeNumbers {
     target: [f64; 3],
@@ -133,7 +133,7 @@ struct EyeNumbers {
     pitch: f64,
 }
 
-/// The status of a frame, as it goes over.
+/// Status text of a frame, as JSON.
 pub fn status_text(
     frame: &ViewFrame,
     colouring: &Colouring,

@@ -1,4 +1,4 @@
-//! The pictures that lie on surfaces, packed once and fetched by number.
+//! Textures of surfaces, packed once and fetched by number.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -8,7 +8,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use softgrasp_window::view::texture::Texture;
 
-/// Pictures by number; clones hold the same.
+/// Textures by number; clones share them.
 #[derive(Clone, Default)]
 pub struct Textures(Arc<Mutex<Kept>>);
 
@@ -18,11 +18,11 @@ struct Kept {
     packed: BTreeMap<u32, Arc<Vec<u8>>>,
 }
 
-/// So many pictures are kept; the oldest go. An object has three at most, a hand one.
+/// Largest number of textures kept; the oldest are dropped. An object has three at most, a hand one.
 const KEPT_MAX: usize = 12;
 
 impl Textures {
-    /// Packs a picture; its number, from 1 on. 0, which is none, where it cannot be packed.
+    /// Packs a texture and returns its number, from 1 on; 0, which is none, if it cannot be packed.
     pub fn add(&self, texture: &Texture) -> u32 {
         let Some(packed) = packed(texture) else { return 0 };
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -35,8 +35,8 @@ impl Textures {
         number
     }
 
-    /// A packed picture: by gzip, width and height as 32-bit numbers, then red, green, blue and alpha
-    /// of each texel.
+    /// Packed texture: gzip of width and height as 32-bit numbers, then red, green, blue and alpha of
+    /// each texel.
     pub fn get(&self, number: u32) -> Option<Arc<Vec<u8>>> {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         kept.packed.get(&number).cloned()

@@ -1,4 +1,4 @@
-//! What goes to a page: the bytes of objects, hands and pictures, little-endian (`docs/xr.md`).
+//! Messages to a page: the bytes of objects, hands and pictures, little-endian (`docs/xr.md`).
 
 use softgrasp_window::view::hand_skin::BONE_COUNT;
 
@@ -6,40 +6,40 @@ use crate::picture::Picture;
 
 /// Version of the messages; the page says so if it knows another.
 pub const FORMAT: u32 = 1;
-/// First byte of an object.
+/// First byte of an object's message.
 pub const OBJECT: u8 = 1;
-/// First byte of a hand.
+/// First byte of a hand's message.
 pub const HAND: u8 = 2;
-/// First byte of a picture.
+/// First byte of a picture's message.
 pub const PICTURE: u8 = 3;
-/// A picture's flags: there is a hand; there are colours; all vertices come.
+/// Flag of a picture: it has a hand.
 pub const WITH_HAND: u8 = 1;
-/// See [`WITH_HAND`].
+/// Flag of a picture: it has colours.
 pub const COLOURED: u8 = 2;
-/// See [`WITH_HAND`].
+/// Flag of a picture: it has all vertices.
 pub const WHOLE: u8 = 4;
-/// Number of a record where there is none.
+/// Number that stands for no record of joints.
 pub const NO_RECORD: u32 = u32::MAX;
 
-/// One thing to draw of an object.
+/// Part of an object that is drawn with one material.
 pub struct ObjectPart {
-    /// Its first triangle.
+    /// Number of its first triangle.
     pub first_triangle: u32,
-    /// How many it has.
+    /// Number of triangles.
     pub triangles: u32,
-    /// Linear red, green, blue.
+    /// Base colour: linear red, green, blue.
     pub colour: [f32; 3],
-    /// 0 is a mirror.
+    /// Roughness from 0 (mirror) to 1.
     pub roughness: f32,
-    /// 0 is no metal.
+    /// Metallic share from 0 (no metal) to 1.
     pub metallic: f32,
-    /// Strength and roughness of a clear layer on top.
+    /// Strength and roughness of a clear layer on the surface.
     pub clearcoat: (f32, f32),
-    /// How much light comes through from behind.
+    /// Share of the light that comes through from behind.
     pub subsurface: f32,
-    /// Number of its picture; 0 is none.
+    /// Number of the colour texture; 0 for none.
     pub texture: u32,
-    /// Number of its relief; 0 is none.
+    /// Number of the relief texture; 0 for none.
     pub relief: u32,
     /// Whether the back of a triangle can be seen.
     pub two_sided: bool,
@@ -47,19 +47,19 @@ pub struct ObjectPart {
 
 /// One vertex of a hand's skin.
 pub struct HandVertex {
-    /// In the pose that the skin was made in, m, palm frame.
+    /// Position in the pose that the skin was made in, m, in the palm's frame.
     pub place: [f32; 3],
-    /// Outward.
+    /// Outward unit normal in the same pose.
     pub normal: [f32; 3],
-    /// Place in the picture.
+    /// Texture coordinates.
     pub uv: [f32; 2],
     /// Weights of the bones; their sum is 1.
     pub weights: [f32; 4],
-    /// Bones, the heaviest first.
+    /// Numbers of the bones, the heaviest first.
     pub bones: [u8; 4],
 }
 
-/// Bytes that grow.
+/// Message that is being written.
 #[derive(Default)]
 struct Bytes(Vec<u8>);
 
@@ -85,7 +85,7 @@ impl Bytes {
     }
 }
 
-/// What of an object stays the same.
+/// Message with the part of an object that does not change.
 pub fn object_message(
     version: u32,
     parts: &[ObjectPart],
@@ -110,7 +110,7 @@ pub fn object_message(
     bytes.0
 }
 
-/// What of a hand stays the same.
+/// Message with the part of a hand that does not change.
 pub fn hand_message(
     version: u32,
     texture: u32,
@@ -130,7 +130,7 @@ pub fn hand_message(
     bytes.0
 }
 
-/// A picture for a page that has drawn `before`, if any: only the vertices that differ.
+/// Message of a picture for a page that has drawn `before`, if any: only the vertices that differ.
 pub fn picture_message(
     picture: &Picture,
     before: Option<&Picture>,
@@ -184,7 +184,7 @@ pub fn picture_message(
     bytes.0
 }
 
-/// Where vertices differ from those of the picture before: first vertex and how many.
+/// Runs of vertices that differ from those of the picture before: first vertex and number.
 fn changed_runs(picture: &Picture, before: Option<&Picture>) -> Vec<(usize, usize)> {
     let count = picture.numbers.len();
     let Some(before) = before else {

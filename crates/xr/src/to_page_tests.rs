@@ -1,4 +1,4 @@
-//! Tests of what goes to a page: read back byte by byte as `docs/xr.md` says.
+//! Tests of messages to a page: read back byte by byte as `docs/xr.md` says.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::*;
 use crate::picture::ObjectMesh;
 use crate::quantised::QuantisedBox;
 
-/// Bytes of a picture before what differs in length.
+/// Length of a picture's message before the parts of varying length, bytes.
 const PICTURE_HEAD: usize = 96;
 
 fn picture(numbers: Vec<[u16; 3]>, shares: Vec<u8>) -> Picture {

@@ -1,4 +1,4 @@
-//! The token in the page's address: who does not know it is refused.
+//! Token in the page's address; requests without it are refused.
 
 use std::fmt::Write;
 
@@ -6,16 +6,16 @@ use std::fmt::Write;
 #[derive(Clone)]
 pub struct Token(String);
 
-/// The system has no random numbers.
+/// The operating system gives no random numbers.
 #[derive(Debug, thiserror::Error)]
 #[error("the system gives no random numbers for the page's token: {0}")]
 pub struct NoRandomNumbers(getrandom::Error);
 
 impl Token {
-    /// A new one.
+    /// New random token.
     ///
     /// # Errors
-    /// [`NoRandomNumbers`].
+    /// [`NoRandomNumbers`] if the operating system gives none.
     pub fn random() -> Result<Self, NoRandomNumbers> {
         let mut bytes = [0_u8; 16];
         getrandom::fill(&mut bytes).map_err(NoRandomNumbers)?;
@@ -27,12 +27,12 @@ impl Token {
         Ok(Self(text))
     }
 
-    /// As it stands in the address.
+    /// The token as it stands in the address.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// Whether a text is it; the time that takes tells nothing of how much of it is right.
+    /// Whether a text equals the token; compared in a time that does not depend on the content.
     pub fn is(&self, text: &str) -> bool {
         let (own, other) = (self.0.as_bytes(), text.as_bytes());
         let differ = own.iter().zip(other).fold(0, |all, (a, b)| all | (a ^ b));

@@ -1,4 +1,4 @@
-//! One page that looks: it gets the newest picture whenever it has drawn the ones before.
+//! One open page: it gets the newest picture whenever it has drawn the ones before.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,15 +12,15 @@ use crate::picture::Picture;
 use crate::site::Site;
 use crate::to_page::picture_message;
 
-/// Pictures on their way at most: one that is being drawn, one that comes.
+/// Largest number of pictures that are sent and not drawn: one being drawn, one on the way.
 const ON_THE_WAY_MAX: u32 = 2;
-/// A page that takes nothing for so long has gone.
+/// Time after which a page that takes no bytes is given up.
 const SEND_MAX: Duration = Duration::from_secs(10);
-/// Pages are asked whether they are there so often, and have gone after silence.
+/// Time between two signs of life asked from a page, and the silence after which it is given up.
 const BEAT: Duration = Duration::from_secs(5);
 const SILENCE_MAX: Duration = Duration::from_secs(20);
 
-/// A page with what it has drawn.
+/// An open page and the pictures it has drawn.
 struct Viewer {
     socket: WebSocket,
     site: Arc<Site>,
@@ -35,17 +35,17 @@ struct Viewer {
     heard: Instant,
 }
 
-/// Why a page is left.
+/// Why the connection to a page ends.
 enum Left {
-    /// It has gone, or takes nothing.
+    /// The page has gone, or takes no bytes.
     Gone,
-    /// It sent what is no message.
+    /// The page sent bytes that are no message.
     Wrong(FromPageError),
     /// The run is over.
     Over,
 }
 
-/// Counts a page as there as long as it lives.
+/// Counts an open page until it is dropped.
 struct Present(Arc<AtomicUsize>);
 
 impl Present {
@@ -61,7 +61,7 @@ impl Drop for Present {
     }
 }
 
-/// Attends to a page until it goes or the run is over.
+/// Serves a page until it goes or the run is over.
 pub async fn attend(socket: WebSocket, site: Arc<Site>, number: u64) {
     let _present = Present::new(&site.viewers);
     let mut viewer = Viewer {
@@ -135,7 +135,7 @@ impl Viewer {
         self.send(Message::Ping(Vec::new().into())).await
     }
 
-    /// Sends what of a picture the page has not drawn yet.
+    /// Sends the parts of a picture that the page has not drawn yet.
     async fn show(&mut self, picture: Arc<Picture>) -> Result<(), Left> {
         let before = self.last.take();
         if before.as_ref().is_none_or(|before| before.object.version != picture.object.version) {

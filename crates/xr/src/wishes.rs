@@ -1,4 +1,4 @@
-//! What pages ask of a run, turned into what the ticks obey.
+//! Wishes of pages, turned into controls of the ticks.
 
 use std::path::{Component, Path, PathBuf};
 use std::sync::mpsc::Sender;
@@ -11,38 +11,38 @@ use softgrasp_window::view::shading::Shading;
 
 use crate::from_page::Ask;
 
-/// The way of wishes to the ticks.
+/// Passes wishes to the ticks.
 pub struct Wishes {
     controls: Sender<Control>,
-    /// `None` where objects are read elsewhere.
+    /// Reads objects; `None` where a window does.
     load: Option<LoadObject>,
     loading: Option<(Loading, ObjectChoice)>,
 }
 
-/// What has become of a wish that concerns the page itself.
+/// Result of a wish for the page itself.
 pub enum Granted {
-    /// Nothing there.
+    /// No result for the page.
     Nothing,
-    /// Something is to be said.
+    /// Sentence for the person, and whether the wish was refused.
     Said(String, bool),
-    /// Colours show something else from now on.
+    /// Quantity that the colours show from now on.
     Shading(Shading),
-    /// The next object looks like this.
+    /// Look of the next object.
     Look(Look),
 }
 
 impl Wishes {
-    /// Wishes to the ticks that obey these controls.
+    /// Passes wishes to the ticks that obey these controls.
     pub fn new(controls: Sender<Control>, load: Option<LoadObject>) -> Self {
         Self { controls, load, loading: None }
     }
 
-    /// Asks something of the ticks; a run that is over does not hear it.
+    /// Sends a control to the ticks; a run that is over ignores it.
     pub fn control(&self, control: Control) {
         let _ = self.controls.send(control);
     }
 
-    /// Does what a page asks, or takes it in hand.
+    /// Grants a wish of a page, or begins to.
     pub fn grant(&mut self, ask: Ask) -> Granted {
         let control = match ask {
             Ask::KeepShape => Control::KeepShape,
@@ -85,7 +85,7 @@ impl Wishes {
         Granted::Said(format!("reading {name} …"), false)
     }
 
-    /// An object that has been read goes to the ticks.
+    /// Passes an object that has been read to the ticks.
     pub fn look_after_reading(&mut self) -> Granted {
         let Some((loading, choice)) = &self.loading else { return Granted::Nothing };
         let Some(result) = loading.take() else { return Granted::Nothing };
@@ -101,17 +101,17 @@ impl Wishes {
     }
 }
 
-/// Whether a text is the name of a file and of no folder.
+/// Whether a text is a file name without a folder.
 fn is_plain_name(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let is_one = matches!(parts.next(), Some(Component::Normal(part)) if part == name);
     is_one && parts.next().is_none() && name.len() <= NAME_MAX && !name.starts_with('.')
 }
 
-/// Longest name of a file, bytes.
+/// Largest length of a file name, bytes.
 const NAME_MAX: usize = 100;
 
-/// A file of the run's folder that is not there yet: nobody at a page is asked whether to replace one.
+/// Path of a new file in the run's folder; pages cannot replace files.
 fn new_file(name: &str) -> Result<PathBuf, String> {
     if !is_plain_name(name) {
         return Err(format!("'{name}' is no name of a file: letters and an end like .msh"));

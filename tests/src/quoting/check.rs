@@ -6,7 +6,7 @@ use super::source::{Column, Source};
 
 /// The files of all reports, by name.
 pub trait Reports {
-    /// Text of a file in the folder of reports; `None` if there is no such file.
+    /// Text of a file in the folder of reports; `None` if it does not exist.
     fn file(&self, name: &str) -> Option<String>;
 }
 
@@ -16,12 +16,12 @@ impl<F: Fn(&str) -> Option<String>> Reports for F {
     }
 }
 
-/// Words that hide a figure from this check.
+/// Words that would hide a figure from this check.
 const HIDDEN: [&str; 8] =
     [" half ", " quarter", " a third", " a fifth", " a tenth", " twice", " ten times", " tenfold"];
 
-/// What does not agree between a page and the reports: all items of the section, and every item
-/// elsewhere that names a source.
+/// Disagreements between a page and the reports: of all items of the section, and of every other item
+/// that names a source.
 pub fn faults(page: &str, section: &str, reports: &impl Reports) -> Vec<String> {
     let strict = items(page, section);
     let all = items(page, "");
@@ -39,7 +39,7 @@ pub fn faults(page: &str, section: &str, reports: &impl Reports) -> Vec<String> 
     faults
 }
 
-/// What does not agree between one item and the reports.
+/// Disagreements between one item and the reports.
 pub fn item_faults(item: &Item, reports: &impl Reports) -> Vec<String> {
     let mut faults = Vec::new();
     let mut columns = Vec::new();
@@ -72,7 +72,7 @@ pub fn item_faults(item: &Item, reports: &impl Reports) -> Vec<String> {
     faults
 }
 
-/// The report is linked, and the file is one of its own.
+/// Checks that the report is linked, and that the file belongs to it.
 fn is_linked(item: &Item, source: &Source, reports: &impl Reports) -> Result<(), String> {
     let of_file = format!("({})", source.file);
     let mut pages = item.links.iter().filter_map(|link| link.strip_prefix("reports/"));
@@ -86,7 +86,7 @@ fn is_constant(figure: &Figure, constants: &[f64]) -> bool {
     !figure.is_limit && constants.contains(&figure.value)
 }
 
-/// One of the column's numbers is rounded to the figure; for a limit, the largest.
+/// Whether one of the column's numbers, rounded, is the figure; for a limit, the largest number.
 fn stands_in(figure: &Figure, column: &Column) -> bool {
     let quotes =
         |number: f64| column.unit.convert(number, figure.unit).is_some_and(|n| figure.quotes(n));
@@ -96,7 +96,7 @@ fn stands_in(figure: &Figure, column: &Column) -> bool {
     }
 }
 
-/// A column is quoted by its smallest and its largest number, or by a limit.
+/// Numbers that a text should quote and does not: the smallest and the largest of a column, or a limit.
 fn unquoted(column: &Column, figures: &[Figure]) -> Vec<String> {
     let quoted = |number: f64| {
         let alone = Column { numbers: vec![number], ..column.clone() };

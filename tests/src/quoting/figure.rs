@@ -1,26 +1,26 @@
-//! Finds the figures of a text: numbers with their precision and unit as written.
+//! Finds the figures in a text: numbers with their precision and unit as written.
 
 use super::unit::Unit;
 
-/// A number as it is written in a text.
+/// Number as it is written in a text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Its letters, without the unit.
+    /// Characters of the number, without the unit.
     pub written: String,
-    /// Where it begins in the text, in bytes.
+    /// Position in the text, bytes.
     pub at: usize,
-    /// What it says.
+    /// Value of the number.
     pub value: f64,
-    /// One in its last digit.
+    /// Value of one unit of its last digit.
     pub step: f64,
-    /// The unit behind it.
+    /// Unit behind the number.
     pub unit: Unit,
     /// Whether it is an upper limit: "below 3e-13", "at most 5 ms".
     pub is_limit: bool,
 }
 
 impl Figure {
-    /// Whether a number of the figure's unit is rounded to it, or for a limit, is rounded up to it.
+    /// Whether a number of the figure's unit is rounded to the figure; for a limit, rounded up.
     pub fn quotes(&self, number: f64) -> bool {
         let slack = 1e-6 * self.step;
         match self.is_limit {
@@ -33,8 +33,8 @@ impl Figure {
 /// Words before a figure that make it an upper limit.
 const LIMITS: [&str; 5] = ["below", "at most", "under", "less than", "no more than"];
 
-/// Every figure of a text, in order. Digits that are part of a word (`p99`, `t4`, `parry3d`) and
-/// dates are none. A thin or plain space may divide groups of three digits.
+/// All figures in a text, in order. Digits that are part of a word (`p99`, `t4`, `parry3d`) and dates are
+/// left out. A thin or plain space may separate groups of three digits.
 pub fn figures(text: &str) -> Vec<Figure> {
     let mut found = Vec::new();
     let mut at = 0;
@@ -84,7 +84,7 @@ fn shared_unit(behind: &str) -> Unit {
     Unit::of(&word).unwrap_or_else(|| shared_unit(behind))
 }
 
-/// How many bytes at the beginning of a text are one number.
+/// Length of the number at the beginning of a text, bytes.
 fn length(text: &str) -> usize {
     let digits = |from: usize| -> usize {
         text[from..].find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len() - from)

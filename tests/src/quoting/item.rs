@@ -1,18 +1,18 @@
 //! Paragraphs, bullets and table rows of a section, with links and sources taken out of the text.
 
-/// One of them.
+/// Paragraph, bullet or table row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Item {
-    /// What a reader sees, without `code` and targets of links.
+    /// Visible text, without `code` and targets of links.
     pub text: String,
     /// Targets of the links.
     pub links: Vec<String>,
-    /// What the comments say.
+    /// Texts of the comments.
     pub comments: Vec<String>,
 }
 
-/// All items of a section of a Markdown page, or of the whole page for an empty heading; blocks of
-/// code are passed over.
+/// All items of a section of a Markdown page, or of the whole page for an empty heading; blocks of code
+/// are left out.
 pub fn items(page: &str, heading: &str) -> Vec<Item> {
     let mut lines: Vec<String> = Vec::new();
     let (mut is_inside, mut is_code) = (heading.is_empty(), false);
@@ -67,7 +67,7 @@ fn item(text: &str) -> Item {
     item
 }
 
-/// What stands between two marks at the beginning of a text, and what follows.
+/// Text between two marks at the beginning of a text, and the rest.
 fn between<'a>(text: &'a str, open: &str, close: &str) -> Option<(&'a str, &'a str)> {
     text.strip_prefix(open)?.split_once(close)
 }

@@ -1,34 +1,34 @@
-//! The source of figures: rows and columns of one file of a report.
+//! Source of figures: rows and columns of one file of a report.
 
 use super::unit::Unit;
 
-/// What a comment names.
+/// Source that a comment names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
-    /// The file.
+    /// Name of the file.
     pub file: String,
-    /// Columns that select rows, each with the values that are wanted.
+    /// Columns that select rows, each with the wanted values.
     pub keys: Vec<(String, Vec<String>)>,
     /// Columns that are quoted, with their units.
     pub columns: Vec<(String, Unit)>,
 }
 
-/// A cell that is quoted.
+/// Column that is quoted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Its name.
+    /// Name of the column.
     pub name: String,
-    /// What its numbers count.
+    /// Unit of its numbers.
     pub unit: Unit,
-    /// Its numbers in the rows that are selected.
+    /// Its numbers in the selected rows.
     pub numbers: Vec<f64>,
 }
 
 impl Source {
-    /// Reads a comment.
+    /// Parses a comment.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// Fault of the comment, in words.
     pub fn parse(comment: &str) -> Result<Self, String> {
         let (left, right) = comment
             .split_once("->")
@@ -47,10 +47,10 @@ impl Source {
         Ok(Self { file, keys, columns })
     }
 
-    /// The columns, with the numbers of the rows that are selected.
+    /// Quoted columns, with their numbers in the selected rows.
     ///
     /// # Errors
-    /// What is not there, in words.
+    /// Missing column or row, in words.
     pub fn select(&self, csv: &str) -> Result<Vec<Column>, String> {
         let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(csv.as_bytes());
         let headers = reader.headers().map_err(|error| format!("{}: {error}", self.file))?.clone();
@@ -92,8 +92,8 @@ impl Source {
         }
     }
 
-    /// Constants that a text may name: values of keys that are numbers, and numbers in the names of
-    /// columns that are quoted (21 in `solve_21_ms`).
+    /// Constants that a text may name: keys' values that are numbers, and numbers in the names of quoted
+    /// columns (21 in `solve_21_ms`).
     pub fn constants(&self) -> impl Iterator<Item = f64> + '_ {
         let values = self.keys.iter().flat_map(|(_, values)| values).map(String::as_str);
         let in_names = self.columns.iter().flat_map(|(name, _)| name.split('_'));
@@ -101,13 +101,13 @@ impl Source {
     }
 }
 
-/// The same words, or the same number.
+/// Whether both texts are the same words, or the same number.
 fn is_same(wanted: &str, cell: &str) -> bool {
     let number = |text: &str| text.parse::<f64>().ok();
     wanted == cell || number(wanted).is_some_and(|wanted| number(cell) == Some(wanted))
 }
 
-/// `name`, or `name [unit]` where the name does not end with its unit.
+/// Parses `name`, or `name [unit]` if the name does not end with its unit.
 fn column(text: &str) -> Result<(String, Unit), String> {
     let text = text.trim();
     if let Some((name, unit)) = text.strip_suffix(']').and_then(|text| text.split_once('[')) {

@@ -1,22 +1,22 @@
 //! The units of figures and columns, and the conversion between them.
 
-/// What a number counts, with the factor to the base of its kind.
+/// Unit of a number, with its factor to the base unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unit {
-    /// A count, a ratio, a relative error.
+    /// Number without a unit: a count, a ratio, a relative error.
     Plain,
-    /// Base: 1.
+    /// Per cent.
     Percent,
-    /// Base: seconds.
+    /// Time; the factor to seconds.
     Time(f64),
-    /// Base: bytes.
+    /// Memory; the factor to bytes.
     Bytes(f64),
-    /// Base: metres.
+    /// Length; the factor to metres.
     Length(f64),
 }
 
 impl Unit {
-    /// By the word behind a figure or at the end of a column's name; `None` for other words.
+    /// Unit by the word behind a figure or at the end of a column's name; `None` for other words.
     pub fn of(word: &str) -> Option<Self> {
         Some(match word {
             "rel" | "×" | "times" => Self::Plain,
@@ -35,7 +35,7 @@ impl Unit {
         })
     }
 
-    /// A number of this unit in another one; `None` if it counts something else.
+    /// Number of this unit converted to another one; `None` if they are of different kinds.
     pub fn convert(self, number: f64, to: Self) -> Option<f64> {
         match (self, to) {
             (Self::Plain, Self::Plain) | (Self::Percent, Self::Percent) => Some(number),

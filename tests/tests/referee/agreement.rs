@@ -1,4 +1,4 @@
-//! Compares two answers, and says by how much printed digits let them differ.
+//! Compares two answers, within the difference that printed digits allow.
 //!
 //! CalculiX prints seven digits, so a number that agrees is within half a unit of the seventh of
 //! what is printed: at most 5e-7 of the number itself. Both programs also round within: a number
@@ -12,22 +12,22 @@ use crate::ccx::{Printed, Results};
 use crate::question::Question;
 use crate::solved::Found;
 
-/// Half a unit of the seventh of seven digits, relative to the number, at most.
+/// Largest rounding of seven printed digits, relative to the number.
 const HALF_DIGIT: f64 = 5e-7;
 /// Rounding within the two programs, relative to the largest number.
 const ROUNDING: f64 = 1e-8;
 
-/// Numbers of one kind, compared.
+/// Comparison of numbers of one kind.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
-    /// Largest difference relative to the largest number.
+    /// Largest difference, relative to the largest number.
     pub difference_rel: f64,
-    /// Largest part of a difference that half a unit of its last digit does not explain, relative
-    /// to the largest number; zero if there is none.
+    /// Largest part of a difference above half a unit of the last digit, relative to the largest number;
+    /// zero if there is none.
     pub beyond_digits_rel: f64,
-    /// Numbers compared.
+    /// Number of compared numbers.
     pub count: usize,
-    /// Those that are not within half a unit of their own last digit, rounding allowed for.
+    /// Number of those that differ by more than half a unit of their last digit and rounding.
     pub outside: usize,
 }
 
@@ -54,7 +54,7 @@ impl Comparison {
         }
     }
 
-    /// Both: relative to the largest, and number by number.
+    /// Whether the differences are small enough, relative to the largest number and for each number.
     pub fn holds(&self) -> bool {
         self.outside == 0 && self.difference_rel <= HALF_DIGIT + ROUNDING
     }
@@ -68,7 +68,7 @@ impl Comparison {
 }
 
 impl Agreement {
-    /// Compares what both have: every displacement ours gives, forces where known.
+    /// Compares every displacement of our answer, and the forces where both have them.
     pub fn of(printed: &Results, found: &Found, question: &Question) -> Self {
         let nodes = printed.displacement.iter().zip(&found.displacement);
         let displacement: Vec<(Printed, f64)> =
@@ -82,12 +82,12 @@ impl Agreement {
         Self { displacement: Comparison::of(&displacement), force, questions: 1 }
     }
 
-    /// Whether everything agrees.
+    /// Whether all comparisons hold.
     pub fn holds(&self) -> bool {
         self.displacement.holds() && self.force.holds()
     }
 
-    /// Takes another question's numbers in.
+    /// Adds the numbers of another question.
     pub fn add(&mut self, other: &Self) {
         self.displacement.add(&other.displacement);
         self.force.add(&other.force);

@@ -1,4 +1,4 @@
-//! The program `ccx`: found, run in a scratch folder under a time limit, its numbers read.
+//! Runs the program `ccx` in a scratch folder under a time limit, and reads its numbers.
 
 use std::io::Read;
 use std::path::Path;
@@ -8,32 +8,32 @@ use std::time::Duration;
 
 use crate::deck::System;
 
-/// One run may take so long; the largest of the full form takes a tenth of it on a quiet machine.
+/// Longest time of one run; the largest of the full form takes a tenth of it on an idle machine.
 const LIMIT: Duration = Duration::from_secs(900);
 
-/// CalculiX as it is on the PATH.
+/// CalculiX as found on the PATH.
 pub struct Ccx {
     version: String,
 }
 
-/// A number as printed: seven digits.
+/// Number as printed, with seven digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Printed {
     pub value: f64,
-    /// Half a unit of its last digit: how far the number meant can be from the one printed.
+    /// Half a unit of the last digit: the largest rounding of the printed number.
     pub half_unit: f64,
 }
 
-/// What one run prints.
+/// Numbers that one run prints.
 ///
-/// Shapes: per node of the system; nodes in no element have zeros.
+/// Shapes: for each node of the system; nodes without an element have zeros.
 pub struct Results {
     pub displacement: Vec<[Printed; 3]>,
     pub force: Vec<[Printed; 3]>,
 }
 
 impl Ccx {
-    /// Looks for it; says that the test is skipped when it is not there.
+    /// Looks for `ccx`; prints that the test is skipped if it is missing.
     pub fn find() -> Option<Self> {
         let output = Command::new("ccx").arg("-v").stdin(Stdio::null()).output();
         let Ok(output) = output else {
@@ -45,21 +45,21 @@ impl Ccx {
         Some(Self { version })
     }
 
-    /// Runs one deck.
+    /// Runs CalculiX on one deck.
     ///
     /// # Panics
-    /// If it fails, takes too long, or does not print every node; with what it said.
+    /// If it fails, takes too long, or does not print every node; with its output.
     pub fn run(&self, folder: &Path, deck: &str, system: &System) -> Results {
         self.try_run(folder, deck, system).unwrap_or_else(|said| panic!("{said}"))
     }
 
-    /// Runs one deck that CalculiX may give up on, as it does where its iterations do not converge.
+    /// Runs a deck that CalculiX may give up on, because its iterations do not converge.
     ///
     /// # Errors
-    /// What it said, if it ends with an error.
+    /// Output of CalculiX, if it ends with an error.
     ///
     /// # Panics
-    /// If it takes too long, or ends well without printing every node.
+    /// If it takes too long, or ends without an error and without printing every node.
     pub fn try_run(&self, folder: &Path, deck: &str, system: &System) -> Result<Results, String> {
         let text = self.printed(folder, deck)?;
         let read = |title| read_block(&text, title, system);
@@ -69,10 +69,10 @@ impl Ccx {
         }
     }
 
-    /// All that one deck prints.
+    /// Text that CalculiX prints for one deck.
     ///
     /// # Errors
-    /// What CalculiX said, if it ends with an error.
+    /// Output of CalculiX, if it ends with an error.
     ///
     /// # Panics
     /// If it takes too long.
@@ -95,7 +95,7 @@ impl Ccx {
     }
 }
 
-/// Waits for the end of the program, which closes its output; what it said, as an error if the
+/// Waits for the end of the program, which closes its output; returns the output, as an error if the
 /// program ended with one.
 fn wait(mut child: Child) -> Result<String, String> {
     let mut output = child.stdout.take().unwrap();
@@ -138,7 +138,7 @@ fn read_block(text: &str, title: &str, system: &System) -> Option<Vec<[Printed; 
 }
 
 impl Printed {
-    /// Reads Fortran's form, which leaves the `E` out where the exponent has three digits.
+    /// Parses a number in Fortran's form, which omits the `E` before an exponent of three digits.
     pub fn parse(text: &str) -> Option<Self> {
         let split = match text.find(['E', 'e', 'D']) {
             Some(at) => (&text[..at], &text[at + 1..]),

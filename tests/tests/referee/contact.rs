@@ -12,10 +12,10 @@ use crate::contact_deck::{INCREMENTS, Press, STICK_OF_PENALTY};
 use crate::object::{self, Object};
 
 const YOUNG: f64 = 2.0e4;
-/// Stiffness of CalculiX' penalty over Young's modulus and the object's size, Pa/m.
+/// Stiffness of CalculiX's penalty, relative to Young's modulus over the object's size.
 const PENALTY: f64 = 1e4;
 
-/// Displacement of every node, and what the upper plate does to the object.
+/// Displacement of every node, m, and force of the upper plate on the object, N.
 struct Found {
     displacement: Vec<[f64; 3]>,
     force: [f64; 3],
@@ -27,7 +27,7 @@ struct PressArguments {
     press: PressCommand,
 }
 
-/// What CalculiX says of the end of the way.
+/// Result of CalculiX at the end of the motion.
 fn by_calculix(ccx: &Ccx, folder: &Path, press: &Press<'_>) -> Found {
     let text = ccx.printed(folder, &press.deck()).unwrap_or_else(|said| panic!("{said}"));
     let numbers = |line: &str| -> Vec<f64> {
@@ -45,7 +45,7 @@ fn by_calculix(ccx: &Ccx, folder: &Path, press: &Press<'_>) -> Found {
     }
 }
 
-/// What `glove-client press` says of it, after some steps of rest; the object has next to no weight.
+/// Result of `glove-client press`, after some steps at rest; the object has almost no weight.
 fn by_press(folder: &Path, object: &Object, press: &Press<'_>) -> Found {
     let [low, high] = press.heights();
     let mut poses = format!("[0, 0, 0, {high:e}, 1, 0, 0, 0]");
@@ -86,8 +86,8 @@ fn by_press(folder: &Path, object: &Object, press: &Press<'_>) -> Found {
     }
 }
 
-/// How far both may be apart, m: how deep CalculiX' penalty lets the plates in, and how far its
-/// friction lets points slide that stick, on both sides.
+/// Largest difference between both, m: the penetration that CalculiX's penalty allows, and the sliding
+/// that its friction allows at sticking points, on both sides.
 fn give_of_penalty(press: &Press<'_>, found: &Found) -> f64 {
     let [low, high] = press.heights();
     let last = press.way.last().unwrap();

@@ -4,37 +4,37 @@ use std::fmt::Write as _;
 
 use softgrasp_core::mesh::{Surface, TetMesh};
 
-/// A press between two plates, each as high as the object's lowest or highest node at first.
+/// Press between two plates, which begin at the object's lowest and highest node.
 ///
 /// Units: m, Pa.
 pub struct Press<'a> {
     pub mesh: &'a TetMesh,
     pub young: f64,
     pub poisson: f64,
-    /// Of both plates; 0 leaves the object free to slide, and then three degrees of freedom that
-    /// feel no force are held.
+    /// Coefficient of friction of both plates. With 0 the object is free to slide, and three degrees of
+    /// freedom without forces are held.
     pub friction: f64,
-    /// Places that the upper plate goes to one after the other: along x, and down.
+    /// Positions of the upper plate, one after the other, m: along x, and down.
     pub way: &'a [[f64; 2]],
     /// Stiffness of the penalty, Pa/m.
     pub penalty: f64,
 }
 
-/// Increments of one piece of the way.
+/// Number of increments for each piece of the motion.
 pub const INCREMENTS: usize = 10;
 
-/// The stiffness against sliding while a point sticks, over that of the penalty.
+/// Ratio of the stiffness against sliding of a sticking point to that of the penalty.
 pub const STICK_OF_PENALTY: f64 = 0.1;
 
 impl Press<'_> {
-    /// Heights of the plates at first: that of the lowest node and that of the highest.
+    /// Heights of the plates at first, m: that of the lowest node and that of the highest.
     pub fn heights(&self) -> [f64; 2] {
         let (low, high) = self.mesh.bounds();
         [low.z, high.z]
     }
 
-    /// The deck. Nodes count from 1; those of the lower plate and then those of the upper one follow
-    /// the object's.
+    /// Input deck. Nodes count from 1; behind the object's are those of the lower plate, then those of
+    /// the upper one.
     pub fn deck(&self) -> String {
         let mut text = self.cells();
         text.push_str(&self.contact_cards());
@@ -60,7 +60,7 @@ impl Press<'_> {
         text
     }
 
-    /// Nodes and elements of the object and of two blocks, which are the plates.
+    /// Nodes and elements of the object, and of two blocks as plates.
     fn cells(&self) -> String {
         let mut text = String::from("*NODE, NSET=BODY\n");
         let mut node = 0;
@@ -141,7 +141,7 @@ impl Press<'_> {
         text
     }
 
-    /// Cards that keep the object from sliding and from turning about the vertical.
+    /// Cards that keep the object from sliding, and from rotating about the vertical.
     fn guides(&self) -> String {
         let (low, high) = self.mesh.bounds();
         let middle = nalgebra::center(&low, &high);

@@ -8,18 +8,20 @@ use softgrasp_protocol::{DofValue, LawName, Material};
 
 use crate::question::Question;
 
-/// Nodes of a system, mid-edge nodes behind the corners.
+/// Nodes of a system: corners, then mid-edge nodes.
 pub struct System {
     pub element: Element,
     pub vertices: Vec<Point3<f64>>,
-    /// Whether an element uses a node.
+    /// For each node, whether an element uses it.
     pub used: Vec<bool>,
     mesh: TetMesh,
 }
 
 impl System {
+    /// System of a mesh and an element.
+    ///
     /// # Panics
-    /// For an element that CalculiX has not.
+    /// For an element that CalculiX does not have.
     pub fn new(mesh: &TetMesh, element: Element) -> Self {
         let (vertices, used) = match element {
             Element::Tet4 => (mesh.vertices().to_vec(), mesh.used_nodes()),
@@ -33,7 +35,7 @@ impl System {
     }
 }
 
-/// The deck that `glove-client solve --export-deck` writes for the question.
+/// Input deck that `glove-client solve --export-deck` writes for the question.
 pub fn deck(system: &System, question: &Question) -> String {
     let values = |pairs: &[(u32, f64)]| -> Vec<DofValue> {
         pairs.iter().map(|&(dof, value)| DofValue { dof, value }).collect()

@@ -16,26 +16,26 @@ use crate::object::{self, Object};
 use crate::question::{Question, large_questions, questions};
 use crate::solved::Asked;
 
-/// Largest difference at large deformation, of the largest number: CalculiX stops its iterations at a
-/// residual of 1e-9 and sums its increments.
+/// Largest difference at large deformation, relative to the largest number: CalculiX stops its iterations
+/// at a residual of 1e-9 and sums its increments.
 const LARGE_AGREE: f64 = 2e-5;
 
-/// Numbers of every element, mean over its points.
+/// Values of every element, as means over its points.
 struct ElementMeans {
     stress: Vec<[Printed; 6]>,
     strain: Vec<[Printed; 6]>,
-    /// Energy for each unit of volume at rest.
+    /// Stored energy for each unit of volume at rest, J/m³.
     density: Vec<Printed>,
 }
 
-/// The deck that also prints stress, strain and energy of the elements at the end of the step.
+/// Input deck that also prints stress, strain and energy of the elements at the end of the step.
 fn deck_with_fields(system: &System, question: &Question) -> String {
     let deck = deck::deck(system, question);
     let (before, end) = deck.rsplit_once("*END STEP").unwrap();
     format!("{before}*EL PRINT, ELSET=BODY, FREQUENCY=100000\nS, E, ENER\n*END STEP{end}")
 }
 
-/// Rows `element point numbers…` under a heading, as means of the points of each element.
+/// Rows `element point numbers…` under a heading, as means over the points of each element.
 fn read_means<const K: usize>(text: &str, title: &str, elements: usize) -> Vec<[Printed; K]> {
     let mut lines = text.lines().skip_while(|line| !line.trim_start().starts_with(title)).skip(1);
     let rows = lines.by_ref().map(|line| line.split_whitespace().collect::<Vec<_>>());
@@ -79,7 +79,7 @@ impl ElementMeans {
     }
 }
 
-/// The fields of the elements from the server.
+/// Fields of the elements in the server's answer.
 fn answered(asked: &Asked, object: &Object, system: &System, question: &Question) -> FieldValues {
     let value = |&(dof, value): &(u32, f64)| DofValue { dof, value };
     let wanted = [Field::ElementStrain, Field::ElementStress, Field::ElementEnergy];

@@ -35,11 +35,11 @@ use crate::table::Table;
 /// Elements that CalculiX has too (C3D4 and C3D10).
 const ELEMENTS: [Element; 2] = [Element::Tet4, Element::Tet10];
 
-/// Systems of more nodes are asked the questions of the short form only: CalculiX takes half a
+/// Number of nodes above which only the questions of the short form are asked: CalculiX takes half a
 /// minute and more for each.
 const LARGE: usize = 8000;
 
-/// Asks both, and compares; adds to the table.
+/// Asks both programs, compares their answers, and adds a row to the table.
 fn compare(ccx: &Ccx, folder: &Path, asked: &Asked, objects: &[Object]) {
     let mut table = Table::default();
     for object in objects {
@@ -86,16 +86,16 @@ fn files_of_others_agree_to_the_digits_that_calculix_prints() {
     compare(&ccx, folder.path(), &Asked::new(), &objects);
 }
 
-/// Share of the largest number by which answers at large deformation may differ. CalculiX stops its
+/// Largest difference of answers at large deformation, relative to the largest number. CalculiX stops its
 /// iterations at a residual of 1e-9 and sums its increments.
 const LARGE_AGREE: f64 = 1e-5;
 
-/// Halvings of a motion until CalculiX must have followed it.
+/// Number of halvings of a motion until CalculiX must have followed it.
 const HALVINGS: usize = 2;
 
-/// The question with the largest of its motion, its half and its quarter that CalculiX follows to
-/// the end, and what it printed. On some meshes its iterations do not converge for the whole of it,
-/// however small it makes its increments.
+/// Question with the largest of its motion, its half and its quarter that CalculiX follows to the end,
+/// and the numbers that it printed. On some meshes its iterations do not converge for the whole motion,
+/// however small its increments.
 fn followed(ccx: &Ccx, folder: &Path, system: &System, asked: Question) -> (Question, Results) {
     let mut question = asked;
     for _ in 0..HALVINGS {

@@ -1,4 +1,4 @@
-//! The objects that are compared: built-in ones, and mesh files of others.
+//! Objects that are compared: built-in ones, and mesh files of other authors.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use glove_client::object::mesh_file::read_mesh_file;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_tests::shared::shared;
 
-/// A mesh and the file it was read from.
+/// Mesh, and the file that it was read from.
 pub struct Object {
     pub name: String,
     pub file: PathBuf,
@@ -21,7 +21,7 @@ struct MeshArguments {
     mesh: MeshCommand,
 }
 
-/// Whether the long form is asked for.
+/// Whether the full form is asked for.
 pub fn is_full() -> bool {
     std::env::var("SOFTGRASP_REFEREE").is_ok_and(|form| form == "full")
 }
@@ -33,7 +33,7 @@ impl Object {
     }
 }
 
-/// The built-in objects, each written by `glove-client mesh` and read again.
+/// Built-in objects, each written by `glove-client mesh` and read again.
 pub fn built_in(folder: &Path, nodes: usize) -> Vec<Object> {
     let nodes = nodes.to_string();
     let make = |shape: BuiltIn| {
@@ -45,8 +45,8 @@ pub fn built_in(folder: &Path, nodes: usize) -> Vec<Object> {
     BuiltIn::ALL.into_iter().map(make).collect()
 }
 
-/// Files of `shared/meshes`, in the order of their names; in the short form those of few nodes.
-/// Says that the test is skipped when there is no such folder.
+/// Files of `shared/meshes`, in the order of their names; in the short form those of few nodes. `None`,
+/// with a line that the test is skipped, if there is no such folder.
 pub fn files() -> Option<Vec<Object>> {
     let entries = std::fs::read_dir(shared("meshes")?).unwrap().map(|entry| entry.unwrap().path());
     // An .ele file is read with its .node file.
@@ -63,5 +63,5 @@ pub fn files() -> Option<Vec<Object>> {
     Some(objects.filter(|o| is_full() || o.mesh.node_count() <= SHORT_NODES_MAX).collect())
 }
 
-/// Nodes of a file in the short form, which has to leave time for the other tests.
+/// Largest number of nodes of a file in the short form, which must leave time for other tests.
 const SHORT_NODES_MAX: usize = 360;

@@ -1,4 +1,4 @@
-//! The questions about an object: several sets of known displacements, and external forces.
+//! Questions about an object: several sets of known displacements, and external forces.
 
 use softgrasp_core::fem::{Element, Material, dof};
 use softgrasp_core::model::Model;
@@ -11,28 +11,28 @@ use crate::solved::Way;
 #[derive(Clone)]
 pub struct Question {
     pub name: &'static str,
-    /// Which way of the product answers it.
+    /// Way of the product that answers the question.
     pub way: Way,
-    /// Asked in the short form too.
+    /// Whether the short form asks it too.
     pub is_short: bool,
     pub young: f64,
     pub poisson: f64,
-    /// Ascending.
+    /// Known displacements, ascending by degree of freedom, m.
     pub known: Vec<(u32, f64)>,
-    /// On degrees of freedom that are not known.
+    /// Forces on degrees of freedom that are not known, N.
     pub forces: Vec<(u32, f64)>,
-    /// Whether it is one of large deformation.
+    /// Whether the question is about large deformation.
     pub is_large: bool,
 }
 
-/// Displacements of a set, as a part of the size of the object.
+/// Largest displacement of a set, relative to the size of the object.
 const PART: f64 = 0.01;
 
-/// Nodes beyond those that just hold: the fewest can be so weak a hold that CalculiX does not give
-/// all of its seven digits again when the nodes are numbered otherwise.
+/// Number of held nodes beyond those that just hold: with the fewest the hold can be so weak that
+/// CalculiX does not repeat all of its seven digits when the nodes are numbered otherwise.
 const SPARE: usize = 2;
 
-/// Four questions, each answered another way; the ways change places with the element.
+/// Four questions, each answered in another way; which one, depends on the element.
 pub fn questions(object: &Object, system: &System) -> Vec<Question> {
     let is_linear = system.element == Element::Tet4;
     let corners = Corners::new(object);
@@ -78,8 +78,8 @@ pub fn questions(object: &Object, system: &System) -> Vec<Question> {
     all.filter(|q| q.known.iter().chain(&q.forces).any(|(_, value)| *value != 0.0)).collect()
 }
 
-/// Low nodes held, high ones pushed by several per cent of the size: the object bends and is
-/// compressed far beyond what linear elasticity is for.
+/// Questions with low nodes held and high ones pushed by several per cent of the size: the object bends
+/// and is compressed far beyond the range of linear elasticity.
 pub fn large_questions(object: &Object) -> Vec<Question> {
     let pushed = |poisson: f64| {
         let mut known = Corners::new(object).held_and_pushed(true);
@@ -99,18 +99,18 @@ pub fn large_questions(object: &Object) -> Vec<Question> {
     all.filter(|q| q.known.iter().any(|(_, value)| *value != 0.0)).collect()
 }
 
-/// Motion of a question of large deformation over that of the others.
+/// Ratio of the motion of a question about large deformation to that of the others.
 const LARGE_OVER_SMALL: f64 = 8.0;
 
 impl Question {
-    /// The same question with half the motion.
+    /// The question with half the motion.
     pub fn halved(mut self) -> Self {
         self.known.iter_mut().for_each(|(_, value)| *value /= 2.0);
         self
     }
 }
 
-/// The corners of an object that elements use.
+/// Corners of an object that elements use.
 struct Corners<'a> {
     object: &'a Object,
     nodes: Vec<usize>,
@@ -132,9 +132,8 @@ impl<'a> Corners<'a> {
         self.model.check_held(&dofs, &[]).is_ok()
     }
 
-    /// As few nodes as hold every body, and [`SPARE`] more so that it is not held by a hair, spread
-    /// over the object, displaced without a pattern; `takes(place, axis)` tells which axes of the
-    /// node at a place of the list are known.
+    /// As few nodes as hold every body, and [`SPARE`] more, spread over the object and displaced at
+    /// random; `takes(place, axis)` tells which axes of the node at a position in the list are known.
     fn few(&self, takes: impl Fn(usize, usize) -> bool) -> Vec<(u32, f64)> {
         let size = self.object.mesh.size();
         let last = self.nodes.len() - 1;
@@ -157,8 +156,8 @@ impl<'a> Corners<'a> {
         known_of((fewest + SPARE).min(last + 1))
     }
 
-    /// The lowest tenth held, or more where that does not hold every body; if `is_pushed`, the
-    /// highest tenth pushed down and aside.
+    /// The lowest tenth held, or more if that does not hold every body; with `is_pushed` also the highest
+    /// tenth pushed down and aside.
     fn held_and_pushed(&self, is_pushed: bool) -> Vec<(u32, f64)> {
         let (mesh, size) = (&self.object.mesh, self.object.mesh.size());
         let (low, high) = mesh.bounds();
@@ -181,7 +180,7 @@ impl<'a> Corners<'a> {
         panic!("{}: all nodes together do not hold it", self.object.name);
     }
 
-    /// Forces on up to five nodes that are not held.
+    /// Forces on at most five nodes that are not held.
     fn forces(&self, known: &[(u32, f64)], young: f64) -> Vec<(u32, f64)> {
         let is_free = |n: &usize| known.binary_search_by_key(&(3 * *n as u32), |k| k.0).is_err();
         let free: Vec<usize> = self.nodes.iter().copied().filter(is_free).collect();

@@ -1,4 +1,4 @@
-//! Answers of Softgrasp: by its program, by its server over a socket, by its mathematics.
+//! Answers of Softgrasp: by its program, by its server over a socket, by its core.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,26 +19,26 @@ use crate::deck::System;
 use crate::object::Object;
 use crate::question::Question;
 
-/// A way to an answer, each with another method.
+/// Way to an answer, each with another method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// `glove-client solve --method auto`, files in and a file out.
+    /// `glove-client solve --method auto`, with files.
     Program,
-    /// A request to a server with reactions wanted, `condensed` for linear elements.
+    /// Request to a server, with reactions; `condensed` for linear elements.
     Socket,
-    /// `Model` and the sparse factor, mid-edge nodes too.
+    /// `Model` and the sparse factor of the core, mid-edge nodes included.
     Core,
 }
 
-/// An answer of ours.
+/// Answer of Softgrasp.
 pub struct Found {
-    /// Per node; of the corners, or of the whole system.
+    /// Displacement of each node, m; of the corners, or of the whole system.
     pub displacement: Vec<[f64; 3]>,
-    /// Force at every known degree of freedom, in the question's order; empty if the way has none.
+    /// Force at every known degree of freedom, N, in the question's order; empty if the way has none.
     pub reaction: Vec<f64>,
 }
 
-/// Where questions go.
+/// Server that questions are sent to.
 pub struct Asked {
     server: RunningServer,
 }
@@ -57,7 +57,7 @@ impl Asked {
         Self { server: fea_server::start(config).unwrap() }
     }
 
-    /// The answer by the question's way.
+    /// Answer in the question's way.
     pub fn answer(
         &self,
         object: &Object,
@@ -72,7 +72,7 @@ impl Asked {
         }
     }
 
-    /// A connection to the server.
+    /// Connection to the server.
     pub fn connection(&self) -> ServerConnection {
         ServerConnection::connect(self.server.address().to_string()).unwrap()
     }
@@ -123,7 +123,7 @@ fn by_core(object: &Object, system: &System, question: &Question) -> Found {
     Found { displacement: displacement.to_vec(), reaction: solution.reaction }
 }
 
-/// Tables of the command contract in, one out.
+/// Answer of the program, by tables of the command contract.
 fn by_program(object: &Object, system: &System, question: &Question, folder: &Path) -> Found {
     let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     let (known, forces, out) = (path("K.csv"), path("F.csv"), path("U.csv"));
@@ -172,7 +172,7 @@ fn reactions_at(table: &[(u32, [f64; 3])], known: &[(u32, f64)]) -> Vec<f64> {
     known.iter().map(|(dof, _)| at(*dof)).collect()
 }
 
-/// A table with a row per node; directions that are not named stay empty.
+/// Table with a row for each node; directions that are not named stay empty.
 fn rows(header: &str, values: &[(u32, f64)]) -> String {
     let mut text = format!("{header}\n");
     for of_node in values.chunk_by(|a, b| a.0 / 3 == b.0 / 3) {

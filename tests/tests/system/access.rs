@@ -1,4 +1,4 @@
-//! Who may come: tokens, encryption, strangers.
+//! Access: tokens, encryption, connections that have not introduced themselves.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use crate::start::config;
 
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// A certificate and key of this machine, in a folder that lives as long as this does.
+/// Certificate and key of this machine, in a folder that is removed with this value.
 struct Pair {
     certificate: PathBuf,
     key: PathBuf,

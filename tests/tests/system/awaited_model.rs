@@ -23,10 +23,10 @@ use softgrasp_tests::watchdog::until;
 use crate::controlled::summary;
 use crate::settings::linear_settings;
 
-/// Longer than anything here takes.
+/// Time after which a test gives up waiting.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A server that has prepared the model when it is told so, and answers nothing else.
+/// Server that has prepared the model when it is told so, and answers nothing else.
 fn slow_server(is_prepared: Receiver<()>) -> SocketAddr {
     let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
     let address = listener.local_addr().unwrap();

@@ -1,5 +1,5 @@
-//! Requests that make no sense: refused with the right code and a text that names the fault, and
-//! the session goes on.
+//! Invalid requests: refused with the right code and a text that names the fault, and the session goes
+//! on. the session goes on.
 
 use fea_server::{RunningServer, ServerConfig};
 use glove_client::ask::connection::ServerConnection;
@@ -14,7 +14,7 @@ use softgrasp_tests::questions::{MATERIAL, Once, cube, frame, once, question, up
 
 use crate::start::{answer, client, config, refusal, server};
 
-/// One session that alternates bad requests and a good one.
+/// Session that alternates invalid requests and a valid one.
 struct Bench {
     // Stops when dropped.
     _server: RunningServer,
@@ -33,8 +33,8 @@ impl Bench {
         Self { _server: server, connection, good }
     }
 
-    /// The request is refused with `code` and a text that holds every one of `says`; then the good
-    /// request gets the same bits as before.
+    /// Checks that the request is refused with `code` and a text that contains all of `says`, and that
+    /// the valid request then gets the same bits as before.
     fn refuses(&mut self, request: &Request, code: RejectCode, says: &[&str]) {
         let (found, text) = refusal(&mut self.connection, request);
         assert_eq!(found, code, "{text}");
@@ -46,7 +46,7 @@ impl Bench {
         assert_eq!(again, self.good, "after: {text}");
     }
 
-    /// The same for the good one-shot request after a change.
+    /// Checks the refusal of the valid request with its own mesh after a change.
     fn refuses_changed(&mut self, change: impl Fn(&mut Once), code: RejectCode, says: &[&str]) {
         let mut request = once(&cube(27), "sparse-cholesky");
         change(&mut request);

@@ -16,10 +16,10 @@ use softgrasp_tests::watchdog::{until, within};
 use crate::start::{answer, client, config, server};
 
 const LIMIT: Duration = Duration::from_secs(120);
-/// The grace time of a stop, and some more for a busy machine.
+/// Longest time of a stop: the grace time, and some more for a busy machine.
 const STOP_MAX: Duration = Duration::from_secs(10);
 
-/// Another session that must not notice anything.
+/// Another session that must not be affected.
 struct Bystander {
     connection: ServerConnection,
     request: Request,
@@ -51,7 +51,7 @@ fn ping(nonce: u64) -> Request {
     Request::Ping { nonce }
 }
 
-/// The code and text of a refusal.
+/// Code and text of a refusal.
 fn rejected(reply: Reply) -> (RejectCode, String) {
     match reply {
         Reply::Rejected(rejected) => (rejected.code, rejected.text),
@@ -59,7 +59,7 @@ fn rejected(reply: Reply) -> (RejectCode, String) {
     }
 }
 
-/// Sends bytes that are no frames: at most one refusal with id 0 comes, then the end.
+/// Sends bytes that are no frames; returns the refusal with id 0, if one comes before the end.
 fn last_words(address: SocketAddr, bytes: &[u8]) -> Option<(RejectCode, String)> {
     let mut session = RawSession::open(address);
     session.send(bytes);

@@ -13,7 +13,7 @@ use crate::start::{client, refusal, server};
 
 const STILL: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
-/// An object above a table, and a finger that comes down on it.
+/// Object above a table, and a finger that comes down on it.
 struct Scene {
     mesh: TetMesh,
     surface: Surface,
@@ -83,7 +83,7 @@ fn advance(connection: &mut ServerConnection, frame: ContactFrame) -> ContactAns
     }
 }
 
-/// An answer without what may differ: times and memory.
+/// Answer as text, without times and memory.
 fn bits(mut answer: ContactAnswer) -> String {
     answer.answer.report = Default::default();
     answer.contact.columns_computed = 0;
@@ -221,7 +221,7 @@ fn auto_is_linear_for_a_touch_and_large_for_a_press() {
     }
 }
 
-/// Puts something wrong into a frame.
+/// Change that makes a contact frame invalid.
 type Damage = fn(&mut ContactFrame);
 
 #[test]
@@ -310,7 +310,7 @@ fn fields_of_contact_frames_are_those_of_their_forces_and_change_nothing() {
     }
 }
 
-/// Forces at nodes add up to those of the bodies, and pressure is where they are.
+/// Checks that forces at nodes add up to those of the bodies, and that pressure is only where they are.
 fn check_fields(step: &ContactAnswer) {
     let [fields] = &step.answer.fields[..] else { panic!("{} fields", step.answer.fields.len()) };
     let [_, _, _, w, x, y, z] = step.state.pose;

@@ -102,7 +102,7 @@ fn stiffer_object_takes_more_force_to_squeeze_and_stays_in_the_hand() {
     run.assert_told(NoticeKind::Refused, "the material is not taken");
 }
 
-/// A hand that squeezes the object as it is now.
+/// Scripted hand that squeezes the object in its present shape.
 fn scripted_again(run: &Controlled) -> Box<softgrasp_hand::hand_source::HandSource> {
     let hand = softgrasp_hand::scripted::ScriptedHand::try_new(
         ScriptName::Squeeze,
@@ -112,7 +112,7 @@ fn scripted_again(run: &Controlled) -> Box<softgrasp_hand::hand_source::HandSour
     Box::new(hand.unwrap().into())
 }
 
-/// The nodes that were saved are the nodes as they are now, and the inside follows.
+/// Checks that the saved nodes are the present ones, and that the inside follows.
 fn assert_saved(path: &Path, run: &Controlled) {
     let saved = read_mesh_file(path).unwrap().mesh;
     let object = run.object();

@@ -1,4 +1,4 @@
-//! A run in lockstep that a test controls as a person would: by wishes between the ticks.
+//! Run in lockstep that a test controls as a person would, by wishes between the ticks.
 
 use std::time::Duration;
 
@@ -28,12 +28,12 @@ use softgrasp_window::view::control::Control;
 use crate::settings::linear_settings;
 use crate::start::server;
 
-/// What the object is made of in these tests.
+/// Material of the objects in these tests.
 pub const MATERIAL: Material = Material { young: 2.0e4, poisson: 0.4 };
-/// Ticks after which nothing that is waited for can still come.
+/// Number of ticks after which a test gives up waiting.
 const TICKS_MAX: usize = 3000;
 
-/// A run, its server, and what has been told.
+/// Run with its server, and the sentences that were told.
 pub struct Controlled {
     pub session: Session,
     pub notices: Vec<Notice>,
@@ -41,12 +41,12 @@ pub struct Controlled {
     _server: RunningServer,
 }
 
-/// How they are solved.
+/// Settings of the solves.
 fn settings() -> SolveSettings {
     SolveSettings { material: MATERIAL, ..linear_settings() }
 }
 
-/// A summary for the report.
+/// Summary of an object for the report.
 pub fn summary(object: &SoftObject) -> ObjectSummary {
     ObjectSummary {
         name: "an object".to_owned(),
@@ -58,13 +58,13 @@ pub fn summary(object: &SoftObject) -> ObjectSummary {
 }
 
 impl Controlled {
-    /// A mouse hand before an object.
+    /// Run with a mouse hand before an object.
     pub fn by_mouse(mesh: TetMesh) -> Self {
         let mouse = MouseHand::new(HandSetup::default(), Planner::waited(), 1.0 / 60.0);
         Self::new(SoftObject::try_new(mesh).unwrap(), mouse.into())
     }
 
-    /// A mouse hand before an object that lies on a table and is grasped by contact with friction.
+    /// Run with a mouse hand before an object that is on a table and is grasped by contact with friction.
     pub fn by_mouse_with_friction(mesh: TetMesh) -> Self {
         let object = SoftObject::try_new(lying(&mesh).unwrap().0).unwrap();
         let mouse = MouseHand::new(HandSetup::default(), Planner::waited(), 1.0 / 60.0)
@@ -76,7 +76,7 @@ impl Controlled {
         })
     }
 
-    /// A script before an object.
+    /// Run with a script before an object.
     pub fn by_script(mesh: TetMesh, script: ScriptName) -> Self {
         let object = SoftObject::try_new(mesh).unwrap();
         let hand = ScriptedHand::try_new(script, HandSetup::default(), &object).unwrap();
@@ -112,7 +112,7 @@ impl Controlled {
         Self { session, notices: Vec::new(), tick: 0, _server: server }
     }
 
-    /// One tick.
+    /// Plays one tick.
     pub fn tick(&mut self) -> TickOutcome {
         let due = Due { tick: self.tick, skipped: 0 };
         self.tick += 1;
@@ -121,13 +121,13 @@ impl Controlled {
         outcome
     }
 
-    /// Asks for something and plays a tick.
+    /// Sends a control and plays a tick.
     pub fn ask(&mut self, control: Control) -> TickOutcome {
         self.session.apply(control);
         self.tick()
     }
 
-    /// Plays until something is so.
+    /// Plays until `done` holds.
     pub fn until(&mut self, what: &str, done: impl Fn(&Self, &TickOutcome) -> bool) {
         for _ in 0..TICKS_MAX {
             let outcome = self.tick();
@@ -143,7 +143,7 @@ impl Controlled {
         self.until(&format!("{state}"), |_, outcome| outcome.state == Some(state));
     }
 
-    /// Plays until the object has been deformed for so many ticks.
+    /// Plays until the object has been deformed for `ticks` ticks.
     pub fn deform(&mut self, ticks: usize) {
         self.until_state(StateName::Deforming);
         for _ in 0..ticks {
@@ -151,18 +151,18 @@ impl Controlled {
         }
     }
 
-    /// The object as it is now.
+    /// Object in its present shape.
     pub fn object(&self) -> &SoftObject {
         self.session.grasp_loop().object()
     }
 
-    /// The last thing that was told, which must be of this kind and hold these words.
+    /// Checks that the last sentence is of this kind and contains these words.
     pub fn assert_told(&self, kind: NoticeKind, words: &str) {
         let last = self.notices.last().expect("nothing was told");
         assert!(last.kind == kind && last.text.contains(words), "{:?}", self.notices);
     }
 
-    /// The end.
+    /// Ends the run; its report.
     pub fn finish(self) -> RunReport {
         self.session.finish(false).unwrap()
     }

@@ -16,9 +16,9 @@ use softgrasp_tests::watchdog::within;
 use crate::start::{answer, client, config};
 
 const CLIENTS: usize = 8;
-/// One round takes less than a second on two cores.
+/// Time limit of a round, which takes less than a second on two cores.
 const LIMIT: Duration = Duration::from_secs(100);
-/// Rounds for each number of threads, where `CROWD_ROUNDS` does not say another.
+/// Number of rounds for each number of threads, unless `CROWD_ROUNDS` says another.
 const ROUNDS: usize = 8;
 
 /// Five touched nodes, far apart.
@@ -33,7 +33,7 @@ fn grip(push: f64) -> Vec<DofValue> {
     TOUCHED.iter().enumerate().flat_map(of_node).collect()
 }
 
-/// What every client does at the same moment as the others; the displacements it was answered.
+/// Conversation of every client, at the same time as the others; hashes of its displacements.
 fn hold_conversation(server: &RunningServer, mesh: &TetMesh) -> Vec<u64> {
     let mut connection = client(server);
     let uploaded = connection.ask(&Request::UploadModel(upload(mesh))).unwrap();

@@ -1,4 +1,4 @@
-//! What an object that has flowed looks like when the hand lets go.
+//! Shape of an object that has flowed, after the hand lets go.
 
 use glove_client::ask::link::Link;
 use glove_client::ask::solve_settings::Elasticity;
@@ -17,8 +17,8 @@ use softgrasp_protocol::{Deformation, LawName};
 use crate::settings::{linear_settings, sized};
 use crate::start::server;
 
-/// How deep the largest dent of a squeezed strawberry is, over how far it was pressed in, and how
-/// many rest shapes it has had.
+/// Depth of the largest dent of a squeezed strawberry, relative to the depth of the press, and number of
+/// its rest shapes.
 fn squeezed(mesh: &TetMesh, yield_stress: f64, pace: Pace) -> (f64, u64) {
     let server = server(2);
     let object = SoftObject::try_new(mesh.clone()).unwrap();

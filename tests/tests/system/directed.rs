@@ -1,5 +1,5 @@
-//! The first minute as it is seen from the eye that is left to the window: what is lifted stays in the
-//! picture, and the dent that is kept is seen.
+//! The first minute in the default view of the window: a lifted object stays in the picture, and a kept
+//! dent is visible.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::mesh::BuiltIn;
@@ -16,11 +16,11 @@ use softgrasp_hand::hand_source::HandSource;
 
 use crate::lift::{Lift, object};
 
-/// Width over height of the smallest window that is tried, and its height in pixels.
+/// Width over height of the smallest window that is tested, and its height in pixels.
 const ASPECT: f64 = 800.0 / 600.0;
 const HEIGHT: f64 = 600.0;
 
-/// Plays the story; the eye after every tick, and the frame.
+/// Plays the story; `seen` gets the frame and the view after every tick. Returns the last frame.
 fn story(mut seen: impl FnMut(&ViewFrame, &ViewCamera)) -> ViewFrame {
     let mesh = object(BuiltIn::Strawberry, 1000, 0.08);
     let mut lift = Lift::of(mesh, ContactScene::default());
@@ -42,7 +42,7 @@ fn story(mut seen: impl FnMut(&ViewFrame, &ViewCamera)) -> ViewFrame {
     last.unwrap()
 }
 
-/// Where a place is in the picture, pixels from its middle.
+/// Position of a point in the picture, pixels from its middle.
 fn pixels(camera: &ViewCamera, place: &Point3<f64>) -> Vector3<f64> {
     let (at, _) = camera.project(place, ASPECT).unwrap();
     0.5 * HEIGHT * Vector3::new(at.x, at.y, 0.0)

@@ -13,7 +13,7 @@ use crate::start::server;
 
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// A conversation, what is heard in it undisturbed, and its bytes.
+/// Conversation, its undisturbed replies, and its bytes.
 struct Reference {
     conversation: Conversation,
     heard: Vec<Heard>,
@@ -29,7 +29,7 @@ fn reference(proxy: &FaultyProxy) -> Reference {
     Reference { conversation, heard, bytes: proxy.recorded() }
 }
 
-/// Offsets behind each frame of a stream.
+/// Offsets of the ends of the frames in a stream.
 fn frame_ends(stream: &[u8]) -> Vec<u64> {
     let mut ends = Vec::new();
     let mut at = 0;
@@ -42,7 +42,7 @@ fn frame_ends(stream: &[u8]) -> Vec<u64> {
     ends
 }
 
-/// Every frame of a stream cut at `offset`, where it is long enough.
+/// Pieces of a stream in which every frame is cut at `offset`, if it is long enough.
 fn cut_in_each_frame(ends: &[u64], offset: u64) -> Pieces {
     let starts = std::iter::once(0).chain(ends.iter().copied());
     let cuts = starts.zip(ends).map(|(start, &end)| (start + offset, end));
@@ -173,7 +173,7 @@ fn recorded_conversation_decodes_the_same_from_memory_cut_anywhere() {
     }
 }
 
-/// Frames of a stream that comes in pieces, with a look after every piece.
+/// Frames of a stream that comes in pieces, with an attempt to read after every piece.
 fn frames(stream: &[u8], cuts: &[usize]) -> Vec<softgrasp_protocol::Frame> {
     let mut buffer = FrameBuffer::new(Limits::default());
     let mut taken = Vec::new();

@@ -1,4 +1,4 @@
-//! The condensed engine, subscriptions, prefetch and ten-node elements, end to end.
+//! The method `condensed`, subscriptions, prefetch and ten-node elements, end to end.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use softgrasp_tests::watchdog::until;
 
 use crate::start::{answer, client, config, refusal, server};
 
-/// Five contacts of a hand, each with its own push.
+/// Five contacts of a hand, each with its own displacement.
 fn contacts(mesh: &TetMesh, push: f64) -> Vec<DofValue> {
     let last = mesh.node_count() as u32 - 1;
     let mut nodes = [0, 5, last / 2, last - 9, last];
@@ -23,7 +23,7 @@ fn contacts(mesh: &TetMesh, push: f64) -> Vec<DofValue> {
     values.map(|dof| DofValue { dof, value: push * 1e-3 * f64::from(dof).sin() }).collect()
 }
 
-/// A question about a kept model.
+/// Question about a kept model.
 fn asking(model: ModelHash, question: Question) -> Request {
     Request::from(Ask::new(model, question))
 }
@@ -85,7 +85,7 @@ fn condensed_frames_equal_the_factor_s_and_say_how_wrong_they_can_be() {
     }
 }
 
-/// The proof runs beside the frames; once it is there every frame carries its bound.
+/// The proof runs in the background; once it is done every answer carries its bound.
 #[test]
 fn proven_bound_arrives_and_is_above_the_true_error() {
     let server = server(1);

@@ -19,7 +19,7 @@ fn mesh() -> MeshData {
     mesh_data(&generate(BuiltIn::Strawberry, 150).unwrap())
 }
 
-/// Low nodes held, high ones pushed aside.
+/// Known displacements: low nodes held, high ones pushed aside.
 fn known(mesh: &MeshData, push: f64) -> Vec<DofValue> {
     let heights = mesh.vertices.iter().map(|place| place[2]);
     let (low, high) = heights
@@ -56,7 +56,7 @@ fn answer(connection: &mut ServerConnection, ask: Ask) -> Answer {
     }
 }
 
-/// Work of the reactions along the known displacements.
+/// Work of the reactions along the known displacements, J.
 fn work(known: &[DofValue], answer: &Answer) -> f64 {
     let of =
         |dof: u32| known.iter().find(|known| known.dof == dof).map_or(0.0, |known| known.value);

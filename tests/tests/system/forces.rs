@@ -17,7 +17,7 @@ use softgrasp_protocol::ElementName;
 use crate::settings::linear_settings;
 use crate::start::server;
 
-/// Forces of a run by tick and state, until the script is over.
+/// Plays a squeeze to the end of the script; `see` is called after each tick with the state.
 fn squeeze(contact: ContactModel, forces: bool, mut see: impl FnMut(&GraspLoop, StateName)) {
     let server = server(1);
     let object = SoftObject::try_new(generate(BuiltIn::Strawberry, 400).unwrap()).unwrap();

@@ -21,7 +21,7 @@ use softgrasp_tests::raw_session::{RawSession, request_frame};
 use crate::settings::linear_settings;
 use crate::start::{answer, client, server};
 
-/// The same mesh after a squeeze: another rest shape, another model.
+/// Mesh after a squeeze: another rest shape, and another model.
 fn kept(mesh: &TetMesh) -> TetMesh {
     let squeezed = mesh.vertices().iter().map(|p| {
         let mut p = *p;

@@ -23,7 +23,7 @@ use softgrasp_hand::sent::Sent;
 use crate::settings::{linear_settings, sized};
 use crate::start::server;
 
-/// A run in lockstep whose hand pinches, lifts and puts down.
+/// Run in lockstep whose hand pinches, lifts and puts down.
 pub struct Lift {
     pub grasp_loop: GraspLoop,
     pub hand: ScriptedHand,
@@ -56,7 +56,7 @@ impl Lift {
         Self { grasp_loop, hand, seen: Seen::default(), tick: 0, server: Some(server) }
     }
 
-    /// One tick; `None` when the script is over.
+    /// Plays one tick; `None` when the script is over.
     pub fn tick(&mut self) -> Option<TickOutcome> {
         let sent = self.hand.next(&self.seen, self.grasp_loop.object());
         (!sent.over).then(|| self.send(&sent))
@@ -69,7 +69,7 @@ impl Lift {
         outcome
     }
 
-    /// Height of the object above where it began, m.
+    /// Height of the object above its first position, m.
     fn height(&self) -> f64 {
         self.grasp_loop.world_from_object().translation.y
     }
@@ -86,7 +86,7 @@ impl Lift {
         heights.fold(f64::INFINITY, f64::min) - table_y.unwrap()
     }
 
-    /// How deep the shown hand is in the shown object, m.
+    /// Penetration of the shown hand into the shown object, m.
     fn shown_depth(&self) -> f64 {
         let (grasp_loop, Some(hand)) = (&self.grasp_loop, self.grasp_loop.hand()) else {
             return 0.0;

@@ -10,7 +10,7 @@ use softgrasp_tests::questions::{object, question, squeeze, upload};
 
 use crate::start::{client, server};
 
-/// Error that is wanted, relative.
+/// Relative error that is asked for.
 const WANTED: f64 = 2e-3;
 
 fn ask(connection: &mut ServerConnection, mesh: &TetMesh, ask: LargeAsk, live: bool) -> Answer {

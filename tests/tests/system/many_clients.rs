@@ -1,4 +1,4 @@
-//! Several clients at once: no answer depends on the other clients.
+//! Several clients at the same time: no answer depends on the others.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use crate::start::{answer, client, config, refusal, server};
 const LIMIT: Duration = Duration::from_secs(120);
 const ROUNDS: usize = 4;
 
-/// Eight clients' requests: different meshes and methods, kept models and whole requests.
+/// Requests of eight clients: different meshes and methods, kept models and requests with their own mesh.
 fn clients() -> Vec<Vec<Request>> {
     let meshes = [
         cube(64),

@@ -25,7 +25,7 @@ fn masks_of(lists: &[&[(u32, f64)]]) -> Masks {
     masks
 }
 
-/// The masks, each with a push of its own, and nothing else.
+/// Question with the masks, each with its own displacement, and no other known displacements.
 fn holding(lists: &[&[(u32, f64)]], method: &str) -> Question {
     let push = |i: usize| [1e-3 * (i as f64).sin(), -2e-3, 1e-3 * (i as f64).cos()];
     Question {
@@ -58,7 +58,7 @@ impl Scene {
         Request::from(Ask::new(self.model, question))
     }
 
-    /// The question is refused with words; then a good one is answered.
+    /// Checks that the question is refused with words, and that a valid one is then answered.
     fn refuses(&mut self, question: Question, code: RejectCode, says: &[&str]) {
         let request = self.frame(question);
         let (found, text) = refusal(&mut self.connection, &request);
@@ -100,7 +100,7 @@ fn means_are_as_asked_and_forces_balance() {
     assert!(said.contains("masks"), "{said}");
 }
 
-/// A mask of one node is that node, also where the scene fixes nodes; support forces too.
+/// A mask of one node is the same as that node, also where the model fixes nodes; support forces too.
 #[test]
 fn masks_of_one_node_answer_as_known_displacements_do() {
     let server = server(1);
@@ -131,7 +131,7 @@ fn masks_of_one_node_answer_as_known_displacements_do() {
     }
 }
 
-/// What a mask presses on a fixed node is not counted as the support's force.
+/// The force of a mask on a fixed node does not count as the support's force.
 #[test]
 fn supports_carry_what_the_masks_press() {
     let server = server(1);

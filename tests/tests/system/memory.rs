@@ -16,7 +16,7 @@ use softgrasp_tests::questions::{
 
 use crate::start::{answer, client, config, refusal};
 
-/// Needs of the squeezed mesh by `front` and `front-mixed`, counted.
+/// Counted memory needs of the squeezed mesh by `front` and `front-mixed`.
 fn counted(mesh: &TetMesh, element: Element) -> [Need; 2] {
     counted_for(mesh, element, squeeze(mesh, 1.0).iter().map(|known| known.dof).collect())
 }

@@ -15,7 +15,7 @@ fn wish(run: &mut Controlled, input: MouseInput) {
     run.ask(Control::Mouse(input));
 }
 
-/// Waits until the hand has done what it does by itself.
+/// Waits until the hand has finished its own motion.
 fn arrive(run: &mut Controlled) {
     let on_its_way = |run: &Controlled| match run.session.hand() {
         HandSource::Mouse(hand) => hand.is_on_its_way(),
@@ -27,7 +27,7 @@ fn arrive(run: &mut Controlled) {
     run.until("the hand is there", |run, _| !on_its_way(run));
 }
 
-/// Reaches and closes all fingers to the planned press.
+/// Reaches the object and closes all fingers to the planned press.
 fn grasp(run: &mut Controlled) {
     wish(run, MouseInput::Reach);
     arrive(run);

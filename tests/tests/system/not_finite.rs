@@ -11,8 +11,8 @@ use softgrasp_tests::questions::{METHODS, cube, once, question, squeeze, upload}
 
 use crate::start::{client, server};
 
-/// Factors of displacements, of forces and of Young's modulus that leave the range of squares, of
-/// products with the stiffness, and of numbers.
+/// Factors of displacements, forces and Young's modulus that exceed the range of squares, of products
+/// with the stiffness, or of numbers.
 const SCALES: [f64; 9] = [1e308, 1e300, 1e200, 1e155, 1e100, 1e-100, 1e-155, 1e-300, 5e-324];
 
 fn scaled(mesh: &TetMesh, scale: f64) -> Vec<DofValue> {
@@ -37,7 +37,7 @@ fn is_finite(answer: &Answer) -> bool {
         && answer.report.error_bound_rel.is_none_or(f64::is_finite)
 }
 
-/// Whether a request was answered; the answer is finite then, and a refusal says why.
+/// Whether a request was answered; checks that the answer is finite, or that the refusal says why.
 fn is_answered(connection: &mut ServerConnection, request: &Request, what: &str) -> bool {
     let answer = match connection.ask(request) {
         Ok(Reply::Answer(answer)) => *answer,

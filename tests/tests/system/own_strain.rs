@@ -9,7 +9,7 @@ use softgrasp_tests::questions::{cube, question, upload};
 
 use crate::start::{answer, client, server};
 
-/// The bottom rests, a corner of the top is moved aside.
+/// Known displacements: the bottom held, a corner of the top moved aside.
 fn pushed(mesh: &TetMesh, push: f64) -> Vec<DofValue> {
     let top = mesh.node_count() as u32 - 1;
     let (low, _) = mesh.bounds();

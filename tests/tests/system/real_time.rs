@@ -28,10 +28,10 @@ use softgrasp_tests::questions::cube;
 use crate::settings::linear_settings;
 use crate::start::server;
 
-/// Longer than anything takes.
+/// Time after which a test gives up waiting.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A run in real time, played tick by tick.
+/// Run in real time, played tick by tick.
 struct Play {
     session: Session,
     tick: u64,
@@ -67,14 +67,14 @@ impl Play {
         Self { session, tick: 0 }
     }
 
-    /// The next tick after so many that were missed; `None` when the script is over.
+    /// Plays the next tick after `skipped` missed ones; `None` when the script is over.
     fn tick_after(&mut self, skipped: u64) -> Option<TickOutcome> {
         let tick = self.tick + skipped;
         self.tick = tick + 1;
         self.session.play(Due { tick, skipped }, tick as f64 / 100.0).unwrap()
     }
 
-    /// A tick with what the server and the work beside the ticks have done so far.
+    /// Plays a tick that finds all finished work of server and background.
     fn settled_tick(&mut self) -> Option<TickOutcome> {
         self.session.settle(PATIENCE);
         self.tick_after(0)
@@ -100,7 +100,7 @@ fn is_deforming(outcome: &TickOutcome) -> bool {
     outcome.state == Some(StateName::Deforming)
 }
 
-/// The invariant of the report, by its records.
+/// Checks the invariant of the report by its records.
 fn check_counts(report: &RunReport) {
     let s = &report.summary;
     assert_eq!(report.ticks, report.played.count() + s.ticks_skipped);
@@ -219,7 +219,7 @@ fn refused_model_is_sent_once_and_told_once() {
     );
 }
 
-/// A server that refuses every model, and how many models and frames it was sent.
+/// Server that refuses every model, and the numbers of models and questions that it received.
 fn start_refusing_server() -> (SocketAddr, Arc<AtomicUsize>, Arc<AtomicUsize>) {
     let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
     let address = listener.local_addr().unwrap();

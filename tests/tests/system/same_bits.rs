@@ -11,8 +11,8 @@ use crate::start::{answer, client, server};
 
 const THREADS: [usize; 4] = [1, 2, 4, 7];
 
-/// Meshes and the methods they are solved by: dense ones over several tiles with a rest, a sparse
-/// one with a tree deep enough to be shared out.
+/// Meshes and the methods they are solved by: dense ones over several tiles with a remainder, a sparse
+/// one with a tree deep enough to be shared among threads.
 fn cases() -> Vec<(&'static str, TetMesh, &'static [&'static str])> {
     vec![
         ("cube of 64", cube(64), &METHODS),

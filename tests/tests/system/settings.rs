@@ -1,4 +1,4 @@
-//! What the objects of these tests are, and how they are solved.
+//! Objects of these tests, and the settings of their solves.
 
 use glove_client::ask::solve_settings::Elasticity;
 use glove_client::ask::solve_settings::{SolveSettings, Subscription};
@@ -6,7 +6,7 @@ use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{ElementName, Material, MethodName};
 
-/// A soft fruit of linear elasticity, held by masks; only its surface is asked for.
+/// Settings for a soft fruit of linear elasticity, held by masks; only its surface is asked for.
 pub fn linear_settings() -> SolveSettings {
     SolveSettings {
         material: Material { young: 2.0e4, poisson: 0.4 },
@@ -19,7 +19,7 @@ pub fn linear_settings() -> SolveSettings {
     }
 }
 
-/// A built-in object whose longest extent is this, m.
+/// Built-in object with this longest extent, m.
 pub fn sized(shape: BuiltIn, nodes: usize, size_m: f64) -> TetMesh {
     let mesh = generate(shape, nodes).unwrap();
     let scaled = mesh.vertices().iter().map(|p| p * (size_m / mesh.size())).collect();

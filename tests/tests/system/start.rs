@@ -6,7 +6,7 @@ use fea_server::{RunningServer, ServerConfig};
 use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_protocol::{Answer, Reply, Request};
 
-/// Settings for a server on a free loopback port with `threads` threads.
+/// Settings of a server on a free loopback port with `threads` threads.
 pub fn config(threads: usize) -> ServerConfig {
     ServerConfig {
         listen: SocketAddr::from(([127, 0, 0, 1], 0)),
@@ -15,17 +15,17 @@ pub fn config(threads: usize) -> ServerConfig {
     }
 }
 
-/// A server on a free loopback port.
+/// Server on a free loopback port.
 pub fn server(threads: usize) -> RunningServer {
     fea_server::start(config(threads)).unwrap()
 }
 
-/// A client that has said hello.
+/// Client that has sent `Hello`.
 pub fn client(server: &RunningServer) -> ServerConnection {
     ServerConnection::connect(server.address().to_string()).unwrap()
 }
 
-/// The answer to a request that must be answered.
+/// Answer to a request that must be answered.
 pub fn answer(connection: &mut ServerConnection, request: &Request) -> Answer {
     match connection.ask(request) {
         Ok(Reply::Answer(answer)) => *answer,
@@ -33,7 +33,7 @@ pub fn answer(connection: &mut ServerConnection, request: &Request) -> Answer {
     }
 }
 
-/// The refusal of a request that must be refused: its code and its text.
+/// Code and text of the refusal of a request that must be refused.
 pub fn refusal(
     connection: &mut ServerConnection,
     request: &Request,

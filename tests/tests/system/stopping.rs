@@ -12,10 +12,10 @@ use softgrasp_tests::watchdog::within;
 use crate::start::{answer, client, server};
 
 const LIMIT: Duration = Duration::from_secs(120);
-/// The grace time of a stop, and some more for a busy machine.
+/// Longest time of a stop: the grace time, and some more for a busy machine.
 const STOP_MAX: Duration = Duration::from_secs(10);
 
-/// Whether a client that was cut off is told so, and nothing else.
+/// Whether the error of a client that was cut off says so.
 fn is_clean(error: &LinkError) -> bool {
     match error {
         LinkError::Closed | LinkError::Connection(_) => true,

@@ -21,7 +21,7 @@ use softgrasp_tests::shared::shared;
 use crate::settings::{linear_settings, sized};
 use crate::start::server;
 
-/// Places of the 25 joints of a recorded pose, m.
+/// Positions of the 25 joints of a recorded pose, m.
 fn places(poses: &Value, name: &str) -> Vec<Vector3<f64>> {
     let joints = &poses["poses"][name]["joints"];
     let place = |joint: &&str| {

@@ -1,5 +1,5 @@
-//! What the wire promises beside answers: versions, cancelling, newest wins, signs of life, several
-//! cases of a kept model, and whose hold a `Drop` releases.
+//! Rules of the wire beside answers: versions, cancelling, newest wins, `Alive`, several cases of a kept
+//! model, and the sessions whose hold a `Drop` releases.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -17,7 +17,7 @@ use crate::start::{answer, client, config, refusal, server};
 
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// Something that takes long: elimination pivot by pivot.
+/// Request that takes long: elimination pivot by pivot.
 fn long(mesh_nodes: usize) -> Request {
     Request::from(once(&cube(mesh_nodes), "gauss-jordan-plain"))
 }

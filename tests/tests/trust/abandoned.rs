@@ -84,7 +84,7 @@ fn clients_that_reset_their_connections_during_long_work_leave_the_server_free()
     });
 }
 
-/// Closes a connection so that the peer hears a reset, as when a process is killed with bytes unread.
+/// Closes a connection with a reset, as when a process is killed with unread bytes.
 fn reset(stream: &TcpStream) {
     let socket = socket2::SockRef::from(stream);
     socket.set_linger(Some(Duration::ZERO)).unwrap();

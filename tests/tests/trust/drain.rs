@@ -1,4 +1,4 @@
-//! A stop with a time to drain, and the pages that tell of it.
+//! A stop with a time to drain, and the status pages meanwhile.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};

@@ -18,20 +18,20 @@ use softgrasp_tests::watchdog::within;
 use crate::start::{answer, client, config};
 
 const SESSIONS: usize = 50;
-/// How long the crowd goes on, where `CROWD_SECONDS` does not say another time.
+/// Time for which the crowd goes on, s, unless `CROWD_SECONDS` says another.
 const SECONDS: u64 = 12;
-/// Room for a few of the models, so that they push each other out.
+/// Memory limit of the server, bytes: room for a few of the models, so that they displace each other.
 const MEMORY_LIMIT: u64 = 32 << 20;
-/// Pushes that are asked about.
+/// Sizes of the displacements that are asked about.
 const PUSHES: [f64; 4] = [1.0, 0.5, -0.5, 0.25];
 const METHODS: [&str; 3] = ["sparse-cholesky", "front", "dense-cholesky"];
 
-/// A mesh that some sessions ask about, and the answers it has when nobody else is there.
+/// Mesh that some sessions ask about, and its answers from a server without other clients.
 struct Subject {
     mesh: TetMesh,
     message: UploadModel,
     hash: ModelHash,
-    /// By push and method.
+    /// Hash of the answer, by displacement and method.
     expected: BTreeMap<(usize, usize), u64>,
 }
 
@@ -58,7 +58,7 @@ impl Subject {
     }
 }
 
-/// One session's life: it asks, goes and comes again until the time is over.
+/// One session after the other of a client, until the time is over.
 struct Life<'a> {
     address: SocketAddr,
     subjects: &'a [Subject],
@@ -116,7 +116,7 @@ impl Life<'_> {
         }
     }
 
-    /// Asks, and brings the model first where the server has made room of it.
+    /// Asks, and uploads the model first if the server has dropped it; checks the bits.
     fn check(
         &mut self,
         connection: &mut ServerConnection,
@@ -159,7 +159,7 @@ impl Life<'_> {
     }
 }
 
-/// A number of the page of the server's state.
+/// Value of a metric on the server's page.
 fn number(pages: SocketAddr, name: &str) -> f64 {
     use std::io::{Read, Write};
     let mut stream = std::net::TcpStream::connect(pages).unwrap();

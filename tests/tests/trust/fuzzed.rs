@@ -8,7 +8,7 @@ use softgrasp_tests::parsers::Parser;
 use softgrasp_tests::random::Random;
 use softgrasp_tests::watchdog::within;
 
-/// Damaged inputs for each parser, where `FUZZ_ROUNDS` does not say another number.
+/// Number of damaged inputs for each parser, unless `FUZZ_ROUNDS` says another.
 const ROUNDS: usize = 4000;
 const LIMIT: Duration = Duration::from_secs(3600);
 
@@ -16,7 +16,7 @@ fn folder(name: &str, parser: Parser) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz").join(name).join(parser.name())
 }
 
-/// All files of a folder in the order of their names; none where there is no folder.
+/// Contents of all files of a folder in the order of their names; empty if there is no folder.
 fn files(folder: &Path) -> Vec<Vec<u8>> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -24,7 +24,7 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
     paths.iter().map(|path| std::fs::read(path).unwrap()).collect()
 }
 
-/// What looks like a number that a program might trust.
+/// Bytes that look like a number which a program might trust.
 const TRAPS: [&[u8]; 10] = [
     b"\xff\xff\xff\xff",
     b"\x00\x00\x00\x80",
@@ -38,7 +38,7 @@ const TRAPS: [&[u8]; 10] = [
     b"\x00\x00\x00\x00\x00\x00\xf8\x7f",
 ];
 
-/// A damaged version of one of some inputs.
+/// Damaged version of one of some inputs.
 fn damaged(random: &mut Random, inputs: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = inputs[random.below(inputs.len())].clone();
     for _ in 0..1 + random.below(4) {

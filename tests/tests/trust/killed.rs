@@ -16,11 +16,11 @@ use softgrasp_tests::server_process::{ServerProcess, serve_if_asked};
 use softgrasp_tests::watchdog::{until, within};
 
 const LIMIT: Duration = Duration::from_secs(240);
-/// Longer than a server needs for anything here.
+/// Time after which a test gives up waiting.
 const PATIENCE: Duration = Duration::from_secs(60);
 const TICKS: u64 = 40;
 
-/// Not a test by itself: the server of the others, in a process of its own.
+/// Not a test by itself: the server of the other tests, in a process of its own.
 #[test]
 fn server_process() {
     serve_if_asked();
@@ -40,7 +40,7 @@ fn model(mesh: &TetMesh) -> ModelUpload {
     ModelUpload { rest_shape: 0, hash, message: std::sync::Arc::new(message) }
 }
 
-/// What the fingers do in a tick.
+/// Question of a tick.
 fn asked(mesh: &TetMesh, tick: u64) -> Question {
     question(squeeze(mesh, 1.0 - tick as f64 / 100.0), "sparse-cholesky")
 }
@@ -49,7 +49,7 @@ fn bits(reached: &Reached) -> Vec<u64> {
     reached.displacement.iter().flatten().map(|u| u.to_bits()).collect()
 }
 
-/// All answers of the ticks, each waited for; `beside` is called after a tick has been asked.
+/// Answers to all ticks, each awaited; `beside` is called after a tick has asked.
 fn answers(address: SocketAddr, mesh: &TetMesh, mut beside: impl FnMut(u64)) -> Vec<Vec<u64>> {
     let link = Link::start(address.to_string(), Priority::Ordinary).unwrap();
     link.set_model(model(mesh));

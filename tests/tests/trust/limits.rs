@@ -1,4 +1,4 @@
-//! Every limit of a server: just under it, at it, and just over it.
+//! Every limit of a server: just below it, at it, and just above it.
 
 use std::time::Duration;
 

@@ -1,4 +1,5 @@
-//! Faults, limits, crowds and restarts: the server keeps answering right, and gives back what it took.
+//! Faults, limits, crowds and restarts: the server goes on to answer correctly, and gives its memory
+//! back.
 
 #![allow(
     clippy::unwrap_used,

@@ -21,7 +21,7 @@ fn number(metrics: &str, name: &str) -> f64 {
     metrics.lines().find_map(|line| line.strip_prefix(name)?.trim().parse().ok()).unwrap()
 }
 
-/// A request of so many bytes that is refused for its nodes once it was received and read.
+/// Request of `bytes` bytes that is refused for its number of nodes, after it was received and read.
 fn request_of(bytes: usize) -> Vec<u8> {
     let vertices = vec![[0.0; 3]; bytes / 24];
     let model =

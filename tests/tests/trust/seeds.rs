@@ -1,5 +1,5 @@
-//! Thousands of links that go wrong, each by its seed, with a clock that never waits: the same bits as
-//! undisturbed or a clean end, and nothing is left behind.
+//! Thousands of faulty links, each by its seed, with a clock that never waits: the same bits as without
+//! faults or a clean end, and no session or memory is left behind.
 
 use std::time::Duration;
 
@@ -16,12 +16,12 @@ use tokio::task::JoinSet;
 use crate::start::config;
 
 const LIMIT: Duration = Duration::from_secs(300);
-/// Seeds, where `SEEDS` does not say another number.
+/// Number of seeds, unless `SEEDS` says another.
 const SEEDS: u64 = 2000;
-/// Bytes that the conversation has about, each way.
+/// Approximate number of bytes of the conversation, in each direction.
 const LEN: usize = 9000;
 
-/// A number of the page of the server's state.
+/// Value of a metric on the server's page.
 fn number(server: &LocalServer, name: &str) -> f64 {
     let text = server.metrics();
     let found = text.lines().find_map(|line| line.strip_prefix(name)?.trim().parse().ok());
@@ -37,7 +37,7 @@ async fn undisturbed(server: &LocalServer, conversation: &Conversation) -> Vec<H
     heard
 }
 
-/// One client over a link that goes wrong; what it heard, and whether it was cut short.
+/// One client over a faulty link; its replies, and whether it was cut short.
 async fn disturbed(
     server: &LocalServer,
     conversation: Conversation,
@@ -51,8 +51,8 @@ async fn disturbed(
     async move { conversation.hold_over(client).await }
 }
 
-/// A client that comes twice: all its bytes at once on a second connection, of which it hears the end
-/// only.
+/// Client that connects twice: on a second connection it sends all its bytes at once, and reads only the
+/// end.
 async fn duplicate(
     server: &LocalServer,
     conversation: &Conversation,

@@ -26,7 +26,7 @@ pub enum ReportName {
 /// Makes one report.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that fails its check is one.
+/// [`ReportError`], also for an answer that fails its check.
 pub fn measure(name: ReportName, options: &Options) -> Result<Report, ReportError> {
     match name {
         ReportName::Accuracy => accuracy::measure(options),

@@ -1,4 +1,4 @@
-//! A client that asks for frames of one object and compares every answer with the right one.
+//! Client that asks frame questions about one object and compares every answer with the exact one.
 
 use glove_client::ask::connection::{Host, ServerConnection};
 use softgrasp_grasp::object::ContactModel;
@@ -17,7 +17,7 @@ use crate::scene::Pressed;
 /// Largest error, relative to a direct solve, with which a time is reported.
 const ERROR_ALLOWED: f64 = 1e-9;
 
-/// One round trip.
+/// One round trip with its time, the server's times, and the error of the answer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Trip {
     pub ms: f64,
@@ -26,7 +26,7 @@ pub(super) struct Trip {
     pub error_rel: f64,
 }
 
-/// What is asked of the server, and the right answer to it.
+/// Question to the server, and the exact answer to it.
 #[derive(Clone)]
 pub(super) struct Asked {
     pub contact: ContactModel,
@@ -34,16 +34,16 @@ pub(super) struct Asked {
     pub nodes: usize,
     pub surface_nodes: usize,
     upload: UploadModel,
-    /// The question for a load of one.
+    /// Question for a load of 1.
     pub question: Question,
-    /// Right displacements of the surface nodes for a load of one, m.
+    /// Exact displacements of the surface nodes for a load of 1, m.
     right: Vec<f64>,
-    /// How far `right` itself may be off.
+    /// Error of `right` itself, relative.
     right_error_rel: f64,
 }
 
 impl Asked {
-    /// Five nodes displaced; `reference` is the right answer.
+    /// Question with five prescribed nodes; `reference` is the exact answer.
     pub fn by_vertices(scene: &Pressed, reference: &Reference, method: &'static str) -> Self {
         let surface = scene.surface.nodes.clone();
         Self {
@@ -60,11 +60,11 @@ impl Asked {
         }
     }
 
-    /// The masks of five fingertips displaced, in the same object; the right answer is one of the
-    /// whole object that keeps balance and displacements, see [`verify`].
+    /// Question with the masks of five fingertips on the same object. The exact answer is one for all
+    /// nodes that keeps balance and prescribed displacements, see [`verify`].
     ///
-    /// # Errors
-    /// [`ReportError`], also when there is no right answer.
+    /// [`ReportError`], also if there is no exact answer. [`ReportError`], also when there is no right
+    /// answer.
     pub fn by_masks(host: &Host, nodes: usize) -> Result<Self, ReportError> {
         const METHOD: &str = "condensed";
         let tips = Tips::grip(nodes)?;
@@ -91,7 +91,7 @@ impl Asked {
         Ok(asked)
     }
 
-    /// The question for another load; displacements are proportional to it.
+    /// Question for another load; the displacements are proportional to it.
     fn scaled(&self, scale: f64) -> Question {
         let mut question = self.question.clone();
         question.known.iter_mut().for_each(|known| known.value *= scale);
@@ -104,7 +104,7 @@ fn of_nodes(nodes: &[u32], displacement: impl Fn(u32) -> [f64; 3]) -> Vec<f64> {
     nodes.iter().flat_map(|&n| displacement(n)).collect()
 }
 
-/// A client of one object.
+/// Client that asks about one object.
 pub(super) struct Asker {
     pub asked: Asked,
     pub model: ModelHash,
@@ -113,14 +113,14 @@ pub(super) struct Asker {
 }
 
 impl Asker {
-    /// Connects and makes sure that the server has the model.
+    /// Connects and uploads the model if the server does not keep it.
     pub fn new(host: &Host, asked: Asked) -> Result<Self, ReportError> {
         let mut connection = host.connect()?;
         let model = upload(&mut connection, asked.upload.clone())?;
         Ok(Self { asked, model, connection, count: 0 })
     }
 
-    /// One frame with its own load, compared with the right answer.
+    /// Asks one frame question with a load of its own; compares the answer with the exact one.
     pub fn frame(&mut self, waiting: Waiting) -> Result<(Trip, Answer), ReportError> {
         self.count += 1;
         // Another load each time; the displacements are proportional to it.
@@ -139,7 +139,7 @@ impl Asker {
         Ok((Trip { ms, stages, residual_rel, error_rel }, answer))
     }
 
-    /// An answer, and the time from asking to having it, ms.
+    /// Answer, and the time from sending the question to having it, ms.
     fn ask(&mut self, scale: f64, waiting: Waiting) -> Result<(f64, Answer), ReportError> {
         let question = self.asked.scaled(scale);
         let request = Request::from(Ask::new(self.model, question));

@@ -16,15 +16,15 @@ use crate::table::{Cell, Table, three_digits};
 use crate::tail::Tail;
 use crate::threads::processors;
 
-/// A method whose matrix is larger is left out: it could not be asked for a frame at all.
+/// Size in bytes above which a method's matrix is too large for frame questions.
 const DENSE_BYTES_MAX: u64 = 512 << 20;
-/// The bar of a warm frame of the largest object: so many echoes, and so long, ms.
+/// Largest time of a warm frame of the largest object, as a multiple of an echo, and in ms.
 const ECHOES_MAX: f64 = 3.0;
 const P99_MAX_MS: f64 = 1.0;
-/// The object that the bar is for.
+/// Number of nodes of the object that the limit is for.
 const NODES_OF_BAR: usize = 10_648;
 
-/// Every way of waiting that is measured, by its name in the tables.
+/// All ways of waiting that are measured, by their names in the tables.
 const HABITS: [(&str, Ends); 3] = [
     ("asleep", Ends::ASLEEP),
     ("client awake", Ends::CLIENT_AWAKE),
@@ -34,7 +34,7 @@ const HABITS: [(&str, Ends); 3] = [
 /// Measures frames of the cube with five contacts: surface nodes back, double precision.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that differs from the right one is one.
+/// [`ReportError`], also for an answer that differs from the exact one.
 pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError> {
     let is_quick = options.is_quick;
     let sizes: &[usize] = if is_quick { &[64, 125] } else { &[216, 267, 343, 1000, 10_648] };
@@ -73,7 +73,7 @@ pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError
     Ok(())
 }
 
-/// Questions to `condensed`: by masks, as `run` asks unless told otherwise, then by single nodes.
+/// Questions to `condensed`: by masks, which is the default of `run`, then by single nodes.
 fn contacts(host: &Host, sizes: &[usize]) -> Result<Vec<Asked>, ReportError> {
     let mut all = Vec::new();
     for &nodes in sizes {
@@ -86,7 +86,7 @@ fn contacts(host: &Host, sizes: &[usize]) -> Result<Vec<Asked>, ReportError> {
     Ok(all)
 }
 
-/// Questions to every method that fits, by single nodes, which all of them know.
+/// Questions to every method that fits in memory, by single nodes, which all of them can answer.
 fn by_every_method(nodes: usize) -> Result<Vec<Asked>, ReportError> {
     let (scene, reference) = pressed(nodes)?;
     let bytes = |m: &Method| m.dense_bytes(scene.unknown_dofs()).unwrap_or(0);
@@ -107,20 +107,20 @@ fn times(trips: &[Trip]) -> Vec<f64> {
     trips.iter().map(|trip| trip.ms).collect()
 }
 
-/// Frames over echoes, in turn; blank where they do not take turns.
+/// Ratio of frames to echoes that took turns; `None` if they did not.
 fn in_turn_ratio(trips: &RoundTrips) -> Option<f64> {
     let ratio = Spread::of_ratio(&times(&trips.frames), &trips.echoes);
     (ratio.count > 0).then_some(ratio.median)
 }
 
-/// Median of frames alone, of echoes alone, and their quotient.
+/// Medians of frames alone and of echoes alone, and their quotient.
 fn alone(trips: &RoundTrips) -> [f64; 3] {
     let frames = Spread::of(times(&trips.frames_alone)).median;
     let echoes = Spread::of(trips.echoes_alone.iter().copied()).median;
     [frames, echoes, frames / echoes]
 }
 
-/// A line for the bar; empty for other objects.
+/// Line that compares with the limit; empty for other objects.
 fn verdict(trips: &RoundTrips, habit: &str) -> String {
     if trips.asked.nodes != NODES_OF_BAR {
         return String::new();

@@ -1,4 +1,4 @@
-//! Frames and echoes of the same bytes, in turn and each alone, with the same habit of waiting.
+//! Frames and echoes of the same bytes, in turn and each alone, with the same way of waiting.
 
 use std::time::Duration;
 
@@ -10,14 +10,14 @@ use crate::report::ReportError;
 use crate::requests::{encode_reply, encode_request, held_nodes};
 use crate::sample::{Competitor, Effort, take_turns, timed_ms};
 
-/// All round trips of one question, and how it began.
+/// All round trips of one question, the lengths of its messages, and the time of the first answer.
 pub(super) struct RoundTrips {
     pub asked: Asked,
     pub held_nodes: usize,
     pub request_bytes: usize,
     pub reply_bytes: usize,
     pub first_ms: f64,
-    /// Frames and echoes in turn; none where an echo would take the processor of the server.
+    /// Frames and echoes in turn; empty if an echo would take the server's processor.
     pub frames: Vec<Trip>,
     pub echoes: Vec<f64>,
     /// Frames without echoes between them, and echoes without frames, ms.
@@ -26,10 +26,10 @@ pub(super) struct RoundTrips {
 }
 
 impl RoundTrips {
-    /// Measures one question with one habit of waiting: the frame's client waits as the echo's.
+    /// Measures one question with one way of waiting, the same for the frame's client and the echo's.
     ///
     /// # Errors
-    /// [`ReportError`]; an answer that is not the right one is one.
+    /// [`ReportError`], also for an answer that differs from the exact one.
     pub fn measure(
         host: &Host,
         asked: &Asked,

@@ -1,4 +1,4 @@
-//! A client that keeps a schedule: it asks a server at each tick, or only waits as long.
+//! Client with a schedule: it asks a server at each tick, or waits for as long without asking.
 
 use std::time::{Duration, Instant};
 
@@ -15,25 +15,25 @@ use crate::scene::Pressed;
 
 /// Largest error, relative to a direct solve, with which a time is reported.
 const ERROR_ALLOWED: f64 = 1e-9;
-/// A proof that takes longer than this is not waited for.
+/// Longest wait for a proof of the error bound.
 const PROOF_MAX: Duration = Duration::from_secs(120);
 
-/// A client and the server that is its own.
+/// Client with a server of its own.
 pub(super) struct Holder<'a> {
     scene: &'a Pressed,
-    /// Right displacements of the surface nodes for the load of the scene, m.
+    /// Exact displacements of the surface nodes for the load of the scene, m.
     right: &'a [f64],
     model: ModelHash,
     connection: ServerConnection,
-    /// An answer to the load of the scene.
+    /// Answer to the load of the scene.
     answer: Answer,
-    /// How long an answer took in the newest turn, by the median.
+    /// Median time of an answer in the newest turn.
     usual: Duration,
     // Stops when dropped.
     _server: RunningServer,
 }
 
-/// Right displacements of the surface nodes of a scene, m.
+/// Exact displacements of the surface nodes of a scene, m.
 ///
 /// # Errors
 /// [`ReportError`].
@@ -45,7 +45,7 @@ pub(super) fn right(scene: &Pressed) -> Result<Vec<f64>, ReportError> {
 }
 
 impl<'a> Holder<'a> {
-    /// Starts a server that asks for real-time scheduling or not, and gives it the scene.
+    /// Starts a server, with real-time scheduling or without, and uploads the scene's model.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -70,10 +70,10 @@ impl<'a> Holder<'a> {
         Ok(Self { scene, right, model, connection, answer, usual, _server: server })
     }
 
-    /// One request at each tick, another load each time.
+    /// Sends one request at each tick, with another load each time.
     ///
     /// # Errors
-    /// [`ReportError`]; an answer that differs from the direct solve is one.
+    /// [`ReportError`], also for an answer that differs from the direct solve.
     pub fn ask_for(&mut self, count: usize) -> Result<Kept, ReportError> {
         let Self { scene, right, model, connection, .. } = self;
         let kept = keep(
@@ -86,11 +86,11 @@ impl<'a> Holder<'a> {
         Ok(kept)
     }
 
-    /// The control: the same sleeps, awake for as long as an answer usually takes, and the same
-    /// preparation and comparison, but nobody is asked.
+    /// Control without requests: sleeps in the same way, stays awake for as long as an answer usually
+    /// takes, and makes the same preparation and comparison.
     ///
     /// # Errors
-    /// As [`Self::ask_for`].
+    /// The same as those of [`Self::ask_for`].
     pub fn idle_for(&mut self, count: usize) -> Result<Kept, ReportError> {
         let Self { scene, right, model, answer, usual, .. } = self;
         keep(
@@ -108,7 +108,7 @@ impl<'a> Holder<'a> {
     }
 }
 
-/// The load of a tick; the displacements are proportional to it.
+/// Load of a tick; the displacements are proportional to it.
 fn scale(number: u32) -> f64 {
     1.0 + 0.25 * (1e-2 * f64::from(number)).sin()
 }
@@ -119,8 +119,8 @@ fn request(scene: &Pressed, model: ModelHash, scale: f64) -> Request {
     Request::from(Ask::new(model, question))
 }
 
-/// An answer that carries its error bound: the proof is made beside the frames after an upload, and
-/// a session lasts longer than it.
+/// Answer with its error bound. The proof is made in the background after an upload, and a session lasts
+/// longer than the proof takes.
 fn proven(connection: &mut ServerConnection, request: &Request) -> Result<Answer, ReportError> {
     let start = Instant::now();
     loop {

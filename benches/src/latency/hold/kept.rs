@@ -1,25 +1,25 @@
-//! The record of a loop's ticks: when each ended, and the server's times in it.
+//! Record of a loop's ticks: when each ended, and the server's times in it.
 
 use std::time::{Duration, Instant};
 
 use glove_client::pace::wait_until;
 use softgrasp_protocol::StageMs;
 
-/// A haptic device asks a thousand times a second.
+/// Period of a tick; a haptic device asks a thousand times a second.
 pub(super) const PERIOD: Duration = Duration::from_millis(1);
 
-/// One tick; times in ms.
+/// Record of one tick; times in ms.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tick {
-    /// From the moment of the tick until its work was done.
+    /// Time from the moment of the tick to the end of its work.
     pub from_tick: f64,
-    /// From beginning the work until it was done.
+    /// Time from the beginning of the work to its end.
     pub work: f64,
-    /// What the server did; nothing in a loop without one.
+    /// Report of the answer; empty in a loop without a server.
     pub solved: Solved,
 }
 
-/// What an answer said of itself, and how wrong it was.
+/// Times that an answer reports, and its error.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Solved {
     pub stages: StageMs,
@@ -28,50 +28,50 @@ pub(super) struct Solved {
     pub error_bound_rel: Option<f64>,
 }
 
-/// All ticks of one loop.
+/// Records of all ticks of one loop.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Kept {
     pub ticks: Vec<Tick>,
-    /// Ticks that passed while an earlier one was still at work.
+    /// Number of ticks that passed while an earlier one was still at work.
     pub missed: usize,
     pub lasted: Duration,
 }
 
 impl Kept {
-    /// Adds what came later.
+    /// Adds the records of a later turn.
     pub fn append(&mut self, mut later: Self) {
         self.ticks.append(&mut later.ticks);
         self.missed += later.missed;
         self.lasted += later.lasted;
     }
 
-    /// Ticks, those that were missed among them.
+    /// Number of ticks, missed ones included.
     pub fn count(&self) -> usize {
         self.ticks.len() + self.missed
     }
 
-    /// Ticks whose work was not done before the next one.
+    /// Number of ticks whose work was not done before the next one.
     pub fn late(&self) -> usize {
         let period = ms(PERIOD);
         self.ticks.iter().filter(|t| t.from_tick >= period).count() + self.missed
     }
 
-    /// The same, per cent.
+    /// Share of late ticks, per cent.
     pub fn late_percent(&self) -> f64 {
         100.0 * self.late() as f64 / self.count().max(1) as f64
     }
 
-    /// One value of every tick that was not missed.
+    /// A value of every tick that was not missed.
     pub fn of(&self, value: fn(&Tick) -> f64) -> impl Iterator<Item = f64> + '_ {
         self.ticks.iter().map(value)
     }
 }
 
-/// Does something at each tick of an absolute schedule; a tick that passes while an earlier one is
-/// still at work is missed. `prepare` comes before the tick, `work` is timed, `check` comes after.
+/// Does work at each tick of an absolute schedule; a tick that passes while an earlier one is still at
+/// work is missed. `prepare` runs before the tick, `work` is timed, `check` runs after it.
 ///
 /// # Errors
-/// Those of `work` and `check`.
+/// Errors of `work` and `check`.
 pub(super) fn keep<P, W, E>(
     count: usize,
     mut prepare: impl FnMut(u32) -> P,

@@ -1,4 +1,4 @@
-//! Writes the page: late ticks with a server and without, with real-time rights and without.
+//! Writes the page: late ticks with and without a server, with and without real-time scheduling.
 
 use softgrasp_core::mesh::BuiltIn;
 
@@ -13,17 +13,17 @@ use crate::table::{Cell, Table, three_digits};
 use crate::tail::{Tail, longer_than};
 use crate::threads::processors;
 
-/// Late answers that are few enough, per cent.
+/// Largest share of late answers, per cent.
 const LATE_BAR_PERCENT: f64 = 0.1;
-/// The object that the bar is for, and about how many nodes it has.
+/// Object that the limit is for, and its approximate number of nodes.
 const NODES: usize = 10_648;
-/// Turns of so many ticks.
+/// Number of turns, and of ticks in each.
 const TURNS: (usize, usize) = (60, 1000);
 
-/// Asks for a frame every millisecond, and lets loops that ask nobody take turns with that.
+/// Asks a frame question every millisecond, in turn with loops that ask nothing.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that differs from the direct solve is one.
+/// [`ReportError`], also for an answer that differs from the direct solve.
 pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError> {
     let (nodes, (turns, ticks)) = if options.is_quick { (125, (2, 250)) } else { (NODES, TURNS) };
     let threads = processors();
@@ -100,7 +100,7 @@ fn times(pairs: &[Pair], scene: &Pressed) -> Table {
     table
 }
 
-/// A row of the table; a loop without a server has no answers to speak of.
+/// Row of the table; a loop without a server has no answers.
 fn row(pair: &Pair, is_control: bool, scene: &Pressed) -> [Cell; 22] {
     let kept = if is_control { &pair.control } else { &pair.asking };
     let (from_tick, work) = (Tail::of(kept.of(|t| t.from_tick)), Tail::of(kept.of(|t| t.work)));

@@ -1,4 +1,4 @@
-//! Lets loops take turns of a second, so that other work on the machine disturbs all alike.
+//! Runs loops in turns of a second, so that other work on the machine disturbs all of them alike.
 
 use glove_client::pace::be_urgent;
 
@@ -6,13 +6,13 @@ use super::holder::Holder;
 use super::kept::Kept;
 use crate::report::ReportError;
 
-/// A loop with its server and one without, with or without real-time rights.
+/// Loop with a server and loop without, both with or both without real-time scheduling.
 pub(super) struct Pair {
-    /// Whether its threads have real-time rights.
+    /// Whether the threads have real-time scheduling.
     pub real_time: bool,
     /// Ticks in which a server was asked.
     pub asking: Kept,
-    /// Ticks of the same sleeps in which nobody was asked.
+    /// Ticks of the same sleeps in which no server was asked.
     pub control: Kept,
 }
 
@@ -21,7 +21,7 @@ pub(super) fn is_granted() -> bool {
     std::thread::scope(|scope| scope.spawn(be_urgent).join().unwrap_or(false))
 }
 
-/// Runs all loops, `turns` times so many ticks each; each turn another one begins.
+/// Runs all loops in `turns` turns of as many ticks each; each turn begins with another one.
 ///
 /// # Errors
 /// [`ReportError`] of the first loop that fails.
@@ -53,7 +53,7 @@ pub(super) fn take_turns(
     Ok(loops.into_iter().map(|(_, pair)| pair).collect())
 }
 
-/// Real-time rights are those of a thread, so each turn has its own.
+/// Runs `work` on a thread of its own, because real-time scheduling belongs to a thread.
 fn on_a_thread(
     real_time: bool,
     work: impl FnOnce() -> Result<Kept, ReportError> + Send,

@@ -1,24 +1,24 @@
-//! Random sets of touched nodes, of which some have never been touched before.
+//! Random sets of touched nodes, some of which have never been touched before.
 
 use softgrasp_protocol::DofValue;
 
-/// Nodes of one grip, and which of them are new to the server.
+/// Touched nodes of one grip, and those of them that are new to the server.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Grip {
     /// All touched nodes, ascending.
     pub nodes: Vec<u32>,
-    /// Those that no earlier request named.
+    /// Nodes that no earlier request named.
     pub fresh: Vec<u32>,
     /// Displacement of every touched degree of freedom, ascending, m.
     pub known: Vec<DofValue>,
 }
 
-/// Fingertips.
+/// Number of fingertips.
 pub(super) const TOUCHED: usize = 5;
-/// Companions of a new node are drawn from the nodes used last: their columns are still kept.
+/// Number of nodes used last from which those beside a new node are drawn: their columns are still kept.
 const RECENT: usize = 200;
 
-/// Draws grips from the surface of one object; no fresh node comes twice.
+/// Draws grips from the surface of one object; no new node occurs twice.
 pub(super) struct Grips {
     random: SplitMix,
     untouched: Vec<u32>,
@@ -28,7 +28,7 @@ pub(super) struct Grips {
 }
 
 impl Grips {
-    /// From the surface nodes of an object.
+    /// Grips of the surface nodes of an object.
     pub fn new(surface: &[u32], reach: f64, seed: u64) -> Self {
         let mut random = SplitMix(seed);
         let mut untouched = surface.to_vec();
@@ -39,7 +39,7 @@ impl Grips {
         Self { random, untouched, touched: Vec::new(), reach }
     }
 
-    /// A grip of five nodes, so many of them fresh; `None` when the surface is used up.
+    /// Grip of five nodes, `fresh_count` of them new; `None` when the surface is used up.
     pub fn draw(&mut self, fresh_count: usize) -> Option<Grip> {
         let companions = TOUCHED.saturating_sub(fresh_count);
         if self.untouched.len() < fresh_count || self.touched.len() < companions {
@@ -78,12 +78,12 @@ impl SplitMix {
         z ^ (z >> 31)
     }
 
-    /// In 0 … 1, without 1.
+    /// Random number in 0 … 1, without 1.
     fn share(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// In 0 … n − 1, for n ≥ 1.
+    /// Random number in 0 … n − 1, for n ≥ 1.
     fn below(&mut self, n: usize) -> usize {
         ((self.share() * n as f64) as usize).min(n.saturating_sub(1))
     }

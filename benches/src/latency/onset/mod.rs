@@ -1,4 +1,4 @@
-//! From sending the first frame of a new grip to its answer.
+//! Time from sending the first question of a new grip to its answer.
 
 mod grips;
 mod report;

@@ -1,4 +1,4 @@
-//! Writes the page: how long the first frame of a grip takes, beside one sparse solve.
+//! Writes the page: time of the first frame of a grip, beside that of one sparse solve.
 
 use std::time::{Duration, Instant};
 
@@ -15,27 +15,27 @@ use crate::table::{Cell, Table, three_digits};
 use crate::tail::{Tail, longer_than};
 use crate::threads::{pool, processors};
 
-/// One kind of touch: nodes that are new to the server, and whether they were named beforehand.
+/// Kind of touch: number of nodes new to the server, and whether they were prefetched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Kind {
     fresh: usize,
     is_prefetched: bool,
 }
 
-/// All kinds, in the order they take turns.
+/// All kinds, in the order of their turns.
 const KINDS: [Kind; 4] = [
     Kind { fresh: 1, is_prefetched: false },
     Kind { fresh: 1, is_prefetched: true },
     Kind { fresh: TOUCHED, is_prefetched: false },
     Kind { fresh: TOUCHED, is_prefetched: true },
 ];
-/// Answers of each kind that are compared with a direct solve, spread over the run.
+/// Number of answers of each kind that are compared with a direct solve, spread over the run.
 const CHECKED: usize = 12;
-/// Touches known nodes up to this time with prefetch, ms.
+/// Largest time of a touch of nodes that were prefetched, ms.
 const PREFETCHED_BAR_MS: f64 = 2.0;
-/// And without, in sparse solves for each new node.
+/// Largest time of a touch without prefetch, as a multiple of a sparse solve for each new node.
 const SOLVES_BAR: f64 = 3.0;
-/// How far a tip pushes along an axis, as a share of the object's size.
+/// Largest displacement of a fingertip along an axis, relative to the object's size.
 const REACH: f64 = 0.02;
 
 /// All trials of one kind on one object.
@@ -46,7 +46,7 @@ struct Case {
     errors: Vec<f64>,
 }
 
-/// All kinds on one object.
+/// Trials of all kinds on one object.
 struct Size {
     nodes: usize,
     surface_nodes: usize,
@@ -57,7 +57,7 @@ struct Size {
 /// Measures the first frame of random grips.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that differs from the direct solve is one.
+/// [`ReportError`], also for an answer that differs from the direct solve.
 pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError> {
     let sizes: &[usize] = if options.is_quick { &[125] } else { &[1000, 3375, 10_648] };
     let threads = processors();
@@ -166,7 +166,7 @@ impl Case {
         Tail::of(self.trials.iter().map(|t| t.ms))
     }
 
-    /// Median over as many sparse solves as the bar allows for each new node.
+    /// Median, relative to the sparse solves that the limit allows for each new node.
     fn over_bar(&self, solve_ms: f64) -> f64 {
         let allowed = SOLVES_BAR * self.kind.fresh as f64 * solve_ms;
         Spread::of(self.trials.iter().map(|t| t.ms)).median / allowed

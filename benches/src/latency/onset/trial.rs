@@ -21,33 +21,33 @@ use crate::scene::Pressed;
 
 /// Largest error, relative to a direct solve, with which a time is reported.
 const ERROR_ALLOWED: f64 = 1e-9;
-/// A proof that takes longer than this is not waited for.
+/// Longest wait for a proof of the error bound.
 const PROOF_MAX: Duration = Duration::from_secs(120);
-/// Rest before a touch, beside a multiple of what a touch takes.
+/// Pause before a touch, besides a multiple of the time that a touch takes.
 const REST: Duration = Duration::from_millis(5);
-/// A finger comes near a surface for many times as long as its columns take.
+/// Pause before a touch, as a multiple of the time that its columns take: a finger comes near as slowly.
 const REST_TOUCHES: f64 = 3.0;
-/// Touches that say how long one takes.
+/// Number of latest touches that tell how long one takes.
 const RECENT: usize = 8;
 
-/// The first frame of one grip.
+/// First frame of one grip.
 pub(super) struct Trial {
     pub ms: f64,
     pub stages: StageMs,
     pub residual_rel: f64,
 }
 
-/// A client of a kept model that touches it here and there.
+/// Client that touches a kept model at different nodes.
 pub(super) struct Toucher<'a> {
     scene: &'a Pressed,
     connection: ServerConnection,
     model: ModelHash,
-    /// How long the latest touches without prefetch took, ms.
+    /// Times of the latest touches without prefetch, ms.
     recent_ms: VecDeque<f64>,
 }
 
 impl<'a> Toucher<'a> {
-    /// Uploads the object anew, so that no column is kept, and waits until nothing is worked on.
+    /// Uploads the object again, so that no column is kept, and waits until the server has no work.
     pub fn try_new(host: &Host, scene: &'a Pressed) -> Result<Self, ReportError> {
         let mut connection = host.connect()?;
         let object = scene.upload();
@@ -71,7 +71,7 @@ impl<'a> Toucher<'a> {
         Ok(())
     }
 
-    /// Rests, names the fresh nodes beforehand if asked to, rests, touches.
+    /// Pauses, prefetches the new nodes if asked to, pauses, touches.
     pub fn touch(
         &mut self,
         grip: &Grip,
@@ -98,7 +98,7 @@ impl<'a> Toucher<'a> {
         Ok((trial, displacement))
     }
 
-    /// Longer than the columns of a grip take, so that prefetch and strain are done.
+    /// Pauses for longer than the columns of a grip take, so that prefetch and strain are done.
     fn rest(&self) {
         let slowest_ms = self.recent_ms.iter().copied().fold(0.0, f64::max);
         std::thread::sleep(REST + Duration::from_secs_f64(1e-3 * REST_TOUCHES * slowest_ms));
@@ -123,7 +123,7 @@ impl<'a> Toucher<'a> {
         }
     }
 
-    /// How far the touched nodes are from where they were put; infinite if some are missing.
+    /// Distance of the touched nodes from their prescribed positions, m; infinite if some are missing.
     fn error_at_touched(&self, grip: &Grip, displacement: &[f64]) -> f64 {
         let surface = &self.scene.surface.nodes;
         if displacement.len() != 3 * surface.len() {
@@ -139,10 +139,10 @@ impl<'a> Toucher<'a> {
 
 /// Error of an answer against a direct solve of the same grip.
 ///
-/// Shapes: `displacement` 3 per surface node, m.
+/// Shapes: `displacement` 3 for each surface node, m.
 ///
 /// # Errors
-/// [`ReportError::Wrong`] above 1e-9.
+/// [`ReportError::Wrong`] if the error is above 1e-9.
 pub(super) fn error_of(
     scene: &Pressed,
     model: &Model,
@@ -162,14 +162,14 @@ pub(super) fn error_of(
     Ok(error)
 }
 
-/// One solve with the factor of a held shape: what a column of the compliance cannot do without.
+/// One solve with the factor of a held shape: the least work for a column of the compliance.
 pub(super) struct SparseSolve {
     factor: FrontFactor<f64>,
     rows: usize,
 }
 
 impl SparseSolve {
-    /// Factors the shape with its five touched nodes held, as the base holds two of them.
+    /// Factors the shape with its five touched nodes held, of which the base holds two.
     pub fn try_new(scene: &Pressed, model: &Model) -> Result<Self, ReportError> {
         let dofs: Vec<u32> = scene.pairs.iter().map(|&(dof, _)| dof).collect();
         let partition = model.held_partition(&dofs)?;
@@ -180,8 +180,8 @@ impl SparseSolve {
         Ok(Self { factor, rows })
     }
 
-    /// Time of one solve with a unit force, on the current pool, ms; the factor is in the caches as
-    /// far as it fits, for one solve goes before.
+    /// Time of one solve with a unit force, on the current pool, ms. The factor is in the caches as far
+    /// as it fits, because another solve precedes.
     pub fn once(&self, row: usize) -> f64 {
         let mut load = vec![0.0; self.rows];
         if let Some(b) = load.get_mut(row % self.rows.max(1)) {

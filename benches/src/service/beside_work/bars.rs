@@ -1,9 +1,9 @@
-//! What was promised of the service, beside what was measured.
+//! Limits that the service must keep, beside the measured values.
 
 use crate::report::Report;
 use crate::table::{Cell, Table};
 
-/// The table of bars, and where a broken one is told.
+/// Table of limits, and the report that is told of a broken one.
 pub(super) struct Bars<'a> {
     table: Table,
     report: &'a mut Report,
@@ -11,7 +11,7 @@ pub(super) struct Bars<'a> {
 }
 
 impl<'a> Bars<'a> {
-    /// An empty table.
+    /// Table without rows.
     pub fn new(report: &'a mut Report, is_quick: bool) -> Self {
         let columns = ["what", "measured", "bar", "unit", "kept"];
         let table = Table::new("service-bars", "Bars", &columns);
@@ -23,7 +23,8 @@ impl<'a> Bars<'a> {
         self.report.table(self.table);
     }
 
-    /// A row; a bar that is not kept is a fault, but not in the quick form, whose figures mean little.
+    /// Adds a row. A limit that is not kept is a fault, except in the small form, whose figures mean
+    /// little.
     pub fn row(&mut self, what: &str, measured: f64, bar: f64, unit: &str) {
         // A figure that could not be had does not keep its bar.
         let is_kept = measured <= bar;
@@ -36,12 +37,12 @@ impl<'a> Bars<'a> {
         self.table.push(cells);
     }
 
-    /// The report, for tables of its own.
+    /// Report, for tables of its own.
     pub fn report(&mut self) -> &mut Report {
         self.report
     }
 
-    /// Whether small sizes and few rounds are asked for.
+    /// Whether the small form is asked for.
     pub fn is_quick(&self) -> bool {
         self.is_quick
     }

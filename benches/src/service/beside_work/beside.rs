@@ -1,4 +1,4 @@
-//! A newcomer and a new contact while others solve for long, and what these lose by it.
+//! A new client and a new contact while others solve for long, and the loss of pace of these.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -19,19 +19,19 @@ use crate::threads::processors;
 
 /// Pause between two questions beside long work.
 const PAUSE: Duration = Duration::from_millis(250);
-/// A newcomer's model is ready within so many times its quiet time.
+/// Largest time until a new client's model is ready, as a multiple of that without other work.
 const NEWCOMER_MAX: f64 = 10.0;
-/// The same for the answer to a new contact.
+/// Largest time of an answer to a new contact, as a multiple of that without other work.
 const CONTACT_MAX: f64 = 5.0;
-/// The long solves lose at most a third of their pace.
+/// Largest loss of pace of the long solves.
 const LOSS_MAX: f64 = 1.0 / 3.0;
 
-/// How much of everything.
+/// Sizes and numbers of all parts.
 struct Amounts {
     newcomer_nodes: usize,
     contact_nodes: usize,
     quiet_questions: usize,
-    /// Sessions that solve without a pause, nodes of each, and solves that are timed at least.
+    /// Number of sessions that solve without a pause, nodes of each, and least number of timed solves.
     long: [(usize, usize, usize); 2],
 }
 
@@ -111,7 +111,7 @@ impl Tables {
     }
 }
 
-/// Questions beside so many sessions that solve so many nodes, until so many solves are done.
+/// Asks questions beside sessions that solve without a pause, until `solves_min` solves are done.
 fn beside(
     address: &str,
     (sessions, nodes, solves_min): (usize, usize, usize),
@@ -150,7 +150,8 @@ fn beside(
     Ok(())
 }
 
-/// Adds the rows of both questions; the slowest of each over the median of the quiet ones.
+/// Adds the rows of both questions; returns the slowest of each, relative to the median without other
+/// work.
 fn rows(table: &mut Table, beside: &str, times: &Times, quiet: &Times) -> [f64; 2] {
     let both = [
         ("a newcomer's model is ready", &times.newcomer_ms, &quiet.newcomer_ms),
@@ -185,14 +186,14 @@ struct LongWork<'a> {
     solves_min: usize,
 }
 
-/// What came of it.
+/// Number of solves, and solves per second.
 struct Pace {
     solves: usize,
     per_s: f64,
 }
 
 impl LongWork<'_> {
-    /// Solves until so many are done; `meanwhile` runs beside and hears when that is so.
+    /// Solves until enough solves are done; `meanwhile` runs beside and can ask whether that is so.
     fn run(
         &self,
         meanwhile: impl FnOnce(&dyn Fn() -> bool) -> Result<(), ReportError>,
@@ -225,7 +226,7 @@ impl LongWork<'_> {
         Ok(Pace { solves, per_s: solves as f64 / begun.elapsed().as_secs_f64() })
     }
 
-    /// One session; the time that it solved, s.
+    /// Runs one session; returns the time for which it solved, s.
     fn solve_on(&self, done: &AtomicUsize, is_failed: &AtomicBool) -> Result<f64, ReportError> {
         let mut connection = ServerConnection::connect(self.address)?;
         let request = Request::from(self.request.clone());

@@ -1,4 +1,4 @@
-//! What one client's long work costs the others, and what a crowd's bytes cost the server.
+//! Effect of one client's long work on the others, and of a crowd's large requests on the server.
 
 mod bars;
 mod beside;

@@ -1,4 +1,4 @@
-//! The report: its bars, and the sections that measure them.
+//! Page of the report: its limits, and the sections that measure them.
 
 use super::bars::Bars;
 use super::{beside, receiving};

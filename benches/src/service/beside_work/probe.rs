@@ -1,4 +1,4 @@
-//! What is asked beside somebody's long work: a newcomer's first model, and a new contact on a kept one.
+//! Questions beside other work: a new client's first model, and a new contact on a kept model.
 
 use std::time::Instant;
 
@@ -13,7 +13,7 @@ use crate::report::{ReportError, check};
 use crate::requests::{answer, upload};
 use crate::scene::Pressed;
 
-/// A client with a kept model that touches other nodes in every question, and newcomers beside it.
+/// Client with a kept model that touches other nodes in every question, and new clients beside it.
 pub(super) struct Probes {
     address: String,
     newcomer: UploadModel,
@@ -26,25 +26,25 @@ struct Contact {
     scene: Pressed,
     model: ModelHash,
     random: Random,
-    /// What was asked and answered, to be checked when the server rests.
+    /// Questions and answers, to be checked when the server has no work.
     answered: Vec<(Vec<DofValue>, Vec<[f64; 3]>)>,
 }
 
-/// Times of both, ms.
+/// Times of both questions, ms.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Times {
     pub newcomer_ms: Vec<f64>,
     pub contact_ms: Vec<f64>,
 }
 
-/// Fingertips of a new contact.
+/// Number of fingertips of a new contact.
 const TOUCHED: usize = 5;
-/// Displacements by cached columns and by a factor differ by rounding only.
+/// Largest relative difference of displacements by cached columns and by a factor, due to rounding.
 const DIFFERENCE_MAX: f64 = 1e-9;
 
 impl Probes {
-    /// Uploads the model of the contacts, of so many nodes, and waits until its bound is proven: from
-    /// then on its server rests.
+    /// Uploads the model of the contacts and waits until its error bound is proven: from then on its
+    /// server has no work.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -70,7 +70,7 @@ impl Probes {
         Ok(Self { address: address.to_owned(), newcomer, contact, count: 0 })
     }
 
-    /// One of each, one after the other.
+    /// Asks one of each, one after the other.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -80,7 +80,7 @@ impl Probes {
         Ok(())
     }
 
-    /// Connects, uploads a model that the server has never seen, and waits until it is ready, ms.
+    /// Connects, uploads a new model, and waits until it is ready; returns the time, ms.
     fn come_new(&mut self) -> Result<f64, ReportError> {
         self.count += 1;
         let mut model = self.newcomer.clone();
@@ -96,10 +96,10 @@ impl Probes {
         Ok(took)
     }
 
-    /// Asks all contacts again, by a factor, and compares: to be called when the server rests.
+    /// Asks all contacts again, by a factor, and compares; to be called when the server has no work.
     ///
     /// # Errors
-    /// [`ReportError::Wrong`] for an answer that was wrong.
+    /// [`ReportError::Wrong`] for a wrong answer.
     pub fn check(&mut self) -> Result<usize, ReportError> {
         let Contact { connection, scene, model, answered, .. } = &mut self.contact;
         for (known, found) in answered.iter() {
@@ -114,7 +114,7 @@ impl Probes {
 }
 
 impl Contact {
-    /// Presses nodes that have not been touched before, ms.
+    /// Presses nodes that have not been touched before; returns the time, ms.
     fn touch(&mut self) -> Result<f64, ReportError> {
         let nodes = &self.scene.surface.nodes;
         let mut touched: Vec<u32> = Vec::new();

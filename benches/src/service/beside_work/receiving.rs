@@ -20,17 +20,19 @@ use crate::threads::processors;
 
 /// Memory of the server for what it keeps, receives and works on, bytes.
 const LIMIT: u64 = 256 << 20;
-/// What the process may hold beside it: program, threads, sessions' own 256 KiB, allocator, bytes.
+/// Memory that the process may hold beside the limit, bytes: program, threads, 256 KiB of each session,
+/// allocator.
 const BESIDE: f64 = (128 << 20) as f64;
-/// Clients of the crowd.
+/// Number of clients of the crowd.
 const CROWD: usize = 8;
-/// Bytes that each of them sends in one request.
+/// Length of the request that each of them sends, bytes.
 const REQUEST_BYTES: [usize; 2] = [200_000_000, 100_000_000];
-/// Nodes that the server takes, so that requests of the crowd are refused once they were read.
+/// Largest number of nodes that the server takes, so that the crowd's requests are refused after they
+/// were read.
 const NODES_MAX: &str = "20000";
-/// How often memory is looked at.
+/// Time between two looks at the server's memory.
 const LOOK: Duration = Duration::from_millis(5);
-/// A client that is not read from gives up after so long.
+/// Time after which a client whose bytes are not read gives up.
 const SENT_MAX: Duration = Duration::from_secs(60);
 
 /// Measures the section.
@@ -137,8 +139,7 @@ fn ended_abnormally() -> ReportError {
     ReportError::Ended { what: "a client of the crowd".to_owned(), said: "it panicked".to_owned() }
 }
 
-/// A model with more nodes than the server takes, so that all that happens to it is to be received and
-/// read.
+/// Request with a model of more nodes than the server takes, so that it is only received and read.
 fn large_request(bytes: usize) -> Result<Vec<u8>, ReportError> {
     let mut model = Pressed::try_new(BuiltIn::Cube, 64)?.upload();
     model.mesh = MeshData { vertices: vec![[0.0; 3]; bytes / 24], ..MeshData::default() };
@@ -148,7 +149,7 @@ fn large_request(bytes: usize) -> Result<Vec<u8>, ReportError> {
     Ok(out)
 }
 
-/// Sends it whole; whether there was no memory to receive it.
+/// Sends a request; returns whether there was no memory to receive it.
 fn is_refused(address: &str, request: &[u8]) -> Result<bool, ReportError> {
     let broken = |error: std::io::Error| LinkError::Connection(error.into());
     let mut stream = TcpStream::connect(address).map_err(broken)?;

@@ -1,4 +1,4 @@
-//! More and more clients, until they are not served in time.
+//! More and more clients, until the server does not answer them in time.
 
 use std::time::{Duration, Instant};
 
@@ -10,11 +10,11 @@ use crate::tail::Tail;
 use crate::threads::processors;
 use crate::visitors::{Kind, Subject, visit};
 
-/// Frames a second of each client.
+/// Frame questions per second of each client.
 const RATE_HZ: f64 = 60.0;
-/// A series ends when 99 % of the frames take longer, ms.
+/// Quantile of 99 % of the times, ms, above which a series ends.
 const TOO_LATE_MS: f64 = 64.0;
-/// No more clients than this are tried.
+/// Largest number of clients.
 const CLIENTS_MAX: usize = 1024;
 
 /// Measures the report.
@@ -61,7 +61,7 @@ fn server(programs: &Programs, threads: usize) -> Result<Server, ReportError> {
     ])
 }
 
-/// More and more clients, until they are not served in time.
+/// Measures more and more clients, until the server does not answer them in time.
 fn climb(
     what: &str,
     subject: &Subject,
@@ -97,7 +97,7 @@ fn climb(
     }
 }
 
-/// Steps of at most a third.
+/// Next number of clients, larger by at most a third.
 fn next(clients: usize) -> usize {
     match clients {
         1..4 => clients + 1,
@@ -105,7 +105,7 @@ fn next(clients: usize) -> usize {
     }
 }
 
-/// Processor time of this process so far, s.
+/// Processor time that this process has used, s.
 fn own_busy_s() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();

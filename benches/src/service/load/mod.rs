@@ -1,4 +1,4 @@
-//! How many clients at 60 Hz one server serves in time, and what stops it.
+//! Number of clients at 60 Hz that one server answers in time, and its limit.
 
 mod climb;
 mod page;

@@ -1,11 +1,11 @@
-//! Writes what was measured: tables, a figure, and what they mean.
+//! Writes the tables, a figure, and the text about them.
 
 use super::row::Row;
 use crate::plot::{Mark, Plot, PlotPoint, Scale, Series};
 use crate::report::{Report, ReportError};
 use crate::table::Table;
 
-/// A frame that is not there by then is late for the next picture, ms.
+/// Time after which an answer is late for the next picture, ms.
 const IN_TIME_MS: f64 = 16.0;
 
 pub(super) fn write(report: &mut Report, rows: &[Row]) -> Result<(), ReportError> {

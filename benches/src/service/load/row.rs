@@ -1,22 +1,22 @@
-//! One row of the report: a number of clients, and what they saw.
+//! Row of the report: a number of clients, and the times and errors of their answers.
 
 use crate::table::Cell;
 use crate::tail::Tail;
 
-/// One number of clients, measured.
+/// Measurement with one number of clients.
 pub(super) struct Row {
     pub what: String,
     pub clients: usize,
     pub answers: usize,
     pub tail: Tail,
-    /// Processors that the server kept busy.
+    /// Number of processors that the server kept busy.
     pub server_busy: Option<f64>,
-    /// Processors that the clients kept busy.
+    /// Number of processors that the clients kept busy.
     pub clients_busy: Option<f64>,
 }
 
 impl Row {
-    /// What the tables show.
+    /// Cells of the tables.
     pub fn cells(&self) -> Vec<Cell> {
         let number = |value: Option<f64>| value.map_or(Cell::Blank, Cell::Number);
         vec![

@@ -15,20 +15,19 @@ use crate::report::{ReportError, check, progress};
 use crate::scene::presses;
 use crate::table::{Cell, Table};
 
-/// Largest force on a free node, relative to the largest on a held one, with which a time is
-/// reported.
+/// Largest force on a free node, relative to the largest on a held one, with which a time is reported.
 const RESIDUAL_ALLOWED: f64 = 1e-9;
-/// A memory limit that is too small for the object.
+/// Memory limit that is too small for the object.
 const SMALL_LIMIT: &str = "1GiB";
-/// Material of `solve` where nothing else is said: Young's modulus, Pa, and Poisson's ratio.
+/// Material of `solve` by default: Young's modulus, Pa, and Poisson's ratio.
 const USUAL_MATERIAL: (f64, f64) = (1.0e5, 0.3);
 const GIB: f64 = 1_073_741_824.0;
 
-/// Solves a sphere of about so many nodes within the usual limits, and asks for it within a limit
-/// that is too small.
+/// Solves a sphere of about so many nodes within the default limits, and asks for it within a limit that
+/// is too small.
 ///
 /// # Errors
-/// [`ReportError`]; an answer that does not keep the balance is one.
+/// [`ReportError`], also for an answer whose forces do not balance.
 pub(super) fn measure(
     programs: &Programs,
     nodes: usize,
@@ -96,7 +95,7 @@ pub(super) fn measure(
     Ok(table)
 }
 
-/// Known displacements as `solve` reads them; three directions of each node follow one another.
+/// Known displacements as a table for `solve`; the three directions of each node follow one another.
 fn known_csv(known: &[(u32, f64)]) -> String {
     let mut text = "node,ux,uy,uz\n".to_owned();
     for three in known.chunks(3) {
@@ -122,7 +121,7 @@ fn answer(path: &Path) -> Result<Vec<f64>, ReportError> {
     Ok(displacement)
 }
 
-/// Largest force on a free degree of freedom over the largest on a known one; infinite if the
+/// Largest force on a free degree of freedom, relative to the largest on a known one; infinite if the
 /// answer does not have the known displacements or the right length.
 fn imbalance(model: &Model, known: &[(u32, f64)], displacement: &[f64]) -> f64 {
     let size = known.iter().fold(0.0f64, |m, (_, u)| m.max(u.abs()));

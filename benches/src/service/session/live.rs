@@ -1,4 +1,4 @@
-//! Live frames at large deformation: how many ticks are answered, and how old the shape is.
+//! Live frames at large deformation: share of answered ticks, and age of the shown shape.
 
 use std::path::Path;
 
@@ -8,12 +8,11 @@ use crate::report::{Options, ReportError, progress};
 use crate::table::Table;
 use crate::tail::Tail;
 
-/// Built-in objects.
+/// Names of built-in objects.
 const BUILT_IN: [&str; 2] = ["strawberry", "toothpaste"];
-/// Files of others.
+/// Files of other authors.
 const FILES: [&str; 3] = ["banana.vtk", "liver.msh1.msh", "bunny.wrong-extension.vtk"];
-/// The bars: so many per cent of the deforming ticks are answered, and no shape is older than so many
-/// ticks.
+/// Least share of answered deforming ticks, per cent, and largest age of a shown shape, in ticks.
 const ANSWERED_PERCENT: f64 = 95.0;
 const AGE_TICKS: f64 = 3.0;
 
@@ -30,10 +29,10 @@ const COLUMNS: [&str; 10] = [
     "bar",
 ];
 
-/// Plays every object with the equations that `run` takes by itself.
+/// Plays every object with the equations that `run` takes by default.
 ///
 /// # Errors
-/// [`ReportError`]; a run that hangs is one.
+/// [`ReportError`], also for a run that hangs.
 pub(super) fn measure(
     programs: &Programs,
     (runs, threads): (usize, usize),

@@ -1,4 +1,4 @@
-//! What a user of `run` gets in real time, from runs of the real programs.
+//! Results for a user of `run` in real time, from runs of the real programs.
 
 mod large;
 mod live;

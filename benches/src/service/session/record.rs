@@ -1,4 +1,4 @@
-//! Reads from the JSON report of a run in real time what its user got.
+//! Reads from the JSON report of a run in real time the results for its user.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,43 +9,43 @@ use softgrasp_grasp::grasp::{GraspEvent, StateName};
 
 use crate::report_error::ReportError;
 
-/// One run, or several added up; times in ms.
+/// Results of one run, or of several together; times in ms.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Record {
     pub nodes: usize,
     pub runs: usize,
     pub ticks: u64,
     pub skipped: u64,
-    /// Ticks that computed for more than 1 ms.
+    /// Number of ticks that computed for more than 1 ms.
     pub long: u64,
     pub deforming: u64,
     pub answered: u64,
-    /// Deforming ticks without an answer, by reason.
+    /// Number of deforming ticks without an answer, by reason.
     pub unanswered: BTreeMap<String, u64>,
-    /// Age of the answer that is shown at the end of each deforming tick that shows one.
+    /// Age of the shown answer at the end of each deforming tick that shows one.
     pub ages: Vec<f64>,
-    /// From the tick in which a grip begins to deform to the one that shows its first answer.
+    /// Times from the tick in which a grip begins to deform to the one that shows its first answer.
     pub first_answers: Vec<f64>,
-    /// Grips of which nothing was ever shown.
+    /// Number of grips without a shown answer.
     pub unseen_grips: usize,
-    /// From the wish to keep a shape, for as long as the object stands still, to its being kept.
+    /// Times from the wish to keep a shape, while the object stands still, to its being kept.
     pub keeps: Vec<f64>,
-    /// From keeping a shape to the server's being ready for it.
+    /// Times from keeping a shape until the server has prepared its model.
     pub ready: Vec<f64>,
     pub round_trips: Vec<f64>,
     pub residual_rel: f64,
-    /// The largest bound, if an answer carried one.
+    /// Largest error bound, if an answer carried one.
     pub error_bound_rel: Option<f64>,
 }
 
-/// A shape that is being kept is the reason of these ticks.
+/// Reason of ticks in which a shape is being kept.
 const KEEPING: &str = "keeping_shape";
 
 impl Record {
     /// Reads the report of a run.
     ///
     /// # Errors
-    /// [`ReportError::Unreadable`].
+    /// [`ReportError::Unreadable`] if something is missing.
     pub fn read(path: &Path) -> Result<Self, ReportError> {
         let unreadable = |why: String| ReportError::Unreadable { path: path.to_owned(), why };
         let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
@@ -55,7 +55,7 @@ impl Record {
             .ok_or_else(|| unreadable("it is no report of a run in real time".to_owned()))
     }
 
-    /// From the parsed report; `None` if something is missing.
+    /// Results in a parsed report; `None` if something is missing.
     pub fn of(json: &Value) -> Option<Self> {
         let summary = &json["summary"];
         let unanswered = summary["unanswered"].as_object()?.iter();
@@ -120,7 +120,7 @@ impl Record {
         }
     }
 
-    /// Adds another run.
+    /// Adds the results of another run.
     pub fn append(&mut self, mut other: Self) {
         self.nodes = other.nodes;
         self.runs += other.runs;
@@ -172,7 +172,7 @@ impl Tick {
     }
 }
 
-/// Moments and words of all events, in order.
+/// Times and words of all events, in order.
 fn events(json: &Value) -> Option<Vec<(f64, String)>> {
     let event = |e: &Value| Some((e["at_ms"].as_f64()?, e["what"].as_str()?.to_owned()));
     json["events"].as_array()?.iter().map(event).collect()
@@ -184,7 +184,8 @@ mod tests {
 
     use super::*;
 
-    /// A run of 10 ms ticks; tick 3 is skipped, the grip of 2 to 6 shows its first answer in 4.
+    /// Report of a run with ticks of 10 ms; tick 3 is skipped, the grip of 2 to 6 shows its first answer
+    /// in 4.
     fn report() -> Value {
         let tick = |tick: u64, state: &str, shown: Option<u64>, why: Option<&str>| {
             json!({"tick": tick, "at_ms": 10.0 * tick as f64, "state": state, "shown_tick": shown,

@@ -1,4 +1,4 @@
-//! Writes the page: age of the shown answer, ticks without one and why, and one large object.
+//! Writes the page: age of the shown answer, ticks without one with their reasons, and one large object.
 
 use std::path::Path;
 
@@ -13,21 +13,21 @@ use crate::table::{Cell, Table};
 use crate::tail::Tail;
 use crate::threads::processors;
 
-/// Files of others.
+/// Files of other authors.
 const FILES: [&str; 3] = ["banana.vtk", "liver.msh1.msh", "turtle.veg"];
 /// Largest residual of an answer with which a time is reported.
 const RESIDUAL_ALLOWED: f64 = 1e-9;
-/// Nodes of the large sphere.
+/// Number of nodes of the large sphere.
 const LARGE: usize = 160_000;
-/// Sessions at once.
+/// Number of sessions at the same time.
 const SESSIONS: usize = 8;
-/// Runs of each arrangement with one client.
+/// Number of runs of each arrangement with one client.
 const RUNS: usize = 3;
 
 /// Plays all objects in all arrangements.
 ///
 /// # Errors
-/// [`ReportError`]; a run that hangs, and an answer with a large residual, are some.
+/// [`ReportError`], also for a run that hangs, and for an answer with a large residual.
 pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError> {
     let programs = Programs::find()?;
     let threads = processors();
@@ -82,7 +82,7 @@ pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError
     Ok(())
 }
 
-/// A built-in object, and files of others; a line for each file that is not there.
+/// A built-in object, and files of other authors; a line for each file that is missing.
 fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
     let named = |name: &str, path: &Path| Object {
         name: name.to_owned(),
@@ -104,7 +104,7 @@ fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
     (objects, left_out)
 }
 
-/// What `run` does by itself: the strawberry is picked up from a table and put down again.
+/// Default of `run`: the strawberry is picked up from a table and put down again.
 fn picked_up() -> Object {
     let name = "strawberry, picked up".to_owned();
     Object { name, arguments: Vec::new(), deformation: "linear" }
@@ -138,7 +138,7 @@ fn age_row(object: &Object, arrangement: Arrangement, record: &Record) -> [Cell;
     ]
 }
 
-/// Of times that are few; nothing of none.
+/// Median of a few times; `None` if there are none.
 fn median(times: &[f64]) -> Option<f64> {
     let spread = Spread::of(times.iter().copied());
     (spread.count > 0).then_some(spread.median)

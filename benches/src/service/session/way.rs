@@ -1,4 +1,4 @@
-//! The runs of one object with one arrangement of programs, added up.
+//! Runs of one object with one arrangement of client and server, added up.
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -7,19 +7,19 @@ use super::record::Record;
 use crate::programs::Programs;
 use crate::report_error::ReportError;
 
-/// How client and server are arranged.
+/// Arrangement of client and server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Arrangement {
-    /// The server is in the client's process.
+    /// The server runs in the client's process.
     Embedded,
-    /// A client and a server, each a process of its own.
+    /// Client and server are two processes.
     TwoProcesses,
-    /// So many clients at once, and one server for all.
+    /// As many clients at the same time, and one server for all.
     ManySessions(usize),
 }
 
 impl Arrangement {
-    /// Its name in the tables.
+    /// Name of the arrangement in the tables.
     pub fn name(self) -> String {
         match self {
             Self::Embedded => "embedded".to_owned(),
@@ -28,13 +28,13 @@ impl Arrangement {
         }
     }
 
-    /// Clients at once.
+    /// Number of clients at the same time.
     fn clients(self) -> usize {
         if let Self::ManySessions(count) = self { count } else { 1 }
     }
 }
 
-/// What is grasped, and how fast.
+/// Object that is grasped, and the equations of its deformation.
 pub(super) struct Object {
     pub name: String,
     /// Arguments of `run` that name it.
@@ -43,13 +43,13 @@ pub(super) struct Object {
     pub deformation: &'static str,
 }
 
-/// Ticks a second.
+/// Ticks per second.
 pub(super) const RATE_HZ: u32 = 100;
 
-/// Plays an object so many times in one arrangement; each time with a server that knows nothing.
+/// Plays an object several times in one arrangement, each time with a new server.
 ///
 /// # Errors
-/// [`ReportError`]; a run that fails or hangs is one.
+/// [`ReportError`], also for a run that fails or hangs.
 pub(super) fn play(
     programs: &Programs,
     object: &Object,

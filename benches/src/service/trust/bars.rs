@@ -1,11 +1,11 @@
-//! What all parts of the report share: how much of everything, rows of bars, a server.
+//! Shared by all parts of the report: sizes and numbers, rows of limits, a server.
 
 use crate::programs::{Programs, Server};
 use crate::report::{Report, ReportError};
 use crate::table::{Cell, Table};
 use crate::threads::processors;
 
-/// How much of everything.
+/// Sizes and numbers of all parts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Amounts {
     pub connections: usize,
@@ -15,7 +15,8 @@ pub(super) struct Amounts {
     pub rounds: usize,
 }
 
-/// A row of the table of bars; not kept is a fault, but not in the quick form, whose figures mean little.
+/// Adds a row with a limit. One that is not kept is a fault, except in the small form, whose figures mean
+/// little.
 pub(super) fn bar(
     bars: &mut Table,
     report: &mut Report,
@@ -31,7 +32,7 @@ pub(super) fn bar(
     bars.push([text(what), Cell::Number(measured), Cell::Number(bar), text(unit), kept]);
 }
 
-/// A server for many sessions, and as many requests as they like.
+/// Server for many sessions with any number of requests.
 pub(super) fn server(programs: &Programs, address: &str) -> Result<Server, ReportError> {
     let threads = processors().to_string();
     programs.serve_as(&[

@@ -1,4 +1,4 @@
-//! Honest clients beside hostile connections, and beside somebody's long work.
+//! Honest clients beside hostile connections, and beside other clients' long work.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -21,15 +21,15 @@ use crate::table::{Cell, Table};
 use crate::tail::Tail;
 use crate::visitors::{Heard, Kind, Subject, visit};
 
-/// Connections that mean no good.
+/// Number of hostile connections.
 const HOSTILE: usize = 200;
-/// Each of them does something so often.
+/// Time between two actions of each hostile connection.
 const ACT_EVERY: Duration = Duration::from_millis(50);
-/// Honest clients, at this rate.
+/// Number of honest clients, and their rate.
 const HONEST: usize = 4;
 const RATE_HZ: f64 = 60.0;
 
-/// Who else is there.
+/// Other clients beside the honest ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Others {
     Nobody,
@@ -50,7 +50,7 @@ impl Others {
     }
 }
 
-/// Measures what honest clients see.
+/// Measures the answers to honest clients.
 ///
 /// # Errors
 /// [`ReportError`].
@@ -130,7 +130,7 @@ fn beside(others: Others, subject: &Subject, address: &str, lasts: Duration) -> 
     (heard, acts.into_inner())
 }
 
-/// Uploads models that nobody has seen before, and drops each.
+/// Uploads new models, and drops each.
 fn upload_on(address: &str, number: usize, is_over: &AtomicBool, acts: &AtomicUsize) {
     let Ok(scene) = Pressed::try_new(BuiltIn::Cube, 8000) else { return };
     let Ok(mut connection) = ServerConnection::connect(address) else { return };
@@ -151,8 +151,8 @@ fn upload_on(address: &str, number: usize, is_over: &AtomicBool, acts: &AtomicUs
     }
 }
 
-/// Gives the calling thread the lowest priority: what it does itself would cost another machine. Where
-/// the system does not let it, the figures are the worse for it.
+/// Gives the calling thread the lowest priority, because hostile clients would be on another machine.
+/// Where the system refuses, the figures are worse for it.
 fn be_last() {
     let tid = std::fs::read_link("/proc/thread-self").ok();
     let tid = tid.and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
@@ -163,7 +163,7 @@ fn be_last() {
     }
 }
 
-/// One connection after the other that means no good, of a kind by its number.
+/// Opens one hostile connection after the other; `number` decides their kind.
 fn be_hostile(address: &str, number: usize, is_over: &AtomicBool, acts: &AtomicUsize) {
     be_last();
     let mut random = Random(number as u64);
@@ -238,7 +238,7 @@ fn act(
     }
 }
 
-/// Whether a peer that was read from is still there.
+/// Whether the peer of a read has not closed.
 fn is_open(read: std::io::Result<usize>) -> bool {
     match read {
         Ok(count) => count > 0,

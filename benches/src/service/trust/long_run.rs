@@ -1,4 +1,5 @@
-//! An hour of frames at 250 Hz, as fast as they go: every answer has the right bits, and nothing grows.
+//! An hour of frame questions at 250 Hz: every answer has the right bits, and the server's memory does
+//! not grow.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;

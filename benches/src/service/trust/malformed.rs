@@ -1,4 +1,5 @@
-//! A million malformed frames on a hundred thousand connections: the server answers on, and does not grow.
+//! A million malformed messages on a hundred thousand connections: the server goes on to answer, and does
+//! not grow.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -14,14 +15,14 @@ use crate::report::{Report, ReportError};
 use crate::table::Table;
 use crate::visitors::{Kind as FrameKind, Subject};
 
-/// Malformed frames on a connection that takes part in the format.
+/// Number of malformed messages on each connection that keeps to the format.
 const FRAMES: usize = 20;
-/// Connections at the same time.
+/// Number of connections at the same time.
 const THREADS: usize = 8;
-/// A server that has not closed by then hangs.
+/// Time after which a server that has not closed is taken to hang.
 const END_MAX: Duration = Duration::from_secs(30);
 
-/// What came of the connections.
+/// Numbers of connections and malformed messages, and of those that failed.
 #[derive(Default)]
 struct Counts {
     connections: AtomicUsize,
@@ -29,7 +30,7 @@ struct Counts {
     unanswered: AtomicUsize,
 }
 
-/// Measures the soak.
+/// Measures the malformed messages.
 ///
 /// # Errors
 /// [`ReportError`].
@@ -105,7 +106,7 @@ fn soak(address: &str, connections: usize, seed: u64, counts: &Counts) {
     });
 }
 
-/// Sends bytes on a connection of their own and reads until the server has closed it; whether it has.
+/// Sends bytes on a new connection and reads until the server has closed it; returns whether it has.
 fn is_ended(address: &str, bytes: &[u8]) -> bool {
     let Ok(mut stream) = TcpStream::connect(address) else { return false };
     let _ = stream.set_read_timeout(Some(END_MAX));
@@ -125,7 +126,7 @@ fn random_bytes(random: &mut Random, len: usize) -> Vec<u8> {
     (0..len).map(|_| random.below(256) as u8).collect()
 }
 
-/// A frame of the right form around bytes without sense.
+/// Message of the right form around random bytes.
 pub(super) fn malformed(random: &mut Random) -> Vec<u8> {
     let requests: Vec<Kind> =
         Kind::ALL.into_iter().filter(|kind| *kind as u16 & 0x8000 == 0).collect();

@@ -1,4 +1,4 @@
-//! A server that is killed and started again at the same address: how soon the client has an answer.
+//! A server that is killed and started again at the same address: time until the client has an answer.
 
 use std::time::{Duration, Instant};
 
@@ -16,9 +16,9 @@ use crate::sample::Spread;
 use crate::scene::Pressed;
 use crate::table::Table;
 
-/// A link that has not answered by then is lost.
+/// Time after which a link without an answer is taken to be lost.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// The hand asks this often.
+/// Time between two requests.
 const TICK: Duration = Duration::from_millis(4);
 
 /// Measures restarts.

@@ -24,44 +24,44 @@ use crate::resources::Resources;
 use crate::store::StoredModel;
 use crate::workers::{Rest, Workers};
 
-/// Above this condition of the small system the touched nodes hold the body weakly.
+/// Condition number of the small system above which the touched nodes hold the body only weakly.
 const CONDITION_WARNING: f64 = 1e9;
 
-/// Bytes that sharpening a bound may take in any case.
+/// Bytes that sharpening an error bound may take in any case.
 const REFINED_BYTES_MIN: u64 = 16 << 20;
 
-/// Which answer the reported strain and rotation belong to.
+/// Answer that the reported strain and rotation belong to.
 #[derive(Clone, Copy)]
 pub(super) enum StrainOf<'a> {
-    /// The answer itself has to wait for it, and for the proof of the bound if `may_prove`.
+    /// This answer, which waits for them, and for the proof of the error bound if `may_prove`.
     ThisAnswer {
-        /// Whether there is memory for the proof.
+        /// Whether there is memory for the proof of the error bound.
         may_prove: bool,
     },
-    /// Worked out beside the frames; no frame waits, and only a frame that asks the same again has it.
+    /// An earlier answer to the same question: strain is computed in the background, and no answer waits.
     Beside(&'a Resources),
 }
 
-/// What one question touches on a model with a base.
+/// Touched degrees of freedom and masks of one question about a model that has a base.
 pub(crate) struct Contacts {
     stored: Arc<StoredModel>,
     base: Arc<Base>,
     known: Known,
     touched: Touched,
-    /// Prescribed displacement of every touched degree of freedom, then three per mask, m.
+    /// Prescribed displacement of every touched degree of freedom, then three for each mask, m.
     q: Vec<f64>,
     /// Nodes whose displacements are wanted.
     nodes: Vec<u32>,
 }
 
-/// The small system of some contacts, and whether it was kept from an earlier frame.
+/// Small system of a set of contacts, and whether it was kept from an earlier frame question.
 pub(super) struct PreparedSet {
     pub set: Arc<ContactSet>,
     pub is_kept: bool,
 }
 
 impl Contacts {
-    /// Sorts out what is touched, without the degrees of freedom that the scene fixes.
+    /// Collects what the question touches, without the degrees of freedom that the model fixes.
     ///
     /// # Errors
     /// [`Refusal`] where the model has no base, or a mask does not fit it.
@@ -84,14 +84,14 @@ impl Contacts {
         Ok(Self { stored, base, known, touched: Touched { dofs, masks }, q, nodes })
     }
 
-    /// The small system, if an earlier frame with the same contacts has left one.
+    /// Small system kept from an earlier question about the same contacts and wanted nodes.
     pub fn kept_set(&self) -> Option<PreparedSet> {
         let set = self.stored.set_for(&self.touched, &self.nodes)?;
         Some(PreparedSet { set, is_kept: true })
     }
 
-    /// Whether forces are wanted that take a product with the whole stiffness: those at the nodes
-    /// that the scene fixes.
+    /// Whether reaction forces are wanted at nodes that the model fixes; they take a product with the
+    /// whole stiffness matrix.
     pub fn has_large_product(&self, question: &Question) -> bool {
         question.want.reactions && !self.base.fixed().is_empty()
     }
@@ -108,10 +108,10 @@ impl Contacts {
         Ok(PreparedSet { set, is_kept: false })
     }
 
-    /// Answers the question, with a kept small system or one made now.
+    /// Answers the question by a kept small system, or by one made now.
     ///
     /// # Errors
-    /// [`Refusal`].
+    /// [`Refusal`] if the request cannot be answered.
     pub fn answer(
         &self,
         question: &Question,
@@ -126,10 +126,10 @@ impl Contacts {
         self.answer_with(&prepared, question, why, strain, clock)
     }
 
-    /// Answers the question with a small system that was found or made for it.
+    /// Answers the question by the given small system.
     ///
     /// # Errors
-    /// [`Refusal`].
+    /// [`Refusal`] if the request cannot be answered.
     pub fn answer_with(
         &self,
         PreparedSet { set, is_kept }: &PreparedSet,
@@ -234,8 +234,8 @@ impl Contacts {
         }
     }
 
-    /// Solves once more for a grip that lasts, in the background, if there is memory for it: its
-    /// bounds get sharper.
+    /// Starts the second solve in the background, which sharpens the error bounds of these contacts, if
+    /// there is memory for it.
     fn sharpen(&self, resources: &Resources, set: &Arc<ContactSet>) {
         if self.base.eigenvalue_min().is_none() || !set.begin_refining() {
             return;
@@ -252,8 +252,8 @@ impl Contacts {
         });
     }
 
-    /// Works out rotation and strain of a frame beside the frames that follow, one at a time,
-    /// resting for nine tenths of the time.
+    /// Computes rotation and strain of an answer in the background, one answer at a time, on a thread
+    /// that rests for nine tenths of the time.
     fn watch_strain(&self, workers: &Workers, set: Arc<ContactSet>, solved: ContactAnswer) {
         let Some(claimed) = self.stored.strain_under_way.take() else { return };
         let (stored, base) = (Arc::clone(&self.stored), Arc::clone(&self.base));
@@ -268,7 +268,7 @@ impl Contacts {
     }
 }
 
-/// How displacements are rounded on the way.
+/// Rounding of displacements that travel in this precision.
 fn delivery(precision: Precision) -> Delivery {
     match precision {
         Precision::F64 => Delivery::Double,
@@ -276,7 +276,7 @@ fn delivery(precision: Precision) -> Delivery {
     }
 }
 
-/// Forces at all known degrees of freedom (3.43b): λ where touched, `K u` where the scene fixes.
+/// Reaction forces at all known degrees of freedom (3.43b): λ where touched, `K u` where the model fixes.
 fn reactions_of(
     known: &Known,
     base: &Base,

@@ -27,7 +27,7 @@ use crate::request::{bodies_of, name_of, settings_of, state_message, state_of};
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
-/// A contact frame with all that its answer needs.
+/// A contact frame that has been checked, with all data for its answer.
 pub(crate) struct PosedContact {
     stored: Arc<StoredModel>,
     state: ObjectState,
@@ -38,15 +38,15 @@ pub(crate) struct PosedContact {
     nodes: NodeChoice,
     precision: Precision,
     fields: FieldSet,
-    /// What is asked of large deformation.
+    /// Wish for large deformation; `None` for linear elasticity.
     large: Option<LargeWish>,
 }
 
 impl PosedContact {
-    /// Checks what a frame names.
+    /// Checks bodies, state, nodes and limits of a contact frame.
     ///
     /// # Errors
-    /// [`Refusal`] naming what is wrong.
+    /// [`Refusal`] that names the wrong part.
     pub fn new(
         resources: &Resources,
         frame: ContactFrame,
@@ -102,7 +102,7 @@ impl PosedContact {
         })
     }
 
-    /// Whether nothing has to be made for it but a small problem, or a factor of a shape at most.
+    /// Whether the step takes only a small contact problem, or at most the factor of a shape.
     pub fn is_prepared(&self) -> bool {
         let is_there = match &self.large {
             Some(wish) => wish.goes_on(),
@@ -111,7 +111,7 @@ impl PosedContact {
         self.stored.has_free_body() && is_there
     }
 
-    /// What computing the columns that it may need is predicted to take.
+    /// Predicted time to compute the columns that the step may need.
     ///
     /// Units: ms.
     pub fn predicted_ms(&self, resources: &Resources) -> f64 {
@@ -120,7 +120,7 @@ impl PosedContact {
         columns_ms(entries, self.missing(), &resources.rates.known())
     }
 
-    /// Nodes near bodies whose columns are not there.
+    /// Number of nodes near bodies whose columns are not cached.
     fn missing(&self) -> usize {
         let mut nodes = self.triangles.as_flattened().to_vec();
         nodes.sort_unstable();
@@ -128,10 +128,10 @@ impl PosedContact {
         self.stored.columns.missing(nodes.into_iter().map(Contact::Node))
     }
 
-    /// Makes the step.
+    /// Answers the contact frame: makes the step.
     ///
     /// # Errors
-    /// [`Refusal`].
+    /// [`Refusal`] if the request cannot be answered.
     pub fn answer(
         self,
         resources: &Resources,
@@ -175,8 +175,8 @@ impl PosedContact {
         Ok(answer)
     }
 
-    /// Fields that are wanted of a step, which has the displacements of all nodes then; those of the
-    /// wanted ones are left.
+    /// Fields that are wanted for a step. `made` then has the displacements of all nodes, which are
+    /// reduced to those of the wanted nodes.
     fn field_values(&self, made: &mut Made) -> Vec<FieldValues> {
         if self.fields.is_empty() {
             return Vec::new();

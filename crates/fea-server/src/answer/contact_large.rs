@@ -18,19 +18,19 @@ use crate::refusal::Refusal;
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
-/// Where a session keeps the object that it presses at large deformation.
+/// Place where a session keeps its free object at large deformation.
 pub(crate) type PressedSeat = Arc<Lock<Option<Box<Pressed>>>>;
 
-/// An object at large deformation between two steps: its shape and the newest factor.
+/// Free object at large deformation between two steps: its shape and the newest factor.
 pub(crate) struct Pressed {
     model: ModelHash,
     law: Law,
     body: LargeBody,
-    /// Memory of the factor, given back with it.
+    /// Memory reserved for the factor, given back with it.
     reservation: Reservation,
 }
 
-/// What is asked of large deformation, of which model, and where the object is kept.
+/// Wish for large deformation: model, equations and law, and the place where the object is kept.
 pub(crate) struct LargeWish {
     pub model: ModelHash,
     pub deformation: Deformation,
@@ -38,24 +38,24 @@ pub(crate) struct LargeWish {
     pub seat: PressedSeat,
 }
 
-/// A step that was made, whether at large deformation, and at what cost.
+/// Outcome of a step, whether it was made at large deformation, and the factors that it took.
 pub(super) struct Made {
     pub outcome: StepOutcome,
     pub is_large: bool,
     pub factors: usize,
-    /// Rotation and stretches of the elements, where they were worked out.
+    /// Rotation and stretches of the elements, where they were computed.
     pub summary: LargeSummary,
 }
 
 impl Made {
-    /// A step by linear elasticity.
+    /// Outcome of a step by linear elasticity.
     pub fn linear(outcome: StepOutcome) -> Self {
         Self { outcome, is_large: false, factors: 0, summary: LargeSummary::UNKNOWN }
     }
 }
 
 impl Pressed {
-    /// The object at rest, and the memory of a factor reserved.
+    /// The object at rest, with memory reserved for a factor.
     fn at_rest(
         resources: &Resources,
         stored: &StoredModel,
@@ -76,7 +76,7 @@ impl Pressed {
         Ok(Box::new(Self { model: wish.model, law: wish.law, body, reservation }))
     }
 
-    /// What linear elasticity would be off by in the shape that the object has, over the largest
+    /// Predicted error of linear elasticity in the object's present shape, relative to the largest
     /// displacement.
     fn promised(&self) -> f64 {
         let summary = self.body.summary();
@@ -85,12 +85,12 @@ impl Pressed {
 }
 
 impl LargeWish {
-    /// Whether the session keeps the object.
+    /// Whether the session keeps an object of the same model and law, with which the step goes on.
     pub fn goes_on(&self) -> bool {
         self.seat.with(|kept| kept.as_ref().is_some_and(|kept| self.is_of(kept)))
     }
 
-    /// The elements of the object that the session keeps, with their law.
+    /// Elements of the object that the session keeps, with their law.
     pub(super) fn elements(&self) -> Option<Arc<Elements>> {
         self.seat.with(|kept| kept.as_ref().map(|kept| Arc::clone(kept.body.elements())))
     }
@@ -99,10 +99,10 @@ impl LargeWish {
         kept.model == self.model && kept.law == self.law
     }
 
-    /// Makes a step.
+    /// Makes one step of the object.
     ///
     /// # Errors
-    /// [`Refusal`]; the object stays what it was.
+    /// [`Refusal`]; the object then stays unchanged.
     pub(super) fn advance(
         &self,
         resources: &Resources,
@@ -148,8 +148,7 @@ impl LargeWish {
     }
 }
 
-/// A step by linear elasticity, if rotation and strain at its end promise an error within what is
-/// allowed.
+/// Step by linear elasticity, if rotation and strain at its end promise an error within the allowed one.
 fn linear_if_small(
     pressed: &Pressed,
     step: &ContactStep<'_>,

@@ -16,7 +16,7 @@ use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::peak_rss_bytes;
 use crate::refusal::Refusal;
 
-/// A question with what has been worked out of it.
+/// A question with its known displacements, forces and the reasons of its plan.
 pub(super) struct Posed<'a> {
     pub question: &'a Question,
     pub known: Known,
@@ -26,10 +26,10 @@ pub(super) struct Posed<'a> {
     pub chosen_because: String,
 }
 
-/// Solves, refined or stopped as the question allows, and gathers what was asked for.
+/// Solves one load case with the factor, refined as far as the question asks, and collects the results.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(super) fn answer(
     model: &Model,
     factored: &Factored,
@@ -54,10 +54,10 @@ pub(super) fn answer(
     gather(model, factored, &posed, &solution, (certainty, strain), clock)
 }
 
-/// Solves several cases together; `estimate` whether to work out what only informs.
+/// Solves several load cases together; `estimate`: whether to compute condition, error and strain too.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(super) fn answer_several(
     model: &Model,
     factored: &Factored,
@@ -109,7 +109,7 @@ pub(super) fn answer_several(
     Ok(answer)
 }
 
-/// What was asked for, out of a solution, and what it cost.
+/// Collects the wanted displacements, reactions and fields of a solution, and writes the report.
 fn gather(
     model: &Model,
     factored: &Factored,
@@ -177,7 +177,7 @@ fn no_bound(error_estimate_rel: Option<f64>) -> String {
     }
 }
 
-/// Displacements of the nodes asked for; mid-edge nodes are the server's own and stay here.
+/// Displacements of the wanted nodes of the mesh; those of mid-edge nodes are never sent.
 fn displacements(model: &Model, solution: &Solution, want: &Want) -> Displacements {
     let of = |n: usize| {
         let u = &solution.displacement[3 * n..3 * n + 3];

@@ -10,10 +10,10 @@ use crate::plan::{PlanError, Subject, admit, counted, shortage};
 use crate::refusal::Refusal;
 use crate::store::ModelStore;
 
-/// A factor takes so long from this size on that looking for freed memory before it costs nothing.
+/// Bytes above which a factor takes so long that reading the machine's free memory first costs little.
 const LARGE_BYTES: u64 = 16 << 20;
 
-/// What a factor is made for, and the memory it may take.
+/// Model and known degrees of freedom that a factor is made for, and the memory it may take.
 #[derive(Clone, Copy)]
 pub(super) struct FactorRequest<'a> {
     pub models: &'a ModelStore,
@@ -27,10 +27,11 @@ pub(super) struct FactorRequest<'a> {
 }
 
 impl FactorRequest<'_> {
-    /// Factors `K11` by the first of some methods whose factor fits, those over fronts first.
+    /// Factors `K11` by the first of `methods` whose factor fits in memory; methods over fronts come
+    /// first.
     ///
     /// # Errors
-    /// [`PlanError::Memory`] where none fits; [`Refusal::Model`] where there is no factor.
+    /// [`PlanError::Memory`] if none fits; [`Refusal::Model`] if `K11` has no factor.
     pub fn factor(&self, methods: &[Method], clock: &mut StageClock) -> Result<Factored, Refusal> {
         if let [method] = *methods
             && !method.has_fronts()
@@ -59,29 +60,30 @@ impl FactorRequest<'_> {
         }
     }
 
-    /// Whether the least that the factor of each of some methods can take is more than there is.
+    /// Whether even the smallest factor of each method needs more memory than there is.
     fn is_hopeless(&self, methods: &[Method]) -> bool {
         let needs = self.subject.predict(self.model.element(), methods);
         let free = self.reservation.free().saturating_sub(self.held);
         needs.iter().all(|need| need.factor_bytes_min > free)
     }
 
-    /// Orders and analyses `K11`: what a factor over fronts needs is known then.
+    /// Orders and analyses `K11`, after which the memory of a factor over fronts is known.
     pub fn analyse(&self, clock: &mut StageClock) -> Result<Analysed, Refusal> {
         let analysed = self.model.analyse(self.dofs, &mut |stage| clock.begin(stage))?;
         clock.end();
         Ok(analysed)
     }
 
-    /// What the factor of a method over fronts needs.
+    /// Memory that the factor of a method over fronts needs.
     pub fn need(&self, analysed: &Analysed, method: Method) -> Need {
         counted(self.model, self.held, analysed, method)
     }
 
-    /// Factors what is analysed by the first of some methods over fronts whose factor fits.
+    /// Factors the analysed `K11` by the first of `methods` (all over fronts) whose factor fits in
+    /// memory.
     ///
     /// # Errors
-    /// As [`FactorRequest::factor`].
+    /// The same as those of [`FactorRequest::factor`].
     pub fn factor_analysed(
         &self,
         analysed: Analysed,
@@ -108,8 +110,8 @@ impl FactorRequest<'_> {
         }
     }
 
-    /// Bytes that a factor may take: where single precision is admitted and there is room for a
-    /// factor in double precision beside it, room for both is reserved, should it not do.
+    /// Bytes that a factor may take. Where single precision is admitted and memory suffices for a factor
+    /// in double precision beside it, both are reserved, in case single precision does not suffice.
     fn limit_with_fallback(&self, analysed: &Analysed, admitted: &Need) -> u64 {
         if !admitted.method.is_single() {
             return u64::MAX;
@@ -129,14 +131,14 @@ impl FactorRequest<'_> {
         }
     }
 
-    /// Reserves memory for the first of some needs that fits.
+    /// Reserves memory for the first of some needs that fits, and returns this need.
     fn admit(&self, needs: &[Need]) -> Result<Need, Refusal> {
         admit(self.models, self.reservation, needs, self.subject)
             .map_err(|shortage| PlanError::Memory(shortage).into())
     }
 
-    /// Factors by a dense method, by the one without a factor, or by the sparse one whose memory is
-    /// counted by itself.
+    /// Factors by a dense method, by the one without a factor, or by the sparse one that counts its own
+    /// memory.
     fn factor_without_fronts(
         &self,
         method: Method,
@@ -171,7 +173,7 @@ impl FactorRequest<'_> {
     }
 }
 
-/// Why a method was taken, where its like in double precision was larger than allowed.
+/// Reason of the plan, with a clause if the method in double precision needed more memory than allowed.
 pub(super) fn because_of_memory(why: String, asked: Method, taken: Method) -> String {
     match asked == taken {
         true => why,

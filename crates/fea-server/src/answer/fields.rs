@@ -15,11 +15,11 @@ use crate::budget::Reservation;
 use crate::refusal::Refusal;
 use crate::resources::Resources;
 
-/// A displacement of every node of the system and the equations that it answers.
+/// Displacement of every node of the system, m, and the equations that it solves.
 pub(super) enum Shape<'a> {
-    /// Linear elasticity.
+    /// Displacement by linear elasticity.
     Linear(&'a [f64]),
-    /// Large deformation by the law of these elements.
+    /// Displacement at large deformation, by the law of these elements.
     Large(&'a Elements, &'a [f64]),
 }
 
@@ -31,14 +31,14 @@ impl Shape<'_> {
     }
 }
 
-/// Bytes of one number.
+/// Bytes of one number in double precision.
 const NUMBER: u64 = size_of::<f64>() as u64;
-/// Numbers that strain and stress of an element take while fields are made, and what elements and nodes
-/// are told.
+/// Numbers that strain and stress of one element take in memory while fields are computed, those of the
+/// answer included.
 const NUMBERS_PER_TET: u64 = 4 * 12 + 24;
 const NUMBERS_PER_NODE: u64 = 48;
 
-/// Fields of elasticity that are wanted of one displacement field, none where none are.
+/// Wanted fields of elasticity for one displacement; empty if none are wanted.
 pub(super) fn field_values(model: &Model, shape: &Shape<'_>, want: &Want) -> Vec<FieldValues> {
     match elastic(want.fields).is_empty() {
         true => Vec::new(),
@@ -46,7 +46,7 @@ pub(super) fn field_values(model: &Model, shape: &Shape<'_>, want: &Want) -> Vec
     }
 }
 
-/// Fields that are wanted of a contact frame; `contacts` those at the end of its step.
+/// Wanted fields of a contact frame; `contacts` are those at the end of its step.
 pub(super) fn contact_field_values(
     model: &Model,
     shape: &Shape<'_>,
@@ -61,7 +61,7 @@ pub(super) fn contact_field_values(
     vec![elastic_values(model, shape, (wanted, nodes), load.as_ref())]
 }
 
-/// The fields that no contact is needed for.
+/// The wanted fields that need no contact.
 fn elastic(wanted: FieldSet) -> FieldSet {
     wanted.iter().filter(|field| !field.is_of_contact()).collect()
 }
@@ -129,7 +129,7 @@ fn chosen(of_all: Vec<f64>, components: usize, nodes: &NodeChoice) -> Vec<f64> {
     }
 }
 
-/// What contacts put on the surface of a body in its deformed shape, in the object's frame.
+/// Forces and pressure that contacts put on the deformed surface, in the object's frame.
 fn surface_load(mesh: &TetMesh, u: &[f64], contacts: &[HeldContact]) -> SurfaceLoad {
     let moved = |(place, u): (&Point3<f64>, &[f64; 3])| place + Vector3::from(*u);
     let places: Vec<Point3<f64>> =
@@ -141,7 +141,7 @@ fn surface_load(mesh: &TetMesh, u: &[f64], contacts: &[HeldContact]) -> SurfaceL
     SurfaceLoad::new(&places, &Surface::from_mesh(mesh).triangles, forces)
 }
 
-/// Makes sure that a question can have the fields it asks for, and reserves what they take.
+/// Checks that the wanted fields exist for the question, and reserves the memory that they take.
 ///
 /// # Errors
 /// [`Refusal::ContactFields`], [`Refusal::FieldsMemory`], [`Refusal::FieldsTooLarge`].
@@ -168,7 +168,7 @@ pub(crate) fn reserve_fields(
         .map(Some)
 }
 
-/// What the fields of one contact frame take.
+/// Reserves the memory that the fields of one contact frame take.
 ///
 /// # Errors
 /// [`Refusal::FieldsMemory`], [`Refusal::FieldsTooLarge`].

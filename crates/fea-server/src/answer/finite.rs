@@ -1,9 +1,9 @@
-//! Looks whether all that a reply says of displacements, forces and errors are finite numbers.
+//! Checks that all displacements, forces and errors of a reply are finite numbers.
 
 use softgrasp_protocol::{Answer, Displacements, Reply, SolveReport};
 
-/// Whether every displacement, every force and every error of a reply is a finite number. What a report
-/// leaves open on purpose (rotation, strain) may be none.
+/// Whether every displacement, force and error of a reply is a finite number. Values that a report leaves
+/// open on purpose (rotation, strain) may be NaN.
 pub(crate) fn is_finite(reply: &Reply) -> bool {
     match reply {
         Reply::Answer(answer) => answer_is_finite(answer),

@@ -1,4 +1,4 @@
-//! Answers one frame on a kept model.
+//! Answers one frame question: linear elasticity on a kept model.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -20,13 +20,13 @@ use crate::request::{checked_forces, name_of, pairs, question_of};
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
-/// Numbers multiplied for a frame that takes less time than handing it to another thread.
+/// Number of multiplications below which answering takes less time than handing over to another thread.
 const SMALL_PRODUCTS: usize = 1 << 18;
 
-/// Numbers that such a frame prescribes at most.
+/// Largest number of prescribed displacements of such a frame question.
 const TOUCHED_MAX: usize = 1 << 10;
 
-/// A frame with all that its plan needs.
+/// A frame question with all data that its plan needs.
 pub(crate) struct PosedFrame {
     hash: ModelHash,
     stored: Arc<StoredModel>,
@@ -37,22 +37,22 @@ pub(crate) struct PosedFrame {
     plan: Plan,
 }
 
-/// A frame whose contact set is kept, with that set: nothing has to be made for its answer.
+/// A frame question and its kept contact set: nothing has to be made for its answer.
 pub(crate) struct KeptFrame {
     frame: PosedFrame,
     contacts: Contacts,
     prepared: PreparedSet,
 }
 
-/// A frame that is ready to be answered, or one that has to be worked on by the pool.
+/// Whether a frame question can be answered at once, or is work for the pool.
 pub(crate) enum Readiness {
-    /// A small product with what is kept.
+    /// The answer is a small product with kept data.
     Ready(Box<KeptFrame>),
-    /// Anything else.
+    /// Any other frame question.
     NotReady(Box<QuestionMessage>),
 }
 
-/// Looks whether a frame is a small product with what is kept, and holds on to what was found.
+/// Looks whether a frame question is a small product with kept data, and holds this data.
 pub(crate) fn readiness(
     resources: &Resources,
     model: ModelHash,
@@ -93,10 +93,10 @@ fn kept_frame(
 }
 
 impl KeptFrame {
-    /// Answers at once, with what was found.
+    /// Answers at once with the kept contact set.
     ///
     /// # Errors
-    /// [`Refusal`].
+    /// [`Refusal`] if the request cannot be answered.
     pub fn answer(&self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {
         let Self { frame, contacts, prepared } = self;
         let strain = StrainOf::Beside(resources);
@@ -104,10 +104,10 @@ impl KeptFrame {
     }
 }
 
-/// One frame on a kept model.
+/// Answers one frame question.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(crate) fn answer_frame(
     resources: &Resources,
     model: ModelHash,
@@ -117,11 +117,11 @@ pub(crate) fn answer_frame(
     PosedFrame::new(resources, model, message)?.answer(resources, clock)
 }
 
-/// Several cases of one frame: other values of the same known displacements. The report is that of
-/// the first with the largest residual and estimate of all.
+/// Answers several cases of one frame question: other values of the same known displacements. The report
+/// is that of the first case, with the largest residual and estimate of all.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(crate) fn answer_cases(
     resources: &Resources,
     model: ModelHash,
@@ -153,16 +153,16 @@ pub(crate) fn answer_cases(
     Ok(answer)
 }
 
-/// The larger of two errors; none where one of them is not known.
+/// The larger of two errors; `None` if one of them is not known.
 fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     Some(a?.max(b?))
 }
 
 impl PosedFrame {
-    /// Checks what a frame names, and plans it.
+    /// Checks the nodes, forces and masks of a frame question, and plans its answer.
     ///
     /// # Errors
-    /// [`Refusal`].
+    /// [`Refusal`] if the request cannot be answered.
     pub fn new(
         resources: &Resources,
         hash: ModelHash,
@@ -178,8 +178,8 @@ impl PosedFrame {
         Ok(Self { hash, stored, message, question, known, forces, plan })
     }
 
-    /// Whether the contact set or the factor that its plan wants is kept: then it takes a product or a
-    /// solve, and otherwise as long as making what is missing.
+    /// Whether the contact set or factor of the plan is kept. If so the answer takes a product or a
+    /// solve; otherwise it takes as long as making the missing one.
     pub fn is_prepared(&self) -> bool {
         match self.plan.method {
             Method::Condensed => {
@@ -191,7 +191,7 @@ impl PosedFrame {
         }
     }
 
-    /// What making is predicted to take.
+    /// Predicted time to make the missing contact set or factor.
     ///
     /// Units: ms.
     pub fn predicted_ms(&self, resources: &Resources) -> f64 {
@@ -208,10 +208,10 @@ impl PosedFrame {
         }
     }
 
-    /// Answers, and makes first what is missing.
+    /// Answers the frame question, after making the missing contact set or factor.
     ///
     /// # Errors
-    /// [`Refusal`].
+    /// [`Refusal`] if the request cannot be answered.
     pub fn answer(mut self, resources: &Resources, clock: StageClock) -> Result<Answer, Refusal> {
         if self.plan.method == Method::Condensed {
             let answer = self.by_columns(resources, clock.clone());

@@ -1,4 +1,4 @@
-//! What answers at large deformation share: what is asked, and how an equilibrium becomes an answer.
+//! Shared by all answers at large deformation: the checked question, and the answer from an equilibrium.
 
 use std::time::Instant;
 
@@ -19,14 +19,13 @@ use crate::machine_memory::last_peak_rss_bytes;
 use crate::refusal::Refusal;
 use crate::request::{checked_forces, checked_masks, name_of, pairs, question_of};
 
-/// Method that reports name.
+/// Name of the method in reports.
 const METHOD: &str = "newton";
-/// Error that a linear answer may have where nobody says how much.
+/// Relative error that a linear answer may have where the question does not say how much.
 pub(super) const LINEAR_ERROR_REL: f64 = 2e-3;
-/// From so near to incompressible a factor in single precision is a poor inverse.
+/// Poisson's ratio above which a factor in single precision is a poor inverse.
 const POISSON_FOR_DOUBLE: f64 = 0.48;
-/// Compression of an element beyond which surfaces crease: meshes do not converge to a smooth
-/// answer.
+/// Smallest principal stretch below which surfaces crease and meshes do not converge to a smooth answer.
 const CREASE_STRETCH: f64 = 0.6;
 
 /// A question about large deformation, checked against its model.
@@ -41,7 +40,7 @@ pub(super) struct LargeQuestion {
 }
 
 impl LargeQuestion {
-    /// What a message asks of a model.
+    /// Takes from the messages what is asked of a model.
     ///
     /// # Errors
     /// [`Refusal`] naming the node, the mask or the number.
@@ -66,11 +65,11 @@ impl LargeQuestion {
         Ok(Self { known, masks, mask_q, forces, is_single, max_error, deadline_ms })
     }
 
-    /// Moves the path of a moving hand to what is asked for, until it is right enough or the deadline
-    /// has passed.
+    /// Moves the path of a live grasp to the prescribed displacements, until the answer is accurate
+    /// enough or the deadline has passed.
     ///
     /// # Errors
-    /// [`NoEquilibrium`]; the path is where it was, then.
+    /// [`NoEquilibrium`]; the path is then unchanged.
     pub fn advance(
         &self,
         path: &mut Path,
@@ -91,10 +90,10 @@ impl LargeQuestion {
         path.advance(&goal, &wish)
     }
 
-    /// Goes from rest to what is asked for in one request, by all means there are.
+    /// Goes from rest to the prescribed displacements within one request, by all means there are.
     ///
     /// # Errors
-    /// [`NoEquilibrium`] with the cause.
+    /// [`NoEquilibrium`] with its cause.
     pub fn find(&self, path: &mut Path, clock: &StageClock) -> Result<Equilibrium, NoEquilibrium> {
         let Self { known, mask_q, forces, .. } = self;
         let goal = Goal { q_known: &known.q_known, mask_q, forces };
@@ -104,19 +103,19 @@ impl LargeQuestion {
     }
 }
 
-/// What a frame may take of its time, and whether it must come to its end.
+/// Time that a frame question at large deformation may take, and whether it must reach its end.
 #[derive(Clone, Copy, Default)]
 pub(super) struct FramePace {
-    /// How long the last factor took, ms.
+    /// Time that the last factor took, ms.
     pub factor_ms: Option<f64>,
-    /// Whether the last balanced shape on the way will do.
+    /// Whether a balanced shape before the end of the motion suffices as the answer.
     pub part_will_do: bool,
 }
 
-/// Time that must be left for a factor, over what the last one took.
+/// Time that must be left for a factor, as a multiple of what the last one took.
 const FACTOR_MARGIN: f64 = 1.5;
 
-/// The law behind a name on the wire.
+/// Material law that a name on the wire stands for.
 pub(super) fn law_of(name: LawName) -> Law {
     match name {
         LawName::NeoHookean => Law::NeoHookean,
@@ -124,7 +123,7 @@ pub(super) fn law_of(name: LawName) -> Law {
     }
 }
 
-/// How an equilibrium was come to.
+/// An equilibrium and how it was found.
 pub(super) struct Found<'a> {
     pub model: &'a Model,
     pub path: &'a Path,
@@ -136,7 +135,7 @@ pub(super) struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// What was asked for, out of the equilibrium, and what it cost.
+    /// The answer with the wanted results of the equilibrium, and its report.
     pub fn answer(
         &self,
         question: &LargeQuestion,

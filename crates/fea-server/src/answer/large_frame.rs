@@ -1,4 +1,4 @@
-//! Answers one frame at large deformation: the session's path on a kept model goes on.
+//! Answers one frame question at large deformation: the session's path on a kept model goes on.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -24,19 +24,20 @@ use crate::refusal::Refusal;
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
-/// The answer to a frame, and what is to be made beside the frames for those that follow.
+/// Answer to a frame question, and the work to be done in the background for those that follow.
 pub(crate) struct Answered {
-    /// The answer.
+    /// Answer to the frame question.
     pub answer: Answer,
-    /// Makes the session's path, where linear elasticity has answered because there was none yet.
+    /// Makes the session's path, where linear elasticity has answered because there was no path yet.
     pub making: Option<Box<dyn FnOnce() + Send>>,
 }
 
-/// One frame on a kept model, from the shape of the session's last one. The first frames of a live grip
-/// are answered by linear elasticity while the path is made beside them, if `may_make` allows it.
+/// Answers one frame question from the shape of the session's last one. The first questions of a live
+/// grip are answered by linear elasticity while the path is made in the background, if `may_make` allows
+/// it.
 ///
 /// # Errors
-/// [`Refusal`]; the path stays where it was, then.
+/// [`Refusal`]; the path then stays unchanged.
 pub(crate) fn answer_large_frame(
     resources: &Arc<Resources>,
     seat: &Seat,
@@ -91,7 +92,7 @@ pub(crate) fn answer_large_frame(
     answered.map(|answer| Answered { answer, making: None })
 }
 
-/// A frame with all that it needs.
+/// A frame question with its model and the server's resources.
 struct Frame {
     resources: Arc<Resources>,
     hash: ModelHash,
@@ -102,27 +103,27 @@ struct Frame {
 }
 
 impl Frame {
-    /// Whether a kept path is one that this frame goes on along.
+    /// Whether the question continues a kept path: same law and yield stress, and not from rest.
     fn goes_on(&self, kept: &ModelPath) -> bool {
         self.ask.path == PathChoice::Continue
             && kept.law == law_of(self.ask.law)
             && kept.yield_stress == self.ask.yield_stress
     }
 
-    /// Whether an answer in time is worth more than an exact one.
+    /// Whether an answer in time matters more than an exact one.
     fn is_live(&self) -> bool {
         self.ask.path == PathChoice::Continue
             && self.ask.pace == Pace::Timely
             && self.question.deadline_ms.is_some()
     }
 
-    /// Error that a linear answer may have.
+    /// Relative error that a linear answer may have.
     fn allowed(&self) -> f64 {
         self.question.max_error.unwrap_or(LINEAR_ERROR_REL)
     }
 
-    /// The linear answer, and what rotation and strain of the whole body promise its error to be at most;
-    /// none where linear elasticity cannot say.
+    /// Linear answer, and the largest error that rotation and strain of the whole body promise; `None`
+    /// where linear elasticity cannot answer.
     fn linear(&self, clock: &StageClock) -> Result<Option<(Answer, f64)>, Refusal> {
         if self.ask.yield_stress.is_some() {
             return Ok(None);
@@ -158,7 +159,7 @@ impl Frame {
         Ok(Some((answer, promised)))
     }
 
-    /// The linear answer while the path is being made: it says that it is not what was wanted.
+    /// Linear answer while the path is being made, with a warning that says so.
     fn meanwhile(&self, answer: Answer, promised: f64) -> Answer {
         let mut answer = linear_answer(answer, promised);
         let report = &mut answer.report;
@@ -176,7 +177,8 @@ impl Frame {
         answer
     }
 
-    /// Makes the path, and goes to where this frame wants it, for the frames that follow.
+    /// Work that makes the path and moves it to this question's displacements, for the questions that
+    /// follow.
     fn making(self: &Arc<Self>, coming: Coming) -> Box<dyn FnOnce() + Send> {
         let frame = Arc::clone(self);
         Box::new(move || {
@@ -225,7 +227,7 @@ impl Frame {
         }))
     }
 
-    /// Goes on to what is asked for.
+    /// Moves the path to the prescribed displacements, and answers.
     fn advance(&self, kept: &mut ModelPath, mut clock: StageClock) -> Result<Answer, Refusal> {
         let Self { question, message, stored, .. } = self;
         if !kept.path.hold().is_by(&question.known.dofs, &question.masks) {
@@ -264,7 +266,7 @@ impl Frame {
         Ok(found.answer(question, message, clock))
     }
 
-    /// Takes the factor that was made beside the frames, or makes one now where the clock must not
+    /// Takes the factor that was made in the background, or makes one now where the elapsed time must not
     /// decide.
     fn take_factor(&self, kept: &mut ModelPath, clock: &mut StageClock) {
         if self.ask.pace == Pace::Repeatable
@@ -284,7 +286,7 @@ impl Frame {
         }
     }
 
-    /// Begins a factor of the newest shape beside the frames, where the one there is has become old.
+    /// Begins a factor of the newest shape in the background, if the present factor has become old.
     fn begin_factor(&self, kept: &mut ModelPath) {
         if self.ask.pace != Pace::Timely || kept.under_way.is_some() {
             return;
@@ -299,7 +301,7 @@ impl Frame {
         });
     }
 
-    /// Rotation and stretches of this shape, or no numbers where the deadline leaves no time for them.
+    /// Rotation and stretches of this shape; NaN where the deadline leaves no time for them.
     fn summary(&self, kept: &mut ModelPath, clock: &StageClock) -> LargeSummary {
         let deadline_ms = self.question.deadline_ms.filter(|_| self.ask.pace == Pace::Timely);
         let left_ms = deadline_ms.map_or(f64::INFINITY, |deadline| deadline - clock.elapsed_ms());
@@ -314,5 +316,5 @@ impl Frame {
     }
 }
 
-/// Time that must be left for rotation and stretches, over what they took last.
+/// Time that must be left for rotation and stretches, as a multiple of what they took last.
 const SUMMARY_MARGIN: f64 = 2.0;

@@ -20,11 +20,11 @@ use crate::refusal::Refusal;
 use crate::request::{check_node_count, element_given, model_of, poisson_max};
 use crate::resources::Resources;
 
-/// Mesh, known displacements and law in one request: all that is known moves in proportion from
-/// rest.
+/// Answers a request with its own mesh at large deformation: all known displacements grow in proportion
+/// from rest.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(crate) fn solve_large(
     resources: &Resources,
     (body, message): (Body, Question),
@@ -75,7 +75,8 @@ pub(crate) fn solve_large(
     Ok(answered)
 }
 
-/// At large strain ten-node elements do not follow as far: linear ones, which do not lock.
+/// Element at large strain, where ten-node elements do not follow as far: a linear one that does not
+/// lock.
 fn cheapest(poisson_max: f64) -> Element {
     match cheapest_element(poisson_max) {
         Element::Tet4 => Element::Tet4,
@@ -83,13 +84,13 @@ fn cheapest(poisson_max: f64) -> Element {
     }
 }
 
-/// A linear answer that is good enough, or how far from it it may be.
+/// A linear answer that is accurate enough, or the error that it may have.
 enum Linear {
     Within(Box<Answer>),
     TooFar { promised: f64 },
 }
 
-/// The linear answer, if its rotation and strain promise an error within what is allowed.
+/// Linear answer, if its rotation and strain promise an error within the allowed one.
 fn linear_within(
     resources: &Resources,
     (body, question): (&Body, &Question),
@@ -112,15 +113,15 @@ fn linear_within(
     Ok(Linear::Within(Box::new(linear_answer(answer, promised))))
 }
 
-/// What the error of a linear displacement field is promised to be at most, over the largest
-/// displacement: rotation and strain leave out terms as large as themselves.
+/// Largest error promised for a linear displacement field, relative to the largest displacement: rotation
+/// and strain leave out terms as large as themselves.
 ///
 /// Units: rad, 1.
 pub(super) fn promised_error(rotation_max: f64, strain_max: f64) -> f64 {
     rotation_max + strain_max
 }
 
-/// A linear answer as an answer to a question about large deformation.
+/// Turns a linear answer into the answer to a question about large deformation.
 pub(super) fn linear_answer(mut answer: Answer, promised: f64) -> Answer {
     let report = &mut answer.report;
     let of_digits = report.error_estimate_rel.unwrap_or(0.0);
@@ -140,7 +141,7 @@ pub(super) fn linear_answer(mut answer: Answer, promised: f64) -> Answer {
     answer
 }
 
-/// Reserves what a path takes once its factor is counted.
+/// Reserves the memory of a path, once that of its factor is counted.
 ///
 /// # Errors
 /// [`PlanError::Memory`].

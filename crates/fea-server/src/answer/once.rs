@@ -22,7 +22,7 @@ use crate::request::{
 };
 use crate::resources::Resources;
 
-/// A request and what its answer may take.
+/// A request with its own mesh, and the memory reserved for its answer.
 pub(super) struct Work<'a> {
     pub resources: &'a Resources,
     pub reservation: Reservation,
@@ -30,10 +30,10 @@ pub(super) struct Work<'a> {
     pub message: QuestionMessage,
 }
 
-/// Mesh, known displacements and partition in one request (thesis 5.1.1).
+/// Answers a request with mesh, known displacements and partition by linear elasticity (thesis 5.1.1).
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(crate) fn solve_once(
     resources: &Resources,
     body: Body,
@@ -97,7 +97,7 @@ impl Work<'_> {
         Ok((direct::answer(model, &factored, posed, clock)?, plan))
     }
 
-    /// The factor or inverse, the plan as it became, and why.
+    /// Makes the factor or inverse; also the plan as it was carried out, and its reason.
     pub(super) fn factored(
         &self,
         plan: Plan,
@@ -119,7 +119,7 @@ impl Work<'_> {
         Ok((factored, plan, why))
     }
 
-    /// Orders, plans again by what is counted, and factors.
+    /// Orders, plans again by the counted work, and factors.
     fn factor_planned_again(
         &self,
         factor: &FactorRequest<'_>,

@@ -17,15 +17,15 @@ use crate::request::{
 };
 use crate::resources::Resources;
 
-/// Vectors of all degrees of freedom that one case holds while it is solved and afterwards: known
-/// and unknown displacements, forces, products, residual, correction, answer.
+/// Vectors of all degrees of freedom that one case holds while it is solved and afterwards: known and
+/// unknown displacements, forces, products, residual, correction, answer.
 const VECTORS_PER_CASE: usize = 12;
 
-/// Mesh, partition and several sets of known displacements in one request: those of `message` and
-/// `cases` more; `estimate` whether to work out what only informs.
+/// Answers a request with mesh, partition and several sets of known displacements: those of `message` and
+/// `cases` more; `estimate`: whether to compute condition, error and strain too.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(crate) fn solve_several(
     resources: &Resources,
     (body, message): (Body, Question),
@@ -66,7 +66,7 @@ pub(crate) fn solve_several(
     Ok(answer)
 }
 
-/// The known displacements of the further cases.
+/// Known displacements of the further cases.
 fn further(model: &Model, first: &[DofValue], cases: &[Vec<f64>]) -> Result<Vec<Known>, Refusal> {
     let known = |values: &Vec<f64>| {
         let pairs = first.iter().zip(values).map(|(known, &value)| (known.dof, value)).collect();
@@ -75,7 +75,7 @@ fn further(model: &Model, first: &[DofValue], cases: &[Vec<f64>]) -> Result<Vec<
     cases.iter().map(known).collect()
 }
 
-/// What solving and answering so many further cases takes beside the factor, if so much is free.
+/// Memory that solving and answering the further cases takes beside the factor, if so much is free.
 ///
 /// Units: bytes.
 ///

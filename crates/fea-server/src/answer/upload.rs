@@ -15,14 +15,14 @@ use crate::request::{check_node_count, element_of, model_of, paired};
 use crate::resources::Resources;
 use crate::store::{Allowed, StoredModel};
 
-/// Nodes or masks prefetched between two looks at what else is waiting: as many as one solve takes.
+/// Nodes or masks prefetched before other waiting work is looked for: as many as one solve takes.
 const PREFETCH_TOGETHER: usize = CONTACTS_TOGETHER;
 
-/// Prepares a model and keeps it; the base of the condensed engine is made with it, so that no frame
-/// has to wait for it.
+/// Makes a model and keeps it. The base for `condensed` is made with it, so that no frame question has to
+/// wait for it.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`] if the request cannot be answered.
 pub(crate) fn upload(
     resources: &Resources,
     hash: ModelHash,
@@ -56,7 +56,7 @@ pub(crate) fn upload(
     Ok(ModelReady { model: hash, unknown_dofs, fixed_dofs, reused, stage_ms: clock.finish() })
 }
 
-/// A model with its base, within the memory that others leave.
+/// A model with its base, within the memory that other reservations leave.
 pub(super) fn stored(
     resources: &Resources,
     reservation: &Reservation,
@@ -81,8 +81,8 @@ pub(super) fn may_prove(reservation: &Reservation, stored: &StoredModel) -> bool
     fits
 }
 
-/// Proves the eigenvalue bound of a kept model, from which every later frame's error bound follows;
-/// leaves it to whoever proves it already.
+/// Proves a lower bound on the smallest eigenvalue of a kept model, from which later error bounds follow.
+/// Returns at once if another thread proves it already.
 pub(crate) fn prove(resources: &Resources, model: ModelHash) {
     let Some(stored) = resources.models.find(model) else { return };
     let Some(_claimed) = stored.proof_under_way.take() else { return };
@@ -97,8 +97,8 @@ pub(crate) fn prove(resources: &Resources, model: ModelHash) {
     }
 }
 
-/// Computes the columns of nodes and masks that may be touched soon, a few at a time, letting frames
-/// pass; what does not fit the model is passed over, and nothing is answered.
+/// Computes the columns of nodes and masks that may be touched soon, a few at a time, so that frame
+/// questions come first. Skips nodes and masks that do not fit the model; nothing is answered.
 pub(crate) fn prefetch(resources: &Resources, hint: &Prefetch) {
     let Some(stored) = resources.models.find(hint.model) else { return };
     let Ok(base) = stored.base() else { return };

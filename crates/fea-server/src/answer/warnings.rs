@@ -9,12 +9,12 @@ use softgrasp_protocol::{Question, SolveReport, Warning, WarningCode, WarningLev
 
 use crate::refusal::Refusal;
 
-/// Linear elasticity errs by the square of the rotation: 1.5 % at 10°.
+/// Chosen: linear elasticity errs by the square of the rotation, 1.5 % at this angle in degrees.
 const ROTATION_WARNING_DEG: f64 = 10.0;
-/// Above this the small-strain measure itself is off by several per cent.
+/// Chosen: above this strain the small-strain measure itself is wrong by several per cent.
 const STRAIN_WARNING: f64 = 0.1;
 
-/// Sentences for answers that leave the range of small rotations and strains.
+/// Warnings for answers outside the range of small rotations and strains.
 pub(super) fn strain_warnings(summary: StrainSummary) -> Vec<Warning> {
     let (rotation_deg, strain) = (summary.rotation_max.to_degrees(), summary.strain_max);
     let mut warnings = Vec::new();
@@ -36,7 +36,7 @@ pub(super) fn strain_warnings(summary: StrainSummary) -> Vec<Warning> {
     warnings
 }
 
-/// Writes into the report how certain the digits are, and refuses an answer without any.
+/// Writes into the report how many digits are certain, and refuses an answer without any.
 pub(super) fn add_certainty(
     certainty: Certainty,
     question: &Question,
@@ -67,7 +67,7 @@ pub(super) fn add_certainty(
     Ok(())
 }
 
-/// Adds a sentence where an answer took longer than it should.
+/// Adds a warning if the answer took longer than the deadline.
 pub(super) fn add_late(deadline_ms: Option<f64>, report: &mut SolveReport) {
     let ms = &report.stage_ms;
     let took = ms.queue + ms.decode + ms.assemble + ms.order + ms.factor + ms.solve + ms.encode;
@@ -77,7 +77,7 @@ pub(super) fn add_late(deadline_ms: Option<f64>, report: &mut SolveReport) {
     }
 }
 
-/// Adds a sentence for each wish of the question that the answer does not meet.
+/// Adds a warning for the error or the deadline of the question that the answer does not meet.
 pub(super) fn add_unmet_wishes(question: &Question, report: &mut SolveReport) {
     add_late(question.deadline_ms, report);
     let Some(wanted) = question.max_error else { return };
@@ -94,8 +94,8 @@ pub(super) fn add_unmet_wishes(question: &Question, report: &mut SolveReport) {
     report.warnings.push(Warning::new(WarningCode::ERROR, text));
 }
 
-/// Warns of linear elements that were asked for on a material on which they lock, and of what a plan
-/// had to give up.
+/// Adds warnings for linear elements that lock on the material although they were asked for, and for what
+/// a plan gave up.
 pub(super) fn add_plan_warnings(
     plan: &Plan,
     asked: Option<Element>,
@@ -110,7 +110,7 @@ pub(super) fn add_plan_warnings(
     }
 }
 
-/// A sentence for elements that lock on a material.
+/// Warning for elements that lock on a material of this Poisson's ratio.
 pub(super) fn locking_warning(element: Element, poisson_max: f64) -> Option<Warning> {
     let locks = element == Element::Tet4 && poisson_max >= LOCKING_POISSON;
     locks.then(|| {

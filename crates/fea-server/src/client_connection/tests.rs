@@ -1,4 +1,4 @@
-//! Tests of a client's connection, on a clock that stands still.
+//! Tests of a client's connection, on a paused clock.
 
 use std::sync::Arc;
 
@@ -32,8 +32,8 @@ fn request_id(incoming: Result<Incoming, SessionError>) -> u64 {
     }
 }
 
-/// A connection, the client's end of it, and the bytes of a request. The clock of these tests
-/// stands still, and goes to the next thing that is waited for when all else rests.
+/// A connection, the client's end of it, and the bytes of a request. The clock of these tests is paused:
+/// it jumps to the next timer when all tasks are idle.
 fn connected() -> (ClientConnection<DuplexStream>, DuplexStream, Vec<u8>) {
     let (client, server) = duplex(1 << 10);
     let mut bytes = Vec::new();

@@ -1,5 +1,5 @@
-//! Reserves memory for a request: by what is predicted from the size of its mesh before anything is
-//! made, by what is counted before a factor is.
+//! Reserves memory for a request: by the prediction from the mesh's size before anything is made, and by
+//! the count before a factor is made.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::model::{Model, ModelError};
@@ -13,7 +13,7 @@ use crate::budget::Reservation;
 use crate::machine_memory::available_bytes;
 use crate::store::ModelStore;
 
-/// What a request for memory is about.
+/// Problem that memory is reserved for.
 #[derive(Clone, Copy)]
 pub(crate) struct Subject {
     pub problem: Problem,
@@ -23,14 +23,14 @@ pub(crate) struct Subject {
 }
 
 impl Subject {
-    /// A request that brings its own mesh.
+    /// Subject of a request with its own mesh.
     pub fn once(mesh: &MeshData, known_dofs: usize) -> Self {
         let size = size_of(mesh);
         let unknown_dofs = (3 * size.nodes).saturating_sub(known_dofs);
         Self { problem: Problem { size, known_dofs }, unknown_dofs, kept: None }
     }
 
-    /// A model that is there.
+    /// Subject of a request about a model that is there.
     pub fn about(model: &Model, known_dofs: usize, kept: Option<ModelHash>) -> Self {
         let nodes = model.mesh().used_nodes().iter().filter(|used| **used).count();
         let size = MeshSize { nodes, tets: model.mesh().tets().len() };
@@ -38,14 +38,14 @@ impl Subject {
         Self { problem: Problem { size, known_dofs }, unknown_dofs, kept }
     }
 
-    /// What some methods are predicted to need.
+    /// Memory that each of some methods is predicted to need.
     pub fn predict(&self, element: Element, methods: &[Method]) -> Vec<Need> {
         methods.iter().map(|&method| Need::predicted(self.problem, element, method)).collect()
     }
 }
 
-/// Reserves memory for the first of some needs that fits, and drops what is kept and unused for
-/// longest to make room for it. A prediction is refused only if the least it can be is too much.
+/// Reserves memory for the first of some needs that fits. To make room, drops kept data that is unused
+/// for longest. A prediction is refused only if the least that it can be is too much.
 ///
 /// # Errors
 /// [`Shortage`] if none fits.
@@ -73,7 +73,7 @@ pub(crate) fn admit(
     Err(shortage(reservation, needs, subject, available.filter(|_| is_machine)))
 }
 
-/// What is short, `available` being what the machine has to spare if that is what is too little.
+/// The shortage; `available` is the machine's free memory in bytes, if that is what does not suffice.
 pub(crate) fn shortage(
     reservation: &Reservation,
     asked: &[Need],
@@ -84,14 +84,14 @@ pub(crate) fn shortage(
     Box::new(Shortage::new(asked, subject.problem, subject.unknown_dofs, limits, available))
 }
 
-/// What a factor over fronts needs once its pattern is analysed, `held` bytes being what the model
+/// Memory that a factor over fronts needs, once its pattern is analysed; `held`: bytes that the model
 /// holds.
 pub(crate) fn counted(model: &Model, held: u64, analysed: &Analysed, method: Method) -> Need {
     let blocks = model.stiffness().pattern().block_count();
     Need::counted(model.element(), method, held, blocks, analysed.analysis())
 }
 
-/// Nodes that elements use, and elements; indices out of range are refused elsewhere.
+/// Number of nodes that elements use, and of elements; indices out of range are refused elsewhere.
 fn size_of(mesh: &MeshData) -> MeshSize {
     let mut used = vec![false; mesh.vertices.len()];
     for &node in mesh.tets.iter().flatten() {

@@ -1,4 +1,4 @@
-//! Plans a frame on a kept model: by kept columns where they can answer it, else by a factor.
+//! Plans the answer to a frame question: by kept columns where possible, else by a factor.
 
 use softgrasp_core::model::Known;
 use softgrasp_core::solve::Method;
@@ -8,13 +8,13 @@ use super::admission::PlanError;
 use super::once::{ASKED, plan_for_masks};
 use crate::store::StoredModel;
 
-/// Above so many touched degrees of freedom the small system is not small any more.
+/// Number of touched degrees of freedom above which the small system is too large.
 const TOUCHED_DOFS_MAX: usize = 600;
 
-/// What is done for one frame.
+/// Plan of the answer to one frame question.
 ///
 /// # Errors
-/// [`PlanError`] where the method asked for, or masks, cannot be answered on this model.
+/// [`PlanError`] if the model cannot be answered by the method asked for, or with masks.
 pub(crate) fn plan_frame(
     question: &Question,
     stored: &StoredModel,
@@ -53,7 +53,7 @@ pub(crate) fn plan_frame(
     }
 }
 
-/// A node that the scene fixes and the question moves all the same.
+/// A node that the model fixes and the question moves, if there is one.
 fn moved_fixed_node(stored: &StoredModel, known: &Known) -> Option<u32> {
     let fixed = stored.model.fixed();
     let moved = |(dof, q): (&u32, &f64)| *q != 0.0 && fixed.binary_search(dof).is_ok();

@@ -17,10 +17,10 @@ use super::rates::MeasuredRates;
 use crate::budget::Reservation;
 use crate::store::ModelStore;
 
-/// Why a method is taken that was named.
+/// Reason of a plan whose method the request named.
 pub(super) const ASKED: &str = "asked for";
 
-/// A request that brings its own mesh, as far as a plan for it goes.
+/// What the plan of a request with its own mesh depends on.
 #[derive(Clone, Copy)]
 pub(crate) struct OnceRequest {
     pub question: Question,
@@ -30,7 +30,7 @@ pub(crate) struct OnceRequest {
 }
 
 impl OnceRequest {
-    /// Whether the choice is weighed by what each way costs.
+    /// Whether the plan is chosen by comparing predicted costs.
     pub fn is_weighed(&self) -> bool {
         let Question { method, element, deadline_ms, max_error, .. } = self.question;
         let has_wish = deadline_ms.is_some() || max_error.is_some();
@@ -45,7 +45,7 @@ impl OnceRequest {
     }
 }
 
-/// Plans a request and reserves what it is predicted to need at the least.
+/// Plans a request and reserves the memory that it is predicted to need at least.
 ///
 /// Units: `elapsed_ms` ms since the request came, for the deadline.
 ///
@@ -72,7 +72,7 @@ pub(crate) fn plan_once(
     Ok(plan)
 }
 
-/// Nothing can be reused, so `auto` factors once, in single precision if only that fits.
+/// Plan without a comparison of costs: `auto` factors once, in single precision if only that fits.
 fn plan_as_asked(request: &OnceRequest) -> Result<Plan, PlanError> {
     let question = &request.question;
     let element = question.element.unwrap_or_else(|| cheapest_element(question.poisson_max));
@@ -91,7 +91,7 @@ fn plan_as_asked(request: &OnceRequest) -> Result<Plan, PlanError> {
     }
 }
 
-/// The plan for a question with masks, which one method answers, if `obstacle` is not in its way.
+/// Plan for a question with masks, which only `condensed` answers, unless there is an `obstacle`.
 pub(super) fn plan_for_masks(
     question: &Question,
     element: Element,
@@ -108,7 +108,7 @@ pub(super) fn plan_for_masks(
     }
 }
 
-/// Chooses among all that fits in memory, before anything is assembled.
+/// Plan by the predicted costs of all methods and elements that fit in memory.
 fn weigh(
     request: &OnceRequest,
     models: &ModelStore,
@@ -150,7 +150,7 @@ fn weigh(
     }
 }
 
-/// The plan again, now that the factor's work is counted and time has gone by, among what fits.
+/// Plan chosen again among the methods that fit, with the counted work of the factor and the time left.
 ///
 /// Units: `elapsed_ms` ms since the request came.
 pub(crate) fn plan_after_order(

@@ -1,6 +1,6 @@
-//! Predicts what a request costs before it is begun, so that it waits for its like only.
+//! Predicts the cost of a request before it is begun, so that it waits only for others of similar cost.
 //!
-//! The prediction chooses a lane and a turn, and nothing that an answer depends on.
+//! The prediction chooses a lane and a turn; no answer depends on it.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::model::Model;
@@ -12,18 +12,17 @@ use softgrasp_protocol::{Ask, Body, ElementChoice, MeshData, Request, Subject, U
 
 use crate::request::{element_given, element_of, poisson_max};
 
-/// Tangents that a request at large deformation is taken to factor.
+/// Number of tangents that a request at large deformation is assumed to factor.
 const TANGENTS_OF_A_MOTION: f64 = 6.0;
-/// Solves of a frame that goes on from the one before.
+/// Number of solves of a frame question that continues a path.
 const SOLVES_OF_A_FRAME: f64 = 5.0;
 /// Right-hand sides that are solved together in the time of about three single ones.
 const TOGETHER: f64 = 15.0;
 const SOLVES_TOGETHER: f64 = 3.0;
-/// Sums over all right-hand sides in refinement, for one case of several.
+/// Number of solves for all right-hand sides that refinement takes for one case of several.
 const SOLVES_PER_CASE: f64 = 1.0;
 
-/// Time that a request with its own mesh is predicted to take on all threads; 0 for those that ask
-/// about a model.
+/// Predicted time of a request with its own mesh, on all threads; 0 for requests about a kept model.
 ///
 /// Units: ms.
 pub(crate) fn request_ms(request: &Request, rates: &Rates) -> f64 {
@@ -48,15 +47,15 @@ fn ask_ms(ask: &Ask, rates: &Rates) -> f64 {
     made_ms(rates, &work, method) + SOLVES_PER_CASE * cases.len() as f64 * solve_ms
 }
 
-/// Time until a factor of a kept model is there and has answered.
+/// Predicted time to make a factor of a kept model and to answer with it.
 ///
 /// Units: ms.
 pub(crate) fn factor_ms(model: &Model, method: Method, rates: &Rates) -> f64 {
     made_ms(rates, &work_of_model(model), method)
 }
 
-/// Time of a frame at large deformation: one that goes on takes some solves with an older factor, the
-/// first one on a model makes the factor.
+/// Predicted time of a frame question at large deformation: one that continues a path takes some solves
+/// with an older factor, the first one about a model makes the factor.
 ///
 /// Units: ms.
 pub(crate) fn large_frame_ms(model: &Model, goes_on: bool, rates: &Rates) -> f64 {
@@ -70,7 +69,7 @@ pub(crate) fn large_frame_ms(model: &Model, goes_on: bool, rates: &Rates) -> f64
     1e3 * SOLVES_OF_A_FRAME * (solve_s + evaluation_s)
 }
 
-/// Time to compute the columns of so many contacts by a factor of so many numbers.
+/// Predicted time to compute the columns of `contacts` contacts by a factor of `factor_entries` entries.
 ///
 /// Units: ms.
 pub(crate) fn columns_ms(factor_entries: f64, contacts: usize, rates: &Rates) -> f64 {
@@ -92,7 +91,7 @@ fn work_of(mesh: &MeshData, element: Element) -> Work {
     Work::estimate(MeshSize { nodes: mesh.vertices.len(), tets: mesh.tets.len() }, element)
 }
 
-/// A name that no method has is refused when its turn comes.
+/// Method of this name; an unknown name is refused later.
 fn method_of(name: &str) -> Method {
     Method::named_or_auto(name).ok().flatten().unwrap_or(Method::Front)
 }

@@ -11,7 +11,7 @@ use softgrasp_core::solve::{Analysed, Factored, FrontFactor, Method, Partition, 
 
 use crate::lock::Lock;
 
-/// Rates of this machine's solving threads.
+/// Rates of this machine's solving threads, once they are measured.
 #[derive(Default)]
 pub(crate) struct MeasuredRates {
     state: Lock<State>,
@@ -25,15 +25,15 @@ enum State {
     Known(Rates),
 }
 
-/// Cubes that are timed: small enough to take a few hundredths of a second together.
+/// Nodes of the two cubes that are timed, which together takes a few hundredths of a second.
 const NODES_SMALL: usize = 216;
 const NODES_LARGE: usize = 1728;
-/// The fastest of so many runs counts: everything that disturbs makes them slower.
+/// Number of runs, of which the fastest counts: every disturbance makes a run slower.
 const RUNS: usize = 2;
 
 impl MeasuredRates {
-    /// The rates, measured now on the current pool if nobody has. Nobody waits for another who
-    /// measures: until that is done, a typical machine is assumed.
+    /// Measured rates; measured now on the current pool if they are not. While another thread measures,
+    /// those of a typical machine.
     pub fn get(&self) -> Rates {
         let before = self.state.with(|state| {
             let before = *state;
@@ -58,7 +58,7 @@ impl MeasuredRates {
         rates
     }
 
-    /// The rates as far as they are known, without measuring: for predictions that need not be right.
+    /// Measured rates, or those of a typical machine; for predictions that need not be exact.
     pub fn known(&self) -> Rates {
         match self.state.with(|state| *state) {
             State::Known(rates) => rates,
@@ -67,14 +67,14 @@ impl MeasuredRates {
     }
 }
 
-/// The speed of this machine with so many threads, for predictions without a server; takes some
-/// hundredths of a second. `None` where it cannot be measured.
+/// Rates of this machine with `threads` threads, for predictions without a server; takes some hundredths
+/// of a second. `None` if they cannot be measured.
 pub fn measure_rates(threads: usize) -> Option<Rates> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;
     pool.install(measure)
 }
 
-/// Seconds of one run and what it gave.
+/// Result of one run and its time, s.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = Instant::now();
     let result = work();
@@ -82,7 +82,7 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (result, start.elapsed().as_secs_f64().max(1e-9))
 }
 
-/// Seconds of the fastest run.
+/// Result of the fastest run and its time, s.
 fn fastest<T>(mut work: impl FnMut() -> Option<T>) -> Option<(T, f64)> {
     let mut best: Option<(T, f64)> = None;
     for _ in 0..RUNS {
@@ -95,7 +95,7 @@ fn fastest<T>(mut work: impl FnMut() -> Option<T>) -> Option<(T, f64)> {
     best
 }
 
-/// Rates from two cubes; `None` where one of them could not be solved.
+/// Rates from the times of two cubes; `None` if one of them cannot be solved.
 fn measure() -> Option<Rates> {
     let small = Cube::new(NODES_SMALL)?;
     let large = Cube::new(NODES_LARGE)?;
@@ -113,7 +113,7 @@ fn measure() -> Option<Rates> {
     })
 }
 
-/// A cube held by its first nodes, assembled and ordered.
+/// Cube held at its first nodes, assembled and ordered.
 struct Cube {
     model: Model,
     partition: Partition,

@@ -6,24 +6,24 @@ use softgrasp_core::fem::Element;
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::memory::{Bytes, Need, Problem, SENSIBLE, nodes_that_fit};
 
-/// A need that does not fit, with all the numbers.
+/// Memory needs that do not fit, with limit, reservations and what would fit.
 #[derive(Debug)]
 pub(crate) struct Shortage {
-    /// Methods that were looked at; none fits.
+    /// Needs of the methods that were asked for; none fits.
     asked: Vec<Need>,
-    /// Methods that would fit.
+    /// Needs of methods that would fit.
     instead: Vec<Need>,
     problem: Problem,
     unknown_dofs: usize,
     limit: u64,
-    /// Reserved for other requests.
+    /// Memory reserved for other requests, bytes.
     reserved: u64,
-    /// What the machine has to spare, where that is what is too little.
+    /// Free memory of the machine, bytes, if that is what does not suffice.
     available: Option<u64>,
 }
 
 impl Shortage {
-    /// What is short when none of some needs fits.
+    /// Shortage of memory when none of the needs fits.
     ///
     /// Units: `limit`, `reserved` (for other requests) and `available` (on the machine, where that is
     /// what is too little) bytes.
@@ -90,7 +90,7 @@ impl fmt::Display for Shortage {
     }
 }
 
-/// A need in words.
+/// Writes a need in words.
 struct InWords<'a>(&'a Need);
 
 impl fmt::Display for InWords<'_> {
@@ -115,7 +115,7 @@ impl fmt::Display for InWords<'_> {
 }
 
 impl Shortage {
-    /// Missing memory in bare numbers, for the log and for programs.
+    /// The shortage in plain numbers, for the log and for programs.
     pub fn detail(&self) -> String {
         let limit = format!("limit_bytes={} reserved_bytes={}", self.limit, self.reserved);
         self.asked.iter().fold(limit, |detail, need| {

@@ -5,7 +5,7 @@ use softgrasp_core::solve::choose::{LOCKING_POISSON, Plan};
 
 use super::once::OnceRequest;
 
-/// Why a plan was taken.
+/// Sentence that tells why a plan was chosen.
 pub(crate) fn because(request: &OnceRequest, plan: &Plan) -> String {
     let choice = match request.is_method_open() {
         true => plan.to_string(),
@@ -20,7 +20,7 @@ pub(crate) fn because(request: &OnceRequest, plan: &Plan) -> String {
     }
 }
 
-/// Why an element was taken where the request left it open.
+/// Why this element was chosen, if the request left it open.
 fn element_because(request: &OnceRequest, plan: &Plan) -> Option<String> {
     if request.question.element.is_some() {
         return None;

@@ -6,21 +6,21 @@ use softgrasp_protocol::{DofValue, NodeChoice, Question, Want};
 
 use crate::refusal::Refusal;
 
-/// With masks so many unknown forces at most: above it the small system is not small any more, and
-/// there is no other method to go to.
+/// Largest number of unknown forces of a question with masks; above it the small system is too large, and
+/// no other method answers.
 const MASK_FORCES_MAX: usize = 600;
 
-/// Known displacements as the core takes them.
+/// Known displacements as pairs of degree of freedom and value, m.
 pub(crate) fn pairs(known: &[DofValue]) -> Vec<(u32, f64)> {
     known.iter().map(|k| (k.dof, k.value)).collect()
 }
 
-/// Nodes of a mask with their weights.
+/// Nodes of a mask, each with its weight.
 pub(crate) fn paired((nodes, weights): (&[u32], &[f64])) -> Vec<(u32, f64)> {
     nodes.iter().copied().zip(weights.iter().copied()).collect()
 }
 
-/// Masks and their displacements, three each, once they are seen to fit the model.
+/// Masks of the question and their displacements (three each, m), checked against the model.
 pub(crate) fn checked_masks(
     model: &Model,
     question: &Question,
@@ -36,11 +36,11 @@ pub(crate) fn checked_masks(
     Ok((model.masks(question.masks.iter().map(paired))?, q.to_vec()))
 }
 
-/// Forces by degree of freedom, once all that a question names is seen to be there; before a factor
-/// is made, because that is what costs.
+/// Forces by degree of freedom, N, after all nodes that the question names were checked; called before a
+/// factor is made, which is the costly part.
 ///
 /// # Errors
-/// [`Refusal`] naming the node.
+/// [`Refusal`] that names the node.
 pub(crate) fn checked_forces(
     model: &Model,
     known: &Known,
@@ -61,7 +61,7 @@ fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {
     }
 }
 
-/// Forces by degree of freedom; empty when there are none.
+/// Forces by degree of freedom, N; empty if the question has none.
 fn scatter_forces(model: &Model, known: &Known, forces: &[DofValue]) -> Result<Vec<f64>, Refusal> {
     if forces.is_empty() {
         return Ok(Vec::new());

@@ -12,10 +12,10 @@ use softgrasp_protocol::{
 
 use crate::refusal::Refusal;
 
-/// The bodies of a frame.
+/// Rigid bodies of a contact frame, as the core takes them.
 ///
 /// # Errors
-/// [`Refusal::Body`] naming the body.
+/// [`Refusal::Body`] with the position of the body.
 pub(crate) fn bodies_of(bodies: Vec<BodyMotion>) -> Result<Vec<MovingBody>, Refusal> {
     bodies.into_iter().enumerate().map(|(at, body)| body_of(at, body)).collect()
 }
@@ -49,7 +49,7 @@ fn shape_of(shape: BodyShape) -> Result<RigidShape, String> {
     made.map_err(|error| error.to_string())
 }
 
-/// A pose whose quaternion is made a unit.
+/// Pose with its quaternion normalised; `None` if it is no pose.
 fn pose_of(pose: &Pose) -> Option<Isometry3<f64>> {
     let [x, y, z, w, i, j, k] = *pose;
     let quaternion = Quaternion::new(w, i, j, k);
@@ -60,10 +60,10 @@ fn pose_of(pose: &Pose) -> Option<Isometry3<f64>> {
     })
 }
 
-/// The state of an object.
+/// State of the object as the core takes it.
 ///
 /// # Errors
-/// [`Refusal::Body`] for a pose that is none.
+/// [`Refusal::Body`] if the pose is none.
 pub(crate) fn state_of(state: StateMessage) -> Result<ObjectState, Refusal> {
     let no_pose = Refusal::ObjectPose { reason: NO_POSE };
     let forces = state.force_nodes.into_iter().zip(state.forces);
@@ -83,7 +83,7 @@ pub(crate) fn state_of(state: StateMessage) -> Result<ObjectState, Refusal> {
     })
 }
 
-/// The state as it travels.
+/// State of the object as a message.
 pub(crate) fn state_message(state: &ObjectState) -> StateMessage {
     let held = |contact: &HeldContact| HeldMessage {
         body: u32::from(contact.body),
@@ -106,7 +106,7 @@ fn pose_message(pose: &Isometry3<f64>) -> Pose {
     [place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k]
 }
 
-/// How a step is made, by the client's wishes within what a server allows.
+/// Settings of a step by the client's wishes, within the server's limits.
 pub(crate) fn settings_of(ask: &ContactAsk) -> StepSettings {
     let most = |asked: u32, most: u32| asked.min(most) as usize;
     StepSettings {
@@ -121,6 +121,6 @@ pub(crate) fn settings_of(ask: &ContactAsk) -> StepSettings {
     }
 }
 
-/// Most rounds and steps of Newton's method of one frame, whatever is asked for.
+/// Largest numbers of rounds and of steps of Newton's method in one contact frame.
 const ROUNDS_MAX: u32 = 64;
 const NEWTON_MAX: u32 = 4000;

@@ -1,4 +1,4 @@
-//! Makes a model of what a message brings: mesh, materials, element, fixed degrees of freedom.
+//! Makes a model from the mesh, materials, element and fixed degrees of freedom of a message.
 
 use nalgebra::Point3;
 use softgrasp_core::fem::{Element, Material};
@@ -9,10 +9,10 @@ use softgrasp_protocol::{ElementChoice, ElementName, Material as MaterialMessage
 use crate::clock::StageClock;
 use crate::refusal::Refusal;
 
-/// A model from what has been sent, with all that is checked of it.
+/// Makes a model and checks all that it is made of.
 ///
 /// # Errors
-/// [`Refusal`] for what the mesh, the materials or the fixed degrees of freedom are at fault for.
+/// [`Refusal`] that names the fault of mesh, materials or fixed degrees of freedom.
 pub(crate) fn model_of(
     mesh: MeshData,
     materials: &[MaterialMessage],
@@ -55,7 +55,7 @@ pub(crate) fn name_of(element: Element) -> ElementName {
     }
 }
 
-/// The element behind a name on the wire.
+/// Element that a name on the wire stands for.
 pub(crate) fn element_of(name: ElementName) -> Element {
     match name {
         ElementName::T4 => Element::Tet4,
@@ -79,8 +79,8 @@ pub(crate) fn poisson_max(materials: &[MaterialMessage]) -> f64 {
     materials.iter().map(|material| material.poisson).fold(-1.0, f64::max)
 }
 
-/// The corners in the order of (3.23). Gmsh and VTK count them the other way round, and the
-/// stiffness does not depend on it, so clients may send either.
+/// Corners of an element in the order of (3.23). Gmsh and VTK use the other orientation; clients may send
+/// either, since the stiffness does not depend on it.
 fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
     let corner = |i: usize| vertices.get(tet[i] as usize).copied();
     match (corner(0), corner(1), corner(2), corner(3)) {
@@ -92,9 +92,9 @@ fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
     }
 }
 
-/// Region labels as positions in the list of materials, which stands in ascending order of the
-/// labels; empty when one material is for the whole body. Labels are any numbers: nothing may be
-/// as large as they are.
+/// Region of each element as a position in the list of materials, which is in ascending order of the
+/// labels; empty if one material is for the whole body. Labels are any numbers, so nothing is allocated
+/// by them.
 fn ranks(labels: &[u32], materials: usize) -> Result<Vec<u32>, Refusal> {
     if materials == 1 {
         return Ok(Vec::new());

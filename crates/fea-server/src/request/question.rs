@@ -7,13 +7,13 @@ use softgrasp_protocol::Question as QuestionMessage;
 
 use crate::refusal::Refusal;
 
-/// What a message asks for and what it leaves open.
+/// Question as the planner takes it: what a message asks for and what it leaves open.
 ///
 /// Shapes: `element` `None` where the server chooses; `poisson_max` the largest Poisson's ratio.
 ///
 /// # Errors
-/// [`Refusal::Method`] for a name that no method has, [`Refusal::Wish`] for a deadline or an error
-/// budget that nothing can be compared with.
+/// [`Refusal::Method`] for an unknown name of a method, [`Refusal::Wish`] for a deadline or an error
+/// budget that is no positive finite number.
 pub(crate) fn question_of(
     message: &QuestionMessage,
     element: Option<Element>,

@@ -1,4 +1,4 @@
-//! All kept models: found by hash, held by sessions, dropped when memory is needed.
+//! All kept models: found by hash, held by sessions, dropped if memory is needed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::stored_model::StoredModel;
 use crate::budget::{Budget, Reservation};
 use crate::lock::Lock;
 
-/// All models; those unused for longest go first.
+/// All kept models; those unused for longest are dropped first.
 ///
 /// Invariant: after every change the models and what is kept for them take at most what the
 /// reservations of requests under way leave of the budget. A model that alone is larger than that
@@ -23,7 +23,8 @@ pub(crate) struct ModelStore {
 #[derive(Default)]
 struct Kept {
     models: BTreeMap<ModelHash, Entry>,
-    /// Sessions that have named a model and not dropped it, those of models that are gone as well.
+    /// Number of sessions that have named a model and not dropped it, also for models that are not kept
+    /// any more.
     holders: BTreeMap<ModelHash, usize>,
     uses: u64,
 }
@@ -35,12 +36,12 @@ struct Entry {
 }
 
 impl ModelStore {
-    /// An empty store within a budget.
+    /// Empty store within a budget.
     pub fn new(budget: Budget) -> Self {
         Self { budget, kept: Lock::default() }
     }
 
-    /// A kept model; using it makes it the last to go.
+    /// A kept model, which then counts as used last.
     pub fn find(&self, hash: ModelHash) -> Option<Arc<StoredModel>> {
         self.kept.with(|kept| {
             kept.uses += 1;
@@ -52,7 +53,7 @@ impl ModelStore {
         })
     }
 
-    /// Keeps a model in place of what its request has reserved.
+    /// Keeps a model; its memory takes the place of the request's reservation.
     pub fn keep(&self, hash: ModelHash, stored: Arc<StoredModel>, reservation: Reservation) {
         self.kept.with(|kept| {
             kept.uses += 1;
@@ -63,7 +64,7 @@ impl ModelStore {
         self.trim();
     }
 
-    /// One session more holds a model, if it is kept; says whether it is.
+    /// Counts one more session that holds a model, if it is kept; returns whether it is.
     pub fn hold(&self, hash: ModelHash) -> bool {
         self.kept.with(|kept| {
             let is_kept = kept.models.contains_key(&hash);
@@ -74,7 +75,7 @@ impl ModelStore {
         })
     }
 
-    /// One session less holds a model; it stays until memory is needed.
+    /// Counts one session less that holds a model; the model stays until memory is needed.
     pub fn release(&self, hash: ModelHash) {
         self.kept.with(|kept| {
             if let Some(holders) = kept.holders.get_mut(&hash) {
@@ -90,7 +91,7 @@ impl ModelStore {
         });
     }
 
-    /// Forgets the models that no session has held and nobody has used since an instant.
+    /// Forgets the models that no session has held and no request has used since `then`.
     pub fn forget_unused_since(&self, then: Instant) {
         let forgotten = self.kept.with(|kept| {
             let Kept { models, holders, .. } = kept;
@@ -105,12 +106,12 @@ impl ModelStore {
         }
     }
 
-    /// How many models are kept, and the bytes of all that is kept for them.
+    /// Number of kept models, and bytes of all that is kept for them.
     pub fn count_and_bytes(&self) -> (usize, u64) {
         self.kept.with(|kept| (kept.models.len(), kept.bytes()))
     }
 
-    /// Forgets a model that no session holds; requests that are using it finish first.
+    /// Forgets a model that no session holds; requests that use it finish first.
     pub fn forget(&self, hash: ModelHash) {
         self.kept.with(|kept| {
             if !kept.holders.contains_key(&hash) {
@@ -119,7 +120,7 @@ impl ModelStore {
         });
     }
 
-    /// Drops what is unused for longest until the invariant holds; the model used last goes last.
+    /// Drops what is unused for longest until the invariant holds.
     pub fn trim(&self) {
         self.kept.with(|kept| {
             let last = kept.models.iter().max_by_key(|(_, entry)| entry.last_use);
@@ -131,15 +132,15 @@ impl ModelStore {
         });
     }
 
-    /// Forgets what a new reservation needs room for; nothing stays for certain but the model `keep`.
+    /// Drops what a new reservation needs room for; only the model `keep` is sure to stay.
     pub fn make_room(&self, keep: Option<ModelHash>) {
         self.kept.with(|kept| kept.trim_to(self.budget.left_for_kept(), keep));
     }
 }
 
 impl Kept {
-    /// Drops factors and contact sets of others, their columns, other models, and at last what can
-    /// be made again of the model `keep`, until no more than `bound` bytes are left.
+    /// Drops factors and contact sets of other models, their columns, the other models, and at last what
+    /// can be made again for the model `keep`, until at most `bound` bytes are left.
     fn trim_to(&mut self, bound: u64, keep: Option<ModelHash>) {
         let mut order: Vec<(u64, ModelHash)> =
             self.models.iter().map(|(&hash, entry)| (entry.last_use, hash)).collect();

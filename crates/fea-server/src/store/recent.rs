@@ -1,4 +1,4 @@
-//! A short list whose entries are in the order in which they were last used.
+//! Short list whose entries are in the order of their last use.
 
 /// Entries, the one used last at the end.
 pub(super) struct Recent<T>(Vec<T>);
@@ -10,24 +10,24 @@ impl<T> Default for Recent<T> {
 }
 
 impl<T> Recent<T> {
-    /// The first entry that `is_it`; using it makes it the last to go.
+    /// First entry for which `is_it` holds; it then counts as used last.
     pub fn find(&mut self, is_it: impl FnMut(&T) -> bool) -> Option<&T> {
         let at = self.0.iter().position(is_it)?;
         self.0[at..].rotate_left(1);
         self.0.last()
     }
 
-    /// Adds an entry as the one used last.
+    /// Adds an entry, which counts as used last.
     pub fn push(&mut self, entry: T) {
         self.0.push(entry);
     }
 
-    /// Drops the entries unused for longest until no more than `max` are left.
+    /// Drops the entries unused for longest until at most `max` are left.
     pub fn shorten(&mut self, max: usize) {
         self.0.drain(..self.0.len().saturating_sub(max));
     }
 
-    /// Keeps the entries that `is_kept`.
+    /// Keeps the entries for which `is_kept` holds.
     pub fn retain(&mut self, is_kept: impl FnMut(&T) -> bool) {
         self.0.retain(is_kept);
     }

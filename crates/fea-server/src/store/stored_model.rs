@@ -13,33 +13,33 @@ use softgrasp_core::solve::{Factored, Method, Stage};
 use super::recent::Recent;
 use crate::lock::Lock;
 
-/// A model and what has been made for it.
+/// A model with its factors, base, columns and contact sets.
 pub(crate) struct StoredModel {
     pub model: Model,
     factors: Lock<Recent<KeptFactor>>,
     base: Result<Arc<Base>, ModelError>,
     pub columns: Columns,
-    /// The body that nothing holds, once a contact frame has asked for it.
+    /// The model as a free body, once a contact frame has asked for it.
     free_body: Lock<Option<Arc<FreeBody>>>,
-    /// Whether a factor in double precision was larger than allowed.
+    /// Whether a factor in double precision needed more memory than allowed.
     pub single_only: AtomicBool,
     sets: Lock<Recent<KeptSet>>,
     strain: Lock<Option<KeptStrain>>,
-    /// Whether somebody works out the strain of a frame.
+    /// Held by the thread that computes the strain of an answer.
     pub strain_under_way: Claim,
-    /// Whether somebody proves the bound of the smallest eigenvalue.
+    /// Held by the thread that proves the bound of the smallest eigenvalue.
     pub proof_under_way: Claim,
 }
 
-/// Something that one thread at a time does and nobody waits for.
+/// Right to do something that only one thread at a time does; other threads do not wait for it.
 #[derive(Default)]
 pub(crate) struct Claim(Arc<AtomicBool>);
 
-/// A claim that is held; given back when dropped, after a panic as well.
+/// Held claim; given back when dropped, also after a panic.
 pub(crate) struct Claimed(Arc<AtomicBool>);
 
 impl Claim {
-    /// Claims it, or `None` if it is claimed.
+    /// Takes the claim; `None` if another thread holds it.
     pub fn take(&self) -> Option<Claimed> {
         (!self.0.swap(true, Ordering::Acquire)).then(|| Claimed(Arc::clone(&self.0)))
     }
@@ -51,42 +51,42 @@ impl Drop for Claimed {
     }
 }
 
-/// Bytes that a model and what is made for it may take.
+/// Memory that a model and what is made for it may take.
 #[derive(Clone, Copy)]
 pub(crate) struct Allowed {
-    /// All of it.
+    /// Memory for everything, bytes.
     pub bytes: u64,
-    /// Columns of the compliance.
+    /// Part of it for columns of the compliance, bytes.
     pub column_cache: u64,
 }
 
-/// A factor for a set of known degrees of freedom.
+/// Factor for a set of known degrees of freedom.
 struct KeptFactor {
     dofs: Vec<u32>,
     factored: Arc<Factored>,
 }
 
-/// A contact set with the rows of the nodes that answers are wanted for.
+/// Contact set with the rows of the wanted nodes.
 struct KeptSet {
     nodes: Vec<u32>,
     set: Arc<ContactSet>,
 }
 
-/// The strain of one frame and what was known in it.
+/// Strain of one answer, with the contacts and displacements that it belongs to.
 struct KeptStrain {
     touched: Touched,
     q: Vec<f64>,
     strain: StrainSummary,
 }
 
-/// Factors kept per model; a grasp needs one, a change of grip a second.
+/// Largest number of factors kept for each model: one for a grasp, a second for a change of grip.
 const FACTORS_MAX: usize = 4;
-/// Contact sets kept per model.
+/// Largest number of contact sets kept for each model.
 const SETS_MAX: usize = 8;
 
 impl StoredModel {
-    /// A model with the base of the condensed engine, or the reason why it has none; columns get
-    /// what the base leaves.
+    /// Model with the base of `condensed`, or the reason why it has none; columns may take what the base
+    /// leaves.
     pub fn new(model: Model, allowed: Allowed, on_stage: &mut dyn FnMut(Stage)) -> Self {
         let left = allowed.bytes.saturating_sub(model.bytes() as u64);
         let base = model.condense(Some(left), on_stage).map(Arc::new);
@@ -106,21 +106,21 @@ impl StoredModel {
         }
     }
 
-    /// The base of the condensed engine, or why there is none.
+    /// Base of `condensed`, or the reason why there is none.
     pub fn base(&self) -> Result<Arc<Base>, ModelError> {
         self.base.clone()
     }
 
-    /// Whether the body that nothing holds has been made.
+    /// Whether the free body has been made.
     pub fn has_free_body(&self) -> bool {
         self.free_body.with(|kept| kept.is_some())
     }
 
-    /// The body that nothing holds, made now if no contact frame has asked for it before. Two at once
-    /// may make it, the same bits each; nobody waits for the other.
+    /// The model as a free body, made now if no contact frame has asked for it before. Two threads may
+    /// both make it, with the same bits; neither waits for the other.
     ///
     /// # Errors
-    /// [`CondensedError`] where it is held, or has parts that move on their own.
+    /// [`CondensedError`] if the body has fixed nodes, or parts that move on their own.
     pub fn free_body(&self, base: &Base) -> Result<Arc<FreeBody>, CondensedError> {
         if let Some(kept) = self.free_body.with(|kept| kept.clone()) {
             return Ok(kept);
@@ -129,13 +129,13 @@ impl StoredModel {
         Ok(self.free_body.with(|kept| Arc::clone(kept.get_or_insert(made))))
     }
 
-    /// A contact set with the rows of some nodes, if it is kept.
+    /// Contact set with the rows of the wanted nodes, if it is kept.
     pub fn set_for(&self, touched: &Touched, nodes: &[u32]) -> Option<Arc<ContactSet>> {
         let is_it = |kept: &KeptSet| kept.set.touched() == touched && kept.nodes == nodes;
         self.sets.with(|sets| sets.find(is_it).map(|kept| Arc::clone(&kept.set)))
     }
 
-    /// Keeps a contact set; the one unused for longest goes when there are too many.
+    /// Keeps a contact set; drops the one unused for longest if there are too many.
     pub fn keep_set(&self, nodes: Vec<u32>, set: Arc<ContactSet>) {
         self.sets.with(|sets| {
             // Two frames at once may have made the same set.
@@ -145,24 +145,24 @@ impl StoredModel {
         });
     }
 
-    /// Strain of the frame with these contacts and displacements, where it is known.
+    /// Strain of an earlier answer with these contacts and displacements, if it is kept.
     pub fn strain_of(&self, touched: &Touched, q: &[f64]) -> Option<StrainSummary> {
         let is_it = |kept: &&KeptStrain| kept.q == q && kept.touched == *touched;
         self.strain.with(|kept| kept.as_ref().filter(is_it).map(|kept| kept.strain))
     }
 
-    /// Keeps the strain of a frame.
+    /// Keeps the strain of an answer.
     pub fn keep_strain(&self, touched: Touched, q: Vec<f64>, strain: StrainSummary) {
         self.strain.with(|kept| *kept = Some(KeptStrain { touched, q, strain }));
     }
 
-    /// Factor for a set of known degrees of freedom by a method, if it is kept.
+    /// Factor by a method for a set of known degrees of freedom, if it is kept.
     pub fn factor_for(&self, dofs: &[u32], method: Method) -> Option<Arc<Factored>> {
         let is_it = |kept: &KeptFactor| kept.factored.method() == method && kept.dofs == dofs;
         self.factors.with(|factors| factors.find(is_it).map(|kept| Arc::clone(&kept.factored)))
     }
 
-    /// Keeps a factor; the one unused for longest goes when there are too many.
+    /// Keeps a factor; drops the one unused for longest if there are too many.
     pub fn keep_factor(&self, dofs: Vec<u32>, factored: Arc<Factored>) {
         self.factors.with(|factors| {
             let method = factored.method();
@@ -172,13 +172,13 @@ impl StoredModel {
         });
     }
 
-    /// Bytes of the model and the base: what cannot be dropped without the model.
+    /// Bytes of the model and its base, which stay as long as the model.
     pub fn lasting_bytes(&self) -> u64 {
         let base = self.base.as_ref().map_or(0, |base| base.bytes());
         (self.model.bytes() + base) as u64
     }
 
-    /// Bytes of all that is kept.
+    /// Bytes of all that is kept for the model.
     pub fn bytes(&self) -> u64 {
         let columns = self.base.as_ref().map_or(0, |base| self.columns.bytes(base));
         let factors: usize =

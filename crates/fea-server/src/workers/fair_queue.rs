@@ -1,26 +1,26 @@
-//! A queue in which askers take turns by what their work costs, and nobody waits for ever.
+//! Queue in which sessions take turns by the cost of their work, so that no session waits for ever.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// One who asks for work to be done: a session.
+/// Session, as the queue knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Asker(u64);
 
 impl Asker {
-    /// One that is no other.
+    /// New asker, different from all others.
     pub fn new() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         Self(NEXT.fetch_add(1, Relaxed))
     }
 }
 
-/// Whose work it is, and what it is predicted to cost.
+/// Asker of a piece of work, and its predicted cost.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn {
     pub asker: Asker,
-    /// Time on all threads, ms.
+    /// Predicted time on all threads, ms.
     pub cost_ms: f64,
 }
 
@@ -33,11 +33,11 @@ pub(crate) struct Turn {
 /// Invariant: `clock ≤` the end of everything that waits.
 pub(super) struct FairQueue<T> {
     waiting: BinaryHeap<Reverse<Entry<T>>>,
-    /// The end of what was begun last, ms of cost.
+    /// Virtual end of the work that was begun last, ms of cost.
     clock: f64,
-    /// The end of each asker's newest work, as long as it is ahead of the clock.
+    /// Virtual end of each asker's newest work, as long as it is ahead of the clock.
     ends: BTreeMap<Asker, f64>,
-    /// Counts what came, so that equals are served in order.
+    /// Number of pieces that came, so that equal ones are served in order.
     count: u64,
 }
 
@@ -47,16 +47,16 @@ struct Entry<T> {
     work: T,
 }
 
-/// Work costs at least so much: what is predicted to cost nothing takes its turns too.
+/// Least cost of a piece of work, ms, so that work predicted to cost nothing takes turns too.
 const COST_MS_MIN: f64 = 1e-3;
 
 impl<T> FairQueue<T> {
-    /// An empty one.
+    /// Empty queue.
     pub fn new() -> Self {
         Self { waiting: BinaryHeap::new(), clock: 0.0, ends: BTreeMap::new(), count: 0 }
     }
 
-    /// Adds work to what waits.
+    /// Adds a piece of work.
     pub fn push(&mut self, turn: Turn, work: T) {
         let cost_ms = match turn.cost_ms.is_finite() {
             true => turn.cost_ms.max(COST_MS_MIN),
@@ -69,7 +69,7 @@ impl<T> FairQueue<T> {
         self.waiting.push(Reverse(Entry { end, number: self.count, work }));
     }
 
-    /// Takes the work whose turn it is.
+    /// Takes the piece of work whose turn it is.
     pub fn pop(&mut self) -> Option<T> {
         let Reverse(Entry { end, work, .. }) = self.waiting.pop()?;
         self.clock = end;

@@ -1,4 +1,4 @@
-//! A lane for work of one size: so many pieces at a time, each on a pool of its own, in fair turns.
+//! Lane for work of one size: some pieces at a time, each on a pool of its own, in fair turns.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use super::pool::pool;
 use super::pool::{EndedAbnormally, caught};
 use crate::lock::Lock;
 
-/// Work of one size, and the pools that do it.
+/// Queue of work of one size, and the pools that do it.
 ///
 /// Each piece has a pool to itself until it ends. On a pool that several pieces shared, a thread that
 /// waits inside a parallel loop would take up another piece, and the first would lie beneath it.
@@ -21,34 +21,34 @@ pub(super) struct Lane {
     state: Arc<Lock<State>>,
     places: Arc<Semaphore>,
     depth: usize,
-    /// Whether memory is given back to the system after each piece.
+    /// Whether freed memory is given back to the system after each piece.
     gives_back: bool,
 }
 
 struct State {
     waiting: FairQueue<Work>,
-    /// Pools that have nothing to do.
+    /// Pools without work.
     idle: Vec<Arc<rayon::ThreadPool>>,
 }
 
 type Work = Box<dyn FnOnce() + Send>;
 
-/// How many pieces of work a lane does at a time, on how many threads each.
+/// Number of pieces of work that a lane does at a time, and of threads for each.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Width {
     pub at_once: usize,
     pub threads: usize,
-    /// How far the threads stand back behind others.
+    /// Nice value of the threads.
     pub niceness: i32,
-    /// Whether the pieces are so large that the memory they have freed is given back to the system.
+    /// Whether the pieces are so large that freed memory is given back to the system after each.
     pub gives_back: bool,
 }
 
 impl Lane {
-    /// A lane where nothing waits.
+    /// Lane without work.
     ///
     /// # Errors
-    /// The system's, when it gives no threads.
+    /// Error of the operating system if it starts no threads.
     pub fn new(name: &str, width: Width, depth: usize) -> std::io::Result<Self> {
         let Width { at_once, threads, niceness, gives_back } = width;
         let idle: std::io::Result<Vec<_>> = (0..at_once)
@@ -59,13 +59,13 @@ impl Lane {
         Ok(Self { state: Arc::new(Lock::new(state)), places, depth, gives_back })
     }
 
-    /// Pieces that wait or are worked on.
+    /// Number of pieces that wait or are worked on.
     pub fn queued(&self) -> usize {
         self.depth - self.places.available_permits()
     }
 
-    /// Runs `work` in its turn and waits for it without blocking the sockets. Work whose session has
-    /// gone before its turn is not begun.
+    /// Runs `work` in its turn and waits for it without blocking the sockets. Work whose session has gone
+    /// before its turn is not begun.
     ///
     /// # Errors
     /// [`EndedAbnormally`] if the work panicked; the pool lives on.
@@ -91,7 +91,7 @@ impl Lane {
         receiver.await.unwrap_or(Err(EndedAbnormally))
     }
 
-    /// Begins what waits, if a pool has nothing to do.
+    /// Begins the next piece, if a pool is idle.
     fn begin_next(&self) {
         let next = self.state.with(|state| {
             let pool = state.idle.pop()?;

@@ -7,13 +7,13 @@ use std::time::Instant;
 use crate::awaited::Abandoned;
 use crate::lock::assert_none_is_held;
 
-/// A thread that waits inside a parallel loop takes other pieces, each on top of the last on one stack.
+/// Stack of a thread: one that waits inside a parallel loop takes other pieces on the same stack.
 const STACK_BYTES: usize = 16 << 20;
 
-/// A pool of exactly `threads` threads; `niceness` is how far they stand back behind others.
+/// Pool of exactly `threads` threads; `niceness` is their nice value.
 ///
 /// # Errors
-/// The system's, when it gives no threads.
+/// Error of the operating system if it starts no threads.
 pub(super) fn pool(
     name: String,
     threads: usize,
@@ -37,7 +37,7 @@ pub(super) fn pool(
 #[error("the work on this request ended abnormally")]
 pub(crate) struct EndedAbnormally;
 
-/// The result of `work`; a panic is logged.
+/// Result of `work`; a panic in it is logged.
 ///
 /// # Errors
 /// [`EndedAbnormally`] if it panicked.
@@ -61,22 +61,22 @@ pub(super) fn caught<T>(place: &str, work: impl FnOnce() -> T) -> Result<T, Ende
     })
 }
 
-/// Lets a thread rest so that it works for a tenth of its time, in pieces far shorter than the
-/// slices in which a system hands out its cores: nothing that is urgent ever waits for it.
+/// Makes a thread sleep so that it works for a tenth of its time, in pieces far shorter than the time
+/// slices of the system's scheduler: urgent work never waits for it.
 pub(crate) struct Rest {
     worked_since: Instant,
 }
 
-/// Time at rest per time at work.
+/// Time asleep for each unit of time at work.
 const REST_PER_WORK: u32 = 9;
 
 impl Rest {
-    /// Work begins.
+    /// Starts the measurement of the time at work.
     pub fn new() -> Self {
         Self { worked_since: Instant::now() }
     }
 
-    /// Rests for what has been worked since the last rest.
+    /// Sleeps in proportion to the time at work since the last sleep.
     pub fn rest(&mut self) {
         std::thread::sleep(REST_PER_WORK * self.worked_since.elapsed());
         self.worked_since = Instant::now();

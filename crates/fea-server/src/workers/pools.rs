@@ -1,5 +1,5 @@
-//! The pools of a server: frames have one, requests a lane of their size, and what nobody waits for one
-//! behind all others.
+//! Pools of a server: one for frame questions, a lane for requests of each size, and one with lower
+//! priority for background work.
 
 use std::sync::{Arc, mpsc};
 
@@ -28,7 +28,7 @@ pub(crate) struct Workers {
     factors: Arc<rayon::ThreadPool>,
 }
 
-/// The pool of frames on what is prepared.
+/// Pool for frame questions whose data is kept.
 #[derive(Clone)]
 struct Frames {
     pool: Arc<rayon::ThreadPool>,
@@ -36,7 +36,7 @@ struct Frames {
     depth: usize,
 }
 
-/// The pool of what nobody waits for.
+/// Pool for background work.
 #[derive(Clone)]
 struct Background {
     pool: Arc<rayon::ThreadPool>,
@@ -46,22 +46,22 @@ struct Background {
 /// Work for the thread beside the frames.
 type Task = Box<dyn FnOnce() + Send>;
 
-/// Predicted cost up to which work is small: an upload of a few thousand nodes, a new contact.
+/// Predicted cost in ms up to which work is small: an upload of a few thousand nodes, a new contact.
 pub(crate) const SMALL_MS_MAX: f64 = 250.0;
-/// Predicted cost up to which work is of middle length.
+/// Predicted cost in ms up to which work is of middle length.
 pub(crate) const MIDDLE_MS_MAX: f64 = 5000.0;
-/// Background tasks that may wait or run at once.
+/// Largest number of background tasks that wait or run.
 const BACKGROUND_MAX: usize = 8;
-/// How far threads stand back: one step of nice is worth a quarter of a share.
+/// Nice values of threads; one step is worth a quarter of a share of the processor.
 const NICENESS_MIDDLE: i32 = 3;
 const NICENESS_LONG: i32 = 5;
 const NICENESS_BACKGROUND: i32 = 10;
 
 impl Workers {
-    /// Pools of exactly `threads` threads for each piece of work, with queues of so many requests.
+    /// Pools of exactly `threads` threads for each piece of work, with queues of `queue_depth` requests.
     ///
     /// # Errors
-    /// The system's, when it gives no threads.
+    /// Error of the operating system if it starts no threads.
     pub fn new(threads: usize, queue_depth: usize) -> std::io::Result<Self> {
         let lane = |name, at_once, niceness| {
             let gives_back = niceness > 0;
@@ -91,8 +91,8 @@ impl Workers {
         self.threads
     }
 
-    /// Runs `work` when a thread is free; nobody waits for it. What is over the bound is dropped: this
-    /// is for hints and for proofs, without which everything still works.
+    /// Runs `work` in the background; no request waits for it. Drops it if too many tasks wait: hints and
+    /// proofs are not needed for an answer.
     pub fn in_background(&self, work: impl FnOnce() + Send + 'static) {
         let Ok(place) = Arc::clone(&self.background.places).try_acquire_owned() else {
             tracing::debug!("a background task is dropped");
@@ -104,23 +104,23 @@ impl Workers {
         });
     }
 
-    /// Makes a factor on a thread of its own, one after the other, while frames go on with the older
-    /// one: on the pool they would wait behind its pieces.
+    /// Makes a factor on a thread of its own, one after the other, while frame questions are answered
+    /// with the older one: on the pool they would wait behind its pieces.
     pub fn factor_beside(&self, work: impl FnOnce() + Send + 'static) {
         self.factors.spawn(move || {
             let _ = caught("on a factor beside the frames", work);
         });
     }
 
-    /// Runs `work` on a thread of its own, one such after the other. For what rests most of the time
-    /// ([`super::Rest`]) and must keep neither the pool nor a core from the frames.
+    /// Runs `work` on a thread of its own, one piece after the other. For work that sleeps most of the
+    /// time ([`super::Rest`]) and must keep neither the pool nor a core from frame questions.
     pub fn beside(&self, work: impl FnOnce() + Send + 'static) {
         if self.beside.send(Box::new(work)).is_err() {
             tracing::error!("the thread beside the frames has ended");
         }
     }
 
-    /// Requests that wait or are worked on.
+    /// Number of requests that wait or are worked on.
     pub fn queued(&self) -> usize {
         let frames = self.frames.depth - self.frames.places.available_permits();
         frames + [&self.small, &self.middle, &self.long].map(Lane::queued).iter().sum::<usize>()
@@ -144,10 +144,10 @@ impl Workers {
         lane.run(turn, work).await
     }
 
-    /// Runs a frame on what is prepared, which has threads that no other work uses.
+    /// Runs a frame question whose data is kept, on threads that no other work uses.
     ///
     /// # Errors
-    /// As [`Workers::run`].
+    /// The same as those of [`Workers::run`].
     pub async fn run_frame<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -168,8 +168,8 @@ impl Workers {
         receiver.await.unwrap_or(Err(EndedAbnormally))
     }
 
-    /// Does `work` at once on the calling thread of the sockets: for work that takes less time than
-    /// handing it over, and that must not wait behind a factor either.
+    /// Runs `work` at once on the calling thread of the sockets: for work that takes less time than
+    /// handing it over, and that must not wait behind a factor.
     ///
     /// # Errors
     /// [`EndedAbnormally`] if the work panicked.

@@ -1,4 +1,4 @@
-//! Certificates: how long one lives, one that has expired, and a new one while the server runs.
+//! Certificates: validity, one that has expired, and a new one while the server runs.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -22,7 +22,7 @@ struct Pair {
 }
 
 impl Pair {
-    /// Valid from and to so many days from now.
+    /// Certificate that is valid between two days, counted from now.
     fn valid(from: i32, to: i32) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let (certificate, key) = (folder.path().join("certificate"), folder.path().join("key"));
@@ -78,7 +78,7 @@ fn connect(
     Ok(stream)
 }
 
-/// Asks for a sign of life and waits for it.
+/// Sends `Ping` and waits for the reply.
 fn ping(stream: &mut (impl Read + Write)) -> std::io::Result<()> {
     let mut bytes = Vec::new();
     Request::Ping { nonce: 7 }.encode_into(1, &Limits::default(), &mut bytes).unwrap();

@@ -1,16 +1,16 @@
-//! What the log says of clients: who it was, in few and harmless words.
+//! Log lines about clients: they name the client, and are short, few and harmless.
 
 use softgrasp_protocol::{Ask, Body, ElementChoice, MeshData, MethodName, Question, Request};
 
 use crate::running::Running;
 
-/// A name of 16 KiB that would turn, colour and break the lines of a terminal.
+/// Client's name of 16 KiB that would turn, colour and break the lines of a terminal.
 fn nasty_name() -> String {
     let nasty = "\u{202e}\u{9b}31m\u{1b}[2J\n\u{2066}\u{feff}\"}";
     nasty.repeat(16_000 / nasty.len())
 }
 
-/// Whether a line can be shown on a terminal as it is.
+/// Whether a terminal shows a line without harm.
 fn is_harmless(line: &str) -> bool {
     line.chars().all(|c| c == '"' || c == '\'' || c == '\\' || c.escape_debug().len() == 1)
 }

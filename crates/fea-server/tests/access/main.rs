@@ -1,5 +1,5 @@
-//! The `fea-server` program towards those who may come and those who may not: strangers, watchers,
-//! tokens, certificates, and what the log says of them.
+//! The `fea-server` program and its access rules: connections that have not introduced themselves, status
+//! pages, tokens, certificates, and what the log says of clients.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail like tests")]

@@ -1,4 +1,4 @@
-//! A running server with its pages and its log, and clients that say as much as a test wants.
+//! A running server with its pages and its log, and clients for tests.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -9,7 +9,7 @@ use std::time::Duration;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{Hello, Limits, RejectCode, Reply, Request};
 
-/// What has not come by then never comes.
+/// Time after which a test gives up waiting.
 pub const LONG: Duration = Duration::from_secs(30);
 
 /// A running server; killed if a test fails.
@@ -32,12 +32,12 @@ pub fn run(arguments: &[&str]) -> Output {
 }
 
 impl Running {
-    /// With one thread, free ports and these arguments.
+    /// Starts a server with one thread, free ports and these arguments.
     pub fn start(arguments: &[&str]) -> Self {
         Self::start_on("127.0.0.1:0", arguments)
     }
 
-    /// The same on an address.
+    /// Starts the same server on the address `listen`.
     pub fn start_on(listen: &str, arguments: &[&str]) -> Self {
         let mut child = command()
             .args(["--listen", listen, "--metrics", "127.0.0.1:0", "--threads", "1"])
@@ -62,7 +62,7 @@ impl Running {
         Self { child, address, pages, log }
     }
 
-    /// The next line of the log that holds a text; those before it are forgotten.
+    /// Next line of the log that contains a text; earlier lines are dropped.
     pub fn log_line(&self, text: &str) -> String {
         loop {
             let line = self.log.recv_timeout(LONG).unwrap_or_else(|_| panic!("no line: {text}"));
@@ -72,7 +72,7 @@ impl Running {
         }
     }
 
-    /// The lines that are there, and those that come until one holds a text.
+    /// Lines of the log up to the first one that contains a text; waits for more as needed.
     pub fn log_until(&self, text: &str) -> Vec<String> {
         let mut lines = Vec::new();
         while !lines.last().is_some_and(|line: &String| line.contains(text)) {
@@ -98,7 +98,7 @@ impl Running {
         (head.split(' ').nth(1).unwrap().parse().unwrap(), text.to_owned())
     }
 
-    /// A number of the page `/metrics`.
+    /// Value of a metric on the page `/metrics`.
     pub fn metric(&self, name: &str) -> f64 {
         let (_, text) = self.page("/metrics");
         let values = text.lines().filter_map(|line| line.rsplit_once(' '));
@@ -106,7 +106,7 @@ impl Running {
         found.unwrap_or_else(|| panic!("no {name} in {text}")).parse().unwrap()
     }
 
-    /// Waits until a number of the page is this.
+    /// Waits until a metric has this value.
     pub fn await_metric(&self, name: &str, value: f64) {
         let start = std::time::Instant::now();
         while self.metric(name) != value {
@@ -115,7 +115,7 @@ impl Running {
         }
     }
 
-    /// A connection that says nothing.
+    /// Connection that sends nothing.
     pub fn silent(&self) -> TcpStream {
         TcpStream::connect(self.address).unwrap()
     }
@@ -140,7 +140,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// On a socket that is connected.
+    /// Client over a socket that is connected.
     pub fn over(stream: TcpStream) -> Self {
         stream.set_nodelay(true).unwrap();
         stream.set_read_timeout(Some(LONG)).unwrap();
@@ -152,7 +152,7 @@ impl Client {
         let _ = self.connection.stream().write_all(bytes);
     }
 
-    /// The reply to a request, or what the server says instead; `None` at the end.
+    /// Reply to a request, or another message of the server; `None` at the end of the stream.
     pub fn ask(&mut self, request: &Request) -> Option<Reply> {
         self.id += 1;
         let mut bytes = Vec::new();
@@ -161,13 +161,13 @@ impl Client {
         self.reply()
     }
 
-    /// What the server says next.
+    /// Next message of the server.
     pub fn reply(&mut self) -> Option<Reply> {
         let frame = self.connection.read_frame().ok()??;
         Some(Reply::decode(&frame, &Limits::default()).unwrap())
     }
 
-    /// Says what it is, with a token or none: the code of a refusal.
+    /// Sends `Hello` with a token or without one; `Err` with the code of a refusal.
     pub fn hello(&mut self, client: &str, token: Option<&str>) -> Result<(), RejectCode> {
         let hello = Hello::new(client, token.map(str::to_owned));
         match self.ask(&Request::Hello(hello)) {
@@ -177,12 +177,12 @@ impl Client {
         }
     }
 
-    /// How the server sees it.
+    /// Address of the client, as the server sees it.
     pub fn peer(&self) -> SocketAddr {
         self.connection.stream().local_addr().unwrap()
     }
 
-    /// Whether it is answered.
+    /// Whether the server answers this client.
     pub fn is_served(&mut self) -> bool {
         self.ask(&Request::Ping { nonce: 7 }) == Some(Reply::Pong { nonce: 7 })
     }

@@ -1,4 +1,4 @@
-//! Connections that say nothing keep nobody out and take no session's place.
+//! Connections that send nothing keep no client out and take no session's place.
 
 use std::net::{IpAddr, SocketAddr, TcpStream};
 
@@ -14,7 +14,7 @@ fn from(own: [u8; 4], to: SocketAddr) -> Option<TcpStream> {
     Some(socket.into())
 }
 
-/// Whether a newcomer is served while these connections are held open, and `/ready` says so.
+/// Whether a new client is served while these connections are open, and `/ready` says so.
 fn newcomer_is_served(server: &Running, held: &[TcpStream]) {
     assert_eq!(server.page("/ready"), (200, "ready\n".to_owned()), "beside {}", held.len());
     assert_eq!(server.client().hello("a newcomer", None), Ok(()), "beside {}", held.len());

@@ -10,7 +10,7 @@ use crate::running::{Running, run};
 const ALICE: &str = "alice has a token of her own";
 const BOB: &str = "Bob's-token-is-long-enough";
 
-/// A file of mode 600 in a folder that lives as long as this does.
+/// File of mode 600 in a folder that is removed with this value.
 struct File {
     path: PathBuf,
     _folder: tempfile::TempDir,

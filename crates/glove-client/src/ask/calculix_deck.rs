@@ -1,4 +1,4 @@
-//! One question as an input deck of CalculiX or Abaqus: whoever doubts an answer asks another program.
+//! One question as an input deck of CalculiX or Abaqus, so that another program can check an answer.
 
 use std::fmt::Write as _;
 
@@ -7,45 +7,45 @@ use softgrasp_core::fem::{Element, QuadraticMesh, TooManyNodes, tet10};
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{DofValue, LawName, Material};
 
-/// A question as another program is to be asked it.
+/// Question to be written as an input deck.
 ///
 /// Units: m, N, Pa.
 pub struct CalculixDeck<'a> {
-    /// Nodes and corners of the elements.
+    /// Nodes, and corners of the elements.
     pub mesh: &'a TetMesh,
-    /// `t4` (C3D4) or `t10` (C3D10); others have no counterpart.
+    /// Element: `t4` (C3D4) or `t10` (C3D10); others have no counterpart.
     pub element: Element,
-    /// Of the whole mesh.
+    /// Material of the whole mesh.
     pub material: Material,
-    /// Law of large deformation; `None` asks for linear elasticity.
+    /// Law of large deformation; `None` for linear elasticity.
     pub law: Option<LawName>,
-    /// Known displacements.
+    /// Known displacements (Dirichlet values), m.
     pub known: &'a [DofValue],
-    /// Forces that keep their directions.
+    /// Forces on degrees of freedom, N; they keep their directions.
     pub forces: &'a [DofValue],
 }
 
-/// Why a question has no deck.
+/// Why a question cannot be written as a deck.
 #[derive(Debug, thiserror::Error)]
 pub enum DeckError {
     /// CalculiX and Abaqus have no such element.
     #[error("a deck is for t4 (C3D4) or t10 (C3D10); CalculiX has no {}", element.name())]
     Element {
-        /// The one asked for.
+        /// Element of the question.
         element: Element,
     },
     /// CalculiX and Abaqus have no such law.
     #[error("a deck is for the law neo-hookean; CalculiX has no {law}")]
     Law {
-        /// The one asked for.
+        /// Law of the question.
         law: LawName,
     },
-    /// No mid-edge nodes can be made.
+    /// The mesh has too many nodes for mid-edge nodes.
     #[error(transparent)]
     Mesh(#[from] TooManyNodes),
 }
 
-/// Nodes and elements as the other program counts them.
+/// Nodes and elements as CalculiX counts them.
 struct Cells {
     vertices: Vec<Point3<f64>>,
     /// Nodes of every element in CalculiX's order, from 0.
@@ -151,10 +151,10 @@ fn line(text: &mut String, words: std::fmt::Arguments<'_>) {
     writeln!(text, "{words}").expect("a string takes everything");
 }
 
-/// Characters of a number that CalculiX reads; further ones it leaves out without a word.
+/// Number of characters of a number that CalculiX reads; it ignores further ones.
 const CARD: usize = 20;
 
-/// A number as exactly as a card holds it: fourteen digits at least (below 1e100).
+/// Number as exactly as a card holds it: at least fourteen digits (below 1e100).
 fn card(x: f64) -> String {
     let exact = format!("{x:e}");
     if exact.len() <= CARD {

@@ -16,12 +16,12 @@ use softgrasp_protocol::{
 use crate::ask::endpoint::{Endpoint, TrustError};
 use crate::ask::server_stream::ServerStream;
 
-/// Where the finite element server is.
+/// Finite element server to be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ServerChoice {
-    /// In this process, still over a loopback socket.
+    /// Server in this process, still over a loopback socket.
     Embedded,
-    /// Elsewhere, `HOST:PORT`.
+    /// Server at an address `HOST:PORT`.
     At(String),
 }
 
@@ -45,31 +45,31 @@ impl fmt::Display for ServerChoice {
     }
 }
 
-/// What can go wrong between client and server.
+/// Errors between client and server.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// The embedded server did not start.
     #[error("the embedded server did not start: {0}")]
     Start(#[from] StartError),
-    /// The address means nothing.
+    /// The server's address cannot be resolved.
     #[error("--server {address} is no address: {source}; write HOST:PORT, or embedded")]
     Address {
-        /// As given.
+        /// Address as it was given.
         address: String,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Nobody answers there.
+    /// No server accepts a connection at the address.
     #[error(
         "no server answers at {address}: {source}; start one with `fea-server --listen {address}`, or use --server embedded"
     )]
     Connect {
-        /// As given.
+        /// Address as it was given.
         address: String,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The server speaks TLS and this client does not.
+    /// The server requires TLS and this client has no trusted certificate.
     #[error(
         "the server at {address} is encrypted; give its certificate or authority with --tls-ca"
     )]
@@ -77,25 +77,25 @@ pub enum LinkError {
         /// Address of the server.
         address: String,
     },
-    /// Encryption cannot be used.
+    /// The settings of the encryption cannot be used.
     #[error(transparent)]
     Encryption(#[from] TrustError),
-    /// The connection broke.
+    /// The connection broke, or its bytes were damaged.
     #[error("the connection to the server broke: {0}")]
     Connection(#[from] ConnectionError),
     /// The server closed the connection instead of answering.
     #[error("the server closed the connection instead of answering")]
     Closed,
-    /// A request that cannot be put on the wire.
+    /// A request cannot be encoded.
     #[error("the request cannot be sent: {0}")]
     Encode(#[from] EncodeError),
-    /// A reply that cannot be read.
+    /// A reply cannot be decoded.
     #[error("the server's reply cannot be decoded: {0}")]
     Decode(#[from] DecodeError),
-    /// The server refused.
+    /// The server refused the request.
     #[error("the server refused ({}): {}", .0.code, .0.text)]
     Rejected(Rejected),
-    /// Another reply than the request asks for.
+    /// The reply is of another kind than the request asks for.
     #[error("the server answered a {asked} with a {got}")]
     Unexpected {
         /// Kind of the request.
@@ -105,18 +105,18 @@ pub enum LinkError {
     },
 }
 
-/// A connection that has been introduced.
+/// Connection to a server that has received `Hello` and sent `Welcome`.
 pub struct ServerConnection {
     connection: Connection<ServerStream>,
     limits: Limits,
     welcome: Welcome,
     request_id: u64,
     out: Vec<u8>,
-    /// Bytes of the newest reply.
+    /// Length of the newest reply, bytes.
     reply_bytes: usize,
 }
 
-/// An address to connect to, and the server behind it if it is this process's own.
+/// Address to connect to, and the server behind it if it runs in this process.
 pub struct Host {
     endpoint: Endpoint,
     stage: StageWatch,
@@ -124,25 +124,26 @@ pub struct Host {
     _embedded: Option<RunningServer>,
 }
 
-/// A server that does not accept within this time is not there.
+/// Longest time for a server to accept the connection.
 const CONNECT_MAX: Duration = Duration::from_secs(2);
-/// A server that says no welcome within this time is not one.
+/// Longest time for a server to send `Welcome`.
 const WELCOME_MAX: Duration = Duration::from_secs(10);
-/// A server's machine that is silent is asked whether it is there after this long, and again so often.
+/// Time of silence after which the system asks the server's machine whether it is there, and between such
+/// questions.
 const ALIVE_EVERY: Duration = Duration::from_secs(1);
-/// A machine that has confirmed nothing for this long, though it was asked or sent something, is gone.
-/// Links that pause for less are waited for.
+/// Time after which a machine that has confirmed nothing, though it was asked or sent something, is taken
+/// to be gone. Shorter pauses of the link are waited for.
 const ALIVE_MAX: Duration = Duration::from_secs(5);
-/// First byte of what a TLS server answers to bytes that are not TLS.
+/// First byte of a TLS server's response to bytes that are not TLS.
 const TLS_ALERT: u8 = 0x15;
-/// A reply that has not begun to come by then is slept for.
+/// Time for which a thread looks for a reply without sleeping.
 const AWAKE_MAX: Duration = Duration::from_micros(300);
 
 impl Host {
-    /// Starts the embedded server, or takes the address as given.
+    /// Starts the embedded server, or takes the address as it was given.
     ///
     /// # Errors
-    /// [`LinkError::Start`].
+    /// [`LinkError::Start`] if the embedded server cannot start.
     pub fn open(choice: &ServerChoice, threads: Option<usize>) -> Result<Self, LinkError> {
         Self::open_within(choice, threads, None)
     }
@@ -152,7 +153,7 @@ impl Host {
     /// Units: `memory_limit` bytes.
     ///
     /// # Errors
-    /// [`LinkError::Start`].
+    /// [`LinkError::Start`] if the embedded server cannot start.
     pub fn open_within(
         choice: &ServerChoice,
         threads: Option<usize>,
@@ -178,37 +179,37 @@ impl Host {
         }
     }
 
-    /// A server elsewhere.
+    /// Host with a server at an address.
     pub fn at(endpoint: Endpoint) -> Self {
         Self { endpoint, stage: StageWatch::default(), _embedded: None }
     }
 
-    /// What the embedded server is doing now, in a word; empty while it does nothing, and for a
-    /// server elsewhere.
+    /// Name of the stage that the embedded server works on; empty while it has no request, and for a
+    /// server at an address.
     pub fn stage(&self) -> impl Fn() -> &'static str + Send + Sync + Clone + 'static {
         let stage = self.stage.clone();
         move || stage.now()
     }
 
-    /// Connects and introduces this client.
+    /// Connects and sends `Hello`.
     ///
     /// # Errors
-    /// [`LinkError`].
+    /// [`LinkError`] if there is no server, or it refuses.
     pub fn connect(&self) -> Result<ServerConnection, LinkError> {
         ServerConnection::connect(&self.endpoint)
     }
 
-    /// The server.
+    /// Address of the server, with its token and encryption.
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 }
 
 impl ServerConnection {
-    /// Connects to a server and says hello, with the token if there is one.
+    /// Connects to a server and sends `Hello`, with the token if there is one.
     ///
     /// # Errors
-    /// [`LinkError`].
+    /// [`LinkError`] if there is no server, or it refuses.
     pub fn connect(to: impl Into<Endpoint>) -> Result<Self, LinkError> {
         let endpoint = to.into();
         let stream = ServerStream::new(open_socket(&endpoint.address)?, &endpoint)?;
@@ -238,23 +239,23 @@ impl ServerConnection {
         Ok(this)
     }
 
-    /// What the server said of itself.
+    /// `Welcome` that the server sent.
     pub fn welcome(&self) -> &Welcome {
         &self.welcome
     }
 
-    /// The stream, to set time limits on it or to shut it down.
+    /// TCP stream of the connection, to set time limits on it or to shut it down.
     pub fn stream(&self) -> &TcpStream {
         self.connection.stream().socket()
     }
 
-    /// Whether the server has closed the connection, or has said something that nobody asked for,
-    /// as it does before it closes; never waits. To be called while no reply is awaited.
+    /// Whether the server has closed the connection, or has sent a message without a request, as it does
+    /// before it closes; never waits. To be called while no reply is awaited.
     pub fn is_closed(&mut self) -> bool {
         !self.connection.stream_mut().is_quiet()
     }
 
-    /// Sends a request and waits for its reply; replies to abandoned requests are passed over.
+    /// Sends a request and waits for its reply; ignores replies to abandoned requests.
     ///
     /// # Errors
     /// [`LinkError`]; after anything but `Rejected` and `Encode` the connection is to be given up.
@@ -265,7 +266,7 @@ impl ServerConnection {
     /// Asks for displacements and waits for the answer.
     ///
     /// # Errors
-    /// As [`Self::ask`].
+    /// The same as those of [`Self::ask`].
     pub fn answer(&mut self, ask: Ask) -> Result<Box<Answer>, LinkError> {
         match self.ask(&Request::Ask(Box::new(ask)))? {
             Reply::Answer(answer) => Ok(answer),
@@ -273,11 +274,11 @@ impl ServerConnection {
         }
     }
 
-    /// [`Self::ask`] for what is answered within a tick: looks for the reply without sleeping for a
-    /// moment, because waking a thread takes as long as solving a frame.
+    /// [`Self::ask`] for requests that are answered within a tick: looks for the reply without sleeping
+    /// for a moment, because waking a thread takes as long as a frame question.
     ///
     /// # Errors
-    /// As [`Self::ask`].
+    /// The same as those of [`Self::ask`].
     pub fn ask_awake(&mut self, request: &Request) -> Result<Reply, LinkError> {
         self.ask_by(request, Self::read_frame_awake)
     }
@@ -303,12 +304,12 @@ impl ServerConnection {
         }
     }
 
-    /// Bytes of the newest request and of its reply, headers included.
+    /// Lengths of the newest request and of its reply, headers included, bytes.
     pub fn bytes_of_exchange(&self) -> [u64; 2] {
         [self.out.len() as u64, self.reply_bytes as u64]
     }
 
-    /// Next frame; sleeps only for one that has not come after [`AWAKE_MAX`].
+    /// Next message; sleeps only if it has not come after [`AWAKE_MAX`].
     fn read_frame_awake(&mut self) -> Result<Option<Frame>, ConnectionError> {
         let start = Instant::now();
         self.stream().set_nonblocking(true)?;
@@ -326,10 +327,11 @@ impl ServerConnection {
         early.unwrap_or_else(|| self.connection.read_frame())
     }
 
-    /// Sends a request without waiting; the id its reply will carry.
+    /// Sends a request without waiting; returns the id that its reply will carry.
     ///
     /// # Errors
-    /// [`LinkError::Encode`], [`LinkError::Connection`].
+    /// [`LinkError::Encode`] for a request that is too large, [`LinkError::Connection`] for a broken
+    /// connection.
     pub fn send(&mut self, request: &Request) -> Result<u64, LinkError> {
         self.request_id += 1;
         self.out.clear();
@@ -339,20 +341,20 @@ impl ServerConnection {
     }
 }
 
-/// Speed and memory of this machine, as an embedded server would find them.
+/// Rates and memory of this machine, as an embedded server would find them.
 pub struct OwnMachine {
-    /// Speeds of its threads; `None` where they cannot be measured.
+    /// Rates of its threads; `None` if they cannot be measured.
     pub rates: Option<Rates>,
-    /// Threads of an embedded server.
+    /// Number of threads of an embedded server.
     pub threads: usize,
-    /// Bytes it has to spare; `None` where the system does not tell.
+    /// Free memory, bytes; `None` where the system does not tell.
     pub available_bytes: Option<u64>,
-    /// Memory limit of a server that was not told another, bytes.
+    /// Memory limit of a server by default, bytes.
     pub usual_limit_bytes: u64,
 }
 
 impl OwnMachine {
-    /// Measures the speeds; takes some hundredths of a second.
+    /// Measures the rates; takes some hundredths of a second.
     pub fn measure() -> Self {
         let ServerConfig { threads, memory_limit, .. } = ServerConfig::default();
         Self {
@@ -364,7 +366,7 @@ impl OwnMachine {
     }
 }
 
-/// The error for a reply of another kind than the request asks for.
+/// Error for a reply of another kind than the request asks for.
 pub fn unexpected(asked: &str, reply: &Reply) -> LinkError {
     LinkError::Unexpected { asked: asked.to_owned(), got: format!("{:?}", reply.kind()) }
 }
@@ -386,8 +388,8 @@ fn open_socket(address: &str) -> Result<TcpStream, LinkError> {
     Err(LinkError::Connect { address: address.to_owned(), source: last })
 }
 
-/// A frame is sent at once, and a machine that is gone without a word is noticed while a reply is awaited,
-/// however long that may take.
+/// Sets the socket's options: bytes are sent at once, and a machine that is gone is noticed while a reply
+/// is awaited, however long that may take.
 fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
     let socket = socket2::SockRef::from(stream);

@@ -1,4 +1,4 @@
-//! Makes contact frames: the surface as it is, the bodies near it, and what can touch in a step.
+//! Makes contact frames: the deformed surface, the bodies near it, and the triangles that can touch them.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use softgrasp_core::dynamics::{self, Candidate, MovingBody, near_triangles};
@@ -7,31 +7,31 @@ use softgrasp_protocol::{
     Pose, Precision,
 };
 
-/// A body of a step, as core takes it for the search and as it travels.
+/// Rigid body of a step: for the search of triangles, and as it travels.
 #[derive(Clone, Debug)]
 pub struct StepBody {
-    /// For the search.
+    /// Shape and poses of the body, for the search.
     pub moving: MovingBody,
-    /// Its shape on the wire.
+    /// Shape of the body on the wire.
     pub shape: BodyShape,
 }
 
-/// An object whose steps are asked for.
+/// Object whose steps are asked for.
 pub struct StepObject<'a> {
-    /// The kept model.
+    /// Name of the kept model.
     pub model: ModelHash,
-    /// Places of all nodes at rest, in the object's frame.
+    /// Positions of all nodes at rest, m, in the object's frame.
     pub vertices: &'a [Point3<f64>],
     /// Triangles of the boundary surface.
     pub triangles: &'a [[u32; 3]],
-    /// Displacement of every node, in the object's frame; zero where it is not known.
+    /// Displacement of every node, m, in the object's frame; zero where it is not known.
     pub displacement: &'a [[f64; 3]],
     /// Nodes whose displacements are wanted.
     pub nodes: NodeChoice,
 }
 
 impl StepObject<'_> {
-    /// The frame of one step from a state; what can touch is found by looking at all triangles.
+    /// Contact frame of one step from a state; triangles that can touch are found among all.
     pub fn frame(&self, state: ObjectState, bodies: &[StepBody], ask: ContactAsk) -> ContactFrame {
         let places: Vec<Point3<f64>> = self
             .vertices
@@ -46,7 +46,7 @@ impl StepObject<'_> {
         self.frame_among(state, bodies, ask, &near)
     }
 
-    /// The frame of one step in which these triangles can touch these bodies.
+    /// Contact frame of one step in which only the `near` triangles can touch bodies.
     pub fn frame_among(
         &self,
         state: ObjectState,
@@ -75,7 +75,7 @@ impl StepObject<'_> {
     }
 }
 
-/// How near a triangle must be to be able to touch in a step that is asked for.
+/// Distance from a body within which a triangle may touch it in a step.
 ///
 /// Units: m.
 pub fn reach_of_step(
@@ -96,13 +96,13 @@ pub fn extent(vertices: &[Point3<f64>]) -> f64 {
     vertices.iter().map(|v| (v - first).norm()).fold(0.0, f64::max)
 }
 
-/// A pose as it travels.
+/// Pose as it travels.
 pub fn pose_of(pose: &Isometry3<f64>) -> Pose {
     let (place, turn) = (pose.translation.vector, pose.rotation);
     [place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k]
 }
 
-/// A pose that has travelled.
+/// Isometry of a pose that has travelled.
 pub fn isometry_of(pose: &Pose) -> Isometry3<f64> {
     let [x, y, z, w, i, j, k] = *pose;
     let turn = UnitQuaternion::new_normalize(Quaternion::new(w, i, j, k));

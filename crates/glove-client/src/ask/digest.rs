@@ -3,42 +3,42 @@
 use nalgebra::Isometry3;
 use softgrasp_protocol::{ContactFrame, NodeChoice, ObjectState, Question};
 
-/// 128 bits of a BLAKE3 hash over the exact bits of numbers, in the making.
+/// BLAKE3 hash over the exact bits of numbers, of which 128 bits are used.
 #[derive(Default)]
 pub struct Digest(blake3::Hasher);
 
 impl Digest {
-    /// Adds a count.
+    /// Adds a count to the hash.
     pub fn count(&mut self, count: u64) {
         self.0.update(&count.to_le_bytes());
     }
 
-    /// Adds the bits of numbers.
+    /// Adds the bits of numbers to the hash.
     pub fn numbers(&mut self, numbers: &[f64]) {
         for number in numbers {
             self.0.update(&number.to_le_bytes());
         }
     }
 
-    /// Adds a text.
+    /// Adds a text to the hash.
     pub fn text(&mut self, text: &str) {
         self.count(text.len() as u64);
         self.0.update(text.as_bytes());
     }
 
-    /// Adds a pose: translation, then quaternion.
+    /// Adds a pose to the hash: translation, then quaternion.
     pub fn isometry(&mut self, pose: &Isometry3<f64>) {
         self.numbers(pose.translation.vector.as_slice());
         self.numbers(pose.rotation.coords.as_slice());
     }
 
-    /// Its 32 hexadecimal digits.
+    /// Digest as 32 hexadecimal digits.
     pub fn end(self) -> String {
         self.0.finalize().to_hex()[..32].to_owned()
     }
 }
 
-/// Digest of what a question asks: known displacements and the partition that follows from them.
+/// Digest of a question: known displacements and the partition that follows from them.
 pub fn request_digest(question: &Question) -> String {
     let mut digest = Digest::default();
     for known in &question.known {
@@ -59,7 +59,7 @@ pub fn request_digest(question: &Question) -> String {
     digest.end()
 }
 
-/// Digest of what a step of a free object asks: its state, the ways of the bodies, what can touch.
+/// Digest of a contact frame: state, motions of the bodies, triangles that can touch.
 pub fn step_digest(frame: &ContactFrame) -> String {
     let mut digest = Digest::default();
     digest.numbers(&[frame.ask.seconds]);

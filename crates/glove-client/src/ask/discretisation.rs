@@ -1,4 +1,4 @@
-//! Estimates the error that the mesh brings, by solving once more with the other element.
+//! Estimates the error of the mesh's discretisation by solving once more with the other element.
 
 use softgrasp_protocol::{
     Answer, Ask, Body, ElementChoice, ElementName, MethodName, NodeChoice, Question, Want,
@@ -6,21 +6,21 @@ use softgrasp_protocol::{
 
 use crate::ask::connection::ServerConnection;
 
-/// Estimate of the error that the mesh brings.
+/// Estimate of the error of the mesh's discretisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiscretisationEstimate {
     /// `‖u_t4 − u_t10‖ / ‖u_t10‖` over the nodes of the mesh, for the same prescribed displacements and
     /// forces; `None` where there is none.
     pub rel: Option<f64>,
-    /// What it is, or why there is none.
+    /// How the estimate was made, or why there is none.
     pub why: String,
 }
 
-/// The estimate needs a few digits only, so the second answer may stop early.
+/// Relative error of the second answer: the estimate needs a few digits only.
 const SECOND_ERROR_MAX: f64 = 1e-6;
 
 impl DiscretisationEstimate {
-    /// The estimate that nobody asked for.
+    /// Result where no estimate was asked for.
     pub fn not_asked() -> Self {
         Self { rel: None, why: "not asked for (--estimate-discretisation)".to_owned() }
     }
@@ -29,8 +29,8 @@ impl DiscretisationEstimate {
     ///
     /// Shapes: `displacements` one per node of the request's mesh. Units: m.
     ///
-    /// A server that refuses or goes leaves no estimate, and the reason is told; the first answer
-    /// stays what it is.
+    /// If the server refuses the second request or goes, there is no estimate, and the reason is told;
+    /// the first answer is not affected.
     pub fn of(
         connection: &mut ServerConnection,
         (body, question): (&Body, &Question),
@@ -69,7 +69,7 @@ impl DiscretisationEstimate {
     }
 }
 
-/// `‖a − b‖ / ‖b‖`; `None` where `b` is zero or one of them is too large to tell.
+/// `‖a − b‖ / ‖b‖`; `None` if `b` is zero or one of them is too large.
 fn difference_rel(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<f64> {
     let pairs = a.iter().flatten().zip(b.iter().flatten());
     let difference: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();

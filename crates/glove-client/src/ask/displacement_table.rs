@@ -4,59 +4,59 @@ use std::fmt::Write as _;
 
 use softgrasp_protocol::DofValue;
 
-/// A table that cannot be used.
+/// Why a table cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// Another header.
+    /// The header differs from the expected one.
     #[error("{name}, line 1: the header is '{found}'; expected '{expected}'")]
     Header {
-        /// File name.
+        /// Name of the file.
         name: String,
-        /// What stands there.
+        /// Header of the file.
         found: String,
-        /// What must.
+        /// Header that is expected.
         expected: String,
     },
-    /// A cell that is no number.
+    /// A cell is no number.
     #[error("{name}, line {line}: '{found}' in column {column} is not a {expected}")]
     Cell {
-        /// File name.
+        /// Name of the file.
         name: String,
-        /// Line from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// Column name.
+        /// Name of the column.
         column: &'static str,
-        /// What stands there.
+        /// Text of the cell.
         found: String,
-        /// What must.
+        /// Kind of number that is expected.
         expected: &'static str,
     },
-    /// Too few or too many cells, or bytes that are no text.
+    /// A line has too few or too many cells, or bytes that are no text.
     #[error("{name}: {source}")]
     Csv {
-        /// File name.
+        /// Name of the file.
         name: String,
-        /// The reader's reason, with the line.
+        /// Error of the CSV reader, with the line.
         source: csv::Error,
     },
-    /// Nothing in it.
+    /// The table has no row.
     #[error("{name} names no degree of freedom; every row is empty or there is none")]
     Empty {
-        /// File name.
+        /// Name of the file.
         name: String,
     },
-    /// A node that the mesh has not.
+    /// A row names a node that the mesh does not have.
     #[error(
         "{name}, line {line}: node {node} does not exist; the mesh has {node_count} nodes, counted from 0 in the order of the file"
     )]
     NoSuchNode {
-        /// File name.
+        /// Name of the file.
         name: String,
-        /// Line from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// Node given.
+        /// Number of the node in the row.
         node: u64,
-        /// Nodes of the mesh.
+        /// Number of nodes of the mesh.
         node_count: usize,
     },
 }
@@ -71,7 +71,7 @@ pub const FORCE_COLUMNS: [&str; 4] = ["node", "fx", "fy", "fz"];
 /// Units: those of the file (m or N).
 ///
 /// # Errors
-/// [`TableError`] names file, line and column.
+/// [`TableError`] with file, line and column.
 pub fn read_table(
     name: &str,
     bytes: &[u8],
@@ -119,7 +119,7 @@ pub fn read_table(
     Ok(values)
 }
 
-/// Table of displacements, every node, shortest decimals that read back to the same bits.
+/// Table of the displacements of every node, as the shortest decimals that give the same bits when read.
 ///
 /// Units: m.
 pub fn write_displacements(displacements: &[[f64; 3]]) -> String {
@@ -132,7 +132,7 @@ pub fn write_displacements(displacements: &[[f64; 3]]) -> String {
     out
 }
 
-/// Table of forces: every node that has one along some axis, zero along the others.
+/// Table of forces: every node with a force along some axis; the other axes have zero.
 ///
 /// Shapes: `forces` ascending by degree of freedom. Units: N.
 pub fn write_reactions(forces: &[DofValue]) -> String {

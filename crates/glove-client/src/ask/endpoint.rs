@@ -1,4 +1,4 @@
-//! A server to connect to: its address, the token it wants, and whose certificates are trusted.
+//! Server to connect to: its address, the token it requires, and the certificates that are trusted.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,14 +8,14 @@ use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, ServerName};
 use rustls::{ClientConfig, ClientConnection, RootCertStore, crypto, version};
 
-/// A server, and how it is spoken to.
+/// Server, with token and trusted certificates.
 #[derive(Clone, Debug)]
 pub struct Endpoint {
-    /// `HOST:PORT`.
+    /// Address `HOST:PORT` of the server.
     pub address: String,
-    /// Shared secret to show, if any.
+    /// Token to be shown to the server; `None` for none.
     pub token: Option<String>,
-    /// Certificates that are trusted; `None` speaks without encryption.
+    /// Certificates that are trusted; `None`: no encryption.
     pub trust: Option<Trust>,
 }
 
@@ -44,20 +44,20 @@ impl From<&Self> for Endpoint {
 }
 
 impl Endpoint {
-    /// This server, to which a token is shown.
+    /// The same server with a token.
     #[must_use]
     pub fn with_token(self, token: Option<&str>) -> Self {
         Self { token: token.map(str::to_owned), ..self }
     }
 
-    /// The host of the address, without its port.
+    /// Host of the address, without its port.
     pub fn host(&self) -> &str {
         let host = self.address.rsplit_once(':').map_or(self.address.as_str(), |(host, _)| host);
         host.trim_start_matches('[').trim_end_matches(']')
     }
 }
 
-/// Certificates that a server's certificate is checked against.
+/// Certificates that the server's certificate is checked against.
 #[derive(Clone)]
 pub struct Trust(Arc<ClientConfig>);
 
@@ -70,21 +70,21 @@ impl fmt::Debug for Trust {
 /// Why a server cannot be trusted.
 #[derive(Debug, thiserror::Error)]
 pub enum TrustError {
-    /// A file without certificates.
+    /// The file contains no certificate that can be used.
     #[error("--tls-ca {path} cannot be used: {reason}; a PEM file with certificates is expected")]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the reader says.
+        /// Reason given by the PEM reader.
         reason: String,
     },
-    /// The library does not go with what it is told.
+    /// The TLS library refuses the settings.
     #[error("TLS cannot be used here: {0}")]
     Tls(#[from] rustls::Error),
-    /// A host that no certificate can name.
+    /// The host is none that a certificate can name.
     #[error("no certificate can name the host {host}; write a host name or an address")]
     Host {
-        /// As given.
+        /// Host as it was given.
         host: String,
     },
 }
@@ -93,7 +93,7 @@ impl Trust {
     /// Trusts the certificates of a PEM file: an authority's, or a server's own self-signed one.
     ///
     /// # Errors
-    /// [`TrustError`].
+    /// [`TrustError`] if the file contains no certificate that can be used.
     pub fn read(path: &Path) -> Result<Self, TrustError> {
         let wrong = |reason: String| TrustError::File { path: path.to_owned(), reason };
         let mut roots = RootCertStore::empty();
@@ -113,10 +113,10 @@ impl Trust {
         Ok(Self(Arc::new(config)))
     }
 
-    /// The client's side of TLS with a host.
+    /// Client's side of a TLS connection to a host.
     ///
     /// # Errors
-    /// [`TrustError`].
+    /// [`TrustError`] if no certificate can name the host.
     pub fn session(&self, host: &str) -> Result<ClientConnection, TrustError> {
         let name = ServerName::try_from(host.to_owned())
             .map_err(|_| TrustError::Host { host: host.to_owned() })?;

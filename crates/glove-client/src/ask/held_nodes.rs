@@ -1,26 +1,26 @@
-//! What the fingertips hold, as the server is asked: degrees of freedom and masks, and their forces.
+//! Degrees of freedom and masks that the fingertips hold, as the server is asked, and their forces.
 
 use nalgebra::Vector3;
 use softgrasp_grasp::grasp::KnownNode;
 use softgrasp_grasp::object::{ContactModel, SoftObject};
 use softgrasp_protocol::{DofValue, Masks};
 
-/// What five fingertips hold, worked out once per set of touched nodes.
+/// Contacts of five fingertips, computed once for each set of touched nodes.
 #[derive(Clone, Debug, Default)]
 pub struct HeldNodes {
     touched: Option<[u32; 5]>,
-    /// Node and finger, ascending by node.
+    /// Held node and finger, ascending by node.
     held: Vec<(u32, usize)>,
-    /// One per finger, thumb first, or none.
+    /// Masks, one for each finger, thumb first; empty if nodes are held.
     masks: Masks,
 }
 
-/// The displacements that five fingertips prescribe.
+/// Displacements that five fingertips prescribe.
 ///
 /// Units: m. Frame: the object's.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PrescribedDisplacements {
-    /// Prescribed displacements of single degrees of freedom.
+    /// Prescribed displacement of each held degree of freedom.
     pub of_dofs: Vec<DofValue>,
     /// Masks whose mean displacement is prescribed.
     pub masks: Masks,
@@ -29,10 +29,10 @@ pub struct PrescribedDisplacements {
 }
 
 impl HeldNodes {
-    /// The displacements that the tips prescribe.
+    /// Displacements that the fingertips prescribe.
     ///
-    /// Units: `tip_radii` and displacements m. Frame: the object's, at rest: what a tip covers is a
-    /// part of the rest surface, so it stays the same while the object deforms.
+    /// Units: `tip_radii` and displacements m. Frame: the object's, at rest: a fingertip covers a part of
+    /// the rest surface, which stays the same while the object deforms.
     pub fn prescribed_displacements(
         &mut self,
         model: ContactModel,
@@ -70,11 +70,11 @@ impl HeldNodes {
         }
     }
 
-    /// Force of each fingertip on the object, thumb first, from an answer to what was prescribed
-    /// last; `None` if the answer holds no forces.
+    /// Force of each fingertip on the object, thumb first, from an answer to the last prescribed
+    /// displacements; `None` if the answer has no forces.
     ///
-    /// Shapes: `reactions` at any degrees of freedom, those that no finger holds are passed over;
-    /// `mask_forces` one per finger or none. Units: N. Frame: the object's.
+    /// Shapes: `reactions` at any degrees of freedom, of which only held ones count; `mask_forces` one
+    /// for each finger, or empty. Units: N. Frame: the object's.
     pub fn fingertip_forces(
         &self,
         reactions: &[DofValue],
@@ -96,13 +96,13 @@ impl HeldNodes {
         Some(forces)
     }
 
-    /// Forgets the nodes: the rest shape has changed.
+    /// Forgets the contacts, because the rest shape has changed.
     pub fn clear(&mut self) {
         self.touched = None;
     }
 }
 
-/// Surface nodes within a tip's radius of its touched node; a node near two belongs to the nearer.
+/// Surface nodes within a fingertip's radius of its touched node; a node near two belongs to the nearer.
 fn patches(object: &SoftObject, tip_radii: [f64; 5], touched: &[u32; 5]) -> Vec<(u32, usize)> {
     let rest = object.rest().vertices();
     let finger_of = |node: u32| {

@@ -1,4 +1,4 @@
-//! What the server is asked, and the connection over which it is asked.
+//! Requests to the server, and the connection that they travel on.
 
 pub mod calculix_deck;
 pub mod connection;

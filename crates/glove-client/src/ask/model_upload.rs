@@ -5,19 +5,19 @@ use std::sync::Arc;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{ElementName, Material, MeshData, ModelHash, UploadModel};
 
-/// The model that frames refer to.
+/// Model that questions refer to.
 #[derive(Clone, Debug)]
 pub struct ModelUpload {
-    /// Which rest shape of the object it is, from 1.
+    /// Number of the object's rest shape, from 1.
     pub rest_shape: u64,
-    /// Its name.
+    /// Hash that names the model.
     pub hash: ModelHash,
-    /// The message, kept so that a server that does not know the model gets it.
+    /// Message with the model, kept for servers that do not know the model.
     pub message: Arc<UploadModel>,
 }
 
 impl ModelUpload {
-    /// The model of a rest shape of one material, with no node fixed.
+    /// Model of a rest shape of one material, without fixed nodes.
     pub fn new(rest: &TetMesh, rest_shape: u64, material: Material, element: ElementName) -> Self {
         let message = UploadModel {
             mesh: mesh_data(rest),
@@ -29,7 +29,7 @@ impl ModelUpload {
     }
 }
 
-/// A mesh as it travels.
+/// Mesh as it travels.
 pub fn mesh_data(mesh: &TetMesh) -> MeshData {
     MeshData {
         vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),

@@ -1,4 +1,4 @@
-//! The contacts whose columns the server is asked to prepare while the hand comes near.
+//! Contacts whose columns the server is asked to prepare while the hand comes near.
 
 use nalgebra::Point3;
 use softgrasp_grasp::object::{ContactModel, RestShape};
@@ -8,29 +8,29 @@ use softgrasp_protocol::Masks;
 /// Contacts whose columns the server has been asked to prepare for this rest shape.
 #[derive(Clone, Debug, Default)]
 pub struct Prefetched {
-    /// Ascending.
+    /// Contacts in ascending order.
     contacts: Vec<NearContact>,
 }
 
-/// A contact that may be made soon: a node, and the finger (0 where any finger's is the same).
+/// Contact that may be made soon: node and finger (0 where the finger makes no difference).
 pub type NearContact = (u32, usize);
 
-/// What the server is asked to prepare next.
+/// Contacts that the server is asked to prepare next.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hint {
-    /// Nodes.
+    /// Nodes that may be touched, by their numbers in the mesh.
     pub nodes: Vec<u32>,
-    /// Masks of tips at nodes.
+    /// Masks of fingertips at such nodes.
     pub masks: Masks,
 }
 
-/// Nodes nearer to a fingertip than this may be touched soon, m …
+/// Chosen: distance to a fingertip, m, within which a node may be touched soon.
 const DISTANCE: f64 = 0.012;
-/// … but no more than so many contacts per rest shape are prepared.
+/// Chosen: largest number of contacts that are prepared for each rest shape.
 const CONTACTS_MAX: usize = 160;
 
 impl Prefetched {
-    /// Contacts near the tips that have not been asked for yet.
+    /// Contacts near the fingertips that have not been asked for yet.
     ///
     /// Units: m. Frame: `tips_in_object` the object's, as `tree`.
     pub fn next(
@@ -56,14 +56,14 @@ impl Prefetched {
         near
     }
 
-    /// Forgets all: the rest shape has changed.
+    /// Forgets all contacts, because the rest shape has changed.
     pub fn clear(&mut self) {
         self.contacts.clear();
     }
 }
 
 impl Hint {
-    /// The hint that names these contacts. Masks take long to work out.
+    /// Hint that names these contacts. Computing masks takes long.
     ///
     /// Units: `tip_radii` m.
     pub fn new(
@@ -92,7 +92,7 @@ impl Hint {
         self.masks.append(&other.masks);
     }
 
-    /// Whether there is nothing to prepare.
+    /// Whether the hint names no contact.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty() && self.masks.is_empty()
     }

@@ -8,16 +8,16 @@ use rustls::{ClientConnection, StreamOwned};
 
 use crate::ask::endpoint::{Endpoint, TrustError};
 
-/// A socket to a server.
+/// Socket to a server.
 pub enum ServerStream {
-    /// Bytes go as they are.
+    /// Bytes travel without encryption.
     Plain(TcpStream),
-    /// Bytes go through TLS.
+    /// Bytes travel through TLS.
     Encrypted(Box<StreamOwned<ClientConnection, TcpStream>>),
 }
 
 impl ServerStream {
-    /// Wraps a connected socket as the endpoint wants it.
+    /// Stream over a connected socket, encrypted if the endpoint trusts certificates.
     ///
     /// # Errors
     /// [`TrustError`]; the handshake itself comes with the first bytes.
@@ -31,7 +31,7 @@ impl ServerStream {
         })
     }
 
-    /// The socket below, to set time limits on it or to shut it down.
+    /// Underlying socket, to set time limits on it or to shut it down.
     pub fn socket(&self) -> &TcpStream {
         match self {
             Self::Plain(socket) => socket,
@@ -39,15 +39,15 @@ impl ServerStream {
         }
     }
 
-    /// Sets how long a read may wait.
+    /// Sets the longest time that a read may wait.
     ///
     /// # Errors
-    /// The system's.
+    /// Error of the operating system.
     pub fn set_read_timeout(&self, at_most: Option<Duration>) -> io::Result<()> {
         self.socket().set_read_timeout(at_most)
     }
 
-    /// Whether nothing has come that has not been read, and the peer has not closed; never waits.
+    /// Whether no unread bytes have come and the peer has not closed; never waits.
     pub fn is_quiet(&mut self) -> bool {
         if self.socket().set_nonblocking(true).is_err() {
             return false;
@@ -63,7 +63,7 @@ impl ServerStream {
     }
 }
 
-/// Takes what has come into TLS, such as tickets; whether none of it is meant for the client.
+/// Reads what has come into TLS, such as tickets; returns whether none of it is data for the client.
 fn takes_only_records(stream: &mut StreamOwned<ClientConnection, TcpStream>) -> bool {
     loop {
         match stream.conn.read_tls(&mut stream.sock) {
@@ -78,8 +78,8 @@ fn takes_only_records(stream: &mut StreamOwned<ClientConnection, TcpStream>) -> 
 }
 
 impl Drop for ServerStream {
-    /// Says goodbye in TLS, so that the server can tell an end from a cut; whether it arrives is of no
-    /// matter.
+    /// Sends the end of the TLS connection, so that the server can tell it from a cut; it need not
+    /// arrive.
     fn drop(&mut self) {
         if let Self::Encrypted(stream) = self {
             stream.conn.send_close_notify();

@@ -1,4 +1,5 @@
-//! What the object is made of, how far its deformation may go, and how its displacements are solved for.
+//! Material of the object, equations of its deformation, and method by which displacements are solved
+//! for.
 
 use softgrasp_core::fem::Element;
 use softgrasp_core::solve::choose::cheapest_element;
@@ -7,39 +8,39 @@ use softgrasp_protocol::{
     Deformation, ElementName, LargeAsk, LawName, Material, MethodName, Pace, PathChoice,
 };
 
-/// What the object is made of and how it is to be solved.
+/// Material of the object, and settings of its solves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveSettings {
-    /// Its material.
+    /// Elastic material of the object.
     pub material: Material,
     /// Element of the model.
     pub element: ElementName,
-    /// Method asked for.
+    /// Solution method, or `auto`.
     pub method: MethodName,
-    /// What a fingertip holds.
+    /// What a fingertip holds: a node, a patch or a mask.
     pub contact: ContactModel,
     /// Nodes whose displacements each tick asks for.
     pub subscription: Subscription,
-    /// Which equations, and by which law.
+    /// Equations and law of the deformation.
     pub elasticity: Elasticity,
-    /// Largest relative error that is acceptable; `None` leaves it to the method, at large
-    /// deformation [`ERROR_OF_FRAMES`].
+    /// Largest relative error that is acceptable; `None` leaves it to the method, or takes
+    /// [`ERROR_OF_FRAMES`] at large deformation.
     pub max_error: Option<f64>,
 }
 
 impl SolveSettings {
-    /// The error that frames may have where nobody says how much.
+    /// Relative error that answers to ticks may have, if none was asked for.
     pub fn error_of_frames(&self) -> Option<f64> {
         let is_linear = self.elasticity.deformation == Deformation::Linear;
         (!is_linear).then_some(ERROR_OF_FRAMES)
     }
 }
 
-/// Estimated error of a frame at large deformation, over the largest displacement, unless another is
-/// asked for: a hundredth of what linear elasticity is off by.
+/// Estimated error of an answer at large deformation, relative to the largest displacement, unless
+/// another one is asked for: a hundredth of the error of linear elasticity.
 pub const ERROR_OF_FRAMES: f64 = 2e-3;
 
-/// The element of frames for a material, by Poisson's ratio: the cheapest that does not lock.
+/// Element for the ticks by Poisson's ratio: the cheapest that does not lock.
 pub fn element_for_frames(poisson: f64) -> ElementName {
     match cheapest_element(poisson) {
         Element::Tet4 => ElementName::T4,
@@ -51,19 +52,19 @@ pub fn element_for_frames(poisson: f64) -> ElementName {
 /// Nodes whose displacements each tick asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subscription {
-    /// What is seen and touched; the inside is asked for when a shape is to be kept.
+    /// Nodes of the surface; the inside is asked for when a shape is to be kept.
     Surface,
-    /// Every node: the whole object is written down.
+    /// Every node, because the whole object is written to files.
     Whole,
 }
 
-/// What the answers of ticks are to hold and how good they are to be, as far as a person asks for it.
+/// Wishes of a person for the answers of ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnswerWishes {
     /// Largest relative error that is acceptable; `None` leaves it to the method.
     pub max_error: Option<f64>,
-    /// Whether the forces of the fingertips are wanted: every answer has them, and on the wire they
-    /// take room (`GraspLoop::fingertip_forces`).
+    /// Whether the forces of the fingertips are wanted. Every answer has them; on the wire they take room
+    /// (`GraspLoop::fingertip_forces`).
     pub forces: bool,
 }
 
@@ -72,20 +73,20 @@ pub struct AnswerWishes {
 /// Units: Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elasticity {
-    /// Which equations.
+    /// Equations of the deformation: linear, large or auto.
     pub deformation: Deformation,
     /// Law of large deformation.
     pub law: LawName,
-    /// Above it the material flows and stays deformed.
+    /// Stress above which the material flows and stays deformed; `None` for never.
     pub yield_stress: Option<f64>,
 }
 
 impl Elasticity {
-    /// That of the thesis.
+    /// Linear elasticity, as in the thesis.
     pub const LINEAR: Self =
         Self { deformation: Deformation::Linear, law: LawName::NeoHookean, yield_stress: None };
 
-    /// What a server is asked; `None` where a question of the linear kind is asked.
+    /// Wish for large deformation in a question; `None` for a linear question.
     pub fn ask(&self, path: PathChoice, pace: Pace) -> Option<LargeAsk> {
         let Self { deformation, law, yield_stress } = *self;
         (deformation != Deformation::Linear).then_some(LargeAsk {

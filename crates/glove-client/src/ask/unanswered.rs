@@ -1,4 +1,4 @@
-//! The reasons for which a deforming tick has no answer, and how often each occurred.
+//! Reasons for which a deforming tick has no answer, and how often each occurred.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,17 +8,17 @@ use std::fmt;
 pub enum Unanswered {
     /// The model of this rest shape was still being sent to the server or prepared there.
     ModelNotReady,
-    /// The first answer of a new grip was still being worked out, with the columns it needs.
+    /// The first answer of a new grip, with the columns it needs, was not ready yet.
     NewGrip,
     /// An earlier answer of the same grip was still awaited when a newer request came.
     AnswerLate,
-    /// The server was not there.
+    /// The server was not connected.
     ServerLost,
     /// The server refused the model, or the request.
     Refused,
     /// No equilibrium was found there; the shape stays where it was.
     NoEquilibrium,
-    /// The tick was not played: its time was over.
+    /// The tick was not played, because its time was over.
     TickSkipped,
     /// The shape was being made the new rest shape.
     KeepingShape,
@@ -31,7 +31,7 @@ pub enum Unanswered {
 }
 
 impl Unanswered {
-    /// Its key in the JSON report.
+    /// Key of the reason in the JSON report.
     pub const fn key(self) -> &'static str {
         match self {
             Self::ModelNotReady => "model_not_ready",
@@ -67,19 +67,19 @@ impl fmt::Display for Unanswered {
     }
 }
 
-/// How many ticks have no answer, by reason.
+/// Number of ticks without an answer, by reason.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct UnansweredCounts(BTreeMap<Unanswered, u64>);
 
 impl UnansweredCounts {
-    /// Counts ticks.
+    /// Counts ticks without an answer.
     pub fn add(&mut self, reason: Unanswered, ticks: u64) {
         if ticks > 0 {
             *self.0.entry(reason).or_default() += ticks;
         }
     }
 
-    /// All of them.
+    /// Number of all ticks without an answer.
     pub fn total(&self) -> u64 {
         self.0.values().sum()
     }

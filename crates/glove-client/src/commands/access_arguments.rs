@@ -21,10 +21,10 @@ pub(super) struct AccessArguments {
 }
 
 impl AccessArguments {
-    /// How a server is spoken to; the embedded one needs nothing of it.
+    /// Endpoint of the server, with token and trusted certificates; `None` for the embedded one.
     ///
     /// # Errors
-    /// A file that cannot be read or is empty, and arguments that go with no server elsewhere.
+    /// A file that cannot be read or is empty, and arguments that do not fit the embedded server.
     pub fn to(&self, server: &ServerChoice) -> anyhow::Result<Option<Endpoint>> {
         let ServerChoice::At(address) = server else {
             let is_given = self.token_file.is_some() || self.tls_ca.is_some();

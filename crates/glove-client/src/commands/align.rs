@@ -68,7 +68,7 @@ enum Part {
     Forearm,
 }
 
-/// What was found and how well.
+/// Result of an alignment, and its errors.
 struct Found {
     flat: AveragedPose,
     pivot: Option<Pivot>,
@@ -76,7 +76,7 @@ struct Found {
 }
 
 impl AlignCommand {
-    /// Records, works out, writes the configuration, says how it went.
+    /// Records, fits, writes the configuration, and tells the errors.
     ///
     /// # Errors
     /// One line each: a silent device, a hand that moved, a file that cannot be read or written.
@@ -100,7 +100,7 @@ impl AlignCommand {
         print(&self.summary(&found, &configuration))
     }
 
-    /// Puts what the recordings say into the configuration.
+    /// Fits the recordings, and puts the result into the configuration.
     fn align(
         &self,
         configuration: &mut HandConfiguration,

@@ -1,4 +1,4 @@
-//! What `align` records: the arm held flat, and the arm turning about its wrist crease.
+//! Recordings for `align`: the arm held flat, and the arm turning about its wrist crease.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -13,21 +13,21 @@ use super::collecting::{Patience, Phase, collect};
 use super::live_samples::{ArmSample, NextArmSample};
 use super::recorded_samples::{recorded_poses, recorded_readings};
 
-/// Where the samples of the arm come from.
+/// Source of the samples of an arm.
 pub(super) enum ArmSource {
-    /// A folder with raw bytes: `flat.tracker.bin`, `turn.tracker.bin`, and for the wrist's angles
-    /// `flat.glove.bin`, without which the wrist counts as straight.
+    /// Folder with raw bytes: `flat.tracker.bin`, `turn.tracker.bin`, and for the wrist's angles
+    /// `flat.glove.bin`; without the last one the wrist counts as straight.
     Recorded(PathBuf),
-    /// Devices on somebody's arm.
+    /// Devices on a person's arm.
     Live(NextArmSample),
 }
 
-/// How the arm is held.
+/// Gesture of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Held {
-    /// Flat at a known place.
+    /// The hand lies flat at a known position.
     Flat,
-    /// Turning about the wrist crease.
+    /// The hand turns about the wrist crease.
     Turning,
 }
 
@@ -52,7 +52,7 @@ impl Held {
         }
     }
 
-    /// Samples of a live recording: 2 s and 10 s of a tracker with two receivers.
+    /// Number of samples of a live recording: 2 s and 10 s of a tracker with two receivers.
     fn samples(self) -> usize {
         match self {
             Self::Flat => 120,
@@ -61,15 +61,15 @@ impl Held {
     }
 }
 
-/// Records of the arm.
+/// Recording of the arm.
 pub(super) struct ArmRecording {
-    /// The receiver in the transmitter's Y-up frame.
+    /// Poses of the receiver in the transmitter's Y-up frame, m.
     pub(super) poses: Vec<Isometry3<f64>>,
-    /// Mean angles of the glove; a flat hand where there was no glove.
+    /// Mean joint angles of the glove; those of a flat hand without a glove.
     pub(super) angles: JointAngles,
 }
 
-/// Records the arm.
+/// Records the arm in one gesture.
 ///
 /// # Errors
 /// A sentence for a file that cannot be read or a device that is silent.
@@ -114,7 +114,7 @@ pub(super) fn record_arm(
     })
 }
 
-/// Mean of the angles of readings.
+/// Mean of the joint angles of some readings.
 fn mean_angles(readings: &[RawSensors], configuration: &HandConfiguration) -> JointAngles {
     let mut sum = JointAngles::flat().to_array();
     for raw in readings {

@@ -54,7 +54,7 @@ pub struct CalibrateCommand {
     from: Option<PathBuf>,
 }
 
-/// 18 or 22.
+/// Parses the number of sensors: 18 or 22.
 fn sensor_count(text: &str) -> Result<SensorCount, String> {
     match text {
         "18" => Ok(SensorCount::Eighteen),
@@ -64,7 +64,7 @@ fn sensor_count(text: &str) -> Result<SensorCount, String> {
 }
 
 impl CalibrateCommand {
-    /// Takes the gestures, writes the files, says how it went.
+    /// Takes the gestures, writes the files, and tells how good the calibration is.
     ///
     /// # Errors
     /// One line each: a wrong size, a silent glove, gestures that make no calibration, a file that
@@ -92,7 +92,7 @@ impl CalibrateCommand {
         print(&self.summary(&report, &configuration))
     }
 
-    /// The configuration that there is, with what the command line changes.
+    /// Present configuration, with the changes of the command line.
     fn configuration(&self) -> anyhow::Result<HandConfiguration> {
         let mut configuration = match &self.setup {
             // Its calibration is about to be made anew, so an old or lost one is no matter.

@@ -4,21 +4,21 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 
-/// How long a person gets ready, and how long a device may be silent.
+/// Time for a person to get ready, and limits on a device's silence.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patience {
     /// Count-down before each gesture.
     pub(super) get_ready: Duration,
-    /// A device that sends nothing for so long in a gesture has the gesture begin again: who holds it
-    /// does not hold it for ever.
+    /// Silence of a device in a gesture after which the gesture begins again, because a person does not
+    /// hold it for ever.
     pub(super) gap: Duration,
-    /// A device that sends nothing for so long is given up. Its driver sets it up again and again
-    /// until then, as in a run.
+    /// Silence after which a device is given up. Until then its driver sets it up again and again, as in
+    /// a run.
     pub(super) silence: Duration,
 }
 
 impl Patience {
-    /// For a person. A CyberGlove takes up to 2.5 s to restart, a FASTRAK 10 s.
+    /// Times for a person. A CyberGlove takes up to 2.5 s to restart, a FASTRAK 10 s.
     pub(super) const PERSON: Self = Self {
         get_ready: Duration::from_secs(3),
         gap: Duration::from_secs(1),
@@ -26,23 +26,23 @@ impl Patience {
     };
 }
 
-/// Where a gesture is.
+/// Phase of a gesture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// So many seconds are left to get ready.
+    /// Count-down before the gesture.
     GetReady {
-        /// Seconds, rounded up.
+        /// Seconds left, rounded up.
         seconds: u64,
     },
-    /// So many samples are still wanted.
+    /// The gesture is held and samples are collected.
     Hold {
-        /// Samples.
+        /// Number of samples still wanted.
         left: usize,
     },
 }
 
-/// Waits out the count-down from the first sample on, then collects `wanted` samples; `seen` gets
-/// every sample of both. After a gap in the gesture both begin again.
+/// Waits for the count-down, from the first sample on, then collects `wanted` samples; `seen` gets every
+/// sample of both. After a gap in the gesture both begin again.
 ///
 /// # Errors
 /// A sentence when the device is silent for too long.

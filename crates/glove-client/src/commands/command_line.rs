@@ -1,14 +1,14 @@
-//! What a person types, before it is parsed: options and a file without a command mean `run`.
+//! Command line before it is parsed: options and a file without a command mean `run`.
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 use softgrasp_grasp::object::ObjectChoice;
 
-/// The words of a command line, the program's name first, with `run` put in where no command is named
-/// and the first word is an option of `run`, a built-in object or a file.
+/// Words of a command line, the program's name first. `run` is inserted if no command is named and the
+/// first word is an option of `run`, a built-in object or a file.
 ///
-/// `is_command` says which words are commands.
+/// `is_command` tells whether a word is a command.
 pub fn with_command(
     words: impl IntoIterator<Item = OsString>,
     is_command: impl Fn(&str) -> bool,

@@ -48,12 +48,13 @@ pub(super) struct ContactArguments {
     viscosity: Option<f64>,
 }
 
-/// How a run grasps.
+/// Rules by which a run grasps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GraspRule {
-    /// What a fingertip does.
+    /// What a fingertip holds by the thesis's rules.
     pub(super) contact: ContactModel,
-    /// What the scene of a grasp by friction is like; the table's height is the object's to say.
+    /// Constants of a grasp by friction, `None` for the thesis's rules; the object sets the table's
+    /// height.
     pub(super) scene: Option<ContactScene>,
 }
 

@@ -1,4 +1,4 @@
-//! What devices have to say in a run, on the terminal: each sentence when it is first known, and once.
+//! Sentences about devices on the terminal during a run: each when it is first known, and once.
 
 use std::collections::BTreeSet;
 use std::sync::mpsc::{Sender, channel};
@@ -6,21 +6,21 @@ use std::thread::JoinHandle;
 
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// Sentences that have been said; a thread of its own says them, so that no tick waits for a terminal.
+/// Sentences that were printed; a thread of its own prints, so that no tick waits for a terminal.
 pub(super) struct DeviceSentences {
     said: BTreeSet<String>,
     to_say: Option<Sender<String>>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// Beyond so many different sentences nobody reads on; the report has them all.
+/// Largest number of different sentences on the terminal; the report has all of them.
 const SAID_MAX: usize = 200;
 
 impl DeviceSentences {
-    /// Says sentences by `say`. To be called before the calling thread has real-time priority.
+    /// Prints sentences by `say`. To be called before the calling thread has real-time priority.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// Error of the operating system if it starts no thread.
     pub(super) fn start(say: impl Fn(&str) + Send + 'static) -> std::io::Result<Self> {
         let (to_say, sentences) = channel::<String>();
         let thread = std::thread::Builder::new().name("sentences".to_owned());
@@ -28,7 +28,7 @@ impl DeviceSentences {
         Ok(Self { said: BTreeSet::new(), to_say: Some(to_say), thread: Some(thread) })
     }
 
-    /// Hears what happened in a tick.
+    /// Takes the sentences of a tick.
     pub(super) fn hear(&mut self, outcome: &TickOutcome) {
         for event in &outcome.events {
             let LoopEvent::Device(notice) = event else { continue };
@@ -44,7 +44,7 @@ impl DeviceSentences {
 }
 
 impl Drop for DeviceSentences {
-    /// Everything is said before the summary of the run.
+    /// Waits until all is printed, so that it precedes the summary of the run.
     fn drop(&mut self) {
         drop(self.to_say.take());
         if let Some(thread) = self.thread.take()

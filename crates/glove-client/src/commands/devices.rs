@@ -20,7 +20,7 @@ pub struct DevicesCommand {
 }
 
 impl DevicesCommand {
-    /// Lists, asks, tells.
+    /// Lists the ports, and asks them if wanted.
     ///
     /// # Errors
     /// A system that cannot list its ports.

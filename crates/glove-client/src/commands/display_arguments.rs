@@ -52,35 +52,35 @@ pub struct DisplayArguments {
     pub(super) eye: Option<Eye>,
 }
 
-/// Width and height, pixels.
+/// Width and height of a picture, pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PictureSize {
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
 }
 
-/// Something that is shown.
+/// Something that pictures and window can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShowItem {
     /// Edges of the elements.
     Elements,
-    /// The shape at rest as a ghost.
+    /// Rest shape, transparent.
     Rest,
-    /// What the search takes the hand for.
+    /// Colliders that the search takes the hand for.
     Colliders,
-    /// Where the tips hold.
+    /// Points that the fingertips hold.
     Contacts,
-    /// How hard they press.
+    /// Forces of the fingertips.
     Forces,
-    /// The hand's skin.
+    /// Skin of the hand.
     Hand,
     /// Spheres of the sphere tree.
     Spheres(Spheres),
 }
 
-/// Where the eye is.
+/// Direction and distance of the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
     turn_deg: f64,
@@ -88,7 +88,7 @@ pub struct Eye {
     distance_m: f64,
 }
 
-/// Largest picture, pixels a side: what graphics cards draw.
+/// Largest width and height of a picture, pixels: what graphics cards draw.
 const PIXELS_MAX: u32 = 8192;
 
 impl DisplayArguments {
@@ -97,14 +97,14 @@ impl DisplayArguments {
         self.snapshot.is_some() || self.frames_dir.is_some() || self.animation.is_some()
     }
 
-    /// Whether what is shown needs the nodes inside the object: a moving picture whose colours were
-    /// not chosen shows strain.
+    /// Whether the wanted display needs the nodes inside the object: an animation without a chosen
+    /// quantity shows strain.
     pub(super) fn needs_inside(&self) -> bool {
         self.display().shading.needs_inside()
             || (self.animation.is_some() && self.shading.is_none())
     }
 
-    /// What is shown at first.
+    /// Items that are shown at first.
     pub(super) fn display(&self) -> Display {
         let mut display = Display {
             level: self.light.unwrap_or_default(),
@@ -128,7 +128,7 @@ impl DisplayArguments {
         display
     }
 
-    /// Where the eye is at first.
+    /// View at first.
     #[cfg(feature = "window")]
     pub(super) fn camera(&self) -> ViewCamera {
         let start = ViewCamera::default();

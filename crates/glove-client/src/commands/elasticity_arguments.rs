@@ -33,8 +33,8 @@ impl ElasticityArguments {
             || matches!(self.deformation, Some(Deformation::Large | Deformation::Auto))
     }
 
-    /// Those of a run: flags win over the scene, and who names a method of linear elasticity gets
-    /// linear elasticity.
+    /// Elasticity of a run: flags win over the scene, and a method of linear elasticity means linear
+    /// elasticity.
     ///
     /// # Errors
     /// Names in the scene that are none, and large deformation by a linear method.
@@ -63,7 +63,7 @@ impl ElasticityArguments {
         checked(Elasticity { deformation, law, yield_stress })
     }
 
-    /// Those of one request: linear where nothing else was named.
+    /// Elasticity of one request: linear if nothing else was named.
     ///
     /// # Errors
     /// A yield stress with linear elasticity.

@@ -90,7 +90,7 @@ mod serving {
     use softgrasp_hand::serial::motion::Motion;
 
     impl EmulateCommand {
-        /// Prints the paths and serves until it is stopped.
+        /// Prints the paths of the devices and serves until it is stopped.
         ///
         /// # Errors
         /// A recording that cannot be read, an object that cannot be grasped, a system without
@@ -206,10 +206,10 @@ mod serving {
 
 #[cfg(not(unix))]
 impl EmulateCommand {
-    /// Says that it cannot be done.
+    /// Fails, because this system has no pseudo-terminals.
     ///
     /// # Errors
-    /// Always: this system has no pseudo-terminals.
+    /// Always.
     pub fn run(&self) -> anyhow::Result<()> {
         anyhow::bail!("this system has no pseudo-terminals, so no device can be emulated here")
     }

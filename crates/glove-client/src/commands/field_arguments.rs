@@ -17,15 +17,15 @@ pub struct FieldArguments {
     fields: Option<Chosen>,
 }
 
-/// Fields by name.
+/// Set of the named fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Chosen(FieldSet);
 
-/// Values of fields that are written without having been asked for, at most: a larger mesh has those of
-/// one number at each node or element only.
+/// Largest number of values of fields that are written unasked; for a larger mesh only fields with one
+/// number at each node or element are.
 const VALUES_BY_DEFAULT: usize = 16 << 20;
 
-/// Fields of one number at each place.
+/// Fields with one number at each node or element.
 const SMALL: [Field; 5] = [
     Field::ElementVonMises,
     Field::NodeVonMises,
@@ -59,16 +59,16 @@ fn parse(text: &str) -> Result<Chosen, String> {
     Ok(Chosen(chosen))
 }
 
-/// Whether a file can hold fields.
+/// Whether a file can contain fields.
 pub fn is_vtu(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "vtu")
 }
 
 impl FieldArguments {
-    /// Fields of an answer without contact, where one of some files can hold them.
+    /// Fields of an answer without contact, if one of the files can contain them.
     ///
     /// # Errors
-    /// One line where fields were named that no file holds, or that only contact has.
+    /// One line for named fields that no file can contain, or that only contact has.
     pub fn of_answer(&self, mesh: &TetMesh, outs: &[PathBuf]) -> anyhow::Result<FieldSet> {
         let elastic = |set: FieldSet| set.iter().filter(|field| !field.is_of_contact()).collect();
         self.check_files(outs.iter().any(|path| is_vtu(path)))?;
@@ -88,10 +88,10 @@ impl FieldArguments {
         })
     }
 
-    /// Fields of a contact frame; `has_file` whether there is a file that can hold them.
+    /// Fields of a contact frame; `has_file`: whether a file can contain them.
     ///
     /// # Errors
-    /// One line where fields were named that no file holds.
+    /// One line for named fields that no file can contain.
     pub fn of_contact(&self, mesh: &TetMesh, has_file: bool) -> anyhow::Result<FieldSet> {
         self.check_files(has_file)?;
         Ok(match self.fields {
@@ -104,7 +104,7 @@ impl FieldArguments {
     /// Whether an answer without contact should have fields.
     ///
     /// # Errors
-    /// As [`FieldArguments::of_answer`].
+    /// The same as those of [`FieldArguments::of_answer`].
     pub fn are_wanted(&self, mesh: &TetMesh, outs: &[PathBuf]) -> anyhow::Result<bool> {
         Ok(!self.of_answer(mesh, outs)?.is_empty())
     }
@@ -123,7 +123,7 @@ fn all() -> FieldSet {
     Field::ALL.into_iter().collect()
 }
 
-/// All fields, or on a large mesh the small ones.
+/// Fields that are written unasked: all, or on a large mesh those with one number.
 fn by_default(mesh: &TetMesh) -> FieldSet {
     let values = |field: Field| match field.place() {
         FieldPlace::Elements => field.components() * mesh.tets().len(),

@@ -14,22 +14,22 @@ use super::live_samples::NextReading;
 use super::recorded_samples::recorded_readings;
 use super::sensor_bars::SensorBars;
 
-/// Where the readings of a gesture come from.
+/// Source of the readings of a gesture.
 pub(super) enum GloveSource {
-    /// A folder with the glove's raw bytes: `flat.bin`, `fist.bin`, `thumb.bin`.
+    /// Folder with the glove's raw bytes: `flat.bin`, `fist.bin`, `thumb.bin`.
     Recorded(PathBuf),
-    /// A glove on somebody's hand.
+    /// Glove on a person's hand.
     Live(NextReading),
 }
 
-/// A gesture as a person is asked for it.
+/// Gesture that a person is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
-    /// The flat hand.
+    /// Flat hand.
     Flat,
-    /// The fist.
+    /// Fist.
     Fist,
-    /// The thumb in front of the palm.
+    /// Thumb in front of the palm.
     Thumb,
 }
 
@@ -67,7 +67,7 @@ impl Shown {
         }
     }
 
-    /// The angles that the gesture is believed to have.
+    /// Joint angles that the gesture is assumed to have.
     fn angles(self) -> JointAngles {
         match self {
             Self::Flat => JointAngles::flat(),
@@ -77,21 +77,21 @@ impl Shown {
     }
 }
 
-/// What is asked of the person.
+/// Gestures that a person is asked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan {
-    /// Sensors of the glove.
+    /// Number of sensors of the glove.
     pub(super) sensors: SensorCount,
     /// Whether the thumb is shown as a third gesture.
     pub(super) with_thumb: bool,
-    /// Readings of a live gesture.
+    /// Number of readings of a live gesture.
     pub(super) readings: usize,
-    /// Times that live gestures may be shown before the last ones are taken as they are.
+    /// Number of times that live gestures may be shown before the last ones are taken as they are.
     pub(super) rounds: usize,
 }
 
 impl Plan {
-    /// About a second of a polled glove, three times at most.
+    /// Plan with about a second of a polled glove for each gesture, and three rounds at most.
     pub(super) fn new(sensors: SensorCount, with_thumb: bool) -> Self {
         Self { sensors, with_thumb, readings: 100, rounds: 3 }
     }
@@ -104,9 +104,9 @@ impl Plan {
     }
 }
 
-/// Takes all gestures and fits them; live gestures that are not good enough are asked for again.
+/// Takes all gestures and fits the calibration; asks again for live gestures that are not good enough.
 ///
-/// What could not be mended is in the report's complaints.
+/// Faults that remain are in the report's complaints.
 ///
 /// # Errors
 /// A sentence for a file that cannot be read or a glove that is silent.
@@ -185,7 +185,7 @@ mod tests {
         silence: Duration::from_secs(30),
     };
 
-    /// A glove that shows gestures in turn, each for so many readings.
+    /// Glove that shows gestures in turn, each for `readings` readings.
     fn glove(gestures: Vec<JointAngles>, readings: usize) -> GloveSource {
         let calibration = Calibration::default();
         let mut count = 0;

@@ -8,10 +8,10 @@ use softgrasp_hand::hand_setup::HandConfiguration;
 
 use crate::object::file_writing::write_file;
 
-/// Reads a configuration and, where it names one, its calibration.
+/// Reads a configuration, and its calibration if it names one.
 ///
 /// # Errors
-/// A sentence with the path.
+/// Sentence with the path.
 pub(super) fn read_configuration(path: &Path) -> anyhow::Result<HandConfiguration> {
     let mut configuration = HandConfiguration::read(&read_text(path)?)
         .with_context(|| format!("cannot use {}", path.display()))?;
@@ -28,7 +28,7 @@ pub(super) fn read_configuration(path: &Path) -> anyhow::Result<HandConfiguratio
 /// Writes a configuration.
 ///
 /// # Errors
-/// The path and the system's reason.
+/// Path and error of the operating system.
 pub(super) fn write_configuration(
     path: &Path,
     configuration: &HandConfiguration,
@@ -36,15 +36,15 @@ pub(super) fn write_configuration(
     Ok(write_file(path, configuration.to_text().as_bytes())?)
 }
 
-/// Reads a file of text.
+/// Reads a text file.
 ///
 /// # Errors
-/// The path and the reason: the system's, or bytes that are not text.
+/// Path and reason: an error of the operating system, or bytes that are no text.
 pub(super) fn read_text(path: &Path) -> anyhow::Result<String> {
     std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
-/// How a file is named in a configuration in this folder: without the folder, where both are in it.
+/// Path of a file as its configuration names it: without the folder, if both are in the same one.
 pub(super) fn relative_to(configuration: &Path, file: &Path) -> PathBuf {
     let folder = configuration.parent().unwrap_or(Path::new(""));
     match file.strip_prefix(folder) {
@@ -60,7 +60,7 @@ pub(super) fn today() -> String {
     date_of_day(seconds / 86_400)
 }
 
-/// The date so many days after 1970-01-01.
+/// Date of a day, counted from 1970-01-01.
 fn date_of_day(days: u64) -> String {
     let is_leap = |year: u64| {
         year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))

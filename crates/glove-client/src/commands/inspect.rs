@@ -34,7 +34,7 @@ pub struct InspectCommand {
 }
 
 impl InspectCommand {
-    /// Reads, mends, tells.
+    /// Reads and mends the mesh, and prints the report.
     ///
     /// # Errors
     /// A file that cannot be read, used or written, or that no way could answer within the memory
@@ -73,7 +73,8 @@ impl InspectCommand {
     }
 }
 
-/// Writes the mesh as it is used, once it is seen that nothing is left to mend; what was done.
+/// Writes the mended mesh, after a check that nothing is left to mend; returns the sentence for the
+/// person.
 fn repair(read: &MeshFile, out: &Path) -> anyhow::Result<String> {
     let MeshFile { mesh, findings, .. } = read;
     let labels = &findings.region_labels;

@@ -6,16 +6,16 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use softgrasp_os::{EndSignal, on_end_signal};
 
-/// The command does not look: a signal ends the program.
+/// The command does not check for signals: a signal ends the program.
 const UNHEARD: u8 = 0;
-/// The command looks at [`asked`].
+/// The command checks [`asked`].
 const HEARD: u8 = 1;
 /// A signal has asked the command to end.
 const ASKED: u8 = 2;
 
 static STATE: AtomicU8 = AtomicU8::new(UNHEARD);
 
-/// Takes the signals over; before any other thread is started.
+/// Installs the handlers; to be called before any other thread is started.
 pub fn watch() {
     let react = |signal: EndSignal| {
         let told = STATE.compare_exchange(HEARD, ASKED, Ordering::Relaxed, Ordering::Relaxed);
@@ -29,13 +29,13 @@ pub fn watch() {
     }
 }
 
-/// From now on the command looks at [`asked`] and ends by itself.
+/// Declares that from now on the command checks [`asked`] and ends by itself.
 pub fn hear() {
     // Where it has heard already, it may have been asked already.
     let _ = STATE.compare_exchange(UNHEARD, HEARD, Ordering::Relaxed, Ordering::Relaxed);
 }
 
-/// Whether the program was asked to end since [`hear`].
+/// Whether a signal has asked the program to end since [`hear`].
 pub fn asked() -> bool {
     STATE.load(Ordering::Relaxed) == ASKED
 }

@@ -1,4 +1,4 @@
-//! The deformed object at the moments that matter, as files, written beside the ticks.
+//! Files of the deformed object at key moments, written beside the ticks.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,15 +12,15 @@ use softgrasp_os::Beside;
 use crate::object::file_writing::write_file;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// Writes the object when it starts to deform, just before its shape is kept or let go, and after.
+/// Writes the object when it starts to deform, just before its shape is kept or released, and after.
 pub struct KeyFrames {
     folder: PathBuf,
     writer: Beside<Picture, anyhow::Result<()>>,
-    /// Displacement after the last tick, and the rest shape it counts from.
+    /// Rest shape after the last tick, and the displacement from it, m.
     before: (Arc<RestShape>, Vec<[f64; 3]>),
 }
 
-/// One file to write.
+/// File to be written.
 struct Picture {
     path: PathBuf,
     rest: Arc<RestShape>,
@@ -31,7 +31,7 @@ impl KeyFrames {
     /// Makes the folder and starts the thread that writes.
     ///
     /// # Errors
-    /// The system's, in one line.
+    /// Error of the operating system, in one line.
     pub fn start(folder: &Path, object: &SoftObject) -> anyhow::Result<Self> {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -41,10 +41,10 @@ impl KeyFrames {
         Ok(Self { folder: folder.to_owned(), writer, before })
     }
 
-    /// Has the files of a tick written.
+    /// Passes the files of a tick to the thread.
     ///
     /// # Errors
-    /// That of a file of an earlier tick.
+    /// Error of a file of an earlier tick.
     pub fn add(
         &mut self,
         tick: u64,
@@ -79,7 +79,7 @@ impl KeyFrames {
     /// Waits until all files are written.
     ///
     /// # Errors
-    /// The first file that could not be.
+    /// Error of the first file that could not be written.
     pub fn finish(mut self) -> anyhow::Result<()> {
         while self.writer.is_busy() {
             self.writer.wait().unwrap_or(Ok(()))?;

@@ -11,24 +11,24 @@ use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::sent::Arrival;
 use softgrasp_hand::serial::{SerialDevices, SerialSource, settings_of_hand};
 
-/// Gives the next reading of the glove; waits for it a short while, `None` if none came.
+/// Returns the next reading of the glove; `None` if none came within a short time.
 pub(super) type NextReading = Box<dyn FnMut() -> Option<RawSensors>>;
 
-/// Gives the next sample of the arm; waits for it a short while, `None` if none came.
+/// Returns the next sample of the arm; `None` if none came within a short time.
 pub(super) type NextArmSample = Box<dyn FnMut() -> Option<ArmSample>>;
 
-/// What the devices say about the arm at one time.
+/// Sample of the arm at one time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ArmSample {
-    /// The receiver in the transmitter's Y-up frame, m.
+    /// Pose of the receiver in the transmitter's Y-up frame, m.
     pub(super) stand_from_receiver: Isometry3<f64>,
-    /// The glove, where there is one.
+    /// Reading of the glove, if there is one.
     pub(super) glove: Option<RawSensors>,
 }
 
-/// A device that has not sent a reading for so long is told to be silent for now.
+/// Time without a reading after which a device counts as silent for now.
 const WAIT: Duration = Duration::from_millis(300);
-/// Devices are looked at so often.
+/// Time between two looks at the devices.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
 
 /// Glove and tracker on their ports, and a reader of what they send.
@@ -54,7 +54,7 @@ impl Live {
         Ok(Self { devices, reader, begun: Instant::now() })
     }
 
-    /// Takes what has come; the samples with when they came, newest first of each.
+    /// Takes what has come: the newest sample of each device, with its time.
     fn sample(&mut self) -> HandSample {
         let at = |arrived: Instant| arrived.saturating_duration_since(self.begun).as_secs_f64();
         let arrivals: Vec<Arrival> = self
@@ -73,7 +73,7 @@ impl Live {
         self.reader.sample(now_s)
     }
 
-    /// Waits until something is newer than it was.
+    /// Waits for a sample that is newer than the last one.
     fn next<T>(&mut self, mut newer: impl FnMut(&HandSample) -> Option<T>) -> Option<T> {
         let until = Instant::now() + WAIT;
         loop {
@@ -89,11 +89,11 @@ impl Live {
     }
 }
 
-/// The glove on its port.
+/// Opens the glove's port.
 ///
 /// # Errors
-/// A sentence, where no port is named or the system gives no thread. A glove that is not there is
-/// waited for.
+/// Sentence if no port is named or the system starts no thread. A glove that is not connected is waited
+/// for.
 pub(super) fn live_glove(
     configuration: &HandConfiguration,
     ports: Option<&SerialSource>,
@@ -109,10 +109,10 @@ pub(super) fn live_glove(
     }))
 }
 
-/// The tracker and the glove on their ports.
+/// Opens the ports of tracker and glove.
 ///
 /// # Errors
-/// As [`live_glove`].
+/// The same as those of [`live_glove`].
 pub(super) fn live_arm(
     configuration: &HandConfiguration,
     ports: Option<&SerialSource>,

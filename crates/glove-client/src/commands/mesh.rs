@@ -25,7 +25,7 @@ pub struct MeshCommand {
 }
 
 impl MeshCommand {
-    /// Generates and writes.
+    /// Generates the mesh and writes it.
     ///
     /// # Errors
     /// A node count out of range, an unknown extension, a file that cannot be written.

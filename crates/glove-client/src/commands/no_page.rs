@@ -1,4 +1,4 @@
-//! The page in a build without the feature `xr`: there is none, and whoever asks is told so.
+//! Stand-in for the page in a build without the feature `xr`: opening it fails with a sentence.
 
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -14,10 +14,10 @@ use crate::pace::Due;
 use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;
 
-/// Never made.
+/// Type without a value: this build has no page.
 pub(super) enum RunPage {}
 
-/// Nobody to talk to.
+/// Stand-in for the channels between page and ticks.
 #[expect(dead_code, reason = "this build has no page that would read them")]
 pub(super) struct PageTalk {
     pub(super) controls: Sender<Control>,
@@ -26,10 +26,10 @@ pub(super) struct PageTalk {
 }
 
 impl RunPage {
-    /// None.
+    /// `None`, because this build has no page.
     ///
     /// # Errors
-    /// A sentence, where a page was asked for.
+    /// Sentence if a page was asked for.
     pub(super) fn open(arguments: &RunArguments, _: &RunPlan) -> anyhow::Result<Option<Self>> {
         if arguments.page.xr.is_some() {
             bail!(
@@ -40,12 +40,12 @@ impl RunPage {
         Ok(None)
     }
 
-    /// Never called.
+    /// Unreachable: there is no page.
     pub(super) fn joints(&self) -> JointsFeed {
         match *self {}
     }
 
-    /// Never called.
+    /// Unreachable: there is no page.
     pub(super) fn begin(
         &mut self,
         _: &RunArguments,
@@ -55,12 +55,12 @@ impl RunPage {
         match *self {}
     }
 
-    /// Never called.
+    /// Unreachable: there is no page.
     pub(super) fn add(&mut self, _: Due, _: f64, _: &TickOutcome, _: &Session) {
         match *self {}
     }
 
-    /// Never called.
+    /// Unreachable: there is no page.
     #[cfg(feature = "window")]
     pub(super) fn show(&mut self, _: &ViewFrame) {
         match *self {}

@@ -1,4 +1,4 @@
-//! Pictures in a build without the feature `window`: there are none, and whoever asks is told so.
+//! Stand-in for pictures in a build without the feature `window`: asking for them fails with a sentence.
 
 use anyhow::bail;
 
@@ -7,14 +7,14 @@ use crate::pace::Due;
 use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;
 
-/// Never made.
+/// Type without a value: this build draws no pictures.
 pub(super) enum RunPictures {}
 
 impl RunPictures {
-    /// None.
+    /// `None`, because this build draws no pictures.
     ///
     /// # Errors
-    /// A sentence, where pictures were asked for.
+    /// Sentence if pictures were asked for.
     pub(super) fn start(arguments: &RunArguments, _: &RunPlan) -> anyhow::Result<Option<Self>> {
         if arguments.shown.wants_pictures() {
             bail!(
@@ -25,7 +25,7 @@ impl RunPictures {
         Ok(None)
     }
 
-    /// Never called.
+    /// Unreachable: no pictures are drawn.
     pub(super) fn add(
         &mut self,
         _: Due,
@@ -36,7 +36,7 @@ impl RunPictures {
         match *self {}
     }
 
-    /// Never called.
+    /// Unreachable: no pictures are drawn.
     pub(super) fn finish(self) -> anyhow::Result<()> {
         match self {}
     }

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;
 
-/// A finite number above 0.
+/// Parses a finite number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
@@ -11,14 +11,14 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A Poisson's ratio of an elastic material.
+/// Parses a Poisson's ratio of an elastic material.
 pub fn poisson(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().map_err(|_| "it must be a number".to_owned())?;
     Material::try_new(1.0, number).map_err(|error| error.to_string())?;
     Ok(number)
 }
 
-/// A whole number, 1 or above.
+/// Parses a whole number, 1 or above.
 pub fn count(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(number) if number > 0 => Ok(number),
@@ -26,7 +26,7 @@ pub fn count(text: &str) -> Result<usize, String> {
     }
 }
 
-/// A speed: 0 or above.
+/// Parses a speed: 0 or above.
 pub fn speed(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
@@ -34,7 +34,7 @@ pub fn speed(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A place: three numbers with commas, m.
+/// Parses a position: three finite numbers with commas, m.
 pub fn place(text: &str) -> Result<Point3<f64>, String> {
     let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
     match numbers[..] {
@@ -45,7 +45,7 @@ pub fn place(text: &str) -> Result<Point3<f64>, String> {
     }
 }
 
-/// A vector: three finite numbers with commas.
+/// Parses a vector: three finite numbers with commas.
 pub fn vector(text: &str) -> Result<Vector3<f64>, String> {
     let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
     match numbers[..] {
@@ -58,7 +58,7 @@ pub fn vector(text: &str) -> Result<Vector3<f64>, String> {
     }
 }
 
-/// A number of ticks.
+/// Parses a number of ticks.
 pub fn ticks(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| "it must be a whole number, 0 or above".to_owned())
 }

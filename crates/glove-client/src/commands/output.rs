@@ -1,4 +1,4 @@
-//! Prints what a command has to say and that its work goes on, and writes its reports.
+//! Prints the results and progress of a command, and writes its reports.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::object::file_writing::write_file_by;
 /// Writes a value as indented JSON with a final newline.
 ///
 /// # Errors
-/// The system's reason with the path.
+/// Error of the operating system, with the path.
 pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
     Ok(write_file_by(path, |file| {
         serde_json::to_writer_pretty(&mut *file, value)?;
@@ -20,7 +20,7 @@ pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::
     })?)
 }
 
-/// Prints to standard output; a closed pipe (`| head`) is not an error worth words.
+/// Prints to standard output; a closed pipe (`| head`) is no error.
 ///
 /// # Errors
 /// Any other failure to write.
@@ -34,13 +34,13 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Shows what is being done until it is dropped.
+/// Shows the present stage of the work until it is dropped.
 pub struct Progress {
     bar: ProgressBar,
 }
 
 impl Progress {
-    /// Begins; nothing is shown when standard error is not a terminal.
+    /// Begins to show `what`; nothing is shown if standard error is not a terminal.
     pub fn start(what: &str) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
@@ -51,7 +51,7 @@ impl Progress {
         Self { bar }
     }
 
-    /// Shows behind the message what `now` returns, and asks it again whenever the line is drawn.
+    /// Shows the result of `now` behind the message, and calls it again whenever the line is drawn.
     pub fn watch(&self, now: impl Fn() -> &'static str + Send + Sync + Clone + 'static) {
         let template = ProgressStyle::with_template("{spinner} {msg} {now} ({elapsed})");
         if let Ok(style) = template {
@@ -63,7 +63,7 @@ impl Progress {
         }
     }
 
-    /// Says what is done now.
+    /// Changes the message.
     pub fn now(&self, what: &str) {
         self.bar.set_message(what.to_owned());
     }

@@ -23,7 +23,7 @@ pub struct PageArguments {
     pub(super) xr_key: Option<PathBuf>,
 }
 
-/// Where the page is served.
+/// Parses the address that the page is served at.
 fn page_address(text: &str) -> Result<SocketAddr, String> {
     let port = text.strip_prefix("localhost:").and_then(|port| port.parse().ok());
     let local = port.map(|port| SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port));

@@ -99,7 +99,7 @@ fn element(text: &str) -> Result<ElementName, String> {
 }
 
 impl PressCommand {
-    /// Reads, plays, writes.
+    /// Reads the files, plays the press, and writes the results.
     ///
     /// # Errors
     /// One line each: what happened, where, and what to do.
@@ -162,7 +162,7 @@ impl PressCommand {
         print(&self.describe(&report, &bodies))
     }
 
-    /// The mesh, or what fills the surface; a surface and what was done to it are told.
+    /// Reads the mesh, or fills the surface with one; prints what was done to a surface.
     fn read_object(&self) -> anyhow::Result<TetMesh> {
         match read_object_file(&self.mesh, NODES_DEFAULT)? {
             ObjectFile::Mesh(file) => Ok(file.mesh),
@@ -180,7 +180,7 @@ impl PressCommand {
         }
     }
 
-    /// Whether a file is written that can hold fields.
+    /// Whether a file is written that can contain fields.
     fn has_fields_file(&self) -> bool {
         self.series.is_some() || self.out.as_ref().is_some_and(|path| is_vtu(path))
     }
@@ -266,7 +266,7 @@ impl PressCommand {
     }
 }
 
-/// Uploads the model.
+/// Uploads the model of the object.
 fn give_model(connection: &mut ServerConnection, upload: &ModelUpload) -> Result<(), LinkError> {
     match connection.ask(&Request::UploadModel((*upload.message).clone()))? {
         Reply::ModelReady(_) => Ok(()),
@@ -274,7 +274,7 @@ fn give_model(connection: &mut ServerConnection, upload: &ModelUpload) -> Result
     }
 }
 
-/// Displacements from rest to where the step has left every node in the world.
+/// Displacement of every node from rest to its position in the world after a step, m.
 fn world_displacement(mesh: &TetMesh, step: &Step) -> Vec<[f64; 3]> {
     let world_from_object = isometry_of(&step.answer.state.pose);
     let moved = |(rest, u): (&Point3<f64>, &[f64; 3])| {
@@ -299,7 +299,7 @@ fn encode(path: &Path, mesh: &TetMesh, step: &Step) -> anyhow::Result<Vec<u8>> {
     encode_fields(mesh, &[], &vectors, fields.as_ref()).context("cannot form the VTU file")
 }
 
-/// Files of all steps, and the file that names them with their times.
+/// Files of all steps, and the file that lists them with their times.
 struct Series {
     folder: PathBuf,
     entries: String,

@@ -21,7 +21,7 @@ impl RecordCommand {
     /// Plays the scene and records it.
     ///
     /// # Errors
-    /// Those of [`RunCommand::run`].
+    /// The same as those of [`RunCommand::run`].
     pub fn run(&self) -> anyhow::Result<()> {
         let record = Some(self.recording.clone());
         RunCommand { arguments: RunArguments { record, ..self.run.arguments.clone() } }.run()

@@ -1,16 +1,15 @@
-//! The object of a recording: which file its name may stand for.
+//! Object of a recording: the mesh file that its name may stand for.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use softgrasp_grasp::object::ObjectChoice;
 
-/// The object that a recording names. A recording may come from anywhere, so the mesh file that it
-/// names is only opened where it lies in the folder of the recording or below it: by the path that
-/// is written there, or beside the recording under the same file name.
+/// Object that a recording names. A recording may come from anywhere. So its mesh file is only opened in
+/// the folder of the recording or below it: by the path in the recording, or under the same file name.
 ///
 /// # Errors
-/// There is no such file there; the path outside is not opened, nor asked whether it exists.
+/// There is no such file there. A path outside the folder is neither opened nor checked.
 pub(super) fn recorded_object(recording: &Path, name: &str) -> anyhow::Result<ObjectChoice> {
     let Ok(ObjectChoice::File(named)) = name.parse() else { return Ok(name.parse()?) };
     let folder = match recording.parent() {
@@ -28,7 +27,7 @@ pub(super) fn recorded_object(recording: &Path, name: &str) -> anyhow::Result<Ob
     }
 }
 
-/// The file that a recording in this folder names, if it lies in the folder or below it.
+/// Path of the file that a recording in this folder names, if it lies in the folder or below it.
 fn file_below(folder: &Path, named: &Path) -> Option<PathBuf> {
     let folder_itself = folder.canonicalize().ok()?;
     let below = |path: PathBuf| {

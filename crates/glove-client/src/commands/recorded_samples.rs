@@ -10,10 +10,10 @@ use softgrasp_hand::devices::cyberglove::{
 use softgrasp_hand::devices::fastrak::{FastrakEvent, FastrakParser};
 use softgrasp_hand::hand_setup::HandConfiguration;
 
-/// A gesture's recording is no longer than this: 20 minutes of a glove.
+/// Largest length of a gesture's recording, bytes: 20 minutes of a glove.
 const MAX_BYTES: u64 = 4 << 20;
 
-/// The glove's readings in a file of its raw bytes.
+/// Readings of the glove in a file of its raw bytes.
 ///
 /// # Errors
 /// A sentence for a file that cannot be read or holds no record of this glove.
@@ -38,7 +38,7 @@ pub(super) fn recorded_readings(
     Ok(readings)
 }
 
-/// The receiver's poses in a file of the tracker's raw bytes, in the transmitter's Y-up frame.
+/// Poses of the receiver in a file of the tracker's raw bytes, in the transmitter's Y-up frame, m.
 ///
 /// # Errors
 /// A sentence for a file that cannot be read or holds no record of this tracker and station.

@@ -1,4 +1,4 @@
-//! The settings of a recorded run, for playing it again.
+//! Settings of a recorded run, for its replay.
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -11,10 +11,10 @@ use crate::ask::solve_settings::Elasticity;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
 use crate::run::contact_grasp::ContactScene;
 
-/// The settings of a recorded run.
+/// Material and settings of the solves of a recorded run.
 ///
 /// # Errors
-/// A name that this program does not know.
+/// A name that this version does not know.
 pub(super) fn recorded_settings(setup: &RecordedSetup) -> anyhow::Result<SolveSettings> {
     let said = "the recording's";
     Ok(SolveSettings {
@@ -38,7 +38,7 @@ pub(super) fn recorded_settings(setup: &RecordedSetup) -> anyhow::Result<SolveSe
     })
 }
 
-/// What a recorded grasp by contact with friction was like; `None` where the thesis's rules held.
+/// Constants of a recorded grasp by friction; `None` for the thesis's rules.
 pub(super) fn recorded_scene(setup: &RecordedSetup) -> Option<ContactScene> {
     let recorded = setup.friction.as_ref()?;
     Some(ContactScene {
@@ -57,10 +57,10 @@ fn recorded_element(name: &str) -> anyhow::Result<ElementName> {
     found.with_context(|| format!("the recording's element is '{name}', which is none"))
 }
 
-/// The hand of a recorded run, its glove and its tracker.
+/// Configuration of the hand of a recorded run, its glove and its tracker.
 ///
 /// # Errors
-/// A text that this program cannot read.
+/// A text that this version cannot read.
 pub(super) fn recorded_hand(setup: &RecordedSetup) -> anyhow::Result<HandConfiguration> {
     let read = HandConfiguration::read(&setup.hand_setup);
     let mut configuration = read.context("the recording's hand")?;
@@ -69,7 +69,7 @@ pub(super) fn recorded_hand(setup: &RecordedSetup) -> anyhow::Result<HandConfigu
     Ok(configuration)
 }
 
-/// Where the sender of joints was placed in a recorded run.
+/// Pose in the world of a sender of joints in a recorded run.
 pub(super) fn recorded_place(setup: &RecordedSetup) -> Option<Isometry3<f64>> {
     let [x, y, z, qx, qy, qz, qw] = setup.world_from_sender?;
     // The quaternion is one already: it comes back with its bits.

@@ -1,4 +1,4 @@
-//! `glove-client replay`: plays a recording again, and says whether the same came out.
+//! `glove-client replay`: plays a recording again, and tells whether the results are the same.
 
 use std::path::PathBuf;
 
@@ -44,10 +44,10 @@ pub struct ReplayCommand {
 }
 
 impl ReplayCommand {
-    /// Plays it.
+    /// Plays the recording and compares.
     ///
     /// # Errors
-    /// One line: why it cannot be played, or what differs.
+    /// One line: why the recording cannot be played, or what differs.
     pub fn run(&self) -> anyhow::Result<()> {
         let arguments = RunArguments {
             hand: Some(HandRequest::Replay(self.recording.clone())),

@@ -35,7 +35,7 @@ pub struct RunCommand {
 const START_WAIT_MAX: Duration = Duration::from_secs(60);
 
 impl RunCommand {
-    /// Plays the scene.
+    /// Plays the run and writes its report.
     ///
     /// # Errors
     /// One line each: what happened, where, and what to do. A run in which answers were asked for
@@ -71,7 +71,7 @@ impl RunCommand {
         Ok(Shown::Not)
     }
 
-    /// Plays without a window; shows one line on a terminal.
+    /// Plays without a window; shows a status line on a terminal.
     pub(super) fn without_window(
         &self,
         plan: &RunPlan,
@@ -143,7 +143,7 @@ impl RunCommand {
         Ok(session.finish(interrupted)?)
     }
 
-    /// How the run is made ready where no window shows it.
+    /// Setup of a run without a window.
     fn setup(&self, plan: &RunPlan, page: Option<&RunPage>) -> Setup {
         let shown_slowly = self.arguments.shown.animation.is_some() || page.is_some();
         Setup {
@@ -159,11 +159,11 @@ impl RunCommand {
     }
 }
 
-/// Whether a run was shown in a window.
+/// Whether a window has shown the run.
 enum Shown {
-    /// It was, and if it began there is a report.
+    /// A window has shown the run; its report, if it began.
     #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "this build has no window"))]
     InWindow(Option<Box<RunReport>>),
-    /// It was not.
+    /// No window has shown the run.
     Not,
 }

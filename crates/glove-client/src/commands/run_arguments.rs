@@ -154,7 +154,7 @@ impl PlaceChoice {
     }
 }
 
-/// The element that ticks are solved with; they need one whose system is condensed.
+/// Element for the ticks; it must be one that `condensed` can solve.
 fn chosen_element(choice: ElementChoice, poisson: f64) -> anyhow::Result<ElementName> {
     match choice {
         ElementChoice::T4 => Ok(ElementName::T4),
@@ -167,73 +167,73 @@ fn chosen_element(choice: ElementChoice, poisson: f64) -> anyhow::Result<Element
     }
 }
 
-/// A run after flags and scene file have been put together.
+/// Settings of a run, from flags and scene file.
 #[derive(Clone)]
 pub(super) struct RunPlan {
-    /// What is grasped.
+    /// Object that is grasped.
     pub(super) object: ObjectChoice,
-    /// Nodes of a built-in object.
+    /// Number of nodes of a built-in object.
     pub(super) nodes: usize,
     /// Longest extent of the object, m; `None` where the hand may choose it.
     pub(super) object_size: Option<f64>,
-    /// Material and solving.
+    /// Material, and settings of the solves.
     pub(super) settings: SolveSettings,
-    /// What a grasp by contact with friction is like; `None` for the thesis's rules.
+    /// Constants of a grasp by friction; `None` for the thesis's rules.
     pub(super) contact_scene: Option<ContactScene>,
-    /// Where the object is put.
+    /// Place where the object is put.
     pub(super) place: ObjectPlace,
-    /// Where to solve.
+    /// Server that solves.
     pub(super) server: ServerChoice,
-    /// How a server elsewhere is spoken to.
+    /// Endpoint of the server, with token and encryption; `None` for the embedded one.
     pub(super) endpoint: Option<Endpoint>,
-    /// Where the hand comes from.
+    /// Hand that is asked for.
     pub(super) hand: HandRequest,
     /// Whether ticks wait for answers.
     pub(super) pace: Pace,
-    /// From tick to tick, in real time.
+    /// Time from tick to tick, in real time; `None` for as fast as possible.
     pub(super) period: Option<Duration>,
-    /// The hand, its glove and its tracker.
+    /// Configuration of the hand, its glove and its tracker.
     pub(super) hand_configuration: HandConfiguration,
-    /// Whether devices send what they will.
+    /// Whether the samples come from live devices.
     pub(super) is_live: bool,
-    /// Where a sender of joints is placed; `None` places its first hand before the object.
+    /// Pose in the world of a sender of joints; `None` puts its first hand before the object.
     pub(super) world_from_sender: Option<Isometry3<f64>>,
-    /// The recording that is played again.
+    /// Recording that is replayed.
     pub(super) recording: Option<Arc<Recording>>,
 }
 
-/// How a run grasps, by which equations, and with which hand.
+/// Rules of the grasp, equations, and configuration of the hand.
 struct Grasping {
     rule: GraspRule,
     elasticity: Elasticity,
     hand: HandRequest,
 }
 
-/// Ticks per second where a person watches.
+/// Ticks per second if a person watches.
 const WATCHED_RATE_HZ: f64 = 60.0;
-/// Longest time from tick to tick, s: an hour is as good as any.
+/// Longest time from tick to tick, s.
 const PERIOD_MAX_S: f64 = 3600.0;
 
 impl RunArguments {
-    /// Whether the run is played without a window: pictures are drawn tick by tick.
+    /// Whether the run is played without a window, because pictures are drawn tick by tick.
     pub(super) fn is_without_window(&self) -> bool {
         self.headless || self.shown.wants_pictures()
     }
 
-    /// Whether a person watches: at a terminal beside the window, or the page. A pipe wants the result.
+    /// Whether a person watches: on a terminal beside the window, or on the page.
     fn is_watched(&self) -> bool {
         (console_is_watched() && !self.is_without_window()) || self.page.xr.is_some()
     }
 
-    /// The object that was named, with `--object` or without.
+    /// Object that was named, with or without `--object`.
     pub(super) fn asked_object(&self) -> Option<&ObjectChoice> {
         self.object.as_ref().or(self.named_object.as_ref())
     }
 
-    /// Puts flags and scene file together.
+    /// Settings of the run, from flags and scene file.
     ///
     /// # Errors
-    /// A scene that cannot be read, or that asks for what cannot be.
+    /// A scene that cannot be read, or settings that do not go together.
     pub(super) fn plan(&self) -> anyhow::Result<RunPlan> {
         if let Some(HandRequest::Replay(path)) = &self.hand
             && !is_foreign(path)
@@ -305,7 +305,7 @@ impl RunArguments {
         })
     }
 
-    /// Whether the hand is that of a headset, which a page has to send.
+    /// Whether the hand is that of a headset, which a page must send.
     fn takes_headset(&self, hand: &HandRequest) -> anyhow::Result<bool> {
         if *hand == HandRequest::Xr && self.page.xr.is_none() {
             bail!(
@@ -315,13 +315,13 @@ impl RunArguments {
         Ok(*hand == HandRequest::Xr)
     }
 
-    /// Where a sender of joints is placed; a page sends the hand in the world's frame.
+    /// Pose in the world of a sender of joints; a page sends the hand in the world frame.
     fn world_from_sender(&self, is_xr: bool) -> Option<Isometry3<f64>> {
         let chosen = self.joints_origin.map(|at| Translation3::from(-at.coords).into());
         chosen.or(is_xr.then(Isometry3::identity))
     }
 
-    /// How the run grasps, by which equations, and with which hand.
+    /// Rules of the grasp, equations, and configuration of the hand.
     fn grasping(&self, scene: &SceneFile, method: &MethodName) -> anyhow::Result<Grasping> {
         // A run of which nothing was said picks a strawberry from a table. Hands that are no script of the
         // thesis's grasp grasp as hands do.
@@ -344,7 +344,7 @@ impl RunArguments {
         Ok(Grasping { rule, elasticity, hand })
     }
 
-    /// The hand of the file that was named, in the size that was given.
+    /// Configuration of the hand from its file, with the size of the command line.
     fn hand_configuration(&self) -> anyhow::Result<HandConfiguration> {
         let mut configuration = match &self.hand_setup {
             Some(path) => read_configuration(path)?,
@@ -360,8 +360,8 @@ impl RunArguments {
         Ok(configuration)
     }
 
-    /// The run of a recording, whatever the scene file says: object, material and solving are those
-    /// that were recorded.
+    /// Settings of the run that is replayed: object, material and solves are the recorded ones, whatever
+    /// the scene file says.
     fn plan_of_recording(&self, path: &Path) -> anyhow::Result<RunPlan> {
         let recording = read_recording(path)?;
         let setup = &recording.setup;
@@ -395,12 +395,12 @@ impl RunArguments {
 }
 
 impl RunPlan {
-    /// From tick to tick of a hand that a person moves or watches, s.
+    /// Time from tick to tick of a hand that a person moves or watches, s.
     pub(super) fn tick_s(&self) -> f64 {
         self.period.map_or(1.0 / WATCHED_RATE_HZ, |period| period.as_secs_f64())
     }
 
-    /// The same run for a person who watches: in real time.
+    /// The same settings for a person who watches: in real time.
     #[cfg(feature = "window")]
     pub(super) fn for_window(&self) -> Self {
         let period = Some(Duration::from_secs_f64(self.tick_s()));
@@ -414,22 +414,22 @@ impl RunPlan {
         self.hand == HandRequest::Xr
     }
 
-    /// Whether a script that is over begins anew: what is recorded, or counted in ticks, is one story.
+    /// Whether a script begins again after its end; not if the run is recorded or has a number of ticks.
     pub(super) fn begins_anew(&self, arguments: &RunArguments) -> bool {
         arguments.record.is_none() && arguments.frames.is_none() && self.recording.is_none()
     }
 
-    /// Its material as the solver knows it.
+    /// Material as the core takes it.
     ///
     /// # Errors
-    /// Not seen: the plan was made of a good one.
+    /// None in practice: the plan was made with a valid material.
     #[cfg(any(feature = "window", feature = "xr"))]
     pub(super) fn elastic_material(&self) -> anyhow::Result<ElasticMaterial> {
         let Material { young, poisson } = self.settings.material;
         Ok(ElasticMaterial::try_new(young, poisson)?)
     }
 
-    /// The object, for the hand that is to grasp it.
+    /// Request for the object, with the hand that is to grasp it.
     pub(super) fn object_request(&self, setup: &HandSetup) -> ObjectRequest {
         ObjectRequest {
             choice: self.object.clone(),

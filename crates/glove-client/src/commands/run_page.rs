@@ -1,4 +1,4 @@
-//! The page of a run: opened before the run, shown every tick that is due, closed after it.
+//! Page of a run: opened before the run, shown every tick that is due, closed after it.
 
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -22,7 +22,7 @@ use crate::run::observer::{Foresight, Observer};
 use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;
 
-/// A page that is served.
+/// Page that is being served.
 pub(super) struct RunPage {
     page: Page,
     out: Option<Outlet>,
@@ -30,21 +30,21 @@ pub(super) struct RunPage {
     foresight: Foresight,
 }
 
-/// Both ends of the person's way to the ticks, as a page needs them.
+/// Channels between page and ticks.
 pub(super) struct PageTalk {
-    /// Where wishes go.
+    /// Channel for wishes to the ticks.
     pub(super) controls: Sender<Control>,
-    /// Sentences for the person.
+    /// Channel of sentences for the person.
     pub(super) notices: Receiver<Notice>,
     /// Whether a window shows the run too.
     pub(super) has_window: bool,
 }
 
 impl RunPage {
-    /// Serves the page, if one was asked for, and prints its address.
+    /// Serves the page, if it was asked for, and prints its address.
     ///
     /// # Errors
-    /// A port that is taken, a certificate that cannot be used.
+    /// A port that is in use, or a certificate that cannot be used.
     pub(super) fn open(arguments: &RunArguments, plan: &RunPlan) -> anyhow::Result<Option<Self>> {
         let Some(address) = arguments.page.xr else { return Ok(None) };
         let page = &arguments.page;
@@ -71,7 +71,7 @@ impl RunPage {
         Ok(Some(Self { page, out: None, observer, foresight }))
     }
 
-    /// Where the hand of a headset comes from.
+    /// Feed of the joints of a headset's hand.
     pub(super) fn joints(&self) -> JointsFeed {
         self.page.joints()
     }
@@ -79,7 +79,7 @@ impl RunPage {
     /// Shows a run from now on. To be called before the calling thread has real-time priority.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// Error of the operating system if it starts no thread.
     pub(super) fn begin(
         &mut self,
         arguments: &RunArguments,
@@ -105,7 +105,7 @@ impl RunPage {
         Ok(())
     }
 
-    /// Takes a tick.
+    /// Offers a tick to the page.
     pub(super) fn add(&mut self, due: Due, now_s: f64, outcome: &TickOutcome, session: &Session) {
         self.observer.note(due, outcome);
         let Some(out) = self.out.as_mut().filter(|out| out.is_due()) else { return };
@@ -114,7 +114,7 @@ impl RunPage {
         out.publish(Box::new(frame));
     }
 
-    /// Takes a frame that somebody else has made.
+    /// Offers a frame that was made for the window.
     #[cfg(feature = "window")]
     pub(super) fn show(&mut self, frame: &ViewFrame) {
         if let Some(out) = self.out.as_mut().filter(|out| out.is_due()) {
@@ -124,7 +124,7 @@ impl RunPage {
 }
 
 impl Drop for RunPage {
-    /// Tells how long hands took to pictures.
+    /// Prints the times from tracked hands to pictures.
     fn drop(&mut self) {
         if let Some(took) = self.page.hand_to_picture() {
             eprintln!(

@@ -1,4 +1,4 @@
-//! Pictures of a run without a window: one moment, every tick, or a moving picture.
+//! Pictures of a run without a window: one moment, every tick, or an animation.
 
 use std::path::{Path, PathBuf};
 
@@ -21,15 +21,15 @@ use crate::run::observer::{Foresight, Observer};
 use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;
 
-/// Draws what was asked for, tick by tick.
+/// Draws the wanted pictures, tick by tick.
 pub(super) struct RunPictures {
     pictures: Pictures,
     display: Display,
-    /// `None` until the first hand places the eye.
+    /// View; `None` until the first hand sets it.
     camera: Option<ViewCamera>,
     eye: DirectedEye,
     foresight: Foresight,
-    /// A moving picture shows strain while the hand squeezes.
+    /// Whether an animation shows strain while the hand squeezes.
     directs_colours: bool,
     observer: Observer,
     snapshot: Option<Snapshot>,
@@ -37,26 +37,26 @@ pub(super) struct RunPictures {
     animation: Option<(PathBuf, Animation)>,
 }
 
-/// A picture of one moment.
+/// Picture of one moment.
 struct Snapshot {
     path: PathBuf,
     watch: Watch,
-    /// The last tick so far that the snapshot could be of; a later tick may take its place.
+    /// Frame of the last tick so far that the snapshot could show; a later one may replace it.
     kept: Option<Box<ViewFrame>>,
-    /// Paths of light a pixel, where light is traced.
+    /// Number of paths of light for each pixel, if light is traced.
     paths: Option<u32>,
-    /// What was asked for, for the sentence that says that it did not come.
+    /// Moment that was asked for, for the sentence that tells that it did not occur.
     moment: Option<Moment>,
 }
 
-/// Ticks from one picture of an animation to the next: 15 a second where there are 60 ticks.
+/// Ticks between two pictures of an animation: 15 pictures a second at 60 ticks a second.
 const ANIMATED_TICKS: u64 = 4;
 
 impl RunPictures {
     /// Begins to draw, if pictures were asked for.
     ///
     /// # Errors
-    /// A sentence, where nothing can draw or the folder cannot be made.
+    /// Sentence if nothing can draw or the folder cannot be made.
     pub(super) fn start(arguments: &RunArguments, plan: &RunPlan) -> anyhow::Result<Option<Self>> {
         let shown = &arguments.shown;
         if !shown.wants_pictures() {
@@ -92,7 +92,7 @@ impl RunPictures {
         }))
     }
 
-    /// Takes a tick.
+    /// Draws a tick, if its picture is wanted.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -134,10 +134,10 @@ impl RunPictures {
         Ok(())
     }
 
-    /// Writes what is left to write.
+    /// Writes the files that remain.
     ///
     /// # Errors
-    /// A file that cannot be written, or a moment that did not come.
+    /// A file that cannot be written, or a moment that did not occur.
     pub(super) fn finish(mut self) -> anyhow::Result<()> {
         self.take_snapshot()?;
         if let Some((path, animation)) = self.animation {
@@ -148,8 +148,8 @@ impl RunPictures {
         Ok(())
     }
 
-    /// Where the eye is: where it was asked to be, where it sees most of the squeeze, or beside the
-    /// first hand that has no plan.
+    /// View of the pictures: the one asked for, the one that sees most of the squeeze, or one beside the
+    /// first hand without a plan.
     fn camera(&mut self, frame: &ViewFrame) -> ViewCamera {
         let directed = self.eye.eye(frame, self.camera.unwrap_or_default(), frame.at_s);
         let camera = directed.or(self.camera).or_else(|| frame.eye_beside_hand());
@@ -175,8 +175,7 @@ impl RunPictures {
     }
 }
 
-/// What was asked for; else single pictures are drawn well, and many where the processor draws so
-/// that they come soon.
+/// Effort for light: as asked for; else high for single pictures, and low for many on the processor.
 fn level(shown: &DisplayArguments, pictures: &Pictures) -> Level {
     let draws_many = shown.frames_dir.is_some() || shown.animation.is_some();
     match shown.light {

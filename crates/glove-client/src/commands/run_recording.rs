@@ -1,4 +1,4 @@
-//! The recording of a run: what is written at its head, and whether an object is that of a recording.
+//! Recording of a run: its header, and the check that an object is the recorded one.
 
 use std::path::Path;
 
@@ -64,10 +64,10 @@ pub(super) fn start_recorder(
     Ok(Recorder::start(path, setup)?)
 }
 
-/// Holds the object that was loaded against the one that was recorded.
+/// Compares the loaded object with the recorded one.
 ///
 /// # Errors
-/// It is another one.
+/// The objects differ.
 pub(super) fn check_object(setup: &RecordedSetup, loaded: &LoadedObject) -> anyhow::Result<()> {
     ensure!(
         mesh_digest(loaded.object.rest()) == setup.mesh,
@@ -78,7 +78,7 @@ pub(super) fn check_object(setup: &RecordedSetup, loaded: &LoadedObject) -> anyh
     Ok(())
 }
 
-/// Digest of places and elements.
+/// Digest of the positions and elements of a mesh.
 fn mesh_digest(mesh: &TetMesh) -> String {
     let mut digest = Digest::default();
     mesh.vertices().iter().for_each(|vertex| digest.numbers(vertex.coords.as_slice()));

@@ -1,4 +1,4 @@
-//! Makes a run ready: the object, the hand, the server, the session that plays them.
+//! Prepares a run: the object, the hand, the server, and the session that plays them.
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
@@ -38,40 +38,40 @@ use crate::run::grasp_loop::GraspLoop;
 use crate::run::run_report::RunReport;
 use crate::run::session::{Session, priority_for};
 
-/// A run that can be played.
+/// Run that can be played.
 pub(super) struct ReadyRun {
-    /// The run.
+    /// Session that plays the run.
     pub(super) session: Session,
-    /// The server, if it runs in this process; it must live as long as the run.
+    /// Server, if it runs in this process; it must live as long as the run.
     pub(super) host: Host,
 }
 
-/// What is being made ready.
+/// Stage of the preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SetupStage {
-    /// The object.
+    /// The object is prepared.
     Object(LoadStage),
-    /// The server and the connection to it.
+    /// The server is started and connected.
     Server,
 }
 
-/// How a run is to be made ready.
+/// Settings of the preparation.
 pub(super) struct Setup {
     /// File that the run is recorded to.
     pub(super) record: Option<PathBuf>,
     /// File for a report of every tick.
     pub(super) report: Option<PathBuf>,
-    /// Threads of an embedded server; `None` takes one per processor.
+    /// Number of threads of an embedded server; `None` takes one per processor.
     pub(super) threads: Option<usize>,
-    /// Whether it ends with the script.
+    /// Whether the run ends with the script.
     pub(super) ends_with_script: bool,
-    /// How many times as long a script squeezes and holds.
+    /// Factor by which a script squeezes and holds longer.
     pub(super) squeeze_times: u32,
-    /// Where the hand of a headset comes from, where there is a page.
+    /// Feed of the joints of a headset's hand, if there is a page.
     pub(super) joints: Option<JointsFeed>,
 }
 
-/// Makes a run ready; says at which stage it is. `seen` is shown the object before the first tick.
+/// Prepares a run and tells the stages. `seen` is shown the object before the first tick.
 ///
 /// # Errors
 /// One line each: what happened, where, and what to do.
@@ -163,7 +163,7 @@ pub(super) fn load_beside(request: ObjectRequest) -> LoadObject {
     })
 }
 
-/// The hand of a run; `grip` is how the scripted one grasps the object.
+/// Hand of a run; `grip` is the plan by which the scripted one grasps the object.
 fn hand_of(
     plan: &RunPlan,
     setup: &Setup,

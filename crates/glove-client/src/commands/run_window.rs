@@ -29,16 +29,16 @@ use crate::run::run_words::{words_of_contact, words_of_server};
 use crate::run::tick_loop::Timing;
 use crate::run::tick_thread::TickThread;
 
-/// Frames are offered to the window so often.
+/// Time between two frames that are offered to the window.
 const FRAMES_EVERY: Duration = Duration::from_millis(7);
-/// A run without its window is looked at so often.
+/// Time between two looks at a run without its window.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Shows a run until the window is closed: its report, if it began; `None` where no window can be
-/// opened, which is said in a sentence.
+/// Shows a run until the window is closed; returns its report, if it began. `None` if no window can be
+/// opened, which is told in a sentence.
 ///
 /// # Errors
-/// One line: why the run could not begin, or broke off.
+/// One line: why the run could not begin, or ended early.
 pub(super) fn show(
     arguments: &RunArguments,
     plan: &RunPlan,
@@ -71,7 +71,7 @@ pub(super) fn show(
     Ok(Some(threads.try_recv().ok().map(TickThread::join).transpose()?))
 }
 
-/// What the window holds of the ticks.
+/// The window's ends of the channels to the ticks.
 fn in_window(
     thread: &mut TickThread,
     report: Option<PathBuf>,
@@ -91,14 +91,14 @@ fn in_window(
     })
 }
 
-/// What a page asks of the ticks, and what they have to say to it, beside the window.
+/// Channels between page and ticks, for a page beside the window.
 struct PageWays {
     asked: Receiver<Control>,
     to_tell: Sender<Notice>,
 }
 
 impl PageWays {
-    /// Hands the page's wishes to the ticks, and their sentences to both; gives the window's.
+    /// Passes the page's wishes to the ticks, and sentences to both; returns the receiver for the window.
     fn connect(
         self,
         thread: &TickThread,
@@ -122,8 +122,8 @@ impl PageWays {
     }
 }
 
-/// Lets a run whose window ended go on to the end of its script, tells how it ended, and ends the
-/// process: with the run's exit code where the display went, with 1 where the window failed.
+/// Lets a run whose window was lost go on to the end of its script, prints its summary, and ends the
+/// process: with the run's exit code if the display was lost, with 1 if the window failed.
 fn when_lost(thread: &TickThread, report: Option<PathBuf>) -> WhenLost {
     let (controls, end) = (thread.controls(), thread.run_end());
     Box::new(move |window| {
@@ -152,7 +152,7 @@ fn when_lost(thread: &TickThread, report: Option<PathBuf>) -> WhenLost {
     })
 }
 
-/// Begins the run beside the window; `begun` hears of its thread.
+/// Begins the run beside the window; `begun` receives its thread.
 fn start(
     arguments: &RunArguments,
     plan: &RunPlan,
@@ -226,7 +226,7 @@ fn start(
     })
 }
 
-/// The step of the loading card.
+/// Position of a stage on the loading card.
 fn step(stage: SetupStage) -> usize {
     match stage {
         SetupStage::Object(stage) => stage as usize,
@@ -234,7 +234,7 @@ fn step(stage: SetupStage) -> usize {
     }
 }
 
-/// What the server is at: known of one in this process only.
+/// Stage of the server; known only of one in this process.
 fn server_stage(choice: &ServerChoice, host: &Host) -> Box<dyn Fn() -> &'static str + Send> {
     match choice {
         ServerChoice::Embedded => Box::new(host.stage()),

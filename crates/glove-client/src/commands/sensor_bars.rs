@@ -6,26 +6,26 @@ use std::time::{Duration, Instant};
 use softgrasp_hand::devices::calibration::sensor_name;
 use softgrasp_hand::devices::cyberglove::{RawSensors, Sensor};
 
-/// Length of a full bar.
+/// Length of a full bar, characters.
 const BAR: usize = 32;
-/// More often than this nobody can read it.
+/// Shortest time between two drawings, as fast as a person reads.
 const DRAW_EVERY: Duration = Duration::from_millis(60);
-/// And in a log not even this often.
+/// Shortest time between two lines of a log.
 const LOG_EVERY: Duration = Duration::from_secs(1);
 
-/// Draws every sensor's reading and what it has shown so far.
+/// Draws every sensor's reading, and the range that it has shown so far.
 pub(super) struct SensorBars<W> {
     out: W,
     is_terminal: bool,
-    /// Least and most reading of each sensor.
+    /// Least and largest reading of each sensor.
     range: [Option<(u8, u8)>; 22],
     drawn: Option<Instant>,
-    /// Lines that the next drawing goes over.
+    /// Number of lines that the next drawing overwrites.
     over: usize,
 }
 
 impl SensorBars<std::io::Stderr> {
-    /// On standard error.
+    /// Bars on standard error.
     pub(super) fn on_standard_error() -> Self {
         let out = std::io::stderr();
         let is_terminal = out.is_terminal();
@@ -34,12 +34,12 @@ impl SensorBars<std::io::Stderr> {
 }
 
 impl<W: Write> SensorBars<W> {
-    /// On a writer; cursor movements only if it is a terminal.
+    /// Bars on a writer, with cursor movements only if it is a terminal.
     pub(super) fn new(out: W, is_terminal: bool) -> Self {
         Self { out, is_terminal, range: [None; 22], drawn: None, over: 0 }
     }
 
-    /// Says something, below what was drawn.
+    /// Prints a sentence below the bars.
     pub(super) fn say(&mut self, text: &str) {
         self.over = 0;
         self.drawn = None;
@@ -47,7 +47,7 @@ impl<W: Write> SensorBars<W> {
         let _ = writeln!(self.out, "{text}").and_then(|()| self.out.flush());
     }
 
-    /// Takes a reading; draws it if it is time.
+    /// Takes a reading, and draws it if it is time.
     pub(super) fn show(&mut self, title: &str, raw: &RawSensors) {
         for sensor in Sensor::ALL {
             let Some(value) = raw.get(sensor) else { continue };
@@ -64,7 +64,7 @@ impl<W: Write> SensorBars<W> {
         let _ = self.out.write_all(text.as_bytes()).and_then(|()| self.out.flush());
     }
 
-    /// All bars, over the ones drawn before.
+    /// Text of all bars, which overwrites the ones before.
     fn screen(&mut self, title: &str, raw: &RawSensors) -> String {
         let mut text = match self.over {
             0 => String::new(),
@@ -84,7 +84,7 @@ impl<W: Write> SensorBars<W> {
     }
 }
 
-/// Name, reading, bar from 0 to 255, least and most reading.
+/// Line of a sensor: name, reading, bar from 0 to 255, least and largest reading.
 fn bar_line(sensor: Sensor, value: u8, (least, most): (u8, u8)) -> String {
     let column = |value: u8| usize::from(value) * BAR / 256;
     let bar: String = (0..BAR)
@@ -97,7 +97,7 @@ fn bar_line(sensor: Sensor, value: u8, (least, most): (u8, u8)) -> String {
     format!("  {:<19} {value:>3} |{bar}| {least:>3} to {most:>3}", sensor_name(sensor))
 }
 
-/// All readings in wire order.
+/// Line with all readings in the order of the wire.
 fn log_line(title: &str, raw: &RawSensors) -> String {
     let values: Vec<String> = raw.as_slice().iter().map(ToString::to_string).collect();
     format!("{title}: {}\n", values.join(" "))

@@ -114,18 +114,18 @@ struct Report {
     server: String,
     #[serde(flatten)]
     solve: SolveSummary,
-    /// Difference between linear and ten-node elements over the answer, or null.
+    /// Difference between linear and ten-node elements, relative to the answer, or null.
     discretisation_estimate_rel: Option<f64>,
-    /// What the estimate is, or why there is none.
+    /// How the estimate was made, or why there is none.
     discretisation_why: String,
-    /// Stored energy of the body, J, where fields were asked for.
+    /// Stored energy of the body, J, if fields were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     strain_energy: Option<f64>,
-    /// Estimated error of the stress in the energy norm, where it was asked for.
+    /// Estimated error of the stress in the energy norm, relative, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     stress_error_rel: Option<f64>,
     out: String,
-    /// Files of the displacements of all cases, where there are several.
+    /// Files of the displacements of all cases, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     outs: Vec<String>,
 }
@@ -143,7 +143,7 @@ struct MeshSummary {
 }
 
 impl Report {
-    /// Adds what the fields of the first case tell of the whole body.
+    /// Adds the totals that the fields of the first case tell of the whole body.
     fn add_fields(&mut self, fields: Option<&FieldValues>) {
         self.strain_energy = fields.map(|fields| fields.energy);
         self.stress_error_rel =
@@ -160,7 +160,7 @@ fn parse_out(text: &str) -> Result<PathBuf, String> {
 }
 
 impl SolveCommand {
-    /// Reads, asks, writes.
+    /// Reads the files, asks the server, and writes the results.
     ///
     /// # Errors
     /// One line each: what happened, where, and what to do.
@@ -233,7 +233,7 @@ impl SolveCommand {
         print(&told)
     }
 
-    /// The embedded server, or the one at an address.
+    /// Host with the embedded server, or the one at an address.
     fn open_host(&self) -> anyhow::Result<Host> {
         if self.memory_limit.is_some() && self.server != ServerChoice::Embedded {
             bail!(
@@ -248,7 +248,7 @@ impl SolveCommand {
         })
     }
 
-    /// Files of all cases; reactions of the further ones come in the order of the first's.
+    /// Writes the files of all cases; the reactions of the further ones are in the order of the first's.
     fn write_cases(
         &self,
         file: &MeshFile,
@@ -303,12 +303,12 @@ impl SolveCommand {
         })
     }
 
-    /// Whether this is more than one question about linear elasticity, or less.
+    /// Whether there are several cases of linear elasticity, or the estimates are left out.
     fn is_several(&self) -> bool {
         self.known.len() > 1 || self.no_estimate
     }
 
-    /// What does not go together.
+    /// Refuses options that do not go together.
     fn check_cases(&self, elasticity: &Elasticity) -> anyhow::Result<()> {
         self.cases().check()?;
         if self.is_several() && elasticity.deformation != Deformation::Linear {
@@ -445,7 +445,7 @@ fn describe(file: &MeshFile, summary: &SolveSummary, outs: &[PathBuf]) -> String
     text
 }
 
-/// What is known of an equilibrium at large deformation.
+/// Sentences on the equilibrium at large deformation.
 fn describe_large(summary: &SolveSummary) -> String {
     let Some(large) = &summary.large else { return String::new() };
     if summary.deformation == Deformation::Linear.as_str() {

@@ -1,4 +1,4 @@
-//! The files of `glove-client solve`: known displacements, displacements and reactions of each case.
+//! Files of `glove-client solve`: known displacements, displacements and reactions of each case.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -22,14 +22,14 @@ pub(super) struct CaseFiles<'a> {
     pub reactions: &'a [PathBuf],
 }
 
-/// The mesh of all cases, and the names of its regions in the file that it came from.
+/// Mesh of all cases, and the names of its regions in its file.
 #[derive(Clone, Copy)]
 pub(super) struct CaseMesh<'a> {
     pub mesh: &'a TetMesh,
     pub labels: &'a [String],
 }
 
-/// What was answered of one case.
+/// Answer to one case.
 #[derive(Clone, Copy)]
 pub(super) struct CaseResult<'a> {
     pub displacements: &'a [[f64; 3]],
@@ -38,8 +38,10 @@ pub(super) struct CaseResult<'a> {
 }
 
 impl CaseFiles<'_> {
+    /// Checks that the numbers of files agree.
+    ///
     /// # Errors
-    /// One line where a file is missing or too many.
+    /// One line if a file is missing or there is one too many.
     pub fn check(self) -> anyhow::Result<()> {
         let cases = self.known.len();
         if self.out.len() != cases {
@@ -55,7 +57,7 @@ impl CaseFiles<'_> {
         Ok(())
     }
 
-    /// Values of the further cases, in the order of the first one's known displacements.
+    /// Known displacements of the further cases, m, in the order of those of the first.
     pub fn further(self, mesh: &TetMesh, first: &[DofValue]) -> anyhow::Result<Vec<Vec<f64>>> {
         let mut cases = Vec::new();
         for path in self.known.iter().skip(1) {
@@ -81,7 +83,7 @@ impl CaseFiles<'_> {
         Ok(cases)
     }
 
-    /// Writes what was asked for of one case.
+    /// Writes the files of one case.
     pub fn write(
         self,
         case: usize,
@@ -107,7 +109,7 @@ fn other_directions(path: &Path, dof: u32, what: &str) -> String {
     )
 }
 
-/// Entries of a table of values by node.
+/// Reads a table of values by node.
 ///
 /// # Errors
 /// One line with file and row.

@@ -11,7 +11,7 @@ use crate::run::run_words::{describe, failure};
 /// Writes and prints the report.
 ///
 /// # Errors
-/// One line: that the report cannot be written, or why the run failed.
+/// One line: why the report cannot be written, or why the run failed.
 pub(super) fn tell(path: Option<&Path>, report: &RunReport) -> anyhow::Result<()> {
     if let Some(path) = path {
         write_json(path, report)?;

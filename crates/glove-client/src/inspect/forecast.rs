@@ -1,4 +1,4 @@
-//! Predicts memory and time of one answer on a mesh, for every element and method.
+//! Predicts memory and time of one answer on a mesh, for each element and method.
 
 use std::fmt;
 
@@ -11,63 +11,63 @@ use softgrasp_core::solve::work::Work;
 
 use crate::ask::connection::OwnMachine;
 
-/// Costs of one answer by every sensible way, held against a limit and this machine.
+/// Costs of one answer by every sensible element and method, compared with a limit and this machine.
 #[derive(Debug, Serialize)]
 pub struct Forecast {
-    /// Best first, linear elements before ten-node ones.
+    /// Forecasts, best first; linear elements come before ten-node ones.
     pub ways: Vec<WayForecast>,
-    /// What a server with this `--memory-limit` may take.
+    /// Memory that a server with this `--memory-limit` may take, bytes.
     pub memory_limit_bytes: u64,
-    /// What this machine has to spare now.
+    /// Free memory of this machine, bytes; `None` where the system does not tell.
     pub memory_available_bytes: Option<u64>,
     /// Whether times come from rates measured on this machine, or typical ones.
     pub rates: &'static str,
-    /// Threads they were measured with.
+    /// Number of threads that the rates were measured with.
     pub threads: usize,
     #[serde(skip)]
     problem: Problem,
 }
 
-/// Cost of one answer by one way.
+/// Cost of one answer by one element and method.
 #[derive(Debug, Serialize)]
 pub struct WayForecast {
-    /// Element.
+    /// Name of the element.
     pub element: &'static str,
-    /// Method.
+    /// Name of the method.
     pub method: &'static str,
-    /// Mesh, pattern and stiffness.
+    /// Memory of mesh, pattern and stiffness, bytes.
     pub model_bytes: u64,
-    /// Factor with all that waits while it is made.
+    /// Memory of the factor while it is made, bytes.
     pub factor_bytes: u64,
-    /// All of it, by the law.
+    /// Memory of all together as predicted, bytes.
     pub bytes: u64,
-    /// The least it can be.
+    /// Least memory of all together that is possible, bytes.
     pub bytes_min: u64,
-    /// The most it can be.
+    /// Largest memory of all together that is possible, bytes.
     pub bytes_max: u64,
-    /// Time of one answer.
+    /// Predicted time of one answer, ms.
     pub predicted_ms: f64,
-    /// Whether it is within the memory limit.
+    /// Whether the memory is within the server's limit.
     pub within_limit: Fit,
-    /// Whether it is within what the machine has to spare.
+    /// Whether the memory is within what the machine has free.
     pub within_machine: Fit,
     #[serde(skip)]
     need: Need,
 }
 
-/// Whether a prediction is within a bound, its uncertainty considered.
+/// Whether a prediction with its uncertainty is within a bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fit {
-    /// Even the most it can be is.
+    /// Even the largest possible value is within the bound.
     Yes,
-    /// It depends; the count, which is made before the factor, decides.
+    /// The bound lies within the uncertainty; the count before the factor decides.
     Perhaps,
-    /// Not even the least it can be is.
+    /// Even the least possible value is above the bound.
     No,
 }
 
-/// What may answer, best first within an element; condensed knows linear ones only.
+/// Elements and methods that may answer, best first for each element; `condensed` has linear ones only.
 const WAYS: [(Element, Method); 6] = [
     (Element::Tet4, Method::Front),
     (Element::Tet4, Method::FrontMixed),
@@ -76,7 +76,7 @@ const WAYS: [(Element, Method); 6] = [
     (Element::Tet10, Method::Front),
     (Element::Tet10, Method::FrontMixed),
 ];
-/// Error that a refined answer is predicted for.
+/// Relative error that a refined answer is predicted for.
 const ERROR_REL: f64 = 1e-12;
 
 impl Fit {
@@ -91,9 +91,9 @@ impl Fit {
 }
 
 impl Forecast {
-    /// Predicts for a mesh of this size.
+    /// Forecast for a mesh of this size.
     ///
-    /// Units: `memory_limit_bytes` bytes; `None` takes that of a server that was not told another.
+    /// Units: `memory_limit_bytes` bytes; `None` takes a server's default.
     pub fn new(problem: Problem, memory_limit_bytes: Option<u64>, machine: &OwnMachine) -> Self {
         let limit = memory_limit_bytes.unwrap_or(machine.usual_limit_bytes);
         let rates = machine.rates.unwrap_or(Rates::ASSUMED);
@@ -126,7 +126,7 @@ impl Forecast {
         }
     }
 
-    /// The first way that is predicted to fit limit and machine, or else the first that may.
+    /// First way that is predicted to fit limit and machine, or else the first that may fit.
     pub fn recommended(&self) -> Option<&WayForecast> {
         let there = self.memory_available_bytes.unwrap_or(u64::MAX).min(self.memory_limit_bytes);
         let may = |fit| fit != Fit::No;
@@ -135,7 +135,7 @@ impl Forecast {
         fits.or_else(|| self.ways.iter().find(is_possible))
     }
 
-    /// Why a server with this limit would refuse the mesh, if it would.
+    /// Reason for which a server with this limit would refuse the mesh, if it would.
     pub fn refusal(&self) -> Option<String> {
         if self.ways.iter().any(|way| way.within_limit != Fit::No) {
             return None;
@@ -163,7 +163,7 @@ impl Forecast {
 }
 
 impl fmt::Display for Forecast {
-    /// One line per way.
+    /// Writes one line for each way.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for way in &self.ways {
             let fits = match way.within_limit {
@@ -207,7 +207,7 @@ impl fmt::Display for Forecast {
     }
 }
 
-/// A time as a person reads it.
+/// Time in ms as text for people.
 fn duration(ms: f64) -> String {
     match ms {
         ms if ms < 1e3 => format!("{ms:.0} ms"),

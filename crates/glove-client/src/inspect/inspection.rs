@@ -16,15 +16,15 @@ use crate::ask::connection::OwnMachine;
 use crate::inspect::forecast::Forecast;
 use crate::inspect::mending_summary::MendingSummary;
 
-/// What `inspect` prints.
+/// Report that `inspect` prints.
 #[derive(Debug, Serialize)]
 pub struct Inspection {
     schema: u32,
     command: &'static str,
     file: String,
-    /// Whether it can be used within the memory limit.
+    /// Whether the mesh can be used within the memory limit.
     pub usable: bool,
-    /// Why not.
+    /// Reason for which the mesh cannot be used.
     pub refused_because: Option<String>,
     format: String,
     nodes: usize,
@@ -39,9 +39,9 @@ pub struct Inspection {
     degenerate_dropped: usize,
     repeated_dropped: usize,
     orphans: usize,
-    /// Bad elements and what mending them changes; null if there is nothing to mend.
+    /// Bad elements and what mending them changes; null if there are none.
     mending: Option<MendingSummary>,
-    /// Why no answer is right: elements that overlap; null where there are none.
+    /// Warning of elements that overlap, so that no answer is right; null if there are none.
     folded: Option<String>,
     surface_triangles: usize,
     surface_nodes: usize,
@@ -67,7 +67,7 @@ struct BoundingBox {
     high: [f64; 3],
 }
 
-/// What would be modelled, and the size of the work it predicts.
+/// Size of the system that would be solved, and its predicted costs.
 #[derive(Debug, Serialize)]
 struct Modelled {
     element: &'static str,
@@ -76,17 +76,17 @@ struct Modelled {
     stiffness_bytes: u64,
     dense_inverse_bytes: u64,
     gauss_jordan_operations: f64,
-    /// Null where nothing fits.
+    /// Recommended method; null if none fits in memory.
     recommended_method: Option<&'static str>,
 }
 
-/// Worst elements listed.
+/// Number of worst elements that are listed.
 const WORST_LISTED: usize = 5;
 
 impl Inspection {
-    /// Looks at a mesh that was read.
+    /// Inspects a mesh that was read.
     ///
-    /// Units: `memory_limit_bytes` bytes; `None` takes a server's usual one.
+    /// Units: `memory_limit_bytes` bytes; `None` takes a server's default.
     pub fn new(
         file: String,
         read: &MeshFile,
@@ -146,7 +146,7 @@ impl Inspection {
         inspection
     }
 
-    /// Sentences a user should read before trusting an answer.
+    /// Remarks that a user should read before trusting an answer.
     fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         let mut say = |when: bool, text: String| {

@@ -5,15 +5,15 @@ use std::fmt;
 use serde::Serialize;
 use softgrasp_core::mesh_io::{Mending, TetFault};
 
-/// What is put right, and how that changes the object.
+/// Bad tetrahedra and lost nodes, and how mending changes the object.
 #[derive(Debug, Serialize)]
 pub struct MendingSummary {
-    /// The first of them, ascending.
+    /// First bad tetrahedra, ascending by number.
     bad_tets: Vec<BadTetSummary>,
     bad_tet_count: usize,
     volume_in_file: f64,
     volume: f64,
-    /// The first of them, ascending.
+    /// First lost nodes, ascending by number.
     lost_nodes: Vec<u32>,
     lost_node_count: usize,
     bodies_in_file: usize,
@@ -29,19 +29,19 @@ struct BadTetSummary {
     tet: usize,
     fault: &'static str,
     action: &'static str,
-    /// As the file orders the corners.
+    /// Signed volume with the corners in the file's order, m³.
     volume: f64,
-    /// The earlier tetrahedron that it repeats.
+    /// Number of the earlier tetrahedron that this one repeats.
     repeats: Option<usize>,
 }
 
-/// Bad elements and lost nodes in the JSON; their number is told in any case.
+/// Largest number of bad elements and of lost nodes listed in the JSON; the counts are always complete.
 const LISTED_JSON: usize = 1000;
-/// Bad elements and lost nodes in the text for a person.
+/// Largest number of bad elements and of lost nodes listed in the text.
 const LISTED_TEXT: usize = 10;
 
 impl MendingSummary {
-    /// From what the reader found.
+    /// Summary of what the reader found.
     pub fn new(mending: &Mending) -> Self {
         let bad = mending.bad.iter().take(LISTED_JSON);
         Self {

@@ -1,26 +1,26 @@
-//! A mesh with its displacements and fields as the bytes of a VTU file.
+//! Encodes a mesh with its displacements and fields as a VTU file.
 
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::mesh_io::{VtuField, WriteError, write_vtu_fields};
 use softgrasp_protocol::{FieldPlace, FieldValues};
 
-/// A vector for each node that is written beside the fields of an answer.
+/// Vector field of the nodes that is written beside the fields of an answer.
 pub struct NodeVectors<'a> {
-    /// Name shown by viewers.
+    /// Name of the field, as viewers show it.
     pub name: &'a str,
-    /// Unit.
+    /// Unit of the values.
     pub unit: &'a str,
-    /// One for each node.
+    /// Vector of each node.
     pub values: &'a [[f64; 3]],
 }
 
-/// The mesh at rest with vectors of its nodes and, where there are some, the fields of an answer about
+/// VTU file of the mesh at rest with vectors of its nodes and, where given, the fields of an answer about
 /// all its nodes.
 ///
-/// Shapes: `labels` empty or one per region.
+/// Shapes: `labels` empty or one for each region.
 ///
 /// # Errors
-/// [`WriteError`] where a field is not one of this mesh.
+/// [`WriteError`] if a field does not fit the mesh.
 pub fn encode_fields(
     mesh: &TetMesh,
     labels: &[String],

@@ -5,39 +5,38 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A file that cannot be written.
+/// Why a file cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FileWriteError {
-    /// The path is a folder's.
+    /// The path names a folder.
     #[error("cannot write {path}: it is a directory")]
     Directory {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
     },
-    /// The system does not let it be written.
+    /// The operating system refuses.
     #[error("cannot write {path}: {source}")]
     System {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
 
-/// Writes a file; a reader never sees half of it, and a failure leaves an older file as it was: the bytes
-/// are written beside it, are made to lie on the disk, and take its name then. A name that is a link
-/// leads to the same file afterwards.
+/// Writes a file completely, or leaves an older file as it was: the bytes are written to a file beside
+/// it, synchronised to the disk, and renamed. A name that is a link leads to the same file afterwards.
 ///
 /// # Errors
-/// [`FileWriteError`] with the path and the system's reason.
+/// [`FileWriteError`] with the path and the error of the operating system.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), FileWriteError> {
     write_file_by(path, |file| file.write_all(bytes))
 }
 
-/// Writes a file that need not be in memory as a whole: `write` writes it piece by piece.
+/// Writes a file whose bytes need not be in memory as a whole: `write` writes them piece by piece.
 ///
 /// # Errors
-/// As [`write_file`].
+/// The same as those of [`write_file`].
 pub fn write_file_by(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -63,7 +62,7 @@ pub fn write_file_by(
     written.map_err(system)
 }
 
-/// A name beside a file that no other writer uses, in this process or another.
+/// Path beside a file that no other writer uses, in this process or another.
 fn beside(path: &Path) -> PathBuf {
     static WRITTEN: AtomicU64 = AtomicU64::new(0);
     let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
@@ -72,7 +71,7 @@ fn beside(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Writes the bytes so that they lie on the disk, with the permissions of the file they are to replace.
+/// Writes the bytes and synchronises them to the disk, with the permissions of the file to be replaced.
 fn write_and_sync(
     part: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -95,7 +94,7 @@ fn buffered(
     pieces.flush()
 }
 
-/// Makes a new name in a folder lie on the disk as well.
+/// Synchronises a new name in a folder to the disk.
 fn sync_folder(path: &Path) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,

@@ -1,5 +1,5 @@
-//! Makes an object ready for the hand: mesh, sphere tree, and a plan to grasp it; beside everything
-//! else where that is wanted, with its progress to be seen.
+//! Makes an object ready for the hand: mesh, sphere tree, and a plan to grasp it; where wanted in the
+//! background, with its progress shown.
 
 use std::sync::Arc;
 
@@ -10,46 +10,47 @@ use softgrasp_hand::scripted::{NoGrasp, PlanRequest};
 
 use crate::object::scene::{SceneError, SceneObject, load_object};
 
-/// Which object is wanted, and the hand that is to grasp it.
+/// Object that is wanted, and the hand that is to grasp it.
 #[derive(Clone)]
 pub struct ObjectRequest {
-    /// The object.
+    /// Built-in object or file.
     pub choice: ObjectChoice,
-    /// Nodes of a built-in object.
+    /// Number of nodes of a built-in object.
     pub nodes: usize,
-    /// Longest extent, m; `None` where the hand may choose it.
+    /// Longest extent of the object, m; `None` where the hand may choose it.
     pub size_m: Option<f64>,
-    /// The hand.
+    /// Dimensions and devices of the hand.
     pub setup: HandSetup,
-    /// What its fingertips hold.
+    /// What a fingertip holds: a node, a patch or a mask.
     pub contact: ContactModel,
 }
 
 /// Why there is no object.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// No mesh.
+    /// The object cannot be read or generated.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A mesh that cannot be touched.
+    /// The mesh is none that can be touched.
     #[error(transparent)]
     Object(#[from] ObjectError),
 }
 
-/// Factor by which an imported object grows while the hand finds no grip, and where it ends, m.
+/// Factor by which an imported object is enlarged while the hand finds no grip, and the largest extent,
+/// m.
 const ENLARGE: f64 = 1.25;
 const ENLARGED_MAX_M: f64 = 0.2;
 
-/// An object that is turned by less than this lies as it was, rad.
+/// Rotation below which an object counts as not rotated, rad.
 const TURN_WORTH_SAYING: f64 = 1e-3;
 
-/// Makes an object ready; says at which stage it is, and asks whether to go on: a caller who does
-/// not want it any more gets `None` soon.
+/// Makes an object ready. `goes_on` is told each stage and returns whether to go on; if it does not, the
+/// result is `None`.
 ///
 /// An imported object whose size was not asked for is enlarged until the hand finds a grip.
 ///
 /// # Errors
-/// [`LoadError`].
+/// [`LoadError`] if there is no object.
 pub fn load(
     request: &ObjectRequest,
     mut goes_on: impl FnMut(LoadStage) -> bool,

@@ -1,4 +1,4 @@
-//! Mesh files: read from disk with those beside them, and written in the format that the extension names.
+//! Mesh files: read with the files beside them, and written in the format that the extension names.
 
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
@@ -15,33 +15,33 @@ use softgrasp_core::surface::SurfaceError;
 /// Why a mesh file gives no mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileReadError {
-    /// The system does not let the file be read.
+    /// The file cannot be read.
     #[error("cannot read {path}: {source}")]
     Read {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Its content is no usable mesh; the message names the file.
+    /// The content of the file is no usable mesh; the message names the file.
     #[error(transparent)]
     Parse(#[from] MeshFileError),
-    /// Its surface cannot be filled.
+    /// The surface in the file cannot be filled.
     #[error("{path}: {source}")]
     Fill {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
-        /// Why not.
+        /// Why the surface cannot be filled.
         source: FillError,
     },
-    /// Its surface cannot be scaled.
+    /// The surface in the file cannot be scaled.
     #[error("{path} cannot be scaled by {scale}: {source}")]
     Scale {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
-        /// The factor.
+        /// Factor of the scaling.
         scale: f64,
-        /// What broke.
+        /// Why the scaled surface is none.
         source: SurfaceError,
     },
 }
@@ -61,12 +61,12 @@ pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshFileReadError> {
     std::fs::read(path).map_err(|source| MeshFileReadError::Read { path: path.to_owned(), source })
 }
 
-/// Bytes of a file that another one names, from the first place where there is one.
+/// Bytes of a file that another one names, from the first path where it exists.
 pub(super) fn read_companion(path: &Path, wanted: &Companion) -> Option<Vec<u8>> {
     companion_paths(path, wanted).into_iter().find_map(|path| std::fs::read(path).ok())
 }
 
-/// Where a file that another one names is looked for, the first place first.
+/// Paths at which a file that another one names is looked for, in this order.
 fn companion_paths(path: &Path, wanted: &Companion) -> Vec<PathBuf> {
     match wanted {
         Companion::Extension(extension) => {
@@ -93,33 +93,33 @@ fn companion_paths(path: &Path, wanted: &Companion) -> Vec<PathBuf> {
     }
 }
 
-/// A mesh that cannot be written in the format asked for.
+/// Why a mesh cannot be written in the format asked for.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeMeshError {
-    /// The extension names no format.
+    /// The extension of the file names no format.
     #[error(
         "{path}: the extension names no format to write; use .msh (Gmsh 4.1), .vtu or .txt (the \
          three lists of the thesis)"
     )]
     Extension {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
     },
-    /// The VTU file.
+    /// The VTU file cannot be encoded.
     #[error("cannot form the VTU file: {0}")]
     Vtu(#[source] WriteError),
-    /// The three lists.
+    /// The three lists cannot be encoded.
     #[error(transparent)]
     Lists(#[from] WriteError),
 }
 
-/// A mesh in the format that the file's extension names. Only VTU holds fields; the other formats
+/// Encodes a mesh in the format that the file's extension names. Only VTU holds fields; the other formats
 /// leave them out.
 ///
-/// Shapes: `labels` empty or one per region; each field one vector per node.
+/// Shapes: `labels` empty or one for each region; each field one vector for each node.
 ///
 /// # Errors
-/// [`EncodeMeshError`].
+/// [`EncodeMeshError`] for another extension, or fields that do not fit the mesh.
 pub fn encode_mesh(
     path: &Path,
     mesh: &TetMesh,

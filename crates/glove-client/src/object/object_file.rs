@@ -1,4 +1,4 @@
-//! An object's file: a mesh is read, a surface is filled.
+//! Object files: a mesh is read, a surface is filled with tetrahedra.
 
 use std::path::Path;
 
@@ -11,31 +11,31 @@ use softgrasp_core::surface::TriangleSurface;
 
 use crate::object::mesh_file::{MeshFileReadError, read_bytes, read_companion, read_mesh_file};
 
-/// What an object's file gave.
+/// Content of an object's file.
 #[derive(Debug)]
 pub enum ObjectFile {
-    /// Tetrahedra, read.
+    /// Mesh of tetrahedra, as read.
     Mesh(Box<MeshFile>),
-    /// A surface, filled.
+    /// Surface, filled with tetrahedra.
     Surface(Box<FilledSurface>),
 }
 
-/// A surface and what fills it.
+/// Surface, and the tetrahedra that fill it.
 #[derive(Debug)]
 pub struct FilledSurface {
-    /// How the surface was written.
+    /// Format of the surface file.
     pub format: SurfaceFormat,
     /// Extent of the surface along each axis, m.
     pub extent: Vector3<f64>,
-    /// Mesh and errors, m.
+    /// Mesh that fills the surface, and its distance from it, m.
     pub filled: Filled,
-    /// Sentences about the file.
+    /// Remarks about the file, in sentences.
     pub notes: Vec<String>,
 }
 
-/// Extent above which a surface is hardly one of a thing for the hand, m.
+/// Extent above which an object is hardly meant for the hand, m.
 const LARGE_M: f64 = 2.0;
-/// And below which.
+/// Extent below which an object is hardly meant for the hand, m.
 const SMALL_M: f64 = 0.002;
 
 /// Reads a mesh, or fills a surface with about `nodes` nodes; the format is found by content.
@@ -50,10 +50,10 @@ pub fn read_object_file(path: &Path, nodes: usize) -> Result<ObjectFile, MeshFil
     Ok(ObjectFile::Surface(Box::new(filled)))
 }
 
-/// Whether a file holds a surface and not a mesh.
+/// Whether a file contains a surface and not a mesh.
 ///
 /// # Errors
-/// A file that cannot be read.
+/// [`MeshFileReadError`] for a file that cannot be read.
 pub fn holds_surface(path: &Path) -> Result<bool, MeshFileReadError> {
     Ok(surface_format(&read_bytes(path)?).is_some())
 }
@@ -90,7 +90,7 @@ impl FilledSurface {
         Ok(Self { format, extent: high - low, filled, notes })
     }
 
-    /// One line: what was filled, and how near it is.
+    /// One line that tells what was filled and how near the mesh is to the surface.
     pub fn told(&self, path: &Path) -> String {
         let filled = &self.filled;
         format!(
@@ -105,7 +105,7 @@ impl FilledSurface {
         )
     }
 
-    /// What was wrong with the surface, a sentence each.
+    /// Faults of the surface, one sentence each.
     pub fn faults(&self) -> Vec<String> {
         let mending = &self.filled.mending;
         let mut said = self.notes.clone();
@@ -150,7 +150,7 @@ impl FilledSurface {
         said
     }
 
-    /// What to do where the extent is hardly that of a thing for the hand in metres.
+    /// Advice where the extent in metres is hardly that of an object for the hand.
     pub fn doubtful_unit(&self) -> Option<String> {
         let longest = self.extent.max();
         let advice = match longest {

@@ -14,15 +14,15 @@ use crate::ask::prefetch::{Hint, NearContact};
 use crate::object::saving::ShapeToSave;
 use crate::pace::Pace;
 
-/// A piece of work.
+/// Work on the object.
 pub enum ObjectJob {
     /// Make a deformed shape the next rest shape: check it, rebuild the tree, form the model.
     Keep {
-        /// The rest shape so far.
+        /// Present rest shape.
         rest: Arc<RestShape>,
-        /// Every vertex of the shape to keep, m.
+        /// Every vertex of the shape to keep, m, in the object's frame.
         vertices: Vec<Point3<f64>>,
-        /// How many rest shapes there have been.
+        /// Number of rest shapes so far.
         rest_shapes: u64,
         /// Material of the model.
         material: Material,
@@ -31,9 +31,9 @@ pub enum ObjectJob {
     },
     /// Make an object with another rest shape, and form its model.
     Replace {
-        /// The rest shape.
+        /// Rest shape of the new object.
         rest: Arc<RestShape>,
-        /// How many rest shapes there will have been.
+        /// Number of rest shapes, the new one included.
         rest_shapes: u64,
         /// Material of the model.
         material: Material,
@@ -42,13 +42,13 @@ pub enum ObjectJob {
     },
     /// Write a shape to a file.
     Save(ShapeToSave),
-    /// Work out what the server is asked to prepare.
+    /// Compute the hint that tells the server which columns to prepare.
     Prefetch {
-        /// The rest shape that the contacts are on.
+        /// Rest shape that the contacts are on.
         rest: Arc<RestShape>,
-        /// How many rest shapes there have been.
+        /// Number of rest shapes so far.
         rest_shapes: u64,
-        /// What a fingertip holds.
+        /// What a fingertip holds: a node, a patch or a mask.
         model: ContactModel,
         /// Radius of each fingertip, m.
         tip_radii: [f64; 5],
@@ -57,28 +57,28 @@ pub enum ObjectJob {
     },
 }
 
-/// What has come of it.
+/// Outcome of a job.
 pub enum ObjectDone {
-    /// The object with its next rest shape, and the model of it; or why it cannot be kept.
+    /// Object with its next rest shape and the model of it, or the reason why it cannot be kept.
     Kept(Result<Box<KeptShape>, ObjectError>),
-    /// The object that takes the place of the one so far, and its model.
+    /// Object that replaces the present one, and its model.
     Replacement(Box<KeptShape>),
-    /// What was written, or why nothing was; a sentence.
+    /// Sentence that tells what was written, or why nothing was.
     Saved(Result<String, String>),
-    /// What the server is asked to prepare for a rest shape.
+    /// Hint for the server, and the rest shape that it belongs to.
     Prefetch {
-        /// How many rest shapes there had been.
+        /// Number of rest shapes when the job began.
         rest_shapes: u64,
-        /// What to prepare.
+        /// Contacts whose columns the server is to prepare.
         hint: Hint,
     },
 }
 
 /// An object with its next rest shape.
 pub struct KeptShape {
-    /// The object, at rest.
+    /// Object at rest.
     pub object: SoftObject,
-    /// Its model.
+    /// Model of the rest shape.
     pub model: ModelUpload,
 }
 
@@ -107,19 +107,19 @@ impl ObjectJob {
     }
 }
 
-/// Does the work: beside the ticks in real time; at once, while the tick waits, in lockstep.
+/// Does jobs: in the background in real time; at once, while the tick waits, in lockstep.
 pub enum ObjectWork {
-    /// At once; what was done and has not been taken yet.
+    /// Jobs are done at once; outcomes that have not been taken yet.
     AtOnce(VecDeque<ObjectDone>),
-    /// On a thread of its own.
+    /// Jobs are done on a thread of its own.
     Beside(Beside<ObjectJob, ObjectDone>),
 }
 
 impl ObjectWork {
-    /// The way that fits the pace.
+    /// Worker that fits the pace.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// Error of the operating system if it starts no thread.
     pub fn start(pace: Pace) -> std::io::Result<Self> {
         Ok(match pace {
             Pace::Lockstep => Self::AtOnce(VecDeque::new()),
@@ -135,8 +135,8 @@ impl ObjectWork {
         }
     }
 
-    /// The next piece of work that is done, in the order it was handed over, if it is to be taken now;
-    /// else it stays the next. Never waits. Work beside the ticks is always taken.
+    /// Takes the next outcome, in the order of the jobs, if `is_due` accepts it; otherwise it stays the
+    /// next. Never waits. Outcomes of background work are always taken.
     pub fn take_if(&mut self, is_due: impl FnOnce(&ObjectDone) -> bool) -> Option<ObjectDone> {
         match self {
             Self::AtOnce(done) if done.front().is_some_and(is_due) => done.pop_front(),
@@ -145,14 +145,14 @@ impl ObjectWork {
         }
     }
 
-    /// Waits until all work that was handed over is done; the outcomes are still to be taken.
+    /// Waits until all jobs are done; their outcomes are still to be taken.
     pub fn settle(&mut self) {
         if let Self::Beside(beside) = self {
             beside.settle();
         }
     }
 
-    /// Whether work was handed over whose outcome has not been taken.
+    /// Whether there are jobs whose outcome has not been taken.
     pub fn is_busy(&self) -> bool {
         match self {
             Self::AtOnce(done) => !done.is_empty(),

@@ -1,4 +1,4 @@
-//! Writes the object as it is, deformed or not, to a file of any format that can be written.
+//! Writes the object in its present shape to a file of any format that can be written.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,52 +11,52 @@ use softgrasp_grasp::object::RestShape;
 use crate::object::file_writing::{FileWriteError, write_file};
 use crate::object::mesh_file::{EncodeMeshError, encode_mesh};
 
-/// A shape that is to be saved.
+/// Shape that is to be written.
 ///
 /// Shapes: `vertices` and `displacement` one per node. Units: m. Frame: the object's own.
 pub struct ShapeToSave {
-    /// The file; its extension names the format.
+    /// Path of the file; its extension names the format.
     pub path: PathBuf,
-    /// The shape that the displacement counts from.
+    /// Rest shape from which the displacement counts.
     pub rest: Arc<RestShape>,
-    /// Every vertex as it is now.
+    /// Present position of every vertex.
     pub vertices: Vec<Point3<f64>>,
-    /// How each came there; a VTU file holds it as `displacement`.
+    /// Displacement of every vertex; a VTU file contains it as `displacement`.
     pub displacement: Vec<[f64; 3]>,
 }
 
-/// A shape that is not saved.
+/// Why a shape is not saved.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     /// Elements are turned inside out; no program could use such a mesh.
     #[error("cannot save {path}: {inversion}; open the hand a little and save it then")]
     Inverted {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
-        /// How far.
+        /// Number of inverted elements, and how far they are.
         inversion: Inversion,
     },
     /// The vertices make no mesh.
     #[error("cannot save {path}: {source}")]
     Shape {
-        /// As given.
+        /// Path as it was given.
         path: PathBuf,
-        /// Why not.
+        /// Fault of the mesh.
         source: MeshError,
     },
-    /// The format.
+    /// The mesh cannot be encoded in the file's format.
     #[error("cannot save {0}")]
     Encode(#[from] EncodeMeshError),
-    /// The file.
+    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] FileWriteError),
 }
 
 impl ShapeToSave {
-    /// Writes the file; returns what there is to tell.
+    /// Writes the file; returns the sentence for the person.
     ///
     /// # Errors
-    /// [`SaveError`]; an older file stays as it was.
+    /// [`SaveError`]; an older file then stays as it was.
     pub fn save(&self) -> Result<String, SaveError> {
         let path = &self.path;
         if let Some(inversion) = Inversion::of(self.rest.mesh(), &self.vertices) {

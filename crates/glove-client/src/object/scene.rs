@@ -11,34 +11,34 @@ use softgrasp_grasp::object::ObjectChoice;
 use crate::object::mesh_file::MeshFileReadError;
 use crate::object::object_file::{ObjectFile, read_object_file};
 
-/// A scene; every field can also be set by a flag, which wins.
+/// Content of a scene file; every field can also be set by a flag, which wins.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneFile {
     /// cube, sphere, strawberry, toothpaste, or a file of a mesh or a surface (relative to the scene
     /// file).
     pub object: Option<String>,
-    /// Nodes of a built-in object or of a surface that is filled.
+    /// Number of nodes of a built-in object, or of a surface that is filled.
     pub nodes: Option<usize>,
-    /// Longest extent, m; a mesh file is scaled to it.
+    /// Longest extent of the object, m; a mesh file is scaled to it.
     pub object_size_m: Option<f64>,
     /// Young's modulus, Pa.
     pub young_pa: Option<f64>,
     /// Poisson's ratio.
     pub poisson: Option<f64>,
-    /// Method's name, or auto.
+    /// Name of the solution method, or `auto`.
     pub method: Option<String>,
-    /// t4, t4-anp or auto.
+    /// Name of the element: t4, t4-anp or auto.
     pub element: Option<String>,
-    /// vertex, patch or mask.
+    /// What a fingertip holds: vertex, patch or mask.
     pub contact: Option<String>,
-    /// contact (with friction and weight) or thesis.
+    /// How the hand grasps: contact (with friction and weight) or thesis.
     pub grasp: Option<String>,
     /// Coefficient of friction of hand and table.
     pub friction: Option<f64>,
     /// Density, kg/m³.
     pub density_kg_m3: Option<f64>,
-    /// linear, large or auto.
+    /// Equations of the deformation: linear, large or auto.
     pub deformation: Option<String>,
     /// Law of large deformation: neo-hookean or neo-hookean-log.
     pub material: Option<String>,
@@ -46,26 +46,26 @@ pub struct SceneFile {
     pub yield_pa: Option<f64>,
 }
 
-/// Why there is no scene.
+/// Why a scene or its object cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The scene file cannot be read.
     #[error("cannot read the scene {path}: {source}")]
     Read {
-        /// The file.
+        /// Path of the scene file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The scene file makes no sense.
+    /// The scene file is no valid scene.
     #[error("{path}: {source}")]
     Parse {
-        /// The file.
+        /// Path of the scene file.
         path: PathBuf,
-        /// With line and column.
+        /// Error of the TOML reader, with line and column.
         source: Box<toml::de::Error>,
     },
-    /// The object's file.
+    /// The object's file cannot be used.
     #[error(transparent)]
     Mesh(#[from] MeshFileReadError),
     /// The object cannot be generated.
@@ -74,34 +74,34 @@ pub enum SceneError {
     /// The object cannot be scaled.
     #[error("the object cannot be scaled to {size_m} m: {source}")]
     Scale {
-        /// Size asked for.
+        /// Size that was asked for, m.
         size_m: f64,
-        /// What broke.
+        /// Fault of the scaled mesh.
         source: MeshError,
     },
-    /// A size that is no length.
+    /// The size is no length.
     #[error("--object-size is {size_m} m; it must be a finite number above 0")]
     Size {
-        /// Size asked for.
+        /// Size that was asked for, m.
         size_m: f64,
     },
 }
 
 /// Extent of an imported object that fits the hand, m.
 pub const IMPORTED_SIZE_M: f64 = 0.08;
-/// Nodes of a built-in object unless told otherwise.
+/// Number of nodes of a built-in object by default.
 pub const NODES_DEFAULT: usize = 1000;
 
 impl SceneFile {
-    /// Reads the text of a scene; a mesh file in it is as it is written there.
+    /// Reads the text of a scene; the path of a mesh file stays as it is written.
     ///
     /// # Errors
-    /// The fault with line and column.
+    /// Fault of the text, with line and column.
     pub fn of_text(text: &str) -> Result<Self, toml::de::Error> {
         toml::from_str(text)
     }
 
-    /// Reads a scene; a mesh file in it is taken relative to the scene's folder.
+    /// Reads a scene file; the path of a mesh file counts from the scene's folder.
     ///
     /// # Errors
     /// [`SceneError`] with the path and, for a fault inside, line and column.
@@ -120,8 +120,8 @@ impl SceneFile {
     }
 }
 
-/// Longest extent of a built-in object that the hand grips best, m, where that is not its own: round
-/// a small strawberry the thumb comes to lie beside the fingers and not before them.
+/// Longest extent of a built-in object that the hand grips best, m, if that is not its own: around a
+/// small strawberry the thumb would close beside the fingers and not opposite to them.
 pub fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
     match object {
         ObjectChoice::BuiltIn(BuiltIn::Strawberry) => Some(0.08),
@@ -129,19 +129,19 @@ pub fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
     }
 }
 
-/// An object ready for the hand, and what was done to make it so.
+/// Object ready for the hand, and remarks on how it was made.
 #[derive(Debug)]
 pub struct SceneObject {
-    /// In m, centred at the origin.
+    /// Mesh of the object, m, centred at the origin.
     pub mesh: TetMesh,
-    /// Sentences for the user.
+    /// Remarks for the user, in sentences.
     pub notes: Vec<String>,
 }
 
 /// Makes or reads the object and brings it to the hand's size.
 ///
 /// # Errors
-/// [`SceneError`].
+/// [`SceneError`] if the object cannot be made, read or scaled.
 pub fn load_object(
     choice: &ObjectChoice,
     nodes: usize,
@@ -174,7 +174,7 @@ pub fn load_object(
     Ok(SceneObject { mesh, notes })
 }
 
-/// The largest piece of a mesh file, with what is to be said of the file.
+/// Largest piece of a mesh file; adds the remarks on the file to `notes`.
 fn read_mesh(path: &Path, file: &MeshFile, notes: &mut Vec<String>) -> TetMesh {
     let findings = &file.findings;
     notes.push(format!(
@@ -204,8 +204,8 @@ fn scaled_and_centred(mesh: &TetMesh, factor: f64) -> Result<TetMesh, MeshError>
     mesh.with_vertices(mesh.vertices().iter().map(moved).collect())
 }
 
-/// A hand holds one body; of several, and of pieces that hang together by an edge or a node only,
-/// the largest is taken. Nodes without elements go too: nothing could be grasped at them.
+/// Largest piece of a mesh, because a hand holds one body. Bodies, and pieces joined by an edge or a node
+/// only, are left out, and so are nodes without elements.
 fn largest_piece(mesh: &TetMesh, notes: &mut Vec<String>) -> TetMesh {
     let bodies = Bodies::from_mesh(mesh);
     let largest = bodies

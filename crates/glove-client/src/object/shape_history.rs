@@ -1,4 +1,4 @@
-//! The rest shapes that an object had before the one it has, so that keeping a shape can be undone.
+//! Earlier rest shapes of an object, so that keeping a shape can be undone.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,11 +11,11 @@ pub struct ShapeHistory {
     earlier: VecDeque<Arc<RestShape>>,
 }
 
-/// Keeping a shape can be undone so many times; the oldest shapes go.
+/// Largest number of earlier shapes; the oldest are dropped.
 pub const UNDO_MAX: usize = 20;
 
 impl ShapeHistory {
-    /// A shape has given way to a kept one.
+    /// Adds a rest shape that a kept one has replaced.
     pub fn push(&mut self, rest: Arc<RestShape>) {
         if self.earlier.len() == UNDO_MAX {
             self.earlier.pop_front();
@@ -23,27 +23,27 @@ impl ShapeHistory {
         self.earlier.push_back(rest);
     }
 
-    /// The shape before the one there is.
+    /// The rest shape before the present one.
     pub fn last(&self) -> Option<&Arc<RestShape>> {
         self.earlier.back()
     }
 
-    /// The first shape that is still known.
+    /// The oldest rest shape that is still known.
     pub fn first(&self) -> Option<&Arc<RestShape>> {
         self.earlier.front()
     }
 
-    /// The shape before has become the one there is.
+    /// Removes the latest shape, because it is the present one again.
     pub fn pop(&mut self) {
         self.earlier.pop_back();
     }
 
-    /// Another object has no earlier shapes.
+    /// Forgets all shapes, because the object is another one.
     pub fn clear(&mut self) {
         self.earlier.clear();
     }
 
-    /// How many times keeping can be undone.
+    /// Number of times that keeping a shape can be undone.
     pub fn len(&self) -> usize {
         self.earlier.len()
     }

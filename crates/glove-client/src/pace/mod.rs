@@ -1,4 +1,4 @@
-//! Keeping step: which tick is due, a clock that can stand, how long a tick may compute.
+//! Timing of ticks: which tick is due, a clock that can be stopped, and the time that a tick may compute.
 
 pub mod run_clock;
 mod schedule;

@@ -1,12 +1,12 @@
-//! The clock of a run: it stands while the run is paused, so that nothing is late afterwards.
+//! Clock of a run: it is stopped while the run is paused, so that no tick is late afterwards.
 
 use std::time::{Duration, Instant};
 
-/// Time since the first tick was due, without pauses. Its owner says what time it is.
+/// Time since the first tick was due, without pauses. The caller passes the present time.
 #[derive(Clone, Copy, Debug)]
 pub struct RunClock {
     start: Instant,
-    /// The time at which it stands.
+    /// Time that the clock shows while it is stopped.
     stands_at: Option<Duration>,
 }
 
@@ -16,27 +16,27 @@ impl RunClock {
         Self { start: now, stands_at: None }
     }
 
-    /// What it shows.
+    /// Time that the clock shows.
     pub fn at(&self, now: Instant) -> Duration {
         self.stands_at.unwrap_or_else(|| now.saturating_duration_since(self.start))
     }
 
-    /// The moment at which it will show a time, if it goes on.
+    /// Moment at which the clock will show a time, if it is not stopped.
     pub fn moment_of(&self, at: Duration) -> Instant {
         self.start + at
     }
 
-    /// Stops it, at this time if it is later.
+    /// Stops the clock, at the time `at_most` if it shows more.
     pub fn stop(&mut self, now: Instant, at_most: Duration) {
         self.stands_at = Some(self.at(now).min(at_most));
     }
 
-    /// Sets a clock that stands forward to a time.
+    /// Sets a stopped clock forward to a time.
     pub fn set_forward(&mut self, at: Duration) {
         self.stands_at = self.stands_at.map(|stands_at| stands_at.max(at));
     }
 
-    /// Lets it go on.
+    /// Starts a stopped clock again.
     pub fn go_on(&mut self, now: Instant) {
         if let Some(at) = self.stands_at.take() {
             // A run cannot be older than the machine's own clock.

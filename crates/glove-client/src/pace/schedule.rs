@@ -1,4 +1,4 @@
-//! Keeping a schedule: which tick is due, waiting for the next one, and the right to run first.
+//! Schedule of ticks: which one is due, waiting for the next, and real-time scheduling of the thread.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ pub enum Pace {
 }
 
 impl Pace {
-    /// Its name in reports.
+    /// Name of the pace in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Free => "free",
@@ -21,12 +21,12 @@ impl Pace {
     }
 }
 
-/// The tick that is due, and how many before it were missed.
+/// The tick that is due, and the number of those that were missed before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Due {
     /// Number of the tick, from 0.
     pub tick: u64,
-    /// Ticks since the last one that was played whose time is over: they are never played.
+    /// Number of ticks since the last played one whose time is over; they are never played.
     pub skipped: u64,
 }
 
@@ -34,20 +34,20 @@ pub struct Due {
 #[derive(Clone, Debug)]
 pub struct Schedule {
     period: Duration,
-    /// First tick that was neither played nor skipped.
+    /// Number of the first tick that was neither played nor skipped.
     next: u64,
 }
 
 impl Schedule {
-    /// A schedule whose first tick is due at the start.
+    /// Schedule whose first tick is due at the start.
     ///
-    /// A period of nothing would make every tick late; the shortest is a nanosecond.
+    /// A period of zero would make every tick late; the shortest is a nanosecond.
     pub fn new(period: Duration) -> Self {
         Self { period: period.max(Duration::from_nanos(1)), next: 0 }
     }
 
-    /// The tick to play at a moment, counted from the start: the newest whose time has come. Those
-    /// before it that were not played are skipped.
+    /// The tick to play at a moment, counted from the start: the newest whose time has come. Earlier ones
+    /// that were not played are skipped.
     pub fn due(&mut self, elapsed: Duration) -> Due {
         let now = (elapsed.as_nanos() / self.period.as_nanos()) as u64;
         // A thread that wakes a moment too early plays the tick it was woken for.
@@ -63,11 +63,11 @@ impl Schedule {
     }
 }
 
-/// Before its moment a thread is awake for so long: as late as it is usually woken.
+/// Time before a moment for which a thread stays awake: it is usually woken as late as this.
 const AWAKE: Duration = Duration::from_micros(150);
 
-/// Asks that the calling thread be run as soon as it has something to do; says whether it is. It
-/// must start no thread afterwards, and rest most of the time.
+/// Asks for real-time scheduling of the calling thread; returns whether it was granted. The thread must
+/// start no other thread afterwards, and sleep most of the time.
 pub fn be_urgent() -> bool {
     let asked = softgrasp_os::be_urgent();
     if let Err(error) = &asked {

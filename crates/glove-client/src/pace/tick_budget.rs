@@ -1,25 +1,25 @@
-//! The millisecond that a thread with real-time priority may compute for at a time.
+//! Budget of a millisecond for which a thread with real-time priority may compute at a time.
 
 use std::time::{Duration, Instant};
 
 use crate::pace::be_urgent;
 
-/// How a thread is scheduled that a tick passes through.
+/// Scheduling of a thread that takes part in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Priority {
-    /// Like any other thread.
+    /// Scheduled like any other thread.
     Ordinary,
-    /// Before the others, where the system allows it, for pieces of work of a millisecond at most.
+    /// Scheduled before others, if the system allows it, for pieces of work of at most a millisecond.
     RealTime,
 }
 
-/// Measures the pieces of work of the calling thread, and takes its real-time priority away when
-/// they are too long to be fair to other threads.
+/// Measures the pieces of work of the calling thread, and takes its real-time priority away if they are
+/// too long for the other threads.
 ///
 /// Invariant: never `urgent` again once [`LONG_IN_A_ROW_MAX`] pieces in a row were over [`LIMIT`].
 #[derive(Debug)]
 pub struct TickBudget {
-    /// What the thread may ask for.
+    /// Priority that the thread may ask for.
     priority: Priority,
     urgent: bool,
     began: Option<Moment>,
@@ -28,26 +28,26 @@ pub struct TickBudget {
     longest: Duration,
 }
 
-/// A moment on the clock of the thread's own computing; on the wall's where the system has none.
+/// Moment on the clock of the thread's computing time; on the wall clock where the system has none.
 #[derive(Clone, Copy, Debug)]
 enum Moment {
     Computed(Duration),
     Wall(Instant),
 }
 
-/// A thread with real-time priority computes no longer than this at a time.
+/// Longest time for which a thread with real-time priority may compute at a time.
 pub const LIMIT: Duration = Duration::from_millis(1);
-/// One long piece may be a page that was not in memory; so many in a row are the work itself.
+/// Number of long pieces in a row after which the priority is given back; one may be a page fault.
 const LONG_IN_A_ROW_MAX: u32 = 3;
 
 impl TickBudget {
-    /// A budget for the calling thread, which stays ordinary until its first piece of work.
+    /// Budget of the calling thread, which stays ordinary until its first piece of work.
     pub const fn new(priority: Priority) -> Self {
         let (in_a_row, over, longest) = (0, 0, Duration::ZERO);
         Self { priority, urgent: false, began: None, in_a_row, over, longest }
     }
 
-    /// A piece of work begins, with real-time priority where that is wanted and allowed.
+    /// Begins a piece of work, with real-time priority if it is wanted and allowed.
     pub fn begin(&mut self) {
         if self.priority == Priority::RealTime && !self.urgent {
             self.urgent = be_urgent();
@@ -58,7 +58,7 @@ impl TickBudget {
         self.began = Some(Moment::now());
     }
 
-    /// What follows may take long: until the next piece the thread is an ordinary one.
+    /// Makes the thread ordinary until the next piece of work, because what follows may take long.
     pub fn step_back(&mut self) {
         if self.urgent {
             softgrasp_os::be_ordinary();
@@ -66,7 +66,7 @@ impl TickBudget {
         }
     }
 
-    /// The piece of work is over; returns how long it was.
+    /// Ends the piece of work; returns its computing time.
     pub fn end(&mut self) -> Duration {
         let computed = self.began.take().map_or(Duration::ZERO, Moment::elapsed);
         self.add(computed);
@@ -88,17 +88,17 @@ impl TickBudget {
         }
     }
 
-    /// What the thread may still ask for.
+    /// Priority that the thread may still ask for.
     pub fn priority(&self) -> Priority {
         self.priority
     }
 
-    /// Pieces over the limit so far.
+    /// Number of pieces that were over the limit.
     pub fn over(&self) -> u64 {
         self.over
     }
 
-    /// Longest piece so far.
+    /// Computing time of the longest piece.
     pub fn longest(&self) -> Duration {
         self.longest
     }

@@ -14,112 +14,112 @@ use super::way::{Way, WayError};
 use crate::object::mesh_file::{MeshFileReadError, read_mesh_file};
 use crate::object::object_file::{holds_surface, read_surface_file};
 
-/// A rigid body of the file.
+/// Rigid body of the file.
 #[derive(Clone, Debug)]
 pub struct PressBody {
-    /// Its name, which the report uses.
+    /// Name of the body in the report.
     pub name: String,
-    /// Its shape.
+    /// Shape of the body.
     pub shape: RigidShape,
-    /// Its shape as it travels on the wire.
+    /// Shape of the body on the wire.
     pub on_the_wire: BodyShape,
-    /// Friction of this body; `None` takes that of all.
+    /// Coefficient of friction of this body; `None` takes the common one.
     pub friction: Option<f64>,
-    /// How far it gives way to a force, m/N.
+    /// Displacement of the body for each unit of force on it, m/N.
     pub compliance: f64,
-    /// Where it is when.
+    /// Motion of the body: its poses by time.
     pub way: Way,
 }
 
-/// All bodies, and how long they are followed.
+/// All bodies, and the time until which they are followed.
 #[derive(Clone, Debug)]
 pub struct PressBodies {
     /// The bodies, in the order of the file.
     pub bodies: Vec<PressBody>,
-    /// When the press ends, s.
+    /// Time at which the press ends, s.
     pub end: f64,
 }
 
-/// Why there are no bodies.
+/// Why a file of bodies cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum BodiesError {
     /// The file cannot be read.
     #[error("cannot read {path}: {source}")]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file makes no sense.
+    /// The file is no valid description of bodies.
     #[error("{path}: {source}")]
     Parse {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// With line and column.
+        /// Error of the TOML reader, with line and column.
         source: Box<toml::de::Error>,
     },
-    /// No body.
+    /// The file contains no body.
     #[error("{path} has no [[body]]")]
     Empty {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A time that is none.
+    /// The end of the press is no positive time.
     #[error("{path}: end is {end} s; it must be above 0")]
     End {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// As given.
+        /// End as it was given, s.
         end: f64,
     },
-    /// A body that is none.
+    /// A body of the file is invalid.
     #[error("{path}: body {name:?}: {reason}")]
     Body {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its name.
+        /// Name of the body.
         name: String,
-        /// What is wrong.
+        /// Fault of the body.
         reason: Box<BodyError>,
     },
 }
 
-/// What is wrong with one body.
+/// Fault of one body.
 #[derive(Debug, thiserror::Error)]
 pub enum BodyError {
-    /// A name given twice.
+    /// Another body has the same name.
     #[error("another body has the same name")]
     Name,
-    /// A size that its shape needs.
+    /// A size that the shape needs is missing.
     #[error("{shape} needs {what}")]
     Missing {
-        /// The shape.
+        /// Name of the shape.
         shape: &'static str,
-        /// The field.
+        /// Name of the missing field.
         what: &'static str,
     },
-    /// A shape that is not there.
+    /// There is no shape of this name.
     #[error("no shape is called {0:?}; there are sphere, capsule, plane, box and mesh")]
     Shape(String),
-    /// A number that can never work.
+    /// A number has an impossible value.
     #[error("{what} is {value}; it must be a number, at least 0")]
     Number {
-        /// The field.
+        /// Name of the field.
         what: &'static str,
-        /// As given.
+        /// Value as it was given.
         value: f64,
     },
-    /// Sizes.
+    /// The sizes make no shape.
     #[error(transparent)]
     Size(#[from] ShapeError),
-    /// Poses.
+    /// The poses make no motion.
     #[error(transparent)]
     Way(#[from] WayError),
-    /// The file of a mesh.
+    /// The file of a mesh cannot be read.
     #[error(transparent)]
     File(#[from] MeshFileReadError),
-    /// The surface of a mesh.
+    /// The surface of a mesh makes no rigid body.
     #[error(transparent)]
     Mesh(#[from] RigidMeshError),
 }
@@ -150,7 +150,7 @@ struct Entry {
 /// Reads a file of bodies; paths in it count from its folder.
 ///
 /// # Errors
-/// [`BodiesError`] in one line that names file and body.
+/// [`BodiesError`] in one line, with file and body.
 pub fn read_bodies(path: &Path) -> Result<PressBodies, BodiesError> {
     let read = |source| BodiesError::Read { path: path.to_owned(), source };
     let text = std::fs::read_to_string(path).map_err(read)?;

@@ -13,43 +13,43 @@ use super::bodies_file::{PressBodies, PressBody};
 use crate::ask::connection::{LinkError, ServerConnection, unexpected};
 use crate::ask::contact_frame::{StepBody, StepObject};
 
-/// A press with all that its steps need.
+/// Press with all that its steps need.
 pub struct Course<'a> {
-    /// The object at rest.
+    /// Object at rest.
     pub mesh: &'a TetMesh,
-    /// Its boundary.
+    /// Boundary surface of the object.
     pub surface: &'a Surface,
-    /// The kept model.
+    /// Name of the kept model.
     pub model: ModelHash,
-    /// The bodies and when they end.
+    /// Bodies, and the time at which the press ends.
     pub bodies: &'a PressBodies,
-    /// Friction of bodies that name none.
+    /// Coefficient of friction of bodies that name none.
     pub friction: f64,
-    /// How each step is made; `seconds` is the longest step.
+    /// Settings of each step; `seconds` is the longest step.
     pub ask: ContactAsk,
     /// Whether the displacements of all nodes are wanted in every step.
     pub whole: bool,
-    /// Fields that are wanted of every such step, and of the last one.
+    /// Fields that are wanted in every step, and in the last one.
     pub fields: FieldSet,
 }
 
-/// One step that has been made.
+/// One step with its answer.
 pub struct Step {
-    /// Time at its end, s.
+    /// Time at the end of the step, s.
     pub time: f64,
-    /// What the server said.
+    /// Answer of the server.
     pub answer: ContactAnswer,
     /// Displacement of every node in the object's frame, m; zero inside unless all are wanted.
     pub displacement: Vec<[f64; 3]>,
-    /// From sending to having the answer.
+    /// Time from sending the request to having the answer, ms.
     pub ms: f64,
 }
 
 impl Course<'_> {
-    /// Makes all steps and hands each to `seen`.
+    /// Makes all steps and passes each to `seen`.
     ///
     /// # Errors
-    /// [`LinkError`], or what `seen` says.
+    /// [`LinkError`], or an error of `seen`.
     pub fn play<E: From<LinkError>>(
         &self,
         connection: &mut ServerConnection,
@@ -103,7 +103,7 @@ impl Course<'_> {
         StepBody { moving, shape: body.on_the_wire.clone() }
     }
 
-    /// Displacement of every node from what an answer has.
+    /// Displacement of every node, from the displacements in an answer.
     fn spread(&self, answer: &mut ContactAnswer) -> Vec<[f64; 3]> {
         let empty = softgrasp_protocol::Displacements::F64(Vec::new());
         let values = std::mem::replace(&mut answer.answer.displacements, empty).into_f64();

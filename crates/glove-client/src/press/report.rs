@@ -7,50 +7,50 @@ use softgrasp_protocol::Deformation;
 
 use super::course::Step;
 
-/// Report of a press.
+/// JSON report of a press.
 #[derive(Debug, Serialize)]
 pub struct PressReport {
-    /// Version of this form.
+    /// Version of the report's form.
     pub schema: u32,
-    /// The command.
+    /// Name of the command.
     pub command: &'static str,
-    /// The object's mesh file.
+    /// Path of the object's mesh file.
     pub mesh: String,
-    /// Its nodes and tetrahedra.
+    /// Number of nodes of the object.
     pub nodes: usize,
-    /// Tetrahedra.
+    /// Number of tetrahedra of the object.
     pub tets: usize,
     /// Young's modulus, Pa.
     pub young: f64,
     /// Poisson's ratio.
     pub poisson: f64,
-    /// kg/m³.
+    /// Density of the object, kg/m³.
     pub density: f64,
-    /// Mass, kg.
+    /// Mass of the object, kg.
     pub mass: f64,
-    /// Acceleration of free fall, m/s².
+    /// Acceleration of free fall, m/s², in the world frame.
     pub gravity: [f64; 3],
-    /// Friction of bodies that name none.
+    /// Coefficient of friction of bodies that name none.
     pub friction: f64,
-    /// Time in which the shape forgets a force, s.
+    /// Time constant with which the shape forgets a force (Kelvin and Voigt), s.
     pub viscosity: f64,
-    /// Finite element.
+    /// Name of the finite element.
     pub element: String,
-    /// `linear`, `large` or `auto`: what was asked for.
+    /// Equations that were asked for: `linear`, `large` or `auto`.
     pub deformation: &'static str,
-    /// Law of large deformation, where it was asked for.
+    /// Law of large deformation, where that was asked for.
     pub material: Option<String>,
-    /// Steps at large deformation.
+    /// Number of steps at large deformation.
     pub steps_large: usize,
-    /// Steps whose gaps and residual are not within what was asked for.
+    /// Number of steps whose penetration or residual is above what was asked for.
     pub steps_not_converged: usize,
     /// Largest penetration of all steps, m.
     pub penetration_max: f64,
-    /// Largest relative residual of contact of all steps.
+    /// Largest residual of the law of contact of all steps, relative.
     pub contact_residual_rel_max: f64,
-    /// Largest residual of the elastic part of all steps, over its forces.
+    /// Largest residual of the elastic part of all steps, relative to its forces.
     pub residual_rel_max: f64,
-    /// Every step.
+    /// All steps, in their order.
     pub steps: Vec<StepReport>,
 }
 
@@ -59,11 +59,11 @@ pub struct PressReport {
 pub struct StepReport {
     /// Time at the end of the step, s.
     pub time: f64,
-    /// Pose of the object: x, y, z, qw, qx, qy, qz.
+    /// Pose of the object in the world: x, y, z in m, quaternion w, x, y, z.
     pub object_pose: [f64; 7],
-    /// Velocity of the centre of mass, m/s.
+    /// Velocity of the object's centre of mass, m/s, in the world frame.
     pub object_velocity: [f64; 3],
-    /// What each body does to the object.
+    /// Forces of each body on the object, by the body's name.
     pub bodies: BTreeMap<String, BodyReport>,
     /// Deepest point of the surface in a body, m.
     pub penetration_max: f64,
@@ -71,57 +71,57 @@ pub struct StepReport {
     pub slip_max: f64,
     /// Largest residual of the law of contact, N.
     pub contact_residual: f64,
-    /// Residual of the law of contact over the largest force of a point.
+    /// Residual of the law of contact, relative to the largest force of a point.
     pub contact_residual_rel: f64,
     /// Largest part of a force outside its cone of friction, N.
     pub cone_violation: f64,
-    /// Which law of friction the forces obey: always Coulomb's, never a relaxation.
+    /// Name of the law of friction that the forces obey: always Coulomb's, never a relaxation.
     pub friction_law: &'static str,
-    /// Whether gaps and residual are within what was asked for.
+    /// Whether penetration and residual are within what was asked for.
     pub converged: bool,
-    /// Residual of the elastic part over its forces.
+    /// Residual of the elastic part, relative to its forces.
     pub residual_rel: f64,
-    /// Bound of the error of the elastic part, or null.
+    /// Proven bound of the relative error of the elastic part, or null.
     pub error_bound_rel: Option<f64>,
-    /// Why there is no bound.
+    /// Reason why there is no bound.
     pub why: String,
-    /// Times the contact problem was made.
+    /// Number of times that the contact problem was made.
     pub rounds: u32,
-    /// Steps of Newton's method.
+    /// Number of steps of Newton's method.
     pub newton_steps: u32,
-    /// Nodes whose columns were computed.
+    /// Number of nodes whose columns were computed.
     pub columns_computed: u32,
-    /// `linear` or `large`: which equations the step was solved by.
+    /// Equations that the step was solved by: `linear` or `large`.
     pub deformation: &'static str,
-    /// Shapes that contact was solved about.
+    /// Number of shapes that contact was solved about.
     pub shapes: u32,
-    /// Factors of the tangent that were made.
+    /// Number of factors of the tangent that were made.
     pub factors: u32,
-    /// Largest rotation of an element, degrees, where it was worked out.
+    /// Largest rotation of an element, degrees, if it was computed.
     pub max_rotation_deg: Option<f64>,
-    /// Largest strain of an element, where it was worked out.
+    /// Largest strain of an element, if it was computed.
     pub max_strain: Option<f64>,
-    /// From sending to having the answer, ms.
+    /// Time from sending the request to having the answer, ms.
     pub ms: f64,
 }
 
-/// What one body does to the object.
+/// Force and torque of one body on the object.
 #[derive(Debug, Serialize)]
 pub struct BodyReport {
-    /// Force on the object, N.
+    /// Force on the object, N, in the world frame.
     pub force: [f64; 3],
-    /// Torque about the place of the body's pose, N m.
+    /// Torque about the position of the body's pose, N m, in the world frame.
     pub torque: [f64; 3],
-    /// Points that press.
+    /// Number of points that press.
     pub contacts: u32,
-    /// Sum of the normal forces, N.
+    /// Sum of the normal components of the forces, N.
     pub normal_force: f64,
-    /// Points that slip.
+    /// Number of points that slip.
     pub slipping: usize,
 }
 
 impl StepReport {
-    /// What is reported of a step.
+    /// Report of one step; `names` are those of the bodies.
     pub fn new(step: &Step, names: &[String]) -> Self {
         let answer = &step.answer;
         let slipping = |body: usize| {

@@ -1,8 +1,8 @@
-//! The way of a rigid body: poses at moments, and even motion between them.
+//! Motion of a rigid body: poses at moments, with even motion between them.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-/// Poses at ascending moments; before the first and after the last the body rests.
+/// Poses at ascending moments; before the first and after the last the body is at rest.
 ///
 /// Units: s. Frame: from the body's to the world.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,41 +10,43 @@ pub struct Way {
     poses: Vec<(f64, Isometry3<f64>)>,
 }
 
-/// Numbers that make no way.
+/// Why numbers describe no motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WayError {
-    /// No pose at all.
+    /// There is no pose.
     #[error("poses is empty; give at least one [t, x, y, z, qw, qx, qy, qz]")]
     Empty,
-    /// A number that is not finite.
+    /// A number is not finite.
     #[error("pose {pose} (from 0) has a number that is not finite")]
     NotFinite {
-        /// Its position.
+        /// Position of the pose in the list.
         pose: usize,
     },
-    /// A quaternion without a direction.
+    /// A quaternion is zero.
     #[error("pose {pose} (from 0) has a quaternion of length 0; no turn is 1, 0, 0, 0")]
     NoTurn {
-        /// Its position.
+        /// Position of the pose in the list.
         pose: usize,
     },
-    /// A moment that is not behind the one before.
+    /// A moment is not later than the one before.
     #[error("pose {pose} (from 0) is at {time} s, not behind the one before at {before} s")]
     Order {
-        /// Its position.
+        /// Position of the pose in the list.
         pose: usize,
-        /// Its moment.
+        /// Moment of the pose, s.
         time: f64,
-        /// That of the pose before.
+        /// Moment of the pose before, s.
         before: f64,
     },
 }
 
 impl Way {
-    /// Shapes: each row time, x, y, z, then the quaternion w, x, y, z, which is made a unit.
+    /// Motion from the rows of a file.
+    ///
+    /// Shapes: each row time, x, y, z, then the quaternion w, x, y, z, which is normalised.
     ///
     /// # Errors
-    /// [`WayError`].
+    /// [`WayError`] if the rows describe no motion.
     pub fn try_new(rows: &[[f64; 8]]) -> Result<Self, WayError> {
         let mut poses: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(rows.len());
         for (pose, row) in rows.iter().enumerate() {
@@ -67,7 +69,7 @@ impl Way {
         }
     }
 
-    /// The pose at a moment: place and turn go evenly from one pose to the next.
+    /// Pose at a moment: position and rotation change evenly from one pose to the next.
     pub fn at(&self, time: f64) -> Isometry3<f64> {
         let next = self.poses.partition_point(|(t, _)| *t <= time);
         match (next.checked_sub(1).map(|last| self.poses[last]), self.poses.get(next)) {
@@ -83,7 +85,7 @@ impl Way {
         }
     }
 
-    /// The last moment named, s.
+    /// Moment of the last pose, s.
     pub fn end(&self) -> f64 {
         self.poses.last().map_or(0.0, |(t, _)| *t)
     }

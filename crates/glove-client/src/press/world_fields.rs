@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use softgrasp_protocol::{Field, FieldValues};
 
-/// Stress and force of contact turned into the axes of the world; strain stays in the axes of the object
-/// at rest, as its mesh does.
+/// Stress and contact force rotated into the axes of the world; strain stays in the axes of the object at
+/// rest, as its mesh does.
 pub fn in_world(mut fields: FieldValues, world_from_object: &UnitQuaternion<f64>) -> FieldValues {
     let turn = world_from_object.to_rotation_matrix();
     for (field, values) in &mut fields.arrays {
@@ -25,7 +25,7 @@ pub fn in_world(mut fields: FieldValues, world_from_object: &UnitQuaternion<f64>
     fields
 }
 
-/// `R σ Rᵀ` of `xx yy zz xy yz zx`.
+/// Rotated tensor `R σ Rᵀ`, for the components `xx yy zz xy yz zx`.
 fn turned(turn: &Matrix3<f64>, [xx, yy, zz, xy, yz, zx]: &[f64; 6]) -> [f64; 6] {
     let m = Matrix3::new(*xx, *xy, *zx, *xy, *yy, *yz, *zx, *yz, *zz);
     let m = turn * m * turn.transpose();

@@ -1,38 +1,38 @@
-//! The answers and times of a run in a few numbers, which do not grow with it.
+//! Answers and times of a run in a few numbers, whose size does not grow with the run.
 
 use hdrhistogram::Histogram;
 use softgrasp_protocol::solve_report::SolveSummary;
 
-/// What the answers of a run were like.
+/// Largest and typical numbers of the answers of a run.
 #[derive(Clone, Debug, Default)]
 pub struct AnswerTally {
-    /// How many there were.
+    /// Number of answers.
     pub solves: usize,
-    /// Largest relative residual.
+    /// Largest relative residual of an answer.
     pub residual_rel_max: f64,
-    /// Round trips, ms.
+    /// Times from sending a request to having its answer, ms.
     pub round_trips: Times,
     /// Ages of the shapes that deforming ticks showed, ms.
     pub ages: Times,
-    /// Bytes on the wire of all requests that were answered.
+    /// Sum of the lengths of all answered requests on the wire, bytes.
     pub bytes_sent: u64,
-    /// Bytes on the wire of their answers.
+    /// Sum of the lengths of their answers on the wire, bytes.
     pub bytes_received: u64,
-    /// Largest rotation of an element, degrees; `None` where no answer tells it.
+    /// Largest rotation of an element, degrees; `None` if no answer tells it.
     pub max_rotation_deg: Option<f64>,
     /// Largest strain of an element, of the same answers.
     pub max_strain: Option<f64>,
-    /// Answers with the equations of large deformation.
+    /// Number of answers by the equations of large deformation.
     pub large_solves: usize,
-    /// Largest estimated relative error.
+    /// Largest estimated relative error of an answer.
     pub error_estimate_rel_max: Option<f64>,
     /// Smallest ratio of an element's volume to that at rest, of the answers at large deformation.
     pub min_jacobian: Option<f64>,
-    /// Equilibria that jumped.
+    /// Number of equilibria that jumped to another shape.
     pub jumps: usize,
     /// Largest resident memory of the server, bytes.
     pub peak_rss_bytes: u64,
-    /// The last answer.
+    /// Report of the last answer.
     pub last: Option<SolveSummary>,
 }
 
@@ -66,13 +66,13 @@ fn larger(one: Option<f64>, other: Option<f64>) -> Option<f64> {
     one.into_iter().chain(other).max_by(f64::total_cmp)
 }
 
-/// Times, of which quantiles are asked. A quantile is off by at most 0.1 %.
+/// Distribution of times, for quantiles. A quantile is wrong by at most 0.1 %.
 ///
 /// Units: ms; from 1 ns to 1 h, longer ones count as 1 h.
 #[derive(Clone, Debug)]
 pub struct Times(Histogram<u64>);
 
-/// One hour, ns.
+/// Longest time that is counted: one hour, ns.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 const NS_PER_MS: f64 = 1e6;
 
@@ -84,18 +84,18 @@ impl Default for Times {
 }
 
 impl Times {
-    /// Counts a time.
+    /// Counts a time, ms.
     pub fn add(&mut self, ms: f64) {
         // A number that is none counts as the shortest.
         self.0.saturating_record((ms * NS_PER_MS) as u64);
     }
 
-    /// How many there are.
+    /// Number of times.
     pub fn count(&self) -> u64 {
         self.0.len()
     }
 
-    /// The time that a part `q` of them does not exceed, ms; `None` where there are none.
+    /// Quantile `q` of the times, ms; `None` if there are none.
     pub fn quantile(&self, q: f64) -> Option<f64> {
         (!self.0.is_empty()).then(|| self.0.value_at_quantile(q) as f64 / NS_PER_MS)
     }

@@ -1,5 +1,5 @@
-//! What becomes of the object besides the grasp: its next rest shape, another object, a file. Made beside
-//! the ticks.
+//! Changes of the object besides the grasp: its next rest shape, another object, a file to be written.
+//! They are made in the background.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,74 +14,75 @@ use crate::object::shape_history::ShapeHistory;
 use crate::pace::Pace;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// How far the next rest shape has come: a kept shape, or the dent that a hand has left.
+/// Progress of the next rest shape: a kept shape, or the dent that a hand has left.
 pub(crate) enum Keep {
-    /// Nobody wishes to keep a shape.
+    /// No shape is to be kept.
     NotWanted,
-    /// The next answer is asked for whole: those so far brought the surface only.
+    /// A shape is to be kept once an answer brings all nodes; the answers so far brought the surface
+    /// only.
     WhenWhole,
-    /// The next rest shape is being made; the object keeps the shape it has.
+    /// The next rest shape is being made; the object keeps its present shape.
     BeingMade,
-    /// It is made, and the grasp is told in this tick.
+    /// The next rest shape is made, and the grasp is told in this tick.
     Made(Box<KeptShape>),
-    /// The hand let go of an object that has flowed: the shape that it springs back to is asked for.
+    /// The hand has released an object that has flowed: the shape that it springs back to is asked for.
     SpringsBack,
-    /// The shape that it has sprung back to is being made the next rest shape.
+    /// The shape after springing back is being made the next rest shape.
     BecomesDent,
 }
 
 impl Keep {
-    /// Whether a shape is to be kept, or a dent.
+    /// Whether a shape, or a dent, is to be kept.
     pub(crate) fn is_wanted(&self) -> bool {
         !matches!(self, Self::NotWanted)
     }
 
-    /// Whether the object stays as it is until its next rest shape is there.
+    /// Whether the object keeps its shape until the next rest shape is ready.
     pub(crate) fn freezes(&self) -> bool {
         matches!(self, Self::BeingMade | Self::Made(_)) || self.is_dent()
     }
 
-    /// Whether what is made is the dent that the hand has left.
+    /// Whether the next rest shape is the dent that the hand has left.
     pub(crate) fn is_dent(&self) -> bool {
         matches!(self, Self::SpringsBack | Self::BecomesDent)
     }
 
-    /// Whether work beside the ticks is waited for.
+    /// Whether background work is awaited.
     pub(crate) fn awaits_work(&self) -> bool {
         matches!(self, Self::BeingMade | Self::BecomesDent)
     }
 }
 
-/// What takes the place of the object.
+/// What replaces the object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Replacement {
-    /// Its rest shape before the last one was kept.
+    /// The rest shape before the last one that was kept.
     EarlierShape,
-    /// Its rest shape before the first one was kept.
+    /// The rest shape before the first one that was kept.
     FirstShape,
-    /// Another material for the rest shape that is there.
+    /// The present rest shape of another material.
     OtherMaterial,
-    /// Another object, by name.
+    /// Another object, by its name.
     Other(String),
 }
 
-/// Changes of the object that are under way, and the rest shapes that it had before.
+/// Changes of the object that are under way, and its earlier rest shapes.
 pub(crate) struct Changing {
     keep: Keep,
     history: ShapeHistory,
     replacement: Option<Replacement>,
-    /// The file to write as soon as every node is known.
+    /// File to be written as soon as every node is known.
     save_to: Option<PathBuf>,
-    /// The last question was asked again for all nodes, outside the ticks.
+    /// Whether the last question was asked again for all nodes, outside the ticks.
     asked_whole: bool,
     work: ObjectWork,
 }
 
 impl Changing {
-    /// Nothing under way.
+    /// No change under way.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// Error of the operating system if it starts no thread.
     pub(crate) fn start(pace: Pace) -> std::io::Result<Self> {
         Ok(Self {
             keep: Keep::NotWanted,
@@ -93,12 +94,12 @@ impl Changing {
         })
     }
 
-    /// How far the next rest shape has come.
+    /// Progress of the next rest shape.
     pub(crate) fn keep(&self) -> &Keep {
         &self.keep
     }
 
-    /// Whether the answers must have every node: a shape or a file waits for the inside.
+    /// Whether answers must have every node, because a shape or a file needs the inside.
     pub(crate) fn wants_whole(&self) -> bool {
         self.keep.is_wanted() || self.save_to.is_some()
     }
@@ -107,7 +108,7 @@ impl Changing {
         self.keep = keep;
     }
 
-    /// The shape that has been made, if it has been; nothing is kept any more then.
+    /// Takes the next rest shape, if it is ready.
     pub(crate) fn take_made(&mut self) -> Option<KeptShape> {
         match std::mem::replace(&mut self.keep, Keep::NotWanted) {
             Keep::Made(kept) => Some(*kept),
@@ -118,7 +119,7 @@ impl Changing {
         }
     }
 
-    /// Nothing deforms the object any more: a shape that waits to be kept is not kept.
+    /// Ends a wish to keep the shape, because nothing deforms the object any more.
     pub(crate) fn stop_keeping(&mut self, outcome: &mut TickOutcome) {
         if self.keep.is_wanted() {
             self.keep = Keep::NotWanted;
@@ -127,7 +128,7 @@ impl Changing {
         }
     }
 
-    /// Has the shape as it is now made into a rest shape; the object stays as it is meanwhile.
+    /// Begins to make the present shape a rest shape; the object keeps its shape meanwhile.
     pub(crate) fn begin_to_keep(
         &mut self,
         keep: Keep,
@@ -144,19 +145,19 @@ impl Changing {
         });
     }
 
-    /// Hands over a piece of work that changes nothing.
+    /// Begins a job that does not change the object.
     pub(crate) fn begin(&mut self, job: ObjectJob) {
         self.work.begin(job);
     }
 
-    /// The next piece of work that is done. New rest shapes only where the tick takes them.
+    /// Takes the next outcome of background work; new rest shapes only if `takes_shapes`.
     pub(crate) fn take_done(&mut self, takes_shapes: bool) -> Option<ObjectDone> {
         self.work.take_if(|done| {
             takes_shapes || !matches!(done, ObjectDone::Kept(_) | ObjectDone::Replacement(_))
         })
     }
 
-    /// A rest shape whose work was lost with its thread is not waited for.
+    /// Gives up a rest shape whose thread has ended.
     pub(crate) fn give_up_lost_work(&mut self, outcome: &mut TickOutcome) {
         if self.keep.awaits_work() && !self.work.is_busy() {
             self.keep = Keep::NotWanted;
@@ -165,12 +166,12 @@ impl Changing {
         }
     }
 
-    /// Waits until all work is done; what has come of it is still to be taken.
+    /// Waits until all background work is done; its outcomes are still to be taken.
     pub(crate) fn settle(&mut self) {
         self.work.settle();
     }
 
-    /// Remembers a rest shape before another takes its place.
+    /// Adds a rest shape to the history, before another replaces it.
     pub(crate) fn remember(&mut self, rest: &Arc<RestShape>) {
         self.history.push(Arc::clone(rest));
     }
@@ -184,10 +185,10 @@ impl Changing {
         self.replacement.is_some()
     }
 
-    /// Refuses a change while another is under way.
+    /// Refuses a change while another one is under way.
     ///
     /// # Errors
-    /// The sentence for the person.
+    /// Sentence for the person.
     pub(crate) fn refuse_while_changing(&mut self) -> Result<(), Notice> {
         // Work that is lost with its thread must not be waited for.
         if !self.work.is_busy() {
@@ -199,7 +200,7 @@ impl Changing {
         }
     }
 
-    /// Has an object made that takes the place of this one.
+    /// Begins to make an object that replaces the present one.
     pub(crate) fn begin_to_replace(
         &mut self,
         rest: Arc<RestShape>,
@@ -216,8 +217,8 @@ impl Changing {
         });
     }
 
-    /// What the object that has been made is, if it is still wanted. The history of rest shapes
-    /// follows it.
+    /// Kind of the replacement that has been made, if it is still wanted. Updates the history of rest
+    /// shapes.
     pub(crate) fn take_replacement(&mut self) -> Option<Replacement> {
         let replacement = self.replacement.take()?;
         match &replacement {
@@ -228,10 +229,10 @@ impl Changing {
         Some(replacement)
     }
 
-    /// Saves the object as it is now, at once or when every node is known.
+    /// Writes the object in its present shape, at once or when every node is known.
     ///
     /// # Errors
-    /// The sentence for the person, while another file waits.
+    /// Sentence for the person, if another file still waits.
     pub(crate) fn save(
         &mut self,
         path: PathBuf,
@@ -250,7 +251,7 @@ impl Changing {
         Ok(Some(Notice::waits(text)))
     }
 
-    /// Begins to write the file that waits for the whole shape, once that is known; whether it began.
+    /// Begins to write the file that waits for all nodes, once they are known; returns whether it began.
     pub(crate) fn save_when_whole(&mut self, object: &SoftObject) -> bool {
         if object.is_whole()
             && let Some(path) = self.save_to.take()
@@ -262,7 +263,7 @@ impl Changing {
         false
     }
 
-    /// Whether the inside is still to be asked for outside the ticks.
+    /// Whether the inside of the object is still to be asked for outside the ticks.
     pub(crate) fn asks_for_inside(&self) -> bool {
         self.save_to.is_some() && !self.asked_whole
     }
@@ -271,7 +272,7 @@ impl Changing {
         self.asked_whole = true;
     }
 
-    /// The file that waits for the inside of the object is not written.
+    /// Gives up the file that waits for the inside of the object.
     pub(crate) fn refuse_to_save(&mut self, why: &str, outcome: &mut TickOutcome) {
         self.asked_whole = false;
         if let Some(path) = self.save_to.take() {

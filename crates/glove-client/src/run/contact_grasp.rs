@@ -1,5 +1,5 @@
-//! A grasp by contact with friction: the free object among the bodies of the hand and above a table, one
-//! step of time at a time.
+//! A grasp by contact with friction: the free object among the rigid bodies of the hand and above a
+//! table, in steps of time.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use softgrasp_core::dynamics::{Candidate, MovingBody};
@@ -19,21 +19,21 @@ use crate::ask::contact_frame::{
 use crate::ask::link::ReachedStep;
 use crate::run::contact_ledger::StepRecord;
 
-/// What an object and the hand that grasps it with friction are like.
+/// Constants of an object and of the hand that grasps it with friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactScene {
     /// Coefficient of friction between hand and object, and between table and object.
     pub friction: f64,
-    /// How far a finger gives way to a force on it, m/N: the measured finger may close further than the
-    /// shown one, which presses by the difference over this.
+    /// Displacement of a finger for each unit of force on it, m/N: the measured finger may close further
+    /// than the shown one, which presses by their distance over this.
     pub finger_compliance: f64,
     /// Density of the object, kg/m³.
     pub density: f64,
-    /// Time in which the shape forgets a force (Kelvin and Voigt), s.
+    /// Time constant with which the shape forgets a force (Kelvin and Voigt), s.
     pub viscosity: f64,
-    /// Acceleration of free fall, m/s², world; −y is down.
+    /// Acceleration of free fall, m/s², in the world frame; −y is down.
     pub gravity: Vector3<f64>,
-    /// Height (y, world) of the table; `None` where there is none.
+    /// Height of the table (y in the world frame), m; `None` without a table.
     pub table_y: Option<f64>,
 }
 
@@ -50,46 +50,46 @@ impl Default for ContactScene {
     }
 }
 
-/// The state of such a grasp.
+/// State of a grasp by contact with friction.
 pub struct ContactGrasp {
     scene: ContactScene,
-    /// Where the object returns to.
+    /// Home pose, to which the object returns.
     world_from_home: Isometry3<f64>,
-    /// The object as the last answer has it.
+    /// State of the object after the last answer.
     state: ObjectState,
-    /// When and where the hand was at the end of the last step that was answered.
+    /// Time and pose of the hand at the end of the last answered step.
     hand: Option<HandMoment>,
-    /// The step that is asked for.
+    /// Step that was asked for and not answered yet.
     asked: Option<Asked>,
-    /// What each body does to the object, of the last answer: the table, then the hand.
+    /// Force and torque of each body on the object in the last answer: the table, then the hand.
     loads: Vec<BodyLoad>,
     /// How well the last step meets the law of contact.
     report: ContactReport,
-    /// The hand has to leave the object before it can touch it.
+    /// Whether the hand must leave the object before it can touch it.
     is_apart: bool,
-    /// Steps in a row in which nothing has moved.
+    /// Number of steps in a row in which nothing has moved.
     still_steps: u32,
-    /// Steps in a row in which nobody would see it move.
+    /// Number of steps in a row with motion too slow to be seen.
     slow_steps: u32,
-    /// The state that was told last.
+    /// State that was reported last.
     told: Option<StateName>,
 }
 
-/// Where the bodies of a hand are at a time, s.
+/// Poses of the bodies of a hand at a time, s.
 #[derive(Clone, Debug)]
 struct HandMoment {
     time_s: f64,
     world_from_bodies: [Isometry3<f64>; HAND_BODIES],
 }
 
-/// What has become of the answer to a step.
+/// What became of the answer to a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TakenStep {
-    /// It is the object's state now.
+    /// The answer is the object's state now.
     Taken,
-    /// It is not the one that is waited for.
+    /// The answer is not to the step that is awaited.
     NotAsked,
-    /// It was not solved, and the object is where it was.
+    /// The step was not solved; the object keeps its position.
     Lost,
 }
 
@@ -100,39 +100,39 @@ struct Asked {
     extent: f64,
 }
 
-/// Bodies before those of the hand: the table.
+/// Number of bodies before those of the hand: the table.
 const TABLE: usize = 1;
-/// Longest step, s: a run that is slower than this goes on in slow motion.
+/// Longest step, s: a run with longer ticks plays in slow motion.
 const STEP_MAX_S: f64 = 1.0 / 60.0;
-/// A step shorter than this is left to the next tick, s.
+/// Shortest step, s; a shorter one is left to the next tick.
 const STEP_MIN_S: f64 = 2e-4;
-/// A hand that comes farther than this in one step was not seen meanwhile, m: it has to leave the object
-/// first.
+/// Distance, m, by which a hand was not followed if it moves farther in one step: it must leave the
+/// object first.
 const LEAP_M: f64 = 0.15;
-/// A hand that was inside the object is clear of it at this distance, m.
+/// Distance, m, at which a hand that was inside the object counts as outside.
 const CLEAR_M: f64 = 2e-3;
-/// An object slower than this lies still, m/s and (times its extent) rad/s …
+/// Speed below which an object is at rest, m/s and (times its extent) rad/s.
 const STILL_SPEED: f64 = 1e-4;
-/// … when it has been so for so many steps.
+/// Number of slow steps in a row after which it is at rest.
 const STILL_STEPS: u32 = 20;
-/// Nobody sees an object move that is slower than this, m/s …
+/// Speed below which motion cannot be seen, m/s.
 const SLOW_SPEED: f64 = 3e-3;
-/// … for so many steps.
+/// Number of such steps in a row after which the object counts as still.
 const SLOW_STEPS: u32 = 12;
-/// A step that was not solved is not taken where the surface is deeper in a body than this, or the object has
-/// gone farther, over its extent.
+/// Penetration, and motion of the object, relative to its extent, above which a step that was not solved
+/// is not taken.
 const LOST_DEPTH: f64 = 0.1;
 const LOST_WAY: f64 = 0.5;
-/// Effort of a step in a run: a later tick asks again anyway.
+/// Largest number of rounds of a step in a run: a later tick asks again anyway.
 const ROUNDS_MAX: u32 = 12;
 const NEWTON_MAX: u32 = 80;
-/// Exact enough to be seen and felt; the report of every step says what was reached.
+/// Penetration that is small enough to see and feel; the report of every step tells what was reached.
 const PENETRATION_REL: f64 = 1e-6;
 const RESIDUAL_REL: f64 = 1e-6;
 
 impl ContactGrasp {
-    /// A grasp of an object that lies at its home at rest. A hand that begins inside the object has to
-    /// leave it first.
+    /// Grasp of an object that is at rest at its home. A hand that begins inside the object must leave it
+    /// first.
     pub fn new(scene: ContactScene, world_from_home: Isometry3<f64>) -> Self {
         Self {
             scene,
@@ -149,17 +149,17 @@ impl ContactGrasp {
         }
     }
 
-    /// What object and hand are like.
+    /// Constants of object and hand.
     pub fn scene(&self) -> &ContactScene {
         &self.scene
     }
 
-    /// Where the object is.
+    /// Pose of the object in the world.
     pub fn world_from_object(&self) -> Isometry3<f64> {
         isometry_of(&self.state.pose)
     }
 
-    /// Another home, to which the object goes at once; a table stays as far below it as it was.
+    /// Sets another home and puts the object there; a table stays as far below it as it was.
     pub fn set_home(&mut self, world_from_home: Isometry3<f64>) {
         let raised = world_from_home.translation.y - self.world_from_home.translation.y;
         self.scene.table_y = self.scene.table_y.map(|table_y| table_y + raised);
@@ -167,12 +167,12 @@ impl ContactGrasp {
         self.return_home();
     }
 
-    /// Puts the object, at rest and undeformed, where its home is.
+    /// Puts the object, at rest and undeformed, at its home.
     pub fn return_home(&mut self) {
         self.put(self.world_from_home);
     }
 
-    /// Puts the object, at rest and undeformed, somewhere.
+    /// Puts the object, at rest and undeformed, at a pose.
     pub fn put(&mut self, world_from_object: Isometry3<f64>) {
         self.state = ObjectState::at_rest(pose_of(&world_from_object));
         self.loads.clear();
@@ -180,26 +180,26 @@ impl ContactGrasp {
         (self.asked, self.still_steps) = (None, 0);
     }
 
-    /// The hand lets go: it has to leave the object before it can touch it again.
+    /// Releases the object: the hand must leave it before it can touch it again.
     pub fn let_go(&mut self) {
         self.is_apart = true;
         self.still_steps = 0;
     }
 
-    /// The shape that the object has now is its rest shape from now on; it stays where it is.
+    /// Makes the present shape the rest shape; the object keeps its pose.
     pub fn meet_new_shape(&mut self) {
         self.state = ObjectState::at_rest(self.state.pose);
         (self.asked, self.still_steps) = (None, 0);
     }
 
-    /// Another object, with a table of its own height.
+    /// Takes another object, with a table of its own height.
     pub fn meet_new_object(&mut self, table_y: Option<f64>) {
         self.scene.table_y = table_y;
         self.return_home();
     }
 
-    /// The question of a tick: the step from the last answer to now, or `None` where there is nothing to
-    /// ask: a step is under way, or the object lies still and no hand is near.
+    /// Contact frame of a tick: the step from the last answer to now. `None` if a step is under way, or
+    /// if the object is still and no hand is near.
     ///
     /// Units: `now_s` s on the client's clock.
     pub fn step(
@@ -266,7 +266,7 @@ impl ContactGrasp {
         }
     }
 
-    /// The table, then the hand, on the way from where it was at the last answer to where it is.
+    /// Bodies of a step, each with its motion since the last answer: the table, then the hand.
     fn bodies(&self, hand: &[HandBody; HAND_BODIES]) -> Vec<StepBody> {
         let friction = self.scene.friction;
         // Without a table a plane far below stands for it: the places of the others stay.
@@ -296,7 +296,7 @@ impl ContactGrasp {
         std::iter::once(table).chain(of_hand).collect()
     }
 
-    /// Triangles that can touch a body; a hand that has to leave the object first touches none.
+    /// Triangles that can touch a body; none for a hand that must leave the object first.
     ///
     /// Units: `extent` of the object m.
     fn candidates(
@@ -324,7 +324,7 @@ impl ContactGrasp {
     }
 
     /// Takes the answer to the step of a tick. A step that was not solved and would throw the object away
-    /// is not taken: the object stays where it was, undeformed, and the hand has to leave it.
+    /// is not taken: the object stays where it was, undeformed, and the hand must leave it.
     pub fn take(&mut self, tick: u64, reached: ReachedStep) -> TakenStep {
         let Some(asked) = self.asked.take_if(|asked| asked.tick == tick) else {
             return TakenStep::NotAsked;
@@ -348,12 +348,12 @@ impl ContactGrasp {
         TakenStep::Taken
     }
 
-    /// The step of a tick is not answered; the next tick asks again. Whether it was waited for.
+    /// Gives up the step of a tick, so that the next tick asks again; returns whether it was awaited.
     pub fn give_up(&mut self, tick: u64) -> bool {
         self.asked.take_if(|asked| asked.tick == tick).is_some()
     }
 
-    /// Whatever step was asked for is not waited for any more; whether one was.
+    /// Gives up any awaited step; returns whether there was one.
     pub fn give_up_any(&mut self) -> bool {
         self.asked.take().is_some()
     }
@@ -363,20 +363,20 @@ impl ContactGrasp {
         std::array::from_fn(|digit| self.loads_of(digit).iter().any(|load| load.contacts > 0))
     }
 
-    /// Force of each finger on the object, N, world, thumb first; zero where it does not touch.
+    /// Force of each finger on the object, N, in the world frame, thumb first; zero without contact.
     pub fn finger_forces(&self) -> [Vector3<f64>; 5] {
         std::array::from_fn(|digit| {
             self.loads_of(digit).iter().map(|load| Vector3::from(load.force)).sum()
         })
     }
 
-    /// What the segments of a finger do; nothing before the first answer.
+    /// Loads of the segments of a finger; empty before the first answer.
     fn loads_of(&self, digit: usize) -> &[BodyLoad] {
         let first = TABLE + 3 * digit;
         self.loads.get(first..first + 3).unwrap_or_default()
     }
 
-    /// What the last step did and how well it meets the law of contact.
+    /// Record of the last step: its forces, and how well it meets the law of contact.
     pub fn record(&self, tick: u64, round_trip_ms: f64) -> StepRecord {
         let table = self.loads.get(..TABLE).unwrap_or_default();
         let palm = self.loads.get(TABLE + 15..).unwrap_or_default();
@@ -384,7 +384,7 @@ impl ContactGrasp {
         StepRecord::new(tick, round_trip_ms, &self.report, (table, fingers, palm))
     }
 
-    /// Whether the state is another than when this was called last: an answer may have changed it.
+    /// Whether the state differs from the one at the last call.
     pub fn enters(&mut self, state: StateName) -> bool {
         self.told.replace(state) != Some(state)
     }
@@ -394,13 +394,13 @@ impl ContactGrasp {
         self.asked.as_ref().is_some_and(|asked| asked.tick < tick)
     }
 
-    /// Whether the object lies or is held still.
+    /// Whether the object is at rest or held still.
     pub fn is_still(&self) -> bool {
         self.slow_steps >= SLOW_STEPS
     }
 
-    /// What hand and object are to each other: `Detached` while the hand has to leave the object,
-    /// `Deforming` from the first touch on.
+    /// State of the grasp: `Detached` while the hand must leave the object, `Deforming` from the first
+    /// touch on.
     pub fn state_name(&self) -> StateName {
         let of_hand = self.loads.get(TABLE..).unwrap_or_default();
         match self.is_apart {
@@ -410,8 +410,8 @@ impl ContactGrasp {
         }
     }
 
-    /// How far the shown hand is from the measured one, m, world: each segment of a finger gives way to
-    /// what presses on it.
+    /// Displacement of the shown hand from the measured one, m, in the world frame: each segment of a
+    /// finger gives way to the force on it.
     pub fn pushed_back(&self) -> [[Vector3<f64>; 3]; 5] {
         let compliance = self.scene.finger_compliance;
         std::array::from_fn(|digit| {
@@ -425,9 +425,9 @@ impl ContactGrasp {
     }
 }
 
-/// The segments of a hand that gives way: a joint moves as far as the segments on both sides of it and those
-/// before it are pushed back, so that none is left in the object, and every segment turns so that it still
-/// joins its two ends.
+/// Segments of a hand that gives way to forces. A joint moves as far as the segments on both sides of it,
+/// and those before it, are pushed back, so that none stays inside the object; every segment turns so
+/// that it still joins its two ends.
 ///
 /// Shapes: `segments` world from segment, thumb first, from the palm outward, +Y along the bone; `ends`
 /// the tip of each finger. Units: m. Frame: world.

@@ -1,13 +1,13 @@
-//! How well the steps of a grasp by friction met the law of contact, step by step and in all.
+//! How well the steps of a grasp by friction met the law of contact, for each step and for the run.
 
 use nalgebra::Vector3;
 use serde::Serialize;
 use softgrasp_protocol::{BodyLoad, ContactReport};
 
-/// One answered step.
+/// Record of one answered step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StepRecord {
-    /// Tick that asked for it.
+    /// Tick that asked for the step.
     pub tick: u64,
     /// Force of each finger on the object, N, thumb first.
     pub finger_force_n: [f64; 5],
@@ -15,7 +15,7 @@ pub struct StepRecord {
     pub palm_force_n: f64,
     /// Force of the table on the object, N.
     pub table_force_n: f64,
-    /// Points that press.
+    /// Number of points that press.
     pub contacts: u32,
     /// Deepest point of the surface in a body, m.
     pub penetration_max_m: f64,
@@ -23,30 +23,30 @@ pub struct StepRecord {
     pub slip_max_m: f64,
     /// Largest residual of the law of Signorini and Coulomb, N.
     pub residual_n: f64,
-    /// Residual of the law of contact over the largest force of a point.
+    /// Residual of the law of contact, relative to the largest force of a point.
     pub residual_rel: f64,
     /// Largest part of a force outside its cone of friction, N.
     pub cone_violation_n: f64,
     /// Whether penetration and residual are within what was asked for.
     pub converged: bool,
-    /// Times the contact problem was made.
+    /// Number of times that the contact problem was made.
     pub rounds: u32,
-    /// Steps of Newton's method.
+    /// Number of steps of Newton's method.
     pub newton_steps: u32,
-    /// From asking to having the answer, ms.
+    /// Time from sending the request to having the answer, ms.
     pub round_trip_ms: f64,
 }
 
-/// All answered steps of a run.
+/// Totals of all answered steps of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ContactTotals {
-    /// Steps.
+    /// Number of answered steps.
     pub steps: u64,
-    /// Steps whose penetration or residual is above what was asked for.
+    /// Number of steps whose penetration or residual is above what was asked for.
     pub not_converged: u64,
     /// Deepest point of the surface in a body, m.
     pub penetration_max_m: f64,
-    /// Largest residual of the law of contact over the largest force of its step.
+    /// Largest residual of the law of contact, relative to the largest force of its step.
     pub residual_rel_max: f64,
     /// Largest residual of the law of contact, N.
     pub residual_max_n: f64,
@@ -57,7 +57,7 @@ pub struct ContactTotals {
 }
 
 impl StepRecord {
-    /// The record of a step; `of_fingers` are the loads of each finger, `table` that of the table.
+    /// Record of a step; `of_fingers` are the loads of each finger, `table` that of the table.
     pub fn new(
         tick: u64,
         round_trip_ms: f64,
@@ -88,7 +88,7 @@ impl StepRecord {
 }
 
 impl ContactTotals {
-    /// Adds a step.
+    /// Adds a step to the totals.
     pub fn add(&mut self, step: &StepRecord) {
         self.steps += 1;
         self.not_converged += u64::from(!step.converged);
@@ -100,7 +100,7 @@ impl ContactTotals {
         self.finger_force_max_n = self.finger_force_max_n.max(force);
     }
 
-    /// What is to be said of them; nothing where there were none.
+    /// Totals as text for the summary; empty if there was no step.
     pub fn words(&self) -> String {
         if self.steps == 0 {
             return String::new();

@@ -1,5 +1,5 @@
-//! The ticks of a grasp by contact with friction: a step of the free object is asked for, and the hand is
-//! shown where the object lets it be.
+//! Ticks of a grasp by contact with friction: each asks for a step of the free object, and shows the hand
+//! where the object lets it be.
 
 use nalgebra::Point3;
 use softgrasp_grasp::grasp::{Command, GraspEvent, HandSegments, StateName};
@@ -14,7 +14,7 @@ use crate::run::live_object::LiveObject;
 use crate::run::shown::Shown;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// A tick of a grasp by friction: its number, its time on the client's clock (s), and the hand.
+/// Tick of a grasp by friction: number, time on the client's clock (s), and hand.
 pub(crate) struct FrictionTick<'a> {
     pub(crate) tick: u64,
     pub(crate) now_s: f64,
@@ -23,7 +23,7 @@ pub(crate) struct FrictionTick<'a> {
 }
 
 impl FrictionTick<'_> {
-    /// What the tick does to object and server; back come the segments of the hand as they are shown.
+    /// Plays the tick; returns the segments of the hand as they are shown.
     ///
     /// # Errors
     /// [`ObjectError`] when the object cannot be shown any more.
@@ -64,7 +64,7 @@ impl FrictionTick<'_> {
         Ok(given_way(&segments, &ends, &contact.pushed_back()))
     }
 
-    /// Asks for the step of the free object to this tick, unless its shape is being kept.
+    /// Asks for the step of the free object up to this tick, unless its shape is being kept.
     fn ask(
         &self,
         holding: &mut Holding,
@@ -104,7 +104,7 @@ impl FrictionTick<'_> {
         Ok(())
     }
 
-    /// Writes down what the person sees of the tick.
+    /// Writes the visible result of the tick into its outcome.
     fn see(
         &self,
         contact: &ContactGrasp,

@@ -1,5 +1,5 @@
-//! One tick of the client in fixed order: bytes, pose, contacts, grasp, request, answer; and what a person
-//! does to the object between two ticks.
+//! One tick of the client in fixed order (bytes, pose, contacts, grasp, request, answer), and a person's
+//! changes of the object between two ticks.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,12 +33,12 @@ use crate::run::questions::Questions;
 use crate::run::shown::Shown;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// The client between devices and server.
+/// The client's loop between devices and server.
 pub struct GraspLoop {
     reader: HandReader,
     holding: Holding,
     object: LiveObject,
-    /// Where the object is put when the first hand comes.
+    /// Place where the object is put when the first hand comes.
     place: ObjectPlace,
     hand: Option<HandPose>,
     shown_segments: HandSegments,
@@ -47,11 +47,11 @@ pub struct GraspLoop {
 }
 
 impl GraspLoop {
-    /// A loop around an object at the origin; its model is sent to the server at once. To be made
-    /// before the calling thread asks for real-time priority.
+    /// Loop around an object at the origin; sends its model to the server at once. To be made before the
+    /// calling thread asks for real-time priority.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// Error of the operating system if it starts no thread.
     pub fn try_new(
         reader: HandReader,
         object: SoftObject,
@@ -73,18 +73,18 @@ impl GraspLoop {
         })
     }
 
-    /// From now on the object is free and has weight, and the hand grasps it by contact with friction
-    /// instead of by the thesis's rules.
+    /// Makes the object free and heavy, so that the hand grasps it by contact with friction instead of by
+    /// the thesis's rules.
     pub fn grasp_with_friction(&mut self, scene: ContactScene) {
         self.holding.by_friction(scene, &mut self.object.shown);
     }
 
-    /// The grasp by friction, if there is one.
+    /// State of the grasp by friction, if there is one.
     pub fn contact_grasp(&self) -> Option<&ContactGrasp> {
         self.holding.friction()
     }
 
-    /// Tells how long it is from tick to tick: a live frame asks for its answer within that time.
+    /// Sets the time from tick to tick: live questions ask for their answer within it.
     pub fn tick_every(&mut self, period: Duration) {
         self.object.questions.tick_every(period);
     }
@@ -94,44 +94,44 @@ impl GraspLoop {
         self.object.questions.pace()
     }
 
-    /// From now on every outcome has the digest of what was asked.
+    /// Adds the digest of the question to every later outcome.
     pub fn want_digests(&mut self) {
         self.object.questions.want_digests();
     }
 
-    /// The object as it is now.
+    /// Object with its present shape.
     pub fn object(&self) -> &SoftObject {
         self.object.shown.object()
     }
 
-    /// Object pose after the last tick.
+    /// Pose of the object in the world after the last tick.
     pub fn world_from_object(&self) -> &Isometry3<f64> {
         self.object.shown.world_from_object()
     }
 
-    /// State of the grasp.
+    /// State of the grasp after the last tick.
     pub fn state(&self) -> StateName {
         self.holding.state_name()
     }
 
-    /// The hand as measured in the last tick.
+    /// Hand as measured in the last tick.
     pub fn hand(&self) -> Option<&HandPose> {
         self.hand.as_ref()
     }
 
-    /// The segments as the last tick shows them, in the world: those that may not enter the object
-    /// stay at their last free pose.
+    /// Segments of the hand as the last tick shows them, in the world: those that may not enter the
+    /// object stay at their last free pose.
     pub fn shown_segments(&self) -> &HandSegments {
         &self.shown_segments
     }
 
-    /// What each fingertip holds after the last tick, thumb first.
+    /// Contact of each fingertip after the last tick, thumb first.
     pub fn contacts(&self) -> [Option<Contact>; 5] {
         self.holding.contacts()
     }
 
-    /// Force of each fingertip on the object as it is shown, thumb first; `None` where the fingers
-    /// do not deform it, until the first answer, and unless [`AnswerWishes::forces`] asks for them.
+    /// Force of each fingertip on the object in its shown shape, thumb first. `None` if the fingers do
+    /// not deform it, until the first answer, and unless [`AnswerWishes::forces`] asks for them.
     ///
     /// Units: N. Frame: the object's.
     pub fn fingertip_forces(&self) -> Option<[Vector3<f64>; 5]> {
@@ -143,47 +143,47 @@ impl GraspLoop {
         !self.object.questions.link().is_giving_model()
     }
 
-    /// Whether the server is there.
+    /// Whether the server is connected.
     pub fn is_connected(&self) -> bool {
         self.object.questions.link().is_connected()
     }
 
-    /// Whether the object is what was asked for, and the server there and prepared for it.
+    /// Whether the object is the one asked for, and the server keeps its model.
     pub fn is_object_ready(&self) -> bool {
         self.object.questions.link().has_model() && !self.object.changing.replaces()
     }
 
-    /// The reader, for its faults.
+    /// Reader of the hand, for its faults.
     pub fn reader(&self) -> &HandReader {
         &self.reader
     }
 
-    /// Waits until the server has answered all, at most so long.
+    /// Waits until all requests have ended, for at most `at_most`; returns whether they have.
     pub fn wait_idle(&self, at_most: Duration) -> bool {
         self.object.questions.link().wait_idle(at_most)
     }
 
-    /// Waits until the server has answered all, at most so long, and until the work beside the ticks
-    /// is done: what the next tick finds then does not depend on time.
+    /// Waits until all requests have ended, for at most `at_most`, and until background work is done:
+    /// then what the next tick finds does not depend on time.
     pub fn settle(&mut self, at_most: Duration) {
         self.object.changing.settle();
         self.object.questions.link().wait_idle(at_most);
     }
 
-    /// What the server has done since the last tick, when no tick follows.
+    /// Takes what has come from the server since the last tick, if no tick follows.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the answer does not fit the object.
     pub fn take_last(&mut self) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
         self.object.pick_up(&mut self.holding, &mut outcome)?;
         Ok(outcome)
     }
 
-    /// One tick at a time on the client's clock.
+    /// Plays one tick, at a time on the client's clock.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the answer does not fit the object.
     pub fn tick(&mut self, tick: u64, now_s: f64, sent: &Sent) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
         self.reader.feed(&sent.arrivals, now_s);
@@ -211,8 +211,8 @@ impl GraspLoop {
         Ok(outcome)
     }
 
-    /// Whether the hand waits until a shape is kept. In lockstep that is in the next tick, and the hand
-    /// goes on.
+    /// Whether the hand waits until a shape is kept. In lockstep this is done in the next tick, and the
+    /// hand goes on.
     fn is_keeping(&self) -> bool {
         self.pace() == Pace::Free && self.object.changing.keep().is_wanted()
     }
@@ -230,8 +230,8 @@ impl GraspLoop {
         }
     }
 
-    /// Tells when a device falls silent, and when it speaks again. A hand that is not heard of stays
-    /// where it was, and so does what it holds.
+    /// Reports devices that fall silent, and those that speak again. A hand without samples keeps its
+    /// pose, and so does the object that it holds.
     fn look_at_devices(&mut self, now_s: f64, outcome: &mut TickOutcome) {
         outcome.silent = self.reader.silent(now_s);
         let silent = &outcome.silent;
@@ -250,7 +250,7 @@ impl GraspLoop {
         outcome.events.extend(self.reader.take_news().into_iter().map(LoopEvent::Device));
     }
 
-    /// What a tick by the rules of the thesis does once there is a hand.
+    /// Plays the part of a tick by the thesis's rules that needs a hand.
     fn tick_of_the_thesis(
         &mut self,
         tick: u64,
@@ -296,7 +296,7 @@ impl GraspLoop {
         })
     }
 
-    /// Does to object and server what the rules of the thesis decided.
+    /// Applies the decisions of the thesis's rules to object and server.
     fn follow(
         &mut self,
         tick: u64,
@@ -334,16 +334,16 @@ impl GraspLoop {
         Ok(())
     }
 
-    /// Says where the object is put when the first hand is heard of.
+    /// Sets the place where the object is put when the first hand comes.
     pub fn put_object(&mut self, place: ObjectPlace) {
         self.place = place;
     }
 
-    /// Goes back to the rest shape before the last one that was kept; the object will be at home
-    /// and free. The news come with a later tick.
+    /// Returns to the rest shape before the last one that was kept; the object is then free at its home.
+    /// The result is told in a later tick.
     ///
     /// # Errors
-    /// Why not, in a sentence.
+    /// Reason for a refusal, in a sentence.
     pub fn undo_keep_shape(&mut self) -> Result<(), Notice> {
         self.object.changing.refuse_while_changing()?;
         let Some(earlier) = self.object.changing.history().last().map(Arc::clone) else {
@@ -353,11 +353,11 @@ impl GraspLoop {
         Ok(())
     }
 
-    /// Puts the object back to where it began, with the shape at rest that it began with. The news
-    /// come with a later tick.
+    /// Puts the object back to its home, with the rest shape that it began with. The result is told in a
+    /// later tick.
     ///
     /// # Errors
-    /// Why not, in a sentence.
+    /// Reason for a refusal, in a sentence.
     pub fn begin_anew(&mut self) -> Result<(), Notice> {
         self.object.changing.refuse_while_changing()?;
         self.put_object_home();
@@ -367,29 +367,28 @@ impl GraspLoop {
         Ok(())
     }
 
-    /// Puts another object in the place of this one; it will be at home and free. The news come
-    /// with a later tick.
+    /// Replaces the object; the new one is free at its home. The result is told in a later tick.
     ///
     /// # Errors
-    /// Why not, in a sentence.
+    /// Reason for a refusal, in a sentence.
     pub fn replace_object(&mut self, rest: Arc<RestShape>, name: &str) -> Result<(), Notice> {
         self.object.changing.refuse_while_changing()?;
         self.object.begin_to_replace(rest, Replacement::Other(name.to_owned()));
         Ok(())
     }
 
-    /// Makes the object of another material; what holds it goes on holding it. An element that is the
-    /// cheapest that does not lock follows Poisson's ratio. The news come with a later tick.
+    /// Changes the object's material; it stays held as it is. An element that was chosen as the cheapest
+    /// without locking follows Poisson's ratio. The result is told in a later tick.
     ///
     /// # Errors
-    /// Why not, in a sentence.
+    /// Reason for a refusal, in a sentence.
     pub fn set_material(&mut self, material: Material) -> Result<(), Notice> {
         self.object.set_material(material)
     }
 
-    /// Turns the object about its centre while nothing holds it (thesis 6.1.2).
+    /// Rotates the object about its centre while nothing holds it (thesis 6.1.2).
     ///
-    /// Frame: the rotation is the world's.
+    /// Frame: the rotation is in the world frame.
     ///
     /// # Errors
     /// [`GraspError`] while the hand holds it.
@@ -404,49 +403,49 @@ impl GraspLoop {
         Ok(())
     }
 
-    /// Lets go of the object where it is, because the hand is replaced.
+    /// Releases the object at its pose, because the hand is replaced.
     pub fn let_object_go(&mut self) {
         self.holding.let_go();
     }
 
-    /// Lets go of the object and puts it back to where it began.
+    /// Releases the object and puts it back to its home.
     pub fn put_object_home(&mut self) {
         self.holding.put_home(&mut self.object.shown);
     }
 
-    /// Saves the object as it is now, whole. Where the inside is not known it is asked for first.
-    /// The news come with a later tick.
+    /// Saves the object in its present shape, with all nodes. If the inside is not known it is asked for
+    /// first. The result is told in a later tick.
     ///
     /// # Errors
-    /// Why not, in a sentence.
+    /// Reason for a refusal, in a sentence.
     pub fn save(&mut self, path: PathBuf) -> Result<Option<Notice>, Notice> {
         self.object.changing.save(path, self.object.shown.object())
     }
 
-    /// The method from the next question on.
+    /// Sets the method, from the next question on.
     pub fn set_method(&mut self, method: MethodName) {
         self.object.questions.set_method(method);
     }
 
-    /// The nodes that are asked for from the next question on.
+    /// Sets the nodes that are asked for, from the next question on.
     pub fn set_subscription(&mut self, subscription: Subscription) {
         self.object.questions.settings_mut().subscription = subscription;
     }
 
-    /// What the answers are to hold from the next question on.
+    /// Wishes for the answers, from the next question on.
     pub fn wishes_mut(&mut self) -> &mut AnswerWishes {
         self.object.questions.wishes_mut()
     }
 
-    /// How many kept shapes can be undone.
+    /// Number of kept shapes that can be undone.
     pub fn undo_count(&self) -> usize {
         self.object.changing.history().len()
     }
 
-    /// Goes on with what is under way while no tick is played.
+    /// Continues what is under way while no tick is played.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the answer does not fit the object.
     pub fn idle(&mut self) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
         self.object.pick_up(&mut self.holding, &mut outcome)?;

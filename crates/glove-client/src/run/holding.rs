@@ -1,4 +1,4 @@
-//! What holds the object: the rules of the thesis, or contact with friction in their place.
+//! Grasp that holds the object: the rules of the thesis, or contact with friction.
 
 use nalgebra::Isometry3;
 use softgrasp_grasp::grasp::{Contact, Grasp, GraspError, StateName, StepInput, StepOutput};
@@ -6,37 +6,37 @@ use softgrasp_grasp::grasp::{Contact, Grasp, GraspError, StateName, StepInput, S
 use crate::run::contact_grasp::{ContactGrasp, ContactScene};
 use crate::run::shown::Shown;
 
-/// What holds the object.
+/// Grasp that holds the object.
 pub(crate) struct Holding {
     thesis: Grasp,
-    /// Takes the place of the thesis's rules, which then only know the object's home.
+    /// Grasp by friction; it replaces the thesis's rules, which then only know the object's home.
     friction: Option<Box<ContactGrasp>>,
 }
 
 impl Holding {
-    /// The rules of the thesis.
+    /// Grasp by the rules of the thesis.
     pub(crate) fn new(thesis: Grasp) -> Self {
         Self { thesis, friction: None }
     }
 
-    /// From now on contact with friction.
+    /// Changes to a grasp by contact with friction.
     pub(crate) fn by_friction(&mut self, scene: ContactScene, shown: &mut Shown) {
         let contact = ContactGrasp::new(scene, *self.thesis.home());
         shown.place(contact.world_from_object());
         self.friction = Some(Box::new(contact));
     }
 
-    /// The rules of the thesis, whether or not they are what holds the object.
+    /// Grasp by the thesis's rules, whether or not it holds the object.
     pub(crate) fn thesis(&self) -> &Grasp {
         &self.thesis
     }
 
-    /// A tick of the rules of the thesis.
+    /// Plays a tick by the thesis's rules.
     pub(crate) fn step(&mut self, input: &StepInput) -> StepOutput {
         self.thesis.step(input)
     }
 
-    /// The grasp by friction, if there is one.
+    /// Grasp by friction, if there is one.
     pub(crate) fn friction(&self) -> Option<&ContactGrasp> {
         self.friction.as_deref()
     }
@@ -52,12 +52,12 @@ impl Holding {
         }
     }
 
-    /// What each fingertip holds by the rules of the thesis, thumb first.
+    /// Contact of each fingertip by the thesis's rules, thumb first.
     pub(crate) fn contacts(&self) -> [Option<Contact>; 5] {
         self.thesis.state().contacts()
     }
 
-    /// Lets go of the object where it is.
+    /// Releases the object at its pose.
     pub(crate) fn let_go(&mut self) {
         self.thesis.let_go();
         if let Some(contact) = &mut self.friction {
@@ -65,7 +65,7 @@ impl Holding {
         }
     }
 
-    /// Puts a free object somewhere.
+    /// Puts a free object at a pose.
     ///
     /// # Errors
     /// [`GraspError`] while the hand holds it.
@@ -80,7 +80,7 @@ impl Holding {
         Ok(())
     }
 
-    /// Another home, to which the object goes at once.
+    /// Sets another home and puts the object there.
     ///
     /// # Errors
     /// [`GraspError`] while the hand holds it.
@@ -92,8 +92,8 @@ impl Holding {
         Ok(())
     }
 
-    /// Lets go of the object and puts it back to where it began. A table is as high as the lowest
-    /// point of the object there.
+    /// Releases the object and puts it back to its home. A table is as high as the lowest point of the
+    /// object there.
     pub(crate) fn put_home(&mut self, shown: &mut Shown) {
         self.thesis.let_go();
         let home = *self.thesis.home();

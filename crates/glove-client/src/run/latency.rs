@@ -1,4 +1,4 @@
-//! How long it takes from the first byte of a sample to the displacement that it causes, by stage.
+//! Times from the first byte of a sample to the display of the displacement that it causes, by stage.
 
 use std::collections::VecDeque;
 
@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use crate::run::answer_tally::Times;
 
-/// What is known of a tick that asked the server.
+/// Times of a tick that has asked the server.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Asked {
     tick: u64,
-    /// First byte of the older of the two samples that it used, s.
+    /// Time of the first byte of the older of the two samples that the tick used, s.
     sample_s: f64,
-    /// When the tick began and when it had asked, s.
+    /// Times at which the tick began and at which it had sent its question, s.
     began_s: f64,
     asked_s: f64,
 }
@@ -21,20 +21,20 @@ struct Asked {
 #[derive(Clone, Debug, Default)]
 pub struct LatencyLedger {
     asked: VecDeque<Asked>,
-    /// Those of each stage, in the order of [`Stage`].
+    /// Times of each stage, in the order of [`Stage`].
     times: [Times; 5],
 }
 
-/// Stages on the way.
+/// Stages from the sample to the display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// From the first byte of the sample to the tick that takes it.
+    /// From the first byte of the older sample to the tick that uses it.
     SampleToTick,
     /// From the beginning of the tick to the question.
     TickToQuestion,
-    /// From the question to the answer, the way included.
+    /// From the question to the answer, transport included.
     QuestionToAnswer,
-    /// From the answer to the tick that shows it, and to the end of that tick.
+    /// From the answer to the end of the tick that shows it.
     AnswerToShown,
     /// From the first byte to the end of the tick that shows what it caused.
     Whole,
@@ -43,18 +43,18 @@ enum Stage {
 /// The times of one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StageLatency {
-    /// Half of the times are not longer, ms.
+    /// Median of the times, ms.
     pub p50_ms: f64,
-    /// 99 % of the times are not longer, ms.
+    /// Time that 99 % of the times do not exceed, ms.
     pub p99_ms: f64,
 }
 
-/// The ledger in numbers.
+/// Quantiles of the times of all stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct LatencySummary {
-    /// Answers that were counted.
+    /// Number of answers that were counted.
     pub answers: usize,
-    /// From the first byte of the older sample to the tick that takes it.
+    /// From the first byte of the older sample to the tick that uses it.
     pub sample_to_tick: StageLatency,
     /// From the beginning of the tick to the question.
     pub tick_to_question: StageLatency,
@@ -66,11 +66,11 @@ pub struct LatencySummary {
     pub whole: StageLatency,
 }
 
-/// Questions that wait for an answer longer than so many others are given up.
+/// Number of questions that wait for an answer; older ones are given up.
 const ASKED_MAX: usize = 1024;
 
 impl LatencyLedger {
-    /// A tick has asked the server.
+    /// Books the question of a tick.
     ///
     /// Units: s on the client's clock.
     pub fn asked(&mut self, tick: u64, sample_s: f64, began_s: f64, asked_s: f64) {
@@ -80,9 +80,10 @@ impl LatencyLedger {
         self.asked.push_back(Asked { tick, sample_s, began_s, asked_s });
     }
 
-    /// An answer is shown.
+    /// Books the answer that a tick shows.
     ///
-    /// Units: `round_trip_ms` from asking to having the answer; `shown_s` s on the client's clock.
+    /// Units: `round_trip_ms` ms from sending the question to having the answer; `shown_s` s on the
+    /// client's clock.
     pub fn shown(&mut self, tick: u64, round_trip_ms: f64, shown_s: f64) {
         let Some(at) = self.asked.iter().position(|asked| asked.tick == tick) else { return };
         let Asked { sample_s, began_s, asked_s, .. } = self.asked[at];
@@ -101,7 +102,7 @@ impl LatencyLedger {
         }
     }
 
-    /// The ledger in numbers; `None` if nothing was counted.
+    /// Summary of the times; `None` if no answer was counted.
     pub fn summary(&self) -> Option<LatencySummary> {
         let stage = |stage: Stage| {
             let times = &self.times[stage as usize];

@@ -1,5 +1,5 @@
-//! The object of a run between hand and server: answers become its shape, and what was made beside the
-//! ticks takes its place.
+//! Object of a run between hand and server: answers become its shape, and results of background work
+//! replace it.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use crate::run::shown::Shown;
 use crate::run::springback::support;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// The object of a run: how it is shown, what is asked about it, and what is made of it.
+/// Object of a run: how it is shown, the questions about it, and its changes.
 pub(crate) struct LiveObject {
     pub(crate) shown: Shown,
     pub(crate) questions: Questions,
@@ -30,10 +30,10 @@ pub(crate) struct LiveObject {
 }
 
 impl LiveObject {
-    /// In lockstep the tick waits for the answers to what it has asked, and takes them.
+    /// Waits, in lockstep, for the answers to the tick's questions, and takes them.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the answer does not fit the object.
     pub(crate) fn wait_in_lockstep(
         &mut self,
         holding: &mut Holding,
@@ -45,10 +45,10 @@ impl LiveObject {
         }
     }
 
-    /// Takes what has come from the server.
+    /// Takes the news and answers that have come from the server.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the answer does not fit the object.
     pub(crate) fn pick_up(
         &mut self,
         holding: &mut Holding,
@@ -85,7 +85,7 @@ impl LiveObject {
         Ok(())
     }
 
-    /// Shows an answer if it belongs to the grasp that is going on, and to a shape that may change.
+    /// Shows an answer if it belongs to the present grasp, and if the shape may change.
     fn show(
         &mut self,
         tick: u64,
@@ -114,8 +114,8 @@ impl LiveObject {
         self.shown.deform(&reached.nodes, reached.displacement)
     }
 
-    /// Shows the answer to the step of a tick of a free object, unless the object has been changed since
-    /// or may not change.
+    /// Shows the answer to a step of the free object, unless the object was changed since then or may not
+    /// change.
     fn show_step(
         &mut self,
         contact: &mut ContactGrasp,
@@ -152,7 +152,7 @@ impl LiveObject {
         shown.deform(&reached.nodes, reached.displacement)
     }
 
-    /// A command for the grasp, unless the shape that is to be kept cannot be, or not yet.
+    /// Command for the grasp; `None` if it would keep a shape that cannot be kept, or not yet.
     pub(crate) fn allowed(
         &mut self,
         command: Option<Command>,
@@ -179,13 +179,13 @@ impl LiveObject {
         matches!(self.changing.keep(), Keep::Made(_)).then_some(Command::KeepShape)
     }
 
-    /// Begins to make the shape as it is now the next rest shape.
+    /// Begins to make the present shape the next rest shape.
     fn begin_to_keep(&mut self, keep: Keep, holding: &mut Holding, outcome: &mut TickOutcome) {
         self.changing.begin_to_keep(keep, self.shown.object(), self.questions.settings());
         self.take_work(holding, outcome);
     }
 
-    /// The shape that is kept is the rest shape from now on, if it has been made; whether it was.
+    /// Takes the kept shape as the rest shape, if it is ready; returns whether it was.
     pub(crate) fn keep_made(&mut self) -> bool {
         let made = self.changing.take_made();
         let is_kept = made.is_some();
@@ -196,16 +196,16 @@ impl LiveObject {
         is_kept
     }
 
-    /// Nothing deforms the object any more.
+    /// Ends a wish to keep the shape, because nothing deforms the object any more.
     pub(crate) fn stop_keeping(&mut self, outcome: &mut TickOutcome) {
         self.shown.forget_answer();
         self.changing.stop_keeping(outcome);
     }
 
-    /// The fingers do not deform the object (any more).
+    /// Ends the deformation, because the fingers do not hold the object any more.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the object cannot be shown.
     pub(crate) fn let_go(
         &mut self,
         holding: &mut Holding,
@@ -229,7 +229,7 @@ impl LiveObject {
         self.shown.relax()
     }
 
-    /// Asks for the shape without the hand. Until it is known the object stays as it is.
+    /// Asks for the shape without the hand; until it is known the object keeps its shape.
     fn begin_to_spring_back(&mut self, grip: u64, outcome: &mut TickOutcome) {
         self.refuse_to_save_half(outcome);
         self.questions.end_grip();
@@ -260,7 +260,7 @@ impl LiveObject {
         Ok(())
     }
 
-    /// There is no shape without the hand.
+    /// Gives up springing back, because there is no equilibrium without the hand.
     fn refuse_springback(&mut self, outcome: &mut TickOutcome) -> Result<(), ObjectError> {
         outcome.sprung_back = true;
         match self.changing.keep() {
@@ -277,7 +277,7 @@ impl LiveObject {
         self.shown.relax()
     }
 
-    /// Puts the dented object in the place of the one that was squeezed.
+    /// Replaces the squeezed object by the one with the dent.
     fn show_dent(&mut self, made: Result<Box<KeptShape>, ObjectError>, outcome: &mut TickOutcome) {
         self.changing.set_keep(Keep::NotWanted);
         match made {
@@ -292,7 +292,7 @@ impl LiveObject {
         }
     }
 
-    /// Takes what has been done beside the ticks.
+    /// Takes the outcomes of background work.
     pub(crate) fn take_work(&mut self, holding: &mut Holding, outcome: &mut TickOutcome) {
         while let Some(done) = self.changing.take_done(self.questions.takes_shapes()) {
             outcome.took_work |= matches!(done, ObjectDone::Kept(_) | ObjectDone::Replacement(_));
@@ -319,7 +319,7 @@ impl LiveObject {
         self.changing.give_up_lost_work(outcome);
     }
 
-    /// Lets the server prepare the columns of what a fingertip is about to touch.
+    /// Asks the server to prepare the columns of contacts that a fingertip is about to make.
     ///
     /// Units: m. Frame: the object's.
     pub(crate) fn prefetch(
@@ -336,7 +336,7 @@ impl LiveObject {
         }
     }
 
-    /// Puts what was made beside the ticks in the place of the object.
+    /// Replaces the object by one that was made in the background.
     fn put_in_place(&mut self, made: KeptShape, holding: &mut Holding, outcome: &mut TickOutcome) {
         // Nobody waits for it.
         let Some(replacement) = self.changing.take_replacement() else { return };
@@ -359,17 +359,17 @@ impl LiveObject {
         outcome.notices.push(Notice::done(text));
     }
 
-    /// From now on the object is another one, or has another rest shape.
+    /// Shows another object, or one with another rest shape, from now on.
     fn show_from_now_on(&mut self, made: KeptShape) {
         self.shown.replace(made.object);
         self.questions.meet_model(made.model);
     }
 
-    /// Has the object made of another material. An element that is the cheapest that does not lock
-    /// follows Poisson's ratio.
+    /// Begins to make the object of another material. An element that was chosen as the cheapest without
+    /// locking follows Poisson's ratio.
     ///
     /// # Errors
-    /// Why not, in a sentence.
+    /// Reason for a refusal, in a sentence.
     pub(crate) fn set_material(&mut self, material: Material) -> Result<(), Notice> {
         ElasticMaterial::try_new(material.young, material.poisson)
             .map_err(|error| Notice::refused(format!("the material is not taken: {error}")))?;
@@ -384,13 +384,13 @@ impl LiveObject {
         Ok(())
     }
 
-    /// Has an object made that takes the place of this one.
+    /// Begins to make an object that replaces this one.
     pub(crate) fn begin_to_replace(&mut self, rest: Arc<RestShape>, replacement: Replacement) {
         let settings = self.questions.settings();
         self.changing.begin_to_replace(rest, replacement, self.shown.object(), settings);
     }
 
-    /// Writes the file that waits for the whole shape, once that is known.
+    /// Writes the file that waits for all nodes, once they are known.
     pub(crate) fn save_when_whole(&mut self, holding: &mut Holding, outcome: &mut TickOutcome) {
         if self.changing.save_when_whole(self.shown.object()) {
             self.take_work(holding, outcome);
@@ -406,7 +406,7 @@ impl LiveObject {
         }
     }
 
-    /// The shape is gone before it was known whole.
+    /// Gives up the file whose shape ended before all of its nodes were known.
     fn refuse_to_save_half(&mut self, outcome: &mut TickOutcome) {
         let why = "the hand let go before the inside of the object was known";
         self.changing.refuse_to_save(why, outcome);

@@ -1,4 +1,4 @@
-//! Copies out of the run what there is to see of a tick.
+//! Copies the visible state of a tick out of the run.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::pace::Due;
 use crate::run::grasp_loop::GraspLoop;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// The hand as it will squeeze the object, made anew when its plan changes.
+/// Preview of the hand that will squeeze the object, made again when its plan changes.
 #[derive(Default)]
 pub struct Foresight {
     made_for: Option<GraspPlan>,
@@ -23,7 +23,7 @@ pub struct Foresight {
 }
 
 impl Foresight {
-    /// What the hand of a run does by itself.
+    /// What the hand of a run does without a person: its script and plan.
     pub fn acts(&mut self, hand: &HandSource, grasp_loop: &GraspLoop) -> HandActs {
         let plan = hand.plan();
         if plan != self.made_for {
@@ -49,19 +49,19 @@ impl Foresight {
     }
 }
 
-/// What is to be told with the next frame, gathered tick by tick.
+/// Gathers, tick by tick, what the next frame for the window tells.
 #[derive(Default)]
 pub struct Observer {
     news: Vec<News>,
     timings: Vec<TickTiming>,
     solve: Option<SolveSummary>,
     ticks_skipped: u64,
-    /// What was heard of the server last.
+    /// Last news of the server.
     said: Option<String>,
 }
 
 impl Observer {
-    /// Takes note of a tick, whether or not it becomes a frame.
+    /// Notes a tick, whether or not it becomes a frame for the window.
     pub fn note(&mut self, due: Due, outcome: &TickOutcome) {
         self.ticks_skipped += due.skipped;
         let heard = outcome.events.iter().rev().find_map(|event| match event {
@@ -76,7 +76,7 @@ impl Observer {
         }
     }
 
-    /// The frame of the tick that was noted last.
+    /// Frame for the window, of the tick that was noted last.
     pub fn frame(
         &mut self,
         due: Due,

@@ -1,22 +1,22 @@
-//! Where an object is put when the hand comes: at its home, or between its thumb and fingers.
+//! Place of an object when the hand comes: its home, or between thumb and fingers.
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use softgrasp_grasp::hand::{HandDimensions, HandPose, JointAngles, clearance, hand_bodies, pose};
 use softgrasp_grasp::object::SoftObject;
 
-/// Postures on the way from the hand as it is to a fist in which thumb and fingers are looked at, and how far
-/// that way goes.
+/// Number of postures between the present hand and a fist, in which the distance of thumb and fingers is
+/// measured, and the part of this motion that is used.
 const POSTURES: u32 = 24;
 const CLOSES_MAX: f64 = 0.7;
-/// Room between hand and object, m.
+/// Least distance between hand and object, m.
 const ROOM_M: f64 = 3e-3;
-/// Steps in which the object is moved away from the palm until there is room, m.
+/// Length of the steps by which the object is moved away from the palm until there is room, m.
 const STEP_M: f64 = 2e-3;
-/// The object is moved away from the palm by no more than this, m.
+/// Largest distance by which the object is moved away from the palm, m.
 const AWAY_MAX_M: f64 = 0.2;
 
-/// Pose of an object, turned as it is at rest, between thumb and fingers of a hand that closes, moved out of
-/// the palm until there is room for it beside the hand as it is.
+/// Pose of an object, oriented as at rest, between thumb and fingers of a closing hand, moved out of the
+/// palm until there is room for it beside the present hand.
 pub(crate) fn where_it_closes(
     dimensions: &HandDimensions,
     angles: &JointAngles,
@@ -43,8 +43,8 @@ pub(crate) fn where_it_closes(
     poses.into_iter().find(has_room).unwrap_or_else(|| at(AWAY_MAX_M))
 }
 
-/// The point between the tips of thumb and of index and middle finger when a hand that closes has so much
-/// room between them as an object is wide.
+/// Point between the tips of the thumb and of index and middle finger, in the posture of a closing hand
+/// in which they are as far apart as the object is wide.
 ///
 /// Units: m. Frame: world.
 fn between_the_tips(

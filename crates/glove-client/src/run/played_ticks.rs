@@ -1,4 +1,4 @@
-//! The ticks of a run, one record each: the newest in memory, older ones in a file.
+//! Records of the ticks of a run: the newest in memory, older ones in a file.
 
 use std::collections::VecDeque;
 use std::collections::vec_deque::Iter;
@@ -13,67 +13,67 @@ use softgrasp_protocol::solve_report::SolveSummary;
 
 use crate::run::contact_ledger::StepRecord;
 
-/// One tick that was played.
+/// Record of one tick that was played.
 #[derive(Clone, Debug, Serialize)]
 pub struct TickRecord {
-    /// Number, from 0.
+    /// Number of the tick, from 0.
     pub tick: u64,
-    /// When it began, ms since the first tick was due.
+    /// Time at which the tick began, ms since the first tick was due.
     pub at_ms: f64,
-    /// Grasp state after it.
+    /// State of the grasp after the tick.
     pub state: String,
-    /// Which tips touch: thumb, index, middle, ring, little.
+    /// Whether each fingertip touches: thumb, index, middle, ring, little.
     pub tips: [bool; 5],
-    /// Segments shown at their last free pose, by finger.
+    /// Number of segments shown at their last free pose, for each finger.
     pub recalled: [u8; 5],
-    /// The answer to what was asked in this tick; null when nothing was asked or no answer came.
+    /// Answer to the tick's question; null if nothing was asked or no answer came.
     pub solve: Option<SolveSummary>,
-    /// The step of a grasp by friction that was asked for in this tick; null where none was answered.
+    /// Step of a grasp by friction that the tick asked for; null if it was not answered.
     pub contact: Option<StepRecord>,
-    /// Why a deforming tick has no answer; null for all others.
+    /// Reason why a deforming tick has no answer; null for all other ticks.
     pub unanswered: Option<&'static str>,
-    /// Tick whose answer the object shows after this one; null while it shows none of this grip.
+    /// Tick whose answer the object shows after this one; null if it shows none of this grip.
     pub shown_tick: Option<u64>,
-    /// Time for which the tick computed, ms.
+    /// Computing time of the tick, ms.
     pub compute_ms: f64,
 }
 
 impl TickRecord {
-    /// Whether the fingers deformed the object.
+    /// Whether the fingers deformed the object in this tick.
     pub(crate) fn deforms(&self) -> bool {
         self.state == StateName::Deforming.to_string()
     }
 
-    /// Whether the fingers deformed the object and nothing has become of it.
+    /// Whether the fingers deformed the object, and there is neither an answer nor a reason yet.
     pub(crate) fn is_open(&self) -> bool {
         self.deforms() && self.solve.is_none() && self.unanswered.is_none()
     }
 }
 
-/// The records of a run, in order. Memory does not grow with the run: beyond the newest, records are
-/// written to a file without a name, if they are wanted at all.
+/// Records of a run, in order. Memory does not grow with the run: older records are written to a file
+/// without a name, if they are wanted at all.
 #[derive(Debug, Default)]
 pub struct PlayedTicks {
     newest: VecDeque<TickRecord>,
-    /// Records that are older, one line of JSON each; `None` where nobody wants them.
+    /// File of older records, one line of JSON each; `None` if they are not wanted.
     older: Option<File>,
-    /// Lines of that file that are not in it yet.
+    /// Lines that are still to be written to the file.
     to_write: Vec<u8>,
     count: u64,
-    /// Why there is no file, where there should be one.
+    /// Reason why there is no file although records are wanted.
     no_file: Option<String>,
-    /// Why older records are not all there.
+    /// Reason why older records are incomplete.
     failed: Option<String>,
 }
 
-/// So many records are in memory: more than a minute at 60 ticks a second. No answer is later.
+/// Number of records in memory: more than a minute at 60 ticks a second. No answer comes later.
 const NEWEST_MAX: usize = 4096;
-/// The file is written in pieces of this size.
+/// Length of the pieces in which the file is written, bytes.
 const PIECE_BYTES: usize = 1 << 16;
 
 impl PlayedTicks {
-    /// Older records are wanted, for a report at this path. They are kept in a file without a name
-    /// beside it, or where the system has its temporary files.
+    /// Keeps older records for a report at this path, in a file without a name beside it, or in the
+    /// system's folder for temporary files.
     pub fn keep_older(&mut self, report: &Path) {
         let folder = report.parent().filter(|folder| *folder != Path::new(""));
         let beside = tempfile::tempfile_in(folder.unwrap_or(Path::new(".")));
@@ -83,7 +83,7 @@ impl PlayedTicks {
         }
     }
 
-    /// Adds a record; the one that leaves memory for it.
+    /// Adds a record; returns the one that leaves memory for it.
     pub fn push(&mut self, record: TickRecord) -> Option<TickRecord> {
         self.count += 1;
         self.newest.push_back(record);
@@ -115,17 +115,17 @@ impl PlayedTicks {
         self.to_write.clear();
     }
 
-    /// Why older records are missing, if they are wanted and are not there.
+    /// Reason why older records are missing, if they are wanted and incomplete.
     pub fn why_missing(&self) -> Option<&str> {
         self.failed.as_deref()
     }
 
-    /// How many ticks were played.
+    /// Number of ticks that were played.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The records in memory, oldest first.
+    /// Records in memory, oldest first.
     pub fn iter(&self) -> Iter<'_, TickRecord> {
         self.newest.iter()
     }
@@ -135,7 +135,7 @@ impl PlayedTicks {
         self.newest.back()
     }
 
-    /// The newest record, to be changed.
+    /// The newest record, for changes.
     pub fn last_mut(&mut self) -> Option<&mut TickRecord> {
         self.newest.back_mut()
     }
@@ -146,7 +146,7 @@ impl PlayedTicks {
         self.newest.get(at)
     }
 
-    /// Record of a tick, to be changed.
+    /// Record of a tick, for changes, if it is in memory.
     pub fn get_mut(&mut self, tick: u64) -> Option<&mut TickRecord> {
         let at = self.newest.binary_search_by_key(&tick, |record| record.tick).ok()?;
         self.newest.get_mut(at)
@@ -162,7 +162,7 @@ impl<'a> IntoIterator for &'a PlayedTicks {
     }
 }
 
-/// All records, older ones as they come from their file.
+/// Serialises all records; older ones as they are read from their file.
 impl Serialize for PlayedTicks {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut all = serializer.serialize_seq(None)?;

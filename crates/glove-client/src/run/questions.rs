@@ -1,4 +1,4 @@
-//! What a run asks the server: the questions of ticks, and which of their answers a tick takes.
+//! Questions of the ticks to the server, and the choice of the answers that a tick takes.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,44 +22,43 @@ use crate::object::object_work::ObjectJob;
 use crate::pace::Pace;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// What a report says when the server has prepared the model of a rest shape.
+/// Text of the report's event when the server has prepared the model of a rest shape.
 pub const MODEL_READY: &str = "model ready";
-/// Stands for the tick of a question about the shape that an object springs back to. Recordings
-/// hold it; every reader of JSON can represent it.
+/// Number used as the tick of a question about the shape that an object springs back to. Recordings
+/// contain it; every reader of JSON can represent it.
 pub const SPRINGBACK: u64 = (1 << 53) - 1;
-/// Stands for the tick of a question that no tick asked; no report counts it.
+/// Number used as the tick of a question outside the ticks, which no report counts.
 pub(crate) const UNCOUNTED: u64 = u64::MAX;
-/// Longest wait of a lockstep tick; a server that takes longer is overtaken.
+/// Longest wait of a lockstep tick for its answer.
 const LOCKSTEP_WAIT_MAX: Duration = Duration::from_secs(30);
-/// Share of the time from tick to tick in which a live frame at large deformation is to be answered;
-/// the rest is for what a solve takes longer, for the wire and for the shape.
+/// Share of the time from tick to tick within which a live question at large deformation is to be
+/// answered; the rest is for solves that take longer, for the wire and for the shape.
 const SHARE_FOR_ANSWERS: f64 = 0.6;
 
-/// What the server is asked about the object, and how.
+/// Questions about the object, and their settings.
 pub(crate) struct Questions {
     link: Link,
     settings: SolveSettings,
     wishes: AnswerWishes,
     pace: Pace,
-    /// Time that a live frame at large deformation may take, ms.
+    /// Time that a live question at large deformation may take, ms.
     answer_within_ms: Option<f64>,
     /// Tick in which the grip began, to tell answers of an earlier grip from those of this one.
     grip: Option<u64>,
     held: HeldNodes,
-    /// What the fingers held the object by in the last tick that asked.
+    /// Contacts of the fingers in the last tick that asked.
     last_known: Option<[KnownNode; 5]>,
     prefetched: Prefetched,
-    /// Whether digests of requests are wanted.
+    /// Whether digests of questions are wanted.
     digests: bool,
-    /// What the tick did with answers when it was recorded, while it is played again.
+    /// Answers that the tick took when it was recorded, during a replay.
     recorded: Option<RecordedAnswers>,
-    /// Requests that have ended and whose time to be taken has not come, while ticks are played
-    /// again.
+    /// Requests that have ended and are taken by a later tick, during a replay.
     held_back: Vec<RequestEnd>,
 }
 
 impl Questions {
-    /// Questions about an object, whose model is sent to the server at once.
+    /// Questions about an object; sends its model to the server at once.
     pub(crate) fn new(
         link: Link,
         settings: SolveSettings,
@@ -92,7 +91,7 @@ impl Questions {
         &self.settings
     }
 
-    /// Settings from the next question on; the material is that of the model that is there.
+    /// Settings of the next questions; the material is that of the present model.
     pub(crate) fn settings_mut(&mut self) -> &mut SolveSettings {
         &mut self.settings
     }
@@ -113,12 +112,12 @@ impl Questions {
         self.digests
     }
 
-    /// A live frame asks for its answer within a share of the time from tick to tick.
+    /// Sets the time from tick to tick, of which live questions ask for their answer within a share.
     pub(crate) fn tick_every(&mut self, period: Duration) {
         self.answer_within_ms = Some(SHARE_FOR_ANSWERS * 1e3 * period.as_secs_f64());
     }
 
-    /// Tells what the next tick did with answers when it was recorded; `None` for a tick that is new.
+    /// Sets the answers that the next tick took when it was recorded; `None` for a tick that is new.
     pub(crate) fn begin_tick(&mut self, recorded: Option<&RecordedAnswers>) {
         self.recorded = recorded.cloned();
     }
@@ -127,12 +126,12 @@ impl Questions {
         self.recorded.as_ref()
     }
 
-    /// Tick in which the grip began that is going on.
+    /// Tick in which the present grip began.
     pub(crate) fn grip(&self) -> Option<u64> {
         self.grip
     }
 
-    /// Tick in which the grip began; it begins in this one if none is going on.
+    /// Tick in which the grip began; it begins in `tick` if there is none.
     pub(crate) fn begin_grip(&mut self, tick: u64) -> u64 {
         *self.grip.get_or_insert(tick)
     }
@@ -141,14 +140,14 @@ impl Questions {
         self.grip = None;
     }
 
-    /// The method from the next question on.
+    /// Sets the method, from the next question on.
     pub(crate) fn set_method(&mut self, method: softgrasp_protocol::MethodName) {
         self.settings.method = method;
         // Columns that were not asked for under another method may be needed now.
         self.prefetched.clear();
     }
 
-    /// The object has another rest shape, or is another one: its model is sent to the server.
+    /// Sends the model of another rest shape or object to the server.
     pub(crate) fn meet_model(&mut self, model: ModelUpload) {
         self.last_known = None;
         self.held.clear();
@@ -156,7 +155,7 @@ impl Questions {
         self.link.set_model(model);
     }
 
-    /// The question of a tick in which the fingers prescribe displacements.
+    /// Question of a tick in which the fingers prescribe displacements.
     pub(crate) fn question_of_tick(
         &mut self,
         object: &SoftObject,
@@ -205,8 +204,8 @@ impl Questions {
         }
     }
 
-    /// Asks the server; whether it was asked. A tick that is played again asks what was answered, by
-    /// the method that answered it, and nothing else.
+    /// Asks the server; returns whether it was asked. A tick that is replayed only asks what was answered
+    /// when it was recorded, by the method that answered it.
     pub(crate) fn ask(
         &mut self,
         tick: u64,
@@ -240,8 +239,8 @@ impl Questions {
         true
     }
 
-    /// Asks the last question of the grip once more, for all nodes and outside the ticks; whether
-    /// there is one.
+    /// Asks the last question of the grip again for all nodes, outside the ticks; returns whether there
+    /// is one.
     pub(crate) fn ask_whole(&mut self, object: &SoftObject, tip_radii: [f64; 5]) -> bool {
         let (Some(grip), Some(known)) = (self.grip, self.last_known) else { return false };
         let question = self.question(object, tip_radii, true, &known);
@@ -249,8 +248,8 @@ impl Questions {
         true
     }
 
-    /// Asks for the shape that the object takes when it is held by nothing but a support
-    /// (prescribed displacements that carry no force).
+    /// Asks for the equilibrium of the object without the hand, held by prescribed displacements that
+    /// carry no force.
     pub(crate) fn ask_to_spring_back(&self, grip: u64, support: Vec<DofValue>) {
         let question = Question {
             known: support,
@@ -262,15 +261,15 @@ impl Questions {
         self.link.ask(SPRINGBACK, grip, question, self.large_ask());
     }
 
-    /// What is asked of large deformation. Where bits are to repeat, nothing may depend on the
-    /// clock: in lockstep, and while a run is recorded or played again.
+    /// Wish for large deformation. In lockstep, and while a run is recorded or replayed, the answer must
+    /// not depend on elapsed time, so that its bits repeat.
     fn large_ask(&self) -> Option<LargeAsk> {
         let repeats = self.pace == Pace::Lockstep || self.digests || self.recorded.is_some();
         let pace = if repeats { FramePace::Repeatable } else { FramePace::Timely };
         self.settings.elasticity.ask(PathChoice::Continue, pace)
     }
 
-    /// In lockstep the tick waits for the answers; whether it did.
+    /// Waits for the answers in lockstep; returns whether it waited.
     pub(crate) fn wait_in_lockstep(&self) -> bool {
         let waits = self.pace == Pace::Lockstep;
         if waits {
@@ -279,8 +278,8 @@ impl Questions {
         waits
     }
 
-    /// Requests that have ended and that the tick takes: all, or when it is played again those that
-    /// it took before, in the same order. What the server has done besides becomes events.
+    /// Requests that have ended and that the tick takes: all, or in a replay those that it took when it
+    /// was recorded, in the same order. Other news of the server become events.
     pub(crate) fn take_ended(&mut self, outcome: &mut TickOutcome) -> Vec<RequestEnd> {
         let (events, ended) = self.link.take();
         outcome.events.extend(events.into_iter().map(|event| LoopEvent::Server(words_of(event))));
@@ -294,18 +293,18 @@ impl Questions {
         taken.collect()
     }
 
-    /// Whether the tick takes rest shapes that were made beside the ticks: one that is played again
-    /// only if it did so before.
+    /// Whether the tick takes rest shapes that were made in the background; in a replay only if it did so
+    /// when it was recorded.
     pub(crate) fn takes_shapes(&self) -> bool {
         self.recorded.as_ref().is_none_or(|recorded| recorded.took_work)
     }
 
-    /// Whether the tick, when it was recorded, got no shape that the object springs back to.
+    /// Whether the recorded tick got no shape to spring back to.
     pub(crate) fn springback_was_refused(&self) -> bool {
         self.recorded.as_ref().is_some_and(|recorded| recorded.springback_refused)
     }
 
-    /// Forces of the fingertips in an answer to the question of this grip (N, the object's frame).
+    /// Forces of the fingertips in an answer to the question of this grip, N, in the object's frame.
     pub(crate) fn fingertip_forces(
         &self,
         reactions: &[DofValue],
@@ -314,8 +313,8 @@ impl Questions {
         self.held.fingertip_forces(reactions, mask_forces)
     }
 
-    /// The work that lets the server prepare the columns of what a fingertip is about to touch, if
-    /// anything is near that has not been prepared.
+    /// Job that makes the hint for contacts that a fingertip is about to make; `None` if all of them are
+    /// prepared.
     ///
     /// Units: m. Frame: the object's.
     pub(crate) fn next_prefetch(

@@ -1,4 +1,4 @@
-//! What a recording keeps of a tick, in plain numbers.
+//! Content of a recording about a tick, in plain numbers.
 
 use softgrasp_core::mesh::Surface;
 use softgrasp_grasp::hand::HandPose;
@@ -14,7 +14,7 @@ use crate::run::grasp_loop::GraspLoop;
 use crate::run::questions::SPRINGBACK;
 use crate::run::tick_outcome::TickOutcome;
 
-/// What a tick made; the recorder adds what it took.
+/// Results of a tick for a recording; the recorder adds the bytes that it used.
 ///
 /// Units: `now_s` s on the client's clock.
 pub fn tick_seen(
@@ -35,7 +35,7 @@ pub fn tick_seen(
     }
 }
 
-/// What happened in a tick, or while none was played, and which answers were taken.
+/// Events of a tick, or of the time without one, and the answers that were taken.
 pub fn news(outcome: &TickOutcome) -> TickNews {
     let of_ticks = outcome.answers.iter().map(|(tick, solve)| AnswerSeen {
         tick: *tick,
@@ -68,8 +68,8 @@ pub fn news(outcome: &TickOutcome) -> TickNews {
     }
 }
 
-/// Hand and object after a tick, the object with its surface or without; `None` until both devices have
-/// spoken.
+/// Hand and object after a tick, with the object's surface if `with_surface`; `None` until both devices
+/// have sent samples.
 ///
 /// Units: `now_s` s on the client's clock.
 pub fn scene(
@@ -93,7 +93,7 @@ pub fn scene(
     })
 }
 
-/// The deformed surface, with its nodes numbered anew.
+/// Deformed surface, with its own numbering of nodes.
 fn surface(object: &SoftObject) -> SurfaceSeen {
     let Surface { nodes, triangles, .. } = object.surface();
     let place_of = |node: &u32| nodes.binary_search(node).map_or(0, |place| place as u32);
@@ -115,7 +115,7 @@ fn pose(tick: u64, hand: &HandPose, grasp_loop: &GraspLoop) -> PoseSeen {
     }
 }
 
-/// Digests of a tick that has just been played.
+/// Digests of the stages of a tick that has just been played.
 pub fn stage_digests(grasp_loop: &GraspLoop, outcome: &TickOutcome) -> StageDigests {
     let Some(hand) = grasp_loop.hand() else { return StageDigests::default() };
     let mut pose = Digest::default();

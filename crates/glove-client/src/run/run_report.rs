@@ -25,67 +25,67 @@ use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 pub struct RunReport {
     schema: u32,
     command: &'static str,
-    /// What was grasped.
+    /// Object that was grasped.
     pub object: ObjectSummary,
-    /// Which hand.
+    /// Kind of hand.
     pub hand: String,
-    /// Where it was solved.
+    /// Server that solved: its address, or `embedded`.
     pub server: String,
-    /// `lockstep` or `free`.
+    /// How ticks and server kept step: `lockstep` or `free`.
     pub pace: &'static str,
-    /// What a fingertip holds: `vertex`, `patch` or `mask`.
+    /// What a fingertip held: `vertex`, `patch` or `mask`.
     pub contact: String,
-    /// Ticks of the run, played and skipped.
+    /// Number of ticks of the run, played and skipped.
     pub ticks: u64,
-    /// Whether the user ended it.
+    /// Whether the user ended the run.
     pub interrupted: bool,
-    /// Grasp states in the order they were first reached.
+    /// States of the grasp, in the order in which they were first reached.
     pub states_reached: Vec<String>,
-    /// Everything that happened.
+    /// Events of the run, in their order.
     pub events: Vec<EventRecord>,
-    /// Events beyond the first 10 000, which are counted only.
+    /// Number of events beyond the first 10 000, which are not listed.
     pub events_left_out: u64,
-    /// One entry per tick that was played.
+    /// Record of each tick that was played.
     #[serde(rename = "frames")]
     pub played: PlayedTicks,
-    /// Why entries of older ticks are missing; null where none is.
+    /// Reason why records of older ticks are missing; null if none is.
     pub frames_missing: Option<String>,
     /// The run in a few numbers.
     pub summary: RunSummary,
-    /// How a replay agrees with its recording; null for other hands.
+    /// Comparison of a replay with its recording; null for other hands.
     pub replay: Option<ReplaySummary>,
-    /// Why the recording of this run is not complete; null where it is, or none was made.
+    /// Reason why the recording of this run is incomplete; null if it is complete, or if there is none.
     pub recording_failed: Option<String>,
-    /// What was wrong with devices from which no pose of a hand ever came; null where one came.
+    /// Faults of devices from which no pose of a hand ever came; null if one came.
     pub no_hand: Option<Vec<String>>,
-    /// The answers, counted as they come.
+    /// Totals of the answers.
     #[serde(skip)]
     answers: AnswerTally,
-    /// What the server refused last, or why it was lost.
+    /// Text of the server's last refusal, or reason of its loss.
     #[serde(skip)]
     pub(crate) last_failure: Option<String>,
 }
 
-/// So many events are told; a device that comes and goes for days brings about no more.
+/// Largest number of events that are listed; a device with a loose contact could cause any number.
 const EVENTS_MAX: usize = 10_000;
 
-/// How a replay agrees with its recording.
+/// Comparison of a replay with its recording.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReplaySummary {
-    /// Ticks that were compared.
+    /// Number of ticks that were compared.
     pub ticks: u64,
-    /// Ticks that could be read in the recording.
+    /// Number of ticks that could be read in the recording.
     pub recorded: u64,
-    /// Ticks with known displacements among those compared.
+    /// Number of compared ticks with known displacements.
     pub requests: u64,
-    /// Tick and stage of the first difference; null when there is none.
+    /// Tick and stage of the first difference; null if there is none.
     pub difference: Option<Difference>,
-    /// Why the recording ends before its file does; null for one that is whole.
+    /// Reason why the recording is cut off; null for a complete one.
     pub cut: Option<String>,
 }
 
 impl ReplaySummary {
-    /// What a hand that was played again has found.
+    /// Comparison that a replayed hand has made.
     pub fn of(hand: &ReplayHand) -> Self {
         let ReplayCheck { ticks, requests, difference } = hand.check.clone();
         let recording = hand.recording();
@@ -93,7 +93,7 @@ impl ReplaySummary {
         Self { ticks, recorded, requests, difference, cut: recording.cut.clone() }
     }
 
-    /// Why the replay does not show that the recording is repeated; `None` where it does.
+    /// Reason why the replay does not confirm its recording; `None` if it does.
     pub fn failed(&self, interrupted: bool) -> Option<String> {
         let Self { ticks, recorded, difference, cut, .. } = self;
         match (difference, cut) {
@@ -115,16 +115,16 @@ impl ReplaySummary {
     }
 }
 
-/// One event.
+/// One event of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EventRecord {
-    /// When.
+    /// Tick of the event.
     pub tick: u64,
-    /// When, ms since the first tick was due.
+    /// Time of the event, ms since the first tick was due.
     pub at_ms: f64,
-    /// `grasp`, `shape` or `server`.
+    /// Kind of the event: `grasp`, `shape` or `server`.
     pub kind: &'static str,
-    /// What, in words.
+    /// What happened, in words.
     pub what: String,
 }
 
@@ -133,82 +133,82 @@ pub struct EventRecord {
 /// Invariant: `deforming_ticks` = `solves` + the sum of `unanswered`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RunSummary {
-    /// Deforming ticks that were answered.
+    /// Number of deforming ticks that were answered.
     pub solves: usize,
-    /// Ticks in which the fingers deformed the object, skipped ones included.
+    /// Number of ticks in which the fingers deformed the object, skipped ones included.
     pub deforming_ticks: u64,
-    /// Deforming ticks without an answer, by reason.
+    /// Number of deforming ticks without an answer, by reason.
     pub unanswered: UnansweredCounts,
-    /// Ticks that were not played because their time was over.
+    /// Number of ticks that were not played because their time was over.
     pub ticks_skipped: u64,
-    /// Ticks that computed for longer than a millisecond.
+    /// Number of ticks that computed for longer than a millisecond.
     pub ticks_over_1_ms: u64,
-    /// Longest time for which a tick computed, ms.
+    /// Longest computing time of a tick, ms.
     pub compute_ms_max: f64,
-    /// From the first byte of a sample to the displacement that it causes, by stage; null for a run
-    /// whose ticks wait for their answers, or in which nothing was deformed.
+    /// Times from the first byte of a sample to the display of the displacement that it causes, by stage;
+    /// null for a run whose ticks wait for their answers, or without deformation.
     pub latency: Option<LatencySummary>,
-    /// Largest relative residual.
+    /// Largest relative residual of an answer.
     pub residual_rel_max: f64,
     /// Median round trip, ms.
     pub round_trip_ms_p50: Option<f64>,
-    /// 99 % of the round trips took no longer, ms.
+    /// Time that 99 % of the round trips did not exceed, ms.
     pub round_trip_ms_p99: Option<f64>,
-    /// Longest round trip, ms: the first of a grasp, which computes what the grip needs.
+    /// Longest round trip, ms: that of the first question of a grasp, which computes the columns of the
+    /// grip.
     pub round_trip_ms_max: Option<f64>,
-    /// How old the shape was that a deforming tick showed: time since the tick that had asked for it, ms,
-    /// median; null where none was shown.
+    /// Median age of the shape that a deforming tick showed, ms: the time since the tick that had asked
+    /// for it; null if none was shown.
     pub shown_age_ms_p50: Option<f64>,
-    /// 99 % of the shapes were not older, ms.
+    /// Age that 99 % of the shapes did not exceed, ms.
     pub shown_age_ms_p99: Option<f64>,
-    /// The oldest shape, ms.
+    /// Age of the oldest shape, ms.
     pub shown_age_ms_max: Option<f64>,
-    /// Bytes on the wire of all requests that were answered.
+    /// Sum of the lengths of all answered requests on the wire, bytes.
     pub bytes_sent: u64,
-    /// Bytes on the wire of their answers.
+    /// Sum of the lengths of their answers on the wire, bytes.
     pub bytes_received: u64,
     /// Largest rotation of an element, degrees, of the answers that tell it; null where none does.
     pub max_rotation_deg: Option<f64>,
     /// Largest strain of an element, of the same answers.
     pub max_strain: Option<f64>,
-    /// Answers that were solved with the equations of large deformation; the others were linear.
+    /// Number of answers by the equations of large deformation; the others were linear.
     pub large_solves: usize,
-    /// Largest estimated error of an answer over its largest displacement; null where none was
+    /// Largest estimated error of an answer, relative to its largest displacement; null if none was
     /// estimated.
     pub error_estimate_rel_max: Option<f64>,
     /// Smallest ratio of an element's volume to that at rest; null without large deformation.
     pub min_jacobian: Option<f64>,
     /// How well the steps of a grasp by friction met the law of contact; null for the thesis's rules.
     pub contact: Option<ContactTotals>,
-    /// Equilibria that jumped.
+    /// Number of equilibria that jumped to another shape.
     pub jumps: usize,
     /// Largest resident memory of the server, bytes.
     pub peak_rss_bytes: u64,
-    /// Times a shape was kept.
+    /// Number of shapes that were kept.
     pub shapes_kept: usize,
-    /// Ticks in which a device was silent and the hand was held where it was.
+    /// Number of ticks in which a device was silent and the hand kept its pose.
     pub ticks_held: u64,
-    /// Jumps of the tracker to the opposite side of its field.
+    /// Number of jumps of the tracker to the opposite side of its field.
     pub hemisphere_flips: u64,
-    /// Bad lines of joints, and lines that no hand fits.
+    /// Number of bad lines of joints, and of lines that no hand fits.
     pub joint_faults: u64,
-    /// How well the hand fits a sender's joints; null where none came.
+    /// Distances of the fitted hand from the joints that were sent; null if none were sent.
     pub joint_fit: Option<FitErrors>,
-    /// Pieces of device bytes that were dropped because no tick took them in time.
+    /// Number of pieces of device bytes that were dropped because no tick took them in time.
     pub pieces_dropped: u64,
-    /// Readings of the glove's sensors, and poses of the tracker, that no hand can have brought about
-    /// and that were not taken.
+    /// Number of readings of the glove that no hand can cause and that were ignored.
     pub glove_jumps: u64,
-    /// See `glove_jumps`.
+    /// Number of poses of the tracker that no hand can cause and that were ignored.
     pub tracker_jumps: u64,
-    /// Bad records of the glove.
+    /// Number of bad records of the glove.
     pub glove_faults: u64,
-    /// Bad records of the tracker.
+    /// Number of bad records of the tracker.
     pub tracker_faults: u64,
 }
 
 impl RunReport {
-    /// An empty report.
+    /// Report of a run without a tick.
     pub fn new(
         object: ObjectSummary,
         hand: String,
@@ -283,7 +283,7 @@ impl RunReport {
         self.add_outcome(due.tick, at_ms, outcome);
     }
 
-    /// Adds what came after the last tick.
+    /// Adds the news that came after the last tick.
     pub fn add_last(&mut self, outcome: &TickOutcome) {
         let at_ms = self.played.last().map_or(0.0, |record| record.at_ms);
         self.add_outcome(self.ticks.saturating_sub(1), at_ms, outcome);
@@ -309,7 +309,7 @@ impl RunReport {
         }
     }
 
-    /// Adds ticks that were not played. They are deforming ticks if the one before them was.
+    /// Adds ticks that were not played; they are deforming ticks if the one before them was.
     pub fn add_skipped(&mut self, ticks: u64) {
         self.ticks += ticks;
         self.summary.ticks_skipped += ticks;
@@ -319,7 +319,7 @@ impl RunReport {
         }
     }
 
-    /// Adds how long the last tick computed.
+    /// Adds the computing time of the last tick.
     pub fn add_computed(&mut self, computed: Duration) {
         if let Some(record) = self.played.last_mut() {
             record.compute_ms = computed.as_secs_f64() * 1e3;
@@ -351,8 +351,9 @@ impl RunReport {
         }
     }
 
-    /// The ticks of which nothing has become, and why. A tick before one that was answered did not wait
-    /// for the end of the run: its answer was lost with the server, or a newer request took its place.
+    /// Deforming ticks without answer or reason, each with the reason that it ends with. A tick before an
+    /// answered one did not wait for the end of the run: its answer was lost with the server, or a newer
+    /// request replaced it.
     fn open_ticks(&self) -> Vec<(u64, Unanswered)> {
         let answered = self.played.iter().filter(|record| record.solve.is_some());
         let last_answered = answered.map(|record| record.tick).max();
@@ -368,7 +369,7 @@ impl RunReport {
         open.map(|record| (record.tick, why(record.tick))).collect()
     }
 
-    /// Fills the summary. What is not answered by now never is.
+    /// Fills the summary. A request without an answer by now stays without one.
     pub fn finish(&mut self, faults: DeviceFaults, budget: &TickBudget) {
         for (tick, why) in self.open_ticks() {
             self.add_unanswered(tick, why);

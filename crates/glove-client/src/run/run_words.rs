@@ -1,9 +1,9 @@
-//! The report of a run in words, for a person who has never seen the program.
+//! Report of a run in words, for a person who does not know the program.
 
 use crate::pace::Pace;
 use crate::run::run_report::{ReplaySummary, RunReport};
 
-/// Why the run is a failure: answers were asked for and none came. `None` if it is none.
+/// Reason why the run is a failure: questions were asked and none was answered. `None` if it is none.
 pub fn failure(report: &RunReport) -> Option<String> {
     if let Some(why) = &report.recording_failed {
         return Some(why.clone());
@@ -28,7 +28,7 @@ pub fn failure(report: &RunReport) -> Option<String> {
     Some(format!("none of {} deforming ticks was answered: {why}", s.deforming_ticks))
 }
 
-/// One screen for a person who has never seen the program.
+/// Summary of one screen, for a person who does not know the program.
 pub fn describe(report: &RunReport) -> String {
     let s = &report.summary;
     let mut text = format!(
@@ -82,7 +82,7 @@ pub fn describe(report: &RunReport) -> String {
     text
 }
 
-/// How large the systems of equations were, how soon they were solved, and how well.
+/// Sentences on the size of the systems of equations, the times and the errors of the answers.
 fn words_of_answers(report: &RunReport) -> String {
     let (s, Some(solve)) = (&report.summary, report.last_answer()) else { return String::new() };
     let ms = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2} ms"));
@@ -107,7 +107,7 @@ fn words_of_answers(report: &RunReport) -> String {
     text
 }
 
-/// How old the shape was that was shown, in real time.
+/// Sentence on the age of the shown shapes, for runs in real time.
 fn words_of_age(report: &RunReport) -> String {
     match (report.summary.shown_age_ms_p50, report.summary.shown_age_ms_max) {
         (Some(median), Some(most)) if report.pace == Pace::Free.name() => {
@@ -117,7 +117,7 @@ fn words_of_age(report: &RunReport) -> String {
     }
 }
 
-/// What is to be said of large deformation.
+/// Sentences on large deformation.
 fn words_of_large(report: &RunReport) -> String {
     let s = &report.summary;
     let Some(min_jacobian) = s.min_jacobian else { return String::new() };
@@ -133,7 +133,7 @@ fn words_of_large(report: &RunReport) -> String {
     text
 }
 
-/// What is to be said of silent devices, of the way of a sample, and of a replay.
+/// Sentences on silent devices, on latency, and on a replay.
 fn words_of_devices(report: &RunReport) -> String {
     let (s, mut text) = (&report.summary, String::new());
     if s.ticks_held > 0 {
@@ -167,7 +167,7 @@ fn words_of_devices(report: &RunReport) -> String {
     text
 }
 
-/// What a fingertip holds, by the name of `--contact`.
+/// Words for what a fingertip holds, by the name of `--contact`.
 pub fn words_of_contact(contact: &str) -> String {
     match contact {
         "vertex" => "the node that it touches (vertex)".to_owned(),
@@ -178,7 +178,7 @@ pub fn words_of_contact(contact: &str) -> String {
     }
 }
 
-/// Where it is solved, by the name of `--server`.
+/// Words for the server, by the name of `--server`.
 pub fn words_of_server(server: &str) -> String {
     match server {
         "embedded" => "in this program".to_owned(),
@@ -186,7 +186,7 @@ pub fn words_of_server(server: &str) -> String {
     }
 }
 
-/// What a replay has found, in a line or two.
+/// Sentences on what a replay has found.
 fn words_of_replay(replay: &ReplaySummary) -> String {
     let ReplaySummary { ticks, requests, difference, cut, .. } = replay;
     let found = match difference {

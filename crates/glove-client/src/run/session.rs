@@ -1,5 +1,5 @@
-//! A run from its first tick to its report: hand, grasp loop and report, one tick at a time, and
-//! what a person asks of it between the ticks.
+//! A run from its first tick to its report: hand, grasp loop and report, one tick at a time, and a
+//! person's wishes between the ticks.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ use crate::run::recorded_tick::{news, scene, stage_digests, tick_seen};
 use crate::run::run_report::{ReplaySummary, RunReport};
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// A run. It has no clock: whoever plays it says which tick is due.
+/// A run. It has no clock: the caller says which tick is due.
 pub struct Session {
     grasp_loop: GraspLoop,
     hand: HandSource,
@@ -35,25 +35,25 @@ pub struct Session {
     report: RunReport,
     budget: TickBudget,
     ends_with_script: bool,
-    /// Commands of the menu; one a tick.
+    /// Commands of the menu, of which each tick takes one.
     commands: VecDeque<Command>,
     notices: Vec<Notice>,
     /// State, tips and segments after the last tick, without its news.
     last: TickOutcome,
     recorder: Option<Recorder>,
     latency: LatencyLedger,
-    /// What was wrong with devices when they were looked at last.
+    /// Faults of the devices when they were last checked.
     complaints: Vec<Notice>,
-    /// A script does not reach for an object that the server is still preparing.
+    /// Whether a script waits while the server prepares the object.
     awaits_model: bool,
 }
 
-/// Devices are looked at every so many ticks.
+/// Number of ticks between two checks of the devices.
 const COMPLAIN_EVERY: u64 = 30;
 
 impl Session {
-    /// A run that has not begun. The thread that plays it gets the priority with the first tick.
-    /// It ends with the script, or goes on with a hand that rests.
+    /// A run that has not begun. The thread that plays it gets `priority` with the first tick. The run
+    /// ends with the script, or goes on with a hand at rest.
     pub fn new(
         grasp_loop: GraspLoop,
         hand: impl Into<HandSource>,
@@ -82,18 +82,18 @@ impl Session {
         }
     }
 
-    /// From now on a script waits until the server has prepared the object: for a person who watches.
+    /// Makes a script wait until the server has prepared the object: for a person who watches.
     pub fn await_model(&mut self) {
         self.awaits_model = true;
     }
 
-    /// Plays the tick that is due; `None` when the script is over. Ticks that were missed are
-    /// counted; the hand is where it is now.
+    /// Plays the tick that is due; `None` if the script is over. Missed ticks are counted; the hand is
+    /// where it is now.
     ///
     /// Units: `now_s` s on the client's clock.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the answer does not fit the object.
     pub fn play(&mut self, due: Due, now_s: f64) -> Result<Option<TickOutcome>, ObjectError> {
         self.budget.begin();
         let began = Instant::now();
@@ -120,7 +120,7 @@ impl Session {
         Ok(Some(outcome))
     }
 
-    /// What comes into a tick; one that is played again has the number and the time it had before.
+    /// Input of a tick; a replayed one has the number and the time that were recorded.
     fn next(&mut self, due: Due, now_s: f64) -> (Due, f64, Sent) {
         if let HandSource::Replay(hand) = &mut self.hand {
             let Some(replayed) = hand.next_tick() else {
@@ -135,7 +135,7 @@ impl Session {
         (due, now_s, sent)
     }
 
-    /// Does again what a person did to the object between two ticks.
+    /// Repeats what a person did to the object between two recorded ticks.
     fn repeat(&mut self, done: Intervention) {
         let repeated = match done {
             Intervention::Turn([x, y, z, w]) => {
@@ -150,7 +150,7 @@ impl Session {
         self.notices.extend(repeated.err().map(Notice::refused));
     }
 
-    /// Tells what is wrong with devices that were open before, or never were.
+    /// Tells the faults of devices that were open before, or never were.
     fn complain(&mut self, tick: u64, outcome: &mut TickOutcome) {
         let HandSource::Live(hand) = &self.hand else { return };
         if tick % COMPLAIN_EVERY != COMPLAIN_EVERY - 1 {
@@ -162,13 +162,13 @@ impl Session {
         self.complaints = complaints;
     }
 
-    /// What is wrong with devices, and with what they send.
+    /// Faults of devices, and of the records that they send.
     fn complaints_of(&self, hand: &LiveHand) -> Vec<Notice> {
         let of_reader = self.grasp_loop.reader().complaints().into_iter().map(Notice::refused);
         hand.complaints().into_iter().chain(of_reader).collect()
     }
 
-    /// Writes down what a tick did, and holds it against what was written down.
+    /// Records a tick, and compares it with a recording during a replay.
     fn record(&mut self, due: Due, now_s: f64, sent: &Sent, outcome: &TickOutcome) {
         if let HandSource::Replay(hand) = &mut self.hand {
             hand.compare(&stage_digests(&self.grasp_loop, outcome));
@@ -184,7 +184,7 @@ impl Session {
         }
     }
 
-    /// Books when the samples came, the question was asked and the answers were shown.
+    /// Books the times of samples, question and shown answers.
     fn note_latency(&mut self, tick: u64, now_s: f64, computed: Duration, outcome: &TickOutcome) {
         // Ticks that wait for their answers have no time of their own.
         if self.grasp_loop.pace() == Pace::Lockstep {
@@ -200,7 +200,7 @@ impl Session {
         }
     }
 
-    /// From now on every tick is recorded.
+    /// Records every tick from now on.
     pub fn record_to(&mut self, recorder: Recorder) {
         self.grasp_loop.want_digests();
         self.recorder = Some(recorder);
@@ -212,11 +212,11 @@ impl Session {
         }
     }
 
-    /// Goes on with what is under way while no tick is played. The outcome repeats what the last
-    /// tick showed.
+    /// Continues what is under way while no tick is played. The outcome repeats what the last tick
+    /// showed.
     ///
     /// # Errors
-    /// As [`Session::play`].
+    /// The same as those of [`Session::play`].
     pub fn idle(&mut self) -> Result<TickOutcome, ObjectError> {
         let outcome = self.grasp_loop.idle()?;
         if let Some(recorder) = &mut self.recorder {
@@ -229,9 +229,8 @@ impl Session {
         Ok(TickOutcome { events, answers, unanswered, notices, state, ..self.last.clone() })
     }
 
-    /// Does what a person asks, or takes it in hand; [`Session::take_notices`] tells what has become
-    /// of it. When ticks are played is the concern of whoever plays them: pause, step and stop
-    /// change nothing here.
+    /// Grants a person's wish, or begins to; [`Session::take_notices`] tells the result. Pause, step and
+    /// stop change nothing here: they concern whoever plays the ticks.
     pub fn apply(&mut self, control: Control) {
         let refused = match control {
             Control::KeepShape => self.command(Command::KeepShape),
@@ -287,17 +286,17 @@ impl Session {
         self.notices.extend(refused.err());
     }
 
-    /// Counts ticks that were missed at the end, after which none is played.
+    /// Counts ticks that were missed at the end and are not played.
     pub fn skip(&mut self, ticks: u64) {
         self.report.add_skipped(ticks);
     }
 
-    /// The grasp loop.
+    /// Grasp loop of the run.
     pub fn grasp_loop(&self) -> &GraspLoop {
         &self.grasp_loop
     }
 
-    /// The hand.
+    /// Hand of the run.
     pub fn hand(&self) -> &HandSource {
         &self.hand
     }
@@ -315,20 +314,20 @@ impl Session {
         std::mem::take(&mut self.notices)
     }
 
-    /// Waits until the server has answered all, at most so long.
+    /// Waits until all requests have ended, for at most `at_most`; returns whether they have.
     pub fn wait_idle(&self, at_most: Duration) -> bool {
         self.grasp_loop.wait_idle(at_most)
     }
 
-    /// Waits until nothing is under way but the planning of the hand; see [`GraspLoop::settle`].
+    /// Waits until only the planning of the hand is under way; see [`GraspLoop::settle`].
     pub fn settle(&mut self, at_most: Duration) {
         self.grasp_loop.settle(at_most);
     }
 
-    /// Ends the run; `interrupted` if the user did.
+    /// Ends the run; `interrupted` if the user ended it.
     ///
     /// # Errors
-    /// As [`Session::play`].
+    /// The same as those of [`Session::play`].
     pub fn finish(mut self, interrupted: bool) -> Result<RunReport, ObjectError> {
         self.report.add_last(&self.grasp_loop.take_last()?);
         self.report.interrupted = interrupted;
@@ -352,7 +351,7 @@ impl Session {
         Ok(self.report)
     }
 
-    /// Takes the news of a tick for the person.
+    /// Takes the news of a tick that the person is told.
     fn hear(&mut self, outcome: &TickOutcome) {
         self.notices.extend(outcome.events.iter().filter_map(notice_of));
         self.notices.extend(outcome.notices.iter().cloned());
@@ -443,7 +442,7 @@ impl Session {
     }
 }
 
-/// What a person wants to be told of an event.
+/// Sentence for the person about an event, if it is worth one.
 fn notice_of(event: &LoopEvent) -> Option<Notice> {
     Some(match event {
         LoopEvent::Grasp(GraspEvent::ShapeKept) => Notice::done("shape kept"),
@@ -461,11 +460,11 @@ fn notice_of(event: &LoopEvent) -> Option<Notice> {
     })
 }
 
-/// Real-time priority for the ticks of an object that follows its answers within half of what such
-/// a thread may compute at a time; the other half is for all else that a tick does.
+/// Real-time priority for the ticks if the object takes an answer within half of the time that such a
+/// thread may compute; the other half is for the rest of a tick.
 ///
 /// # Errors
-/// [`ObjectError`] when the object cannot be shown.
+/// [`ObjectError`] if the object cannot be shown.
 pub fn priority_for(object: &mut SoftObject) -> Result<Priority, ObjectError> {
     let mut trial = TickBudget::new(Priority::Ordinary);
     let still = vec![[0.0; 3]; object.surface().nodes.len()];

@@ -1,4 +1,4 @@
-//! The object as a run shows it: its shape and pose, and the answer that the shape comes from.
+//! The object as a run shows it: shape and pose, and the answer that the shape comes from.
 
 use nalgebra::{Isometry3, Vector3};
 use softgrasp_grasp::object::{ObjectError, SoftObject};
@@ -12,12 +12,12 @@ pub(crate) struct Shown {
     tick: Option<u64>,
     /// Force of each fingertip in that answer, N, in the object's frame.
     forces: Option<[Vector3<f64>; 5]>,
-    /// Whether the shape has flowed, so that it will not go back to rest.
+    /// Whether the material has flowed, so that the object will not return to its rest shape.
     has_flowed: bool,
 }
 
 impl Shown {
-    /// An object whose frame is the world's.
+    /// Object at the origin of the world.
     pub(crate) fn new(object: SoftObject) -> Self {
         let world_from_object = Isometry3::identity();
         Self { object, world_from_object, tick: None, forces: None, has_flowed: false }
@@ -43,12 +43,12 @@ impl Shown {
         self.has_flowed
     }
 
-    /// Moves the object as a whole.
+    /// Sets the pose of the object.
     pub(crate) fn place(&mut self, world_from_object: Isometry3<f64>) {
         self.world_from_object = world_from_object;
     }
 
-    /// Names the answer that the shape comes from.
+    /// Sets the answer that the shape comes from.
     pub(crate) fn name_answer(
         &mut self,
         tick: u64,
@@ -58,20 +58,20 @@ impl Shown {
         (self.tick, self.forces, self.has_flowed) = (Some(tick), forces, has_flowed);
     }
 
-    /// The shape comes from no answer of a grip any more.
+    /// Forgets the answer, because the shape comes from none of this grip.
     pub(crate) fn forget_answer(&mut self) {
         (self.tick, self.forces) = (None, None);
     }
 
-    /// What has flowed is taken care of.
+    /// Forgets that the material has flowed, because its dent is being kept.
     pub(crate) fn forget_flow(&mut self) {
         self.has_flowed = false;
     }
 
-    /// Moves the answered nodes by their displacements (m, in the object's frame).
+    /// Moves the answered nodes by their displacements, m, in the object's frame.
     ///
     /// # Errors
-    /// [`ObjectError`] when they are not those of this object.
+    /// [`ObjectError`] if they are not nodes of this object.
     pub(crate) fn deform(
         &mut self,
         nodes: &NodeChoice,
@@ -83,15 +83,15 @@ impl Shown {
         }
     }
 
-    /// Goes back to the rest shape.
+    /// Returns to the rest shape.
     ///
     /// # Errors
-    /// [`ObjectError`] when the object cannot be shown any more.
+    /// [`ObjectError`] if the object cannot be shown.
     pub(crate) fn relax(&mut self) -> Result<(), ObjectError> {
         self.object.relax()
     }
 
-    /// From now on the object is another one, or has another rest shape.
+    /// Shows another object, or one with another rest shape, from now on.
     pub(crate) fn replace(&mut self, object: SoftObject) {
         self.object = object;
         self.forget_answer();

@@ -1,13 +1,12 @@
-//! What just holds an object that springs back: prescribed displacements that carry no force.
+//! Support of an object that springs back: prescribed displacements that carry no force.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_protocol::DofValue;
 
-/// Three nodes of the surface, held where they are just so that the object cannot move as a whole: no
-/// force is needed for that.
+/// Three nodes of the surface, held so that the object cannot move rigidly; no force is needed for that.
 ///
-/// Units: m. Frame: the object's. Ascending by degree of freedom.
+/// Units: m. Frame: the object's. Shapes: ascending by degree of freedom.
 pub(crate) fn support(object: &SoftObject) -> Vec<DofValue> {
     let nodes = &object.surface().nodes;
     let places: Vec<Point3<f64>> =
@@ -22,11 +21,11 @@ pub(crate) fn support(object: &SoftObject) -> Vec<DofValue> {
     held
 }
 
-/// Places and axes that just hold a body: all three axes of one place, two of another, one of a
-/// third. Whatever equilibrium the body has, they carry no force.
+/// Points and axes of a statically determinate support: all three axes of one point, two of another, one
+/// of a third. They carry no force in any equilibrium of the body.
 ///
 /// # Panics
-/// If there is no place.
+/// If there is no point.
 fn determinate_support(places: &[Point3<f64>]) -> [(usize, usize); 6] {
     let farthest = |distance: &dyn Fn(&Point3<f64>) -> f64| {
         let all = (0..places.len())
@@ -56,7 +55,7 @@ mod tests {
 
     use super::*;
 
-    /// The support holds a body if no rigid motion leaves all six where they are.
+    /// The support holds a body if no rigid motion leaves all six degrees of freedom at rest.
     #[test]
     fn support_holds_a_body_however_it_is_turned() {
         for turn in 0..50 {

@@ -8,18 +8,18 @@ use softgrasp_protocol::solve_report::SolveSummary;
 
 use crate::run::tick_outcome::TickOutcome;
 
-/// The status line; silent when standard error is not a terminal.
+/// Status line of a run; nothing is written if standard error is not a terminal.
 pub struct StatusLine {
     bar: ProgressBar,
     drawn: Option<Instant>,
     last_solve: Option<SolveSummary>,
 }
 
-/// More often than this nobody can read it.
+/// Shortest time between two drawings, as fast as a person reads.
 const DRAW_EVERY: Duration = Duration::from_millis(50);
 
 impl StatusLine {
-    /// An empty line.
+    /// Empty status line.
     pub fn start() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
         if let Ok(style) = ProgressStyle::with_template("{msg}") {
@@ -28,13 +28,13 @@ impl StatusLine {
         Self { bar, drawn: None, last_solve: None }
     }
 
-    /// Says sentences above the line.
+    /// Function that writes sentences above the line.
     pub fn speaker(&self) -> impl Fn(&str) + Send + 'static {
         let bar = self.bar.clone();
         move |text| bar.suspend(|| eprintln!("glove-client: {text}"))
     }
 
-    /// Shows a tick.
+    /// Shows the state after a tick.
     pub fn show(&mut self, tick: u64, outcome: &TickOutcome) {
         if let Some((_, solve)) = outcome.answers.last() {
             self.last_solve = Some(solve.clone());

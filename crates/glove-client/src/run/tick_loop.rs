@@ -1,4 +1,4 @@
-//! Plays a run to its end: when each tick is due, what is asked of it meanwhile, pause and stop.
+//! Plays a run to its end: when each tick is due, a person's wishes, pause and stop.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
@@ -12,12 +12,12 @@ use crate::pace::{Due, Schedule, wait_until};
 use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;
 
-/// When ticks are played.
+/// Times at which ticks are played.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timing {
-    /// From tick to tick, in real time; `None` plays one after the other, as fast as they go.
+    /// Time from tick to tick, in real time; `None` plays one after the other without pause.
     pub period: Option<Duration>,
-    /// Ticks to play; `None` until the script ends or the run is stopped.
+    /// Number of ticks to play; `None` until the script ends or the run is stopped.
     pub ticks_max: Option<u64>,
 }
 
@@ -30,28 +30,28 @@ pub struct TickLoop<'a> {
     ticks_max: u64,
     clock: RunClock,
     mode: Mode,
-    /// The tick that follows the last one that was played.
+    /// Number of the tick after the last played one.
     next: u64,
 }
 
-/// Whether ticks are played.
+/// Whether ticks are played, paused, or played one by one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Plays,
     Paused,
-    /// Paused, but for one tick.
+    /// Paused, except for one tick.
     Steps,
     Stopped,
 }
 
 /// Ticks per second of a run without a period, on the client's clock.
 const LOCKSTEP_RATE_HZ: f64 = 60.0;
-/// While nothing is played, and before a tick that is far off, controls are looked for so often.
+/// Time between two looks for controls, while no tick is played and before a tick that is far off.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 impl<'a> TickLoop<'a> {
-    /// A loop whose first tick is due now. Controls come in, sentences for the person go out; if
-    /// nobody listens to them they are lost.
+    /// Loop whose first tick is due now. Controls come in, sentences for the person go out; they are lost
+    /// if nobody listens.
     pub fn new(
         session: &'a mut Session,
         timing: Timing,
@@ -70,12 +70,12 @@ impl<'a> TickLoop<'a> {
         }
     }
 
-    /// Plays until the script or the ticks end, the run is stopped, or `asked_to_end` says so;
-    /// returns whether it was ended by the user. After each tick, and after something has changed
-    /// while no tick was played, `sink` is told; then its `Due` and its time (s) are the last ones.
+    /// Plays until the script or the ticks end, the run is stopped, or `asked_to_end` is true; returns
+    /// whether the user ended it. `sink` is called after each tick, and after a change while no tick was
+    /// played; then its `Due` and its time (s) are the last ones.
     ///
     /// # Errors
-    /// That of a tick, or the first of `sink`.
+    /// Error of a tick, or the first of `sink`.
     pub fn play<E: From<ObjectError>>(
         mut self,
         asked_to_end: impl Fn() -> bool,
@@ -124,7 +124,7 @@ impl<'a> TickLoop<'a> {
         }
     }
 
-    /// Waits for the next tick, but not longer than a control may wait; whether one came.
+    /// Waits for the next tick, but not longer than a control may wait; returns whether a control came.
     fn rest(&mut self) -> bool {
         let now = Instant::now();
         let until = match (self.mode, &self.schedule) {
@@ -148,13 +148,13 @@ impl<'a> TickLoop<'a> {
         false
     }
 
-    /// Whether the next tick is still to be waited for.
+    /// Whether the next tick is not due yet.
     fn is_early(&self) -> bool {
         let next_at = self.schedule.as_ref().map_or(Duration::ZERO, Schedule::next_at);
         self.mode == Mode::Plays && self.clock.at(Instant::now()) < next_at
     }
 
-    /// The tick to play now and its time on the client's clock, s.
+    /// Tick to be played now, and its time on the client's clock, s.
     fn due(&mut self) -> (Due, f64) {
         let Some(schedule) = &mut self.schedule else {
             return (Due { tick: self.next, skipped: 0 }, self.next as f64 / LOCKSTEP_RATE_HZ);
@@ -166,7 +166,7 @@ impl<'a> TickLoop<'a> {
         (schedule.due(elapsed), elapsed.as_secs_f64())
     }
 
-    /// Obeys what has been asked since; whether anything was.
+    /// Obeys the controls that have come; returns whether there were any.
     fn obey_all(&mut self) -> bool {
         let mut any = false;
         while let Ok(control) = self.controls.try_recv() {

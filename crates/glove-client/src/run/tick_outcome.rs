@@ -1,4 +1,4 @@
-//! The outcome of one tick: events, the state of the grasp, answers, and ticks without one.
+//! Outcome of one tick: events, state of the grasp, answers, and ticks without one.
 
 use softgrasp_grasp::grasp::{GraspEvent, StateName};
 use softgrasp_hand::notice::Notice;
@@ -9,23 +9,23 @@ use softgrasp_protocol::solve_report::SolveSummary;
 use crate::ask::unanswered::Unanswered;
 use crate::run::contact_ledger::StepRecord;
 
-/// What happened, for the report; in the order it happened.
+/// Event of a tick, for the report; in the order of occurrence.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoopEvent {
-    /// The grasp changed.
+    /// The state of the grasp changed.
     Grasp(GraspEvent),
-    /// A shape was to be kept, but cannot be.
+    /// A shape that was to be kept cannot be kept.
     KeepRefused(String),
     /// The object was changed, replaced or saved.
     Shape(String),
-    /// The server came, went, or refused.
+    /// The server was connected, lost, or refused.
     Server(String),
-    /// What speaks, or is wrong with a device: it fell silent, speaks again, sends what it should not.
+    /// News of a device: it fell silent, speaks again, or sends bad records.
     Device(Notice),
 }
 
 impl LoopEvent {
-    /// `grasp`, `shape` or `server`, and what happened in words.
+    /// Kind of the event (`grasp`, `shape` or `server`), and what happened in words.
     pub fn kind_and_words(&self) -> (&'static str, String) {
         match self {
             Self::Grasp(GraspEvent::TipTouched(finger, node)) => {
@@ -40,40 +40,40 @@ impl LoopEvent {
     }
 }
 
-/// One tick, for the status line and the report.
+/// Outcome of one tick, for the status line and the report.
 #[derive(Clone, Debug, Default)]
 pub struct TickOutcome {
     /// Events of this tick.
     pub events: Vec<LoopEvent>,
-    /// State after it; `None` until both devices have spoken.
+    /// State of the grasp after the tick; `None` until both devices have sent samples.
     pub state: Option<StateName>,
-    /// Which tips hold or touch, thumb first.
+    /// Whether each fingertip holds or touches, thumb first.
     pub tips: [bool; 5],
-    /// Segments shown at their last free pose, by finger.
+    /// Number of segments shown at their last free pose, for each finger.
     pub recalled: [u8; 5],
-    /// Answers that came, with the tick they were asked for in.
+    /// Answers that came, each with the tick that had asked.
     pub answers: Vec<(u64, SolveSummary)>,
     /// Steps of a grasp by friction that were answered.
     pub steps: Vec<StepRecord>,
-    /// Deforming ticks of which it is now certain that no answer comes, and why.
+    /// Deforming ticks that will certainly have no answer, each with the reason.
     pub unanswered: Vec<(u64, Unanswered)>,
-    /// Tick whose answer the object shows now; `None` while it shows none of this grip.
+    /// Tick whose answer the object shows now; `None` if it shows none of this grip.
     pub shown_tick: Option<u64>,
-    /// Devices that are silent: the hand is held where it was.
+    /// Devices that are silent, so that the hand keeps its pose.
     pub silent: Vec<Device>,
     /// Ticks among the answers whose path at large deformation began at rest.
     pub from_rest: Vec<u64>,
-    /// Whether the answer to what the object springs back to was taken, or its refusal.
+    /// Whether the tick took the answer about springing back, or its refusal.
     pub sprung_back: bool,
     /// Whether there was no shape to spring back to.
     pub springback_refused: bool,
-    /// Whether a rest shape that was made beside the ticks was taken.
+    /// Whether the tick took a rest shape that was made in the background.
     pub took_work: bool,
-    /// Whether the step of a free object that had been asked for was given up.
+    /// Whether an awaited step of a free object was given up.
     pub gave_up_step: bool,
-    /// Digest of what the server is asked, where that is recorded or held against a recording.
+    /// Digest of the tick's question, if it is recorded or compared with a recording.
     pub request_digest: Option<String>,
-    /// What the person sees next.
+    /// Visible result of the tick for the person.
     pub seen: Seen,
     /// Sentences for the person.
     pub notices: Vec<Notice>,

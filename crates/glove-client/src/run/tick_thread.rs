@@ -14,23 +14,23 @@ use crate::run::session::Session;
 use crate::run::tick_loop::{TickLoop, Timing};
 use crate::run::tick_outcome::TickOutcome;
 
-/// Owner of the thread that plays a run. When it is dropped the run is stopped.
+/// Thread that plays a run. Dropping this stops the run.
 pub struct TickThread {
     controls: Sender<Control>,
     notices: Option<Receiver<Notice>>,
     end: RunEnd,
 }
 
-/// The thread of a run.
+/// Handle of the thread that plays a run.
 type Ticks = JoinHandle<Result<RunReport, RunError>>;
 
-/// The end of a run, which one of those who share it may wait for.
+/// End of a run; one of those who share it may wait for it.
 #[derive(Clone)]
 pub struct RunEnd {
     thread: Arc<Mutex<Option<Ticks>>>,
 }
 
-/// A run that did not come to its report.
+/// Why a run has no report.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The object cannot be shown any more.
@@ -42,12 +42,12 @@ pub enum RunError {
 }
 
 impl TickThread {
-    /// Starts the thread and the run. To be called from a thread without real-time priority; the new
-    /// one asks for it with its first tick if the session is to have it, and `sink`, which it tells
-    /// after each tick, must be brief then.
+    /// Starts the thread and the run. To be called from a thread without real-time priority. If the
+    /// session is to have it, the new thread asks for it with its first tick; `sink`, which is called
+    /// after each tick, must then be brief.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// Error of the operating system if it starts no thread.
     pub fn start(
         mut session: Session,
         timing: Timing,
@@ -69,12 +69,12 @@ impl TickThread {
         Ok(Self { controls, notices: Some(notices), end })
     }
 
-    /// Asks for something; a run that is over does not hear it. Never waits.
+    /// Sends a control; a run that is over ignores it. Never waits.
     pub fn ask(&self, control: Control) {
         let _ = self.controls.send(control);
     }
 
-    /// Another way to ask, for another thread.
+    /// Sender of controls for another thread.
     pub fn controls(&self) -> Sender<Control> {
         self.controls.clone()
     }
@@ -84,12 +84,12 @@ impl TickThread {
         self.notices.as_ref()?.try_recv().ok()
     }
 
-    /// Where all sentences for the person come from, for somebody else who shows them from now on.
+    /// Receiver of all sentences for the person, for another one who shows them from now on.
     pub fn take_notices(&mut self) -> Option<Receiver<Notice>> {
         self.notices.take()
     }
 
-    /// The end of the run, for another thread.
+    /// End of the run, for another thread.
     pub fn run_end(&self) -> RunEnd {
         self.end.clone()
     }
@@ -102,7 +102,7 @@ impl TickThread {
     /// Waits for the end of the run; returns its report.
     ///
     /// # Errors
-    /// [`RunError`].
+    /// [`RunError`] if the run has no report.
     pub fn join(self) -> Result<RunReport, RunError> {
         self.end.wait()
     }
@@ -119,16 +119,16 @@ impl Drop for TickThread {
 }
 
 impl RunEnd {
-    /// Whether it is there, or somebody waits for it already.
+    /// Whether the run has ended, or another thread waits for its end already.
     pub fn is_there(&self) -> bool {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
         thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// Waits for it; returns the report of the run.
+    /// Waits for the end of the run; returns its report.
     ///
     /// # Errors
-    /// [`RunError`]; [`RunError::Lost`] too where somebody else waits for it.
+    /// [`RunError`]; also [`RunError::Lost`] if another thread waits for it.
     pub fn wait(&self) -> Result<RunReport, RunError> {
         let Some(thread) = self.take() else { return Err(RunError::Lost) };
         thread.join().unwrap_or(Err(RunError::Lost))

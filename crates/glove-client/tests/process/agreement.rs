@@ -8,7 +8,7 @@ use crate::start::{Folder, displacements, largest, shared, succeed};
 
 const METHODS: [&str; 4] = ["gauss-jordan", "dense-inverse", "dense-cholesky", "sparse-cholesky"];
 
-/// Solves by every method and compares with the first.
+/// Solves by every method and compares the answers with the first.
 fn check(folder: &Folder, mesh: &str, known: &str, poisson: &str) {
     let (out, report) = (folder.path("U.csv"), folder.path("R.json"));
     let answers: Vec<_> = METHODS
@@ -50,7 +50,8 @@ fn check(folder: &Folder, mesh: &str, known: &str, poisson: &str) {
     }
 }
 
-/// The lowest fifth held, the highest tenth pushed down by 5 mm and left free along x.
+/// Known displacements: the lowest fifth held, the highest tenth pushed down by 5 mm and left free along
+/// x.
 pub fn pushed(shape: BuiltIn, nodes: usize) -> String {
     let mesh = generate(shape, nodes).unwrap();
     let (low, high) = mesh.bounds();

@@ -5,7 +5,7 @@ use softgrasp_core::mesh::BuiltIn;
 use crate::agreement::pushed;
 use crate::start::{Folder, displacements, fail, largest, succeed};
 
-/// The same push, `factor` times as far.
+/// Table of the same displacements, times `factor`.
 fn scaled(table: &str, factor: f64) -> String {
     table.replace("-0.005", &format!("{}", -0.005 * factor))
 }

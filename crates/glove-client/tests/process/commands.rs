@@ -34,7 +34,7 @@ fn solve(folder: &Folder, more: &[&str]) -> Vec<String> {
     arguments
 }
 
-/// The work fails: exit code 1, the reason in the first line.
+/// Checks that the work fails: exit code 1, the reason in the first line.
 fn fails(arguments: &[String], says: &[&str]) {
     let said = fail(1, arguments);
     let first = said.lines().next().unwrap_or("");

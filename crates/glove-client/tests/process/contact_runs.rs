@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::start::{Folder, fail, succeed};
 
-/// A run of a strawberry of 300 nodes; its report.
+/// Report of a run with a strawberry of 300 nodes.
 fn lifted(folder: &Folder, more: &[&str]) -> Value {
     let report = folder.path("lift.json");
     let run = ["run", "--headless", "--nodes", "300", "--threads", "2", "--report", &report];

@@ -13,7 +13,7 @@ use softgrasp_hand::serial::{SerialDevices, SerialSettings};
 use crate::emulator::Emulator;
 use crate::start::{Folder, fail, succeed};
 
-/// Only a hang takes so long.
+/// Time after which a process is taken to hang.
 const HANG: Duration = Duration::from_secs(120);
 
 #[test]

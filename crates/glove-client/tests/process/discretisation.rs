@@ -7,7 +7,7 @@ use softgrasp_core::mesh::BuiltIn;
 use crate::agreement::pushed;
 use crate::start::{Folder, displacements, succeed};
 
-/// A pushed cube of so many nodes, solved with more options; report and displacements.
+/// Solves a pushed cube of about `nodes` nodes with more options; report and displacements.
 fn solve(folder: &Folder, nodes: usize, known: &str, more: &[&str]) -> (Value, Vec<[f64; 3]>) {
     let mesh = folder.path("cube.msh");
     succeed(&["mesh", "cube", "--nodes", &nodes.to_string(), "--out", &mesh]);

@@ -1,4 +1,4 @@
-//! Runs of a hand whose joints another program sends: what is said of it on the terminal, and when.
+//! Runs of a hand whose joints another program sends: what the terminal tells of it, and when.
 
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
@@ -12,7 +12,7 @@ use softgrasp_hand::joints::record_of_hand;
 
 use crate::start::command;
 
-/// A run that listens for joints, and what it says.
+/// Run that listens for joints, and the lines that it prints.
 struct JointRun {
     run: Child,
     sender: UdpSocket,
@@ -21,7 +21,7 @@ struct JointRun {
     heard: Vec<String>,
 }
 
-/// Only a hang takes so long.
+/// Time after which a run is taken to hang.
 const HANG: Duration = Duration::from_secs(120);
 
 impl JointRun {
@@ -40,8 +40,8 @@ impl JointRun {
         Self { run, sender, address, said, heard: Vec::new() }
     }
 
-    /// Sends records of a hand that opens and closes, `spoilt`, until a sentence holds these words,
-    /// while the run goes on.
+    /// Sends records of a hand that opens and closes, changed by `spoilt`, until a sentence contains
+    /// `words`, while the run goes on.
     fn until_said(&mut self, words: &str, spoilt: impl Fn(String) -> Option<String>) {
         let begun = Instant::now();
         for i in 0.. {
@@ -65,7 +65,7 @@ impl JointRun {
         }
     }
 
-    /// Ends the run; its exit code and all that it said.
+    /// Ends the run; its exit code and all lines that it printed.
     fn end(mut self) -> (Option<i32>, Vec<String>) {
         let kill = format!("kill -INT {}", self.run.id());
         assert!(std::process::Command::new("sh").args(["-c", &kill]).status().unwrap().success());
@@ -83,7 +83,7 @@ fn lines(from: ChildStderr) -> Receiver<String> {
     lines
 }
 
-/// How often a line begins with these words.
+/// Number of lines that begin with these words.
 fn count(said: &[String], words: &str) -> usize {
     said.iter().filter(|line| line.starts_with(&format!("glove-client: {words}"))).count()
 }

@@ -1,5 +1,5 @@
-//! Runs whose server is killed in the middle: what is said of the ticks after that, and that a replay of
-//! their recordings finds the same.
+//! Runs whose server is killed in the middle: the reasons of the later ticks, and the same result in a
+//! replay of their recordings. their recordings finds the same.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::start::{Folder, succeed};
 
-/// A server behind a way that is cut, for good, when so many bytes have gone to it.
+/// Server behind a connection that is cut for good once so many bytes have gone to it.
 struct Mortal {
     address: SocketAddr,
     left: Arc<AtomicI64>,
@@ -47,7 +47,7 @@ impl Mortal {
     }
 }
 
-/// Passes on what comes as long as `goes_on`, then closes both.
+/// Passes on bytes as long as `goes_on`, then closes both sides.
 fn pass_on(mut from: TcpStream, mut to: TcpStream, goes_on: impl Fn(i64) -> bool) {
     let mut buffer = [0; 1 << 16];
     while let Ok(count) = from.read(&mut buffer) {
@@ -58,7 +58,7 @@ fn pass_on(mut from: TcpStream, mut to: TcpStream, goes_on: impl Fn(i64) -> bool
     let _ = (from.shutdown(Shutdown::Both), to.shutdown(Shutdown::Both));
 }
 
-/// A run in real time of a small strawberry, recorded; its report.
+/// Report of a recorded run in real time with a small strawberry.
 fn run(folder: &Folder, server: &Mortal, more: &[&str]) -> Value {
     let (path, report) = (folder.path("run.mcap"), folder.path("run.json"));
     let address = server.address.to_string();
@@ -68,7 +68,8 @@ fn run(folder: &Folder, server: &Mortal, more: &[&str]) -> Value {
     serde_json::from_str(&folder.read("run.json")).unwrap()
 }
 
-/// Kills the server when these shares of all bytes have gone to it; checks each run and its replay.
+/// Kills the server when each of these shares of all bytes has gone to it; checks each run and its
+/// replay.
 fn check_runs(shares: &[f64], more: &[&str]) {
     let folder = Folder::new();
     let whole = Mortal::dies_after(i64::MAX);

@@ -1,4 +1,4 @@
-//! Runs that browsers and headsets look at: what they are sent, and what they send.
+//! Runs that browsers and headsets look at: the messages to them, and those that they send.
 
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::net::TcpStream;
@@ -15,12 +15,12 @@ use tungstenite::{Error, Message, WebSocket, connect};
 
 use crate::start::{Folder, command, fail, succeed};
 
-/// Only a hang takes so long.
+/// Time after which a run is taken to hang.
 const HANG: Duration = Duration::from_secs(240);
-/// The object of these runs.
+/// Options that choose the object of these runs.
 const OBJECT: [&str; 4] = ["--object", "strawberry", "--nodes", "300"];
 
-/// A run that serves a page, and one viewer of it.
+/// Run that serves a page, and one viewer of it.
 struct SeenRun {
     run: Child,
     address: String,
@@ -28,19 +28,19 @@ struct SeenRun {
     seen: Seen,
 }
 
-/// What the viewer has seen.
+/// Counts of what the viewer has received.
 #[derive(Default)]
 struct Seen {
     objects: u32,
     pictures: u32,
-    /// Pictures after the first in which vertices came, and in which none did.
+    /// Number of pictures after the first in which vertices came, and in which none did.
     moved: u32,
     still: u32,
     vertices: u32,
     statuses: Vec<String>,
-    /// Heights of the object, m.
+    /// Height of the object in each picture, m.
     heights: Vec<f32>,
-    /// Numbers of the records that the hand followed.
+    /// Number of the record that the hand followed in each picture.
     records: Vec<u32>,
     error: f32,
     ended: Option<String>,
@@ -65,7 +65,7 @@ impl SeenRun {
         Self { run, address, socket, seen: Seen::default() }
     }
 
-    /// Takes what has come, and says of each picture that it has been drawn.
+    /// Takes what has come, and acknowledges each picture.
     fn look(&mut self) {
         loop {
             match self.socket.read() {
@@ -110,7 +110,7 @@ impl SeenRun {
         self.socket.send(Message::text(text)).unwrap();
     }
 
-    /// Ends the run by the page's menu; its exit code.
+    /// Ends the run by the page's menu; its exit code and what the viewer received.
     fn end(mut self) -> (Option<i32>, Seen) {
         self.ask(r#"{"ask":"exit"}"#);
         let begun = Instant::now();
@@ -138,7 +138,7 @@ impl Drop for SeenRun {
 }
 
 impl Seen {
-    /// Takes a binary message; the number of a picture.
+    /// Takes a binary message; returns the number of a picture.
     fn take(&mut self, bytes: &[u8]) -> Option<u32> {
         let whole = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -171,14 +171,14 @@ impl Seen {
         self.statuses.iter().any(|status| status.contains(words))
     }
 
-    /// How far the object has been lifted above where it lay, m.
+    /// Height of the object above its first position, m.
     fn lifted(&self) -> f32 {
         let lay = self.heights.first().copied().unwrap_or_default();
         self.heights.iter().map(|height| height - lay).fold(0.0, f32::max)
     }
 }
 
-/// The hand of a scripted lift, tick by tick, as a perfect tracker would see it.
+/// Hand of a scripted lift, tick by tick, as a perfect tracker would measure it.
 fn lifting_hand(folder: &Folder) -> Vec<JointsRecord> {
     let path = folder.path("lift.mcap");
     let lift = ["run", "--headless", "--hand", "scripted:lift", "--record", &path];
@@ -196,7 +196,7 @@ fn lifting_hand(folder: &Folder) -> Vec<JointsRecord> {
     records
 }
 
-/// A hand as a page sends it.
+/// Message of a hand as a page sends it.
 fn message(record: &JointsRecord, number: u32) -> Message {
     let mut bytes = vec![0x82, 1, WEBXR_JOINT_COUNT as u8, 0];
     bytes.extend(number.to_le_bytes());

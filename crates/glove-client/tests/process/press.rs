@@ -7,7 +7,7 @@ use crate::start::{Folder, displacements, fail, succeed};
 const TABLE: &str = "[[body]]\nname = \"table\"\nshape = \"plane\"\nnormal = [0, 0, 1]\n\
                      poses = [[0, 0, 0, -0.035, 1, 0, 0, 0]]\n";
 
-/// A ball of 7 cm on a table whose bodies are these besides it.
+/// Folder with a ball of 7 cm on a table, and these bodies besides.
 fn folder(end: f64, bodies: &str) -> Folder {
     let folder = Folder::new();
     succeed(&["mesh", "sphere", "--nodes", "300", "--out", &folder.path("ball.msh")]);
@@ -27,7 +27,7 @@ fn number(value: &Value, path: &str) -> f64 {
     value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} in {value}"))
 }
 
-/// Two fingertips that close from the sides until 0.6 s, then rise by 3 cm until 1.1 s.
+/// Poses of two fingertips that close from the sides until 0.6 s, then rise by 3 cm until 1.1 s.
 fn pinch(closed: f64) -> String {
     let finger = |name: &str, side: f64| {
         let row = |t: f64, x: f64, z: f64| format!("[{t}, {}, 0, {z}, 1, 0, 0, 0]", side * x);

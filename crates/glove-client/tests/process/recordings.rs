@@ -11,7 +11,7 @@ fn record(folder: &Folder, more: &[&str]) -> String {
     path
 }
 
-/// Plays a recording again; its report.
+/// Report of a replay.
 fn replay(folder: &Folder, path: &str, more: &[&str]) -> serde_json::Value {
     let report = folder.path("replay.json");
     succeed(&[&["replay", path, "--check", "--report", &report], more].concat());
@@ -72,7 +72,7 @@ fn recording_that_was_cut_off_is_replayed_up_to_the_cut_and_its_check_fails() {
     check_fails(&cut, &format!("only its first {ticks} ticks could be compared"));
 }
 
-/// `replay --check` of this recording ends with exit code 1 and says this.
+/// Checks that `replay --check` of this recording ends with exit code 1 and prints these words.
 fn check_fails(path: &str, words: &str) {
     let output = run(&["replay", path, "--check"]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -144,12 +144,12 @@ fn mesh_file_beside_its_recording_is_found_from_any_folder() {
     succeed(&["replay", &moved.path("run.mcap"), "--check"]);
 }
 
-/// Writes a recording anew, its messages changed.
+/// Writes a recording again with changed messages.
 fn rewrite(path: &str, to: &str, change: impl Fn(&str, &str) -> String) {
     rewrite_where(path, to, |_| true, change);
 }
 
-/// Writes a recording anew, with the messages of some topics, changed.
+/// Writes a recording again with the messages of some topics, changed.
 fn rewrite_where(
     path: &str,
     to: &str,

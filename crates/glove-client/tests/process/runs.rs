@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::start::{Folder, run};
 
-/// Every tick was played or skipped, every deforming tick answered or given a reason.
+/// Checks that every tick was played or skipped, and every deforming tick answered or given a reason.
 fn check_counts(report: &Value) {
     let count = |value: &Value| value.as_u64().unwrap();
     let summary = &report["summary"];

@@ -11,13 +11,13 @@ use softgrasp_emulator::emulation::PseudoTerminal;
 use crate::emulator::Emulator;
 use crate::start::{Folder, command, succeed};
 
-/// A hand that squeezes a small strawberry.
+/// Emulated devices of a hand that squeezes a small strawberry.
 fn emulated(links: &str, more: &[&str]) -> Emulator {
     let usual = ["--script", "squeeze", "--nodes", "300", "--link-dir", links];
     Emulator::start(&[&usual[..], more].concat())
 }
 
-/// A run with that hand, by the rules that the emulators' script is planned for, which is recorded.
+/// Recorded run with that hand, by the rules that the emulators' script is planned for.
 fn run(folder: &Folder, links: &str, frames: &str) -> Child {
     let hand = format!("serial:glove={links}/glove,tracker={links}/tracker");
     run_with(folder, &hand, frames)
@@ -43,7 +43,7 @@ fn happened(report: &Value, words: &str) -> bool {
     events.iter().any(|event| event["what"].as_str().unwrap().contains(words))
 }
 
-/// The recording gives the same bits again, whatever came from the devices and when.
+/// Checks that a replay gives the same bits, whatever came from the devices and when.
 fn assert_replays(folder: &Folder) {
     let (path, again) = (folder.path("run.mcap"), folder.path("again.json"));
     succeed(&["replay", &path, "--check", "--threads", "1", "--report", &again]);
@@ -95,7 +95,7 @@ fn faults_and_pulled_cables_do_not_end_a_run() {
     assert_replays(&folder);
 }
 
-/// Writes records as a glove of 18 sensors and a tracker send them that answer nothing; pulls the
+/// Writes records of a glove with 18 sensors and of a tracker that do not answer commands; pulls the
 /// tracker's cable for two seconds in the middle.
 fn feed(links: &std::path::Path, seconds: f64) {
     let glove = PseudoTerminal::open(Some(&links.join("glove"))).unwrap();

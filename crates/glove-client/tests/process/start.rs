@@ -1,21 +1,21 @@
-//! Running the program, and the data it is run on.
+//! Starts the program, and finds the data of the tests.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-/// The program, with nothing on standard input.
+/// The program, without standard input.
 pub fn command() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_glove-client"));
     command.env_remove("RUST_LOG").stdin(Stdio::null());
     command
 }
 
-/// Runs to the end.
+/// Runs the program to its end.
 pub fn run<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
     command().args(arguments).output().unwrap()
 }
 
-/// Runs something that must succeed; what it printed.
+/// Runs the program, which must succeed; its standard output.
 pub fn succeed<S: AsRef<std::ffi::OsStr> + std::fmt::Debug>(arguments: &[S]) -> String {
     let output = run(arguments);
     let said = String::from_utf8_lossy(&output.stderr);
@@ -23,7 +23,7 @@ pub fn succeed<S: AsRef<std::ffi::OsStr> + std::fmt::Debug>(arguments: &[S]) -> 
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs something that must fail with this exit code; what it said on standard error.
+/// Runs the program, which must fail with this exit code; its standard error.
 pub fn fail<S: AsRef<std::ffi::OsStr> + std::fmt::Debug>(code: i32, arguments: &[S]) -> String {
     let output = run(arguments);
     let said = String::from_utf8(output.stderr).unwrap();
@@ -40,12 +40,12 @@ impl Folder {
         Self(tempfile::tempdir().unwrap())
     }
 
-    /// Path of a file in it, there or not.
+    /// Path of a file in the folder, whether or not it exists.
     pub fn path(&self, name: &str) -> String {
         self.0.path().join(name).display().to_string()
     }
 
-    /// Writes a file; its path.
+    /// Writes a file and returns its path.
     pub fn write(&self, name: &str, text: &str) -> String {
         std::fs::write(self.path(name), text).unwrap();
         self.path(name)
@@ -56,8 +56,8 @@ impl Folder {
     }
 }
 
-/// A folder of the data made by others: `shared/` beside the workspace, or where
-/// `SOFTGRASP_SHARED` says. Says that the test is skipped when there is none.
+/// Folder of data made by others: `shared/` beside the workspace, or where `SOFTGRASP_SHARED` says.
+/// `None`, with a line that the test is skipped, if there is none.
 pub fn shared(name: &str) -> Option<PathBuf> {
     let found = match std::env::var_os("SOFTGRASP_SHARED") {
         Some(path) => Some(PathBuf::from(path)),
@@ -73,7 +73,7 @@ pub fn shared(name: &str) -> Option<PathBuf> {
     folder
 }
 
-/// Rows of `node,ux,uy,uz` by node.
+/// Rows of a table `node,ux,uy,uz`, by node.
 pub fn displacements(text: &str) -> Vec<(usize, [f64; 3])> {
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("node,ux,uy,uz"));
@@ -86,7 +86,7 @@ pub fn displacements(text: &str) -> Vec<(usize, [f64; 3])> {
     lines.map(row).collect()
 }
 
-/// Largest component in magnitude.
+/// Largest component in magnitude, m.
 pub fn largest(rows: &[(usize, [f64; 3])]) -> f64 {
     rows.iter().flat_map(|(_, u)| u).fold(0.0, |most: f64, u| most.max(u.abs()))
 }

@@ -12,16 +12,16 @@ use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
 
-/// Displacements of the nodes asked for, m, three components each.
+/// Displacements of the nodes asked for, three components each, m, in the frame of the mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Displacements {
-    /// As computed.
+    /// Components in double precision, as computed, m.
     F64(Vec<[f64; 3]>),
-    /// Divided by `scale`, m, and rounded to single precision.
+    /// Components divided by `scale` and rounded to single precision.
     F32Quantised {
-        /// Largest component in magnitude.
+        /// Largest component in magnitude, m.
         scale: f64,
-        /// Components over `scale`, within ±1.
+        /// Components divided by `scale`, within ±1.
         values: Vec<[f32; 3]>,
     },
 }
@@ -29,19 +29,19 @@ pub enum Displacements {
 /// Answer to an `Ask`: the first case, the report of all, and the further cases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// What it cost and how wrong it can be; of several cases the worst errors.
+    /// Times of the stages, residual and error bound; with several cases the largest errors of all.
     pub report: SolveReport,
-    /// What only large deformation has; `None` where linear elasticity was asked for.
+    /// Report of the equilibrium at large deformation; `None` where linear elasticity was asked for.
     pub large: Option<LargeReport>,
-    /// Nodes that `displacements` belong to, in this order.
+    /// Nodes that `displacements` belong to, in the same order.
     pub nodes: NodeChoice,
-    /// Displacements.
+    /// Displacements of the first case, m.
     pub displacements: Displacements,
-    /// Forces at the known degrees of freedom, N; empty if not asked for.
+    /// Reaction forces at the known degrees of freedom, first case, N; empty if not asked for.
     pub reactions: Vec<DofValue>,
-    /// Force of each mask, N, in the order of the question; empty if not asked for.
+    /// Force on each mask, N, in the order of the question; empty if not asked for.
     pub mask_forces: Vec<[f64; 3]>,
-    /// The further cases, in the order of the request.
+    /// Answers of the further cases, in the order of the request.
     pub cases: Vec<CaseAnswer>,
     /// Fields of the first case and of each further one; empty if none were asked for.
     pub fields: Vec<FieldValues>,
@@ -50,13 +50,13 @@ pub struct Answer {
 /// Displacements and forces of one further case, always in double precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseAnswer {
-    /// Displacements of the same nodes as the first case's, m.
+    /// Displacements of the same nodes as those of the first case, m.
     pub displacements: Vec<[f64; 3]>,
-    /// Forces at the same degrees of freedom as the first case's, N.
+    /// Reaction forces at the same degrees of freedom as those of the first case, N.
     pub reactions: Vec<f64>,
 }
 
-/// Announces the arrays of an [`Answer`].
+/// Part of an [`Answer`], which announces its arrays.
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 pub(super) struct AnswerPart {
     report: Block,
@@ -72,7 +72,7 @@ pub(super) struct AnswerPart {
 }
 
 impl Displacements {
-    /// Displacements for the way, in the precision asked for.
+    /// Displacements in the form in which they travel, by the precision asked for.
     ///
     /// Units: m. With [`Precision::F32Quantised`] each component is off by at most 2⁻²⁴ of the
     /// largest one, since `|u / scale| ≤ 1` and single precision rounds to half of 2⁻²³. Where the
@@ -92,7 +92,7 @@ impl Displacements {
         Self::F32Quantised { scale, values: values.collect() }
     }
 
-    /// Number of nodes.
+    /// Number of nodes that have a displacement here.
     pub fn node_count(&self) -> usize {
         match self {
             Self::F64(values) => values.len(),
@@ -100,7 +100,7 @@ impl Displacements {
         }
     }
 
-    /// Displacements in double precision, m.
+    /// Displacements in double precision, m, multiplied by the scale where they were quantised.
     pub fn into_f64(self) -> Vec<[f64; 3]> {
         match self {
             Self::F64(values) => values,
@@ -146,8 +146,8 @@ impl Answer {
         })
     }
 
-    /// Arrays: nodes if listed, displacements, reactions, forces of masks, the cases one by one, the
-    /// fields case by case.
+    /// Writes the arrays: nodes if listed, displacements, reactions, forces of masks, the cases one by
+    /// one, the fields case by case.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         if let NodeChoice::Nodes(nodes) = &self.nodes {
             writer.array(nodes);
@@ -165,7 +165,7 @@ impl Answer {
         write_fields(writer, &self.fields);
     }
 
-    /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
+    /// Reads the arrays that [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
     pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
         part: AnswerPart,
@@ -237,7 +237,8 @@ impl AnswerPart {
 }
 
 impl CaseAnswer {
-    /// The list whose length is not that of the first case, its length and the one it should have.
+    /// Name of a list that differs in length from that of the first case, its length and the expected
+    /// one.
     fn mismatch(&self, (nodes, reactions): (usize, usize)) -> Option<(&'static str, usize, usize)> {
         let lists = [
             ("displacements of a case", self.displacements.len(), nodes),

@@ -18,9 +18,9 @@ use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 /// Source: thesis (5.1.1) for mesh, material, partition and question in one request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ask {
-    /// What is asked about.
+    /// Mesh or kept model that the request is about.
     pub subject: Subject,
-    /// What is known and asked.
+    /// Known displacements, forces and masks, and which results are wanted.
     pub question: Question,
     /// Large deformation: law, yield stress, path and pace; `None` for linear elasticity.
     pub large: Option<LargeAsk>,
@@ -30,7 +30,8 @@ pub struct Ask {
     ///
     /// Units: m.
     pub cases: Vec<Vec<f64>>,
-    /// Whether to leave out what only informs: condition, estimated error, rotation and strain.
+    /// Whether to leave out the estimates that do not change the answer: condition, estimated error,
+    /// rotation and strain.
     pub without_estimate: bool,
     /// Whether a newer request of this kind for the same model makes this one needless: one that has
     /// not been begun by then is refused with `Superseded`.
@@ -39,23 +40,23 @@ pub struct Ask {
     pub report: ReportLevel,
 }
 
-/// What an [`Ask`] is about.
+/// What an [`Ask`] is about: a mesh or a kept model.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Subject {
     /// A mesh that comes with the request; the server keeps nothing of it.
     Mesh(Box<Body>),
-    /// A model that the server keeps, by its name.
+    /// A model that the server keeps, by the hash that names it.
     Model(ModelHash),
 }
 
 /// Mesh, material and element of one request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
-    /// Nodes and elements.
+    /// Nodes and elements of the mesh.
     pub mesh: MeshData,
-    /// One material, or one for each region.
+    /// One material for the whole body, or one for each region.
     pub materials: Vec<Material>,
-    /// Which element, or the server's choice.
+    /// Kind of element, or the choice of it left to the server.
     pub element: ElementChoice,
 }
 
@@ -70,7 +71,7 @@ struct AskPart {
     report: ReportLevel,
 }
 
-/// The first fields of an [`AskPart`].
+/// The first fields of an [`AskPart`]; enough to know the kept model.
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
 struct AskHead {
     subject: SubjectPart,
@@ -86,7 +87,7 @@ enum SubjectPart {
 const CASES: &str = "cases";
 
 impl Ask {
-    /// A question in linear elasticity with one case.
+    /// A question about linear elasticity with one case.
     pub fn new(subject: impl Into<Subject>, question: Question) -> Self {
         Self {
             subject: subject.into(),
@@ -99,9 +100,9 @@ impl Ask {
         }
     }
 
-    /// The kept model that a frame asks about, and whether it makes older requests about it needless.
+    /// Name of the kept model that an `Ask` is about, and the `newest_wins` of the request.
     ///
-    /// Decodes nothing but the first fields.
+    /// Decodes only the first fields of the part.
     pub fn kept_model(frame: &Frame) -> Option<(ModelHash, bool)> {
         if frame.kind() != Some(Kind::Ask) {
             return None;
@@ -113,7 +114,8 @@ impl Ask {
         }
     }
 
-    /// Arrays: those of the mesh if it comes along, those of the question, the cases one by one.
+    /// Writes the arrays: those of the mesh if it comes along, those of the question, the cases one by
+    /// one.
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
         let expected = self.question.known.len();
         if let Some(case) = self.cases.iter().find(|case| case.len() != expected) {

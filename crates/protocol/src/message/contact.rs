@@ -14,73 +14,73 @@ use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
 
-/// One step of a kept model that nothing holds, among rigid bodies. Nothing of it is kept by the
-/// server: the state comes with the request and goes back with the answer.
+/// One step of a kept model that no fixed degree of freedom holds, among rigid bodies. The state comes
+/// with the request and goes back with the answer; the server does not depend on an earlier one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactFrame {
-    /// Which model.
+    /// Name of the kept model.
     pub model: ModelHash,
-    /// How the step is made.
+    /// Length, physical constants and accuracy of the step.
     pub ask: ContactAsk,
-    /// The object when the step begins.
+    /// State of the object at the beginning of the step.
     pub state: ObjectState,
-    /// The bodies.
+    /// Rigid bodies, each with its poses at the beginning and the end of the step.
     pub bodies: Vec<BodyMotion>,
-    /// Surface triangles that can touch a body in this step: nodes in the model's order …
+    /// Surface triangles that can touch a body in this step, by their nodes in the model's order.
     pub triangles: Vec<[u32; 3]>,
-    /// … and for each of them the position of its body in `bodies`.
+    /// For each of these triangles the position in `bodies` of the body that it can touch.
     pub triangle_bodies: Vec<u32>,
     /// Nodes whose displacements are wanted.
     pub nodes: NodeChoice,
-    /// How displacements are to travel.
+    /// Precision in which displacements travel.
     pub precision: Precision,
-    /// Fields of strain, stress, energy and contact that are wanted too.
+    /// Fields of strain, stress, energy and contact that are wanted beside the displacements.
     pub fields: FieldSet,
 }
 
-/// How a step is made.
+/// Length, physical constants and accuracy of one step.
 ///
 /// Units: s, m/s², kg/m³, s; `…_rel` relative.
 #[derive(Clone, Copy, Debug, PartialEq, SchemaRead, SchemaWrite)]
 pub struct ContactAsk {
-    /// Length of the step.
+    /// Length of the step, s.
     pub seconds: f64,
-    /// Acceleration of free fall, world.
+    /// Acceleration of free fall, m/s², in the world frame.
     pub gravity: [f64; 3],
-    /// Density of the object.
+    /// Density of the object, kg/m³.
     pub density: f64,
-    /// Time in which the shape forgets a force (Kelvin and Voigt).
+    /// Time constant with which the shape forgets a force (Kelvin and Voigt), s; 0 for none.
     pub viscosity: f64,
-    /// Penetration that is small enough, as a share of the object's size.
+    /// Accepted penetration, relative to the object's size.
     pub penetration_rel: f64,
-    /// Residual of the law of contact that is small enough, as a share of the largest force.
+    /// Accepted residual of the law of contact, relative to the largest force.
     pub residual_rel: f64,
-    /// Most times that the contact problem is made anew about where it ended.
+    /// Most times that the contact problem is set up anew about the state where the last one ended.
     pub rounds_max: u32,
     /// Steps of Newton's method after which no further round is begun.
     pub newton_max: u32,
-    /// Large deformation, or linear elasticity where it suffices; none for linear elasticity.
+    /// Large deformation, or linear elasticity where it suffices; `None` for linear elasticity.
     pub deformation: Option<Deformation>,
-    /// Law of large deformation.
+    /// Energy of the material at large deformation.
     pub law: LawName,
 }
 
 /// Answer to `ContactFrame`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactAnswer {
-    /// Displacements and the report of every answer.
+    /// Displacements in the object's frame, without the rigid motion, and the report of the solve.
     pub answer: Answer,
-    /// How well the law of contact is met.
+    /// How well the answer meets the law of contact.
     pub contact: ContactReport,
-    /// The object when the step has ended.
+    /// State of the object at the end of the step.
     pub state: ObjectState,
-    /// Points that press.
+    /// Points of the object's surface that press on a body.
     pub points: Vec<ContactPoint>,
-    /// What each body does to the object, in the order of the bodies.
+    /// Force and torque of each body on the object, in the order of the bodies.
     pub loads: Vec<BodyLoad>,
 }
 
-/// How well a step meets the law of contact.
+/// How well the answer of a step meets the law of contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
 pub struct ContactReport {
     /// Deepest point of the surface in a body, m.
@@ -89,55 +89,55 @@ pub struct ContactReport {
     pub slip_max: f64,
     /// Largest residual of the natural map of Signorini's and Coulomb's law, N.
     pub residual: f64,
-    /// Residual of the natural map over the largest force of a point.
+    /// Largest residual of the natural map over the largest force of a point.
     pub residual_rel: f64,
     /// Largest part of a force outside its cone of friction, N.
     pub cone_violation: f64,
     /// Whether penetration and residual are within what was asked for.
     pub is_converged: bool,
-    /// Times the contact problem was made.
+    /// Number of times that the contact problem was made.
     pub rounds: u32,
-    /// Sweeps over all points.
+    /// Number of sweeps over all points.
     pub sweeps: u32,
-    /// Steps of Newton's method.
+    /// Number of steps of Newton's method.
     pub newton_steps: u32,
-    /// Nodes whose columns of the compliance were computed for this step, by linear elasticity.
+    /// Number of nodes whose columns of the compliance were computed for this step, by linear elasticity.
     pub columns_computed: u32,
     /// Whether the elastic part was solved at large deformation.
     pub is_large: bool,
-    /// Shapes that contact was solved about, one after the other; 1 for linear elasticity.
+    /// Number of shapes that contact was solved about, one after the other; 1 for linear elasticity.
     pub shapes: u32,
-    /// Factors of the tangent that were made.
+    /// Number of factors of the tangent that were made for this step.
     pub factors: u32,
 }
 
 /// A point of the object's surface that presses on a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactPoint {
-    /// Position of the body.
+    /// Position of the body in the request's list.
     pub body: u32,
-    /// Whether it slips.
+    /// Whether the point slips along the body.
     pub slips: bool,
-    /// Where it is, m, world.
+    /// Position of the point, m, in the world frame.
     pub place: [f64; 3],
-    /// Out of the body, world.
+    /// Unit normal out of the body, in the world frame.
     pub normal: [f64; 3],
-    /// Force on the object, N, world.
+    /// Force on the object, N, in the world frame.
     pub force: [f64; 3],
-    /// Slip along the body in this step, m, world.
+    /// Slip along the body in this step, m, in the world frame.
     pub slip: [f64; 3],
 }
 
-/// The sum of a body's forces on the object.
+/// Sum of the forces of one body on the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BodyLoad {
-    /// Force, N, world.
+    /// Force on the object, N, in the world frame.
     pub force: [f64; 3],
-    /// Torque about the place of the body's pose at the end, N m, world.
+    /// Torque about the position of the body's pose at the end of the step, N m, in the world frame.
     pub torque: [f64; 3],
-    /// Sum of the normal parts, N.
+    /// Sum of the normal components of the forces, N.
     pub normal_force: f64,
-    /// Points that press.
+    /// Number of points that press on the body.
     pub contacts: u32,
 }
 
@@ -148,7 +148,7 @@ struct ContactFramePart {
     state: Block,
     body_count: u32,
     triangle_count: u32,
-    /// Whether nodes are listed.
+    /// Whether the wanted nodes are listed; `false` means all nodes.
     listed: bool,
     node_count: u32,
     precision: Precision,
@@ -168,7 +168,7 @@ const TRIANGLES: &str = "candidate triangles";
 const NODES: &str = "wanted nodes";
 const POINTS: &str = "contact points";
 const LOADS: &str = "loads of bodies";
-/// Numbers of a contact point and of a load.
+/// Numbers that a contact point takes in its array.
 const POINT_NUMBERS: usize = 12;
 const LOAD_NUMBERS: usize = 7;
 

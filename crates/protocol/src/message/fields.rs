@@ -9,12 +9,12 @@ use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
 
-/// One field. A symmetric tensor has six components, `xx yy zz xy yz zx`.
+/// One field of an answer. A symmetric tensor has six components, `xx yy zz xy yz zx`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Field {
-    /// Strain, mean over each element.
+    /// Strain, mean over each element, relative.
     ElementStrain,
-    /// Strain of each node.
+    /// Strain of each node, relative.
     NodeStrain,
     /// Cauchy's stress, mean over each element, Pa.
     ElementStress,
@@ -38,17 +38,17 @@ pub enum Field {
     ContactForce,
 }
 
-/// What a field has values at.
+/// Kind of entity that a field has a value for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldPlace {
-    /// Every element of the mesh.
+    /// All elements of the mesh, in their order.
     Elements,
-    /// The nodes that the answer is about.
+    /// The nodes that the answer is about, in its order.
     Nodes,
 }
 
 impl Field {
-    /// All of them, in the order of their bits.
+    /// All fields, in the order of their bits.
     pub const ALL: [Self; 12] = [
         Self::ElementStrain,
         Self::NodeStrain,
@@ -64,12 +64,12 @@ impl Field {
         Self::ContactForce,
     ];
 
-    /// Position of its bit in a [`FieldSet`].
+    /// Position of the field's bit in a [`FieldSet`].
     pub const fn bit(self) -> u32 {
         self as u32
     }
 
-    /// What it is called in files.
+    /// Name of the field in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::ElementStrain | Self::NodeStrain => "strain",
@@ -83,7 +83,7 @@ impl Field {
         }
     }
 
-    /// Unit of its values.
+    /// Unit of the field's values.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::ElementStrain | Self::NodeStrain => "1",
@@ -94,7 +94,7 @@ impl Field {
         }
     }
 
-    /// What it has values at.
+    /// Whether the field has values for elements or for nodes.
     pub const fn place(self) -> FieldPlace {
         match self {
             Self::ElementStrain
@@ -106,7 +106,7 @@ impl Field {
         }
     }
 
-    /// Components of one value.
+    /// Number of components of one value: 6 for a tensor, 3 for a vector, 1 for a scalar.
     pub const fn components(self) -> usize {
         match self {
             Self::ElementStrain | Self::NodeStrain | Self::ElementStress | Self::NodeStress => 6,
@@ -115,7 +115,7 @@ impl Field {
         }
     }
 
-    /// Whether it belongs to contact frames only.
+    /// Whether the field exists in answers to contact frames only.
     pub const fn is_of_contact(self) -> bool {
         matches!(self, Self::ContactPressure | Self::ContactForce)
     }
@@ -131,47 +131,47 @@ impl fmt::Display for Field {
     }
 }
 
-/// Fields that are wanted, one bit for each; bits of fields that a later version has are kept.
+/// Set of fields, one bit for each; bits of fields that only a later version has are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
 pub struct FieldSet(u32);
 
 impl FieldSet {
-    /// No field.
+    /// The set without a field.
     pub const NONE: Self = Self(0);
 
-    /// From bits, those of fields that are not known among them.
+    /// Set with these bits; bits of unknown fields are kept.
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
 
-    /// Its bits.
+    /// The bits of the set.
     pub const fn bits(self) -> u32 {
         self.0
     }
 
-    /// Whether no field is wanted that is known here.
+    /// Whether the set contains no field that this version knows.
     pub fn is_empty(self) -> bool {
         self.iter().next().is_none()
     }
 
-    /// Whether a field is wanted.
+    /// Whether the set contains a field.
     pub const fn has(self, field: Field) -> bool {
         self.0 & (1 << field.bit()) != 0
     }
 
-    /// The same with one field more.
+    /// The set with one field added.
     #[must_use]
     pub const fn with(self, field: Field) -> Self {
         Self(self.0 | (1 << field.bit()))
     }
 
-    /// Fields of both.
+    /// Union of both sets.
     #[must_use]
     pub const fn joined(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// The fields that are known here, in the order of their bits.
+    /// The fields of the set that this version knows, in the order of their bits.
     pub fn iter(self) -> impl Iterator<Item = Field> {
         Field::ALL.into_iter().filter(move |field| self.has(*field))
     }
@@ -183,7 +183,7 @@ impl FromIterator<Field> for FieldSet {
     }
 }
 
-/// Fields of one case.
+/// Values of the fields of one case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldValues {
     /// Stored energy of the whole body, J.
@@ -191,8 +191,8 @@ pub struct FieldValues {
     /// Estimated error of the stress in the energy norm, relative; NaN where no field of the error was
     /// asked for.
     pub error_rel: f64,
-    /// Fields in the order of their bits, each with its values: components of one place one behind the
-    /// other.
+    /// Fields in the order of their bits, each with its values: the components of one element or node
+    /// stand side by side.
     pub arrays: Vec<(Field, Vec<f64>)>,
 }
 
@@ -206,7 +206,7 @@ impl FieldValues {
         self.arrays.iter().map(|(field, _)| *field).collect()
     }
 
-    /// Elements that its fields have values at.
+    /// Number of elements that the fields have values for; 0 if there is no field of elements.
     fn element_count(&self) -> usize {
         let of_elements = |(field, _): &&(Field, Vec<f64>)| field.place() == FieldPlace::Elements;
         let first = self.arrays.iter().find(of_elements);
@@ -223,11 +223,11 @@ pub(super) struct FieldsPart {
 
 const FIELDS: &str = "values of a field";
 const FIELD_ELEMENTS: &str = "elements of fields";
-/// Numbers of each case before its arrays: energy and relative error.
+/// Numbers that stand before the fields of each case: energy and relative error.
 const TOTALS: usize = 2;
 
 impl FieldsPart {
-    /// Of the fields of all cases, if there are any.
+    /// Announcement for the fields of all cases; `None` if there are no fields.
     ///
     /// Shapes: `node_count` nodes that the answer is about, `case_count` cases, the first one among them.
     pub(super) fn of(
@@ -266,7 +266,7 @@ impl FieldsPart {
         }
     }
 
-    /// Reads what [`write_fields`] wrote; the counts have been checked.
+    /// Reads the arrays that [`write_fields`] wrote; the counts have been checked.
     pub(super) fn read_arrays(
         self,
         reader: &mut PayloadReader<'_>,
@@ -287,7 +287,7 @@ impl FieldsPart {
     }
 }
 
-/// Arrays: for each case energy and relative error, then its fields in the order of their bits.
+/// Writes for each case energy and relative error, then its fields in the order of their bits.
 pub(super) fn write_fields(writer: &mut PayloadWriter<'_>, fields: &[FieldValues]) {
     for case in fields {
         writer.array(&[case.energy, case.error_rel]);
@@ -297,7 +297,7 @@ pub(super) fn write_fields(writer: &mut PayloadWriter<'_>, fields: &[FieldValues
     }
 }
 
-/// Values of a field, each of so many components.
+/// Number of values of a field: that of the elements or of the nodes.
 fn count_at(field: Field, node_count: usize, element_count: usize) -> usize {
     match field.place() {
         FieldPlace::Elements => element_count,

@@ -6,24 +6,24 @@ use std::str::FromStr;
 use serde::Serialize;
 use wincode::{SchemaRead, SchemaWrite};
 
-/// What an `Ask` about large deformation says beside its question.
+/// What an `Ask` for large deformation says beside its question.
 ///
 /// Units: `yield_stress` Pa.
 #[derive(Clone, Copy, Debug, Default, PartialEq, SchemaRead, SchemaWrite)]
 pub struct LargeAsk {
-    /// Whether the server may answer linearly where that is good enough.
+    /// Whether the server may answer by linear elasticity where that is accurate enough.
     pub deformation: Deformation,
-    /// Energy of the material.
+    /// Law of the material: its stored energy.
     pub law: LawName,
-    /// Above it the material flows and stays deformed; `None` for a material that never flows.
+    /// Stress above which the material flows and stays deformed; `None` for a material that never flows.
     pub yield_stress: Option<f64>,
-    /// Where the path begins; of no effect for a mesh that comes along.
+    /// Where the path of the equilibrium begins; without effect for a mesh that comes along.
     pub path: PathChoice,
-    /// Whether the clock may decide what is done.
+    /// Whether the elapsed time may decide what is done.
     pub pace: Pace,
 }
 
-/// Which equations are solved.
+/// Equations that are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub enum Deformation {
     /// Equilibrium of the deformed body.
@@ -48,23 +48,23 @@ pub enum LawName {
     NeoHookeanLog,
 }
 
-/// Where the path of a frame at large deformation begins.
+/// Where the path of the equilibrium begins for a question about a kept model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub enum PathChoice {
-    /// At the shape of this session's last such frame on this model; at rest if there is none.
+    /// At the shape of this session's last such question about this model; at rest if there is none.
     #[default]
     Continue,
-    /// At rest.
+    /// At the undeformed shape.
     FromRest,
 }
 
-/// Whether the clock may decide what is done.
+/// Whether the elapsed time may decide what is done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub enum Pace {
-    /// What is done does not depend on the clock: the same frames give the same bits.
+    /// What is done does not depend on elapsed time: the same questions give the same bits.
     #[default]
     Repeatable,
-    /// Work made beside the frames is used as soon as it is there.
+    /// Factors made in the background are used as soon as they are ready.
     Timely,
 }
 
@@ -72,7 +72,7 @@ pub enum Pace {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{name:?} is no kind of deformation; there are linear, large and auto")]
 pub struct DeformationError {
-    /// The text.
+    /// The text that is no name of a deformation.
     pub name: String,
 }
 
@@ -80,7 +80,7 @@ pub struct DeformationError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no law is called {name:?}; there are neo-hookean and neo-hookean-log")]
 pub struct LawNameError {
-    /// The text.
+    /// The text that is no name of a law.
     pub name: String,
 }
 
@@ -89,34 +89,33 @@ pub struct LawNameError {
 /// Units: none; `…_rel` relative.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, SchemaRead, SchemaWrite)]
 pub struct LargeReport {
-    /// Whether linear elasticity was good enough and gave the answer.
+    /// Whether linear elasticity was accurate enough and gave the answer.
     #[serde(skip)]
     pub is_linear: bool,
-    /// Steps of Newton's method.
+    /// Number of steps of Newton's method.
     pub newton_steps: u32,
-    /// Linear systems that were solved.
+    /// Number of linear systems that were solved.
     pub linear_solves: u32,
-    /// Frames since the shape that the newest factor belongs to.
+    /// Number of questions since the shape that the newest factor belongs to.
     pub factor_age: u32,
-    /// Pieces that the motion of the known displacements was cut into.
+    /// Number of pieces that the motion of the known displacements was cut into.
     pub substeps: u32,
     /// Smallest ratio of an element's volume to that at rest.
     pub min_jacobian: f64,
-    /// Estimated error in the energy norm over the energy norm of the displacement.
+    /// Estimated error in the energy norm, relative to the energy norm of the displacement.
     pub energy_error_rel: Option<f64>,
-    /// Largest principal stretch of an element, 1 at rest; NaN where it was not worked out for this
-    /// answer.
+    /// Largest principal stretch of an element, 1 at rest; NaN where it was not computed for this answer.
     pub max_stretch: f64,
-    /// Whether the equilibrium jumped (snap-through).
+    /// Whether the equilibrium jumped to another shape (snap-through).
     pub jumped: bool,
-    /// Whether the residual is at rounding or below 1e-8: nothing is gained by asking again.
+    /// Whether the residual is at rounding or below 1e-8, so that asking again gains nothing.
     pub settled: bool,
     /// Largest accumulated plastic strain; 0 without yield stress.
     pub plastic_strain: f64,
 }
 
 impl Deformation {
-    /// Name used in commands and reports.
+    /// Name of the deformation in commands and reports.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -144,7 +143,7 @@ impl fmt::Display for Deformation {
 }
 
 impl LargeReport {
-    /// Deformation that the answer is of.
+    /// Whether the answer is that of linear elasticity or of large deformation.
     pub const fn deformation(&self) -> Deformation {
         match self.is_linear {
             true => Deformation::Linear,
@@ -154,7 +153,7 @@ impl LargeReport {
 }
 
 impl LawName {
-    /// Name used in commands and reports.
+    /// Name of the law in commands and reports.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::NeoHookean => "neo-hookean",

@@ -6,7 +6,7 @@ use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
 
-/// Contacts that are held by a weighted mean of nodes; kept flat, as they travel.
+/// Masks, contacts held by a weighted mean of nodes; stored flat, as they travel.
 ///
 /// Invariant: the lengths add up to the number of nodes and to that of weights. Whether weights and
 /// nodes make sense is for the server to say.
@@ -33,7 +33,7 @@ impl Masks {
         self.weights.extend(entries.iter().map(|entry| entry.1));
     }
 
-    /// Adds the masks of another list behind these.
+    /// Appends the masks of another list.
     pub fn append(&mut self, other: &Self) {
         self.lens.extend_from_slice(&other.lens);
         self.nodes.extend_from_slice(&other.nodes);
@@ -45,7 +45,7 @@ impl Masks {
         self.lens.len()
     }
 
-    /// Whether there is none.
+    /// Whether the list contains no mask.
     pub fn is_empty(&self) -> bool {
         self.lens.is_empty()
     }
@@ -69,14 +69,14 @@ impl Masks {
         })
     }
 
-    /// Arrays: lengths, nodes, weights.
+    /// Writes the arrays: lengths, nodes, weights.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         writer.array(&self.lens);
         writer.array(&self.nodes);
         writer.array(&self.weights);
     }
 
-    /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
+    /// Reads the arrays that [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
     pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
         part: MasksPart,

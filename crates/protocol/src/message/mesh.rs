@@ -13,11 +13,11 @@ use crate::{DecodeError, EncodeError, Limits};
 /// Units: m. Nothing of this is checked here except the lengths.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
-    /// Coordinates `x y z` of each node.
+    /// Coordinates `x y z` of each node at rest, m.
     pub vertices: Vec<[f64; 3]>,
-    /// Corners of each element.
+    /// Nodes at the four corners of each element.
     pub tets: Vec<[u32; 4]>,
-    /// Region label of each element, or empty.
+    /// Region label of each element; empty if there is one material for all.
     pub regions: Vec<u32>,
 }
 
@@ -62,7 +62,7 @@ impl MeshPart {
     }
 }
 
-/// Arrays: vertices, corners, labels if any, pairs of Young's modulus and Poisson's ratio.
+/// Writes the arrays: vertices, corners, labels if any, pairs of Young's modulus and Poisson's ratio.
 pub(super) fn write_mesh(writer: &mut PayloadWriter<'_>, mesh: &MeshData, materials: &[Material]) {
     writer.array(&mesh.vertices);
     writer.array(&mesh.tets);
@@ -71,7 +71,7 @@ pub(super) fn write_mesh(writer: &mut PayloadWriter<'_>, mesh: &MeshData, materi
     writer.array(&table);
 }
 
-/// What [`write_mesh`] wrote; the counts have been checked.
+/// Reads the arrays that [`write_mesh`] wrote; the counts have been checked.
 pub(super) fn read_mesh(
     reader: &mut PayloadReader<'_>,
     part: &MeshPart,

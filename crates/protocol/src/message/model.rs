@@ -21,35 +21,36 @@ pub struct ModelHash(pub [u8; 32]);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{text:?} is not a model's name (64 hexadecimal digits)")]
 pub struct ModelHashError {
-    /// The text.
+    /// The text that is no model hash.
     pub text: String,
 }
 
-/// Mesh, material and the degrees of freedom that are known in every frame.
+/// Request to keep a model: mesh, material and the degrees of freedom that are known in every question.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UploadModel {
-    /// Nodes and elements.
+    /// Nodes and elements of the mesh.
     pub mesh: MeshData,
-    /// One material, or one for each region.
+    /// One material for the whole body, or one for each region.
     pub materials: Vec<Material>,
-    /// Which element.
+    /// Kind of element.
     pub element: ElementName,
-    /// Degrees of freedom `3 · node + axis` that stay at zero unless a frame gives them a value.
+    /// Degrees of freedom `3 · node + axis` whose displacement is zero unless a question gives it a
+    /// value.
     pub fixed: Vec<u32>,
 }
 
-/// An uploaded model can be used.
+/// Answer to `UploadModel`: the uploaded model can be used.
 #[derive(Clone, Debug, PartialEq, SchemaRead, SchemaWrite)]
 pub struct ModelReady {
-    /// Its name from now on.
+    /// Hash that names the model from now on.
     pub model: ModelHash,
-    /// Degrees of freedom to be solved for.
+    /// Number of degrees of freedom to be solved for, those of unused nodes left out.
     pub unknown_dofs: u64,
-    /// Degrees of freedom that are fixed.
+    /// Number of degrees of freedom that are fixed.
     pub fixed_dofs: u64,
-    /// Whether the server had it already.
+    /// Whether the server kept this model already.
     pub reused: bool,
-    /// What it took.
+    /// Wall times of the upload by stage, ms.
     pub stage_ms: StageMs,
 }
 
@@ -90,17 +91,17 @@ impl ModelHash {
     }
 }
 
-/// First bytes of every hashed model; changes when the same upload would give other answers.
+/// First bytes of every hashed model; they change when the same upload would give other answers.
 const MODEL_FORMAT: &str = "softgrasp model 1";
 
-/// Hint which nodes or masks will be touched soon.
+/// Hint which nodes or masks will be touched soon, so that the server can compute their columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prefetch {
-    /// Which model.
+    /// Name of the kept model.
     pub model: ModelHash,
-    /// The nodes.
+    /// Nodes that will probably be touched, by their numbers in the mesh.
     pub nodes: Vec<u32>,
-    /// The masks.
+    /// Masks that will probably be held.
     pub masks: Masks,
 }
 

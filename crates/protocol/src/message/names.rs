@@ -17,12 +17,12 @@ pub struct MethodName(String);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{name:?} cannot be a method's name (1 to 32 of a-z, 0-9, - and _)")]
 pub struct MethodNameError {
-    /// The text.
+    /// The text that is no name of a method.
     pub name: String,
 }
 
 impl MethodName {
-    /// Checked constructor.
+    /// Name of a method, if the text may be one.
     ///
     /// # Errors
     /// [`MethodNameError`] for an empty or long text or one with other characters.
@@ -37,12 +37,12 @@ impl MethodName {
         }
     }
 
-    /// The choice is left to the server.
+    /// The method `auto`, which leaves the choice to the server.
     pub fn auto() -> Self {
         Self("auto".to_owned())
     }
 
-    /// The name itself.
+    /// The name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -81,7 +81,7 @@ pub enum ElementName {
 }
 
 impl ElementName {
-    /// Name used in commands and reports.
+    /// Name of the element in commands and reports.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::T4 => "t4",
@@ -91,19 +91,19 @@ impl ElementName {
     }
 }
 
-/// Element in a report, by its number: a server may use one that this version does not know.
+/// Element that a report names by its number: a server may use one that this version does not know.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
 pub struct ElementUsed(u32);
 
-/// Element wanted for one self-contained request; the answer tells which was used.
+/// Element wanted for one request with its own mesh; the answer tells which one was used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub enum ElementChoice {
-    /// [`ElementName::T4`].
+    /// Linear tetrahedron, [`ElementName::T4`].
     #[default]
     T4,
-    /// [`ElementName::T10`].
+    /// Quadratic tetrahedron, [`ElementName::T10`].
     T10,
-    /// [`ElementName::T4Anp`].
+    /// Linear tetrahedron with averaged pressure, [`ElementName::T4Anp`].
     T4Anp,
     /// The server chooses by material, deadline and memory.
     Auto,
@@ -159,7 +159,7 @@ impl From<ElementName> for ElementChoice {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no element is called {name:?}; there are t4, t4-anp, t10 and auto")]
 pub struct ElementChoiceError {
-    /// The text.
+    /// The text that is no name of an element.
     pub name: String,
 }
 

@@ -7,31 +7,31 @@ use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
 
-/// What an object is like between two steps; a client gives back what it was given.
+/// State of a free object between two steps; a client sends back the state that it received.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectState {
-    /// Where the mesh is in the world.
+    /// Pose of the object's mesh in the world frame.
     pub pose: Pose,
-    /// Velocity of the centre of mass, m/s, world.
+    /// Velocity of the centre of mass, m/s, in the world frame.
     pub velocity: [f64; 3],
-    /// Angular velocity, rad/s, world.
+    /// Angular velocity, rad/s, in the world frame.
     pub angular_velocity: [f64; 3],
-    /// Nodes with forces whose elastic response is the present shape …
+    /// Nodes with forces whose elastic response is the present shape.
     pub force_nodes: Vec<u32>,
-    /// … and these forces, N, in the object's frame.
+    /// Forces on these nodes, N, in the object's frame.
     pub forces: Vec<[f64; 3]>,
-    /// Contacts at the end of the last step.
+    /// Contacts at the end of the last step, with which the next one begins.
     pub contacts: Vec<HeldContact>,
 }
 
 /// A contact at the end of a step: the next one begins with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldContact {
-    /// Position of the body.
+    /// Position of the body in the list of bodies.
     pub body: u32,
-    /// Nodes of the triangle it lies in.
+    /// Nodes of the surface triangle that the contact lies in.
     pub nodes: [u32; 3],
-    /// Their weights.
+    /// Weights of these nodes at the contact's position.
     pub weights: [f64; 3],
     /// Force on the object, N, in the object's frame.
     pub force: [f64; 3],
@@ -51,7 +51,7 @@ const FORCES: &str = "forces of the state";
 const CONTACTS: &str = "contacts of the state";
 
 impl ObjectState {
-    /// An object at rest and undeformed at the origin.
+    /// State of an undeformed object that rests at `pose`.
     pub fn at_rest(pose: Pose) -> Self {
         Self {
             pose,
@@ -77,7 +77,7 @@ impl ObjectState {
         })
     }
 
-    /// Arrays: nodes with forces, forces; of the contacts body and nodes, weights and forces.
+    /// Writes the arrays: nodes with forces, forces; of the contacts body and nodes, weights and forces.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         writer.array(&self.force_nodes);
         writer.array(&self.forces);
@@ -92,7 +92,7 @@ impl ObjectState {
         writer.array(numbers.as_flattened());
     }
 
-    /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
+    /// Reads the arrays that [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
     pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
         part: ObjectStatePart,

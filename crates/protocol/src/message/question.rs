@@ -10,40 +10,40 @@ use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
 
-/// Nodes to be answered.
+/// Nodes whose displacements are answered.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum NodeChoice {
-    /// Every node, in the order of the mesh.
+    /// Every node of the mesh, in its order.
     #[default]
     All,
     /// These nodes, in this order.
     Nodes(Vec<u32>),
 }
 
-/// How displacements are to travel.
+/// Precision in which displacements travel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
 pub enum Precision {
-    /// Eight bytes a component, as computed.
+    /// Eight bytes for each component, as computed.
     #[default]
     F64,
-    /// Four bytes a component, rounded to 2⁻²⁴ of the largest one.
+    /// Four bytes for each component, rounded to 2⁻²⁴ of the largest one.
     F32Quantised,
 }
 
-/// What the answer shall hold.
+/// Results that the answer shall contain.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Want {
     /// Nodes whose displacements are wanted.
     pub nodes: NodeChoice,
-    /// Whether the forces at the known degrees of freedom are wanted.
+    /// Whether the reaction forces at the known degrees of freedom are wanted.
     pub reactions: bool,
-    /// How displacements are to travel.
+    /// Precision in which displacements travel.
     pub precision: Precision,
-    /// Fields of strain, stress and energy that are wanted too.
+    /// Fields of strain, stress and energy that are wanted beside the displacements.
     pub fields: FieldSet,
 }
 
-/// Partition, load, and how well and how soon the answer is needed.
+/// Known displacements, loads and masks of the first case; accuracy and time that are wanted.
 ///
 /// Units: `known` and `mask_displacements` m, `forces` N, `max_error` relative, `deadline_ms` ms from
 /// the arrival.
@@ -51,21 +51,21 @@ pub struct Want {
 /// Source: thesis (3.41) to (3.43) for the partition, 4.5.1 for where known displacements come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Question {
-    /// Known displacements.
+    /// Known displacements (Dirichlet values), m.
     pub known: Vec<DofValue>,
-    /// Forces at free degrees of freedom; those not named are zero.
+    /// Forces at unknown degrees of freedom, N; where none is named the force is zero.
     pub forces: Vec<DofValue>,
-    /// Nodes held together by their weighted mean, with one force each.
+    /// Masks: nodes held together by their weighted mean, with one force for each mask.
     pub masks: Masks,
-    /// The mean displacement of each mask.
+    /// Prescribed mean displacement of each mask, m.
     pub mask_displacements: Vec<[f64; 3]>,
-    /// How to solve.
+    /// Solution method, or `auto`.
     pub method: MethodName,
-    /// What to answer.
+    /// Results that the answer shall contain.
     pub want: Want,
     /// Largest relative error that is acceptable; `None` leaves it to the method.
     pub max_error: Option<f64>,
-    /// Time after which the answer is of no use.
+    /// Time after which the answer is of little use, ms; `None` for no deadline.
     pub deadline_ms: Option<f64>,
 }
 
@@ -117,7 +117,8 @@ impl Question {
         })
     }
 
-    /// Arrays: known displacements, forces, wanted nodes if listed, masks and their displacements.
+    /// Writes the arrays: known displacements, forces, wanted nodes if listed, masks and their
+    /// displacements.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         writer.dof_values(&self.known);
         writer.dof_values(&self.forces);
@@ -128,7 +129,7 @@ impl Question {
         writer.array(&self.mask_displacements);
     }
 
-    /// Reads what [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
+    /// Reads the arrays that [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
     pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
         part: QuestionPart,

@@ -29,7 +29,7 @@ pub enum RejectCode {
     NotPositiveDefinite,
     /// The solve would need more memory than the server may use.
     MemoryLimit,
-    /// The answer could not be had in time.
+    /// The answer could not be computed before its deadline.
     Deadline,
     /// The server is about to end.
     ShuttingDown,
@@ -49,7 +49,7 @@ pub enum RejectCode {
 }
 
 impl RejectCode {
-    /// All codes that are known, in the order of their numbers, which count from 1.
+    /// All codes that this version knows, in the order of their numbers, which count from 1.
     pub const ALL: [Self; 16] = [
         Self::BadRequest,
         Self::UnknownModel,
@@ -69,7 +69,7 @@ impl RejectCode {
         Self::Superseded,
     ];
 
-    /// Number on the wire.
+    /// Number of the code on the wire.
     pub fn number(self) -> u16 {
         match self {
             Self::Other(number) => number,
@@ -77,7 +77,7 @@ impl RejectCode {
         }
     }
 
-    /// Code with this number.
+    /// Code with this number; [`Other`](Self::Other) if it is not known.
     pub fn from_number(number: u16) -> Self {
         let known = usize::from(number).checked_sub(1).and_then(|at| Self::ALL.get(at));
         known.copied().unwrap_or(Self::Other(number))
@@ -90,16 +90,17 @@ impl fmt::Display for RejectCode {
     }
 }
 
-/// The request is not granted; the session goes on.
+/// Refusal of a request; the session goes on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rejected {
-    /// Why, for the program.
+    /// Reason as a code, for the program.
     pub code: RejectCode,
-    /// Why, for the user; one line.
+    /// Reason in one line, for the user.
     pub text: String,
-    /// Anything more, for the log; may be empty.
+    /// Further detail for the log; may be empty.
     pub detail: String,
-    /// When to ask again; 0 where the server does not know, or where it is of no use.
+    /// Time after which to ask again; 0 where the server does not know it, or where asking again is of no
+    /// use.
     ///
     /// Units: ms.
     pub retry_after_ms: u32,
@@ -117,7 +118,7 @@ struct RejectedPart {
 const VERSIONS_WITHOUT_LENGTH: std::ops::RangeInclusive<u16> = 1..=3;
 
 impl Rejected {
-    /// A refusal without detail.
+    /// A refusal with code and text, without detail.
     pub fn new(code: RejectCode, text: impl Into<String>) -> Self {
         Self { code, text: text.into(), detail: String::new(), retry_after_ms: 0 }
     }

@@ -17,18 +17,18 @@ pub enum Reply {
     Answer(Box<Answer>),
     /// Answer to `HaveModel`.
     ModelState {
-        /// Whether the model can be used without an upload.
+        /// Whether the server keeps the model, so that no upload is needed.
         known: bool,
     },
     /// Answer to `UploadModel`.
     ModelReady(ModelReady),
-    /// Refusal of any request.
+    /// Refusal of any request that has a reply.
     Rejected(Rejected),
     /// Says that the server is there, to a client whose `Hello` asked for it; request id 0.
     Alive,
     /// Answer to `Ping`.
     Pong {
-        /// The number of the `Ping`.
+        /// The number that the `Ping` carried.
         nonce: u64,
     },
     /// Answer to `ContactFrame`.
@@ -36,7 +36,7 @@ pub enum Reply {
 }
 
 impl Reply {
-    /// Its kind.
+    /// Kind of the reply.
     pub fn kind(&self) -> Kind {
         match self {
             Self::Welcome(_) => Kind::Welcome,
@@ -54,7 +54,7 @@ impl Reply {
     ///
     /// # Errors
     /// [`EncodeError`] if the message is too large or its lists do not fit together; `out` is then
-    /// as before.
+    /// unchanged.
     pub fn encode_into(
         &self,
         request_id: u64,
@@ -73,10 +73,10 @@ impl Reply {
         })
     }
 
-    /// Message in a frame.
+    /// Decodes the reply in a frame.
     ///
     /// # Errors
-    /// [`DecodeError`]; the stream is sound.
+    /// [`DecodeError`]; the stream is sound and the session can go on.
     pub fn decode(frame: &Frame, limits: &Limits) -> Result<Self, DecodeError> {
         let kind = frame.kind().ok_or(DecodeError::UnknownKind { kind: frame.header.kind })?;
         let mut reader = PayloadReader::new(&frame.payload);

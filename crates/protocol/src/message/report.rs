@@ -11,49 +11,49 @@ use crate::{DecodeError, EncodeError, Limits};
 /// Wall time by stage, ms; a stage that was not needed is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, SchemaRead, SchemaWrite)]
 pub struct StageMs {
-    /// Payload to arrays.
+    /// Decoding the payload into the message.
     pub decode: f64,
-    /// Stiffness matrix.
+    /// Assembling the stiffness matrix.
     pub assemble: f64,
-    /// Fill-reducing order.
+    /// Finding an elimination order with little fill.
     pub order: f64,
-    /// Factorisation or inversion.
+    /// Factoring or inverting; with `condensed` computing the missing columns and the small system.
     pub factor: f64,
-    /// Right-hand sides and refinement.
+    /// Solving for the right-hand sides, with refinement.
     pub solve: f64,
-    /// Arrays to payload.
+    /// Collecting and rounding the results for the payload.
     pub encode: f64,
-    /// Waiting for a worker.
+    /// Waiting for a worker thread.
     pub queue: f64,
 }
 
-/// How much a report tells.
+/// How much of the report an answer carries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub enum ReportLevel {
-    /// Numbers and texts.
+    /// All numbers and texts.
     #[default]
     Full,
-    /// Numbers; texts are empty.
+    /// All numbers; texts are empty.
     Short,
-    /// Nothing: numbers are none (NaN where there must be one).
+    /// No report: numbers are `None`, or NaN where there must be a number.
     None,
 }
 
-/// How much of an answer rounding has left, by the estimate of its error; a number, since a later
+/// Severity of the loss of digits by rounding, by the estimate of the error; a number, since a later
 /// version may have more levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
 pub struct WarningLevel(u32);
 
-/// What a warning is about, for programs; a number, since a later version may have more of them.
+/// Subject of a warning, for programs; a number, since a later version may have more subjects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
 pub struct WarningCode(pub u16);
 
-/// Something that the user should know.
+/// Something about an answer that the user should know.
 #[derive(Clone, Debug, Default, PartialEq, Eq, SchemaRead, SchemaWrite)]
 pub struct Warning {
-    /// What it is about.
+    /// Subject of the warning.
     pub code: WarningCode,
-    /// The sentence for people.
+    /// Sentence of the warning, for people.
     pub text: String,
 }
 
@@ -62,58 +62,58 @@ pub struct Warning {
 /// Units: `…_ms` ms, `…_rel` relative, `…_deg` degrees, `…_bytes` bytes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, SchemaRead, SchemaWrite)]
 pub struct SolveReport {
-    /// Method that was used.
+    /// Method that was used; never `auto`.
     pub method: String,
     /// Element that was used.
     pub element: ElementUsed,
-    /// Degrees of freedom solved for.
+    /// Number of degrees of freedom solved for.
     pub unknown_dofs: u64,
-    /// Degrees of freedom given.
+    /// Number of degrees of freedom that are known or fixed, and three for each mask.
     pub known_dofs: u64,
-    /// Wall time by stage.
+    /// Wall time by stage, ms.
     #[serde(rename = "ms")]
     pub stage_ms: StageMs,
-    /// Residual over right-hand side, on the free rows.
+    /// Norm of the residual over that of the right-hand side, at the unknown degrees of freedom.
     pub residual_rel: f64,
-    /// Proven bound of the relative error, if one could be had.
+    /// Proven bound of the relative error of the displacements, if there is one.
     pub error_bound_rel: Option<f64>,
-    /// Why there is no bound.
+    /// Why there is no bound; `None` if there is one.
     #[serde(rename = "why")]
     pub error_bound_why: Option<String>,
-    /// Steps of iterative refinement.
+    /// Number of steps of iterative refinement, or of conjugate gradients.
     pub refinement_steps: u32,
-    /// Largest rotation of an element; linear elasticity is wrong where this is large. NaN where it
-    /// was not worked out for this answer.
+    /// Largest rotation of an element; linear elasticity is wrong where this is large. NaN where it was
+    /// not computed for this answer.
     pub max_rotation_deg: f64,
-    /// Largest principal strain, NaN likewise.
+    /// Largest principal strain of an element in magnitude; NaN where `max_rotation_deg` is.
     pub max_strain: f64,
-    /// Arithmetic that was used.
+    /// Arithmetic that was used, as `f64` or `f32 factor, f64 residual`.
     pub precision: String,
     /// Estimate of the condition number, if one was made: how much errors of rounding can grow.
     pub condition_estimate: Option<f64>,
     /// Estimate of the largest error over the largest displacement, if one was made; no bound.
     pub error_estimate_rel: Option<f64>,
-    /// What the estimate means.
+    /// Severity of the loss of digits, by `error_estimate_rel`.
     pub warning_level: WarningLevel,
-    /// What the user should know.
+    /// Warnings for the user, in words.
     pub warnings: Vec<Warning>,
-    /// Largest resident memory of the server so far.
+    /// Largest resident memory of the server since its start; 0 where the system does not tell.
     pub peak_rss_bytes: u64,
-    /// Whether a kept factor was used.
+    /// Whether a factor, or the small system of `condensed`, was kept from an earlier question.
     pub factor_reused: bool,
-    /// Why this method.
+    /// Why this method and element were chosen, in words.
     pub chosen_because: String,
 }
 
 impl WarningLevel {
-    /// Nothing is known to be amiss.
+    /// No loss of digits is known.
     pub const NONE: Self = Self(0);
-    /// Digits are lost: the estimate is above 1e-9, or above the error that was asked for.
+    /// Digits are lost: the estimate is above 1e-9 and above the error that was asked for.
     pub const CAUTION: Self = Self(1);
     /// Few digits are left: the estimate is above 1e-3.
     pub const SERIOUS: Self = Self(2);
 
-    /// Name used in reports; a level that is not known is at least serious.
+    /// Name of the level in reports; an unknown level is shown as a serious one.
     pub const fn as_str(self) -> &'static str {
         match self.0 {
             0 => "none",
@@ -130,11 +130,11 @@ impl Serialize for WarningLevel {
 }
 
 impl WarningCode {
-    /// An element turns so far that linear elasticity is off there.
+    /// An element rotates so far that linear elasticity is wrong there.
     pub const ROTATION: Self = Self(1);
     /// An element is strained more than linear elasticity is meant for.
     pub const STRAIN: Self = Self(2);
-    /// Rounding has taken digits.
+    /// Rounding has taken digits; the level says how many.
     pub const DIGITS: Self = Self(3);
     /// The answer is later than the deadline of the question.
     pub const LATE: Self = Self(4);
@@ -142,22 +142,22 @@ impl WarningCode {
     pub const ERROR: Self = Self(5);
     /// Deadline, error and memory did not go together: the choice of method gave up one of them.
     pub const CHOICE: Self = Self(6);
-    /// Elements lock: the object seems stiffer than it is.
+    /// Elements lock: the object appears stiffer than it is.
     pub const LOCKING: Self = Self(7);
-    /// The touched nodes hold the body weakly.
+    /// The touched nodes hold the body only weakly against rigid motion.
     pub const HOLD: Self = Self(8);
-    /// The equilibrium snapped to another shape.
+    /// The equilibrium jumped to another shape (snap-through).
     pub const SNAP: Self = Self(9);
     /// An element is pressed so far that surfaces crease.
     pub const CREASE: Self = Self(10);
     /// Linear elasticity answers while the equilibrium at large deformation is prepared.
     pub const PREPARING: Self = Self(11);
-    /// The mesh itself: parts of it lie in one another.
+    /// Parts of the mesh itself lie in one another.
     pub const MESH: Self = Self(12);
 }
 
 impl Warning {
-    /// A warning with its sentence.
+    /// A warning with code and sentence.
     pub fn new(code: WarningCode, text: impl Into<String>) -> Self {
         Self { code, text: text.into() }
     }
@@ -176,7 +176,7 @@ impl Serialize for Warning {
 }
 
 impl SolveReport {
-    /// As much of it as was asked for.
+    /// The report with as much of it as was asked for.
     #[must_use]
     pub fn at_level(self, level: ReportLevel) -> Self {
         match level {
@@ -193,7 +193,7 @@ impl SolveReport {
         }
     }
 
-    /// A report that tells nothing: what must be a number is NaN.
+    /// A report without content: what must be a number is NaN.
     pub fn untold() -> Self {
         Self {
             residual_rel: f64::NAN,
@@ -203,12 +203,12 @@ impl SolveReport {
         }
     }
 
-    /// Whether it is [`untold`](Self::untold).
+    /// Whether the report is [`untold`](Self::untold).
     pub fn is_untold(&self) -> bool {
         self.residual_rel.is_nan()
     }
 
-    /// A report that tells nothing takes no bytes.
+    /// Encoded report; no bytes for one that is [`untold`](Self::untold).
     pub(super) fn block(&self) -> Result<Block, EncodeError> {
         match self.is_untold() {
             true => Ok(Block::default()),

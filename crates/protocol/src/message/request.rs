@@ -14,23 +14,23 @@ pub enum Request {
     Hello(Hello),
     /// Question about a mesh or a kept model; answered by `Answer`.
     Ask(Box<Ask>),
-    /// Is this model known? Answered by `ModelState`.
+    /// Question whether the server keeps a model of this name; answered by `ModelState`.
     HaveModel(ModelHash),
-    /// Model to keep; answered by `ModelReady`.
+    /// Model that the server shall keep; answered by `ModelReady`.
     UploadModel(UploadModel),
-    /// The request with this id is not wanted any more: it is refused with `Cancelled` unless it has
-    /// been answered. Not answered itself.
+    /// Cancels the request with this id: it is refused with `Cancelled` unless it has been answered. Not
+    /// answered itself.
     Cancel {
-        /// Id of the request.
+        /// Id of the request to be cancelled.
         request_id: u64,
     },
-    /// Hint, not answered.
+    /// Hint which nodes and masks will be touched soon; not answered.
     Prefetch(Prefetch),
-    /// The model is not needed any more; not answered.
+    /// The client does not need this model any more; not answered.
     Drop(ModelHash),
     /// Answered by `Pong` with the same number.
     Ping {
-        /// Any number.
+        /// Any number; the `Pong` repeats it.
         nonce: u64,
     },
     /// One step of a free object among rigid bodies; answered by `ContactAnswer`.
@@ -44,7 +44,7 @@ impl From<Ask> for Request {
 }
 
 impl Request {
-    /// Its kind.
+    /// Kind of the request.
     pub fn kind(&self) -> Kind {
         match self {
             Self::Hello(_) => Kind::Hello,
@@ -61,11 +61,11 @@ impl Request {
 
     /// Appends one frame to `out`.
     ///
-    /// Of `limits` only the payload's length is compared; give the server's, from `Welcome`.
+    /// Of `limits` only the payload's length is compared; pass the server's limits from `Welcome`.
     ///
     /// # Errors
     /// [`EncodeError`] if the message is too large or its lists do not fit together; `out` is then
-    /// as before.
+    /// unchanged.
     pub fn encode_into(
         &self,
         request_id: u64,
@@ -84,10 +84,10 @@ impl Request {
         })
     }
 
-    /// Message in a frame.
+    /// Decodes the request in a frame.
     ///
     /// # Errors
-    /// [`DecodeError`]; the stream is sound, so the request can be refused and the session go on.
+    /// [`DecodeError`]; the stream is sound, so the request can be refused and the session can go on.
     pub fn decode(frame: &Frame, limits: &Limits) -> Result<Self, DecodeError> {
         let kind = frame.kind().ok_or(DecodeError::UnknownKind { kind: frame.header.kind })?;
         let mut reader = PayloadReader::new(&frame.payload);

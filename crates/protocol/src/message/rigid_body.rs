@@ -4,59 +4,60 @@ use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
 
-/// A pose: place x, y, z in m, then the unit quaternion w, x, y, z of its turn.
+/// Pose of a body in the world: position x, y, z in m, then the unit quaternion w, x, y, z of its
+/// rotation.
 pub type Pose = [f64; 7];
 
-/// Shape of a rigid body in a frame of its own, m.
+/// Shape of a rigid body in the body's own frame, m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BodyShape {
-    /// A ball around the origin.
+    /// Ball around the origin.
     Sphere {
-        /// Its radius.
+        /// Radius of the ball, m.
         radius: f64,
     },
-    /// All within a radius of a segment along z, centred at the origin.
+    /// All points within a radius of a segment along z that is centred at the origin.
     Capsule {
-        /// The radius.
+        /// Radius around the segment, m.
         radius: f64,
-        /// Length of the segment.
+        /// Length of the segment, m.
         length: f64,
     },
-    /// The half space below a plane through the origin.
+    /// Half space below a plane through the origin.
     Plane {
-        /// Out of the half space.
+        /// Normal of the plane, out of the half space.
         normal: [f64; 3],
     },
-    /// A box around the origin.
+    /// Box around the origin with edges along the axes.
     Box {
-        /// Half its edges.
+        /// Half the length of the edge along each axis, m.
         half: [f64; 3],
     },
-    /// The inside of a closed surface.
+    /// Inside of a closed surface of triangles.
     Mesh {
-        /// Corners.
+        /// Coordinates of the corners, m.
         vertices: Vec<[f64; 3]>,
-        /// Triangles, counter-clockwise seen from outside.
+        /// Corners of each triangle, counter-clockwise seen from outside.
         triangles: Vec<[u32; 3]>,
     },
 }
 
-/// A rigid body that moves while the object answers.
+/// Rigid body that moves on a given way during one step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyMotion {
-    /// Its shape.
+    /// Shape of the body.
     pub shape: BodyShape,
-    /// Pose in the world when the step begins.
+    /// Pose in the world frame at the beginning of the step.
     pub start: Pose,
-    /// Pose in the world when it ends.
+    /// Pose in the world frame at the end of the step.
     pub end: Pose,
-    /// Coefficient of friction.
+    /// Coefficient of Coulomb friction between body and object.
     pub friction: f64,
-    /// How far the body gives way to a force, m/N; 0 for one that keeps to its poses.
+    /// Displacement of the body for each unit of force on it, m/N; 0 for one that keeps to its poses.
     pub compliance: f64,
 }
 
-/// Numbers of a body besides its mesh: three sizes, two poses, friction, compliance.
+/// Numbers of a body besides its mesh: three sizes, two poses of seven, friction, compliance.
 const NUMBERS: usize = 19;
 const BODIES: &str = "rigid bodies";
 const SIZES: &str = "sizes of meshes of bodies";
@@ -84,18 +85,18 @@ impl BodyShape {
     }
 }
 
-/// Announces `bodies`.
+/// Number of bodies, as the part announces it.
 pub(super) fn count_of_bodies(bodies: &[BodyMotion]) -> Result<u32, EncodeError> {
     count_of(BODIES, bodies.len())
 }
 
-/// Compares the announced count with the limits.
+/// Compares the announced number of bodies with the limits.
 pub(super) fn check_bodies(count: u32, limits: &Limits) -> Result<(), DecodeError> {
     check_count(BODIES, count, limits.node_count_max.min(u32::from(u16::MAX)))?;
     Ok(())
 }
 
-/// Arrays: kinds, numbers, and of the meshes sizes, vertices and triangles.
+/// Writes the arrays: kinds, numbers, and of the meshes sizes, vertices and triangles.
 pub(super) fn write_bodies(
     writer: &mut PayloadWriter<'_>,
     bodies: &[BodyMotion],
@@ -122,7 +123,7 @@ pub(super) fn write_bodies(
     Ok(())
 }
 
-/// Reads what [`write_bodies`] wrote; the count has been checked.
+/// Reads the arrays that [`write_bodies`] wrote; the count has been checked.
 pub(super) fn read_bodies(
     reader: &mut PayloadReader<'_>,
     count: usize,
@@ -168,7 +169,7 @@ pub(super) fn read_bodies(
     Ok(bodies)
 }
 
-/// A sum of announced counts as a length, if it is within the limit.
+/// Sum of announced counts as a length, if it is within the limit.
 fn checked_sum(what: &'static str, sum: u64, count_max: u32) -> Result<usize, DecodeError> {
     check_count(what, u32::try_from(sum).unwrap_or(u32::MAX), count_max)
 }

@@ -13,14 +13,13 @@ use crate::{DecodeError, EncodeError, Limits, VersionRange};
 pub struct Hello {
     /// Name and version of the client, for the log.
     pub client: String,
-    /// Shared secret, if the server wants one; never shown by `Debug`.
+    /// Token that the server may require; never shown by `Debug`.
     pub token: Option<String>,
     /// Versions of the wire that the client speaks.
     pub versions: VersionRange,
-    /// What the client can do beyond the version, by name.
+    /// Names of capabilities that the client has beyond the version.
     pub capabilities: Vec<String>,
-    /// The server sends `Alive` when it has sent nothing for so long, whether it works or rests; 0:
-    /// never.
+    /// Silence of the server after which it sends `Alive`, whether it works or is idle; 0: never.
     ///
     /// Units: ms.
     pub alive_every_ms: u32,
@@ -33,15 +32,15 @@ pub struct Welcome {
     pub server: String,
     /// Version of the server program (not of the wire).
     pub version: String,
-    /// Threads it solves with.
+    /// Number of threads that the server solves with.
     pub threads: u32,
-    /// What it reads at most.
+    /// Limits on what the server reads.
     pub limits: Limits,
-    /// Version of the wire from now on: the highest that both sides speak.
+    /// Version of the wire for all that follows: the highest that both sides speak.
     pub wire: u16,
-    /// What the server can do, by name; a client passes over names it does not know.
+    /// Names of the server's capabilities; a client passes over names it does not know.
     pub capabilities: Vec<String>,
-    /// A client that has sent nothing for so long is given up; 0: it may rest for ever.
+    /// Silence of a client after which the server gives it up; 0: it may be silent for ever.
     ///
     /// Units: ms.
     pub idle_ms: u64,
@@ -59,7 +58,7 @@ struct WelcomePart {
 }
 
 impl Default for Welcome {
-    /// A server without a name that speaks this version of the wire.
+    /// `Welcome` of a server without a name that speaks this version of the wire.
     fn default() -> Self {
         Self {
             server: String::new(),
@@ -74,7 +73,7 @@ impl Default for Welcome {
 }
 
 impl Hello {
-    /// A client of this version that shows a token, if it has one, and needs no `Alive`.
+    /// `Hello` of a client of this version with its token, if it has one; no `Alive` is asked for.
     pub fn new(client: impl Into<String>, token: Option<String>) -> Self {
         Self {
             client: client.into(),

@@ -11,16 +11,16 @@ use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
 use crate::raw::{Random, fuzz_plan, only_frame};
 use crate::samples::{Message, conversation};
 
-/// What a scripted stream does on one call.
+/// One call of a scripted stream.
 #[derive(Clone, Debug)]
 enum Step {
     /// Gives these bytes, or takes as many.
     Bytes(Vec<u8>),
-    /// Fails once.
+    /// Fails once with this kind of error.
     Fault(ErrorKind),
 }
 
-/// Plays its steps; at their end it is closed for reading.
+/// Stream that plays its steps; at their end it is closed for reading.
 #[derive(Debug, Default)]
 struct Script {
     steps: VecDeque<Step>,
@@ -327,7 +327,7 @@ fn a_silent_peer_on_a_socket_times_out_and_is_heard_later() {
     assert!(near.read_frame().unwrap().is_none());
 }
 
-/// A stream whose system says that the peer's machine does not answer any more.
+/// A stream whose system reports that the peer's machine does not answer any more.
 #[cfg(unix)]
 struct Dead;
 

@@ -6,7 +6,7 @@ use softgrasp_protocol::*;
 
 use crate::random_messages::{answer, number, point};
 
-/// Any contact frame.
+/// Strategy that draws any contact frame.
 pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
     let deformation =
         prop::option::of(prop_oneof![Just(Deformation::Large), Just(Deformation::Auto)]);
@@ -57,7 +57,7 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
     )
 }
 
-/// Any answer to a contact frame.
+/// Strategy that draws any answer to a contact frame.
 pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
     let report = (prop::array::uniform5(number()), any::<bool>(), any::<[u32; 6]>()).prop_map(
         |(numbers, is_converged, counts)| {

@@ -8,7 +8,7 @@ use softgrasp_protocol::*;
 use crate::random_contact::{contact_answer, contact_frame};
 use crate::samples::{Message, masks_of};
 
-/// Any message; no NaN, so that equality can be asked for.
+/// Strategy that draws any message; without NaN, so that equality can be tested.
 pub fn any_message() -> impl Strategy<Value = Message> {
     let request = (any::<u64>(), any_request()).prop_map(|(id, m)| Message::Request(id, m));
     let reply = (any::<u64>(), any_reply()).prop_map(|(id, m)| Message::Reply(id, m));
@@ -141,7 +141,7 @@ pub fn answer() -> impl Strategy<Value = Answer> {
     })
 }
 
-/// Fields of so many cases with as many elements as nodes and one more.
+/// Fields of `cases` cases, each with values for `nodes` nodes and one element more.
 fn fields(are_there: bool, nodes: usize, cases: usize) -> Vec<FieldValues> {
     if !are_there {
         return Vec::new();
@@ -308,7 +308,7 @@ pub fn point() -> impl Strategy<Value = [f64; 3]> {
     prop::array::uniform3(number())
 }
 
-/// Every sort of double except NaN.
+/// Strategy that draws every kind of double except NaN.
 pub fn number() -> impl Strategy<Value = f64> {
     use prop::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
     POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO | INFINITE

@@ -52,7 +52,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Number below `end`, which must not be 0.
+    /// Random number below `end`, which must not be 0.
     pub fn below(&mut self, end: usize) -> usize {
         usize::try_from(self.next() % end as u64).unwrap()
     }
@@ -66,7 +66,7 @@ impl Random {
     }
 }
 
-/// `SEED` and `FUZZ_ROUNDS` of the environment, or these.
+/// Seeds of the rounds, from `SEED` and `FUZZ_ROUNDS` of the environment or from the arguments.
 pub fn fuzz_plan(seed: u64, rounds: u64) -> std::ops::Range<u64> {
     let read = |name: &str, default: u64| match std::env::var(name) {
         Ok(text) => text.parse().expect("a whole number"),

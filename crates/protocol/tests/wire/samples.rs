@@ -89,7 +89,7 @@ pub fn variants() -> Vec<(&'static str, Message)> {
     ]
 }
 
-/// Some fields, of elements and of nodes.
+/// Set of some fields, of elements and of nodes.
 fn asked_fields() -> FieldSet {
     [Field::ElementStress, Field::NodeVonMises, Field::ElementEnergy].into_iter().collect()
 }

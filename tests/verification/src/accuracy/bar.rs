@@ -1,4 +1,4 @@
-//! A bar in tension: pulled at one end, free to become thinner.
+//! A bar in tension: pulled at one end, with lateral contraction free.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Element;
@@ -13,7 +13,7 @@ const LENGTH: f64 = 3.0;
 /// Traction on the end, Pa.
 const PULL: f64 = 100.0;
 
-/// Error at the nodes of an eighth of the bar, with an irregular inside and `cells` boxes across.
+/// Error at the nodes of an eighth of the bar, with irregular inner nodes and `cells` boxes across.
 ///
 /// Closed form: `u = (σ / E) (x, −ν y, −ν z)`, held by every element.
 ///

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::mesh::{MeshError, Surface, TetMesh, signed_volume};
 
-/// A block of boxes over [0, 1]³, bent by `place`.
+/// Block of boxes over [0, 1]³, mapped by `place`.
 ///
 /// Each box has six tetrahedra around the diagonal between its node of even and its node of odd
 /// numbers, so neighbours are mirror images: with an even count along an axis so is the block.
@@ -47,10 +47,10 @@ pub fn block(
     turned(vertices, tets)
 }
 
-/// Orders in which the three axes are walked from one end of the diagonal to the other.
+/// Orders of the three axes on the way from one end of the diagonal to the other.
 const PATHS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-/// A mesh of tetrahedra whose corners are in any order.
+/// Mesh of tetrahedra whose corners may be in any order.
 pub(super) fn turned(
     vertices: Vec<Point3<f64>>,
     mut tets: Vec<[u32; 4]>,
@@ -63,10 +63,10 @@ pub(super) fn turned(
     TetMesh::try_new(vertices, tets, Vec::new())
 }
 
-/// The same mesh with its inner nodes moved without a pattern, each by up to `reach` per axis.
+/// The mesh with its inner nodes moved at random, each by up to `reach` along each axis.
 ///
 /// # Errors
-/// [`MeshError`] if that turns an element inside out.
+/// [`MeshError`] if this turns an element inside out.
 pub fn shaken(mesh: &TetMesh, reach: f64) -> Result<TetMesh, MeshError> {
     let outside = Surface::from_mesh(mesh).nodes;
     let mut vertices = mesh.vertices().to_vec();

@@ -52,9 +52,9 @@ mod tests {
     use super::*;
     use crate::accuracy::{ELEMENTS, order};
 
-    /// How far beam theory and the clamped body may differ, relative to the deflection. The clamped
-    /// end cannot become wider, which reaches a height deep; the energy there is 3 h/L of the whole,
-    /// and bending without the widening is stiffer by ν² at most.
+    /// Largest difference between beam theory and the clamped body, relative to the deflection. The
+    /// clamped end cannot deform laterally, which has effect as deep as the height; the energy there is 3
+    /// h/L of the whole, and bending without lateral deformation is stiffer by ν² at most.
     const VALID_TO: f64 = 3.0 * POISSON * POISSON / LENGTH;
 
     /// Displacements that elements hold are stiffer than all displacements there are, so finer

@@ -1,4 +1,4 @@
-//! A body made of one element: its nodes, its equations, loads on it and integrals over it.
+//! A body made of one kind of element: its nodes, its equations, loads on it and integrals over it.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::outcome::Solved;
 use super::quadrature::POINTS;
 use softgrasp_bench::report::ReportError;
 
-/// A mesh with an element and a material, mid-edge nodes known to it.
+/// Mesh with a kind of element and a material, mid-edge nodes included.
 ///
 /// Shapes: `nodes` those of the mesh, then the mid-edge nodes if the element has them.
 pub struct Discrete {
@@ -25,10 +25,12 @@ pub struct Discrete {
     model: Model,
 }
 
-/// A displacement given at one degree of freedom.
+/// Displacement given at one degree of freedom, m.
 pub type Given = (u32, f64);
 
 impl Discrete {
+    /// Body of a mesh, an element and a material.
+    ///
     /// # Errors
     /// [`ReportError::Model`] and [`ReportError::Material`].
     pub fn new(
@@ -59,17 +61,17 @@ impl Discrete {
         Ok(Self { element, nodes, of_elements, surface, model })
     }
 
-    /// The model of it.
+    /// Model of the body.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The element.
+    /// Kind of element.
     pub fn element(&self) -> Element {
         self.element
     }
 
-    /// Coordinates of every node.
+    /// Coordinates of every node, m.
     pub fn nodes(&self) -> &[Point3<f64>] {
         &self.nodes
     }
@@ -79,8 +81,7 @@ impl Discrete {
         self.on_triangles(|_| true)
     }
 
-    /// For every node, whether it is on a triangle of the surface that `is_meant` picks by its
-    /// corners.
+    /// For every node, whether it is on a triangle of the surface that `is_meant` selects by its corners.
     pub fn on_triangles(&self, is_meant: impl Fn(&[Point3<f64>; 3]) -> bool) -> Vec<bool> {
         let mut on = vec![false; self.nodes.len()];
         for triangle in &self.surface {
@@ -91,7 +92,7 @@ impl Discrete {
         on
     }
 
-    /// Degrees of freedom along `axis` of the nodes that `is_meant` picks, all given `value`.
+    /// Degrees of freedom along `axis` of the nodes that `is_meant` selects, all given `value`.
     pub fn give(
         &self,
         axis: usize,
@@ -102,7 +103,7 @@ impl Discrete {
         meant.map(|(n, _)| (dof(n, axis) as u32, value)).collect()
     }
 
-    /// All three displacements of the nodes that `is_meant` picks by number, by a field.
+    /// All three displacements of the nodes that `is_meant` selects by number, from a field.
     pub fn give_field(
         &self,
         is_meant: &[bool],
@@ -118,7 +119,7 @@ impl Discrete {
 
     /// Nodal forces of a traction that is constant on every triangle it acts on.
     ///
-    /// `traction` is asked with the corners and the outward normal. Units: Pa, N.
+    /// `traction` gets the corners and the outward normal. Units: Pa, N.
     pub fn traction(
         &self,
         traction: impl Fn(&[Point3<f64>; 3], Vector3<f64>) -> Option<Vector3<f64>>,
@@ -154,8 +155,8 @@ impl Discrete {
         forces
     }
 
-    /// Solves with known displacements (of any node, twice the same is once) and nodal forces
-    /// (3 per node, or none; those at known degrees of freedom go into the support).
+    /// Solves with known displacements (of any node; the same one twice counts once) and nodal forces (3
+    /// for each node, or none; those at known degrees of freedom go into the support).
     ///
     /// # Errors
     /// [`ReportError::Model`], [`ReportError::Solve`].
@@ -210,7 +211,7 @@ pub struct Answer {
 }
 
 impl Discrete {
-    /// What was solved by an answer for this body.
+    /// Case, element and size that an answer for this body belongs to.
     pub fn solved(
         &self,
         case: &'static str,
@@ -224,24 +225,24 @@ impl Discrete {
 }
 
 impl Answer {
-    /// Displacement of every degree of freedom.
+    /// Displacement of every degree of freedom, m.
     pub fn displacement(&self) -> &[f64] {
         &self.solution.displacement
     }
 
-    /// Displacement of one node.
+    /// Displacement of one node, m.
     pub fn at(&self, node: usize) -> Vector3<f64> {
         at(&self.solution.displacement, node)
     }
 
-    /// Sum of the support forces at those known degrees of freedom that are in `of`, N.
+    /// Sum of the support forces at the known degrees of freedom that are in `of`, N.
     pub fn support(&self, of: &[Given]) -> f64 {
         let meant: BTreeSet<u32> = of.iter().map(|(dof, _)| *dof).collect();
         let pairs = self.known.iter().zip(&self.solution.reaction);
         pairs.filter(|(dof, _)| meant.contains(dof)).map(|(_, force)| force).sum()
     }
 
-    /// Largest distance of a node's displacement from a field, over its largest value.
+    /// Largest difference of a node's displacement from a field, relative to the field's largest value.
     pub fn error_at_nodes(
         &self,
         nodes: &[Point3<f64>],

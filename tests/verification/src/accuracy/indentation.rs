@@ -17,7 +17,7 @@ const SPHERE: f64 = 10.0;
 const DEPTH: f64 = CONTACT * CONTACT / SPHERE;
 /// Half the width, and the depth, of the block.
 const REACH: f64 = 8.0;
-/// How much thicker each box is than the one before, away from the contact, with two per radius.
+/// Ratio of the thicknesses of neighbouring boxes away from the contact, with two boxes per radius.
 const GROWTH: f64 = 1.5;
 
 /// Force `4/3 E* √R δ^1.5` with `E* = E / (1 − ν²)`.
@@ -116,8 +116,8 @@ mod tests {
         }
     }
 
-    /// With far boxes that stayed as they were, twice the boxes per radius made it worse: 0.2 % off,
-    /// then 0.9 %.
+    /// With far boxes of constant size, twice the boxes per radius made it worse: 0.2 % error, then 0.9
+    /// %.
     #[test]
     fn indentation_by_averaged_pressure_does_not_get_worse_with_the_mesh() {
         let error = |cells| pressed(Element::Tet4Anp, cells).unwrap().error_rel;

@@ -10,9 +10,8 @@ use super::discrete::Discrete;
 use super::outcome::Outcome;
 use softgrasp_bench::report::ReportError;
 
-/// How far the displacements of a symmetric block under a symmetric press are from symmetric,
-/// relative to the largest; `cells` (an even number) boxes along each edge. NaN if the mesh itself
-/// is not symmetric.
+/// Deviation from symmetry of the displacements of a symmetric block under a symmetric press, relative to
+/// the largest; `cells` (an even number) boxes along each edge. NaN if the mesh itself is not symmetric.
 ///
 /// # Errors
 /// [`ReportError`].
@@ -71,7 +70,7 @@ mod tests {
         }
     }
 
-    /// Any object: the mirrored mesh, with corners exchanged to keep its volume positive.
+    /// Any object: the mirrored mesh, with corners exchanged so that its volume stays positive.
     #[test]
     fn mirrored_object_has_mirrored_displacements() {
         let mesh = generate(BuiltIn::Strawberry, 150).unwrap();

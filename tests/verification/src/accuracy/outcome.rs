@@ -1,19 +1,19 @@
-//! The outcome of a case for one element on one mesh.
+//! Outcome of a case for one element on one mesh.
 
 use softgrasp_core::fem::Element;
 
-/// A quantity beside its closed form or published value.
+/// Quantity beside its closed form or published value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// What was solved for it.
+    /// Case, element and mesh of the quantity.
     pub solved: Solved,
-    /// What is compared.
+    /// Name of the quantity.
     pub quantity: &'static str,
-    /// As computed; none where a whole field is compared.
+    /// Computed value; `None` if a whole field is compared.
     pub computed: Option<f64>,
-    /// As it should be.
+    /// Expected value.
     pub expected: Option<f64>,
-    /// Relative error.
+    /// Relative error of the computed value.
     pub error_rel: f64,
 }
 
@@ -22,39 +22,39 @@ pub struct Outcome {
 pub struct Solved {
     /// Name of the case.
     pub case: &'static str,
-    /// The element.
+    /// Kind of element.
     pub element: Element,
-    /// Poisson's ratio.
+    /// Poisson's ratio of the material.
     pub poisson: f64,
-    /// Boxes or layers along the length that the case names.
+    /// Number of boxes or layers along the length that the case names.
     pub cells: usize,
-    /// Nodes, mid-edge nodes among them.
+    /// Number of nodes, mid-edge nodes included.
     pub nodes: usize,
-    /// Unknown degrees of freedom.
+    /// Number of unknown degrees of freedom.
     pub unknown: usize,
 }
 
 impl Solved {
-    /// One number beside what it should be.
+    /// Outcome of one number beside its expected value.
     pub fn with_number(self, quantity: &'static str, computed: f64, expected: f64) -> Outcome {
         let outcome = self.with_error(quantity, (computed / expected - 1.0).abs());
         Outcome { computed: Some(computed), expected: Some(expected), ..outcome }
     }
 
-    /// The error of a whole field.
+    /// Outcome of a whole field, by its error.
     pub fn with_error(self, quantity: &'static str, error_rel: f64) -> Outcome {
         Outcome { solved: self, quantity, computed: None, expected: None, error_rel }
     }
 }
 
 impl Outcome {
-    /// The order of convergence from a coarser mesh of the same case to this one.
+    /// Order of convergence from a coarser mesh of the same case to this one.
     pub fn order_from(&self, coarser: &Self) -> f64 {
         let refined = self.solved.cells as f64 / coarser.solved.cells as f64;
         (coarser.error_rel / self.error_rel).ln() / refined.ln()
     }
 
-    /// Whether the other is the same case, element, material and quantity on another mesh.
+    /// Whether `other` is the same case, element, material and quantity on another mesh.
     pub fn is_like(&self, other: &Self) -> bool {
         let same = |o: &Self| {
             let Solved { case, element, poisson, .. } = o.solved;
@@ -64,7 +64,7 @@ impl Outcome {
     }
 }
 
-/// What rounding may leave of an answer that the element holds exactly, relative to the largest
-/// displacement: ε times the condition of `K11`, below 1e5 on the small meshes these cases have.
+/// Error by rounding of an answer that the element represents exactly, relative to the largest
+/// displacement: ε times the condition of `K11`, below 1e5 on the small meshes of these cases.
 #[cfg(test)]
 pub const ROUNDING: f64 = 1e-11;

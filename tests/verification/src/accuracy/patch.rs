@@ -1,4 +1,4 @@
-//! Patch test: constant strain, given on the surface of an irregular mesh, fills it.
+//! Patch test: constant strain, prescribed on the surface of an irregular mesh, must be constant inside.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use softgrasp_core::fem::Element;
@@ -8,7 +8,7 @@ use super::discrete::Discrete;
 use super::outcome::Outcome;
 use softgrasp_bench::report::ReportError;
 
-/// Error at the nodes; every element holds a linear field, so only rounding may be left.
+/// Error at the nodes; every element represents a linear field, so only rounding may be left.
 ///
 /// # Errors
 /// [`ReportError`].

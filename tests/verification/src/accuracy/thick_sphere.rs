@@ -11,7 +11,7 @@ use softgrasp_bench::report::ReportError;
 const YOUNG: f64 = 1e5;
 const INNER: f64 = 1.0;
 const OUTER: f64 = 2.0;
-/// Pressure, Pa.
+/// Pressure on the inner surface, Pa.
 const PRESSURE: f64 = 1000.0;
 
 /// Lamé's displacement `p a³ r / (E (b³ − a³)) · (1 − 2ν + (1 + ν) b³ / (2 r³))` outwards.

@@ -51,7 +51,7 @@ mod tests {
     use super::*;
     use crate::accuracy::{ELEMENTS, order};
 
-    /// Nearly the order of theory: 1.9 of 2 and 2.8 of 3, for meshes this coarse still show terms of
+    /// Nearly the order of theory: 1.9 of 2 and 2.8 of 3, because meshes this coarse still show terms of
     /// higher order.
     #[test]
     fn displacements_converge_with_their_order() {

@@ -1,4 +1,4 @@
-//! Attacks the bound in one scene: random grips, every bound compared with the true error.
+//! Tries to break the error bound in one scene: random grips, every bound compared with the true error.
 
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::{Base, Columns, ContactSet, Delivery, Touched};
@@ -10,19 +10,19 @@ use super::tally::{Bound, Tally};
 use softgrasp_bench::random::Random;
 use softgrasp_bench::report::ReportError;
 
-/// How much is tried.
+/// Number of contact sets and of grips.
 #[derive(Clone, Copy)]
 pub(super) struct Amount {
-    /// Contact sets per scene and kind.
+    /// Number of contact sets for each scene and kind.
     pub sets: usize,
-    /// Grips per contact set.
+    /// Number of grips for each contact set.
     pub grips: usize,
 }
 
-/// Grips a scene in every way; one tally per kind of contacts.
+/// Grips a scene by every kind of contacts; one tally for each kind.
 ///
 /// # Errors
-/// [`ReportError`] where no base can be made.
+/// [`ReportError`] if no base can be made.
 pub(super) fn attack(
     scene: &Scene,
     seed: u64,
@@ -86,7 +86,7 @@ fn grip(
     Ok(())
 }
 
-/// All nodes, or some, or few of them many times.
+/// Wanted nodes: all, or some, or few of them many times.
 fn wanted(scene: &Scene, random: &mut Random) -> Vec<u32> {
     let count = scene.model.mesh().node_count();
     match random.below(3) {
@@ -96,7 +96,8 @@ fn wanted(scene: &Scene, random: &mut Random) -> Vec<u32> {
     }
 }
 
-/// Norm of the error over that of the right answer, all nodes; those delivered as they arrive.
+/// Norm of the error over that of the exact answer, all nodes; delivered ones with the rounding of the
+/// wire.
 fn error_rel(
     mut whole: Vec<f64>,
     nodes: &[u32],

@@ -1,4 +1,4 @@
-//! The right answer of a grip, as sums of two doubles.
+//! Exact answer of a grip, as sums of two doubles.
 
 use nalgebra::{DMatrix, DVector};
 use softgrasp_core::fem::Stiffness;
@@ -6,15 +6,15 @@ use softgrasp_core::solve::condensed::Touched;
 
 use softgrasp_bench::reference::{two_product, two_sum};
 
-/// Displacements of all nodes per unit displacement of each contact, with the stiffness taken as it
-/// is stored.
+/// Displacements of all nodes for a unit displacement of each contact, with the stiffness as it is
+/// stored.
 ///
-/// Shapes: one field of 3N sums of two doubles per contact direction.
+/// Shapes: one field of 3N sums of two doubles for each contact direction.
 pub(super) struct Exact {
     fields: Vec<Vec<(f64, f64)>>,
 }
 
-/// A reference whose last correction is larger has not settled.
+/// Largest last correction of a reference that counts as converged.
 const SETTLED: f64 = 1e-20;
 const STEPS_MAX: usize = 30;
 
@@ -28,8 +28,8 @@ struct System<'a> {
 }
 
 impl Exact {
-    /// Solves densely and refines with residuals in twice the working precision; `None` where that
-    /// does not settle.
+    /// Solves densely and refines with residuals in twice the working precision; `None` if this does not
+    /// converge.
     pub fn of(stiffness: &Stiffness, fixed: &[u32], touched: &Touched) -> Option<Self> {
         let all = 3 * stiffness.node_count();
         let mut rows = 0;
@@ -48,7 +48,7 @@ impl Exact {
         system.solve().map(|fields| Self { fields })
     }
 
-    /// Displacements of all nodes for displacements of the contacts.
+    /// Displacements of all nodes for displacements of the contacts, m.
     pub fn displacement(&self, q: &[f64]) -> Vec<(f64, f64)> {
         let mut u = vec![(0.0, 0.0); self.fields.first().map_or(0, Vec::len)];
         for (field, q) in self.fields.iter().zip(q) {

@@ -6,7 +6,7 @@ use softgrasp_core::solve::condensed::Touched;
 use super::scenes::Scene;
 use softgrasp_bench::random::Random;
 
-/// How contacts are chosen.
+/// Kind of contacts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Vertices,
@@ -39,7 +39,7 @@ impl Kind {
     }
 }
 
-/// Contacts of one kind; they may still be refused as dependent or not holding.
+/// Contacts of one kind; they may still be refused as dependent or as not holding the body.
 pub(super) fn contacts(scene: &Scene, kind: Kind, random: &mut Random) -> Touched {
     let node_count = scene.model.mesh().node_count();
     let count = 3 + random.below(3);
@@ -67,7 +67,7 @@ pub(super) fn contacts(scene: &Scene, kind: Kind, random: &mut Random) -> Touche
     Touched { dofs, masks }
 }
 
-/// Displacements of the contacts: any, or nearly one and the same, or one of them alone.
+/// Displacements of the contacts, m: any, or nearly one and the same, or of one of them alone.
 pub(super) fn pushes(scene: &Scene, touched: &Touched, random: &mut Random) -> Vec<f64> {
     let count = touched.force_count();
     let size = 0.1 * scene.length * 10f64.powf(-3.0 * random.share());
@@ -90,7 +90,7 @@ pub(super) fn pushes(scene: &Scene, touched: &Touched, random: &mut Random) -> V
         .collect()
 }
 
-/// A mask of some of the nodes nearest to one, with any weights.
+/// Mask of some of the nodes nearest to one, with any weights.
 fn mask(scene: &Scene, around: u32, random: &mut Random) -> Option<Mask> {
     let vertices = scene.model.mesh().vertices();
     let centre = vertices[around as usize];
@@ -102,8 +102,8 @@ fn mask(scene: &Scene, around: u32, random: &mut Random) -> Option<Mask> {
     Mask::try_new(entries.collect()).ok()
 }
 
-/// Three nodes that are hardly off one line, the flattest of some random triples, and perhaps one
-/// more close by.
+/// Three nodes almost on one line, the flattest of some random triples, and perhaps one more node near
+/// them.
 fn in_line(scene: &Scene, random: &mut Random) -> Vec<u32> {
     let vertices = scene.model.mesh().vertices();
     let (mut flattest, mut found) = (f64::INFINITY, vec![0, 1, 2]);

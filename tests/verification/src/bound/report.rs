@@ -1,4 +1,4 @@
-//! Writes the report: how far above the true error the bound is, by body and contacts.
+//! Writes the report: ratio of the bound to the true error, by body and contacts.
 
 use rayon::prelude::*;
 

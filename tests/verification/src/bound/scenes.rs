@@ -7,15 +7,15 @@ use softgrasp_core::model::{Element, Model};
 
 use softgrasp_bench::report::ReportError;
 
-/// A body, and to which rows of the report its grips belong.
+/// Body, and the rows of the report that its grips belong to.
 pub(super) struct Scene {
     pub family: &'static str,
     pub model: Model,
-    /// Unit of length, m: how far contacts are pushed.
+    /// Unit of length, m, by which contacts are pushed.
     pub length: f64,
 }
 
-/// What a scene is made of: family, cells, size in units of length, that unit in m, modulus in Pa,
+/// Data of a scene: family, cells, size in units of length, that unit in m, Young's modulus in Pa,
 /// Poisson's ratio, element, whether one end is fixed.
 type Plan = (&'static str, [usize; 3], [f64; 3], f64, f64, f64, Element, bool);
 
@@ -48,10 +48,10 @@ const PLANS: [Plan; 22] = [
     ("sheet 1000:1", FLAT, [1.0, 1.0, 0.001], 1.0, 1e5, 0.499, Element::Tet4, false),
 ];
 
-/// Every scene.
+/// All scenes.
 ///
 /// # Errors
-/// [`ReportError`] where one cannot be set up.
+/// [`ReportError`] if a scene cannot be set up.
 pub(super) fn all() -> Result<Vec<Scene>, ReportError> {
     PLANS.iter().map(scene).collect()
 }
@@ -66,8 +66,8 @@ fn scene(plan: &Plan) -> Result<Scene, ReportError> {
     Ok(Scene { family, model, length })
 }
 
-/// A box of cells of six tetrahedra each, its inner places moved a little so that no two rows of the
-/// stiffness are alike.
+/// Box of cells of six tetrahedra each, its inner nodes moved a little so that no two rows of the
+/// stiffness are equal.
 fn block(cells: [usize; 3], size: [f64; 3]) -> Result<TetMesh, ReportError> {
     let [a, b, c] = cells;
     let at = |[i, j, k]: [usize; 3]| (i + (a + 1) * (j + (b + 1) * k)) as u32;

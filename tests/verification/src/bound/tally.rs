@@ -1,29 +1,29 @@
-//! Counts proven bounds over true errors.
+//! Counts of proven bounds and true errors.
 
 use std::collections::BTreeMap;
 
 use softgrasp_core::solve::condensed::Delivery;
 
-/// A bound, or why there is none.
+/// Error bound, or the reason why there is none.
 pub(super) type Bound = Result<f64, &'static str>;
 
-/// What became of some grips.
+/// Counts over some grips.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tally {
-    /// Bound over error, in double precision from residuals, after a second solve, and after a
+    /// Ratios of bound to error: in double precision from residuals, after a second solve, and after a
     /// second solve in single precision.
     pub ratios: [Vec<f64>; 3],
-    /// True errors in double precision.
+    /// True errors in double precision, relative.
     pub errors: Vec<f64>,
-    /// Grips whose bound was below the error: error and bound.
+    /// Error and bound of each grip whose bound was below the error.
     pub below: Vec<(f64, f64)>,
-    /// Grips without a bound, by reason: before and after a second solve.
+    /// Number of grips without a bound, by reason: before and after a second solve.
     pub none: [BTreeMap<&'static str, usize>; 2],
-    /// Grips.
+    /// Number of grips.
     pub grips: usize,
-    /// Contacts that do not hold the body or depend on each other.
+    /// Number of contact sets that do not hold the body or depend on each other.
     pub refused_sets: usize,
-    /// Contacts for which no right answer could be found.
+    /// Number of contact sets for which no exact answer could be found.
     pub sets_without_reference: usize,
 }
 
@@ -58,7 +58,7 @@ impl Tally {
         }
     }
 
-    /// Adds another's counts.
+    /// Adds the counts of another tally.
     pub fn join(&mut self, other: &Self) {
         for (own, of_other) in self.ratios.iter_mut().zip(&other.ratios) {
             own.extend(of_other);
@@ -76,7 +76,7 @@ impl Tally {
     }
 }
 
-/// Value below which a share of some numbers lies; NaN if there are none.
+/// Quantile of some numbers; NaN if there are none.
 pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

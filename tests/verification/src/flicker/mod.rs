@@ -1,4 +1,5 @@
-//! Report `flicker`: noise of the devices against the hysteresis of the grasp, and what it costs.
+//! Report `flicker`: noise of the devices against the hysteresis of the grasp, and the delay that it
+//! costs.
 
 mod noise;
 mod report;

@@ -1,4 +1,4 @@
-//! Noise of a glove and a tracker, put on the bytes that they send.
+//! Noise of a glove and a tracker, added to the bytes that they send.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use softgrasp_hand::sent::{Arrival, Device};
@@ -10,16 +10,16 @@ const POSITION_CM: f64 = 0.08;
 /// Standard deviation of the tracker's attitude about each axis, rad (0.15°).
 const ATTITUDE_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 
-/// Noise that is the same in every run.
+/// Source of noise that is the same in every run.
 pub struct Noise(Random);
 
 impl Noise {
-    /// Noise of its own for each seed.
+    /// Source of noise with a seed.
     pub fn new(seed: u64) -> Self {
         Self(Random(seed.wrapping_mul(0x2545_F491_4F6C_DD1D)))
     }
 
-    /// Normal, of standard deviation 1 (Box and Muller 1958).
+    /// Normal random number of standard deviation 1 (Box and Muller 1958).
     fn normal(&mut self) -> f64 {
         let (radius, angle) = (self.0.share().max(1e-300), self.0.share());
         (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
@@ -29,8 +29,8 @@ impl Noise {
         Vector3::new(self.normal(), self.normal(), self.normal())
     }
 
-    /// The same bytes from devices that measure with noise: each sensor of the glove one count off
-    /// either way in two thirds of the readings, the tracker off in place and attitude.
+    /// Adds noise to device bytes: each sensor of the glove is one count off either way in two thirds of
+    /// the readings, the tracker is off in position and orientation.
     ///
     /// The bytes are those of the scripted set-up: records of 22 sensors, binary quaternions, cm.
     pub fn on(&mut self, arrivals: &[Arrival]) -> Vec<Arrival> {

@@ -6,9 +6,9 @@ use super::trial::{RATE_HZ, Stage};
 use softgrasp_bench::report::{Options, Report, ReportError, progress};
 use softgrasp_bench::table::{Cell, Table};
 
-/// Release margins, m.
+/// Release margins that are tried, m.
 const MARGINS_M: [f64; 8] = [0.0, 0.0005, 0.001, 0.002, 0.0025, 0.003, 0.004, 0.006];
-/// Margin of the product, in the form of a table.
+/// Release margin of the product, m.
 const PRODUCT: f64 = Grasp::RELEASE_MARGIN_M;
 
 /// Measures the report.

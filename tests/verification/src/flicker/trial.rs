@@ -1,4 +1,4 @@
-//! One hand with noise: how often a grasp that is held changes, and how late it lets go.
+//! A hand with noise: number of changes of a held grasp, and delay of its release.
 
 use anyhow::Context;
 use glove_client::object::loading::{ObjectRequest, load};
@@ -15,17 +15,18 @@ use softgrasp_hand::sent::Arrival;
 
 use super::noise::Noise;
 
-/// A hand that holds still does so for more ticks than this; one that closes slowly stops for fewer.
+/// Number of ticks without motion above which a hand counts as still; one that closes slowly stops for
+/// fewer.
 const STILL_TICKS: usize = 8;
 /// Ticks per second.
 pub const RATE_HZ: f64 = 60.0;
 
-/// An object and the plan to grasp it.
+/// Object, and the plan to grasp it.
 pub struct Stage {
     loaded: LoadedObject,
 }
 
-/// A grasp that follows bytes, without a server: what the fingers hold does not depend on it.
+/// Grasp that follows device bytes, without a server: the contacts do not depend on it.
 struct Follower<'a> {
     stage: &'a Stage,
     grasp: Grasp,
@@ -35,10 +36,10 @@ struct Follower<'a> {
 }
 
 impl Stage {
-    /// The strawberry of the default run.
+    /// Stage with the strawberry of the default run.
     ///
     /// # Errors
-    /// It cannot be made.
+    /// The object cannot be made.
     pub fn strawberry() -> anyhow::Result<Self> {
         let choice = ObjectChoice::BuiltIn(BuiltIn::Strawberry);
         let request = ObjectRequest {
@@ -67,8 +68,8 @@ impl Stage {
         })
     }
 
-    /// The bytes of a script, tick by tick, until the grasp of the product is as wanted, or to its
-    /// end.
+    /// Device bytes of a script, tick by tick, until `holds` accepts the state of the product's grasp, or
+    /// to the end.
     fn script(
         &self,
         script: ScriptName,
@@ -91,12 +92,12 @@ impl Stage {
         anyhow::bail!("the script does not come to the state")
     }
 
-    /// How often the grasp changes while the hand that has just come into a state rests, with noise.
+    /// Number of changes of the grasp while a hand rests, with noise, that has just come into a state.
     ///
     /// Units: `margin_m` m.
     ///
     /// # Errors
-    /// The script does not come to the state.
+    /// The script does not reach the state.
     pub fn changes(
         &self,
         margin_m: f64,
@@ -119,8 +120,8 @@ impl Stage {
         Ok(changes)
     }
 
-    /// How long after the hand has begun to open the object is not deformed any more, s; `None` if a
-    /// grasp with this margin has let go before.
+    /// Time from the beginning of the opening of the hand until the object is not deformed any more, s;
+    /// `None` if a grasp with this margin has released it before.
     ///
     /// # Errors
     /// The script does not come so far.

@@ -1,4 +1,4 @@
-//! One hard case: the question, and what was promised about its answer before it was measured.
+//! A hard case: the question, and the promise about its answer, made before it was measured.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;
@@ -9,23 +9,23 @@ use super::refusal::Reason;
 use super::shapes::{nearest, nodes_where};
 use softgrasp_bench::report::ReportError;
 
-/// Threads of the pools that must give the same bits; the first is asked again at the end.
+/// Numbers of threads of the pools that must give the same bits; the first is asked again at the end.
 pub(super) const THREADS: [usize; 5] = [2, 1, 4, 7, 2];
 
-/// What is asked: an object, what holds it, what moves it.
+/// Question about an object: its support and its known displacements.
 ///
 /// Units: m, Pa.
 #[derive(Clone, Debug)]
 pub(super) struct Question {
     pub mesh: TetMesh,
     pub materials: Vec<Material>,
-    /// Degrees of freedom that the scene holds at zero.
+    /// Degrees of freedom that the model fixes at zero.
     pub fixed: Vec<u32>,
-    /// Known displacements as a request names them: in any order, perhaps twice.
+    /// Known displacements as a request names them, m: in any order, perhaps twice.
     pub pairs: Vec<(u32, f64)>,
 }
 
-/// Outcomes that a case allows.
+/// Kinds of outcomes that a case allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Allowed {
     pub exact: bool,
@@ -33,72 +33,71 @@ pub(super) struct Allowed {
     pub refused: bool,
 }
 
-/// Which ways are asked.
+/// Set of ways that a case is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reach {
-    /// All of them, dense ones too.
+    /// All ways, dense methods included.
     All,
     /// One method of each kind, for a question that is asked two hundred times.
     OfEachKind,
-    /// What `auto` may choose for a mesh too large for the others: linear elements.
+    /// Ways that `auto` may choose for a mesh too large for the others: linear elements.
     Large,
 }
 
-/// How often a question is asked, each time of the shape that the answer before left.
+/// Number of repetitions, each with the shape that the answer before left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Repeats {
     Once,
-    /// Every second time backwards.
+    /// So many repetitions; every second one is pushed backwards.
     ToAndFro(usize),
     Onwards(usize),
 }
 
-/// A question and what was promised.
+/// Question, and the promise about its answer.
 #[derive(Clone, Debug)]
 pub(super) struct Case {
     pub name: String,
     pub question: Question,
-    /// The right reason for there being no answer, where there is none.
+    /// Right reason for a refusal.
     pub reason: Reason,
-    /// What ways with a factor in double precision may do.
+    /// Outcomes allowed for ways with a factor in double precision.
     pub double: Allowed,
-    /// What ways with a factor in single precision may do.
+    /// Outcomes allowed for ways with a factor in single precision.
     pub single: Allowed,
-    /// The right displacement of every node where it is known without solving.
+    /// Exact displacement of every node, m, if it is known without solving.
     pub field: Option<Vec<f64>>,
     pub reach: Reach,
     pub repeats: Repeats,
-    /// How often it is asked, each time with another number of threads, at most
-    /// [`THREADS`].
+    /// Number of runs, each with another number of threads; at most as many as [`THREADS`].
     pub runs: usize,
 }
 
-/// Cases of one kind, the reason for their thresholds, and what a user should do.
+/// Cases of one kind, the reason for their thresholds, and advice for users.
 #[derive(Clone, Debug)]
 pub(super) struct Family {
     pub name: &'static str,
-    /// Why the thresholds are what they are.
+    /// Reason for the thresholds.
     pub reasoning: &'static str,
     pub advice: &'static str,
     pub cases: Vec<Case>,
 }
 
-/// How large a report is made.
+/// Size of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Form {
     pub is_quick: bool,
-    /// Cells along an edge of the block that most cases are made of.
+    /// Number of cells along an edge of the block that most cases use.
     pub cells: usize,
 }
 
-/// Error of a well supported block of ν = 0.3: Skeel's condition number of some thousands times the
-/// rounding of a double, and a margin of ten or so for the sums over rows.
+/// Relative error of a well supported block of ν = 0.3: Skeel's condition number of some thousands times
+/// the rounding of a double, and a margin of about ten for the sums over rows.
 const WELL_POSED: f64 = 1e-11;
-/// Condition of the same block, roughly.
+/// Approximate condition number of the same block.
 const WELL_POSED_CONDITION: f64 = 1e3;
-/// Growth at which no digit is certain: the condition times the rounding is a tenth.
+/// Growth of the condition at which no digit is certain: the condition times the rounding is a tenth.
 const DOUBLE_GROWTH_MAX: f64 = 0.1 / (WELL_POSED_CONDITION * f64::EPSILON);
-/// Share of that from which an estimate that errs by its usual factors may say so already.
+/// Share of that growth from which on an estimate may refuse already, since it is wrong by some factor.
 const REFUSAL_MARGIN: f64 = 1e-3;
 
 impl Allowed {
@@ -119,8 +118,8 @@ impl Allowed {
 impl Case {
     /// A case whose condition is `growth` times that of a well supported block, by theory.
     ///
-    /// Where the expected error grows beyond what goes without saying an answer may be degraded, as
-    /// it states; and it may be refused where no digit can be certain.
+    /// If theory predicts a larger error, the answer may be degraded, as it states; it may be refused if
+    /// no digit can be certain.
     pub fn new(name: impl Into<String>, question: Question, growth: f64) -> Self {
         let double = if growth >= REFUSAL_MARGIN * DOUBLE_GROWTH_MAX {
             Allowed::ANY
@@ -144,17 +143,17 @@ impl Case {
         }
     }
 
-    /// States the right reason of a refusal.
+    /// Sets the right reason for a refusal.
     pub fn because(self, reason: Reason) -> Self {
         Self { reason, ..self }
     }
 
-    /// States the outcomes that are allowed, whatever the factor.
+    /// Sets the outcomes that are allowed, whatever the factor.
     pub fn allowing(self, allowed: Allowed) -> Self {
         Self { double: allowed, single: allowed, ..self }
     }
 
-    /// The right answer, known without solving: `u = u(x)`.
+    /// Sets the exact answer, known without solving: `u = u(x)`.
     pub fn with_field(mut self, field: impl Fn(&Point3<f64>) -> Vector3<f64>) -> Self {
         let vertices = self.question.mesh.vertices();
         self.field = Some(vertices.iter().flat_map(|p| <[f64; 3]>::from(field(p))).collect());
@@ -163,8 +162,8 @@ impl Case {
 }
 
 impl Question {
-    /// An object that the scene holds at its lower end along an axis and two contacts at the other
-    /// end move by a hundredth of its size.
+    /// Object that is fixed at its lower end along an axis, and whose other end two contacts move by a
+    /// hundredth of its size.
     pub fn clamped(mesh: TetMesh, materials: Vec<Material>, axis: usize) -> Self {
         let (low, high) = mesh.bounds();
         let end = nodes_where(&mesh, |p| p[axis] - low[axis] <= 1e-9 * (high - low)[axis]);
@@ -177,8 +176,7 @@ impl Question {
         Self { mesh, materials, fixed, pairs }
     }
 
-    /// An object that nothing but contacts at five corners holds and moves by a hundredth of its
-    /// size.
+    /// Object that only contacts at five corners hold, which move by a hundredth of its size.
     pub fn held(mesh: TetMesh, materials: Vec<Material>) -> Self {
         let (low, high) = mesh.bounds();
         let size = mesh.size();
@@ -199,27 +197,27 @@ impl Question {
         Self { mesh, materials, fixed: Vec::new(), pairs }
     }
 
-    /// The same with all known displacements multiplied.
+    /// The question with all known displacements multiplied by `by`.
     pub fn scaled(&self, by: f64) -> Self {
         let pairs = self.pairs.iter().map(|&(dof, value)| (dof, by * value)).collect();
         Self { pairs, ..self.clone() }
     }
 }
 
-/// All axes of some nodes.
+/// Degrees of freedom of all axes of some nodes.
 pub(super) fn all_axes(nodes: &[u32]) -> Vec<u32> {
     nodes.iter().flat_map(|n| 3 * n..3 * n + 3).collect()
 }
 
-/// A node moved by a multiple of a vector.
+/// Known displacement of a node: a multiple of a vector.
 pub(super) fn moved(node: u32, by: [f64; 3], times: f64) -> Vec<(u32, f64)> {
     (3 * node..3 * node + 3).zip(by).map(|(dof, value)| (dof, times * value)).collect()
 }
 
-/// Rubber of ν = 0.3.
+/// Rubber with ν = 0.3.
 ///
 /// # Errors
-/// None in fact: the material is one.
+/// None in practice: the constants describe a material.
 pub(super) fn plain() -> Result<Vec<Material>, ReportError> {
     Ok(vec![Material::try_new(1.0e5, 0.3)?])
 }

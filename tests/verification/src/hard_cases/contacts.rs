@@ -10,7 +10,7 @@ use softgrasp_bench::report::ReportError;
 /// Contacts on neighbours and twice on one node, with equal and with contradicting values.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     let mesh = block([form.cells; 3], [1.0; 3])?;
     let cell = 1.0 / form.cells as f64;

@@ -1,4 +1,4 @@
-//! Sums of two doubles, and a dense factor made of them, for right answers of hard cases.
+//! Sums of two doubles, and a dense factor made of them, for exact answers of hard cases.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -7,7 +7,7 @@ use softgrasp_core::solve::Partition;
 
 use softgrasp_bench::reference::{two_product, two_sum};
 
-/// About 32 digits: `.0` rounded, `.1` what rounding lost.
+/// Number of about 32 digits: `.0` the rounded value, `.1` the part that rounding lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct DoubleDouble(pub f64, pub f64);
 
@@ -61,10 +61,10 @@ impl Div for DoubleDouble {
     }
 }
 
-/// `K11 Q_u = −K12 Q_k` by a dense LDLᵀ factor in sums of two doubles, over all degrees of freedom;
-/// `None` where a pivot vanishes.
+/// Solution of `K11 Q_u = −K12 Q_k` by a dense LDLᵀ factor in sums of two doubles, for all degrees of
+/// freedom; `None` if a pivot vanishes.
 ///
-/// Shapes: `q_known` one per known degree of freedom; 3N back.
+/// Shapes: `q_known` one for each known degree of freedom; the result 3N.
 ///
 /// Source: thesis (3.43a).
 pub(super) fn solve_dense(

@@ -11,12 +11,12 @@ use super::answer::{Answer, since};
 use super::case::Question;
 use super::refusal::Refusal;
 
-/// Memory for columns; more than any case needs.
+/// Memory for columns, bytes; more than any case needs.
 const COLUMN_BYTES: usize = 1 << 30;
-/// Nodes up to which the bound is proven: it takes a second factor.
+/// Number of nodes up to which the bound is proven, which takes a second factor.
 const PROVEN_NODES_MAX: usize = 20_000;
 
-/// The model of a question.
+/// Model of a question.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -25,7 +25,7 @@ pub(super) fn model_of(question: &Question, element: Element) -> Result<Model, M
     Model::try_new(mesh.clone(), element, materials, fixed.clone(), &mut |_| {})
 }
 
-/// By a factor or inverse of `K11`.
+/// Answer by a factor or inverse of `K11`.
 ///
 /// # Errors
 /// [`Refusal`].
@@ -54,8 +54,8 @@ pub(super) fn direct(
     .if_certain()
 }
 
-/// By columns of the compliance. With `by_masks` every touched node is held by a mask of that node
-/// alone, which is the same question asked of other code.
+/// Answer by columns of the compliance. With `by_masks` every touched node is held by a mask of that node
+/// alone, which is the same question to other code.
 ///
 /// # Errors
 /// [`Refusal`].
@@ -105,19 +105,19 @@ pub(super) fn condensed(
     .if_certain()
 }
 
-/// Known displacements, those of whole nodes apart where they are to be masks.
+/// Known displacements; if masks are wanted, those of whole nodes apart.
 pub(super) struct Grouped {
-    /// By degree of freedom.
+    /// Displacements by degree of freedom, m.
     pub loose: Vec<(u32, f64)>,
-    /// By node.
+    /// Displacements by node, to be held by masks, m.
     pub masked: Vec<(u32, [f64; 3])>,
 }
 
-/// More masks than a hand has fingers are not asked for; the rest stays as it is.
+/// Largest number of masks; further nodes are held without masks.
 const MASKS_MAX: usize = 10;
 
 impl Grouped {
-    /// `pairs` ascending, each degree of freedom once.
+    /// Groups `pairs`, which are ascending, each degree of freedom once.
     pub fn of(pairs: &[(u32, f64)], by_masks: bool) -> Self {
         let (mut loose, mut masked) = (Vec::new(), Vec::new());
         for of_node in pairs.chunk_by(|a, b| a.0 / 3 == b.0 / 3) {

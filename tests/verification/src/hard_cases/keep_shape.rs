@@ -1,4 +1,4 @@
-//! Cases in which a shape is kept again and again: each answer is the next rest shape.
+//! Cases in which shapes are kept repeatedly: each answer is the next rest shape.
 
 use glove_client::ask::connection::Host;
 use nalgebra::Vector3;
@@ -13,15 +13,15 @@ use super::truth::{Errors, Truth};
 use super::ways::Way;
 use softgrasp_bench::report::ReportError;
 
-/// How often a shape is kept.
+/// Number of times that a shape is kept.
 const TIMES: usize = 200;
-/// Of these answers one is compared with a reference.
+/// Number of answers of which one is compared with a reference.
 const COMPARED_EVERY: usize = 10;
 
 /// Two hundred shapes kept, to and fro and always onwards.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     let mesh = block([2; 3], [1.0; 3])?;
     let question = Question::held(mesh, plain()?);
@@ -52,17 +52,17 @@ pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     })
 }
 
-/// What became of a question that is asked again and again.
+/// Result of a question that is asked repeatedly.
 pub(super) enum Walk {
     /// The last answer, and the largest errors of those that were compared.
     Answered(Answer, Option<Errors>),
     /// No answer, or a shape that cannot be kept.
     Refused(Refusal),
-    /// An answer on the way that was wrong beyond its threshold and beyond what it said.
+    /// An answer on the way whose error was above its threshold and above what it stated.
     Failed(String),
 }
 
-/// Asks, keeps the shape, asks again.
+/// Asks, keeps the shape, and repeats.
 pub(super) fn walk(way: Way, case: &Case, compare: bool, host: &Host) -> Walk {
     let (times, and_fro) = match case.repeats {
         Repeats::Once => (1, false),
@@ -113,7 +113,7 @@ pub(super) fn walk(way: Way, case: &Case, compare: bool, host: &Host) -> Walk {
     }
 }
 
-/// Whichever is larger, over its threshold.
+/// The errors that are larger, relative to their threshold.
 fn larger(a: Option<Errors>, b: Option<Errors>) -> Option<Errors> {
     match (a, b) {
         (Some(a), Some(b)) if a.largest_rel * b.threshold_rel > b.largest_rel * a.threshold_rel => {

@@ -7,10 +7,10 @@ use softgrasp_bench::report::ReportError;
 
 const NODES: usize = 100_000;
 
-/// One press, by what `auto` may choose; nothing in the quick form.
+/// One press, by the ways that `auto` may choose; empty in the small form.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     let mut cases = Vec::new();
     if !form.is_quick && !cfg!(test) {

@@ -11,7 +11,7 @@ use softgrasp_bench::plot::{Mark, Plot, PlotError, PlotPoint, Series};
 use softgrasp_bench::report::ReportError;
 use softgrasp_bench::table::Table;
 
-/// Displacement over force of a pushed block by one element, over that of the reference.
+/// Displacement over force of a pushed block by one element, relative to the reference.
 pub(super) struct Softness {
     element: Element,
     nu: f64,
@@ -21,12 +21,12 @@ pub(super) struct Softness {
 }
 
 const YOUNG: f64 = 1.0e5;
-/// The block is a metre wide and twice as high.
+/// Height of the block, m; it is a metre wide.
 const HEIGHT: f64 = 2.0;
 const COLUMNS: [&str; 5] =
     ["element", "poisson", "cells_per_m", "displacement_per_force_m_per_N", "over_reference"];
 
-/// Every element at every ν, beside ten-node elements of a finer mesh.
+/// Softness of every element at every ν, beside ten-node elements of a finer mesh.
 ///
 /// # Errors
 /// [`ReportError`].
@@ -82,7 +82,7 @@ pub(crate) fn compliance(
     Ok((1.0 / work, [vertices.len(), dofs.len()]))
 }
 
-/// The figures as numbers.
+/// Table of the numbers.
 pub(super) fn table(all: &[Softness]) -> Table {
     let title = "Locking: a clamped block pushed sideways";
     let mut table = Table::new("hard-cases-locking", title, &COLUMNS);
@@ -98,7 +98,7 @@ pub(super) fn table(all: &[Softness]) -> Table {
     table
 }
 
-/// Displacement over that of the reference against 1 − 2ν.
+/// Figure of the displacement, relative to the reference, against 1 − 2ν.
 ///
 /// # Errors
 /// [`PlotError`].

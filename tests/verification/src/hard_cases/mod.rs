@@ -1,4 +1,5 @@
-//! Report `hard-cases`: what every method does where numbers get difficult, and what was promised.
+//! Report `hard-cases`: the answers of every method to numerically difficult questions, and the promises
+//! about them.
 
 mod answer;
 mod case;

@@ -1,4 +1,4 @@
-//! The outcome of a question: exact, degraded as stated, refused with reason, or failed.
+//! Outcome of a question: exact, degraded as stated, refused with a reason, or failed.
 
 use softgrasp_core::solve::ERROR_UNREMARKABLE;
 
@@ -6,26 +6,26 @@ use super::case::Allowed;
 use super::refusal::{Reason, Refusal};
 use super::truth::Errors;
 
-/// Of one row.
+/// Outcome of one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// The error is at most a hundred times the expected one, or what the way goes down to.
+    /// The error is at most a hundred times the expected one, or the one that the way stops at.
     Exact,
-    /// The error is larger, at most what the answer states, and what it states is warned of.
+    /// The error is larger, at most what the answer states, and the answer warns of it.
     Degraded,
-    /// There is no answer, and a sentence why.
+    /// There is no answer, but a sentence with the reason.
     Refused,
-    /// Anything else, and whatever the case does not allow.
+    /// Any other result, and any that the case does not allow.
     Failed,
 }
 
-/// What an answer says and how wrong it is.
+/// Statement of an answer about its error, and its true error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Judged {
     pub errors: Option<Errors>,
     pub stated_rel: f64,
     pub bound_rel: Option<f64>,
-    /// Error that the way goes down to, where rounding is not what ends it.
+    /// Relative error that the way stops at, if not at rounding.
     pub promised_rel: f64,
 }
 
@@ -41,7 +41,7 @@ impl Outcome {
         }
     }
 
-    /// Outcome of a refusal, and what is to be said about it.
+    /// Outcome of a refusal, and a note about it.
     pub fn of_refusal(refusal: &Refusal, right: Reason, allowed: Allowed) -> (Self, String) {
         let Refusal { reason, text } = refusal;
         if text.trim().is_empty() {
@@ -59,7 +59,7 @@ impl Outcome {
         }
     }
 
-    /// Outcome of an answer, and what is to be said about it.
+    /// Outcome of an answer, and a note about it.
     pub fn of_answer(judged: &Judged, allowed: Allowed) -> (Self, String) {
         let failed = |text: String| (Self::Failed, text);
         let Judged { errors: Some(errors), stated_rel, bound_rel, promised_rel } = *judged else {
@@ -88,7 +88,7 @@ impl Outcome {
     }
 }
 
-/// The right answer is itself rounded to double precision.
+/// Relative rounding of the exact answer, which is stored in double precision.
 const ROUNDED: f64 = 4.0 * f64::EPSILON;
 
 #[cfg(test)]

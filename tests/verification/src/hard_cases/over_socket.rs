@@ -1,5 +1,5 @@
-//! Answers by a server over a loopback socket: one request that holds all, and frames on a kept
-//! model.
+//! Answers by a server over a loopback socket: one request with its own mesh, and frame questions about a
+//! kept model.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -16,10 +16,10 @@ use super::case::Question;
 use super::in_process::Grouped;
 use super::refusal::{Reason, Refusal};
 
-/// A frame's error is estimated in the background; it is asked for again until then.
+/// Longest wait for the estimate of a frame's error, which is made in the background.
 const ESTIMATE_WAIT: Duration = Duration::from_secs(5);
 
-/// By one request with mesh, material and question, and the server's choice of method.
+/// Answer to one request with mesh, material and question, by the server's choice of method.
 ///
 /// # Errors
 /// [`Refusal`].
@@ -41,8 +41,8 @@ pub(super) fn solve(question: &Question, element: Element, host: &Host) -> Resul
     read(ask(&mut connection, &request)?, begin)?.if_certain()
 }
 
-/// By a frame on a model that the server keeps; with `by_masks` every touched node is held by a mask
-/// of that node alone.
+/// Answer to a frame question about a kept model; with `by_masks` every touched node is held by a mask of
+/// that node alone.
 ///
 /// # Errors
 /// [`Refusal`].
@@ -91,7 +91,7 @@ fn on_the_wire(question: &Question) -> (MeshData, Vec<Material>) {
     (mesh, materials.map(of).collect())
 }
 
-/// A question of all nodes in double precision, method left open.
+/// Question about all nodes in double precision, method left open.
 fn asked(known: &[(u32, f64)], by_masks: bool) -> Result<Asked, Refusal> {
     let by_dof: BTreeMap<u32, f64> = known.iter().copied().collect();
     // What is given twice or is no number is sent as it is.

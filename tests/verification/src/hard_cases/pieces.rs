@@ -1,4 +1,4 @@
-//! Cases with pieces joined by a node or an edge, and with bodies that nothing touches.
+//! Cases with pieces joined by a node or an edge, and with bodies without contact.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,7 +10,7 @@ use softgrasp_bench::report::ReportError;
 /// A block and its copy: hinged at a node, at an edge, or apart.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     let block = block([form.cells; 3], [1.0; 3])?;
     let ways_to_join: [(&str, [f64; 3], usize); 3] = [

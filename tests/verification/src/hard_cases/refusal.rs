@@ -1,28 +1,28 @@
-//! The kinds of refusals, to compare the reason of a refusal with the right one.
+//! Kinds of refusals, to compare the reason of a refusal with the right one.
 
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;
 use softgrasp_core::solve::{Certainty, SolveError};
 use softgrasp_protocol::{RejectCode, Rejected};
 
-/// Kinds of reasons.
+/// Kind of the reason of a refusal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reason {
-    /// The question contradicts itself, or holds what is no number.
+    /// The question contradicts itself, or contains a number that is not finite.
     Question,
-    /// A rigid motion is held back by nothing.
+    /// A rigid motion is left free.
     Free,
-    /// The body is held, but rounding takes every digit.
+    /// The body is held so weakly that rounding takes every digit.
     Weak,
-    /// Numbers leave the range of a double.
+    /// Numbers exceed the range of a double.
     Range,
     /// An element of the kept shape would be turned inside out.
     Inverted,
-    /// Anything else: memory, a broken connection.
+    /// Any other reason: memory, a broken connection.
     Other,
 }
 
-/// A refusal: its kind, and the sentence a user reads.
+/// Refusal: its kind, and the sentence for the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Refusal {
     pub reason: Reason,
@@ -47,7 +47,7 @@ impl Refusal {
         Self { reason, text: text.into() }
     }
 
-    /// No digit of an answer is certain.
+    /// Refusal because no digit of an answer is certain.
     pub fn uncertain(certainty: Certainty) -> Self {
         let Certainty { condition, error_rel } = certainty;
         let text = format!(

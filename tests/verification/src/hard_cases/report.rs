@@ -1,4 +1,4 @@
-//! Writes the report: the outcome of every method in every case, and what a user should do.
+//! Writes the report: outcome of every method in every case, and advice for users.
 
 use super::case::{Case, Family, Form};
 use super::outcome::Outcome;
@@ -58,7 +58,7 @@ fn fault(row: &Row) -> String {
     format!("{}, {}; {element} by {way}: {}", row.family, row.case, row.note)
 }
 
-/// Whether the same question, with the same element, is answered by another way.
+/// Whether another way with the same element answers the same question.
 fn is_answered_elsewhere(row: &Row, rows: &[Row]) -> bool {
     let is_same = |other: &&Row| {
         let of = |r: &Row| (r.family, r.way.element());
@@ -68,7 +68,8 @@ fn is_answered_elsewhere(row: &Row, rows: &[Row]) -> bool {
     rows.iter().filter(is_same).any(is_answered)
 }
 
-/// A question that one way answers is refused by another only where that is said to be beyond it.
+/// Marks refusals of questions that another way answers as failed, unless they are a stated limit of the
+/// way.
 fn refuse_refusals_that_others_answer(rows: &mut [Row]) {
     let is_unexcused = |row: &Row| row.outcome == Outcome::Refused && row.way.limit().is_none();
     let unexcused: Vec<usize> = (0..rows.len())
@@ -80,7 +81,7 @@ fn refuse_refusals_that_others_answer(rows: &mut [Row]) {
     }
 }
 
-/// How far the thresholds are above the errors of exact answers.
+/// Ratio of the thresholds to the errors of exact answers.
 fn slack(rows: &[Row]) -> String {
     let of = |row: &Row| {
         let Numbers { error_rel, threshold_rel, .. } = row.numbers?;
@@ -99,7 +100,7 @@ fn slack(rows: &[Row]) -> String {
     )
 }
 
-/// Refusals whose question another way answers, with the reason that each has.
+/// Refusals of questions that another way answers, with their reasons.
 fn refusals(rows: &[Row]) -> String {
     let refused = rows.iter().filter(|r| r.outcome == Outcome::Refused);
     let answered: Vec<&Row> = refused.clone().filter(|r| is_answered_elsewhere(r, rows)).collect();
@@ -121,7 +122,7 @@ fn refusals(rows: &[Row]) -> String {
     }
 }
 
-/// How many rows there are of each outcome.
+/// Number of rows of each outcome.
 fn totals(rows: &[Row]) -> String {
     let of = |outcome: Outcome| {
         let count = rows.iter().filter(|r| r.outcome == outcome).count();
@@ -136,7 +137,7 @@ fn totals(rows: &[Row]) -> String {
     )
 }
 
-/// The three cases with the largest errors that kept their promise, each of another family.
+/// The three cases with the largest errors within their promise, each of another family.
 fn worst(families: &[Family], rows: &[Row]) -> String {
     let error = |row: &Row| row.numbers.and_then(|n| n.error_rel).unwrap_or(0.0);
     let mut found: Vec<(&Family, &Row)> = Vec::new();
@@ -165,7 +166,7 @@ fn worst(families: &[Family], rows: &[Row]) -> String {
     text
 }
 
-/// Why the thresholds are what they are.
+/// Reasons for the thresholds.
 fn promises(families: &[Family]) -> String {
     let line = |f: &Family| format!("- **{}:** {} *{}*\n", f.name, f.reasoning, f.advice);
     let lines: String = families.iter().map(line).collect();
@@ -204,7 +205,7 @@ const RECORDS: [&str; 20] = [
     "index",
 ];
 
-/// Every row.
+/// Table of all rows.
 fn record_table(rows: &[Row]) -> Table {
     let mut table = Table::new("hard-cases", "Every row", &RECORDS);
     for (index, row) in rows.iter().enumerate() {
@@ -252,7 +253,7 @@ const CASES: [&str; 13] = [
     "condition_max",
 ];
 
-/// Every case, with how many of its ways had which outcome.
+/// Table of all cases, with the number of ways for each outcome.
 fn case_table(families: &[Family], rows: &[Row]) -> Table {
     let title = "Every case: what was allowed, and outcomes of its ways";
     let mut table = Table::new("hard-cases-outcomes", title, &CASES);
@@ -284,7 +285,7 @@ fn case_table(families: &[Family], rows: &[Row]) -> Table {
     table
 }
 
-/// True error against what an answer says of itself.
+/// Figure of the true error against the error that an answer states.
 fn figure(rows: &[Row]) -> Result<String, PlotError> {
     let points = |keep: &dyn Fn(&Row) -> bool| -> Vec<PlotPoint> {
         let of = |row: &Row| {

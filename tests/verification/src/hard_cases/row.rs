@@ -16,7 +16,7 @@ use super::ways::Way;
 use softgrasp_bench::report::ReportError;
 use softgrasp_bench::threads::pool;
 
-/// One way through one case.
+/// Result of one way in one case.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub family: &'static str,
@@ -25,21 +25,21 @@ pub(super) struct Row {
     pub way: Way,
     pub allowed: Allowed,
     pub outcome: Outcome,
-    /// Reason of a refusal or failure, or what a degraded answer states.
+    /// Reason of a refusal or failure, or statement of a degraded answer.
     pub note: String,
     pub against: &'static str,
     pub numbers: Option<Numbers>,
-    /// FNV-1a of the answer's bits, or of the reason for there being none.
+    /// FNV-1a of the answer's bits, or of the reason of a refusal.
     pub hash: u64,
-    /// Runs that gave these bits.
+    /// Number of runs that gave these bits.
     pub runs: usize,
 }
 
-/// Numbers of an answer.
+/// Errors and time of an answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Numbers {
     pub error_rel: Option<f64>,
-    /// Largest error with which the answer is exact.
+    /// Largest relative error with which the answer counts as exact.
     pub threshold_rel: Option<f64>,
     pub stated_rel: f64,
     pub bound_rel: Option<f64>,
@@ -48,25 +48,25 @@ pub(super) struct Numbers {
     pub ms: f64,
 }
 
-/// What one run of a row found.
+/// Result of one run of a row.
 enum Found {
     Answer(Box<Answer>, Option<Errors>),
     Refusal(Refusal),
     Fault(String),
 }
 
-/// A pool that rows are asked on, and a server with as many threads.
+/// Pool on which rows are asked, and a server with as many threads.
 #[derive(Clone)]
 struct Place {
     pool: Arc<rayon::ThreadPool>,
     host: Arc<Host>,
 }
 
-/// Pools and servers that rows are asked on.
+/// Pools and servers on which rows are asked.
 pub(super) struct Pools(Vec<Place>);
 
 impl Pools {
-    /// A pool and a server for every entry of [`THREADS`].
+    /// One pool and one server for every entry of [`THREADS`].
     ///
     /// # Errors
     /// [`ReportError::Threads`], [`ReportError::Link`].
@@ -79,7 +79,7 @@ impl Pools {
     }
 }
 
-/// A way that takes longer hangs.
+/// Time after which a way is taken to hang.
 fn limit(reach: Reach) -> Duration {
     match reach {
         Reach::All | Reach::OfEachKind => Duration::from_secs(120),
@@ -87,7 +87,7 @@ fn limit(reach: Reach) -> Duration {
     }
 }
 
-/// Every way through one case.
+/// Rows of all ways in one case.
 pub(super) fn rows_of(family: &Family, case: &Case, pools: &Pools) -> Vec<Row> {
     let shared = Arc::new(case.clone());
     let mut rows = Vec::new();
@@ -155,7 +155,7 @@ fn row(family: &Family, case: &Arc<Case>, way: Way, right: &Arc<Truth>, pools: &
     first.unwrap_or_else(|| judged(family, case, way, right.source, never_asked()))
 }
 
-/// Asks once; compares where there is something to compare with.
+/// Asks once; compares if there is an exact answer.
 fn ask(case: &Case, way: Way, right: Option<&Truth>, host: &Host) -> (Found, u64) {
     let found = match case.repeats {
         Repeats::Once => match way.answer(&case.question, host) {
@@ -229,7 +229,7 @@ fn judged(
     }
 }
 
-/// The result of some work, unless it panics or takes too long; what hangs is left behind.
+/// Result of some work, unless it panics or takes too long; a thread that hangs is abandoned.
 fn guarded<T: Send + 'static>(
     limit: Duration,
     work: impl FnOnce() -> T + Send + 'static,
@@ -253,7 +253,7 @@ fn panic_text(payload: &(dyn std::any::Any + Send)) -> &str {
     text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("without words")
 }
 
-/// FNV-1a, 64 bits.
+/// Hash by FNV-1a, 64 bits.
 fn hash_of(bytes: impl Iterator<Item = u8>) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)

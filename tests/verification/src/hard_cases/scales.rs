@@ -1,4 +1,4 @@
-//! Cases in other units and amounts, which change an answer by their factor only.
+//! Cases in other units and magnitudes, which must change an answer only by their factor.
 
 use softgrasp_core::fem::Material;
 
@@ -7,10 +7,10 @@ use super::refusal::Reason;
 use super::shapes::{block, in_unit};
 use softgrasp_bench::report::ReportError;
 
-/// The same block in units of length and force up to a million apart and more.
+/// The same block in units of length and force that differ by factors of a million and more.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn units(form: Form) -> Result<Family, ReportError> {
     let mesh = block([form.cells; 3], [1.0; 3])?;
     let pairs: &[(f64, f64)] = match form.is_quick {
@@ -46,10 +46,10 @@ pub(super) fn units(form: Form) -> Result<Family, ReportError> {
     })
 }
 
-/// Displacements from 1e-12 to half of the size, and what is no displacement.
+/// Displacements from 1e-12 to half of the size, and values that are not finite.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn displacements(form: Form) -> Result<Family, ReportError> {
     let mesh = block([form.cells; 3], [1.0; 3])?;
     let shares: &[f64] =

@@ -1,9 +1,9 @@
-//! Meshes of the hard cases: blocks, and what is done to them.
+//! Meshes of the hard cases: blocks, and changes of them.
 
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::mesh::{MeshError, TetMesh, signed_volume};
 
-/// A box from the origin, six tetrahedra around the same diagonal of every cell.
+/// Box from the origin, with six tetrahedra around the same diagonal of every cell.
 ///
 /// Units: m.
 ///
@@ -37,23 +37,23 @@ pub(super) fn block(cells: [usize; 3], size: [f64; 3]) -> Result<TetMesh, MeshEr
     TetMesh::try_new(vertices, tets, Vec::new())
 }
 
-/// Nodes at places that fulfil a condition, ascending.
+/// Nodes whose positions fulfil a condition, ascending.
 pub(super) fn nodes_where(mesh: &TetMesh, is_in: impl Fn(&Point3<f64>) -> bool) -> Vec<u32> {
     let nodes = mesh.vertices().iter().enumerate().filter(|(_, p)| is_in(p));
     nodes.map(|(node, _)| node as u32).collect()
 }
 
-/// The node nearest to a place; the first of equals.
+/// Node nearest to a position; the first one of equals.
 pub(super) fn nearest(mesh: &TetMesh, place: &Point3<f64>) -> u32 {
     let distance = |node: &usize| (mesh.vertices()[*node] - place).norm();
     let nearest = (0..mesh.node_count()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
     nearest.unwrap_or(0) as u32
 }
 
-/// The same mesh with a region per element, by the place of its centre.
+/// The mesh with a region for each element, by the position of its centre.
 ///
 /// # Errors
-/// None in fact: there is a label for every element.
+/// None in practice: there is a label for every element.
 pub(super) fn with_regions(
     mesh: &TetMesh,
     region: impl Fn(&Point3<f64>) -> u32,
@@ -66,10 +66,10 @@ pub(super) fn with_regions(
     TetMesh::try_new(mesh.vertices().to_vec(), mesh.tets().to_vec(), regions)
 }
 
-/// The same mesh with one node elsewhere.
+/// The mesh with one node moved.
 ///
 /// # Errors
-/// [`MeshError`] if that turns an element inside out.
+/// [`MeshError`] if this turns an element inside out.
 pub(super) fn with_node_at(
     mesh: &TetMesh,
     node: u32,
@@ -80,18 +80,18 @@ pub(super) fn with_node_at(
     mesh.with_vertices(vertices)
 }
 
-/// The same mesh in another unit of length.
+/// The mesh in another unit of length.
 ///
 /// # Errors
-/// [`MeshError`] if volumes leave the range of a double.
+/// [`MeshError`] if volumes exceed the range of a double.
 pub(super) fn in_unit(mesh: &TetMesh, unit: f64) -> Result<TetMesh, MeshError> {
     mesh.with_vertices(mesh.vertices().iter().map(|p| p * unit).collect())
 }
 
-/// A mesh and a shifted copy of it, one where nodes fall together.
+/// Mesh together with a shifted copy of it, joined where nodes coincide.
 ///
 /// # Errors
-/// [`MeshError`] for a shift that makes the copy none.
+/// [`MeshError`] if the copy is no mesh.
 pub(super) fn doubled(mesh: &TetMesh, shift: Vector3<f64>) -> Result<TetMesh, MeshError> {
     let mut vertices = mesh.vertices().to_vec();
     let same = 1e-9 * mesh.size();

@@ -4,14 +4,14 @@ use super::case::{Case, Family, Form, Question, plain};
 use super::shapes::block;
 use softgrasp_bench::report::ReportError;
 
-/// Cells along a sheet and a rod.
+/// Number of cells along a sheet and a rod.
 const SHEET_CELLS: usize = 4;
 const ROD_CELLS: usize = 8;
 
 /// Sheets and rods, clamped at one end and bent at the other.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     let ratios: &[f64] = if form.is_quick { &[1e3] } else { &[1e1, 1e2, 1e3] };
     let mut cases = Vec::new();

@@ -10,7 +10,7 @@ use softgrasp_bench::report::ReportError;
 /// Elements collapsed onto a short edge and onto a face.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     let mesh = block([form.cells; 3], [1.0; 3])?;
     let mut cases = Vec::new();
@@ -36,7 +36,7 @@ pub(super) fn family(form: Form) -> Result<Family, ReportError> {
     })
 }
 
-/// The inner node moved along an edge, until so little of the edge is left.
+/// Mesh whose inner node is moved along an edge, until the share `left` of the edge remains.
 fn with_short_edge(mesh: &TetMesh, form: Form, left: f64) -> Result<TetMesh, MeshError> {
     let cell = 1.0 / form.cells as f64;
     let inner = nearest(mesh, &Point3::from([cell; 3]));
@@ -44,8 +44,8 @@ fn with_short_edge(mesh: &TetMesh, form: Form, left: f64) -> Result<TetMesh, Mes
     with_node_at(mesh, inner, other - Vector3::x() * (left * cell))
 }
 
-/// The inner node moved towards the middle of a face of the elements around it, until the smallest
-/// dihedral angle is as asked for; and how much of the way was left.
+/// Mesh whose inner node is moved towards the middle of a face of the elements around it, until the
+/// smallest dihedral angle is `angle_deg`; also the share of the way that remains.
 fn with_dihedral(mesh: &TetMesh, form: Form, angle_deg: f64) -> Result<(TetMesh, f64), MeshError> {
     let inner = nearest(mesh, &Point3::from([1.0 / form.cells as f64; 3]));
     let at = |node: u32| mesh.vertices()[node as usize];

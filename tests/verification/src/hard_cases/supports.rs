@@ -11,7 +11,7 @@ use softgrasp_bench::report::ReportError;
 /// Three contacts, from well spread to nearly in line.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn weak(form: Form) -> Result<Family, ReportError> {
     // An even number of cells: an edge has a node in its middle.
     let mesh = block([2; 3], [1.0; 3])?;
@@ -55,7 +55,7 @@ fn name(arm: f64, how: &str) -> String {
     }
 }
 
-/// The two ends of an edge of the block, and a third node so far from their line: the opposite
+/// The two ends of an edge of the block, and a third node at distance `arm` from their line: the opposite
 /// corner, or the middle of the edge moved inwards.
 fn three_contacts(mesh: &TetMesh, arm: f64) -> Result<(TetMesh, [u32; 3]), ReportError> {
     let at = |x: f64, y: f64, z: f64| nearest(mesh, &Point3::new(x, y, z));
@@ -71,7 +71,7 @@ fn three_contacts(mesh: &TetMesh, arm: f64) -> Result<(TetMesh, [u32; 3]), Repor
 /// Two contacts, one, none; three in line.
 ///
 /// # Errors
-/// [`ReportError`] where a case cannot be set up.
+/// [`ReportError`] if a case cannot be set up.
 pub(super) fn free(form: Form) -> Result<Family, ReportError> {
     let mesh = block([form.cells; 3], [1.0; 3])?;
     let corner =

@@ -1,4 +1,4 @@
-//! The right answer of a case, and the error of another answer to it.
+//! Exact answer of a case, and the error of another answer.
 
 use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::{ERROR_UNREMARKABLE, Loads, Method};
@@ -9,59 +9,58 @@ use super::in_process::model_of;
 use softgrasp_bench::reference::{Reference, error_rel};
 use softgrasp_core::model::Element;
 
-/// Right displacements of one question and element.
+/// Exact displacements for one question and element.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Truth {
-    /// Of every node of the system: the stiffness as assembled, solved to the last bits.
+    /// Displacements of every node of the system, m: the assembled stiffness, solved to the last bits.
     solved: Option<Vec<f64>>,
-    /// Of every node of the mesh, known without solving.
+    /// Displacements of every node of the mesh, m, known without solving.
     field: Option<Vec<f64>>,
-    /// Degrees of freedom of the mesh: what lies behind are mid-edge nodes.
+    /// Number of degrees of freedom of the mesh; further ones belong to mid-edge nodes.
     mesh_dofs: usize,
-    /// Skeel's condition number by the factor that the truth was made with.
+    /// Skeel's condition number, by the factor that the exact answer was made with.
     condition: Option<f64>,
-    /// Where it comes from, in words.
+    /// Origin of the exact answer, in words.
     pub source: &'static str,
 }
 
-/// How wrong an answer is.
+/// Errors of an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Errors {
-    /// Largest difference over the largest displacement, the worst of all truths there are.
+    /// Largest difference, relative to the largest displacement; the largest over all exact answers.
     pub largest_rel: f64,
-    /// Norm of the difference to the solved truth over its norm.
+    /// Norm of the difference to the solved answer, relative to its norm.
     pub norm_rel: Option<f64>,
-    /// The largest error with which an answer is exact.
+    /// Largest relative error with which an answer counts as exact.
     pub threshold_rel: f64,
 }
 
-/// Largest unknown count that is solved densely in sums of two doubles.
+/// Largest number of unknowns that is solved densely in sums of two doubles.
 const DENSE_MAX: usize = 1100;
-/// Nodes from which the reference is made from a factor on all threads.
+/// Number of nodes from which on the reference is made by a factor on all threads.
 const LARGE: usize = 5000;
-/// A reference whose last correction is larger has not settled.
+/// Largest last correction of a reference that counts as converged.
 const SETTLED: f64 = 1e-15;
 
-/// The largest error with which an answer is exact, at most: beyond, it has to say so.
+/// Upper limit of the error with which an answer counts as exact; a larger one must be stated.
 const THRESHOLD_MAX: f64 = ERROR_UNREMARKABLE;
-/// How far above the expected error the threshold is.
+/// Ratio of the threshold to the expected error.
 const MARGIN: f64 = 100.0;
-/// Skeel's condition number is the error when all roundings conspire; they cancel to a sixty-fourth
-/// of it or so.
+/// Ratio of Skeel's condition number, which assumes that all roundings add up, to the error in practice.
 const CANCELLED: f64 = 64.0;
-/// What a factor in single precision leaves: refinement ends with corrections below 1e-13.
+/// Relative error that a factor in single precision leaves: refinement ends with corrections below 1e-13.
 const SINGLE_LEFT: f64 = 1e-14;
 
-/// Expected error of an answer: `ε (κ / 64 + 1)`, κ Skeel's condition number of the case, and for a
-/// factor in single precision what its refinement leaves.
+/// Expected relative error of an answer: `ε (κ / 64 + 1)`, κ Skeel's condition number of the case, and
+/// for a factor in single precision the error that refinement leaves.
 pub(super) fn expected_error(condition: f64, is_single: bool) -> f64 {
     let left = if is_single { SINGLE_LEFT } else { 0.0 };
     f64::EPSILON * (condition / CANCELLED + 1.0) + left
 }
 
 impl Truth {
-    /// Solves to the last bits, where that can be done: refined, else densely in twice the
-    /// precision. Without either there is only the field of the case, if it has one.
+    /// Solves to the last bits, if possible: refined, or densely in twice the precision. Otherwise only
+    /// the field of the case is known, if it has one.
     pub fn of(question: &Question, element: Element, field: Option<&[f64]>) -> Self {
         let field = field.map(<[f64]>::to_vec);
         let solved = model_of(question, element).ok().and_then(|model| {
@@ -81,12 +80,12 @@ impl Truth {
         Self { solved, field, mesh_dofs, condition, source }
     }
 
-    /// None of its own: every question on the way has another.
+    /// No exact answer: every question on the way has another one.
     pub fn on_the_way() -> Self {
         Self { source: "reference", ..Self::default() }
     }
 
-    /// Errors of an answer; `None` where there is nothing to compare with.
+    /// Errors of an answer; `None` if there is no exact answer.
     pub fn errors_of(&self, answer: &[f64], is_single: bool) -> Option<Errors> {
         // A server sends the nodes of the mesh only.
         let compare = |right: &Vec<f64>| match answer.len() >= self.mesh_dofs {
@@ -108,14 +107,14 @@ impl Truth {
         Some(Errors { largest_rel, norm_rel, threshold_rel: self.threshold_rel(is_single) })
     }
 
-    /// The largest error with which an answer is exact: a hundred times the expected one.
+    /// Largest relative error with which an answer counts as exact: a hundred times the expected one.
     fn threshold_rel(&self, is_single: bool) -> f64 {
         let condition = self.condition.unwrap_or(f64::INFINITY);
         (MARGIN * expected_error(condition, is_single)).min(THRESHOLD_MAX)
     }
 }
 
-/// A right answer.
+/// Exact answer that was solved for.
 struct Solved {
     displacement: Vec<f64>,
     condition: Option<f64>,

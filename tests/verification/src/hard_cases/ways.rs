@@ -1,4 +1,4 @@
-//! Lists what is asked: every method with every element, `condensed`, masks, and the server.
+//! Ways in which cases are asked: every method with every element, `condensed`, masks, and the server.
 
 use glove_client::ask::connection::Host;
 use softgrasp_core::model::Element;
@@ -10,25 +10,25 @@ use super::case::{Allowed, Case, Question, Reach};
 use super::refusal::{Reason, Refusal};
 use super::{in_process, over_socket};
 
-/// One way.
+/// Way in which a case is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
-    /// A factor or inverse of `K11`.
+    /// By a factor or inverse of `K11`.
     Direct(Element, Method),
-    /// Columns of the compliance.
+    /// By columns of the compliance.
     Condensed(Element),
-    /// The same with every touched node held by a mask of that node alone.
+    /// By columns of the compliance, with every touched node held by a mask of that node alone.
     Masks(Element),
-    /// One request to a server, which chooses the method.
+    /// By one request to a server, which chooses the method.
     Server(Element),
-    /// A frame on a model that the server keeps.
+    /// By a frame question about a model that the server keeps.
     Frame(Element),
-    /// The same with masks.
+    /// By a frame question with masks.
     MaskFrame(Element),
 }
 
 impl Way {
-    /// Ways that a case of this reach is asked.
+    /// All ways of this reach.
     pub fn of(reach: Reach) -> Vec<Self> {
         let all = |element: Element| {
             let direct = Method::DIRECT.into_iter().map(move |m| Self::Direct(element, m));
@@ -93,13 +93,13 @@ impl Way {
         }
     }
 
-    /// Whether its factor is in single precision.
+    /// Whether the factor of this way is in single precision.
     pub fn is_single(self) -> bool {
         matches!(self, Self::Direct(_, method) if method.is_single())
     }
 
-    /// What a case allows this way: one without a factor may also refuse what is weakly held, and say more
-    /// of its error than a factor has.
+    /// Outcomes that a case allows this way. One without a factor may also refuse a weakly held body, and
+    /// state a larger error than a factor has.
     pub fn allowed(self, case: &Case) -> Allowed {
         match self {
             Self::Direct(_, Method::Multigrid) => {
@@ -110,13 +110,13 @@ impl Way {
         }
     }
 
-    /// The right reason of a refusal: that of the case, and weakness where only this way may refuse.
+    /// Right reason of a refusal: that of the case, or weakness if only this way may refuse.
     pub fn reason(self, case: &Case) -> Reason {
         let is_own = self.allowed(case).refused && !case.double.refused && !self.is_single();
         if is_own { Reason::Weak } else { case.reason }
     }
 
-    /// Error that this way goes down to; rounding alone decides for the others.
+    /// Relative error that this way stops at; 0 if it stops at rounding.
     pub fn promised_rel(self) -> f64 {
         match self {
             Self::Direct(_, Method::Multigrid) => ERROR_ITERATED,
@@ -124,8 +124,8 @@ impl Way {
         }
     }
 
-    /// Why this way may refuse a question, for the weakness of what holds the body, that another way
-    /// answers; none where that is a fault.
+    /// Reason why this way may refuse a weakly held body although another way answers; `None` if it may
+    /// not.
     pub fn limit(self) -> Option<&'static str> {
         match self {
             Self::Direct(
@@ -143,10 +143,10 @@ impl Way {
         }
     }
 
-    /// Answers a question, in process on the current rayon pool.
+    /// Answers a question in this process, on the current rayon pool, or by the server.
     ///
     /// # Errors
-    /// [`Refusal`]: the reason for which there is no answer.
+    /// [`Refusal`]: the reason why there is no answer.
     pub fn answer(self, question: &Question, host: &Host) -> Result<Answer, Refusal> {
         match self {
             Self::Direct(element, method) => in_process::direct(question, element, method),

@@ -12,69 +12,69 @@ use crate::ask::unanswered::Unanswered;
 /// News about the server.
 #[derive(Debug)]
 pub enum LinkEvent {
-    /// Connected, or connected again.
+    /// The server is connected, or connected again.
     Connected {
         /// Name and version of the server.
         server: String,
     },
-    /// The server has the model.
+    /// The server keeps the model.
     ModelReady(ModelReady),
-    /// The server refused the model or a request; told once, until something changes.
+    /// The server has refused the model or a request; told once, until something changes.
     Refused {
-        /// What was refused and why, in one short line.
+        /// Subject and reason of the refusal, in one short line.
         text: String,
     },
-    /// The connection is lost; it is tried again.
+    /// The connection is lost; the link tries to connect again.
     Lost {
-        /// Why.
+        /// Reason of the loss.
         text: String,
     },
 }
 
-/// How the request of one tick ended. Every request that the link was given ends exactly once.
+/// End of a tick's request. Every request that the link was given ends exactly once.
 #[derive(Debug)]
 pub struct RequestEnd {
-    /// Tick the request was made in.
+    /// Tick that made the request.
     pub tick: u64,
     /// The answer, or why there is none.
     pub reached: Result<Box<Reached>, Unanswered>,
 }
 
-/// The server's answer to the request of a tick.
+/// Answer of the server to a tick's request.
 #[derive(Debug)]
 pub struct Reached {
-    /// Which rest shape it belongs to.
+    /// Number of the rest shape that the answer belongs to.
     pub rest_shape: u64,
     /// Nodes that `displacement` belongs to.
     pub nodes: NodeChoice,
-    /// Displacement of these nodes, m.
+    /// Displacements of these nodes, m, in the object's frame.
     pub displacement: Vec<[f64; 3]>,
-    /// Forces at the known degrees of freedom, N; empty if not asked for.
+    /// Reaction forces at the known degrees of freedom, N; empty if not asked for.
     pub reactions: Vec<DofValue>,
     /// Force of each mask, N, in the order of the question; empty if not asked for.
     pub mask_forces: Vec<[f64; 3]>,
-    /// What it cost and how wrong it can be.
+    /// Times of the stages, residual and error bound.
     pub report: Box<SolveReport>,
-    /// What is reported of large deformation; `None` for an answer to a linear question.
+    /// Report of large deformation; `None` for an answer to a linear question.
     pub large: Option<LargeReport>,
-    /// Whether its path at large deformation began at rest, and not where the answer before ended.
+    /// Whether the path at large deformation began at rest, not at the end of the answer before.
     pub from_rest: bool,
-    /// What is answered to a step of a free object among rigid bodies; `None` for an answer to
-    /// prescribed displacements.
+    /// Result of a step of a free object among rigid bodies; `None` for an answer to prescribed
+    /// displacements.
     pub step: Option<ReachedStep>,
-    /// From sending to having the answer.
+    /// Time from sending the request to having the answer.
     pub round_trip: Duration,
-    /// Bytes of request and answer.
+    /// Lengths of request and answer on the wire, bytes.
     pub bytes: [u64; 2],
 }
 
-/// The part of an answer that only a step of a free object has.
+/// Part of an answer that only a step of a free object has.
 #[derive(Debug)]
 pub struct ReachedStep {
-    /// How well the law of contact is met.
+    /// How well the answer meets the law of contact.
     pub contact: ContactReport,
-    /// The object at the end of the step.
+    /// State of the object at the end of the step.
     pub state: ObjectState,
-    /// What each body does to the object, in the order of the bodies asked about.
+    /// Force and torque of each body on the object, in the order of the request.
     pub loads: Vec<BodyLoad>,
 }

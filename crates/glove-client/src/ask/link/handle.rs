@@ -1,4 +1,4 @@
-//! The ticks' side of the link.
+//! Handle by which the ticks use the link.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -15,18 +15,18 @@ use crate::ask::prefetch::Hint;
 use crate::ask::unanswered::Unanswered;
 use crate::pace::tick_budget::Priority;
 
-/// Owner of the link's thread.
+/// Handle of the link's thread.
 pub struct Link {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Link {
-    /// Starts the link to a server. Its thread has the priority while it awaits the answer of a
-    /// tick; it connects and sends the model like any other thread.
+    /// Starts the link to a server. Its thread has `priority` while it awaits the answer of a tick; it
+    /// connects and sends the model with ordinary priority.
     ///
     /// # Errors
-    /// The system's, when it gives no thread.
+    /// Error of the operating system if it starts no thread.
     pub fn start(server: impl Into<Endpoint>, priority: Priority) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let worker = Worker::new(Arc::clone(&shared), server.into(), priority);
@@ -35,7 +35,7 @@ impl Link {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Sets the model that requests refer to from now on; an older request that waits ends.
+    /// Sets the model that later requests refer to; an older request that waits ends.
     pub fn set_model(&self, model: ModelUpload) {
         let mut state = self.shared.lock();
         state.drop_request(Unanswered::GraspEnded);
@@ -47,16 +47,16 @@ impl Link {
         self.shared.notify();
     }
 
-    /// Asks for the displacements of a tick; a request that has not been sent yet is replaced.
-    /// `grip` is the tick in which the grip began; at large deformation its first answer begins at
-    /// the shape at rest, the others where the one before ended.
+    /// Asks for the displacements of a tick; replaces a request that has not been sent yet. `grip` is the
+    /// tick in which the grip began; at large deformation its first answer begins at the shape at rest,
+    /// the others where the answer before ended.
     pub fn ask(&self, tick: u64, grip: u64, question: Question, large: Option<LargeAsk>) {
         let asked = TickQuestion::Held { question: Box::new(question), large };
         self.replace(TickRequest { tick, grip, asked });
     }
 
-    /// Asks for a step of the free object; a request that has not been sent yet is replaced. The model
-    /// is the link's to say. A server that refuses is asked again when `grip` is another.
+    /// Asks for a step of the free object; replaces a request that has not been sent yet. The link fills
+    /// in the model. After a refusal the server is asked again only when `grip` changes.
     pub fn ask_step(&self, tick: u64, grip: u64, frame: ContactFrame) {
         self.replace(TickRequest { tick, grip, asked: TickQuestion::Step(Box::new(frame)) });
     }
@@ -66,13 +66,13 @@ impl Link {
         self.shared.notify();
     }
 
-    /// Hints at contacts that may be made soon; there is no answer.
+    /// Sends a hint of contacts that may be made soon; there is no answer.
     pub fn prefetch(&self, hint: &Hint) {
         self.shared.lock().outbox.hint.append(hint);
         self.shared.notify();
     }
 
-    /// Ends a request that has not been sent yet: the grasp is over.
+    /// Ends a request that has not been sent yet, because the grasp is over.
     pub fn cancel(&self) {
         self.shared.lock().drop_request(Unanswered::GraspEnded);
     }
@@ -82,8 +82,8 @@ impl Link {
         self.shared.lock().take()
     }
 
-    /// Waits until nothing is asked for and nothing in flight, the server is looked for in vain, or
-    /// the time is up; whether all is answered.
+    /// Waits until no request waits or is in flight, the server cannot be found, or the time is up;
+    /// returns whether all requests were answered.
     pub fn wait_idle(&self, at_most: Duration) -> bool {
         let state = self.shared.lock();
         let losses = state.losses;
@@ -91,17 +91,17 @@ impl Link {
         self.shared.wait_while(state, at_most, waits).is_idle()
     }
 
-    /// Whether the server is being given the model: it assembles, orders and factors.
+    /// Whether the model is being sent to the server and prepared there: assembled, ordered, factored.
     pub fn is_giving_model(&self) -> bool {
         self.shared.lock().activity == Activity::Uploading
     }
 
-    /// Whether the server is there and has been given the model, or has refused it.
+    /// Whether the server is connected and keeps the model, or has refused it.
     pub fn has_model(&self) -> bool {
         self.shared.lock().has_model()
     }
 
-    /// Whether the server is there.
+    /// Whether the server is connected.
     pub fn is_connected(&self) -> bool {
         self.shared.lock().connected
     }

@@ -1,4 +1,4 @@
-//! The state that the ticks and the link's thread share: what is to be sent, and what has come.
+//! State shared by the ticks and the link's thread: requests to be sent, and news that has come.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -11,89 +11,89 @@ use crate::ask::model_upload::ModelUpload;
 use crate::ask::prefetch::Hint;
 use crate::ask::unanswered::Unanswered;
 
-/// The request of one tick.
+/// Request of one tick.
 pub struct TickRequest {
-    /// The tick.
+    /// Number of the tick.
     pub tick: u64,
-    /// Tick in which the grip began that it belongs to.
+    /// Tick in which the grip of this request began.
     pub grip: u64,
-    /// What is asked.
+    /// Question of the request.
     pub asked: TickQuestion,
 }
 
-/// What a tick asks.
+/// Question of a tick.
 pub enum TickQuestion {
-    /// The shape under prescribed displacements.
+    /// Shape under prescribed displacements.
     Held {
-        /// The displacements.
+        /// Known displacements and wanted results.
         question: Box<Question>,
-        /// What is asked of large deformation; `None` for a linear answer. Where its path begins is
-        /// the link's to say.
+        /// Wish for large deformation; `None` for linear elasticity. The link decides where its path
+        /// begins.
         large: Option<LargeAsk>,
     },
-    /// A step of the free object among rigid bodies. Its model is the link's to say.
+    /// Step of the free object among rigid bodies. The link fills in its model.
     Step(Box<ContactFrame>),
 }
 
-/// What the link's thread is doing.
+/// Activity of the link's thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Activity {
-    /// It waits for something to do.
+    /// Waits for a request.
     #[default]
     Waiting,
-    /// It looks for the server, or rests until it looks again.
+    /// Connects to the server, or pauses before the next attempt.
     Connecting,
-    /// It gives the server the model.
+    /// Sends the model to the server.
     Uploading,
-    /// It waits for the first answer of a grip.
+    /// Waits for the first answer of a grip.
     FirstAnswer,
-    /// It waits for another answer of a grip.
+    /// Waits for another answer of a grip.
     LaterAnswer,
 }
 
-/// Everything that waits to be sent: of each kind the newest only.
+/// Messages to be sent: of each kind only the newest.
 #[derive(Default)]
 pub struct Outbox {
-    /// The model that requests refer to.
+    /// Model that requests refer to.
     pub model: Option<ModelUpload>,
-    /// The model is to be made ready even if no request comes.
+    /// Whether the server is to prepare the model even if no request comes.
     pub model_is_new: bool,
-    /// The newest request that has not been sent.
+    /// Newest request that has not been sent.
     pub request: Option<TickRequest>,
     /// Contacts whose columns are to be prepared.
     pub hint: Hint,
 }
 
-/// What ticks and link share.
+/// State shared by the ticks and the link's thread.
 #[derive(Default)]
 pub struct LinkState {
-    /// To be sent.
+    /// Messages to be sent.
     pub outbox: Outbox,
-    /// What the thread is doing.
+    /// Activity of the link's thread.
     pub activity: Activity,
-    /// Whether something is in flight.
+    /// Whether a request is in flight.
     pub busy: bool,
-    /// Whether the server is there.
+    /// Whether the server is connected.
     pub connected: bool,
     /// Whether the server has refused the newest model.
     pub model_refused: bool,
-    /// Whether the ticks know that the server is not there.
+    /// Whether the ticks have been told that the server is lost.
     pub lost: bool,
-    /// How often the server was looked for and not found, or went away.
+    /// Number of times that the server was not found, or was lost.
     pub losses: u64,
-    /// The link is to end.
+    /// Whether the link is to end.
     pub stop: bool,
-    /// News that no tick has picked up.
+    /// News that no tick has taken.
     events: VecDeque<LinkEvent>,
-    /// Requests that have ended; no more than ticks have made requests since they last looked.
+    /// Requests that have ended; no more than ticks have made since they last took them.
     ended: Vec<RequestEnd>,
 }
 
-/// News that no tick picks up are not kept beyond this many; the oldest go.
+/// Largest number of news that are kept; the oldest are dropped.
 const EVENTS_MAX: usize = 256;
 
 impl LinkState {
-    /// Puts a request in the place of the one that waits, which ends.
+    /// Replaces the request that waits, which ends.
     pub fn replace_request(&mut self, request: TickRequest) {
         let why = match self.activity {
             _ if !self.connected => Unanswered::ServerLost,
@@ -114,12 +114,12 @@ impl LinkState {
         }
     }
 
-    /// A request has ended.
+    /// Adds the end of a request.
     pub fn end(&mut self, end: RequestEnd) {
         self.ended.push(end);
     }
 
-    /// There is news.
+    /// Adds news.
     pub fn tell(&mut self, event: LinkEvent) {
         if self.events.len() >= EVENTS_MAX {
             self.events.pop_front();
@@ -132,7 +132,7 @@ impl LinkState {
         (self.events.drain(..).collect(), std::mem::take(&mut self.ended))
     }
 
-    /// Whether the server is there and nothing is to be done about the newest model any more.
+    /// Whether the server is connected, and keeps the newest model or has refused it.
     pub fn has_model(&self) -> bool {
         let is_done = match self.activity {
             // A job that has just been begun may be that of the model.
@@ -143,13 +143,13 @@ impl LinkState {
         self.connected && !self.outbox.model_is_new && is_done
     }
 
-    /// Whether nothing waits and nothing is in flight.
+    /// Whether no request waits and none is in flight.
     pub fn is_idle(&self) -> bool {
         self.outbox.request.is_none() && !self.busy && !self.outbox.model_is_new
     }
 }
 
-/// The state behind its lock, and the signal that it has changed.
+/// State behind its lock, and the signal that it has changed.
 #[derive(Default)]
 pub struct Shared {
     state: Mutex<LinkState>,
@@ -157,22 +157,22 @@ pub struct Shared {
 }
 
 impl Shared {
-    /// The state, for as short as possible.
+    /// Locks the state; to be held for as short a time as possible.
     pub fn lock(&self) -> MutexGuard<'_, LinkState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Wakes whoever waits for a change.
+    /// Wakes the threads that wait for a change.
     pub fn notify(&self) {
         self.changed.notify_all();
     }
 
-    /// Waits for a change.
+    /// Waits for a change of the state.
     pub fn wait<'a>(&'a self, state: MutexGuard<'a, LinkState>) -> MutexGuard<'a, LinkState> {
         self.changed.wait(state).unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until the condition does not hold any more, at most so long.
+    /// Waits until the condition does not hold any more, for at most `at_most`.
     pub fn wait_while<'a>(
         &'a self,
         state: MutexGuard<'a, LinkState>,

@@ -1,4 +1,4 @@
-//! The link's thread: connects, gives the server the model, asks, and remembers refusals.
+//! Thread of the link: connects, sends the model, asks, and remembers refusals.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -17,20 +17,20 @@ use crate::ask::prefetch::Hint;
 use crate::ask::unanswered::Unanswered;
 use crate::pace::tick_budget::{Priority, TickBudget};
 
-/// A lost server is looked for at once, then after this pause, which doubles up to the longest.
+/// First pause between attempts to find a lost server; it doubles up to the longest.
 const PAUSE_MIN: Duration = Duration::from_millis(50);
-/// Longest pause where nobody was found: one who comes back is found at once.
+/// Longest pause if there was no server: one that comes back is found soon.
 const PAUSE_MAX: Duration = Duration::from_millis(200);
-/// Longest pause where a server was found that does not want this client now.
+/// Longest pause if a server refuses the connection for now.
 const UNWANTED_PAUSE_MAX: Duration = Duration::from_secs(2);
-/// A server whose machine answers but which is silent for this long is taken for lost: while it prepares
-/// a model or the first answer of a grip, and within a grip.
+/// Longest silence of a server whose machine answers: while it prepares a model or the first answer of a
+/// grip, and within a grip. After it the server is taken to be lost.
 const PREPARING_MAX: Duration = Duration::from_secs(1800);
 const SILENCE_MAX: Duration = Duration::from_secs(20);
-/// A refusal is told in one line of at most so many characters.
+/// Largest number of characters of the line that tells of a refusal.
 const REFUSAL_LEN_MAX: usize = 120;
 
-/// The thread and what it knows of the server.
+/// Thread of the link, and its knowledge of the server.
 pub struct Worker {
     shared: Arc<Shared>,
     endpoint: Endpoint,
@@ -38,26 +38,26 @@ pub struct Worker {
     session: Option<Session>,
 }
 
-/// One connection, and what the server has said on it.
+/// One connection, and what the server keeps or refuses on it.
 struct Session {
     connection: ServerConnection,
-    /// Model that the server has.
+    /// Model that the server keeps.
     model: Option<ModelHash>,
     refusal: Option<Refusal>,
     /// Grip whose first answer has come.
     answered_grip: Option<u64>,
-    /// Grip of which it has been told that an equilibrium was not found.
+    /// Grip for which a missing equilibrium has been told.
     told_grip: Option<u64>,
 }
 
-/// What the server has refused, so that it is not asked again.
+/// Model or request that the server has refused, so that it is not asked again.
 struct Refusal {
     model: ModelHash,
-    /// The grip whose requests it refuses; `None` where it refuses the model itself.
+    /// Grip whose requests the server refuses; `None` if it refuses the model itself.
     grip: Option<u64>,
 }
 
-/// What the thread is to do next.
+/// Next task of the thread.
 struct Job {
     model: ModelUpload,
     request: Option<TickRequest>,
@@ -70,7 +70,7 @@ impl Worker {
         Self { shared, endpoint, budget: TickBudget::new(priority), session: None }
     }
 
-    /// Works until the link is to end.
+    /// Runs until the link is to end.
     pub fn work(mut self) {
         let mut pause = Duration::ZERO;
         while let Some(mut job) = self.next_job() {
@@ -116,7 +116,7 @@ impl Worker {
         }
     }
 
-    /// Does a job; the request in it is ended and taken out unless the server was lost.
+    /// Does a job; ends its request unless the server was lost.
     fn do_job(&mut self, job: &mut Job) -> Result<(), LinkError> {
         let Self { shared, endpoint, budget, session } = self;
         let session = match session {
@@ -201,7 +201,7 @@ impl Session {
         }
     }
 
-    /// Remembers a refusal and tells of it, shortly; the whole text goes to the log.
+    /// Remembers a refusal and tells of it in one line; the whole text goes to the log.
     fn refuse(&mut self, shared: &Shared, what: &str, rejected: &Rejected, refusal: Refusal) {
         tracing::info!(code = %rejected.code, text = rejected.text, "the server refused {what}");
         let text = format!("{what} ({}): {}", rejected.code, shortened(&rejected.text));
@@ -213,7 +213,7 @@ impl Session {
         self.refusal = Some(refusal);
     }
 
-    /// Tells once in a grip that an equilibrium was not found, and why.
+    /// Tells, once in a grip, that no equilibrium was found, and why.
     fn tell_no_equilibrium(&mut self, shared: &Shared, grip: u64, rejected: &Rejected) {
         tracing::info!(text = rejected.text, "no equilibrium");
         if self.told_grip.replace(grip) != Some(grip) {
@@ -222,7 +222,7 @@ impl Session {
         }
     }
 
-    /// Sends the model unless the server knows it.
+    /// Sends the model unless the server keeps it.
     fn offer_model(&mut self, model: &ModelUpload, shared: &Shared) -> Result<(), LinkError> {
         shared.lock().activity = Activity::Uploading;
         self.wait_at_most(PREPARING_MAX)?;
@@ -313,7 +313,7 @@ impl Session {
         Ok(reached)
     }
 
-    /// What is sent for a request.
+    /// Message of a tick's request.
     fn message_of(&self, model: &ModelUpload, request: &TickRequest) -> Request {
         match &request.asked {
             TickQuestion::Held { question, large } => {
@@ -331,7 +331,7 @@ impl Session {
     }
 }
 
-/// The server is not there: what was asked is tried again, unless a newer request has come.
+/// Books the loss of the server; the request is tried again unless a newer one has come.
 fn lose(state: &mut LinkState, error: &LinkError, job: Job) {
     // Said once; that it is still not there is no news.
     if !state.lost {
@@ -355,13 +355,13 @@ fn end(shared: &Shared, request: Option<TickRequest>, reached: Result<Box<Reache
     }
 }
 
-/// Whether a refusal is about where this tick would have gone, not about the grip.
+/// Whether the refusal is due to this tick's displacements and not to the grip.
 fn is_passing(request: &TickRequest, rejected: &Rejected) -> bool {
     matches!(&request.asked, TickQuestion::Held { large: Some(_), .. })
         && rejected.code == RejectCode::Uncertain
 }
 
-/// The longest pause after a loss.
+/// Longest pause after a loss.
 fn pause_max(error: &LinkError) -> Duration {
     match error {
         // It would have to count and refuse this client again and again.
@@ -373,12 +373,13 @@ fn pause_max(error: &LinkError) -> Duration {
     }
 }
 
-/// Whether a refusal is about what was asked; the others are about the server's state and pass.
+/// Whether a refusal stays as long as the request is the same; other refusals are due to the server's
+/// state.
 fn stays(code: RejectCode) -> bool {
     !matches!(code, RejectCode::Busy | RejectCode::ShuttingDown)
 }
 
-/// The first statement of a text, cut where it is still too long.
+/// First statement of a text, cut if it is too long.
 fn shortened(text: &str) -> String {
     let ends = ["; ", ". ", "\n"].iter().filter_map(|end| text.find(end));
     let first = &text[..ends.min().unwrap_or(text.len())];

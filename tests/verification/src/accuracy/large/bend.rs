@@ -36,7 +36,7 @@ pub fn pushed(element: Element, cells: usize) -> Result<Vec<Row>, ReportError> {
     followed(element, ("45° bend", cells), (cells / SLENDER).max(1), STEPS)
 }
 
-/// The same with one box over the section and all of the force in one step.
+/// Displacement of the tip with one box over the section and the whole force in one step.
 ///
 /// # Errors
 /// [`ReportError`].

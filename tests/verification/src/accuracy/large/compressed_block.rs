@@ -10,7 +10,7 @@ use crate::accuracy::block::block;
 use crate::accuracy::discrete::Discrete;
 use softgrasp_bench::report::ReportError;
 
-/// μ, N/mm².
+/// Shear modulus μ, N/mm².
 const SHEAR: f64 = 80.194;
 const POISSON: f64 = 0.4999;
 /// Unit of the pressure, N/mm².

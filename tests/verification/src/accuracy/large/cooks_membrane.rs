@@ -15,10 +15,9 @@ const BULK: f64 = 400_942.0;
 const SHEAR: f64 = 80.1938;
 /// Force on the edge for each unit of thickness.
 const FORCE: f64 = 100.0;
-/// Vertical displacement of the upper corner: what elements that do not lock come to in print,
-/// within 0.1.
+/// Vertical displacement of the upper corner: published values of elements that do not lock, within 0.1.
 const PUBLISHED: f64 = 6.93;
-/// Steps of the force.
+/// Number of steps of the force.
 const STEPS: usize = 2;
 
 /// Vertical displacement of the upper corner, with `cells` × `cells` boxes and one through the

@@ -1,4 +1,4 @@
-//! Meshes of cylinders: rings of triangles, pulled up in layers.
+//! Meshes of cylinders: rings of triangles, extruded in layers.
 
 use nalgebra::{Point3, Vector2};
 use softgrasp_core::mesh::{MeshError, TetMesh};

@@ -15,10 +15,9 @@ const LENGTH: f64 = 50.0;
 /// Steps from one load to the next.
 const STEPS: usize = 4;
 
-/// `P L² / E I`, by how much the end comes nearer over L, deflection over L.
+/// Load `P L² / E I`, shortening of the distance of the ends over L, deflection over L.
 ///
-/// Source: Bisshopp and Drucker, Quart. Appl. Math. 3 (1945) 272; the digits are integrated in the
-/// tests.
+/// Source: Bisshopp and Drucker, Quart. Appl. Math. 3 (1945) 272; the digits are integrated in the tests.
 const ELASTICA: [(f64, f64, f64); 3] =
     [(1.0, 0.05643, 0.30172), (5.0, 0.38763, 0.71379), (10.0, 0.55500, 0.81061)];
 

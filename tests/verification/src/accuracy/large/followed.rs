@@ -14,7 +14,7 @@ use crate::accuracy::discrete::{Discrete, Given};
 use crate::accuracy::outcome::{Outcome, Solved};
 use softgrasp_bench::report::ReportError;
 
-/// A body with a law, what is known of it, and the shape it has now.
+/// Body with a law, its known degrees of freedom, and its present shape.
 pub struct Followed<'a> {
     discrete: &'a Discrete,
     solved: Solved,
@@ -23,14 +23,14 @@ pub struct Followed<'a> {
     path: Path,
 }
 
-/// What a body is pushed by: known displacements, and forces, three for each node or none.
+/// Load of a body: known displacements, and forces, three for each node or none.
 pub type Push = (Vec<Given>, Vec<f64>);
 
-/// A figure of a shape: what it is, as computed, as it should be.
+/// Figure of a shape: its name, computed and expected value.
 pub type Figure = (&'static str, f64, f64);
 
 impl<'a> Followed<'a> {
-    /// A body at rest that the degrees of freedom of `given` hold.
+    /// Body at rest, held at the degrees of freedom of `given`.
     ///
     /// # Errors
     /// [`ReportError::Model`].
@@ -53,10 +53,10 @@ impl<'a> Followed<'a> {
         Ok(Self { discrete, solved, elements, known, path })
     }
 
-    /// Goes to a push in equal steps; `push` is asked for each with the share of the way.
+    /// Goes to a load in equal steps; `push` gives the load at each share of the way.
     ///
     /// # Errors
-    /// [`ReportError::Model`]; where there is no shape, that of the last step stays.
+    /// [`ReportError::Model`]; without an equilibrium the shape of the last step stays.
     pub fn follow(&mut self, steps: usize, push: impl Fn(f64) -> Push) -> Result<End, ReportError> {
         let mut cost = Cost::default();
         for step in 1..=steps {
@@ -81,7 +81,7 @@ impl<'a> Followed<'a> {
         Ok(self.path.advance(&goal, &Wish::EXACT))
     }
 
-    /// Rows for figures of the shape under a load; where it has none, for what they should be.
+    /// Rows for the figures of the shape under a load; without a shape, rows with the expected values.
     pub fn rows(&self, load: f64, end: &End, figures: &[Figure]) -> Vec<Row> {
         let row = |&(quantity, computed, expected): &Figure| {
             let solved = self.solved.clone();
@@ -96,7 +96,7 @@ impl<'a> Followed<'a> {
         figures.iter().map(row).collect()
     }
 
-    /// What is solved.
+    /// Case, element and size of the body.
     pub fn solved(&self) -> &Solved {
         &self.solved
     }
@@ -130,7 +130,7 @@ impl<'a> Followed<'a> {
         nodes.map(|(n, _)| of_node(&forces, n)).sum()
     }
 
-    /// `Σ f ⊗ X`: the nominal stress of a body in balance, summed over its volume at rest, N m.
+    /// Sum `Σ f ⊗ X`: the nominal stress of a body in balance, integrated over its volume at rest, N m.
     pub fn stress_sum(&self) -> Matrix3<f64> {
         let forces = self.forces();
         let nodes = self.discrete.nodes().iter().enumerate();
@@ -138,12 +138,12 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// The three components at a node.
+/// Three components at a node.
 pub fn of_node(of_dofs: &[f64], node: usize) -> Vector3<f64> {
     Vector3::new(of_dofs[dof(node, 0)], of_dofs[dof(node, 1)], of_dofs[dof(node, 2)])
 }
 
-/// Number of the node nearest to a place at rest.
+/// Number of the node nearest to a position at rest.
 pub fn nearest(nodes: &[Point3<f64>], place: &Point3<f64>) -> usize {
     let away = |p: &Point3<f64>| (p - place).norm_squared();
     let nodes = nodes.iter().enumerate();

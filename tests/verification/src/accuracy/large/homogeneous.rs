@@ -10,12 +10,12 @@ use crate::accuracy::block::{block, shaken};
 use crate::accuracy::discrete::Discrete;
 use softgrasp_bench::report::ReportError;
 
-/// Along how many axes the cube is stretched.
+/// Axes along which the cube is stretched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stretched {
-    /// Along x.
+    /// Stretched along x.
     Uniaxial,
-    /// Along x and y alike.
+    /// Stretched equally along x and y.
     Equibiaxial,
 }
 

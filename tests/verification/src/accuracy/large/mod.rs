@@ -1,4 +1,4 @@
-//! Large deformation: shapes followed from load to load, beside closed forms and published values.
+//! Large deformation: shapes followed from load to load, compared with closed forms and published values.
 
 mod bend;
 mod compressed_block;

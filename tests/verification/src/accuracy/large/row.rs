@@ -1,59 +1,59 @@
-//! One figure of a followed shape beside what it should be, and what the shape cost.
+//! One figure of a followed shape beside its expected value, and the cost of the shape.
 
 use softgrasp_core::solve::equilibrium::{Equilibrium, NoEquilibrium};
 
 use crate::accuracy::outcome::Outcome;
 
-/// A figure of a case for one element on one mesh under one load.
+/// Figure of a case, for one element on one mesh under one load.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// The figure; where there is no shape, nothing computed and an error that is no number.
+    /// Figure with its error; without a shape, no computed value and the error NaN.
     pub outcome: Outcome,
-    /// The load, in the unit that the case names.
+    /// Load, in the unit that the case names.
     pub load: f64,
-    /// How the shape was come to.
+    /// How the shape was found.
     pub end: End,
 }
 
-/// How a shape was come to.
+/// How a shape was found.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
-    /// It was given at every node, so nothing was looked for.
+    /// The shape was prescribed at every node.
     Given,
-    /// Found, at this cost.
+    /// The shape was found, at this cost.
     Found(Cost),
-    /// Not found.
+    /// No shape was found.
     Lost {
-        /// Step of the load, from 1, that had no shape.
+        /// Step of the load, from 1, that had no equilibrium.
         step: usize,
-        /// Steps of the load.
+        /// Number of steps of the load.
         steps: usize,
-        /// What the engine says.
+        /// Reason that the core gives.
         why: NoEquilibrium,
     },
-    /// Not looked for, because a smaller load had no shape.
+    /// No shape was looked for, because a smaller load had none.
     NotTried,
 }
 
-/// What a shape cost, since the shape under the load before.
+/// Cost of a shape, since the shape under the load before.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
-    /// Steps of the load.
+    /// Number of steps of the load.
     pub steps: usize,
-    /// Pieces that these were cut into.
+    /// Number of pieces that these steps were cut into.
     pub pieces: usize,
-    /// Solves with a factor.
+    /// Number of solves with a factor.
     pub solves: usize,
-    /// Factors made.
+    /// Number of factors made.
     pub factors: usize,
-    /// Forces out of balance in the end, over those that hold the body.
+    /// Norm of the forces out of balance at the end, relative to those that hold the body.
     pub residual_rel: f64,
     /// Whether a step ended far from where the tangent led.
     pub jumped: bool,
 }
 
 impl Cost {
-    /// Adds what a step cost.
+    /// Adds the cost of a step.
     pub fn add(&mut self, found: &Equilibrium) {
         self.steps += 1;
         self.pieces += found.substeps as usize;
@@ -65,7 +65,7 @@ impl Cost {
 }
 
 impl End {
-    /// The cost of a shape that was found.
+    /// Cost of a shape that was found.
     pub fn cost(&self) -> Option<&Cost> {
         match self {
             Self::Found(cost) => Some(cost),
@@ -73,12 +73,12 @@ impl End {
         }
     }
 
-    /// Whether there is a shape to look at.
+    /// Whether there is a shape.
     pub fn has_shape(&self) -> bool {
         matches!(self, Self::Given | Self::Found(_))
     }
 
-    /// In words, with the sentence of the engine.
+    /// The end in words, with the reason of the core.
     pub fn words(&self) -> String {
         match self {
             Self::Given => "given".to_owned(),
@@ -92,12 +92,12 @@ impl End {
 }
 
 impl Row {
-    /// Whether the other is the same figure under the same load on another mesh.
+    /// Whether `other` is the same figure under the same load on another mesh.
     pub fn is_like(&self, other: &Self) -> bool {
         self.load == other.load && self.outcome.is_like(&other.outcome)
     }
 
-    /// The order of convergence from a coarser mesh to this one.
+    /// Order of convergence from a coarser mesh to this one.
     pub fn order_from(&self, coarser: &Self) -> f64 {
         self.outcome.order_from(&coarser.outcome)
     }

@@ -1,4 +1,4 @@
-//! Section of the report `accuracy` on large deformation: its cases, its tables, what they are.
+//! Section of the report `accuracy` on large deformation: cases, tables and text.
 
 use softgrasp_core::fem::Element::{self, Tet4, Tet4Anp, Tet10};
 
@@ -14,7 +14,7 @@ use softgrasp_bench::table::{Cell, Table};
 /// A case for an element, a Poisson's ratio and a number of cells.
 type Followed = fn(Element, f64, usize) -> Result<Vec<Row>, ReportError>;
 
-/// A case, and what it is solved with.
+/// A case, and the elements, materials and meshes it is solved with.
 struct Case {
     followed: Followed,
     elements: &'static [Element],
@@ -22,8 +22,7 @@ struct Case {
     cells: &'static [usize],
 }
 
-/// Every case, one entry for each list of meshes; one of fixed material takes no notice of Poisson's
-/// ratio.
+/// Every case, one entry for each list of meshes; cases of a fixed material ignore Poisson's ratio.
 const CASES: &[Case] = &[
     Case {
         followed: |element, nu, cells| stretched(Stretched::Uniaxial, element, nu, cells),
@@ -125,7 +124,7 @@ const CASES: &[Case] = &[
 /// Follows every case and adds the section to the report.
 ///
 /// # Errors
-/// [`ReportError`]; a shape that is not found is a row that says so.
+/// [`ReportError`]; a shape that is not found becomes a row that says so.
 pub fn add_to(report: &mut Report, options: &Options) -> Result<(), ReportError> {
     let mut rows: Vec<Row> = Vec::new();
     for case in CASES {

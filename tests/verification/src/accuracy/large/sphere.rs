@@ -1,4 +1,4 @@
-//! A hollow sphere that is widened from inside.
+//! A hollow sphere that is inflated.
 
 use nalgebra::Point3;
 use softgrasp_core::fem::hyperelastic::Law;
@@ -14,7 +14,7 @@ const INNER: f64 = 1.0;
 const OUTER: f64 = 2.0;
 /// Stretches of the inner radius.
 const STRETCHES: [f64; 2] = [1.5, 2.0];
-/// Steps to each.
+/// Number of steps to each stretch.
 const STEPS: usize = 5;
 
 /// Pressure over μ, incompressible: `g(λ_b) − g(λ_a)` with `g(λ) = 2/λ + 1/(2 λ⁴)` and

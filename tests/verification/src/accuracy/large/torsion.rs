@@ -58,8 +58,8 @@ pub fn twisted(element: Element, poisson: f64, cells: usize) -> Result<Vec<Row>,
 /// Poisson's ratios, each half as far from 0.5 as the one before.
 const NEARER: [f64; 4] = [0.48, 0.49, 0.495, 0.4975];
 
-/// How the figures near those of the incompressible body as Poisson's ratio nears 0.5, on one mesh:
-/// in their differences most of its own error is gone.
+/// Difference of the figures from those of the incompressible body as Poisson's ratio approaches 0.5, on
+/// one mesh. Most of the mesh's own error cancels in their differences.
 ///
 /// # Errors
 /// [`ReportError`].

@@ -1,4 +1,4 @@
-//! A body that is turned as a whole holds no force.
+//! A body that is rotated rigidly is free of forces.
 
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use softgrasp_core::fem::Element;
@@ -11,16 +11,16 @@ use crate::accuracy::discrete::Discrete;
 use softgrasp_bench::report::ReportError;
 
 const YOUNG: f64 = 1.0;
-/// Angles, rad.
+/// Angles of the rotation, rad.
 const ANGLES: [f64; 4] = [0.1, 1.0, 2.0, 3.0];
-/// Steps from one angle to the next where one face leads: known nodes go straight.
+/// Number of steps from one angle to the next where one face leads, since known nodes move straight.
 const STEPS: usize = 5;
 
 fn axis() -> Unit<Vector3<f64>> {
     Unit::new_normalize(Vector3::new(1.0, -0.4, 0.3))
 }
 
-/// Displacement of a turn by an angle around the origin.
+/// Displacement of a rotation by an angle around the origin.
 fn turn(angle: f64, p: &Point3<f64>) -> Vector3<f64> {
     Rotation3::from_axis_angle(&axis(), angle) * p.coords - p.coords
 }
