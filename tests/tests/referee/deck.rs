@@ -4,8 +4,9 @@ use glove_client::ask::calculix_deck::CalculixDeck;
 use nalgebra::Point3;
 use softgrasp_core::fem::{Element, QuadraticMesh};
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_protocol::{DofValue, LawName, Material};
+use softgrasp_protocol::{DofValue, LawName};
 
+use crate::object::Object;
 use crate::question::Question;
 
 /// Nodes of a system: corners, then mid-edge nodes.
@@ -35,15 +36,15 @@ impl System {
     }
 }
 
-/// Input deck that `glove-client solve --export-deck` writes for the question.
-pub fn deck(system: &System, question: &Question) -> String {
+/// The deck that `glove-client solve --export-deck` writes for the question.
+pub fn deck(object: &Object, system: &System, question: &Question) -> String {
     let values = |pairs: &[(u32, f64)]| -> Vec<DofValue> {
         pairs.iter().map(|&(dof, value)| DofValue { dof, value }).collect()
     };
     let deck = CalculixDeck {
         mesh: &system.mesh,
         element: system.element,
-        material: Material { young: question.young, poisson: question.poisson },
+        materials: &object.materials(question.young, question.poisson),
         law: question.is_large.then_some(LawName::NeoHookean),
         known: &values(&question.known),
         forces: &values(&question.forces),

@@ -28,9 +28,9 @@ struct ElementMeans {
     density: Vec<Printed>,
 }
 
-/// Input deck that also prints stress, strain and energy of the elements at the end of the step.
-fn deck_with_fields(system: &System, question: &Question) -> String {
-    let deck = deck::deck(system, question);
+/// The deck that also prints stress, strain and energy of the elements at the end of the step.
+fn deck_with_fields(object: &Object, system: &System, question: &Question) -> String {
+    let deck = deck::deck(object, system, question);
     let (before, end) = deck.rsplit_once("*END STEP").unwrap();
     format!("{before}*EL PRINT, ELSET=BODY, FREQUENCY=100000\nS, E, ENER\n*END STEP{end}")
 }
@@ -86,7 +86,7 @@ fn answered(asked: &Asked, object: &Object, system: &System, question: &Question
     let (young, poisson) = (question.young, question.poisson);
     let body = Body {
         mesh: mesh_data(&object.mesh),
-        materials: vec![softgrasp_protocol::Material { young, poisson }],
+        materials: object.materials(young, poisson),
         element: if system.element == Element::Tet4 {
             ElementChoice::T4
         } else {
@@ -111,7 +111,7 @@ fn answered(asked: &Asked, object: &Object, system: &System, question: &Question
 fn compare(ccx: &Ccx, folder: &Path, asked: &Asked, object: &Object, of: (Element, Question)) {
     let (element, question) = of;
     let system = System::new(&object.mesh, element);
-    let text = ccx.printed(folder, &deck_with_fields(&system, &question)).unwrap();
+    let text = ccx.printed(folder, &deck_with_fields(object, &system, &question)).unwrap();
     let printed = ElementMeans::read(&text, object.mesh.tets().len());
     let fields = answered(asked, object, &system, &question);
     let pairs = |printed: &[[Printed; 6]], field: Field| -> Vec<(Printed, f64)> {

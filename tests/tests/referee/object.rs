@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use glove_client::commands::mesh::MeshCommand;
-use glove_client::object::mesh_file::read_mesh_file;
-use softgrasp_core::mesh::{BuiltIn, TetMesh};
+use glove_client::object::mesh_file::{encode_mesh, read_mesh_file};
+use glove_client::object::region_choice::{Ellipsoid, MeshOfRegions, RegionChoice};
+use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
+use softgrasp_protocol::Material;
 use softgrasp_tests::shared::shared;
 
 /// Mesh, and the file that it was read from.
@@ -13,7 +15,12 @@ pub struct Object {
     pub name: String,
     pub file: PathBuf,
     pub mesh: TetMesh,
+    /// Whether the region `stone` of the file is of a material of its own.
+    pub has_stone: bool,
 }
+
+/// Young's modulus of the stone over that of the body, and Poisson's ratio of the stone.
+const STONE: (f64, f64) = (50.0, 0.2);
 
 #[derive(Parser)]
 struct MeshArguments {
@@ -29,7 +36,15 @@ pub fn is_full() -> bool {
 impl Object {
     fn read(name: &str, file: PathBuf) -> Self {
         let mesh = read_mesh_file(&file).unwrap().mesh;
-        Self { name: name.to_owned(), file, mesh }
+        Self { name: name.to_owned(), file, mesh, has_stone: false }
+    }
+
+    /// Materials of a question in which the body is of Young's modulus `young` and Poisson's ratio `poisson`:
+    /// that of the body, and that of the stone if there is one.
+    pub fn materials(&self, young: f64, poisson: f64) -> Vec<Material> {
+        let stone = Material { young: STONE.0 * young, poisson: STONE.1 };
+        let body = Material { young, poisson };
+        [body].into_iter().chain(self.has_stone.then_some(stone)).collect()
     }
 }
 
@@ -45,7 +60,22 @@ pub fn built_in(folder: &Path, nodes: usize) -> Vec<Object> {
     BuiltIn::ALL.into_iter().map(make).collect()
 }
 
-/// Files of `shared/meshes`, in the order of their names; in the short form those of few nodes. `None`,
+/// A sphere with a stone in it, off its middle, written with its regions and read again.
+pub fn sphere_with_stone(folder: &Path, nodes: usize) -> Object {
+    let file = folder.join("sphere-with-stone.msh");
+    let mesh = generate(BuiltIn::Sphere, nodes).unwrap();
+    let size = mesh.size();
+    let of = Ellipsoid { centre_m: [0.1 * size, 0.0, 0.0], radii_m: [0.2 * size; 3] };
+    let (young_pa, poisson) = (1.0, 0.0);
+    let stone = RegionChoice { name: "stone".to_owned(), young_pa, poisson, ellipsoid: Some(of) };
+    let made = MeshOfRegions::try_new(mesh, &["flesh".to_owned()], &[stone]).unwrap();
+    let surface = Surface::from_mesh(&made.mesh);
+    let bytes = encode_mesh(&file, &made.mesh, made.regions.names(), &surface, &[]).unwrap();
+    std::fs::write(&file, bytes).unwrap();
+    Object { has_stone: true, ..Object::read("sphere with a stone", file) }
+}
+
+/// Files of `shared/meshes`, in the order of their names; in the short form those of few nodes.
 /// with a line that the test is skipped, if there is no such folder.
 pub fn files() -> Option<Vec<Object>> {
     let entries = std::fs::read_dir(shared("meshes")?).unwrap().map(|entry| entry.unwrap().path());

@@ -87,7 +87,7 @@ impl Asked {
         let (young, poisson) = (question.young, question.poisson);
         let body = Body {
             mesh: mesh_data(&object.mesh),
-            materials: vec![softgrasp_protocol::Material { young, poisson }],
+            materials: object.materials(young, poisson),
             element,
         };
         let asked = softgrasp_protocol::Question {
@@ -109,9 +109,11 @@ impl Asked {
 }
 
 fn by_core(object: &Object, system: &System, question: &Question) -> Found {
-    let material = Material::try_new(question.young, question.poisson).unwrap();
+    let materials = object.materials(question.young, question.poisson);
+    let materials: Vec<Material> =
+        materials.iter().map(|m| Material::try_new(m.young, m.poisson).unwrap()).collect();
     let (mesh, element) = (object.mesh.clone(), system.element);
-    let model = Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).unwrap();
+    let model = Model::try_new(mesh, element, &materials, vec![], &mut |_| {}).unwrap();
     let known = model.known(question.known.clone()).unwrap();
     let factored = model.factor(&known.dofs, Method::SparseCholesky, &mut |_| {}).unwrap();
     let mut forces = vec![0.0; 3 * model.system_node_count()];
@@ -133,6 +135,11 @@ fn by_program(object: &Object, system: &System, question: &Question, folder: &Pa
     let mut arguments = vec!["solve", "--mesh", object.file.to_str().unwrap()];
     arguments.extend(["--known", &known, "--young", &young, "--poisson", &poisson]);
     arguments.extend(["--element", element, "--server", "embedded", "--out", &out]);
+    let stone = object.materials(question.young, question.poisson).pop().unwrap();
+    let stone = format!("stone:{}:{}", stone.young, stone.poisson);
+    if object.has_stone {
+        arguments.extend(["--material-region", &stone]);
+    }
     if !question.forces.is_empty() {
         std::fs::write(&forces, rows("node,fx,fy,fz", &question.forces)).unwrap();
         arguments.extend(["--forces", &forces]);

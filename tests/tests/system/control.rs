@@ -24,7 +24,7 @@ use softgrasp_window::view::control::Control;
 use crate::controlled::{Controlled, MATERIAL, summary};
 
 fn model_hash(object: &SoftObject) -> ModelHash {
-    ModelUpload::new(object.rest(), 1, MATERIAL, ElementName::T4).hash
+    ModelUpload::new(object.rest_shape(), 1, MATERIAL, ElementName::T4).hash
 }
 
 fn loaded(mesh: TetMesh) -> Box<LoadedObject> {

@@ -20,13 +20,16 @@ use super::strain::principal_max;
 use super::tet4::{self, Gradients};
 use crate::mesh::TetMesh;
 
-/// What recovery needs of one rest shape of one material, worked out once, and the memory that it
+/// What recovery needs of one rest shape, worked out once, and the memory that it
 /// works in. A node that no element uses has the value 0.
 ///
 /// Shapes: N nodes, M elements. Units: m, Pa.
 #[derive(Clone, Debug)]
 pub struct StressRecovery {
+    /// Shear modulus of the stiffest material, Pa.
     shear_modulus: f64,
+    /// Shear modulus of each element over the largest; empty for a mesh of one material.
+    share_of_stiffest: Vec<f64>,
     tets: Vec<[u32; 4]>,
     gradients: Vec<Gradients>,
     /// Volume of the elements around each node, m³.
@@ -53,10 +56,19 @@ pub struct OtherNodeCount {
 }
 
 impl StressRecovery {
-    /// Prepares a rest shape of one material; the regions of the mesh make no difference.
+    /// Prepares a rest shape. At the nodes between two materials the stress is the average across them.
     ///
-    /// Units: mesh m.
-    pub fn new(mesh: &TetMesh, material: &Material) -> Self {
+    /// Shapes: `materials` one, or one per region number of the mesh. Units: mesh m.
+    ///
+    /// # Panics
+    /// Without a material.
+    pub fn new(mesh: &TetMesh, materials: &[Material]) -> Self {
+        let of_region = |region: usize| materials[region.min(materials.len() - 1)].shear_modulus();
+        let shear_modulus = materials.iter().map(Material::shear_modulus).fold(0.0, f64::max);
+        let share_of_stiffest = match materials {
+            [_] => Vec::new(),
+            _ => mesh.regions().iter().map(|&r| of_region(r as usize) / shear_modulus).collect(),
+        };
         let tets = mesh.tets().to_vec();
         let gradients: Vec<Gradients> =
             (0..tets.len()).map(|tet| tet4::gradients(&mesh.corners(tet))).collect();
@@ -66,7 +78,8 @@ impl StressRecovery {
         }
         let norms = gradients.iter().flat_map(|g| &g.of_shape).map(Vector3::norm);
         Self {
-            shear_modulus: material.shear_modulus(),
+            shear_modulus,
+            share_of_stiffest,
             steepest: norms.fold(0.0, f64::max),
             of_elements: vec![Tensor::zeros(); tets.len()],
             of_nodes: vec![Tensor::zeros(); mesh.node_count()],
@@ -105,6 +118,7 @@ impl StressRecovery {
         values: &mut Vec<f64>,
     ) -> Result<(), OtherNodeCount> {
         self.recover(displacement)?;
+        self.weigh_by_stiffness();
         let factor = 2.0 * self.shear_modulus * 1.5f64.sqrt();
         values.clear();
         values.extend(self.of_nodes.iter().map(|strain| factor * deviator(strain).norm()));
@@ -131,7 +145,8 @@ impl StressRecovery {
         values: &mut Vec<f64>,
     ) -> Result<f64, OtherNodeCount> {
         self.recover(displacement)?;
-        // One material: the shear modulus cancels, so strains do for stresses.
+        // The largest shear modulus cancels, so strains, weighed by their share of it, do for stresses.
+        self.weigh_by_stiffness();
         self.of_elements.iter_mut().chain(&mut self.of_nodes).for_each(|t| *t = deviator(t));
         values.clear();
         values.resize(self.of_nodes.len(), 0.0);
@@ -161,11 +176,19 @@ impl StressRecovery {
         if got != expected {
             return Err(OtherNodeCount { got, expected });
         }
-        self.of_nodes.fill(Tensor::zeros());
         let elements = self.tets.iter().zip(&self.gradients).zip(&mut self.of_elements);
         for ((nodes, g), strain) in elements {
             *strain = strain_of(g, &nodes.map(|node| Vector3::from(displacement[node as usize])));
-            let weighted = *strain * g.volume;
+        }
+        self.average_at_nodes();
+        Ok(())
+    }
+
+    /// Averages the tensors of the elements at the nodes, weighed by volume.
+    fn average_at_nodes(&mut self) {
+        self.of_nodes.fill(Tensor::zeros());
+        for ((nodes, g), own) in self.tets.iter().zip(&self.gradients).zip(&self.of_elements) {
+            let weighted = *own * g.volume;
             nodes.iter().for_each(|&node| self.of_nodes[node as usize] += weighted);
         }
         for (strain, volume) in self.of_nodes.iter_mut().zip(&self.volume_around) {
@@ -173,7 +196,19 @@ impl StressRecovery {
                 *strain /= *volume;
             }
         }
-        Ok(())
+    }
+
+    /// Makes strains of elements and nodes into stresses over twice the largest shear modulus (their deviators are
+    /// meant), where there are several materials.
+    fn weigh_by_stiffness(&mut self) {
+        if self.share_of_stiffest.is_empty() {
+            return;
+        }
+        self.of_elements
+            .iter_mut()
+            .zip(&self.share_of_stiffest)
+            .for_each(|(t, share)| *t *= *share);
+        self.average_at_nodes();
     }
 
     /// The strain that rounding alone can make of these displacements.

@@ -1,5 +1,6 @@
 //! One question as an input deck of CalculiX or Abaqus, so that another program can check an answer.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use nalgebra::Point3;
@@ -15,8 +16,8 @@ pub struct CalculixDeck<'a> {
     pub mesh: &'a TetMesh,
     /// Element: `t4` (C3D4) or `t10` (C3D10); others have no counterpart.
     pub element: Element,
-    /// Material of the whole mesh.
-    pub material: Material,
+    /// Of the whole mesh, or one for each region that has elements, in ascending order of the regions' numbers.
+    pub materials: &'a [Material],
     /// Law of large deformation; `None` for linear elasticity.
     pub law: Option<LawName>,
     /// Known displacements (Dirichlet values), m.
@@ -65,8 +66,10 @@ impl CalculixDeck<'_> {
     pub fn text(&self) -> Result<String, DeckError> {
         let cells = Cells::of(self.mesh, self.element)?;
         let mut text = cells.cards();
-        text.push_str(&self.material_cards()?);
-        text.push_str("*SOLID SECTION, ELSET=BODY, MATERIAL=SOFT\n");
+        match self.materials {
+            [only] => self.section_cards(&mut text, *only, "BODY", "SOFT")?,
+            several => self.region_cards(&mut text, several)?,
+        }
         // Far below the digits that are printed.
         text.push_str(match self.law {
             Some(_) => {
@@ -91,20 +94,41 @@ impl CalculixDeck<'_> {
         Ok(text)
     }
 
-    fn material_cards(&self) -> Result<String, DeckError> {
-        let Material { young, poisson } = self.material;
-        let mut text = String::from("*MATERIAL, NAME=SOFT\n");
+    /// A set of elements, a material and a section for each region.
+    fn region_cards(&self, text: &mut String, materials: &[Material]) -> Result<(), DeckError> {
+        let numbers: BTreeSet<u32> = self.mesh.regions().iter().copied().collect();
+        for (place, (number, material)) in numbers.into_iter().zip(materials).enumerate() {
+            let set = format!("REGION{place}");
+            line(text, format_args!("*ELSET, ELSET={set}"));
+            let of_region = self.mesh.regions().iter().zip(1..).filter(|(r, _)| **r == number);
+            of_region.for_each(|(_, element)| line(text, format_args!("{element},")));
+            self.section_cards(text, *material, &set, &format!("SOFT{place}"))?;
+        }
+        Ok(())
+    }
+
+    /// A material, and the elements that are of it.
+    fn section_cards(
+        &self,
+        text: &mut String,
+        material: Material,
+        set: &str,
+        name: &str,
+    ) -> Result<(), DeckError> {
+        let Material { young, poisson } = material;
+        line(text, format_args!("*MATERIAL, NAME={name}"));
         match self.law {
-            None => line(&mut text, format_args!("*ELASTIC\n{},{}", card(young), card(poisson))),
+            None => line(text, format_args!("*ELASTIC\n{},{}", card(young), card(poisson))),
             Some(LawName::NeoHookean) => {
                 let c10 = young / (4.0 * (1.0 + poisson));
                 let d1 = 6.0 * (1.0 - 2.0 * poisson) / young;
                 let cards = format!("{},{}", card(c10), card(d1));
-                line(&mut text, format_args!("*HYPERELASTIC, NEO HOOKE\n{cards}"));
+                line(text, format_args!("*HYPERELASTIC, NEO HOOKE\n{cards}"));
             }
             Some(law) => return Err(DeckError::Law { law }),
         }
-        Ok(text)
+        line(text, format_args!("*SOLID SECTION, ELSET={set}, MATERIAL={name}"));
+        Ok(())
     }
 }
 
@@ -174,8 +198,8 @@ mod tests {
         let mesh = generate(BuiltIn::Cube, 27).unwrap();
         let known = [DofValue { dof: 4, value: 1e-3 }];
         let forces = [DofValue { dof: 8, value: -0.5 }];
-        let material = Material { young: 6e4, poisson: 0.25 };
-        CalculixDeck { mesh: &mesh, element, material, law, known: &known, forces: &forces }.text()
+        let materials = &[Material { young: 6e4, poisson: 0.25 }];
+        CalculixDeck { mesh: &mesh, element, materials, law, known: &known, forces: &forces }.text()
     }
 
     #[test]
@@ -194,6 +218,34 @@ mod tests {
         assert!(text.contains("*ELASTIC\n6e4,2.5e-1\n"), "{text}");
         assert!(text.contains("*BOUNDARY\n2,2,2,1e-3\n*CLOAD\n3,3,-5e-1\n"), "{text}");
         assert!(text.contains("TYPE=C3D4"), "{text}");
+    }
+
+    #[test]
+    fn every_region_has_its_elements_its_material_and_its_section() {
+        let cube = generate(BuiltIn::Cube, 27).unwrap();
+        // Region 1 has no element: it has no material either.
+        let regions = (0..cube.tets().len()).map(|tet| if tet < 2 { 2 } else { 0 }).collect();
+        let mesh = softgrasp_core::mesh::TetMesh::try_new(
+            cube.vertices().to_vec(),
+            cube.tets().to_vec(),
+            regions,
+        );
+        let deck = CalculixDeck {
+            mesh: &mesh.unwrap(),
+            element: Element::Tet4,
+            materials: &[
+                Material { young: 1e4, poisson: 0.25 },
+                Material { young: 2e6, poisson: 0.5 / 4.0 },
+            ],
+            law: None,
+            known: &[],
+            forces: &[],
+        };
+        let text = deck.text().unwrap();
+        let stone = "*ELSET, ELSET=REGION1\n1,\n2,\n*MATERIAL, NAME=SOFT1\n*ELASTIC\n2e6,1.25e-1\n\
+                     *SOLID SECTION, ELSET=REGION1, MATERIAL=SOFT1\n";
+        assert!(text.contains(stone), "{text}");
+        assert!(text.contains("*ELSET, ELSET=REGION0\n3,\n4,\n"), "{text}");
     }
 
     #[test]

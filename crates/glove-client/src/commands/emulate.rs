@@ -167,6 +167,7 @@ mod serving {
             let strawberry = ObjectChoice::BuiltIn(BuiltIn::Strawberry);
             let choice = self.object.clone().unwrap_or(strawberry);
             let request = ObjectRequest {
+                regions: Vec::new(),
                 nodes: self.nodes.unwrap_or(NODES_DEFAULT),
                 size_m: self.object_size.or_else(|| size_to_hold(&choice)),
                 setup: setup.clone(),

@@ -29,6 +29,7 @@ pub mod record;
 mod recorded_object;
 mod recorded_samples;
 mod recorded_settings;
+mod region_arguments;
 pub mod replay;
 pub mod run;
 mod run_arguments;

@@ -14,13 +14,15 @@ use super::field_arguments::{FieldArguments, is_vtu};
 use super::numbers::{count, poisson, positive, speed, vector};
 use super::output::Progress;
 use super::output::{print, write_json};
+use super::region_arguments::RegionArguments;
 use crate::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, unexpected};
 use crate::ask::contact_frame::isometry_of;
 use crate::ask::displacement_table::write_displacements;
-use crate::ask::model_upload::ModelUpload;
+use crate::ask::model_upload::{ModelUpload, materials};
 use crate::object::field_writing::{NodeVectors, encode_fields};
 use crate::object::file_writing::write_file;
 use crate::object::object_file::{ObjectFile, read_object_file};
+use crate::object::region_choice::regions_of;
 use crate::object::scene::NODES_DEFAULT;
 use crate::press::bodies_file::{PressBodies, read_bodies};
 use crate::press::course::{Course, Step};
@@ -44,6 +46,8 @@ pub struct PressCommand {
     /// Poisson's ratio.
     #[arg(long, default_value_t = 0.4, value_name = "NU", value_parser = poisson, allow_hyphen_values = true)]
     poisson: f64,
+    #[command(flatten)]
+    regions: RegionArguments,
     /// Density, kg/m³.
     #[arg(long, default_value_t = 1000.0, value_name = "KG/M3", value_parser = positive, allow_hyphen_values = true)]
     density: f64,
@@ -106,7 +110,7 @@ impl PressCommand {
     pub fn run(&self) -> anyhow::Result<()> {
         let progress = Progress::start("reading");
         let bodies = read_bodies(&self.bodies)?;
-        let mesh = self.read_object()?;
+        let (mesh, region_names) = self.read_object()?;
         let surface = Surface::from_mesh(&mesh);
         let is_known = |path: &PathBuf| {
             matches!(path.extension().and_then(|e| e.to_str()), Some("vtu" | "csv"))
@@ -123,7 +127,9 @@ impl PressCommand {
         progress.now(&format!("{} nodes:", mesh.node_count()));
         progress.watch(host.stage());
         let material = Material { young: self.young, poisson: self.poisson };
-        let upload = ModelUpload::new(&mesh, 1, material, self.element);
+        let regions = regions_of(&mesh, &region_names, &self.regions.regions)?;
+        let materials = materials(&mesh, &regions, material);
+        let upload = ModelUpload::of_mesh(&mesh, 1, materials, self.element);
         give_model(&mut connection, &upload)?;
         let course = Course {
             mesh: &mesh,
@@ -162,10 +168,11 @@ impl PressCommand {
         print(&self.describe(&report, &bodies))
     }
 
-    /// Reads the mesh, or fills the surface with one; prints what was done to a surface.
-    fn read_object(&self) -> anyhow::Result<TetMesh> {
+    /// The mesh with the names of its regions, or what fills the surface; a surface and what was done to it are
+    /// told.
+    fn read_object(&self) -> anyhow::Result<(TetMesh, Vec<String>)> {
         match read_object_file(&self.mesh, NODES_DEFAULT)? {
-            ObjectFile::Mesh(file) => Ok(file.mesh),
+            ObjectFile::Mesh(file) => Ok((file.mesh, file.findings.region_labels)),
             ObjectFile::Surface(surface) => {
                 let doubt = surface.doubtful_unit().map(|doubt| {
                     format!("{doubt}: `glove-client fill {} --scale S` first", self.mesh.display())
@@ -175,7 +182,7 @@ impl PressCommand {
                 {
                     eprintln!("glove-client: {line}");
                 }
-                Ok(surface.filled.mesh)
+                Ok((surface.filled.mesh, Vec::new()))
             }
         }
     }

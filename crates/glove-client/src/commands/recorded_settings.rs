@@ -4,11 +4,12 @@ use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use softgrasp_hand::devices::calibration::read_toml;
 use softgrasp_hand::hand_setup::HandConfiguration;
-use softgrasp_hand::recording::RecordedSetup;
+use softgrasp_hand::recording::{RecordedRegion, RecordedSetup};
 use softgrasp_protocol::{ElementName, LawName, Material};
 
 use crate::ask::solve_settings::Elasticity;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
+use crate::object::region_choice::{Ellipsoid, RegionChoice};
 use crate::run::contact_grasp::ContactScene;
 
 /// Material and settings of the solves of a recorded run.
@@ -36,6 +37,17 @@ pub(super) fn recorded_settings(setup: &RecordedSetup) -> anyhow::Result<SolveSe
         },
         max_error: setup.max_error,
     })
+}
+
+/// Regions of a recorded object that are of a material of their own.
+pub(super) fn recorded_regions(setup: &RecordedSetup) -> Vec<RegionChoice> {
+    let of = |recorded: &RecordedRegion| RegionChoice {
+        name: recorded.name.clone(),
+        young_pa: recorded.young_pa,
+        poisson: recorded.poisson,
+        ellipsoid: recorded.ellipsoid_m.map(|[centre_m, radii_m]| Ellipsoid { centre_m, radii_m }),
+    };
+    setup.regions.iter().map(of).collect()
 }
 
 /// Constants of a recorded grasp by friction; `None` for the thesis's rules.

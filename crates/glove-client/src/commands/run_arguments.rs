@@ -27,13 +27,17 @@ use super::hand_files::read_configuration;
 use super::numbers::{count, place, poisson, positive, speed, ticks};
 use super::page_arguments::PageArguments;
 use super::recorded_object::recorded_object;
-use super::recorded_settings::{recorded_hand, recorded_place, recorded_scene, recorded_settings};
+use super::recorded_settings::{
+    recorded_hand, recorded_place, recorded_regions, recorded_scene, recorded_settings,
+};
+use super::region_arguments::RegionArguments;
 use crate::ask::connection::ServerChoice;
 use crate::ask::endpoint::Endpoint;
 use crate::ask::solve_settings::Elasticity;
 use crate::ask::solve_settings::{SolveSettings, Subscription, element_for_frames};
 use crate::object::loading::ObjectRequest;
 use crate::object::object_place::ObjectPlace;
+use crate::object::region_choice::RegionChoice;
 use crate::object::scene::{NODES_DEFAULT, SceneFile, size_to_hold};
 use crate::pace::Pace;
 use crate::run::contact_grasp::ContactScene;
@@ -102,6 +106,8 @@ pub struct RunArguments {
     /// Poisson's ratio [default: 0.4].
     #[arg(long, value_name = "NU", value_parser = poisson, allow_hyphen_values = true)]
     pub(super) poisson: Option<f64>,
+    #[command(flatten)]
+    pub(super) regions: RegionArguments,
     #[command(flatten)]
     pub(super) elasticity: ElasticityArguments,
     /// Largest relative error of an answer wanted [default: at large deformation 2e-3].
@@ -176,6 +182,8 @@ pub(super) struct RunPlan {
     pub(super) nodes: usize,
     /// Longest extent of the object, m; `None` where the hand may choose it.
     pub(super) object_size: Option<f64>,
+    /// Regions of a material of their own.
+    pub(super) regions: Vec<RegionChoice>,
     /// Material, and settings of the solves.
     pub(super) settings: SolveSettings,
     /// Constants of a grasp by friction; `None` for the thesis's rules.
@@ -266,6 +274,8 @@ impl RunArguments {
         // Flags have been checked; what is wrong here stands in the scene file.
         ElasticMaterial::try_new(material.young, material.poisson)
             .context("the scene's material")?;
+        let regions = self.chosen_regions(&scene)?;
+        let largest = regions.iter().map(|region| region.poisson).fold(material.poisson, f64::max);
         let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
         let is_xr = self.takes_headset(&hand)?;
         let watched = self.is_watched();
@@ -279,9 +289,10 @@ impl RunArguments {
             object,
             nodes: self.nodes.or(scene.nodes).unwrap_or(NODES_DEFAULT),
             object_size,
+            regions,
             settings: SolveSettings {
                 material,
-                element: chosen_element(element, material.poisson)?,
+                element: chosen_element(element, largest)?,
                 method,
                 contact: rule.contact,
                 subscription: match (&self.out_dir, self.shown.needs_inside()) {
@@ -303,6 +314,22 @@ impl RunArguments {
             world_from_sender: self.world_from_sender(is_xr),
             recording: None,
         })
+    }
+
+    /// Regions of flags and scene; a flag wins over the scene's region of its name, whose place it keeps.
+    fn chosen_regions(&self, scene: &SceneFile) -> anyhow::Result<Vec<RegionChoice>> {
+        let mut regions = scene.region.clone();
+        for region in &self.regions.regions {
+            match regions.iter_mut().find(|known| known.name == region.name) {
+                Some(known) => {
+                    (known.young_pa, known.poisson) = (region.young_pa, region.poisson);
+                }
+                None => regions.push(region.clone()),
+            }
+        }
+        // Flags have been checked; what is wrong here stands in the scene file.
+        regions.iter().try_for_each(|region| region.material().map(drop)).context("the scene")?;
+        Ok(regions)
     }
 
     /// Whether the hand is that of a headset, which a page must send.
@@ -377,6 +404,7 @@ impl RunArguments {
             },
             nodes: setup.nodes,
             object_size: setup.size_m,
+            regions: recorded_regions(setup),
             settings: recorded_settings(setup)?,
             contact_scene: recorded_scene(setup),
             place: if setup.placed_in_hand { ObjectPlace::Hand } else { ObjectPlace::Home },
@@ -435,6 +463,7 @@ impl RunPlan {
             choice: self.object.clone(),
             nodes: self.nodes,
             size_m: self.object_size,
+            regions: self.regions.clone(),
             setup: setup.clone(),
             contact: self.settings.contact,
         }

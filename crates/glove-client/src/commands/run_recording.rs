@@ -6,12 +6,15 @@ use anyhow::ensure;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_hand::devices::calibration::toml_text;
 use softgrasp_hand::loaded_object::LoadedObject;
-use softgrasp_hand::recording::{RecordedFriction, RecordedSetup, Recorder, VERSION};
+use softgrasp_hand::recording::{
+    RecordedFriction, RecordedRegion, RecordedSetup, Recorder, VERSION,
+};
 
 use super::run_arguments::RunPlan;
 use crate::ask::digest::Digest;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
 use crate::object::object_place::ObjectPlace;
+use crate::object::region_choice::RegionChoice;
 
 /// Begins the recording of a run.
 ///
@@ -34,6 +37,7 @@ pub(super) fn start_recorder(
         mesh: mesh_digest(loaded.object.rest()),
         young_pa: material.young,
         poisson: material.poisson,
+        regions: plan.regions.iter().map(recorded_region).collect(),
         element: element.to_string(),
         method: method.to_string(),
         contact: contact.to_string(),
@@ -62,6 +66,15 @@ pub(super) fn start_recorder(
         }),
     };
     Ok(Recorder::start(path, setup)?)
+}
+
+fn recorded_region(region: &RegionChoice) -> RecordedRegion {
+    RecordedRegion {
+        name: region.name.clone(),
+        young_pa: region.young_pa,
+        poisson: region.poisson,
+        ellipsoid_m: region.ellipsoid.map(|of| [of.centre_m, of.radii_m]),
+    }
 }
 
 /// Compares the loaded object with the recorded one.

@@ -153,7 +153,10 @@ pub(super) fn make_ready(
 #[cfg(any(feature = "window", feature = "xr"))]
 pub(super) fn load_beside(request: ObjectRequest) -> LoadObject {
     Arc::new(move |wish, goes_on| {
+        // Another object has other regions.
+        let is_other = wish.choice != request.choice;
         let request = ObjectRequest {
+            regions: if is_other { Vec::new() } else { request.regions.clone() },
             choice: wish.choice,
             nodes: wish.nodes.unwrap_or(request.nodes),
             size_m: wish.size_m.or(request.size_m),

@@ -21,16 +21,18 @@ use super::elasticity_arguments::ElasticityArguments;
 use super::field_arguments::FieldArguments;
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
+use super::region_arguments::RegionArguments;
 use super::solve_cases::{CaseFiles, CaseMesh, CaseResult, read_values};
 use crate::ask::calculix_deck::CalculixDeck;
 use crate::ask::connection::{Host, ServerChoice};
 use crate::ask::discretisation::DiscretisationEstimate;
 use crate::ask::displacement_table::{DISPLACEMENT_COLUMNS, FORCE_COLUMNS, TableError};
-use crate::ask::model_upload::mesh_data;
+use crate::ask::model_upload::{materials, mesh_data};
 use crate::ask::solve_settings::Elasticity;
 use crate::commands::output::Progress;
 use crate::object::file_writing::write_file;
 use crate::object::mesh_file::read_mesh_file;
+use crate::object::region_choice::regions_of;
 
 /// Solve one request on a mesh file: prescribed displacements in, all displacements out.
 #[derive(Args)]
@@ -72,6 +74,8 @@ pub struct SolveCommand {
     /// Poisson's ratio.
     #[arg(long, default_value_t = 0.3, value_name = "NU", value_parser = poisson, allow_hyphen_values = true)]
     poisson: f64,
+    #[command(flatten)]
+    regions: RegionArguments,
     /// Largest relative error of the solution wanted: auto takes the fastest method within it.
     #[arg(long, value_name = "REL", value_parser = positive, allow_hyphen_values = true)]
     max_error: Option<f64>,
@@ -167,12 +171,16 @@ impl SolveCommand {
     pub fn run(&self) -> anyhow::Result<()> {
         let progress = Progress::start("reading the mesh");
         let file = read_mesh_file(&self.mesh)?;
+        let materials = self.materials(&file)?;
         let question = self.question(&file.mesh)?;
         let elasticity = self.elasticity.of_request()?;
         self.check_cases(&elasticity)?;
         let cases = self.cases().further(&file.mesh, &question.known)?;
         if let Some(path) = &self.export_deck {
-            write_file(path, self.deck(&file.mesh, &question, &elasticity)?.as_bytes())?;
+            write_file(
+                path,
+                self.deck(&file.mesh, &materials, &question, &elasticity)?.as_bytes(),
+            )?;
         }
         progress.now("starting");
         let host = self.open_host()?;
@@ -183,11 +191,7 @@ impl SolveCommand {
             ServerChoice::At(address) => format!("solving for {nodes} nodes at {address}"),
         });
         progress.watch(host.stage());
-        let body = Body {
-            mesh: mesh_data(&file.mesh),
-            materials: vec![Material { young: self.young, poisson: self.poisson }],
-            element: self.element,
-        };
+        let body = Body { mesh: mesh_data(&file.mesh), materials, element: self.element };
         // A second solve asks about the same body.
         let again = self.estimate_discretisation.then(|| (body.clone(), question.clone()));
         let start = Instant::now();
@@ -231,6 +235,14 @@ impl SolveCommand {
             told.push_str(&describe_discretisation(&discretisation));
         }
         print(&told)
+    }
+
+    /// Materials of the mesh's regions, as they travel.
+    fn materials(&self, file: &MeshFile) -> anyhow::Result<Vec<Material>> {
+        let body = Material { young: self.young, poisson: self.poisson };
+        let names = &file.findings.region_labels;
+        let regions = regions_of(&file.mesh, names, &self.regions.regions)?;
+        Ok(materials(&file.mesh, &regions, body))
     }
 
     /// Host with the embedded server, or the one at an address.
@@ -333,6 +345,7 @@ impl SolveCommand {
     fn deck(
         &self,
         mesh: &TetMesh,
+        materials: &[Material],
         question: &Question,
         elasticity: &Elasticity,
     ) -> anyhow::Result<String> {
@@ -349,7 +362,7 @@ impl SolveCommand {
         let deck = CalculixDeck {
             mesh,
             element,
-            material: Material { young: self.young, poisson: self.poisson },
+            materials,
             law: (!is_linear).then_some(elasticity.law),
             known: &question.known,
             forces: &question.forces,

@@ -3,11 +3,14 @@
 
 use std::sync::Arc;
 
-use softgrasp_grasp::object::{ContactModel, ObjectChoice, ObjectError, SoftObject, lying};
+use softgrasp_grasp::object::{
+    ContactModel, ObjectChoice, ObjectError, RestShape, SoftObject, lying,
+};
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject, ObjectSummary};
 use softgrasp_hand::scripted::{NoGrasp, PlanRequest};
 
+use crate::object::region_choice::{MeshOfRegions, RegionChoice, RegionError};
 use crate::object::scene::{SceneError, SceneObject, load_object};
 
 /// Object that is wanted, and the hand that is to grasp it.
@@ -19,6 +22,8 @@ pub struct ObjectRequest {
     pub nodes: usize,
     /// Longest extent of the object, m; `None` where the hand may choose it.
     pub size_m: Option<f64>,
+    /// Regions of a material of their own.
+    pub regions: Vec<RegionChoice>,
     /// Dimensions and devices of the hand.
     pub setup: HandSetup,
     /// What a fingertip holds: a node, a patch or a mask.
@@ -31,6 +36,9 @@ pub enum LoadError {
     /// The object cannot be read or generated.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// Regions that it has not.
+    #[error(transparent)]
+    Region(#[from] RegionError),
     /// The mesh is none that can be touched.
     #[error(transparent)]
     Object(#[from] ObjectError),
@@ -55,13 +63,16 @@ pub fn load(
     request: &ObjectRequest,
     mut goes_on: impl FnMut(LoadStage) -> bool,
 ) -> Result<Option<LoadedObject>, LoadError> {
-    let ObjectRequest { choice, nodes, size_m, setup, contact } = request;
+    let ObjectRequest { choice, nodes, size_m, regions, setup, contact } = request;
     let mut size = *size_m;
     loop {
         if !goes_on(LoadStage::Mesh) {
             return Ok(None);
         }
-        let SceneObject { mut mesh, mut notes } = load_object(choice, *nodes, size)?;
+        let SceneObject { mesh, region_names, mut notes } = load_object(choice, *nodes, size)?;
+        let made = MeshOfRegions::try_new(mesh, &region_names, regions)?;
+        let (mut mesh, regions) = (made.mesh, made.regions);
+        notes.extend(made.notes);
         if *contact == ContactModel::Friction {
             let (lies, turn) = lying(&mesh).map_err(ObjectError::Shape)?;
             mesh = lies;
@@ -80,7 +91,7 @@ pub fn load(
         if !goes_on(LoadStage::Tree) {
             return Ok(None);
         }
-        let object = SoftObject::try_new(mesh)?;
+        let object = SoftObject::at_rest(RestShape::try_new(mesh)?.with_regions(regions), 1);
         if !goes_on(LoadStage::Plan) {
             return Ok(None);
         }
@@ -116,6 +127,7 @@ mod tests {
             choice: object.parse().unwrap(),
             nodes: 64,
             size_m: None,
+            regions: Vec::new(),
             setup: HandSetup::default(),
             contact: ContactModel::default(),
         }

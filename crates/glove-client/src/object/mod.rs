@@ -7,6 +7,7 @@ pub mod mesh_file;
 pub mod object_file;
 pub mod object_place;
 pub mod object_work;
+pub mod region_choice;
 pub mod saving;
 pub mod scene;
 pub mod shape_history;

@@ -88,14 +88,18 @@ impl ObjectJob {
             Self::Keep { rest, vertices, rest_shapes, material, element } => {
                 ObjectDone::Kept(rest.kept(vertices).map(|kept| {
                     let object = SoftObject::at_rest(kept, rest_shapes + 1);
-                    let model =
-                        ModelUpload::new(object.rest(), object.rest_shapes(), material, element);
+                    let model = ModelUpload::new(
+                        object.rest_shape(),
+                        object.rest_shapes(),
+                        material,
+                        element,
+                    );
                     Box::new(KeptShape { object, model })
                 }))
             }
             Self::Replace { rest, rest_shapes, material, element } => {
                 let object = SoftObject::at_rest(rest, rest_shapes);
-                let model = ModelUpload::new(object.rest(), rest_shapes, material, element);
+                let model = ModelUpload::new(object.rest_shape(), rest_shapes, material, element);
                 ObjectDone::Replacement(Box::new(KeptShape { object, model }))
             }
             Self::Save(shape) => ObjectDone::Saved(shape.save().map_err(|error| one_line(&error))),

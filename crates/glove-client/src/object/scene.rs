@@ -10,6 +10,7 @@ use softgrasp_grasp::object::ObjectChoice;
 
 use crate::object::mesh_file::MeshFileReadError;
 use crate::object::object_file::{ObjectFile, read_object_file};
+use crate::object::region_choice::RegionChoice;
 
 /// Content of a scene file; every field can also be set by a flag, which wins.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq)]
@@ -44,6 +45,8 @@ pub struct SceneFile {
     pub material: Option<String>,
     /// Yield stress, Pa.
     pub yield_pa: Option<f64>,
+    /// Regions of a material of their own.
+    pub region: Vec<RegionChoice>,
 }
 
 /// Why a scene or its object cannot be used.
@@ -134,6 +137,8 @@ pub fn size_to_hold(object: &ObjectChoice) -> Option<f64> {
 pub struct SceneObject {
     /// Mesh of the object, m, centred at the origin.
     pub mesh: TetMesh,
+    /// Names of its regions; none where no file names them.
+    pub region_names: Vec<String>,
     /// Remarks for the user, in sentences.
     pub notes: Vec<String>,
 }
@@ -150,11 +155,14 @@ pub fn load_object(
     if let Some(size_m) = size_m.filter(|s| !(s.is_finite() && *s > 0.0)) {
         return Err(SceneError::Size { size_m });
     }
-    let mut notes = Vec::new();
+    let (mut notes, mut region_names) = (Vec::new(), Vec::new());
     let mesh = match choice {
         ObjectChoice::BuiltIn(shape) => generate(*shape, nodes)?,
         ObjectChoice::File(path) => match read_object_file(path, nodes)? {
-            ObjectFile::Mesh(file) => read_mesh(path, &file, &mut notes),
+            ObjectFile::Mesh(file) => {
+                region_names.clone_from(&file.findings.region_labels);
+                read_mesh(path, &file, &mut notes)
+            }
             ObjectFile::Surface(surface) => {
                 notes.push(surface.told(path));
                 notes.extend(surface.faults());
@@ -166,12 +174,12 @@ pub fn load_object(
         ObjectChoice::BuiltIn(_) => size_m,
         ObjectChoice::File(_) => Some(size_m.unwrap_or(IMPORTED_SIZE_M)),
     };
-    let Some(size_m) = size_m else { return Ok(SceneObject { mesh, notes }) };
+    let Some(size_m) = size_m else { return Ok(SceneObject { mesh, region_names, notes }) };
     let factor = size_m / mesh.size();
     notes.push(format!("scaled by {factor:.3} to {size_m} m and centred (--object-size)"));
     let mesh =
         scaled_and_centred(&mesh, factor).map_err(|source| SceneError::Scale { size_m, source })?;
-    Ok(SceneObject { mesh, notes })
+    Ok(SceneObject { mesh, region_names, notes })
 }
 
 /// Largest piece of a mesh file; adds the remarks on the file to `notes`.

@@ -374,12 +374,13 @@ impl LiveObject {
         ElasticMaterial::try_new(material.young, material.poisson)
             .map_err(|error| Notice::refused(format!("the material is not taken: {error}")))?;
         self.changing.refuse_while_changing()?;
+        let rest = Arc::clone(self.shown.object().rest_shape());
+        let element = |poisson| element_for_frames(rest.regions().largest_poisson(poisson));
         let settings = self.questions.settings_mut();
-        if settings.element == element_for_frames(settings.material.poisson) {
-            settings.element = element_for_frames(material.poisson);
+        if settings.element == element(settings.material.poisson) {
+            settings.element = element(material.poisson);
         }
         settings.material = material;
-        let rest = Arc::clone(self.shown.object().rest_shape());
         self.begin_to_replace(rest, Replacement::OtherMaterial);
         Ok(())
     }

@@ -66,7 +66,12 @@ impl Questions {
         object: &SoftObject,
     ) -> Self {
         let SolveSettings { material, element, max_error, .. } = settings;
-        link.set_model(ModelUpload::new(object.rest(), object.rest_shapes(), material, element));
+        link.set_model(ModelUpload::new(
+            object.rest_shape(),
+            object.rest_shapes(),
+            material,
+            element,
+        ));
         Self {
             link,
             settings,

@@ -2,12 +2,14 @@
 
 mod choice;
 mod contact_model;
+mod regions;
 mod rest_shape;
 mod resting;
 mod soft_object;
 
 pub use choice::ObjectChoice;
 pub use contact_model::{ContactModel, UnknownContact};
+pub use regions::Regions;
 pub use rest_shape::{ObjectError, RestShape};
 pub use resting::{lying, resting_turn};
 pub use soft_object::SoftObject;

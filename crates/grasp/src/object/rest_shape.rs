@@ -1,9 +1,12 @@
 //! The shape an object returns to when nothing holds it, with all that is worked out from it once.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::contact::{Mask, SurfaceStars};
 use softgrasp_core::mesh::{Inversion, MeshError, Surface, TetMesh};
 
+use super::regions::Regions;
 use crate::sphere_tree::{SphereTree, TreeError, vertex_normals};
 
 /// A mesh at rest: its boundary surface, sphere tree and vertex normals.
@@ -16,6 +19,7 @@ pub struct RestShape {
     stars: SurfaceStars,
     tree: SphereTree,
     normals: Vec<Vector3<f64>>,
+    regions: Arc<Regions>,
 }
 
 /// Why an object cannot be touched, or a shape not be kept.
@@ -51,7 +55,8 @@ impl RestShape {
         let tree = SphereTree::try_build(mesh.vertices(), &surface.nodes)?;
         let mut normals = Vec::new();
         vertex_normals(mesh.vertices(), &surface.triangles, &mut normals)?;
-        Ok(Self { mesh, surface, stars, tree, normals })
+        let regions = Arc::default();
+        Ok(Self { mesh, surface, stars, tree, normals, regions })
     }
 
     /// The rest shape that a deformed shape of this object makes (thesis 4.6, 6.1.2).
@@ -63,7 +68,18 @@ impl RestShape {
     /// [`ObjectError::Tree`] for vertices that make no mesh.
     pub fn kept(&self, vertices: Vec<Point3<f64>>) -> Result<Self, ObjectError> {
         self.check(&vertices)?;
-        Self::try_new(self.mesh.with_vertices(vertices)?)
+        let kept = Self::try_new(self.mesh.with_vertices(vertices)?)?;
+        Ok(Self { regions: Arc::clone(&self.regions), ..kept })
+    }
+
+    /// The same rest shape, whose regions have names and materials of their own.
+    pub fn with_regions(self, regions: Regions) -> Self {
+        Self { regions: Arc::new(regions), ..self }
+    }
+
+    /// Names and materials of the regions of the mesh.
+    pub fn regions(&self) -> &Regions {
+        &self.regions
     }
 
     /// Checks whether a deformed shape could become the rest shape.

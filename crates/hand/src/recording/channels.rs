@@ -102,6 +102,7 @@ impl Channel {
             Self::Setup => json!({
                 "version": integer, "program": text, "object": text, "nodes": integer,
                 "size_m": {"type": ["number", "null"]}, "mesh": text, "young_pa": number, "poisson": number,
+                "regions": {"type": "array", "items": {"type": "object"}},
                 "element": text, "method": text, "contact": text, "whole": flag, "hand": text,
                 "deformation": text, "law": text, "yield_pa": {"type": ["number", "null"]},
                 "max_error": {"type": ["number", "null"]},

@@ -18,6 +18,7 @@ pub(super) fn setup() -> RecordedSetup {
         size_m: None,
         mesh: String::new(),
         young_pa: 2e4,
+        regions: Vec::new(),
         poisson: 0.4,
         element: "t4".to_owned(),
         method: "auto".to_owned(),

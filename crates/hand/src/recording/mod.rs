@@ -18,6 +18,6 @@ pub use replay::{ReplayHand, Replayed};
 pub use replay_check::{Difference, ReplayCheck};
 pub use stages::{Stage, StageDigests};
 pub use tick::{
-    AnswerSeen, EventSeen, HandSeen, Intervention, PoseSeen, RecordedFriction, RecordedSetup,
-    RecordedTick, SPRINGBACK_REFUSED, SceneSeen, SurfaceSeen, TickSeen,
+    AnswerSeen, EventSeen, HandSeen, Intervention, PoseSeen, RecordedFriction, RecordedRegion,
+    RecordedSetup, RecordedTick, SPRINGBACK_REFUSED, SceneSeen, SurfaceSeen, TickSeen,
 };

@@ -26,6 +26,9 @@ pub struct RecordedSetup {
     pub young_pa: f64,
     /// Poisson's ratio.
     pub poisson: f64,
+    /// Regions of the mesh with a material of their own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<RecordedRegion>,
     /// Name of the finite element.
     pub element: String,
     /// Name of the method that was asked for.
@@ -65,6 +68,20 @@ pub struct RecordedSetup {
     /// Where a sender of joints was placed: m, then quaternion x y z w; `None` where its first hand
     /// was placed before the object.
     pub world_from_sender: Option<[f64; 7]>,
+}
+
+/// A region of the object's mesh with a material of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordedRegion {
+    /// Name of the region in the mesh file, or of what the ellipsoid holds.
+    pub name: String,
+    /// Young's modulus, Pa.
+    pub young_pa: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// Centre and half axes of the ellipsoid in which the region lies, m, in the object's frame; `None` where the
+    /// mesh file says where it is.
+    pub ellipsoid_m: Option<[[f64; 3]; 2]>,
 }
 
 /// What a grasp by contact with friction was like.

@@ -22,7 +22,7 @@ pub struct ShadedObject {
 }
 
 impl ShadedObject {
-    /// An object with this rest shape, of one material.
+    /// An object with this rest shape, whose body is of a material.
     pub fn new(rest: Arc<RestShape>, material: Material) -> Self {
         Self { rest, material, recovery: None, values: Vec::new(), error_of_whole: None }
     }
@@ -67,7 +67,8 @@ impl ShadedObject {
 
     fn recover<T>(&mut self, work: impl FnOnce(&mut StressRecovery, &mut Vec<f64>) -> T) -> T {
         let Self { rest, material, recovery, values, .. } = self;
-        work(recovery.get_or_insert_with(|| StressRecovery::new(rest.mesh(), material)), values)
+        let made = || StressRecovery::new(rest.mesh(), &rest.regions().materials(*material));
+        work(recovery.get_or_insert_with(made), values)
     }
 
     /// Values of the last shading, one per node.

@@ -43,6 +43,7 @@ impl Stage {
     pub fn strawberry() -> anyhow::Result<Self> {
         let choice = ObjectChoice::BuiltIn(BuiltIn::Strawberry);
         let request = ObjectRequest {
+            regions: Vec::new(),
             nodes: 1000,
             size_m: size_to_hold(&choice),
             setup: HandSetup::default(),

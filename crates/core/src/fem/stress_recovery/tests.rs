@@ -17,7 +17,7 @@ fn material() -> Material {
 }
 
 fn recovery(mesh: &TetMesh) -> StressRecovery {
-    StressRecovery::new(mesh, &material())
+    StressRecovery::new(mesh, &[material()])
 }
 
 fn field(mesh: &TetMesh, map: impl Fn(&Point3<f64>) -> Vector3<f64>) -> Vec<[f64; 3]> {
@@ -203,4 +203,34 @@ proptest! {
             prop_assert!(error[node] < 1e-9);
         }
     }
+}
+
+#[test]
+fn stress_of_a_bar_of_two_materials_is_the_same_in_both_and_that_of_each_strain() {
+    // Two halves, pulled so that each has the strain of its stiffness: one uniaxial stress in both.
+    let cube = generate(BuiltIn::Cube, 343).unwrap();
+    let middle = 0.5 * (cube.bounds().0.x + cube.bounds().1.x);
+    let is_right = |tet: &[u32; 4]| {
+        let sum: f64 = tet.iter().map(|&n| cube.vertices()[n as usize].x).sum();
+        u32::from(sum / 4.0 > middle)
+    };
+    let regions: Vec<u32> = cube.tets().iter().map(is_right).collect();
+    assert!(regions.contains(&0) && regions.contains(&1));
+    let mesh = TetMesh::try_new(cube.vertices().to_vec(), cube.tets().to_vec(), regions).unwrap();
+    let stiff = Material::try_new(3.0 * YOUNG, 0.0).unwrap();
+    let soft = Material::try_new(YOUNG, 0.0).unwrap();
+    // Without a lateral strain the two halves fit together.
+    let u = field(&mesh, |p| {
+        let x = p.x - middle;
+        Vector3::new(if x > 0.0 { 0.01 * x } else { 0.03 * x }, 0.0, 0.0)
+    });
+    let mut recovery = StressRecovery::new(&mesh, &[soft, stiff]);
+    let (mut stress, mut strain) = (Vec::new(), Vec::new());
+    recovery.von_mises(&u, &mut stress).unwrap();
+    assert_all_near(&stress, 0.03 * YOUNG, 1e-8);
+    let of_whole = recovery.error(&u, &mut strain).unwrap();
+    assert!(of_whole < 1e-12, "{of_whole}");
+    recovery.principal_strain(&u, &mut strain).unwrap();
+    assert!(strain.iter().any(|e| (e - 0.01).abs() < 1e-9));
+    assert!(strain.iter().any(|e| (e - 0.03).abs() < 1e-9));
 }
