@@ -150,17 +150,27 @@ impl StressRecovery {
         self.of_elements.iter_mut().chain(&mut self.of_nodes).for_each(|t| *t = deviator(t));
         values.clear();
         values.resize(self.of_nodes.len(), 0.0);
-        let largest = self.of_nodes.iter().map(Tensor::norm).fold(0.0, f64::max);
-        if largest <= self.rounding(displacement) {
-            return Ok(0.0);
+        let (mut of_error, mut of_answer, mut largest) = (0.0, 0.0, 0.0f64);
+        for material in self.materials_apart() {
+            // The true stress jumps between two materials, so each is smoothed by itself.
+            if material.is_some() {
+                self.average_at_nodes(material);
+            }
+            largest = self.of_nodes.iter().map(Tensor::norm).fold(largest, f64::max);
+            for (tet, nodes) in
+                self.tets.iter().enumerate().filter(|(tet, _)| self.is_of(*tet, material))
+            {
+                let (volume, own) = (self.gradients[tet].volume, &self.of_elements[tet]);
+                let square = mean_square(&nodes.map(|node| self.of_nodes[node as usize] - own));
+                of_error += volume * square;
+                of_answer += volume * own.norm_squared();
+                let rms = square.sqrt();
+                nodes.iter().for_each(|&node| values[node as usize] += volume * rms);
+            }
         }
-        let (mut of_error, mut of_answer) = (0.0, 0.0);
-        for ((nodes, g), own) in self.tets.iter().zip(&self.gradients).zip(&self.of_elements) {
-            let square = mean_square(&nodes.map(|node| self.of_nodes[node as usize] - own));
-            of_error += g.volume * square;
-            of_answer += g.volume * own.norm_squared();
-            let rms = square.sqrt();
-            nodes.iter().for_each(|&node| values[node as usize] += g.volume * rms);
+        if largest <= self.rounding(displacement) {
+            values.fill(0.0);
+            return Ok(0.0);
         }
         for (value, volume) in values.iter_mut().zip(&self.volume_around) {
             if *volume > 0.0 {
@@ -180,20 +190,27 @@ impl StressRecovery {
         for ((nodes, g), strain) in elements {
             *strain = strain_of(g, &nodes.map(|node| Vector3::from(displacement[node as usize])));
         }
-        self.average_at_nodes();
+        self.average_at_nodes(None);
         Ok(())
     }
 
-    /// Averages the tensors of the elements at the nodes, weighed by volume.
-    fn average_at_nodes(&mut self) {
+    /// Averages the tensors of the elements, of all of them or of one material, at the nodes, weighed by volume.
+    fn average_at_nodes(&mut self, material: Option<f64>) {
         self.of_nodes.fill(Tensor::zeros());
-        for ((nodes, g), own) in self.tets.iter().zip(&self.gradients).zip(&self.of_elements) {
-            let weighted = *own * g.volume;
-            nodes.iter().for_each(|&node| self.of_nodes[node as usize] += weighted);
+        let mut volume_around = vec![0.0; self.of_nodes.len()];
+        for (tet, (nodes, g)) in self.tets.iter().zip(&self.gradients).enumerate() {
+            if !self.is_of(tet, material) {
+                continue;
+            }
+            let weighted = self.of_elements[tet] * g.volume;
+            for &node in nodes {
+                self.of_nodes[node as usize] += weighted;
+                volume_around[node as usize] += g.volume;
+            }
         }
-        for (strain, volume) in self.of_nodes.iter_mut().zip(&self.volume_around) {
-            if *volume > 0.0 {
-                *strain /= *volume;
+        for (tensor, volume) in self.of_nodes.iter_mut().zip(volume_around) {
+            if volume > 0.0 {
+                *tensor /= volume;
             }
         }
     }
@@ -208,7 +225,20 @@ impl StressRecovery {
             .iter_mut()
             .zip(&self.share_of_stiffest)
             .for_each(|(t, share)| *t *= *share);
-        self.average_at_nodes();
+        self.average_at_nodes(None);
+    }
+
+    /// Shares of the largest shear modulus, one for each material, where there are several; else `None` for all.
+    fn materials_apart(&self) -> Vec<Option<f64>> {
+        let mut shares = self.share_of_stiffest.clone();
+        shares.sort_by(f64::total_cmp);
+        shares.dedup();
+        if shares.is_empty() { vec![None] } else { shares.into_iter().map(Some).collect() }
+    }
+
+    /// Whether an element is of a material; every one is of `None`.
+    fn is_of(&self, tet: usize, material: Option<f64>) -> bool {
+        material.is_none_or(|share| self.share_of_stiffest[tet] == share)
     }
 
     /// The strain that rounding alone can make of these displacements.
