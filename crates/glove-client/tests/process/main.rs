@@ -25,6 +25,7 @@ mod page;
 mod press;
 mod recordings;
 mod references;
+mod regions;
 mod runs;
 mod serial_runs;
 mod start;
