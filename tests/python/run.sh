@@ -34,6 +34,7 @@ bin_dir="$(cd "$BIN_DIR" 2>/dev/null && pwd)" || fail "there is no $BIN_DIR"
 [ -x "$bin_dir/fea-server" ] || fail "there is no $bin_dir/fea-server; build it first"
 
 "$installed" -m pip install -q './clients/python[test]' || fail "the package cannot be installed"
+"$installed" -m pip install -q pyigtl 2>/dev/null || say "skipped: the bridge to OpenIGTLink (no pyigtl)"
 export SOFTGRASP_SERVER="$bin_dir/fea-server" PATH="$bin_dir:$PATH"
 # Nothing is written into the tree.
 export PYTHONDONTWRITEBYTECODE=1 MPLCONFIGDIR="$work" XDG_CACHE_HOME="$work"
