@@ -5,6 +5,17 @@
 //! [`plot`] give it a form, and [`report`] writes it under the head that [`machine`] knows.
 //! A further report is one more file, one more [`ReportName`] and one more arm of [`measure`].
 //! What times nothing is verification and stands in `tests/verification`, in the same form.
+//!
+//! ```
+//! use softgrasp_bench::Report;
+//! use softgrasp_bench::table::Table;
+//!
+//! let mut report = Report::begin("example", "An example", "1", &Default::default());
+//! let mut table = Table::new("example", "One row", &["nodes"]);
+//! table.push([267usize.into()]);
+//! report.table(table);
+//! assert!(report.markdown().contains("| 267 |"));
+//! ```
 
 pub mod axis;
 pub mod collision;

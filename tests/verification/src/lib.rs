@@ -1,7 +1,17 @@
 //! Verification in full, by a command: `cargo run --release --bin softgrasp-verify -- REPORT` writes every error
 //! into `reports/`, in the form of `softgrasp-bench`. Nothing here is timed.
 //!
-//! The short form of each report runs in `cargo test` (`tests/` of this package).
+//! The short form of each report runs in `cargo test` (`tests/` of this package). Machine, table, page and command
+//! line are those of `softgrasp-bench`; a report is one folder here and one [`ReportName`].
+//!
+//! ```no_run
+//! use softgrasp_bench::Options;
+//! use softgrasp_verification::{ReportName, measure};
+//!
+//! let options = Options { is_quick: true, ..Options::default() };
+//! println!("{}", measure(ReportName::Flicker, &options)?.markdown());
+//! # Ok::<(), softgrasp_bench::ReportError>(())
+//! ```
 
 pub mod accuracy;
 pub mod bound;

@@ -107,7 +107,7 @@ impl RunCommand {
         let mut status = StatusLine::start();
         let mut sentences = DeviceSentences::start(status.speaker())
             .context("cannot start a thread beside the ticks")?;
-        let timing = Timing { period: plan.period, ticks_max: self.arguments.frames };
+        let timing = Timing { period: plan.period, ticks_max: self.arguments.ticks };
         // Without a window and a page nobody asks for anything and nobody is told.
         let (controls, to_obey) = channel();
         let (to_tell, notices) = channel();
@@ -151,7 +151,7 @@ impl RunCommand {
             report: self.arguments.report.clone(),
             threads: self.arguments.threads,
             // Whoever looks at the page sees the story again.
-            ends_with_script: self.arguments.frames.is_none()
+            ends_with_script: self.arguments.ticks.is_none()
                 && (page.is_none() || !plan.begins_anew(&self.arguments)),
             squeeze_times: if shown_slowly { 3 } else { 1 },
             joints: page.map(RunPage::joints),

@@ -121,8 +121,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "FACTOR", value_parser = speed, allow_hyphen_values = true)]
     pub(super) speed: Option<f64>,
     /// Ticks to play [default: until the script ends].
-    #[arg(long, visible_alias = "ticks", value_name = "N", value_parser = ticks, allow_hyphen_values = true)]
-    pub(super) frames: Option<u64>,
+    #[arg(long, visible_alias = "frames", value_name = "N", value_parser = ticks, allow_hyphen_values = true)]
+    pub(super) ticks: Option<u64>,
     /// No window.
     #[arg(long)]
     pub(super) headless: bool,
@@ -444,7 +444,7 @@ impl RunPlan {
 
     /// Whether a script begins again after its end; not if the run is recorded or has a number of ticks.
     pub(super) fn begins_anew(&self, arguments: &RunArguments) -> bool {
-        arguments.record.is_none() && arguments.frames.is_none() && self.recording.is_none()
+        arguments.record.is_none() && arguments.ticks.is_none() && self.recording.is_none()
     }
 
     /// Material as the core takes it.

@@ -171,7 +171,7 @@ fn start(
         squeeze_times: SQUEEZE_TIMES,
         joints: page.as_ref().map(RunPage::joints),
     };
-    let timing = Timing { period: plan.period, ticks_max: arguments.frames };
+    let timing = Timing { period: plan.period, ticks_max: arguments.ticks };
     let begins_anew = plan.begins_anew(arguments);
     Start::begin(move |at| {
         let ReadyRun { mut session, host } =
