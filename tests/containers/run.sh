@@ -7,10 +7,8 @@
 #   BIN_DIR=target/debug tests/containers/run.sh     takes programs that are built already
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-
-say() { printf 'containers: %s\n' "$*"; }
-fail() { say "FAILED: $*" >&2; exit 1; }
-skip() { say "skipped: $*"; exit 0; }
+# shellcheck source=tests/script.sh
+source tests/script.sh containers
 
 command -v docker >/dev/null || skip "there is no docker command"
 timeout 20 docker info >/dev/null 2>&1 || skip "no docker engine answers"
@@ -100,16 +98,6 @@ build_images() {
 
 # With -a: newer versions list running containers only.
 container_of() { "${compose[@]}" ps -aq "$1"; }
-
-# Waits until a command succeeds, at most so many seconds.
-wait_until() {
-    local deadline=$((SECONDS + $1))
-    shift
-    until "$@"; do
-        [ "$SECONDS" -lt "$deadline" ] || return 1
-        sleep 0.2
-    done
-}
 
 server_has_sessions() {
     [ "$(docker logs "$(container_of server)" 2>&1 | grep -c 'session begins')" -ge "$1" ]

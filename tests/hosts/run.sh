@@ -7,15 +7,13 @@
 #
 #   BIN_DIR=target/release tests/hosts/run.sh [--table FILE] [--object NAME] [--nodes N]
 #
-# BIN_DIR: programs that are built already (default: target/debug). --table writes the table to a
+# BIN_DIR: programs that are built already. --table writes the table to a
 # file too. What is grasped is a cube of 216 nodes unless the options say otherwise.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+# shellcheck source=tests/script.sh
+source tests/script.sh hosts
 here="$(pwd)/tests/hosts" checks="$(pwd)/tests/operations"
-
-say() { printf 'hosts: %s\n' "$*"; }
-fail() { say "FAILED: $*" >&2; exit 1; }
-skip() { say "skipped: $*"; exit 0; }
 
 object=cube nodes=216 table=""
 while [ $# -gt 0 ]; do
@@ -33,24 +31,15 @@ done
 
 missing() {
     command -v ip >/dev/null || [ -x /usr/sbin/ip ] || { echo "ip (iproute2)"; return; }
-    python3 -c 'import sys; sys.exit(sys.version_info < (3, 8))' 2>/dev/null || echo python3
+    has_python 3.8 || echo python3
 }
 
 [ "$(id -u)" = 0 ] || skip "network namespaces want root"
-if [ -n "$(missing)" ] && command -v apt-get >/dev/null; then
-    {
-        timeout 300 apt-get update &&
-            DEBIAN_FRONTEND=noninteractive timeout 600 \
-                apt-get install -y --no-install-recommends iproute2 python3
-    } >/dev/null 2>&1 </dev/null || true
-fi
+[ -z "$(missing)" ] || install iproute2 python3
 [ -z "$(missing)" ] || skip "$(missing) is not there and could not be installed"
 PATH="$PATH:/usr/sbin"
-bin_dir="$(cd "${BIN_DIR:-target/debug}" 2>/dev/null && pwd)" || fail "there is no ${BIN_DIR:-target/debug}"
+take_programs fea-server glove-client
 server_program="$bin_dir/fea-server" client_program="$bin_dir/glove-client"
-for program in "$server_program" "$client_program"; do
-    [ -x "$program" ] || fail "there is no $program; build it first (cargo build --bins)"
-done
 
 # -- The hosts, the processes, and how everything ends
 

@@ -4,36 +4,25 @@
 # all; health and metrics. Ends with 0 when everything holds, and with 0 and one line where a part
 # is missing and cannot be installed.
 #
-#   BIN_DIR=target/release tests/operations/run.sh     takes programs that are built (default: target/debug)
+#   BIN_DIR=target/release tests/operations/run.sh     takes programs that are built already
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+# shellcheck source=tests/script.sh
+source tests/script.sh operations
 here="$(pwd)/tests/operations"
-
-say() { printf 'operations: %s\n' "$*"; }
-fail() { say "FAILED: $*" >&2; exit 1; }
-skip() { say "skipped: $*"; exit 0; }
 
 # -- What it needs
 
 missing() {
     command -v haproxy >/dev/null || [ -x /usr/sbin/haproxy ] || { echo haproxy; return; }
-    python3 -c 'import sys; sys.exit(sys.version_info < (3, 8))' 2>/dev/null || echo python3
+    has_python 3.8 || echo python3
 }
 
-if [ -n "$(missing)" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-    {
-        timeout 300 apt-get update &&
-            DEBIAN_FRONTEND=noninteractive timeout 600 \
-                apt-get install -y --no-install-recommends haproxy python3
-    } >/dev/null 2>&1 </dev/null || true
-fi
+[ -z "$(missing)" ] || install haproxy python3
 [ -z "$(missing)" ] || skip "$(missing) is not there and could not be installed"
 PATH="$PATH:/usr/sbin"
-bin_dir="$(cd "${BIN_DIR:-target/debug}" 2>/dev/null && pwd)" || fail "there is no ${BIN_DIR:-target/debug}"
+take_programs fea-server glove-client
 server_program="$bin_dir/fea-server" client_program="$bin_dir/glove-client"
-for program in "$server_program" "$client_program"; do
-    [ -x "$program" ] || fail "there is no $program; build it first (cargo build --bins)"
-done
 
 # -- The folder, the processes, and how everything ends
 
@@ -61,16 +50,6 @@ show_logs() {
         [ -e "$file" ] || continue
         say "the end of ${file##*/}:"
         tail -n 6 "$file"
-    done
-}
-
-# Waits until a command succeeds, at most so many seconds.
-wait_until() {
-    local deadline=$((SECONDS + $1))
-    shift
-    until "$@"; do
-        [ "$SECONDS" -lt "$deadline" ] || return 1
-        sleep 0.05
     done
 }
 

@@ -8,10 +8,8 @@
 #   PYTHON=python3.12 tests/python/run.sh          takes another Python
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-
-say() { printf 'python: %s\n' "$*"; }
-fail() { say "FAILED: $*" >&2; exit 1; }
-skip() { say "skipped: $*"; exit 0; }
+# shellcheck source=tests/script.sh
+source tests/script.sh python
 
 python="${PYTHON:-python3}"
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null ||
@@ -26,12 +24,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1
 timeout 120 "$installed" -m pip install -q --retries 1 --timeout 15 hatchling 2>/dev/null ||
     skip "no packages can be installed here (no index of packages, or no way to it)"
 
-if [ -z "${BIN_DIR:-}" ]; then
-    cargo build --workspace --locked --bin fea-server
-    BIN_DIR="${CARGO_TARGET_DIR:-target}/debug"
-fi
-bin_dir="$(cd "$BIN_DIR" 2>/dev/null && pwd)" || fail "there is no $BIN_DIR"
-[ -x "$bin_dir/fea-server" ] || fail "there is no $bin_dir/fea-server; build it first"
+take_programs fea-server
 
 "$installed" -m pip install -q './clients/python[test]' || fail "the package cannot be installed"
 "$installed" -m pip install -q pyigtl 2>/dev/null || say "skipped: the bridge to OpenIGTLink (no pyigtl)"

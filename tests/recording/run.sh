@@ -7,25 +7,18 @@
 #   BIN_DIR=target/release tests/recording/run.sh     takes a client that is built already
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+# shellcheck source=tests/script.sh
+source tests/script.sh recording
 
-say() { printf 'recording: %s\n' "$*"; }
-
-if ! python3 -c 'import sys; sys.exit(sys.version_info < (3, 9))' 2>/dev/null; then
-    say "skipped: there is no python3 (3.9 or later)"
-    exit 0
-fi
+has_python 3.9 || skip "there is no python3 (3.9 or later)"
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
 if ! python3 -m venv "$work/venv" >/dev/null 2>&1 ||
     ! "$work/venv/bin/pip" install --quiet --disable-pip-version-check mcap jsonschema 2>/dev/null; then
-    say "skipped: mcap and jsonschema cannot be installed from PyPI"
-    exit 0
+    skip "mcap and jsonschema cannot be installed from PyPI"
 fi
-if [ -z "${BIN_DIR:-}" ]; then
-    cargo build --workspace --locked --bin glove-client
-    BIN_DIR="${CARGO_TARGET_DIR:-target}/debug"
-fi
-client="$BIN_DIR/glove-client"
+take_programs glove-client
+client="$bin_dir/glove-client"
 "$client" run --headless --hand scripted:squeeze --object cube --nodes 64 --record "$work/squeeze.mcap" \
     >/dev/null
 "$work/venv/bin/python" tests/recording/check.py "$work/squeeze.mcap" "$work"

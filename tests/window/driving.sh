@@ -2,8 +2,8 @@
 # To be sourced with bash, in the root of the repository, under `set -euo pipefail`.
 
 here=$(pwd)
-
-say() { printf 'window: %s\n' "$*"; }
+# shellcheck source=tests/script.sh
+source tests/script.sh window
 
 # -- What it needs
 
@@ -19,24 +19,11 @@ missing() {
         compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null || echo "a Vulkan driver"
 }
 
-if [ -n "$(missing)" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-    say "installing ${packages[*]}"
-    {
-        timeout 300 apt-get update &&
-            DEBIAN_FRONTEND=noninteractive timeout 600 \
-                apt-get install -y --no-install-recommends "${packages[@]}"
-    } >/dev/null 2>&1 </dev/null || true
-fi
-if [ -n "$(missing)" ]; then
-    say "skipped: $(missing) is not there and could not be installed (Debian: apt-get install ${packages[*]})"
-    exit 0
-fi
-bin_dir="${BIN_DIR:-target/debug}"
-client="$(cd "$bin_dir" 2>/dev/null && pwd)/glove-client"
-if [ ! -x "$client" ]; then
-    say "there is no glove-client in $bin_dir; build it first (cargo build --bin glove-client)"
-    exit 1
-fi
+[ -z "$(missing)" ] || install "${packages[@]}"
+[ -z "$(missing)" ] ||
+    skip "$(missing) is not there and could not be installed (Debian: apt-get install ${packages[*]})"
+take_programs glove-client
+client="$bin_dir/glove-client"
 
 # -- The folder, the display, and how everything ends
 

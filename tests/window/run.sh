@@ -5,7 +5,7 @@
 # (Xvfb), and the processor draws it. Ends with 0 when everything holds, and with 0 and one line
 # where a part is missing and cannot be installed.
 #
-#   BIN_DIR=target/debug tests/window/run.sh     takes a client that is built already (the default)
+#   BIN_DIR=target/debug tests/window/run.sh     takes a client that is built already
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 # shellcheck source=tests/window/driving.sh

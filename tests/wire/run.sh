@@ -6,16 +6,10 @@
 #   BIN_DIR=target/release tests/wire/run.sh     takes a server that is built already
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+# shellcheck source=tests/script.sh
+source tests/script.sh wire
 
-say() { printf 'wire: %s\n' "$*"; }
-
-if ! python3 -c 'import sys; sys.exit(sys.version_info < (3, 8))' 2>/dev/null; then
-    say "skipped: there is no python3 (3.8 or later)"
-    exit 0
-fi
-if [ -z "${BIN_DIR:-}" ]; then
-    cargo build --workspace --locked --bin fea-server
-    BIN_DIR="${CARGO_TARGET_DIR:-target}/debug"
-fi
-python3 -I -S tests/wire/run.py "$BIN_DIR/fea-server" docs/wire.md
+has_python 3.8 || skip "there is no python3 (3.8 or later)"
+take_programs fea-server
+python3 -I -S tests/wire/run.py "$bin_dir/fea-server" docs/wire.md
 say "passed"

@@ -15,7 +15,7 @@ fn negative_and_impossible_numbers_are_refused_by_name_and_not_taken_for_options
         (RUN, "--rate", &["-100", "0", "inf"]),
         (RUN, "--object-size", &["-0.1", "0"]),
         (RUN, "--threads", &["-1", "0"]),
-        (RUN, "--frames", &["-1", "many"]),
+        (RUN, "--ticks", &["-1", "many"]),
         (SOLVE, "--young", &["-1", "0"]),
         (SOLVE, "--poisson", &["0.5", "-1"]),
         (SOLVE, "--threads", &["-1", "0"]),

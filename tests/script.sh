@@ -1,0 +1,50 @@
+# What the scripts of tests share: their words, packages of Debian, and the programs that they run.
+# To be sourced with bash, in the root of the repository, under `set -euo pipefail`, with the name that
+# the script says its lines under: `source tests/script.sh xr`.
+
+script_name=$1
+
+say() { printf '%s: %s\n' "$script_name" "$*"; }
+fail() { say "FAILED: $*" >&2; exit 1; }
+skip() { say "skipped: $*"; exit 0; }
+
+# has_python MAJOR.MINOR: whether there is a python3 of this version or a later one.
+has_python() {
+    python3 -c "import sys; sys.exit(sys.version_info < (${1/./, }))" 2>/dev/null
+}
+
+# install PACKAGE…: from Debian's packages, where that is permitted. Who calls looks afterwards.
+install() {
+    [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null || return 0
+    say "installing $*"
+    {
+        timeout 300 apt-get update &&
+            DEBIAN_FRONTEND=noninteractive timeout 600 \
+                apt-get install -y --no-install-recommends "$@"
+    } >/dev/null 2>&1 </dev/null || true
+}
+
+# take_programs PROGRAM…: those in BIN_DIR, or else built now; `bin_dir` is where they are.
+take_programs() {
+    local program
+    if [ -z "${BIN_DIR:-}" ]; then
+        # shellcheck disable=SC2046  # an option and a word for each program
+        cargo build --workspace --locked $(printf -- '--bin %s ' "$@")
+        BIN_DIR="${CARGO_TARGET_DIR:-target}/debug"
+    fi
+    bin_dir="$(cd "$BIN_DIR" 2>/dev/null && pwd)" || fail "there is no $BIN_DIR"
+    for program in "$@"; do
+        [ -x "$bin_dir/$program" ] ||
+            fail "there is no $bin_dir/$program; build it first (cargo build --bin $program)"
+    done
+}
+
+# wait_until SECONDS COMMAND…: until the command succeeds, at most so long.
+wait_until() {
+    local deadline=$((SECONDS + $1))
+    shift
+    until "$@"; do
+        [ "$SECONDS" -lt "$deadline" ] || return 1
+        sleep 0.05
+    done
+}
