@@ -38,6 +38,7 @@ mod run_page;
 #[cfg_attr(not(feature = "window"), path = "no_pictures.rs")]
 mod run_pictures;
 mod run_recording;
+mod run_series;
 mod run_setup;
 #[cfg(feature = "window")]
 mod run_window;

@@ -24,6 +24,7 @@ use crate::object::file_writing::write_file;
 use crate::object::object_file::{ObjectFile, read_object_file};
 use crate::object::region_choice::regions_of;
 use crate::object::scene::NODES_DEFAULT;
+use crate::object::series::Series;
 use crate::press::bodies_file::{PressBodies, read_bodies};
 use crate::press::course::{Course, Step};
 use crate::press::report::{PressReport, StepReport};
@@ -149,7 +150,8 @@ impl PressCommand {
             progress.now(&format!("{:.3} of {:.3} s", step.time, bodies.end));
             steps.push(StepReport::new(&step, &names));
             if let Some(series) = &mut series {
-                series.add(&mesh, &step)?;
+                let path = series.add(step.time);
+                write_file(&path, &encode(&path, &mesh, &step)?)?;
             }
             last = Some(step);
             Ok(())
@@ -304,40 +306,4 @@ fn encode(path: &Path, mesh: &TetMesh, step: &Step) -> anyhow::Result<Vec<u8>> {
     let fields = step.answer.answer.fields.first().cloned();
     let fields = fields.map(|fields| in_world(fields, &turn));
     encode_fields(mesh, &[], &vectors, fields.as_ref()).context("cannot form the VTU file")
-}
-
-/// Files of all steps, and the file that lists them with their times.
-struct Series {
-    folder: PathBuf,
-    entries: String,
-    count: usize,
-}
-
-impl Series {
-    fn create(folder: &Path) -> anyhow::Result<Self> {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        Ok(Self { folder: folder.to_owned(), entries: String::new(), count: 0 })
-    }
-
-    fn add(&mut self, mesh: &TetMesh, step: &Step) -> anyhow::Result<()> {
-        self.count += 1;
-        let name = format!("step_{:05}.vtu", self.count);
-        let path = self.folder.join(&name);
-        write_file(&path, &encode(&path, mesh, step)?)?;
-        self.entries.push_str(&format!(
-            "    <DataSet timestep=\"{}\" part=\"0\" file=\"{name}\"/>\n",
-            step.time
-        ));
-        Ok(())
-    }
-
-    fn finish(self) -> anyhow::Result<()> {
-        let text = format!(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" \
-             byte_order=\"LittleEndian\">\n  <Collection>\n{}  </Collection>\n</VTKFile>\n",
-            self.entries
-        );
-        Ok(write_file(&self.folder.join("series.pvd"), text.as_bytes())?)
-    }
 }

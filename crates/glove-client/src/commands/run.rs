@@ -11,6 +11,7 @@ use super::key_frames::KeyFrames;
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_page::{PageTalk, RunPage};
 use super::run_pictures::RunPictures;
+use super::run_series::RunSeries;
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 #[cfg(feature = "window")]
 use super::run_window;
@@ -98,6 +99,9 @@ impl RunCommand {
             Ok(())
         })?;
         drop(progress);
+        let series = self.arguments.series.as_deref();
+        let mut series =
+            series.map(|folder| RunSeries::start(folder, plan.tick_s())).transpose()?;
         let mut session = session;
         session.apply(Control::SetForces(pictures.is_some()));
         if plan.pace == Pace::Lockstep {
@@ -126,6 +130,9 @@ impl RunCommand {
             if let Some(pictures) = &mut pictures {
                 pictures.add(due, now_s, outcome, session)?;
             }
+            if let Some(series) = &mut series {
+                series.add(due.tick, session.grasp_loop())?;
+            }
             match &mut key_frames {
                 Some(frames) => frames.add(due.tick, outcome, session.grasp_loop().object()),
                 None => Ok(()),
@@ -136,6 +143,9 @@ impl RunCommand {
         drop((page, controls));
         if let Some(key_frames) = key_frames {
             key_frames.finish()?;
+        }
+        if let Some(series) = series {
+            series.finish()?;
         }
         if let Some(pictures) = pictures {
             pictures.finish()?;

@@ -134,6 +134,10 @@ pub struct RunArguments {
     /// Folder for the deformed object at key frames (VTU).
     #[arg(long, value_name = "D")]
     pub(super) out_dir: Option<PathBuf>,
+    /// Folder for the object at every tick, as VTU files where it is in the world and a PVD file that ParaView
+    /// plays; without a window.
+    #[arg(long, value_name = "DIR")]
+    pub(super) series: Option<PathBuf>,
     /// Records the run: device bytes, poses, contacts, requests, answers (MCAP).
     #[arg(long, value_name = "F.mcap")]
     pub(super) record: Option<PathBuf>,
@@ -225,12 +229,17 @@ const PERIOD_MAX_S: f64 = 3600.0;
 impl RunArguments {
     /// Whether the run is played without a window, because pictures are drawn tick by tick.
     pub(super) fn is_without_window(&self) -> bool {
-        self.headless || self.shown.wants_pictures()
+        self.headless || self.series.is_some() || self.shown.wants_pictures()
     }
 
     /// Whether a person watches: on a terminal beside the window, or on the page.
     fn is_watched(&self) -> bool {
         (console_is_watched() && !self.is_without_window()) || self.page.xr.is_some()
+    }
+
+    /// Whether something that is written or shown needs the nodes inside the object.
+    fn needs_whole(&self) -> bool {
+        self.out_dir.is_some() || self.series.is_some() || self.shown.needs_inside()
     }
 
     /// Object that was named, with or without `--object`.
@@ -295,9 +304,9 @@ impl RunArguments {
                 element: chosen_element(element, largest)?,
                 method,
                 contact: rule.contact,
-                subscription: match (&self.out_dir, self.shown.needs_inside()) {
-                    (None, false) => Subscription::Surface,
-                    (Some(_), _) | (_, true) => Subscription::Whole,
+                subscription: match self.needs_whole() {
+                    false => Subscription::Surface,
+                    true => Subscription::Whole,
                 },
                 elasticity,
                 max_error: self.max_error,

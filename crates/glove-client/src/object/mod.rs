@@ -10,4 +10,5 @@ pub mod object_work;
 pub mod region_choice;
 pub mod saving;
 pub mod scene;
+pub mod series;
 pub mod shape_history;

@@ -74,3 +74,25 @@ fn thesis_and_contact_do_not_mix_and_it_is_said_why() {
     let said = fail(1, &["run", "--headless", "--grasp", "thesis", "--hand", "scripted:lift"]);
     assert!(said.contains("--grasp contact"), "{said}");
 }
+
+#[test]
+fn series_of_a_run_has_every_tick_with_its_time_and_the_object_where_it_was_lifted_to() {
+    let folder = Folder::new();
+    let series = folder.path("series");
+    let fixed = ["run", "--object", "sphere", "--nodes", "200", "--hand", "scripted:lift"];
+    succeed(&[&fixed[..], &["--rate", "60", "--ticks", "240", "--series", &series]].concat());
+    let list = folder.read("series/series.pvd");
+    let files: Vec<&str> = list.lines().filter(|line| line.contains("<DataSet")).collect();
+    assert!(!files.is_empty() && files.len() <= 240, "{}", files.len());
+    let time = |line: &str| -> f64 {
+        line.split("timestep=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+    };
+    assert!(files.is_sorted_by(|a, b| time(a) < time(b)), "{list}");
+    for line in files {
+        let name = line.split("file=\"").nth(1).unwrap().split('"').next().unwrap();
+        let text = folder.read(&format!("series/{name}"));
+        for array in ["Name=\"displacement\"", "Name=\"elastic_displacement\""] {
+            assert!(text.contains(array), "{name} has no {array}");
+        }
+    }
+}
