@@ -76,14 +76,14 @@ fn thesis_and_contact_do_not_mix_and_it_is_said_why() {
 }
 
 #[test]
-fn series_of_a_run_has_every_tick_with_its_time_and_the_object_where_it_was_lifted_to() {
+fn series_of_a_run_has_every_tick_with_its_time() {
     let folder = Folder::new();
     let series = folder.path("series");
     let fixed = ["run", "--object", "sphere", "--nodes", "200", "--hand", "scripted:lift"];
-    succeed(&[&fixed[..], &["--rate", "60", "--ticks", "240", "--series", &series]].concat());
+    succeed(&[&fixed[..], &["--ticks", "100", "--series", &series]].concat());
     let list = folder.read("series/series.pvd");
     let files: Vec<&str> = list.lines().filter(|line| line.contains("<DataSet")).collect();
-    assert!(!files.is_empty() && files.len() <= 240, "{}", files.len());
+    assert_eq!(files.len(), 100);
     let time = |line: &str| -> f64 {
         line.split("timestep=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
     };
