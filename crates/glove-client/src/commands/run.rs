@@ -18,12 +18,51 @@ use super::run_window;
 use super::tell_report::tell;
 use crate::commands::interruption;
 use crate::commands::output::Progress;
-use crate::pace::Pace;
+use crate::pace::{Due, Pace};
 use crate::run::run_report::RunReport;
+use crate::run::session::Session;
 use crate::run::status_line::StatusLine;
 use crate::run::tick_loop::{TickLoop, Timing};
+use crate::run::tick_outcome::TickOutcome;
 use softgrasp_hand::hand_request::HandRequest;
 use softgrasp_window::view::control::Control;
+
+/// Files that a run without a window writes beside its ticks.
+struct RunFiles {
+    key_frames: Option<KeyFrames>,
+    series: Option<RunSeries>,
+    pictures: Option<RunPictures>,
+}
+
+impl RunFiles {
+    /// Adds what is wanted of a tick.
+    fn add(
+        &mut self,
+        due: Due,
+        now_s: f64,
+        outcome: &TickOutcome,
+        session: &Session,
+    ) -> anyhow::Result<()> {
+        if let Some(pictures) = &mut self.pictures {
+            pictures.add(due, now_s, outcome, session)?;
+        }
+        if let Some(series) = &mut self.series {
+            series.add(due.tick, session.grasp_loop())?;
+        }
+        match &mut self.key_frames {
+            Some(frames) => frames.add(due.tick, outcome, session.grasp_loop().object()),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits until all files are written.
+    fn finish(self) -> anyhow::Result<()> {
+        let Self { key_frames, series, pictures } = self;
+        key_frames.map_or(Ok(()), KeyFrames::finish)?;
+        series.map_or(Ok(()), RunSeries::finish)?;
+        pictures.map_or(Ok(()), RunPictures::finish)
+    }
+}
 
 /// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
 #[derive(Args, Default)]
@@ -84,7 +123,7 @@ impl RunCommand {
                    take --hand scripted"
             );
         }
-        let mut pictures = RunPictures::start(&self.arguments, plan)?;
+        let pictures = RunPictures::start(&self.arguments, plan)?;
         let progress = Progress::start("preparing the object");
         let setup = self.setup(plan, page.as_ref());
         let at = |stage| match stage {
@@ -100,10 +139,10 @@ impl RunCommand {
         })?;
         drop(progress);
         let series = self.arguments.series.as_deref();
-        let mut series =
-            series.map(|folder| RunSeries::start(folder, plan.tick_s())).transpose()?;
+        let series = series.map(|folder| RunSeries::start(folder, plan.tick_s())).transpose()?;
         let mut session = session;
         session.apply(Control::SetForces(pictures.is_some()));
+        let mut files = RunFiles { key_frames, series, pictures };
         if plan.pace == Pace::Lockstep {
             // From the first tick on the server is there, so that every run tells the same story.
             session.wait_idle(START_WAIT_MAX);
@@ -127,29 +166,12 @@ impl RunCommand {
             if let Some(page) = &mut page {
                 page.add(due, now_s, outcome, session);
             }
-            if let Some(pictures) = &mut pictures {
-                pictures.add(due, now_s, outcome, session)?;
-            }
-            if let Some(series) = &mut series {
-                series.add(due.tick, session.grasp_loop())?;
-            }
-            match &mut key_frames {
-                Some(frames) => frames.add(due.tick, outcome, session.grasp_loop().object()),
-                None => Ok(()),
-            }
+            files.add(due, now_s, outcome, session)
         })?;
         drop(sentences);
         drop(status);
         drop((page, controls));
-        if let Some(key_frames) = key_frames {
-            key_frames.finish()?;
-        }
-        if let Some(series) = series {
-            series.finish()?;
-        }
-        if let Some(pictures) = pictures {
-            pictures.finish()?;
-        }
+        files.finish()?;
         Ok(session.finish(interrupted)?)
     }
 
