@@ -2,9 +2,8 @@
 
     python gradient.py
 
-The derivative of a quantity J(u) by prescribed displacements and forces is one more linear solve
-with the same stiffness: the gradient of J is the load, what is known is held at zero, and the
-reactions are the answer (K is symmetric). Where torch is installed (`softgrasp[torch]`), a function
+The derivative of a quantity J(u) is one more linear solve with the same stiffness
+(`KeptModel.gradient`). Where torch is installed (`softgrasp[torch]`), a function
 of autograd does it, and an optimiser of torch finds the displacements; without it numpy does.
 """
 
@@ -26,10 +25,6 @@ class Elastic:
 
     def __init__(self, kept: softgrasp.KeptModel, case: LoadCase) -> None:
         self.kept, self.case = kept, case
-        held = np.union1d(case.known_dofs, kept.fixed_dofs)
-        # The free degrees of freedom of nodes that a tetrahedron uses.
-        used = 3 * np.unique(kept.model.mesh.tets)[:, None] + np.arange(3)
-        self.free = np.setdiff1d(used, held).astype(np.uint32)
 
     def displacements(self, known: np.ndarray) -> np.ndarray:
         """Displacements of all nodes for the known ones, m; shape (nodes, 3)."""
@@ -38,11 +33,8 @@ class Elastic:
 
     def gradient(self, by_displacements: np.ndarray) -> np.ndarray:
         """dJ by each known displacement, from dJ by each displacement (nodes, 3)."""
-        load = np.ascontiguousarray(by_displacements, dtype=float).reshape(-1)
-        dofs = self.case.known_dofs
-        adjoint = LoadCase(dofs, np.zeros(len(dofs)), self.free, load[self.free])
-        reactions = self.kept.frame(adjoint, nodes=[]).reactions
-        return load[dofs] - reactions.forces[np.searchsorted(reactions.dofs, dofs)]
+        found = self.kept.gradient(self.case, by_displacements=by_displacements)
+        return found.known_displacements
 
 
 def wanted_shape(mesh: softgrasp.Mesh) -> np.ndarray:

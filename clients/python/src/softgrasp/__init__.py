@@ -44,6 +44,7 @@ from .errors import (
     UnsupportedVersion,
 )
 from .field_values import FieldName, FieldValues, PlacedFields, WantedFields, matrices
+from .gradient import Gradient
 from .large import LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
@@ -80,6 +81,7 @@ __all__ = [
     "Element",
     "FieldName",
     "FieldValues",
+    "Gradient",
     "InternalFault",
     "KeptModel",
     "LargeAnswer",

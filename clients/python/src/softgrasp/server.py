@@ -18,6 +18,7 @@ from .connection import Connection
 from .contact import ContactAnswer, ContactStep, ObjectState
 from .errors import UnknownModel
 from .field_values import WantedFields
+from .gradient import Gradient, gradient
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
@@ -227,6 +228,23 @@ class KeptModel(NamedModel):
         """
         call = calls.solve_several(self.hash, case, displacements, True, Question(**options))
         return self._ask(call)
+
+    def gradient(
+        self,
+        case: LoadCase,
+        *,
+        by_displacements: ArrayLike | None = None,
+        by_reactions: ArrayLike | None = None,
+        answer: Answer | None = None,
+    ) -> Gradient:
+        """Derivatives of a quantity J at a load case, by one more solve with the same factor.
+
+        J is told by its own derivatives there: `by_displacements` by each displacement (nodes, 3),
+        `by_reactions` by the reaction at each known degree of freedom of the case, in its order. `answer`
+        is that to the case, of all nodes; without it the case is asked once more. Linear elasticity;
+        by places of nodes and materials with `t4` only. `ValueError` for masks and other shapes.
+        """
+        return gradient(self, case, by_displacements, by_reactions, answer)
 
     def contact_frame(
         self,
