@@ -1,9 +1,10 @@
 //! Page of a run: opened before the run, shown every tick that is due, closed after it.
 
+use std::net::IpAddr;
 use std::sync::mpsc::{Receiver, Sender};
 
 use anyhow::Context;
-use fea_server::Encryption;
+use fea_server::{Encryption, EncryptionError};
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::joints::JointsFeed;
@@ -15,6 +16,7 @@ use softgrasp_window::view::object_skin::Look;
 use softgrasp_window::view::outlet::Outlet;
 use softgrasp_xr::{Page, PageOptions, ShownRun};
 
+use super::page_arguments::PageArguments;
 use super::run_arguments::{RunArguments, RunPlan};
 use super::run_setup::load_beside;
 use crate::pace::Due;
@@ -48,14 +50,8 @@ impl RunPage {
     pub(super) fn open(arguments: &RunArguments, plan: &RunPlan) -> anyhow::Result<Option<Self>> {
         let Some(address) = arguments.page.xr else { return Ok(None) };
         let page = &arguments.page;
-        let encryption = match (&page.xr_cert, &page.xr_key, page.xr_tls) {
-            (Some(certificate), Some(key), _) => Some(Encryption::read(certificate, key)?),
-            (_, _, true) => {
-                let names = ["localhost", "127.0.0.1", &address.ip().to_string()];
-                Some(Encryption::self_made(&names.map(str::to_owned))?)
-            }
-            _ => None,
-        };
+        let encryption =
+            encryption_of(page, address.ip()).context("the page cannot be encrypted")?;
         let encryption = encryption.map(|encryption| encryption.acceptor());
         let is_encrypted = encryption.is_some();
         let takes_hands = plan.takes_headset();
@@ -133,5 +129,17 @@ impl Drop for RunPage {
                 took.pictures, took.p50_ms, took.p99_ms
             );
         }
+    }
+}
+
+/// What the page is encrypted with: the pair of files, one that is made now, or nothing.
+fn encryption_of(page: &PageArguments, ip: IpAddr) -> Result<Option<Encryption>, EncryptionError> {
+    match (&page.xr_cert, &page.xr_key, page.xr_tls) {
+        (Some(certificate), Some(key), _) => Encryption::read(certificate, key).map(Some),
+        (_, _, true) => {
+            let names = ["localhost", "127.0.0.1", &ip.to_string()];
+            Encryption::self_made(&names.map(str::to_owned)).map(Some)
+        }
+        _ => Ok(None),
     }
 }

@@ -293,5 +293,8 @@ fn page_that_cannot_be_served_is_one_sentence() {
     assert!(said.contains("give it an address by --xr"), "{said}");
     let files = ["--xr", "127.0.0.1:0", "--xr-cert", "none.pem", "--xr-key", "none.pem"];
     let said = fail(1, &run(&files));
-    assert!(said.contains("certificate none.pem of the page cannot be used"), "{said}");
+    assert!(
+        said.contains("the page cannot be encrypted: certificate none.pem cannot be used"),
+        "{said}"
+    );
 }
