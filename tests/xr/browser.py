@@ -13,7 +13,7 @@ PATIENCE_S = 180
 class Browser:
     """One page in one browser."""
 
-    def __init__(self, program, folder, size=(1280, 800)):
+    def __init__(self, program, folder, size=(1280, 800), pixel_ratio=1):
         to_browser, self._write = os.pipe()
         self._read, from_browser = os.pipe()
 
@@ -43,7 +43,7 @@ class Browser:
         for domain in ("Page", "Runtime"):
             self.ask(f"{domain}.enable")
         self.ask("Emulation.setDeviceMetricsOverride", {
-            "width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False})
+            "width": size[0], "height": size[1], "deviceScaleFactor": pixel_ratio, "mobile": False})
 
     def _message(self, until):
         while b"\0" not in self._rest:
