@@ -102,16 +102,6 @@ make_hosts() {
     ip -n "$name-server" address add "$server_host/24" dev wire
 }
 
-# Waits until a command succeeds, at most so many seconds.
-wait_until() {
-    local deadline=$((SECONDS + $1))
-    shift
-    until "$@"; do
-        [ "$SECONDS" -lt "$deadline" ] || return 1
-        sleep 0.05
-    done
-}
-
 has_ended() { [[ "$(ps -o stat= -p "$1" 2>/dev/null)" =~ ^(Z|$) ]]; }
 
 # The exit code of a process of ours, which must end within so many seconds.

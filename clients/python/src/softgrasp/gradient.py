@@ -10,19 +10,16 @@ for a number p of a material or the place of a node: of linear tetrahedra âˆ‚K/â
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .answer import Answer
 from .arrays import F64, U32, Floats, Numbers
 from .load_case import LoadCase
 from .model import Material, Model
-
-if TYPE_CHECKING:
-    from .answer import Answer
-    from .server import KeptModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,34 +39,35 @@ class Gradient:
 
 
 def gradient(
-    kept: KeptModel,
+    model: Model,
+    fixed_dofs: Numbers,
+    ask: Callable[[LoadCase], Answer],
     case: LoadCase,
     by_displacements: ArrayLike | None,
     by_reactions: ArrayLike | None,
     answer: Answer | None,
 ) -> Gradient:
-    """The derivatives at a load case; see `KeptModel.gradient`."""
+    """The derivatives at a load case; see `KeptModel.gradient`. `ask` solves a load case of the model, whose
+    `fixed_dofs` stay at zero."""
     if case.masks:
         raise ValueError("there is no gradient for load cases with masks")
-    nodes, dofs = kept.model.mesh.node_count, case.known_dofs
+    nodes, dofs = model.mesh.node_count, case.known_dofs
     slope = _shaped(by_displacements, (nodes, 3), "by_displacements").reshape(-1)
     of_reactions = _shaped(by_reactions, (len(dofs),), "by_reactions")
-    held = np.union1d(dofs, kept.fixed_dofs)
-    used = 3 * np.unique(kept.model.mesh.tets)[:, None] + np.arange(3)
+    held = np.union1d(dofs, fixed_dofs)
+    used = 3 * np.unique(model.mesh.tets)[:, None] + np.arange(3)
     free = np.setdiff1d(used, held).astype(U32)
-    adjoint = kept.frame(LoadCase(dofs, -of_reactions, free, slope[free]))
+    adjoint = ask(LoadCase(dofs, -of_reactions, free, slope[free]))
     of_adjoint = adjoint.reactions
-    holding = of_adjoint.forces[np.searchsorted(of_adjoint.dofs, dofs)] if len(dofs) else dofs
+    holding = of_adjoint.forces[np.searchsorted(of_adjoint.dofs, dofs)]
     forces = np.array(adjoint.displacements, dtype=F64)
     forces.reshape(-1)[held] = 0.0
     points, young, poisson = None, None, None
-    if kept.model.kept_element == "t4":
-        solved = kept.frame(case) if answer is None else answer
+    if model.kept_element == "t4":
+        solved = ask(case) if answer is None else answer
         if solved.nodes is not None:
             raise ValueError("the answer must have the displacements of all nodes")
-        points, young, poisson = _by_elements(
-            kept.model, solved.displacements, adjoint.displacements
-        )
+        points, young, poisson = _by_elements(model, solved.displacements, adjoint.displacements)
     return Gradient(slope[dofs] - holding, forces, points, young, poisson)
 
 

@@ -244,7 +244,9 @@ class KeptModel(NamedModel):
         is that to the case, of all nodes; without it the case is asked once more. Linear elasticity;
         by places of nodes and materials with `t4` only. `ValueError` for masks and other shapes.
         """
-        return gradient(self, case, by_displacements, by_reactions, answer)
+        return gradient(
+            self.model, self.fixed_dofs, self.frame, case, by_displacements, by_reactions, answer
+        )
 
     def contact_frame(
         self,
