@@ -15,6 +15,7 @@
 
 pub mod accuracy;
 pub mod bound;
+mod bricks;
 pub mod flicker;
 pub mod hard_cases;
 

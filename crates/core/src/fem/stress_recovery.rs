@@ -72,12 +72,8 @@ impl StressRecovery {
         let tets = mesh.tets().to_vec();
         let gradients: Vec<Gradients> =
             (0..tets.len()).map(|tet| tet4::gradients(&mesh.corners(tet))).collect();
-        let mut volume_around = vec![0.0; mesh.node_count()];
-        for (nodes, g) in tets.iter().zip(&gradients) {
-            nodes.iter().for_each(|&node| volume_around[node as usize] += g.volume);
-        }
         let norms = gradients.iter().flat_map(|g| &g.of_shape).map(Vector3::norm);
-        Self {
+        let mut made = Self {
             shear_modulus,
             share_of_stiffest,
             steepest: norms.fold(0.0, f64::max),
@@ -85,8 +81,10 @@ impl StressRecovery {
             of_nodes: vec![Tensor::zeros(); mesh.node_count()],
             tets,
             gradients,
-            volume_around,
-        }
+            volume_around: Vec::new(),
+        };
+        made.volume_around = made.volumes_around(None);
+        made
     }
 
     /// Largest absolute principal strain of each node.
@@ -197,22 +195,35 @@ impl StressRecovery {
     /// Averages the tensors of the elements, of all of them or of one material, at the nodes, weighed by volume.
     fn average_at_nodes(&mut self, material: Option<f64>) {
         self.of_nodes.fill(Tensor::zeros());
-        let mut volume_around = vec![0.0; self.of_nodes.len()];
         for (tet, (nodes, g)) in self.tets.iter().zip(&self.gradients).enumerate() {
-            if !self.is_of(tet, material) {
-                continue;
-            }
-            let weighted = self.of_elements[tet] * g.volume;
-            for &node in nodes {
-                self.of_nodes[node as usize] += weighted;
-                volume_around[node as usize] += g.volume;
+            if self.is_of(tet, material) {
+                let weighted = self.of_elements[tet] * g.volume;
+                nodes.iter().for_each(|&node| self.of_nodes[node as usize] += weighted);
             }
         }
-        for (tensor, volume) in self.of_nodes.iter_mut().zip(volume_around) {
-            if volume > 0.0 {
-                *tensor /= volume;
+        let of_material;
+        let volumes = match material {
+            None => &self.volume_around,
+            Some(_) => {
+                of_material = self.volumes_around(material);
+                &of_material
+            }
+        };
+        for (tensor, volume) in self.of_nodes.iter_mut().zip(volumes) {
+            if *volume > 0.0 {
+                *tensor /= *volume;
             }
         }
+    }
+
+    /// Volume of the elements around each node, of all of them or of one material, m³.
+    fn volumes_around(&self, material: Option<f64>) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.of_nodes.len()];
+        let elements = self.tets.iter().zip(&self.gradients).enumerate();
+        for (_, (nodes, g)) in elements.filter(|(tet, _)| self.is_of(*tet, material)) {
+            nodes.iter().for_each(|&node| volumes[node as usize] += g.volume);
+        }
+        volumes
     }
 
     /// Makes strains of elements and nodes into stresses over twice the largest shear modulus (their deviators are

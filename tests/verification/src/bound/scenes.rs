@@ -1,11 +1,13 @@
 //! Bodies that are gripped: blocks, rods and sheets, in several units and materials.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use softgrasp_core::fem::Material;
-use softgrasp_core::mesh::{TetMesh, signed_volume};
+use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::model::{Element, Model};
 
 use softgrasp_bench::report::ReportError;
+
+use crate::bricks::{bricks, number};
 
 /// Body, and the rows of the report that its grips belong to.
 pub(super) struct Scene {
@@ -69,35 +71,15 @@ fn scene(plan: &Plan) -> Result<Scene, ReportError> {
 /// Box of cells of six tetrahedra each, its inner nodes moved a little so that no two rows of the
 /// stiffness are equal.
 fn block(cells: [usize; 3], size: [f64; 3]) -> Result<TetMesh, ReportError> {
-    let [a, b, c] = cells;
-    let at = |[i, j, k]: [usize; 3]| (i + (a + 1) * (j + (b + 1) * k)) as u32;
-    let places = (0..=c).flat_map(|k| (0..=b).flat_map(move |j| (0..=a).map(move |i| [i, j, k])));
-    let vertices: Vec<Point3<f64>> = places
-        .map(|place| {
-            let moved = |axis: usize| {
-                let step = place[axis] as f64;
-                let is_inner = place[axis] > 0 && place[axis] < cells[axis];
-                let seed = (3 * at(place) as usize + axis) as f64;
-                let shift = if is_inner { 0.2 * (2.3 * seed).sin() } else { 0.0 };
-                size[axis] * (step + shift) / cells[axis] as f64
-            };
-            Point3::from(Vector3::new(moved(0), moved(1), moved(2)))
-        })
-        .collect();
-    let mut tets = Vec::new();
-    for (k, j, i) in (0..c).flat_map(|k| (0..b).flat_map(move |j| (0..a).map(move |i| (k, j, i)))) {
-        for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-            let mut corner = [i, j, k];
-            let mut tet = [at(corner); 4];
-            for (position, axis) in axes.into_iter().enumerate() {
-                corner[axis] += 1;
-                tet[position + 1] = at(corner);
-            }
-            if signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
-                tet.swap(0, 1);
-            }
-            tets.push(tet);
-        }
-    }
-    Ok(TetMesh::try_new(vertices, tets, Vec::new())?)
+    let place = |place: [usize; 3]| {
+        let moved = |axis: usize| {
+            let step = place[axis] as f64;
+            let is_inner = place[axis] > 0 && place[axis] < cells[axis];
+            let seed = (3 * number(cells, place) as usize + axis) as f64;
+            let shift = if is_inner { 0.2 * (2.3 * seed).sin() } else { 0.0 };
+            size[axis] * (step + shift) / cells[axis] as f64
+        };
+        Point3::new(moved(0), moved(1), moved(2))
+    };
+    Ok(bricks(cells, place)?)
 }

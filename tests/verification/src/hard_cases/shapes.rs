@@ -1,7 +1,9 @@
 //! Meshes of the hard cases: blocks, and changes of them.
 
 use nalgebra::{Point3, Vector3};
-use softgrasp_core::mesh::{MeshError, TetMesh, signed_volume};
+use softgrasp_core::mesh::{MeshError, TetMesh};
+
+use crate::bricks::bricks;
 
 /// Box from the origin, with six tetrahedra around the same diagonal of every cell.
 ///
@@ -10,31 +12,10 @@ use softgrasp_core::mesh::{MeshError, TetMesh, signed_volume};
 /// # Errors
 /// [`MeshError`] for a box without volume.
 pub(super) fn block(cells: [usize; 3], size: [f64; 3]) -> Result<TetMesh, MeshError> {
-    let [a, b, c] = cells;
-    let at = |[i, j, k]: [usize; 3]| (i + (a + 1) * (j + (b + 1) * k)) as u32;
-    let mut vertices = Vec::new();
-    for (k, j, i) in
-        (0..=c).flat_map(|k| (0..=b).flat_map(move |j| (0..=a).map(move |i| (k, j, i))))
-    {
-        let place = |axis: usize, step: usize| size[axis] * (step as f64 / cells[axis] as f64);
-        vertices.push(Point3::new(place(0, i), place(1, j), place(2, k)));
-    }
-    let mut tets = Vec::new();
-    for (k, j, i) in (0..c).flat_map(|k| (0..b).flat_map(move |j| (0..a).map(move |i| (k, j, i)))) {
-        for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-            let mut corner = [i, j, k];
-            let mut tet = [at(corner); 4];
-            for (position, axis) in axes.into_iter().enumerate() {
-                corner[axis] += 1;
-                tet[position + 1] = at(corner);
-            }
-            if signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
-                tet.swap(0, 1);
-            }
-            tets.push(tet);
-        }
-    }
-    TetMesh::try_new(vertices, tets, Vec::new())
+    bricks(cells, |place| {
+        let along = |axis: usize| size[axis] * (place[axis] as f64 / cells[axis] as f64);
+        Point3::new(along(0), along(1), along(2))
+    })
 }
 
 /// Nodes whose positions fulfil a condition, ascending.
