@@ -61,7 +61,7 @@ pub enum RegionError {
     Twice(String),
     /// An ellipsoid in which no element lies.
     #[error(
-        "region {0}: no element lies in its ellipsoid; a finer mesh (--nodes) has smaller ones"
+        "region {0}: no element lies in its ellipsoid; move it, make it larger, or take a finer mesh"
     )]
     Empty(String),
     /// An ellipsoid without a size.
