@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from conftest import PROGRAM, ROOT
 
-DOCUMENTS = ["clients/python/README.md", "docs/python.md"]
+DOCUMENTS = ["clients/python/README.md", "docs/python.md", "docs/start.md"]
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
