@@ -1,4 +1,5 @@
-//! Every figure of the sections "Numbers" of README and of the reports' own page stands in a committed report.
+//! Every figure of the sections "Numbers" of README, of the reports' own page and of the paper stands in
+//! a committed report.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,12 @@ fn page_of_reports() -> String {
     page.replace("](", "](reports/")
 }
 
+/// Paper, with its links to reports counted from the root.
+fn paper() -> String {
+    let page = fs::read_to_string(root().join("docs/paper.md")).expect("docs/paper.md can be read");
+    page.replace("](../reports/", "](reports/")
+}
+
 /// Text of a committed file of a report.
 fn report(name: &str) -> Option<String> {
     fs::read_to_string(root().join("reports").join(name)).ok()
@@ -30,7 +37,9 @@ fn report(name: &str) -> Option<String> {
 
 #[test]
 fn every_figure_of_the_readme_is_in_a_report() {
-    for (name, page) in [("README", readme()), ("reports/README", page_of_reports())] {
+    let pages =
+        [("README", readme()), ("reports/README", page_of_reports()), ("docs/paper", paper())];
+    for (name, page) in pages {
         let found = faults(&page, SECTION, &report);
         assert!(found.is_empty(), "{name} and reports differ:\n  {}", found.join("\n  "));
     }
@@ -60,7 +69,7 @@ fn changed(figure: &Figure) -> String {
 #[test]
 fn a_figure_of_the_readme_that_is_changed_is_noticed() {
     let mut count = 0;
-    let pages = [readme(), page_of_reports()];
+    let pages = [readme(), page_of_reports(), paper()];
     for item in pages.iter().flat_map(|page| items(page, SECTION)) {
         for figure in figures(&item.text) {
             let mut altered = item.clone();
