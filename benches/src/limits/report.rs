@@ -1,6 +1,6 @@
 //! Writes the page: rate of the factor relative to the rate of a product, against the size.
 
-use softgrasp_core::solve::Real;
+use softgrasp_core::solve::FrontPrecision;
 
 use super::one_size::{Rounds, table};
 use super::round::{Problem, Round};
@@ -80,7 +80,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     Ok(report)
 }
 
-fn round<T: Real + faer::traits::RealField + From<f32>>(
+fn round<T: FrontPrecision + faer::traits::RealField + From<f32>>(
     problem: &Problem,
     threads: usize,
     residual_allowed: f64,
@@ -89,7 +89,7 @@ fn round<T: Real + faer::traits::RealField + From<f32>>(
 }
 
 /// Adds one row, and one point of the figure.
-fn add<T: Real>(
+fn add<T: FrontPrecision>(
     table: &mut Table,
     series: &mut Vec<Series>,
     precision: &str,

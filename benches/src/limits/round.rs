@@ -5,7 +5,7 @@ use std::sync::Arc;
 use softgrasp_core::fem::{Material, Stiffness};
 use softgrasp_core::mesh::{BuiltIn, generate};
 use softgrasp_core::model::{Element, Model};
-use softgrasp_core::solve::{FrontAnalysis, FrontFactor, Partition, Real};
+use softgrasp_core::solve::{FrontAnalysis, FrontFactor, FrontPrecision, Partition};
 
 use super::product::product_rate;
 use crate::report::{ReportError, check};
@@ -77,7 +77,7 @@ impl Round {
     ///
     /// # Errors
     /// [`ReportError`] if there is no factor, or its answer is wrong.
-    pub fn take<T: Real + faer::traits::RealField + From<f32>>(
+    pub fn take<T: FrontPrecision + faer::traits::RealField + From<f32>>(
         problem: &Problem,
         threads: usize,
         residual_allowed: f64,

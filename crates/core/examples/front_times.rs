@@ -14,7 +14,7 @@ use nalgebra::Point3;
 use softgrasp_core::fem::{Material, Stiffness, StiffnessPattern, assemble};
 use softgrasp_core::mesh::{TetMesh, signed_volume};
 use softgrasp_core::solve::{
-    Factored, FrontAnalysis, FrontFactor, Loads, Method, Partition, Real, Stage,
+    Factored, FrontAnalysis, FrontFactor, FrontPrecision, Loads, Method, Partition, Stage,
 };
 
 /// Right-hand sides of the wider solve.
@@ -87,7 +87,7 @@ fn residual(stiffness: &Stiffness, partition: &Partition, x: &[f64], b: &[f64]) 
         .fold(0.0, f64::max)
 }
 
-fn run_front<T: Real>(
+fn run_front<T: FrontPrecision>(
     stiffness: &Stiffness,
     partition: &Partition,
     b: &[f64],

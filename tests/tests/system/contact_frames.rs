@@ -61,6 +61,8 @@ impl Scene {
                 newton_max: 60,
                 deformation: self.deformation,
                 law: LawName::default(),
+                yield_stress: None,
+                path: PathChoice::Continue,
             },
             state,
             bodies: vec![

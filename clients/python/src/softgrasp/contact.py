@@ -81,6 +81,10 @@ class ContactStep:
     """Large deformation, or linear elasticity where it suffices; None: linear elasticity."""
     law: Law = "neo-hookean"
     """Law of large deformation."""
+    yield_stress: float | None = None
+    """Stress above which the material flows and stays deformed, Pa; None: never."""
+    from_rest: bool = False
+    """Forget shape, factor and plastic strain of the session's last step."""
 
     def __post_init__(self) -> None:
         positive(self.seconds, "the length of a step")
@@ -90,6 +94,10 @@ class ContactStep:
             raise ValueError(f"deformation is None or one of {DEFORMATIONS}")
         if self.law not in LAWS:
             raise ValueError(f"law is one of {LAWS}, not {self.law!r}")
+        if self.yield_stress is not None:
+            positive(self.yield_stress, "the yield stress")
+            if self.deformation in (None, "linear"):
+                raise ValueError("a yield stress needs deformation large or auto")
 
     def part(self) -> Part:
         """The fields on the wire."""
@@ -101,7 +109,12 @@ class ContactStep:
             part.fields("B", 0)
         else:
             part.fields("BI", 1, DEFORMATIONS.index(self.deformation))
-        return part.fields("I", LAWS.index(self.law))
+        part.fields("I", LAWS.index(self.law))
+        if self.yield_stress is None:
+            part.fields("B", 0)
+        else:
+            part.fields("Bd", 1, self.yield_stress)
+        return part.fields("I", int(self.from_rest))
 
 
 @dataclass(frozen=True, eq=False)

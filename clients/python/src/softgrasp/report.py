@@ -142,6 +142,8 @@ class ContactReport:
     """Shapes that contact was solved about; 1 for linear elasticity."""
     factors: int
     """Factors of the tangent that were made."""
+    plastic_strain: float
+    """Largest accumulated plastic strain."""
 
 
 def read_solve_report(fields: Fields) -> SolveReport:
@@ -206,10 +208,10 @@ def read_contact_report(fields: Fields) -> ContactReport:
     depth, slip, residual, relative, cone, converged, *counts = fields.fields(_CONTACT)
     errors = (depth, slip, residual, relative, cone)
     rounds, sweeps, newton, columns = counts
-    is_large, shapes, factors = fields.fields(_CONTACT_END)
+    is_large, shapes, factors, plastic = fields.fields(_CONTACT_END)
     deformation = "large" if fields.truth(is_large) else "linear"
     told = (fields.truth(converged), rounds, sweeps, newton, columns)
-    return ContactReport(*errors, *told, deformation, shapes, factors)
+    return ContactReport(*errors, *told, deformation, shapes, factors, plastic)
 
 
 _LEVELS = ("none", "caution", "serious")
@@ -241,4 +243,4 @@ _MEMORY = struct.Struct("<QB")
 _LARGE = struct.Struct("<B4Id")
 _LARGE_END = struct.Struct("<dBBd")
 _CONTACT = struct.Struct("<5dB4I")
-_CONTACT_END = struct.Struct("<BII")
+_CONTACT_END = struct.Struct("<BIId")

@@ -14,20 +14,23 @@ use crate::solve::vectors::norm;
 /// Elements of an object, the shape that forces of a state have given it, and a factor near it.
 ///
 /// The shape follows from the forces, so a body made anew finds it; one that is kept has it, and the
-/// factor, already.
+/// factor, already. A body that yields is another matter: what has flowed is known to it alone.
 ///
 /// Shapes: 3N. Units: m.
 pub struct LargeBody {
-    elements: Arc<Elements>,
     pattern: Arc<StiffnessPattern>,
     shape: Shape,
     tangent: Option<Arc<FreeTangent>>,
     factors: usize,
+    /// Size of the forces without which a yielding body is called unloaded, N: yield stress times the
+    /// area that a cube of its volume has.
+    unloaded: f64,
 }
 
-/// A shape and the forces that it answers.
-#[derive(Clone, Default)]
+/// A shape, the forces that it answers, and the plastic flow before it.
+#[derive(Clone)]
 pub(super) struct Shape {
+    pub elements: Arc<Elements>,
     pub displacement: Vec<f64>,
     pub forces: Vec<NodeForce>,
 }
@@ -60,8 +63,9 @@ impl LargeBody {
     /// Shapes: `pattern` that of the elements' stiffness.
     pub fn at_rest(elements: Arc<Elements>, pattern: Arc<StiffnessPattern>) -> Self {
         let displacement = vec![0.0; 3 * elements.node_count()];
-        let shape = Shape { displacement, forces: Vec::new() };
-        Self { elements, pattern, shape, tangent: None, factors: 0 }
+        let unloaded = elements.yield_stress().map_or(0.0, |stress| stress * area_of(&pattern));
+        let shape = Shape { elements, displacement, forces: Vec::new() };
+        Self { pattern, shape, tangent: None, factors: 0, unloaded }
     }
 
     /// Displacement of every node from rest, 3N, m, in the object's frame.
@@ -82,19 +86,27 @@ impl LargeBody {
 
     /// Rotation and stretches of the elements.
     pub fn summary(&self) -> LargeSummary {
-        self.elements.summary(&self.shape.displacement)
+        self.elements().summary(&self.shape.displacement)
     }
 
     /// Rotation and stretches of the elements under another displacement field.
     ///
     /// Shapes: `displacement` 3N.
     pub fn summary_of(&self, displacement: &[f64]) -> LargeSummary {
-        self.elements.summary(displacement)
+        self.elements().summary(displacement)
     }
 
-    /// Its elements, with their law.
+    /// Its elements, with their law and what has flowed.
     pub fn elements(&self) -> &Arc<Elements> {
-        &self.elements
+        &self.shape.elements
+    }
+
+    /// Makes the plastic flow of the present shape permanent.
+    pub(super) fn flow(&mut self) {
+        let Shape { elements, displacement, .. } = &mut self.shape;
+        if elements.is_plastic() {
+            Arc::make_mut(elements).commit(displacement);
+        }
     }
 
     pub(super) fn shape(&self) -> &Shape {
@@ -122,7 +134,7 @@ impl LargeBody {
         displacement: &[f64],
     ) -> Result<Arc<FreeTangent>, CondensedError> {
         let Elasticity { base, body, columns } = elasticity;
-        let of = |curvature| self.elements.tangent(&self.pattern, displacement, curvature);
+        let of = |curvature| self.elements().tangent(&self.pattern, displacement, curvature);
         let tangent = of(Curvature::AsItIs);
         let turning = self.turning_stiffness(body, displacement);
         let sprung = |share: f64| {
@@ -156,7 +168,7 @@ impl LargeBody {
     /// Springs at a density of one that are as stiff against turning as the forces of a shape are bent on
     /// it, N/m⁴.
     fn turning_stiffness(&self, body: &FreeBody, displacement: &[f64]) -> f64 {
-        let forces = self.elements.evaluate(displacement).forces;
+        let forces = self.elements().evaluate(displacement).forces;
         let mut moments = Matrix3::zeros();
         for ((f, u), rest) in
             forces.chunks_exact(3).zip(displacement.chunks_exact(3)).zip(self.pattern.places())
@@ -175,7 +187,7 @@ impl LargeBody {
         displacement: &[f64],
         forces: &[NodeForce],
     ) -> Balance {
-        let evaluated = self.elements.evaluate(displacement);
+        let evaluated = self.elements().evaluate(displacement);
         let mut left = spread(forces, displacement.len());
         let size = norm(&left);
         elasticity.body.balanced(&mut left, displacement);
@@ -184,6 +196,8 @@ impl LargeBody {
         let residual_rel = match (evaluated.energy.is_finite() && off.is_finite(), size > 0.0) {
             (false, _) => f64::INFINITY,
             (true, true) => off / size,
+            // What has flowed holds itself in a shape that is not that of rest.
+            (true, false) if self.unloaded > 0.0 => off / self.unloaded,
             // Without forces nothing but rest is in balance.
             (true, false) if off == 0.0 => 0.0,
             (true, false) => f64::INFINITY,
@@ -193,14 +207,15 @@ impl LargeBody {
 
     /// Share of a step that leaves every element its volume and turns none too far.
     pub(super) fn share_of_step(&self, from: &[f64], step: &[f64]) -> f64 {
-        let change = self.elements.gradient_change_max(step);
+        let change = self.elements().gradient_change_max(step);
         match change.is_finite() {
-            true => self.elements.step_limit(from, step).min(GRADIENT_STEP / change.max(1e-300)),
+            true => self.elements().step_limit(from, step).min(GRADIENT_STEP / change.max(1e-300)),
             false => f64::NAN,
         }
     }
 
-    /// Takes the shape that some forces give the body, from rest on, unless it has it already.
+    /// Takes the shape that some forces give the body, from rest on, unless it has it already. A body that
+    /// has flowed begins at the shape that it has.
     ///
     /// # Errors
     /// [`StepError::NoShape`] where none is found.
@@ -212,7 +227,10 @@ impl LargeBody {
         if self.shape.forces == forces {
             return Ok(());
         }
-        let rest = vec![0.0; self.shape.displacement.len()];
+        let rest = match self.elements().is_plastic() {
+            true => self.shape.displacement.clone(),
+            false => vec![0.0; self.shape.displacement.len()],
+        };
         let mut left = f64::INFINITY;
         for pieces in LOAD_PIECES {
             let mut displacement = rest.clone();
@@ -225,7 +243,7 @@ impl LargeBody {
                 }
             }
             if left <= SHAPE_RESIDUAL.sqrt() {
-                self.shape = Shape { displacement, forces: forces.to_vec() };
+                (self.shape.displacement, self.shape.forces) = (displacement, forces.to_vec());
                 return Ok(());
             }
         }
@@ -239,7 +257,7 @@ impl LargeBody {
         displacement: &mut [f64],
         forces: &[NodeForce],
     ) -> Result<f64, CondensedError> {
-        if forces.is_empty() {
+        if forces.is_empty() && !self.elements().is_plastic() {
             displacement.fill(0.0);
             return Ok(0.0);
         }
@@ -266,6 +284,16 @@ impl LargeBody {
         }
         Ok(left)
     }
+}
+
+/// Area of a face of the cube that has the volume of the box around some nodes, m².
+fn area_of(pattern: &StiffnessPattern) -> f64 {
+    let far = Vector3::repeat(f64::INFINITY);
+    let ends = pattern
+        .places()
+        .iter()
+        .fold((far, -far), |(low, high), place| (low.inf(&place.coords), high.sup(&place.coords)));
+    (ends.1 - ends.0).product().abs().powf(2.0 / 3.0)
 }
 
 /// A spring for every degree of freedom that has a mass.

@@ -66,9 +66,12 @@ impl LargeStep<'_, '_> {
         let mass = step.checked(state)?;
         body.take_shape_of(step.elasticity, &state.forces)?;
         let parts = step.parts(state, &mass);
-        step.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
+        let before = body.shape().clone();
+        let made = step.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
             LargeStep { step: *part, body }.advance_or_halve(begun, wanted, HALVINGS)
-        })
+        });
+        // Parts before the one that failed are taken back, with what has flowed in them.
+        made.inspect_err(|_| drop(body.put(before)))
     }
 
     /// Makes the step at once, or in halves where it finds no end.
@@ -85,7 +88,7 @@ impl LargeStep<'_, '_> {
             Err(error) => *error == StepError::InsideOut,
         };
         if halvings == 0 || !is_lost {
-            return whole;
+            return whole.inspect(|_| self.body.flow());
         }
         let after = self.body.put(before);
         let body = &mut *self.body;
@@ -97,7 +100,7 @@ impl LargeStep<'_, '_> {
             (Ok(halves), Ok(whole)) if halves.is_nearer_than(whole) => Ok(halves),
             _ => {
                 self.body.put(after);
-                whole
+                whole.inspect(|_| self.body.flow())
             }
         }
     }
@@ -185,7 +188,8 @@ impl LargeStep<'_, '_> {
         let is_off = now > self.tolerance() && now > LEFT_BY_FACTOR * *left;
         progress.is_stale = !is_whole || is_off;
         *left = if now.is_finite() { now.min(LEFT_AT_FIRST) } else { LEFT_AT_FIRST };
-        if progress.held.is_empty() && scene.elastic_forces(&[]).is_empty() {
+        let is_unloaded = progress.held.is_empty() && scene.elastic_forces(&[]).is_empty();
+        if is_unloaded && !self.body.elements().is_plastic() {
             // Nothing presses: the shape is that of rest.
             progress.is_stale |= progress.about.iter().any(|u| *u != 0.0);
             progress.about.fill(0.0);
@@ -266,8 +270,8 @@ impl LargeStep<'_, '_> {
         };
         let displacements = wanted.iter().map(of_node).collect();
         let outcome = self.step.outcome(scene, &response, &found, displacements);
-        let forces = found.end.forces;
-        self.body.put(Shape { displacement, forces });
+        let (elements, forces) = (Arc::clone(self.body.elements()), found.end.forces);
+        self.body.put(Shape { elements, displacement, forces });
         let is_converged = far <= 1.0;
         StepOutcome { residual_rel: told, is_converged, ..outcome }
     }

@@ -33,6 +33,8 @@ mod state;
 mod step;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod yield_tests;
 
 pub use bodies::{MovingBody, near_triangles, reach_of_step};
 pub use features::Candidate;

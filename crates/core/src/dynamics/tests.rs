@@ -60,8 +60,19 @@ impl Object {
         bodies: &[MovingBody],
         settings: StepSettings,
     ) -> StepOutcome {
+        self.try_advance_large(large, state, bodies, settings).unwrap()
+    }
+
+    /// The same, or why there is no such step.
+    pub(super) fn try_advance_large(
+        &self,
+        large: &mut LargeBody,
+        state: &ObjectState,
+        bodies: &[MovingBody],
+        settings: StepSettings,
+    ) -> Result<StepOutcome, StepError> {
         self.with_step(state, bodies, settings, |step| {
-            LargeStep { step, body: large }.advance(state, &self.surface.nodes).unwrap()
+            LargeStep { step, body: large }.advance(state, &self.surface.nodes)
         })
     }
 
@@ -85,6 +96,13 @@ impl Object {
     /// The object at large deformation, at rest.
     pub(super) fn large(&self, law: Law) -> LargeBody {
         let elements = Arc::new(self.model.hyperelastic(law).unwrap());
+        LargeBody::at_rest(elements, Arc::clone(self.model.stiffness().pattern()))
+    }
+
+    /// The object at large deformation, at rest, of a material that yields.
+    pub(super) fn yielding(&self, stress_pa: f64) -> LargeBody {
+        let elements = self.model.hyperelastic(Law::NeoHookean).unwrap();
+        let elements = Arc::new(elements.with_yield(stress_pa).unwrap());
         LargeBody::at_rest(elements, Arc::clone(self.model.stiffness().pattern()))
     }
 

@@ -24,7 +24,7 @@ mod zero_energy;
 
 pub use certainty::{Certainty, ERROR_REFUSED, ERROR_SERIOUS, ERROR_UNREMARKABLE};
 pub use direct::{Analysed, Factored, Fallback, Loads, Solution, SolveError};
-pub use front::{FrontAnalysis, FrontError, FrontFactor, Real};
+pub use front::{FrontAnalysis, FrontError, FrontFactor, FrontPrecision};
 pub use method::Stage;
 pub use method::{Method, UnknownMethod, Within};
 pub use mobility::{FreeMotion, Motion, find_free_motion};

@@ -12,8 +12,9 @@ use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{Contact, Elasticity};
 use softgrasp_protocol::{
-    Answer, BodyLoad as LoadMessage, ContactAnswer, ContactFrame, ContactPoint, ContactReport,
-    Deformation, Displacements, FieldSet, FieldValues, NodeChoice, Precision, SolveReport,
+    Answer, BodyLoad as LoadMessage, ContactAnswer, ContactAsk, ContactFrame, ContactPoint,
+    ContactReport, Deformation, Displacements, FieldSet, FieldValues, NodeChoice, PathChoice,
+    Precision, SolveReport,
 };
 
 use super::contact_large::{LargeWish, Made, PressedSeat};
@@ -86,7 +87,6 @@ impl PosedContact {
             body: u16::try_from(body).unwrap_or(u16::MAX),
         };
         let law = law_of(ask.law);
-        let wish = |deformation| LargeWish { model, deformation, law, seat };
         let candidates = (0u32..).zip(&triangle_bodies).map(candidate).collect();
         Ok(Self {
             stored,
@@ -98,7 +98,14 @@ impl PosedContact {
             nodes,
             precision,
             fields,
-            large: ask.deformation.filter(|d| *d != Deformation::Linear).map(wish),
+            large: deformation_of(&ask).map(|deformation| LargeWish {
+                model,
+                deformation,
+                law,
+                yield_stress: ask.yield_stress,
+                from_rest: ask.path == PathChoice::FromRest,
+                seat,
+            }),
         })
     }
 
@@ -198,7 +205,7 @@ impl PosedContact {
     }
 
     fn answered(self, made: Made, fields: Vec<FieldValues>, computed: u64) -> ContactAnswer {
-        let Made { outcome, is_large, factors, summary } = made;
+        let Made { outcome, is_large, factors, plastic_strain, summary } = made;
         let (method, factor_reused) = match is_large {
             false => ("condensed", computed == 0),
             true => ("newton", factors == 0),
@@ -236,6 +243,7 @@ impl PosedContact {
             is_large,
             shapes: outcome.shapes as u32,
             factors: factors as u32,
+            plastic_strain,
         };
         let displacements = Displacements::of(outcome.displacements, self.precision);
         ContactAnswer {
@@ -254,6 +262,14 @@ impl PosedContact {
             points: outcome.contacts.iter().map(point_message).collect(),
             loads: outcome.loads.iter().map(load_message).collect(),
         }
+    }
+}
+
+/// Equations of a step; `None` for linear elasticity, which has no yield stress.
+fn deformation_of(ask: &ContactAsk) -> Option<Deformation> {
+    match ask.yield_stress {
+        Some(_) => Some(Deformation::Large),
+        None => ask.deformation.filter(|deformation| *deformation != Deformation::Linear),
     }
 }
 

@@ -25,6 +25,8 @@ pub(crate) type PressedSeat = Arc<Lock<Option<Box<Pressed>>>>;
 pub(crate) struct Pressed {
     model: ModelHash,
     law: Law,
+    /// Pa; `None` for a material that never flows.
+    yield_stress: Option<f64>,
     body: LargeBody,
     /// Memory reserved for the factor, given back with it.
     reservation: Reservation,
@@ -35,6 +37,10 @@ pub(crate) struct LargeWish {
     pub model: ModelHash,
     pub deformation: Deformation,
     pub law: Law,
+    /// Pa; `None` for a material that never flows.
+    pub yield_stress: Option<f64>,
+    /// Whether what the session keeps is forgotten.
+    pub from_rest: bool,
     pub seat: PressedSeat,
 }
 
@@ -43,6 +49,8 @@ pub(super) struct Made {
     pub outcome: StepOutcome,
     pub is_large: bool,
     pub factors: usize,
+    /// Largest accumulated plastic strain of an element.
+    pub plastic_strain: f64,
     /// Rotation and stretches of the elements, where they were computed.
     pub summary: LargeSummary,
 }
@@ -50,7 +58,8 @@ pub(super) struct Made {
 impl Made {
     /// Outcome of a step by linear elasticity.
     pub fn linear(outcome: StepOutcome) -> Self {
-        Self { outcome, is_large: false, factors: 0, summary: LargeSummary::UNKNOWN }
+        let summary = LargeSummary::UNKNOWN;
+        Self { outcome, is_large: false, factors: 0, plastic_strain: 0.0, summary }
     }
 }
 
@@ -63,7 +72,7 @@ impl Pressed {
         base: &Base,
     ) -> Result<Box<Self>, Refusal> {
         let model = &stored.model;
-        let elements = Arc::new(model.hyperelastic(wish.law)?);
+        let elements = Arc::new(model.yielding(wish.law, wish.yield_stress)?);
         let pattern = model.stiffness().pattern();
         let reservation = resources.budget.reservation();
         // The tangent and its positive part stand beside the linear stiffness.
@@ -73,7 +82,8 @@ impl Pressed {
         let subject = Subject::about(model, 0, Some(wish.model));
         admit(&resources.models, &reservation, &[need], &subject).map_err(PlanError::Memory)?;
         let body = LargeBody::at_rest(elements, Arc::clone(pattern));
-        Ok(Box::new(Self { model: wish.model, law: wish.law, body, reservation }))
+        let LargeWish { model, law, yield_stress, .. } = *wish;
+        Ok(Box::new(Self { model, law, yield_stress, body, reservation }))
     }
 
     /// Predicted error of linear elasticity in the object's present shape, relative to the largest
@@ -96,7 +106,10 @@ impl LargeWish {
     }
 
     fn is_of(&self, kept: &Pressed) -> bool {
-        kept.model == self.model && kept.law == self.law
+        !self.from_rest
+            && kept.model == self.model
+            && kept.law == self.law
+            && kept.yield_stress == self.yield_stress
     }
 
     /// Makes one step of the object.
@@ -143,6 +156,7 @@ impl LargeWish {
             outcome,
             is_large: true,
             factors: pressed.body.factors() - before,
+            plastic_strain: pressed.body.elements().plastic_strain_max(),
             summary: pressed.body.summary(),
         })
     }
@@ -166,5 +180,5 @@ fn linear_if_small(
         .iter()
         .filter_map(|&node| outcome.displacements.get(node as usize).copied())
         .collect();
-    Ok(Some(Made { outcome, is_large: false, factors: 0, summary }))
+    Ok(Some(Made { summary, ..Made::linear(outcome) }))
 }

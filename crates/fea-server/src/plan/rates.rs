@@ -7,7 +7,7 @@ use softgrasp_core::mesh::{BuiltIn, generate};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::rates::{FactorRates, FactorSample, Rates};
 use softgrasp_core::solve::work::{MeshSize, Work};
-use softgrasp_core::solve::{Analysed, Factored, FrontFactor, Method, Partition, Real};
+use softgrasp_core::solve::{Analysed, Factored, FrontFactor, FrontPrecision, Method, Partition};
 
 use crate::lock::Lock;
 
@@ -143,7 +143,7 @@ impl Cube {
         Some(Self { model, partition, analysed, work, assemble_s, order_s })
     }
 
-    fn sample<T: Real>(&self) -> Option<FactorSample> {
+    fn sample<T: FrontPrecision>(&self) -> Option<FactorSample> {
         let analysis = self.analysed.analysis();
         let (factor, factor_s) =
             fastest(|| FrontFactor::<T>::try_new(analysis, self.model.stiffness()).ok())?;

@@ -22,7 +22,7 @@ pub(super) enum GraspChoice {
 #[derive(Args, Clone, Copy, Default)]
 pub(super) struct ContactArguments {
     /// contact (fingers press with friction, the object has weight and lies on a table; linear
-    /// elasticity) or thesis (three fingertips hold it, five deform it) [default: contact for mouse,
+    /// elasticity unless --deformation says otherwise) or thesis (three fingertips hold it, five deform it) [default: contact for mouse,
     /// devices, joints, recordings of others, the script lift, and a run without --object, --hand and
     /// --scene; else thesis].
     #[arg(long, value_name = "contact|thesis")]
@@ -98,9 +98,6 @@ impl ContactArguments {
         }
         if held.is_some_and(|held| held != ContactModel::Friction) {
             bail!("--contact says what a fingertip of --grasp thesis holds; leave one of both out");
-        }
-        if elasticity.wants_large() {
-            bail!("--grasp contact is of linear elasticity so far; take --grasp thesis with it");
         }
         let usual = ContactScene::default();
         let friction = self.friction.or(scene.friction).unwrap_or(usual.friction);

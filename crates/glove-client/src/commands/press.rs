@@ -7,9 +7,12 @@ use clap::Args;
 use nalgebra::Point3;
 use softgrasp_core::mesh::{Surface, TetMesh};
 use softgrasp_protocol::solve_report::SCHEMA;
-use softgrasp_protocol::{ContactAsk, Deformation, ElementName, LawName, Material, Reply, Request};
+use softgrasp_protocol::{
+    ContactAsk, Deformation, ElementName, Material, PathChoice, Reply, Request,
+};
 
 use super::access_arguments::AccessArguments;
+use super::elasticity_arguments::ElasticityArguments;
 use super::field_arguments::{FieldArguments, is_vtu};
 use super::numbers::{count, poisson, positive, speed, vector};
 use super::output::Progress;
@@ -19,6 +22,7 @@ use crate::ask::connection::{Host, LinkError, ServerChoice, ServerConnection, un
 use crate::ask::contact_frame::isometry_of;
 use crate::ask::displacement_table::write_displacements;
 use crate::ask::model_upload::{ModelUpload, materials};
+use crate::ask::solve_settings::Elasticity;
 use crate::object::field_writing::{NodeVectors, encode_fields};
 use crate::object::file_writing::write_file;
 use crate::object::object_file::{ObjectFile, read_object_file};
@@ -64,13 +68,8 @@ pub struct PressCommand {
     /// Longest step, s.
     #[arg(long, default_value_t = 0.01, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     step: f64,
-    /// Equations of the elastic part: linear, large, or auto, which takes the linear ones where rotation
-    /// and strain promise an error below 0.2 %.
-    #[arg(long, default_value_t = Deformation::Linear, value_name = "linear|large|auto")]
-    deformation: Deformation,
-    /// Law of large deformation: neo-hookean or neo-hookean-log.
-    #[arg(long, default_value_t = LawName::NeoHookean, value_name = "neo-hookean|neo-hookean-log")]
-    material: LawName,
+    #[command(flatten)]
+    elasticity: ElasticityArguments,
     /// Finite element.
     #[arg(long, default_value = "t4", value_name = "t4|t4-anp", value_parser = element)]
     element: ElementName,
@@ -110,6 +109,7 @@ impl PressCommand {
     /// One line each: what happened, where, and what to do.
     pub fn run(&self) -> anyhow::Result<()> {
         let progress = Progress::start("reading");
+        let elasticity = self.elasticity.of_request()?;
         let bodies = read_bodies(&self.bodies)?;
         let (mesh, region_names) = self.read_object()?;
         let surface = Surface::from_mesh(&mesh);
@@ -138,7 +138,7 @@ impl PressCommand {
             model: upload.hash,
             bodies: &bodies,
             friction: self.friction,
-            ask: self.ask(),
+            ask: self.ask(elasticity),
             whole: self.series.is_some(),
             fields: self.fields.of_contact(&mesh, self.has_fields_file())?,
         };
@@ -163,7 +163,7 @@ impl PressCommand {
         if let (Some(path), Some(last)) = (&self.out, &last) {
             write_file(path, &encode(path, &mesh, last)?)?;
         }
-        let report = self.summary(&mesh, steps);
+        let report = self.summary(&mesh, steps, elasticity);
         if let Some(path) = &self.report {
             write_json(path, &report)?;
         }
@@ -194,7 +194,7 @@ impl PressCommand {
         self.series.is_some() || self.out.as_ref().is_some_and(|path| is_vtu(path))
     }
 
-    fn ask(&self) -> ContactAsk {
+    fn ask(&self, elasticity: Elasticity) -> ContactAsk {
         ContactAsk {
             seconds: self.step,
             gravity: self.gravity.into(),
@@ -204,12 +204,21 @@ impl PressCommand {
             residual_rel: 1e-9,
             rounds_max: 40,
             newton_max: 1000,
-            deformation: Some(self.deformation),
-            law: self.material,
+            deformation: Some(elasticity.deformation),
+            law: elasticity.law,
+            yield_stress: elasticity.yield_stress,
+            // The first step of a session finds nothing to go on with.
+            path: PathChoice::Continue,
         }
     }
 
-    fn summary(&self, mesh: &TetMesh, steps: Vec<StepReport>) -> PressReport {
+    fn summary(
+        &self,
+        mesh: &TetMesh,
+        steps: Vec<StepReport>,
+        elasticity: Elasticity,
+    ) -> PressReport {
+        let is_large = elasticity.deformation != Deformation::Linear;
         let most = |number: fn(&StepReport) -> f64| steps.iter().map(number).fold(0.0, f64::max);
         let volume: f64 = (0..mesh.tets().len()).map(|tet| mesh.signed_volume(tet)).sum();
         PressReport {
@@ -226,8 +235,9 @@ impl PressCommand {
             friction: self.friction,
             viscosity: self.viscosity,
             element: self.element.as_str().to_owned(),
-            deformation: self.deformation.as_str(),
-            material: (self.deformation != Deformation::Linear).then(|| self.material.to_string()),
+            deformation: elasticity.deformation.as_str(),
+            material: is_large.then(|| elasticity.law.to_string()),
+            yield_pa: elasticity.yield_stress,
             steps_large: steps.iter().filter(|step| step.deformation == "large").count(),
             residual_rel_max: most(|step| step.residual_rel),
             steps_not_converged: steps.iter().filter(|step| !step.converged).count(),
@@ -256,7 +266,7 @@ impl PressCommand {
                 report.steps_not_converged
             ));
         }
-        if self.deformation != Deformation::Linear {
+        if report.deformation != Deformation::Linear.as_str() {
             text.push_str(&format!(
                 "{} steps at large deformation, forces out of balance by {:.1e} at most\n",
                 report.steps_large, report.residual_rel_max

@@ -369,7 +369,7 @@ impl RunArguments {
         let needs_thesis = !lifts || *method != MethodName::auto();
         let rule = self.grasp.of_run(scene, &self.elasticity, needs_thesis)?;
         let elasticity = match rule.scene {
-            Some(_) => Elasticity::LINEAR,
+            Some(_) => self.elasticity.of_contact(scene)?,
             None => self.elasticity.of_run(scene, method)?,
         };
         let script = if rule.scene.is_some() { ScriptName::Lift } else { ScriptName::default() };

@@ -40,6 +40,8 @@ pub struct PressReport {
     pub deformation: &'static str,
     /// Law of large deformation, where that was asked for.
     pub material: Option<String>,
+    /// Yield stress, Pa; null for a material that never flows.
+    pub yield_pa: Option<f64>,
     /// Number of steps at large deformation.
     pub steps_large: usize,
     /// Number of steps whose penetration or residual is above what was asked for.
@@ -97,6 +99,8 @@ pub struct StepReport {
     pub shapes: u32,
     /// Number of factors of the tangent that were made.
     pub factors: u32,
+    /// Largest accumulated plastic strain, 0 without a yield stress.
+    pub plastic_strain: f64,
     /// Largest rotation of an element, degrees, if it was computed.
     pub max_rotation_deg: Option<f64>,
     /// Largest strain of an element, if it was computed.
@@ -163,6 +167,7 @@ impl StepReport {
             },
             shapes: contact.shapes,
             factors: contact.factors,
+            plastic_strain: contact.plastic_strain,
             max_rotation_deg: Some(report.max_rotation_deg).filter(|angle| angle.is_finite()),
             max_strain: Some(report.max_strain).filter(|strain| strain.is_finite()),
             ms: step.ms,

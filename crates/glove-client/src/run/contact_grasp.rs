@@ -9,14 +9,15 @@ use softgrasp_grasp::hand::{HAND_BODIES, HandBody};
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_grasp::sphere_tree::{SearchedSurface, triangles_near};
 use softgrasp_protocol::{
-    BodyLoad, BodyShape, ContactAsk, ContactFrame, ContactReport, LawName, ModelHash, NodeChoice,
-    ObjectState,
+    BodyLoad, BodyShape, ContactAsk, ContactFrame, ContactReport, Deformation, ModelHash,
+    NodeChoice, ObjectState, PathChoice,
 };
 
 use crate::ask::contact_frame::{
     StepBody, StepObject, extent, isometry_of, pose_of, reach_of_step,
 };
 use crate::ask::link::ReachedStep;
+use crate::ask::solve_settings::Elasticity;
 use crate::run::contact_ledger::StepRecord;
 
 /// Constants of an object and of the hand that grasps it with friction.
@@ -65,6 +66,8 @@ pub struct ContactGrasp {
     loads: Vec<BodyLoad>,
     /// How well the last step meets the law of contact.
     report: ContactReport,
+    /// Whether the server's last step is not the one that the state comes from.
+    strayed: bool,
     /// Whether the hand must leave the object before it can touch it.
     is_apart: bool,
     /// Number of steps in a row in which nothing has moved.
@@ -91,6 +94,16 @@ pub enum TakenStep {
     NotAsked,
     /// The step was not solved; the object keeps its position.
     Lost,
+}
+
+/// Wishes for a step beside its hand and object.
+pub struct StepWish {
+    /// Nodes whose displacements are wanted.
+    pub nodes: NodeChoice,
+    /// Equations of the elastic part, law, and yield stress.
+    pub elasticity: Elasticity,
+    /// Where the shape is found: at the end of the session's last step, unless that was given up.
+    pub path: PathChoice,
 }
 
 struct Asked {
@@ -129,6 +142,7 @@ const NEWTON_MAX: u32 = 80;
 /// Penetration that is small enough to see and feel; the report of every step tells what was reached.
 const PENETRATION_REL: f64 = 1e-6;
 const RESIDUAL_REL: f64 = 1e-6;
+const RESIDUAL_REL_OF_LARGE: f64 = 1e-4;
 
 impl ContactGrasp {
     /// Grasp of an object that is at rest at its home. A hand that begins inside the object must leave it
@@ -142,6 +156,7 @@ impl ContactGrasp {
             asked: None,
             loads: Vec::new(),
             report: ContactReport::default(),
+            strayed: true,
             is_apart: true,
             still_steps: 0,
             slow_steps: 0,
@@ -177,7 +192,7 @@ impl ContactGrasp {
         self.state = ObjectState::at_rest(pose_of(&world_from_object));
         self.loads.clear();
         self.let_go();
-        (self.asked, self.still_steps) = (None, 0);
+        (self.asked, self.still_steps, self.strayed) = (None, 0, true);
     }
 
     /// Releases the object: the hand must leave it before it can touch it again.
@@ -189,7 +204,7 @@ impl ContactGrasp {
     /// Makes the present shape the rest shape; the object keeps its pose.
     pub fn meet_new_shape(&mut self) {
         self.state = ObjectState::at_rest(self.state.pose);
-        (self.asked, self.still_steps) = (None, 0);
+        (self.asked, self.still_steps, self.strayed) = (None, 0, true);
     }
 
     /// Takes another object, with a table of its own height.
@@ -208,7 +223,7 @@ impl ContactGrasp {
         now_s: f64,
         hand: &[HandBody; HAND_BODIES],
         object: &SoftObject,
-        nodes: NodeChoice,
+        wish: StepWish,
     ) -> Option<ContactFrame> {
         if self.asked.is_some() {
             return None;
@@ -231,7 +246,7 @@ impl ContactGrasp {
             self.is_apart = true;
         }
         let bodies = self.bodies(hand);
-        let ask = self.ask(seconds);
+        let ask = self.ask(seconds, &wish);
         let extent = extent(object.rest().vertices());
         let near = self.candidates(&bodies, object, extent, &ask);
         let is_touchable = near.iter().any(|candidate| usize::from(candidate.body) >= TABLE);
@@ -245,24 +260,28 @@ impl ContactGrasp {
             vertices: object.rest().vertices(),
             triangles: &object.surface().triangles,
             displacement: object.displacement(),
-            nodes,
+            nodes: wish.nodes,
         };
         self.asked = Some(Asked { tick, hand: moment, extent });
         Some(step_object.frame_among(self.state.clone(), &bodies, ask, &near))
     }
 
-    fn ask(&self, seconds: f64) -> ContactAsk {
+    fn ask(&self, seconds: f64, wish: &StepWish) -> ContactAsk {
+        let Elasticity { deformation, law, yield_stress } = wish.elasticity;
+        let is_linear = deformation == Deformation::Linear;
         ContactAsk {
             seconds,
             gravity: self.scene.gravity.into(),
             density: self.scene.density,
             viscosity: self.scene.viscosity,
             penetration_rel: PENETRATION_REL,
-            residual_rel: RESIDUAL_REL,
+            residual_rel: if is_linear { RESIDUAL_REL } else { RESIDUAL_REL_OF_LARGE },
             rounds_max: ROUNDS_MAX,
             newton_max: NEWTON_MAX,
-            deformation: None,
-            law: LawName::default(),
+            deformation: (!is_linear).then_some(deformation),
+            law,
+            yield_stress,
+            path: if self.strayed { PathChoice::FromRest } else { wish.path },
         }
     }
 
@@ -344,18 +363,23 @@ impl ContactGrasp {
         self.still_steps = if is_still { self.still_steps.saturating_add(1) } else { 0 };
         self.slow_steps = if speed < SLOW_SPEED { self.slow_steps.saturating_add(1) } else { 0 };
         (self.state, self.loads, self.report) = (state, loads, contact);
+        self.strayed = false;
         self.hand = Some(asked.hand);
         TakenStep::Taken
     }
 
     /// Gives up the step of a tick, so that the next tick asks again; returns whether it was awaited.
     pub fn give_up(&mut self, tick: u64) -> bool {
-        self.asked.take_if(|asked| asked.tick == tick).is_some()
+        let is_awaited = self.asked.take_if(|asked| asked.tick == tick).is_some();
+        self.strayed |= is_awaited;
+        is_awaited
     }
 
     /// Gives up any awaited step; returns whether there was one.
     pub fn give_up_any(&mut self) -> bool {
-        self.asked.take().is_some()
+        let is_awaited = self.asked.take().is_some();
+        self.strayed |= is_awaited;
+        is_awaited
     }
 
     /// Whether each finger presses on the object, thumb first.

@@ -33,6 +33,10 @@ pub struct StepRecord {
     pub rounds: u32,
     /// Number of steps of Newton's method.
     pub newton_steps: u32,
+    /// Whether the elastic part was solved at large deformation.
+    pub large: bool,
+    /// Largest accumulated plastic strain, 0 without a yield stress.
+    pub plastic_strain: f64,
     /// Time from sending the request to having the answer, ms.
     pub round_trip_ms: f64,
 }
@@ -42,6 +46,10 @@ pub struct StepRecord {
 pub struct ContactTotals {
     /// Number of answered steps.
     pub steps: u64,
+    /// Number of steps at large deformation; the others were linear.
+    pub large: u64,
+    /// Largest accumulated plastic strain, 0 without a yield stress.
+    pub plastic_strain_max: f64,
     /// Number of steps whose penetration or residual is above what was asked for.
     pub not_converged: u64,
     /// Deepest point of the surface in a body, m.
@@ -82,6 +90,8 @@ impl StepRecord {
             converged: report.is_converged,
             rounds: report.rounds,
             newton_steps: report.newton_steps,
+            large: report.is_large,
+            plastic_strain: report.plastic_strain,
             round_trip_ms,
         }
     }
@@ -91,6 +101,8 @@ impl ContactTotals {
     /// Adds a step to the totals.
     pub fn add(&mut self, step: &StepRecord) {
         self.steps += 1;
+        self.large += u64::from(step.large);
+        self.plastic_strain_max = self.plastic_strain_max.max(step.plastic_strain);
         self.not_converged += u64::from(!step.converged);
         self.penetration_max_m = self.penetration_max_m.max(step.penetration_max_m);
         self.residual_rel_max = self.residual_rel_max.max(step.residual_rel);
@@ -105,7 +117,16 @@ impl ContactTotals {
         if self.steps == 0 {
             return String::new();
         }
-        format!(
+        let large = match (self.large, self.plastic_strain_max) {
+            (0, _) => String::new(),
+            (steps, 0.0) => format!("  large deformation   {steps} of {} steps\n", self.steps),
+            (steps, flowed) => format!(
+                "  large deformation   {steps} of {} steps; {:.1} % of plastic strain at most\n",
+                self.steps,
+                100.0 * flowed,
+            ),
+        };
+        let told = format!(
             "  contact             {} steps, surface at most {:.1e} m deep, law of contact met to {:.1e} N \
              ({:.1e} of the largest force), {} steps above what was asked for\n  \
              finger force        {:.2} N at most\n",
@@ -115,7 +136,8 @@ impl ContactTotals {
             self.residual_rel_max,
             self.not_converged,
             self.finger_force_max_n,
-        )
+        );
+        told + &large
     }
 }
 

@@ -5,10 +5,11 @@ use nalgebra::Point3;
 use softgrasp_grasp::grasp::{Command, GraspEvent, HandSegments, StateName};
 use softgrasp_grasp::hand::{HandColliders, HandDimensions, HandPose, hand_bodies};
 use softgrasp_grasp::object::ObjectError;
+use softgrasp_protocol::PathChoice;
 
 use crate::ask::digest::step_digest;
 use crate::ask::unanswered::Unanswered;
-use crate::run::contact_grasp::{ContactGrasp, given_way};
+use crate::run::contact_grasp::{ContactGrasp, StepWish, given_way};
 use crate::run::holding::Holding;
 use crate::run::live_object::LiveObject;
 use crate::run::shown::Shown;
@@ -86,8 +87,15 @@ impl FrictionTick<'_> {
             outcome.gave_up_step |= contact.give_up_any();
         }
         let bodies = hand_bodies(self.dimensions, self.hand);
-        let nodes = questions.nodes(shown.object(), changing.wants_whole());
-        let frame = contact.step(self.tick, self.now_s, &bodies, shown.object(), nodes);
+        let wish = StepWish {
+            nodes: questions.nodes(shown.object(), changing.wants_whole()),
+            elasticity: questions.settings().elasticity,
+            path: match recorded.is_some_and(|recorded| recorded.from_rest) {
+                true => PathChoice::FromRest,
+                false => PathChoice::Continue,
+            },
+        };
+        let frame = contact.step(self.tick, self.now_s, &bodies, shown.object(), wish);
         let Some(frame) = frame else {
             let is_lost = recorded.is_none() && is_given_up;
             return Err(if is_lost { Unanswered::ServerLost } else { Unanswered::AnswerLate });

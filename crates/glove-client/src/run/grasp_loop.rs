@@ -10,7 +10,7 @@ use softgrasp_grasp::grasp::{
     Command, Contact, Grasp, GraspError, GraspEvent, HandSegments, StateName, StepInput,
     StepOutput, sense,
 };
-use softgrasp_grasp::hand::{HandColliders, HandPose};
+use softgrasp_grasp::hand::{HandColliders, HandPose, above_table};
 use softgrasp_grasp::object::{ObjectError, RestShape, SoftObject};
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::notice::Notice;
@@ -114,7 +114,7 @@ impl GraspLoop {
         self.holding.state_name()
     }
 
-    /// Hand as measured in the last tick.
+    /// Hand of the last tick, as measured, but never below the table of a grasp by friction.
     pub fn hand(&self) -> Option<&HandPose> {
         self.hand.as_ref()
     }
@@ -192,8 +192,9 @@ impl GraspLoop {
         self.object.save_when_whole(&mut self.holding, &mut outcome);
         self.look_at_devices(now_s, &mut outcome);
         // Until both devices have spoken there is no hand to act with.
-        let Some(hand) = self.reader.hand(now_s) else { return Ok(outcome) };
-        self.meet_first_hand(&hand, now_s);
+        let Some(measured) = self.reader.hand(now_s) else { return Ok(outcome) };
+        self.meet_first_hand(&measured, now_s);
+        let hand = self.held_up(&measured);
         self.object.take_work(&mut self.holding, &mut outcome);
         let command = self.object.allowed(sent.command, &mut self.holding, &mut outcome);
         let keeping = self.is_keeping();
@@ -209,6 +210,13 @@ impl GraspLoop {
         }
         self.hand = Some(hand);
         Ok(outcome)
+    }
+
+    /// The hand as the table lets it be: a table stops a hand as it stops an object.
+    fn held_up(&self, measured: &HandPose) -> HandPose {
+        let table_y = self.holding.friction().and_then(|contact| contact.scene().table_y);
+        let dimensions = &self.reader.setup().dimensions;
+        table_y.map_or(*measured, |table_y| above_table(dimensions, measured, table_y))
     }
 
     /// Whether the hand waits until a shape is kept. In lockstep this is done in the next tick, and the

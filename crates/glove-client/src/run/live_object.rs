@@ -129,6 +129,7 @@ impl LiveObject {
         let summary =
             SolveSummary::new((*reached.report).clone(), None, ms).with_bytes(reached.bytes);
         outcome.answers.push((tick, summary));
+        outcome.from_rest.extend(reached.from_rest.then_some(tick));
         let is_current = reached.rest_shape == shown.object().rest_shapes();
         if !is_current || self.changing.keep().freezes() {
             contact.give_up(tick);

@@ -70,6 +70,22 @@ impl HandPose {
     pub fn finger(&self, finger: Finger) -> &FingerPose {
         &self.fingers[finger.index()]
     }
+
+    /// The hand moved as a whole, m, in the world.
+    #[must_use]
+    pub fn moved(&self, way: &Vector3<f64>) -> Self {
+        let moved = |pose: &Isometry3<f64>| Translation3::from(*way) * pose;
+        let mut hand = *self;
+        hand.world_from_palm = moved(&self.world_from_palm);
+        for finger in &mut hand.fingers {
+            for segment in &mut finger.segments {
+                segment.world_from_segment = moved(&segment.world_from_segment);
+            }
+            finger.tip_centre += way;
+            finger.contact_point += way;
+        }
+        hand
+    }
 }
 
 /// Places every segment of the hand.

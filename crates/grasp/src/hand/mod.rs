@@ -16,4 +16,4 @@ pub use joints::{ANGLE_COUNT, ANGLE_NAMES, Finger, FingerAngles, JointAngles, Th
 pub use kinematics::{
     FingerPose, HandPose, SegmentPose, forearm_from_palm, pose, pose_of_segments,
 };
-pub use rigid_bodies::{HAND_BODIES, HandBody, clearance, hand_bodies};
+pub use rigid_bodies::{HAND_BODIES, HandBody, above_table, clearance, hand_bodies};

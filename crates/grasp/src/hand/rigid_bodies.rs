@@ -60,6 +60,20 @@ pub fn clearance(
     points.map(nearest).fold(f64::INFINITY, f64::min)
 }
 
+/// The hand raised as a whole until none of its bodies is below a table, as a hand is by a real one; the
+/// same hand where none is.
+///
+/// Units: `table_y` m. Frame: world, y up.
+pub fn above_table(dimensions: &HandDimensions, hand: &HandPose, table_y: f64) -> HandPose {
+    let bodies = hand_bodies(dimensions, hand);
+    let lowest = bodies.iter().flat_map(|body| body.ends().map(|end| end.y - body.radius));
+    let depth = lowest.fold(f64::INFINITY, f64::min) - table_y;
+    match depth < 0.0 {
+        true => hand.moved(&Vector3::new(0.0, -depth, 0.0)),
+        false => *hand,
+    }
+}
+
 /// Radius of the capsules of the palm over the breadth of the hand: half the thickness of a palm.
 const PALM_RADIUS_SHARE: f64 = 0.13;
 /// The metacarpals come together at the wrist: there they are so far apart, over their distance at the
@@ -157,6 +171,33 @@ mod tests {
             let inside = bodies[15..].iter().any(|body| body.distance(&point) < 0.0);
             assert!(inside, "({x}, {y}) is in no body of the palm");
             assert!(clearance(&bodies, std::iter::once(point)) < 0.0);
+        }
+    }
+
+    #[test]
+    fn hand_above_a_table_stays_and_one_in_it_is_raised_until_it_touches() {
+        let hand = HandDimensions::default();
+        let lowest = |pose: &HandPose| {
+            let bodies = hand_bodies(&hand, pose);
+            let of = |body: &HandBody| body.ends().map(|end| end.y - body.radius);
+            bodies.iter().flat_map(of).fold(f64::INFINITY, f64::min)
+        };
+        for (height, turn) in [(0.3, 0.4), (0.02, -1.3), (-0.1, 2.0)] {
+            let palm = Isometry3::new(Vector3::new(0.1, height, 0.0), Vector3::x() * turn);
+            let pose = pose(&hand, &JointAngles::from_array(&[0.5; 23]), palm);
+            let table_y = 0.01;
+            let held = above_table(&hand, &pose, table_y);
+            if lowest(&pose) >= table_y {
+                assert_eq!(held, pose);
+                continue;
+            }
+            assert!((lowest(&held) - table_y).abs() < 1e-12, "{height} m");
+            let way = held.world_from_palm.translation.vector - palm.translation.vector;
+            assert!(way.xz().norm() < 1e-15, "straight up");
+            for (now, before) in held.fingers.iter().zip(&pose.fingers) {
+                assert!((now.tip() - before.tip() - way).norm() < 1e-12);
+                assert!((now.contact_point - before.contact_point - way).norm() < 1e-12);
+            }
         }
     }
 }

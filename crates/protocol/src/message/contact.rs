@@ -4,7 +4,7 @@ use wincode::{SchemaRead, SchemaWrite};
 
 use super::answer::{Answer, AnswerPart};
 use super::fields::FieldSet;
-use super::large::{Deformation, LawName};
+use super::large::{Deformation, LawName, PathChoice};
 use super::model::ModelHash;
 use super::object_state::{ObjectState, ObjectStatePart};
 use super::question::{NodeChoice, Precision};
@@ -63,6 +63,12 @@ pub struct ContactAsk {
     pub deformation: Option<Deformation>,
     /// Energy of the material at large deformation.
     pub law: LawName,
+    /// Stress above which the material flows and stays deformed, Pa; `None` for a material that never does.
+    /// What has flowed is known to the session alone.
+    pub yield_stress: Option<f64>,
+    /// Whether the step goes on with the shape, the factor and the plastic strain of the session's last step
+    /// at large deformation, or finds the shape by the forces of the state from rest on.
+    pub path: PathChoice,
 }
 
 /// Answer to `ContactFrame`.
@@ -109,6 +115,8 @@ pub struct ContactReport {
     pub shapes: u32,
     /// Number of factors of the tangent that were made for this step.
     pub factors: u32,
+    /// Largest accumulated plastic strain, 0 without a yield stress.
+    pub plastic_strain: f64,
 }
 
 /// A point of the object's surface that presses on a body.

@@ -30,6 +30,8 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
                 newton_max: steps,
                 deformation,
                 law,
+                yield_stress: (rounds % 3 == 0).then_some(seconds),
+                path: if steps % 2 == 0 { PathChoice::Continue } else { PathChoice::FromRest },
             }
         },
     );
@@ -77,6 +79,7 @@ pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
                 is_large: shapes % 2 == 1,
                 shapes,
                 factors,
+                plastic_strain: slip_max,
             }
         },
     );

@@ -332,6 +332,8 @@ fn contact_frame() -> ContactFrame {
             newton_max: 400,
             deformation: Some(Deformation::Auto),
             law: LawName::NeoHookeanLog,
+            yield_stress: Some(750.0),
+            path: PathChoice::FromRest,
         },
         state: object_state(),
         bodies: vec![
@@ -381,6 +383,7 @@ fn contact_answer() -> ContactAnswer {
             is_large: true,
             shapes: 4,
             factors: 1,
+            plastic_strain: 0.125,
         },
         state: object_state(),
         points: vec![point],

@@ -20,7 +20,8 @@ use crate::mesh::TetMesh;
 /// Shapes: M elements, N nodes of the system (mid-edge nodes behind the corners). Units: m, Pa.
 #[derive(Clone, Debug)]
 pub struct Elements {
-    pub(super) body: Body,
+    /// What no step changes, shared by copies.
+    pub(super) body: Arc<Body>,
     /// `None` where the elements have no yield stress.
     pub(super) plastic: Option<Plastic>,
 }
@@ -41,7 +42,7 @@ impl Elements {
         materials: &[Material],
     ) -> Result<Self, AssemblyError> {
         let body = Body::try_new(mesh, element, quadratic, law, materials)?;
-        Ok(Self { body, plastic: None })
+        Ok(Self { body: Arc::new(body), plastic: None })
     }
 
     /// These elements with a yield stress, without plastic strain at first. Their elasticity is
@@ -83,6 +84,11 @@ impl Elements {
     /// Whether the elements have a yield stress.
     pub fn is_plastic(&self) -> bool {
         self.plastic.is_some()
+    }
+
+    /// Yield stress, Pa; `None` where the elements have none.
+    pub fn yield_stress(&self) -> Option<f64> {
+        self.plastic.as_ref().map(Plastic::yield_stress)
     }
 
     /// Largest accumulated plastic strain of a point, `Σ √(2/3) ‖dev e‖` of what flowed; 0 without a

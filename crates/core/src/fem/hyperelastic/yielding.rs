@@ -50,6 +50,11 @@ impl Plastic {
         Ok(Self { radius, points: vec![PlasticPoint::default(); points * body.rest.len()] })
     }
 
+    /// Yield stress, Pa.
+    pub fn yield_stress(&self) -> f64 {
+        self.radius / (2.0f64 / 3.0).sqrt()
+    }
+
     /// Bytes of the points' states.
     pub fn bytes(&self) -> usize {
         self.points.len() * size_of::<PlasticPoint>()

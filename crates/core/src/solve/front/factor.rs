@@ -49,7 +49,7 @@ pub enum FrontError {
     OtherPattern,
 }
 
-impl<T: Real> FrontFactor<T> {
+impl<T: FrontPrecision> FrontFactor<T> {
     /// Factors `K11` on the current rayon pool; the bits do not depend on its size.
     ///
     /// # Errors
@@ -79,9 +79,7 @@ impl<T: Real> FrontFactor<T> {
             false => self.analysis.blocks_max::<T>(),
         };
         probe_memory(limit * size_of::<T>())?;
-        let blocks = Blocks::new(limit);
-        let run = Run { analysis: &self.analysis, stiffness, blocks };
-        run.subtrees(&self.analysis.roots, 0, &mut self.panels).map(drop)
+        T::factor((&self.analysis, &mut self.panels), stiffness, limit)
     }
 
     /// Bytes of the panels.
@@ -246,9 +244,57 @@ impl<T: Real> FrontFactor<T> {
     }
 
     fn solve_ordered(&self, x: &mut [T], width: usize, paths: &Paths) {
-        solve_ordered((&self.analysis, &self.panels), x, width, paths);
+        T::solve((&self.analysis, &self.panels), x, width, paths);
     }
 }
+
+/// Precision of a factor: `f64`, or `f32` at half the time and memory for use with refinement.
+///
+/// Factorisation and substitution of both are compiled once, in this crate: a crate that names a factor
+/// would otherwise compile all their kernels again.
+pub trait FrontPrecision: Real {
+    /// Factors all fronts into their panels; `limit` numbers are the most that wait at once.
+    ///
+    /// # Errors
+    /// As [`FrontFactor::refactor`].
+    #[doc(hidden)]
+    fn factor(
+        into: (&FrontAnalysis, &mut [Lines<Self>]),
+        stiffness: &Stiffness,
+        limit: usize,
+    ) -> Result<(), FrontError>;
+
+    /// Substitutes along some paths; each row of `x` has `width` numbers.
+    #[doc(hidden)]
+    fn solve(by: (&FrontAnalysis, &[Lines<Self>]), x: &mut [Self], width: usize, paths: &Paths);
+}
+
+macro_rules! front_precision {
+    ($real:ty) => {
+        impl FrontPrecision for $real {
+            fn factor(
+                (analysis, panels): (&FrontAnalysis, &mut [Lines<Self>]),
+                stiffness: &Stiffness,
+                limit: usize,
+            ) -> Result<(), FrontError> {
+                let run = Run { analysis, stiffness, blocks: Blocks::new(limit) };
+                run.subtrees(&analysis.roots, 0, panels).map(drop)
+            }
+
+            fn solve(
+                by: (&FrontAnalysis, &[Lines<Self>]),
+                x: &mut [Self],
+                width: usize,
+                paths: &Paths,
+            ) {
+                solve_ordered(by, x, width, paths);
+            }
+        }
+    };
+}
+
+front_precision!(f64);
+front_precision!(f32);
 
 /// A factorisation, while it is made.
 struct Run<'a, T> {

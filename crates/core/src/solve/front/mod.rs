@@ -17,5 +17,5 @@ mod supernodes;
 mod tests;
 
 pub use analysis::FrontAnalysis;
-pub use factor::{FrontError, FrontFactor};
-pub use real::Real;
+pub use factor::{FrontError, FrontFactor, FrontPrecision};
+use real::Real;

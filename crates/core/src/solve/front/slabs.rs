@@ -30,7 +30,7 @@ struct Line([f64; 8]);
 /// A list of numbers that begins where a cache line does.
 ///
 /// Shapes: it holds at least as many as were asked for, rounded up to whole lines.
-pub(super) struct Lines<T> {
+pub struct Lines<T> {
     lines: Vec<Line>,
     numbers: PhantomData<T>,
 }

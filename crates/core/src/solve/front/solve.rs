@@ -11,7 +11,7 @@ use super::substitute::Panel;
 const SERIAL_PRODUCTS: usize = 400_000;
 
 /// Which fronts a solve passes through; both sets are closed towards the roots.
-pub(super) struct Paths {
+pub struct Paths {
     /// Fronts that right-hand sides reach on the way up.
     up: Vec<bool>,
     /// Fronts needed on the way down.

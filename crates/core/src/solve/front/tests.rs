@@ -57,7 +57,7 @@ fn partition_of(mesh: &TetMesh, known: &[u32]) -> Partition {
     Partition::try_new(&mesh.used_nodes(), known).unwrap()
 }
 
-fn factor_of<T: Real>(stiffness: &Stiffness, partition: &Partition) -> FrontFactor<T> {
+fn factor_of<T: FrontPrecision>(stiffness: &Stiffness, partition: &Partition) -> FrontFactor<T> {
     let analysis = Arc::new(FrontAnalysis::new(stiffness, partition));
     FrontFactor::try_new(&analysis, stiffness).unwrap()
 }

@@ -281,10 +281,11 @@ impl Session {
         budget.begin();
         let start = Instant::now();
         let asked = self.message_of(model, request);
-        let from_rest = matches!(
-            &asked,
-            Request::Ask(ask) if ask.large.is_some_and(|large| large.path == PathChoice::FromRest)
-        );
+        let from_rest = match &asked {
+            Request::Ask(ask) => ask.large.map(|large| large.path),
+            Request::ContactFrame(frame) => frame.ask.deformation.map(|_| frame.ask.path),
+            _ => None,
+        } == Some(PathChoice::FromRest);
         let reply = self.connection.ask_awake(&asked);
         let round_trip = start.elapsed();
         let bytes = self.connection.bytes_of_exchange();
@@ -324,7 +325,11 @@ impl Session {
                 Request::Ask(Box::new(ask))
             }
             TickQuestion::Step(frame) => {
-                let frame = ContactFrame { model: model.hash, ..(**frame).clone() };
+                let mut frame = ContactFrame { model: model.hash, ..(**frame).clone() };
+                // A new session knows nothing of the step before.
+                if self.answered_grip.is_none() {
+                    frame.ask.path = PathChoice::FromRest;
+                }
                 Request::ContactFrame(Box::new(frame))
             }
         }
