@@ -69,16 +69,18 @@ fn tangent_of(normal: &Vector3<f64>) -> Vector3<f64> {
 
 /// `W` and `b` of some points about a configuration.
 ///
+/// Shapes: `unpressed` the displacement of the response's rows if nothing pressed, m.
+///
 /// # Errors
 /// [`ProblemError`] where a number is not finite.
 pub(super) fn problem(
     scene: &Scene<'_>,
     response: &Response<'_>,
-    about: &Configuration,
+    (about, unpressed): (&Configuration, &[Vector3<f64>]),
     points: &[ProblemPoint],
 ) -> Result<ContactProblem, ProblemError> {
     let w = operator(scene, response, points);
-    let b = free_motion(scene, response, about, points);
+    let b = free_motion(scene, response, (about, unpressed), points);
     let cones = points.iter().map(|point| point.cone(scene)).collect();
     ContactProblem::try_new(w, b, cones)
 }
@@ -158,7 +160,7 @@ pub(super) fn residual(
 fn free_motion(
     scene: &Scene<'_>,
     response: &Response<'_>,
-    about: &Configuration,
+    (about, unpressed): (&Configuration, &[Vector3<f64>]),
     points: &[ProblemPoint],
 ) -> Vec<f64> {
     let at = about.configured();
@@ -167,11 +169,10 @@ fn free_motion(
     let h = scene.rigid.seconds;
     let shift = turn.inverse() * (h * (free.velocity - about.motion.velocity));
     let angle = turn.inverse() * (h * (free.angular_velocity - about.motion.angular_velocity));
-    let unpressed = response.displacement(&scene.elastic_forces(&[]));
     let mut b = Vec::with_capacity(3 * points.len());
     for p in points {
         let point = &p.point;
-        let elastic = scene.place(response, &unpressed, &point.nodes, &point.weights)
+        let elastic = scene.place(response, unpressed, &point.nodes, &point.weights)
             - scene.place(response, &about.displacement, &point.nodes, &point.weights);
         let body = usize::from(point.body);
         let pushed = scene.bodies[body].compliance * about.body_forces[body];

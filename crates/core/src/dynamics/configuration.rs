@@ -58,10 +58,11 @@ impl Scene<'_> {
 
     /// The configuration that contact forces in the frame of a turned object lead to.
     ///
-    /// The columns of all nodes with a force have been asked for.
+    /// The columns of all nodes with a force have been asked for. `unpressed` is the displacement of the
+    /// response's rows if nothing pressed.
     pub fn configuration(
         &self,
-        response: &Response<'_>,
+        (response, unpressed): (&Response<'_>, &[Vector3<f64>]),
         contacts: Vec<HeldContact>,
         at: &Configured<'_>,
     ) -> Configuration {
@@ -73,8 +74,13 @@ impl Scene<'_> {
             wrench.torque += (place - self.rigid.mass.centre).cross(&contact.force);
         }
         let motion = self.rigid.motion(&wrench, &at.world_from_object.rotation);
-        let forces = self.elastic_forces(&at_nodes(&contacts));
-        let displacement = response.displacement(&forces);
+        let pressing = at_nodes(&contacts);
+        let answered = self.answered();
+        let new: Vec<NodeForce> =
+            pressing.iter().map(|(node, force)| (*node, answered * force)).collect();
+        let mut displacement = response.moved(&new);
+        displacement.iter_mut().zip(unpressed).for_each(|(u, unpressed)| *u += unpressed);
+        let forces = self.elastic_forces(&pressing);
         Configuration { contacts, motion, forces, displacement, body_forces }
     }
 

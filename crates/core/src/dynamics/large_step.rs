@@ -225,7 +225,9 @@ impl LargeStep<'_, '_> {
             ..asked
         };
         let size = self.step.size();
-        let mut rounds = Rounds { settings: &settings, size, scene, response: &mut response };
+        let unpressed = &response.displacement(&scene.elastic_forces(&[]));
+        let mut rounds =
+            Rounds { settings: &settings, size, scene, response: &mut response, unpressed };
         let found = rounds.play(held, start)?;
         let all: Vec<u32> = (0..self.step.vertices.len() as u32).collect();
         let mut displacement: Vec<f64> =

@@ -42,6 +42,8 @@ pub(super) struct Rounds<'s, 'r> {
     pub size: f64,
     pub scene: &'s Scene<'s>,
     pub response: &'r mut Response<'s>,
+    /// Displacement of the response's rows at the end of the step if nothing pressed, m.
+    pub unpressed: &'r [Vector3<f64>],
 }
 
 /// The points of a contact problem, and how well the configuration that it is about answers it.
@@ -68,7 +70,7 @@ impl Rounds<'_, '_> {
         for contact in &held {
             pool.add(contact.into(), &mut []);
         }
-        let mut about = self.scene.configuration(self.response, held, start);
+        let mut about = self.configuration(held, start);
         let (mut rounds, mut sweeps, mut newton_steps) = (0, 0, 0);
         let mut best: Option<(f64, Configuration, Round)> = None;
         loop {
@@ -105,18 +107,24 @@ impl Rounds<'_, '_> {
                 residual: INEXACT * round.residual,
                 attempts_max: ATTEMPTS,
             };
-            let problem = problem(self.scene, self.response, &about, &round.points)?;
+            let about_now = (&about, self.unpressed);
+            let problem = problem(self.scene, self.response, about_now, &round.points)?;
             let solution = Solution::of(&problem, &round.lambda, budget);
             rounds += 1;
             sweeps += solution.sweeps;
             newton_steps += solution.newton_steps;
             let contacts = pressing(&round.points, &solution.lambda);
-            let next = self.scene.configuration(self.response, contacts, &about.configured());
+            let next = self.configuration(contacts, &about.configured());
             let about_now = std::mem::replace(&mut about, next);
             if best.as_ref().is_none_or(|(best_far, ..)| far < *best_far) {
                 best = Some((far, about_now, round));
             }
         }
+    }
+
+    /// The configuration that contact forces lead to.
+    fn configuration(&self, contacts: Vec<HeldContact>, at: &Configured<'_>) -> Configuration {
+        self.scene.configuration((&*self.response, self.unpressed), contacts, at)
     }
 
     /// Material points at the corners of all candidates.

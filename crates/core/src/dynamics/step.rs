@@ -123,7 +123,12 @@ impl ContactStep<'_> {
         let scene = self.scene(state, mass, response.displacement(&state.forces));
         let size = self.size();
         let settings = &self.settings;
-        let mut rounds = Rounds { settings, size, scene: &scene, response: &mut response };
+        // What is left of the shape that the step began with: the response is linear.
+        let left = 1.0 - scene.answered();
+        let unpressed: Vec<Vector3<f64>> = scene.begun.iter().map(|u| left * u).collect();
+        let unpressed = &unpressed;
+        let mut rounds =
+            Rounds { settings, size, scene: &scene, response: &mut response, unpressed };
         let start = Configured {
             world_from_object: state.world_from_object,
             displacement: &scene.begun,

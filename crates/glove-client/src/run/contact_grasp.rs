@@ -394,6 +394,11 @@ impl ContactGrasp {
         })
     }
 
+    /// Force of the table on the object, N, in the world frame; zero without contact.
+    pub fn table_force(&self) -> Vector3<f64> {
+        self.loads.first().map_or(Vector3::zeros(), |load| Vector3::from(load.force))
+    }
+
     /// Loads of the segments of a finger; empty before the first answer.
     fn loads_of(&self, digit: usize) -> &[BodyLoad] {
         let first = TABLE + 3 * digit;

@@ -127,6 +127,9 @@ impl FrictionTick<'_> {
         outcome.seen.state = Some(state);
         outcome.seen.world_from_object = *shown.world_from_object();
         outcome.seen.is_still = contact.is_still();
+        outcome.seen.finger_forces_n = contact.finger_forces().map(|force| force.norm());
+        outcome.seen.table_force_n = contact.table_force().norm();
+        outcome.seen.friction = contact.scene().friction;
         outcome.seen.is_late = contact.is_late(self.tick);
     }
 }

@@ -30,6 +30,12 @@ pub struct Seen {
     pub is_still: bool,
     /// Whether the object has not answered what the hand did before: a hand that lifts waits for it.
     pub is_late: bool,
+    /// Force of each finger on the object, N, thumb first; zero where none is known.
+    pub finger_forces_n: [f64; 5],
+    /// Force of the table on the object, N: its weight, while nothing else holds it.
+    pub table_force_n: f64,
+    /// Coefficient of friction between hand and object; 0 where nothing holds by friction.
+    pub friction: f64,
     /// Whether the object is being prepared and the person waits for it: the hand does not reach before.
     pub object_awaited: bool,
 }
@@ -89,6 +95,8 @@ pub struct ScriptedHand {
     lift: f64,
     /// Centre of the object that the hand came for, world.
     came_for: Option<Point3<f64>>,
+    /// Weight of the object, N, as the table felt it before the hand came.
+    weight_n: f64,
     /// How the object lay that the plan was made for, where it had rolled.
     planned_for: Option<UnitQuaternion<f64>>,
 }
@@ -106,6 +114,10 @@ const SQUEEZE: f64 = 1.5;
 /// Closure per tick far from and near the expected touch.
 const CLOSE_FAST: f64 = 0.03;
 const CLOSE_SLOW: f64 = 0.008;
+/// Closure per tick while a grip is tightened.
+const CLOSE_TIGHT: f64 = 0.003;
+/// A grip presses so many times as hard as friction needs to hold the weight.
+const GRIP_MARGIN: f64 = 2.5;
 /// How much further than expected a finger closes while it looks for the touch.
 const CLOSE_BEYOND: f64 = 0.15;
 impl ScriptedHand {
@@ -148,6 +160,7 @@ impl ScriptedHand {
             lift: 0.0,
             came_for: None,
             planned_for: None,
+            weight_n: 0.0,
         }
     }
 
@@ -239,6 +252,9 @@ impl ScriptedHand {
             // Until the fingers close the hand goes to where the object is.
             if matches!(step, Some(Step::Look | Step::Reach)) {
                 self.came_for = Some(seen.world_from_object * centre);
+                if seen.finger_forces_n == [0.0; 5] {
+                    self.weight_n = seen.table_force_n;
+                }
             }
             centre = self.came_for.unwrap_or(centre);
         }
@@ -271,7 +287,7 @@ impl ScriptedHand {
         let t = (f64::from(self.step_tick) / f64::from(ticks_max)).min(1.0);
         self.progress = t * t * (3.0 - 2.0 * t);
         self.close(step, seen);
-        if self.step_tick >= ticks_max || is_done(step, seen) {
+        if self.step_tick >= ticks_max || self.is_done(step, seen) {
             self.at += 1;
             self.step_tick = 0;
         }
@@ -323,9 +339,11 @@ impl ScriptedHand {
             }
             Step::Pinch => self.close_to(&plan.touch, progress),
             Step::Grip => self.close_to(&plan.press, progress),
+            Step::Tighten => self.tighten(seen),
             Step::Squeeze => {
                 let deeper = |digit: usize| {
-                    plan.touch[digit] + SQUEEZE * (plan.press[digit] - plan.touch[digit])
+                    let held = self.closure_before[digit].max(plan.press[digit]);
+                    held + (SQUEEZE - 1.0) * (plan.press[digit] - plan.touch[digit])
                 };
                 self.close_to(&std::array::from_fn(deeper), progress);
             }
@@ -346,6 +364,45 @@ impl ScriptedHand {
         for digit in 0..5 {
             let before = self.closure_before[digit];
             self.closure[digit] = before + progress * (closure[digit] - before);
+        }
+    }
+
+    /// Closes the thumb, and the fingers, by a little where they press less than it takes to lift.
+    fn tighten(&mut self, seen: &Seen) {
+        let lacks = self.lacks_grip(seen);
+        for digit in 0..5 {
+            let (lacks, holds) = match digit {
+                0 => (lacks[0], true),
+                // Fingers that only close along do not touch.
+                _ => (lacks[1], self.plan.press[digit] > self.plan.touch[digit]),
+            };
+            if lacks && holds {
+                self.closure[digit] = (self.closure[digit] + CLOSE_TIGHT).min(1.0);
+            }
+        }
+    }
+
+    /// Whether the thumb, and the fingers together, press less than holds the weight by friction.
+    fn lacks_grip(&self, seen: &Seen) -> [bool; 2] {
+        if seen.friction <= 0.0 {
+            return [false; 2];
+        }
+        // Each side holds half of the weight.
+        let needed = GRIP_MARGIN * 0.5 * self.weight_n / seen.friction;
+        let [thumb, fingers @ ..] = seen.finger_forces_n;
+        [thumb < needed, fingers.iter().sum::<f64>() < needed]
+    }
+
+    /// Whether the person sees and feels that the step has done what it was for.
+    fn is_done(&self, step: Step, seen: &Seen) -> bool {
+        match step {
+            Step::CloseThree => {
+                matches!(seen.state, Some(StateName::Attached | StateName::Deforming))
+            }
+            Step::CloseOthers => seen.state == Some(StateName::Deforming),
+            Step::Look => seen.is_still,
+            Step::Tighten => self.lacks_grip(seen) == [false; 2],
+            _ => false,
         }
     }
 
@@ -400,18 +457,6 @@ impl ScriptedHand {
             _ => 0.0,
         };
         above_ground(&palm, away)
-    }
-}
-
-/// Whether the person sees that the step has done what it was for.
-fn is_done(step: Step, seen: &Seen) -> bool {
-    match step {
-        Step::CloseThree => {
-            matches!(seen.state, Some(StateName::Attached | StateName::Deforming))
-        }
-        Step::CloseOthers => seen.state == Some(StateName::Deforming),
-        Step::Look => seen.is_still,
-        _ => false,
     }
 }
 

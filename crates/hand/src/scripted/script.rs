@@ -50,14 +50,14 @@ impl ScriptName {
     pub(super) fn steps(self) -> Vec<Step> {
         use Step::{
             CloseOthers, CloseThree, Grip, Hold, Keep, Look, Lower, Open, Pinch, Press, Raise,
-            Reach, Retreat, Squeeze,
+            Reach, Retreat, Squeeze, Tighten,
         };
         let squeeze = [Reach, CloseThree, CloseOthers, Press, Hold];
         match self {
             Self::Approach => vec![Reach, Hold, Retreat],
             Self::Lift => vec![
-                Look, Reach, Pinch, Grip, Raise, Hold, Squeeze, Hold, Keep, Hold, Lower, Open,
-                Retreat,
+                Look, Reach, Pinch, Grip, Tighten, Raise, Hold, Squeeze, Hold, Keep, Hold, Lower,
+                Open, Retreat,
             ],
             Self::Attach => vec![Reach, CloseThree, Hold, Open, Retreat],
             Self::Squeeze => squeeze.to_vec(),
@@ -101,6 +101,8 @@ pub(super) enum Step {
     Pinch,
     /// The fingers press as deep as was planned.
     Grip,
+    /// Thumb and fingers close on until they hold the object's weight by friction.
+    Tighten,
     /// The hand lifts what it holds.
     Raise,
     /// The fingers press deeper.
@@ -122,6 +124,7 @@ impl Step {
             Self::CloseThree | Self::CloseOthers => 90,
             Self::Press | Self::Grip | Self::Squeeze => 50,
             Self::Look => 150,
+            Self::Tighten => 120,
             Self::Pinch => 60,
             Self::Raise | Self::Lower => 70,
             Self::Hold => 15,

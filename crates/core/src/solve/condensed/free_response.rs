@@ -47,12 +47,23 @@ enum Source<'a> {
     Shape(ShapeResponse<'a>),
 }
 
+impl<'a> Source<'a> {
+    fn base(&self) -> &'a Base {
+        match self {
+            Source::Linear(elasticity) => elasticity.base,
+            Source::Shape(shape) => shape.base,
+        }
+    }
+}
+
 /// The response of some nodes (rows) to forces at nodes that are added as they are needed.
 ///
 /// Shapes: one 3 × 3 block for each row and each node with a force.
 pub struct Response<'a> {
     source: Source<'a>,
     rows: Vec<u32>,
+    /// Position of each row among the nodes of the surface; `None` for a node inside.
+    places: Vec<Option<usize>>,
     /// Columns of the held compliance, by node of the force.
     kept: BTreeMap<u32, Arc<ContactColumns>>,
 }
@@ -63,14 +74,20 @@ const TASK_ROWS: usize = 512;
 impl<'a> Response<'a> {
     /// Shapes: `rows` ascending nodes.
     pub fn new(elasticity: Elasticity<'a>, rows: Vec<u32>) -> Self {
-        Self { source: Source::Linear(elasticity), rows, kept: BTreeMap::new() }
+        Self::from(Source::Linear(elasticity), rows)
     }
 
     /// The response of a shape that is deformed already, to first order about it.
     ///
     /// Shapes: `rows` ascending nodes.
     pub fn about(shape: ShapeResponse<'a>, rows: Vec<u32>) -> Self {
-        Self { source: Source::Shape(shape), rows, kept: BTreeMap::new() }
+        Self::from(Source::Shape(shape), rows)
+    }
+
+    fn from(source: Source<'a>, rows: Vec<u32>) -> Self {
+        let surface = &source.base().surface;
+        let places = rows.iter().map(|&node| surface.place_of(node)).collect();
+        Self { source, rows, places, kept: BTreeMap::new() }
     }
 
     /// The nodes whose displacement can be asked for, ascending.
@@ -115,18 +132,11 @@ impl<'a> Response<'a> {
     /// If the node was not named to [`Response::need`].
     pub fn held(&self, node: u32) -> HeldCompliance<'_> {
         let columns = &self.kept[&node];
-        let nodes = &self.base().surface;
+        let nodes = &self.source.base().surface;
         HeldCompliance {
             nodes,
             surface: columns.surface(nodes),
             fields: columns.fields.each_ref().map(Vec::as_slice),
-        }
-    }
-
-    fn base(&self) -> &'a Base {
-        match self.source {
-            Source::Linear(elasticity) => elasticity.base,
-            Source::Shape(shape) => shape.base,
         }
     }
 
@@ -139,16 +149,20 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// Finishes the displacement of some nodes under forces, of which that of the columns is there.
-    fn finish(&self, forces: &[NodeForce], nodes: &[u32], displacement: &mut [[f64; 3]]) {
-        match self.source {
-            Source::Linear(elasticity) => elasticity.body.relieve(forces, nodes, displacement),
-            Source::Shape(shape) => {
-                for (u, &node) in displacement.iter_mut().zip(nodes) {
-                    let offset = &shape.offset[3 * node as usize..3 * node as usize + 3];
-                    u.iter_mut().zip(offset).for_each(|(u, offset)| *u += offset);
-                }
-            }
+    /// Takes from the displacement that the columns give to some nodes what inertia relieves.
+    fn relieve(&self, forces: &[NodeForce], nodes: &[u32], displacement: &mut [[f64; 3]]) {
+        // Columns about a shape are those of the free body.
+        if let Source::Linear(elasticity) = self.source {
+            elasticity.body.relieve(forces, nodes, displacement);
+        }
+    }
+
+    /// Adds the displacement that is left without forces.
+    fn add_offset(&self, nodes: &[u32], displacement: &mut [[f64; 3]]) {
+        let Source::Shape(shape) = self.source else { return };
+        for (u, &node) in displacement.iter_mut().zip(nodes) {
+            let offset = &shape.offset[3 * node as usize..3 * node as usize + 3];
+            u.iter_mut().zip(offset).for_each(|(u, offset)| *u += offset);
         }
     }
 
@@ -156,12 +170,31 @@ impl<'a> Response<'a> {
     ///
     /// Units: N, m. Frame: the object's.
     pub fn displacement(&self, forces: &[NodeForce]) -> Vec<Vector3<f64>> {
+        let mut u = self.moved_rows(forces);
+        self.add_offset(&self.rows, &mut u);
+        u.into_iter().map(Vector3::from).collect()
+    }
+
+    /// The part of [`Response::displacement`] that is in proportion to the forces.
+    ///
+    /// Units: N, m. Frame: the object's.
+    pub fn moved(&self, forces: &[NodeForce]) -> Vec<Vector3<f64>> {
+        self.moved_rows(forces).into_iter().map(Vector3::from).collect()
+    }
+
+    fn moved_rows(&self, forces: &[NodeForce]) -> Vec<[f64; 3]> {
         let mut u = vec![[0.0; 3]; self.rows.len()];
         for (node, force) in forces {
-            self.held(*node).add(force, &self.rows, &mut u);
+            let columns = self.held(*node);
+            for ((u, &node), place) in u.iter_mut().zip(&self.rows).zip(&self.places) {
+                match place {
+                    Some(place) => add_moved(u, force, &columns.surface[*place]),
+                    None => add_moved(u, force, &columns.block(node)),
+                }
+            }
         }
-        self.finish(forces, &self.rows, &mut u);
-        u.into_iter().map(Vector3::from).collect()
+        self.relieve(forces, &self.rows, &mut u);
+        u
     }
 
     /// Displacement of any nodes under forces at needed nodes, on the current rayon pool.
@@ -176,7 +209,8 @@ impl<'a> Response<'a> {
                 columns.add(force, nodes, u);
             }
         });
-        self.finish(forces, nodes, &mut u);
+        self.relieve(forces, nodes, &mut u);
+        self.add_offset(nodes, &mut u);
         u
     }
 
@@ -224,10 +258,16 @@ impl HeldCompliance<'_> {
     /// Adds what a force does to some nodes.
     fn add(&self, force: &Vector3<f64>, nodes: &[u32], displacement: &mut [[f64; 3]]) {
         for (u, &node) in displacement.iter_mut().zip(nodes) {
-            let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = self.block(node);
-            u[0] += force.x * xx + force.y * yx + force.z * zx;
-            u[1] += force.x * xy + force.y * yy + force.z * zy;
-            u[2] += force.x * xz + force.y * yz + force.z * zz;
+            add_moved(u, force, &self.block(node));
         }
     }
+}
+
+/// Adds what a force does to a node, from what unit forces along x, y and z do to it.
+#[inline]
+fn add_moved(u: &mut [f64; 3], force: &Vector3<f64>, block: &Block) {
+    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = block;
+    u[0] += force.x * xx + force.y * yx + force.z * zx;
+    u[1] += force.x * xy + force.y * yy + force.z * zy;
+    u[2] += force.x * xz + force.y * yz + force.z * zz;
 }
