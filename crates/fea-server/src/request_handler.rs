@@ -53,8 +53,16 @@ pub(crate) struct RequestHandler {
 }
 
 /// Names of this server's capabilities, for `Welcome`.
-const CAPABILITIES: [&str; 7] =
-    ["large", "cases", "contact", "cancel", "newest-wins", "report-levels", "fields"];
+const CAPABILITIES: [&str; 8] = [
+    "large",
+    "cases",
+    "contact",
+    "cancel",
+    "newest-wins",
+    "report-levels",
+    "fields",
+    "small-system",
+];
 /// Shortest time between two `Alive`.
 const ALIVE_MIN: Duration = Duration::from_millis(100);
 

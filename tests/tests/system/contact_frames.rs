@@ -61,6 +61,7 @@ impl Scene {
                 newton_max: 60,
                 deformation: self.deformation,
                 law: LawName::default(),
+                small_system: false,
             },
             state,
             bodies: vec![
