@@ -206,6 +206,7 @@ impl PressCommand {
             newton_max: 1000,
             deformation: Some(self.deformation),
             law: self.material,
+            small_system: false,
         }
     }
 
