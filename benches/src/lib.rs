@@ -22,6 +22,7 @@ pub mod collision;
 pub mod command;
 pub mod contact;
 pub mod echo;
+pub mod felt;
 pub mod fit;
 pub mod frontier;
 pub mod large;
@@ -62,6 +63,8 @@ pub enum ReportName {
     Scaling,
     /// Force of one press on finer meshes by each contact model, and its frame time.
     Contact,
+    /// Energy and error of forces that a hand feels of late answers, and their rate.
+    Felt,
     /// Tree build, refit and search against parry3d and brute force.
     Collision,
     /// Large deformation: error against time of frames, and random walks of the hand.
@@ -81,6 +84,7 @@ pub fn measure(name: ReportName, options: &Options) -> Result<Report, ReportErro
         ReportName::Limits => limits::measure(options),
         ReportName::Scaling => scaling::measure(options),
         ReportName::Contact => contact::measure(options),
+        ReportName::Felt => felt::measure(options),
         ReportName::Collision => collision::measure(options),
         ReportName::Large => large::measure(options),
         ReportName::Service => service::measure(options),

@@ -30,6 +30,16 @@ fn collision_is_timed_and_nothing_is_missed() {
 }
 
 #[test]
+fn forces_are_felt_without_energy() {
+    let report = quick(ReportName::Felt);
+    assert_eq!(report.column("felt.csv", "rendered").len(), 8);
+    let created = report.numbers("felt.csv", "created_mJ");
+    assert!(created.chunks_exact(4).all(|ways| ways[3] <= 1.0 + 1e-6), "{created:?}");
+    let rows = report.column("felt-rates.csv", "ticks");
+    assert!(rows.iter().all(|ticks| ticks.parse::<u64>().unwrap() > 100), "{rows:?}");
+}
+
+#[test]
 fn contacts_are_pressed_and_timed_with_small_errors() {
     let report = quick(ReportName::Contact);
     let contacts = report.column("contact.csv", "contact");

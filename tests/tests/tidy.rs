@@ -149,7 +149,7 @@ fn packages() -> Vec<String> {
 #[test]
 fn crates_depend_downwards_only() {
     // What each package may need of the others, and what it may not need at all.
-    let rules: [(&str, &[&str], &[&str]); 10] = [
+    let rules: [(&str, &[&str], &[&str]); 11] = [
         // JSON is the text of glTF, no form of the wire: no type of core derives a form of it.
         ("crates/core", &[], &["tokio", "serde"]),
         ("crates/protocol", &[], &["nalgebra", "rayon"]),
@@ -176,6 +176,11 @@ fn crates_depend_downwards_only() {
             &["softgrasp-core", "softgrasp-grasp", "softgrasp-hand", "softgrasp-window"],
             &["kiss3d", "egui", "wgpu", "serial2"],
         ),
+        (
+            "crates/force",
+            &["softgrasp-core", "softgrasp-os"],
+            &["tokio", "kiss3d", "softgrasp-protocol"],
+        ),
         ("crates/emulator", &["softgrasp-grasp", "softgrasp-hand"], &["tokio", "kiss3d"]),
         (
             "crates/fea-server",
@@ -187,6 +192,7 @@ fn crates_depend_downwards_only() {
             &[
                 "softgrasp-core",
                 "softgrasp-emulator",
+                "softgrasp-force",
                 "softgrasp-grasp",
                 "softgrasp-hand",
                 "softgrasp-os",

@@ -53,7 +53,7 @@ pub(crate) struct RequestHandler {
 }
 
 /// Names of this server's capabilities, for `Welcome`.
-const CAPABILITIES: [&str; 8] = [
+const CAPABILITIES: [&str; 9] = [
     "large",
     "cases",
     "contact",
@@ -62,6 +62,7 @@ const CAPABILITIES: [&str; 8] = [
     "report-levels",
     "fields",
     "contact-yield",
+    "small-system",
 ];
 /// Shortest time between two `Alive`.
 const ALIVE_MIN: Duration = Duration::from_millis(100);

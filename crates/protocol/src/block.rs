@@ -46,6 +46,12 @@ impl Block {
         read_fields(&self.0)
     }
 
+    /// The block without some bytes at its end, which a reader takes for zero.
+    pub(crate) fn without_last(mut self, bytes: usize) -> Self {
+        self.0.truncate(self.0.len().saturating_sub(bytes));
+        self
+    }
+
     /// Whether the block holds no field at all.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()

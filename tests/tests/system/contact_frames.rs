@@ -63,6 +63,7 @@ impl Scene {
                 law: LawName::default(),
                 yield_stress: None,
                 path: PathChoice::Continue,
+                small_system: false,
             },
             state,
             bodies: vec![

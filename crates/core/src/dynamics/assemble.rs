@@ -79,14 +79,19 @@ pub(super) fn problem(
     (about, unpressed): (&Configuration, &[Vector3<f64>]),
     points: &[ProblemPoint],
 ) -> Result<ContactProblem, ProblemError> {
-    let w = operator(scene, response, points);
+    let all: Vec<&ProblemPoint> = points.iter().collect();
+    let w = operator(scene, response, &all);
     let b = free_motion(scene, response, (about, unpressed), points);
     let cones = points.iter().map(|point| point.cone(scene)).collect();
     ContactProblem::try_new(w, b, cones)
 }
 
 /// `W`: place of every point per force at every point.
-fn operator(scene: &Scene<'_>, response: &Response<'_>, points: &[ProblemPoint]) -> DMatrix<f64> {
+pub(super) fn operator(
+    scene: &Scene<'_>,
+    response: &Response<'_>,
+    points: &[&ProblemPoint],
+) -> DMatrix<f64> {
     let n = points.len();
     let mut w = DMatrix::zeros(3 * n, 3 * n);
     // Held displacement of every point under the force of one.
@@ -101,7 +106,7 @@ fn operator(scene: &Scene<'_>, response: &Response<'_>, points: &[ProblemPoint])
         }
         // Symmetric: what lies above the diagonal is what lies below.
         for i in j..n {
-            let block = block(scene, &points[i], force, &moved[i]);
+            let block = block(scene, points[i], force, &moved[i]);
             w.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
             if i != j {
                 w.fixed_view_mut::<3, 3>(3 * j, 3 * i).copy_from(&block.transpose());

@@ -134,7 +134,7 @@ impl LargeStep<'_, '_> {
         }
         let is_sound = |end: &End| end.residual_rel.is_finite() && end.told.is_finite();
         let Some(end) = progress.best.filter(is_sound) else { return Err(StepError::InsideOut) };
-        let outcome = self.finished(&scene, (rows, end), wanted);
+        let outcome = self.finished(&scene, (rows, end), wanted)?;
         Ok(progress.effort.told(outcome))
     }
 
@@ -261,11 +261,15 @@ impl LargeStep<'_, '_> {
         scene: &Scene<'_>,
         (rows, end): (Vec<u32>, End),
         wanted: &[u32],
-    ) -> StepOutcome {
+    ) -> Result<StepOutcome, StepError> {
         let Elasticity { base, body, .. } = self.step.elasticity;
         let End { found, displacement, tangent, offset, told, far, .. } = end;
         let shape = ShapeResponse { base, body, tangent: &tangent, offset: &offset };
-        let response = Response::about(shape, rows);
+        let mut response = Response::about(shape, rows);
+        if self.step.settings.small_system {
+            let pressing = found.pressing.iter().flat_map(|(p, _)| p.point.weighted());
+            response.need(pressing.map(|(node, _)| node))?;
+        }
         let of_node = |&node: &u32| {
             let at = 3 * node as usize;
             [displacement[at], displacement[at + 1], displacement[at + 2]]
@@ -275,7 +279,7 @@ impl LargeStep<'_, '_> {
         let (elements, forces) = (Arc::clone(self.body.elements()), found.end.forces);
         self.body.put(Shape { elements, displacement, forces });
         let is_converged = far <= 1.0;
-        StepOutcome { residual_rel: told, is_converged, ..outcome }
+        Ok(StepOutcome { residual_rel: told, is_converged, ..outcome })
     }
 
     /// Mass and inertia of the body in its shape.

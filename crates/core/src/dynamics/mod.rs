@@ -26,9 +26,13 @@ mod large_step;
 mod large_tests;
 #[cfg(test)]
 mod law_tests;
+mod resultants;
 mod rigid_motion;
 mod rounds;
 mod settings;
+mod small_system;
+#[cfg(test)]
+mod small_system_tests;
 mod state;
 mod step;
 #[cfg(test)]
@@ -42,6 +46,7 @@ pub use large_body::LargeBody;
 pub use large_step::LargeStep;
 pub use rigid_motion::MassProperties;
 pub use settings::{StepError, StepSettings};
+pub use small_system::{BodyContact, SmallSystem};
 pub use state::{BodyLoad, PointContact, StepOutcome};
 pub use state::{HeldContact, ObjectState};
 pub use step::ContactStep;

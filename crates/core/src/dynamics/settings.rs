@@ -25,6 +25,8 @@ pub struct StepSettings {
     pub rounds_max: usize,
     /// Steps of Newton's method after which no further round is begun.
     pub newton_max: usize,
+    /// Whether the small system of the step is wanted.
+    pub small_system: bool,
 }
 
 impl Default for StepSettings {
@@ -38,6 +40,7 @@ impl Default for StepSettings {
             residual_rel: 1e-9,
             rounds_max: 16,
             newton_max: 400,
+            small_system: false,
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use super::small_system::SmallSystem;
 use crate::contact::coulomb::PointState;
 use crate::solve::condensed::NodeForce;
 
@@ -134,6 +135,9 @@ pub struct StepOutcome {
     pub newton_steps: usize,
     /// Shapes that contact was solved about, one after the other; 1 for a linear step.
     pub shapes: usize,
+    /// How the forces of the bodies follow from their places at the end; `None` where it was not asked for
+    /// or could not be made.
+    pub small_system: Option<SmallSystem>,
 }
 
 impl StepOutcome {

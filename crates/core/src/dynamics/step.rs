@@ -8,6 +8,7 @@ use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
 use super::configuration::{Configured, Scene, sums_by_body};
 use super::features::{Candidate, merged};
+use super::resultants::small_system;
 use super::rigid_motion::{MassProperties, RigidStep};
 use super::rounds::{Found, Rounds};
 use super::settings::{StepError, StepSettings};
@@ -258,6 +259,10 @@ impl ContactStep<'_> {
             let friction = self.bodies[usize::from(point.point.body)].friction;
             FrictionCone { friction }.violation(point.local(force))
         };
+        let small_system = match self.settings.small_system {
+            true => small_system(scene, response, found),
+            false => None,
+        };
         StepOutcome {
             state: ObjectState {
                 world_from_object,
@@ -280,6 +285,7 @@ impl ContactStep<'_> {
             sweeps: found.sweeps,
             newton_steps: found.newton_steps,
             shapes: 1,
+            small_system,
         }
     }
 }

@@ -6,15 +6,16 @@ use std::time::Instant;
 
 use softgrasp_core::contact::coulomb::PointState;
 use softgrasp_core::dynamics::{
-    BodyLoad, Candidate, ContactStep, MovingBody, ObjectState, PointContact, StepSettings,
+    BodyContact, BodyLoad, Candidate, ContactStep, MovingBody, ObjectState, PointContact,
+    SmallSystem, StepSettings,
 };
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{Contact, Elasticity};
 use softgrasp_protocol::{
-    Answer, BodyLoad as LoadMessage, ContactAnswer, ContactAsk, ContactFrame, ContactPoint,
-    ContactReport, Deformation, Displacements, FieldSet, FieldValues, NodeChoice, PathChoice,
-    Precision, SolveReport,
+    Answer, BodyContact as ContactMessage, BodyLoad as LoadMessage, ContactAnswer, ContactAsk, ContactFrame,
+    ContactPoint, ContactReport, Deformation, Displacements, FieldSet, FieldValues, NodeChoice,
+    PathChoice, Precision, SmallSystem as SmallSystemMessage, SolveReport,
 };
 
 use super::contact_large::{LargeWish, Made, PressedSeat};
@@ -229,6 +230,7 @@ impl PosedContact {
             chosen_because: "contact with friction".to_owned(),
             ..SolveReport::default()
         };
+        let small_system = outcome.small_system.as_ref().map(small_message).unwrap_or_default();
         let contact = ContactReport {
             penetration_max: outcome.penetration_max,
             slip_max: outcome.slip_max,
@@ -244,6 +246,7 @@ impl PosedContact {
             shapes: outcome.shapes as u32,
             factors: factors as u32,
             plastic_strain,
+            small_contacts: small_system.contacts.len() as u32,
         };
         let displacements = Displacements::of(outcome.displacements, self.precision);
         ContactAnswer {
@@ -261,6 +264,7 @@ impl PosedContact {
             state: state_message(&outcome.state),
             points: outcome.contacts.iter().map(point_message).collect(),
             loads: outcome.loads.iter().map(load_message).collect(),
+            small_system,
         }
     }
 }
@@ -281,6 +285,21 @@ fn point_message(point: &PointContact) -> ContactPoint {
         normal: point.normal.into(),
         force: point.force.into(),
         slip: point.slip.into(),
+    }
+}
+
+fn small_message(system: &SmallSystem) -> SmallSystemMessage {
+    let contact = |contact: &BodyContact| ContactMessage {
+        body: u32::from(contact.body),
+        place: contact.place.into(),
+        normal: contact.normal.into(),
+        force: contact.force.into(),
+        friction: contact.friction,
+    };
+    SmallSystemMessage {
+        contacts: system.contacts.iter().map(contact).collect(),
+        // Symmetric: its columns are its rows.
+        compliance: system.compliance.as_slice().to_vec(),
     }
 }
 

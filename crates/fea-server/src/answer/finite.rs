@@ -16,6 +16,7 @@ pub(crate) fn is_finite(reply: &Reply) -> bool {
                 && contact.points.iter().all(vectors)
                 && all(state.pose.iter().chain(&state.velocity).chain(&state.angular_velocity))
                 && all(state.forces.iter().flatten())
+                && all(&contact.small_system.compliance)
         }
         _ => true,
     }

@@ -14,6 +14,7 @@ mod elasticity_arguments;
 pub mod emulate;
 mod field_arguments;
 pub mod fill;
+mod force_arguments;
 mod gestures;
 mod hand_files;
 pub mod inspect;

@@ -209,6 +209,7 @@ impl PressCommand {
             yield_stress: elasticity.yield_stress,
             // The first step of a session finds nothing to go on with.
             path: PathChoice::Continue,
+            small_system: false,
         }
     }
 

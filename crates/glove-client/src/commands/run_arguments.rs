@@ -23,6 +23,7 @@ use super::access_arguments::AccessArguments;
 use super::contact_arguments::{ContactArguments, GraspRule};
 use super::display_arguments::DisplayArguments;
 use super::elasticity_arguments::ElasticityArguments;
+use super::force_arguments::ForceArguments;
 use super::hand_files::read_configuration;
 use super::numbers::{count, place, poisson, positive, speed, ticks};
 use super::page_arguments::PageArguments;
@@ -131,6 +132,8 @@ pub struct RunArguments {
     pub(super) shown: DisplayArguments,
     #[command(flatten)]
     pub(super) page: PageArguments,
+    #[command(flatten)]
+    pub(super) felt: ForceArguments,
     /// Folder for the deformed object at key frames (VTU).
     #[arg(long, value_name = "D")]
     pub(super) out_dir: Option<PathBuf>,
@@ -192,6 +195,8 @@ pub(super) struct RunPlan {
     pub(super) settings: SolveSettings,
     /// Constants of a grasp by friction; `None` for the thesis's rules.
     pub(super) contact_scene: Option<ContactScene>,
+    /// Device that takes the forces.
+    pub(super) force: Option<softgrasp_force::Target>,
     /// Place where the object is put.
     pub(super) place: ObjectPlace,
     /// Server that solves.
@@ -288,8 +293,10 @@ impl RunArguments {
         let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
         let is_xr = self.takes_headset(&hand)?;
         let watched = self.is_watched();
+        let (force, contact_scene) = self.felt.of_run(rule.scene)?;
         // Devices have a time of their own.
-        let rate = self.rate.or((watched || hand.is_live()).then_some(WATCHED_RATE_HZ));
+        let is_timed = watched || hand.is_live() || force.is_some();
+        let rate = self.rate.or(is_timed.then_some(WATCHED_RATE_HZ));
         let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
         let object_size =
             self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
@@ -311,7 +318,8 @@ impl RunArguments {
                 elasticity,
                 max_error: self.max_error,
             },
-            contact_scene: rule.scene,
+            contact_scene,
+            force,
             place: self.place.map_or(ObjectPlace::Home, PlaceChoice::place),
             endpoint: self.access.to(&server)?,
             server,
@@ -416,6 +424,7 @@ impl RunArguments {
             regions: recorded_regions(setup),
             settings: recorded_settings(setup)?,
             contact_scene: recorded_scene(setup),
+            force: None,
             place: if setup.placed_in_hand { ObjectPlace::Hand } else { ObjectPlace::Home },
             endpoint: self.access.to(&server)?,
             server,

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use nalgebra::Isometry3;
+use softgrasp_force::Renderer;
 use softgrasp_grasp::grasp::Grasp;
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_hand::foreign_recording::{ForeignHand, is_foreign};
@@ -137,6 +138,9 @@ pub(super) fn make_ready(
     if let Some(scene) = plan.contact_scene {
         let table_y = Some(grasp_loop.object().rest_shape().bottom());
         grasp_loop.grasp_with_friction(ContactScene { table_y, ..scene });
+        if let Some(target) = plan.force.clone() {
+            grasp_loop.feel(Renderer::start(target).context("the hand cannot feel")?);
+        }
     }
     grasp_loop.put_object(plan.place);
     if let Some(period) = plan.period {

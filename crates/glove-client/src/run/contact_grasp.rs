@@ -1,9 +1,12 @@
 //! A grasp by contact with friction: the free object among the rigid bodies of the hand and above a
 //! table, in steps of time.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use std::time::Instant;
+
+use nalgebra::{Isometry3, Vector3};
 use softgrasp_core::dynamics::{Candidate, MovingBody};
 use softgrasp_core::rigid_body::RigidShape;
+use softgrasp_force::ForceReport;
 use softgrasp_grasp::grasp::StateName;
 use softgrasp_grasp::hand::{HAND_BODIES, HandBody};
 use softgrasp_grasp::object::SoftObject;
@@ -19,6 +22,7 @@ use crate::ask::contact_frame::{
 use crate::ask::link::ReachedStep;
 use crate::ask::solve_settings::Elasticity;
 use crate::run::contact_ledger::StepRecord;
+use crate::run::felt::FeltHand;
 
 /// Constants of an object and of the hand that grasps it with friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +80,8 @@ pub struct ContactGrasp {
     slow_steps: u32,
     /// State that was reported last.
     told: Option<StateName>,
+    /// Force that the hand feels.
+    felt: Option<FeltHand>,
 }
 
 /// Poses of the bodies of a hand at a time, s.
@@ -108,6 +114,7 @@ pub struct StepWish {
 
 struct Asked {
     tick: u64,
+    at: Instant,
     hand: HandMoment,
     /// Extent of the object at rest, m ([`extent`]).
     extent: f64,
@@ -161,6 +168,7 @@ impl ContactGrasp {
             still_steps: 0,
             slow_steps: 0,
             told: None,
+            felt: None,
         }
     }
 
@@ -191,6 +199,7 @@ impl ContactGrasp {
     pub fn put(&mut self, world_from_object: Isometry3<f64>) {
         self.state = ObjectState::at_rest(pose_of(&world_from_object));
         self.loads.clear();
+        self.felt.iter_mut().for_each(FeltHand::let_go);
         self.let_go();
         (self.asked, self.still_steps, self.strayed) = (None, 0, true);
     }
@@ -204,6 +213,7 @@ impl ContactGrasp {
     /// Makes the present shape the rest shape; the object keeps its pose.
     pub fn meet_new_shape(&mut self) {
         self.state = ObjectState::at_rest(self.state.pose);
+        self.felt.iter_mut().for_each(FeltHand::let_go);
         (self.asked, self.still_steps, self.strayed) = (None, 0, true);
     }
 
@@ -225,10 +235,13 @@ impl ContactGrasp {
         object: &SoftObject,
         wish: StepWish,
     ) -> Option<ContactFrame> {
+        let world_from_bodies = std::array::from_fn(|i| hand[i].world_from_body);
+        if let Some(felt) = &self.felt {
+            felt.hand(self.world_from_table(), &world_from_bodies);
+        }
         if self.asked.is_some() {
             return None;
         }
-        let world_from_bodies = std::array::from_fn(|i| hand[i].world_from_body);
         let moment = HandMoment { time_s: now_s, world_from_bodies };
         let before = self.hand.get_or_insert_with(|| moment.clone());
         let seconds = match now_s - before.time_s {
@@ -262,8 +275,28 @@ impl ContactGrasp {
             displacement: object.displacement(),
             nodes: wish.nodes,
         };
-        self.asked = Some(Asked { tick, hand: moment, extent });
+        self.asked = Some(Asked { tick, at: Instant::now(), hand: moment, extent });
         Some(step_object.frame_among(self.state.clone(), &bodies, ask, &near))
+    }
+
+    /// Lets the hand feel the object from now on.
+    pub(crate) fn feel(&mut self, felt: FeltHand) {
+        self.felt = Some(felt);
+    }
+
+    /// Says whether the server that the force comes from is there.
+    pub(crate) fn feel_server(&self, is_lost: bool) {
+        self.felt.iter().for_each(|felt| felt.server(is_lost));
+    }
+
+    /// Ends the force and tells of it.
+    pub(crate) fn end_force(&mut self) -> Option<ForceReport> {
+        self.felt.take().map(FeltHand::finish)
+    }
+
+    /// Pose of the table; without one a plane far below stands for it: the places of the others stay.
+    fn world_from_table(&self) -> Isometry3<f64> {
+        Isometry3::translation(0.0, self.scene.table_y.unwrap_or(-1e3), 0.0)
     }
 
     fn ask(&self, seconds: f64, wish: &StepWish) -> ContactAsk {
@@ -282,19 +315,18 @@ impl ContactGrasp {
             law,
             yield_stress,
             path: if self.strayed { PathChoice::FromRest } else { wish.path },
+            small_system: self.felt.is_some(),
         }
     }
 
     /// Bodies of a step, each with its motion since the last answer: the table, then the hand.
     fn bodies(&self, hand: &[HandBody; HAND_BODIES]) -> Vec<StepBody> {
         let friction = self.scene.friction;
-        // Without a table a plane far below stands for it: the places of the others stay.
-        let table_y = self.scene.table_y.unwrap_or(-1e3);
         let up = Vector3::y_axis();
         let table = StepBody {
             moving: MovingBody::resting(
                 RigidShape::Plane { normal: up },
-                Isometry3::translation(0.0, table_y, 0.0),
+                self.world_from_table(),
                 friction,
             ),
             shape: BodyShape::Plane { normal: up.into_inner().into() },
@@ -348,7 +380,7 @@ impl ContactGrasp {
         let Some(asked) = self.asked.take_if(|asked| asked.tick == tick) else {
             return TakenStep::NotAsked;
         };
-        let ReachedStep { contact, state, loads } = reached;
+        let ReachedStep { contact, state, loads, small_system } = reached;
         let extent = asked.extent;
         let moved = Vector3::from_fn(|axis, _| state.pose[axis] - self.state.pose[axis]).norm();
         let is_far = contact.penetration_max > LOST_DEPTH * extent || moved > LOST_WAY * extent;
@@ -358,6 +390,10 @@ impl ContactGrasp {
             return TakenStep::Lost;
         }
         let norm = |v: &[f64; 3]| v[0].hypot(v[1]).hypot(v[2]);
+        let world_from_table = self.world_from_table();
+        if let Some(felt) = &mut self.felt {
+            felt.answer(&small_system, world_from_table, &asked.hand.world_from_bodies, asked.at);
+        }
         let speed = norm(&state.velocity).max(norm(&state.angular_velocity) * extent);
         let is_still = speed < STILL_SPEED;
         self.still_steps = if is_still { self.still_steps.saturating_add(1) } else { 0 };
@@ -452,42 +488,4 @@ impl ContactGrasp {
             })
         })
     }
-}
-
-/// Segments of a hand that gives way to forces. A joint moves as far as the segments on both sides of it,
-/// and those before it, are pushed back, so that none stays inside the object; every segment turns so
-/// that it still joins its two ends.
-///
-/// Shapes: `segments` world from segment, thumb first, from the palm outward, +Y along the bone; `ends`
-/// the tip of each finger. Units: m. Frame: world.
-pub fn given_way(
-    segments: &[[Isometry3<f64>; 3]; 5],
-    ends: &[Point3<f64>; 5],
-    pushed_back: &[[Vector3<f64>; 3]; 5],
-) -> [[Isometry3<f64>; 3]; 5] {
-    std::array::from_fn(|digit| {
-        let push = &pushed_back[digit];
-        if push.iter().all(|p| *p == Vector3::zeros()) {
-            return segments[digit];
-        }
-        let joint = |i: usize| Point3::from(segments[digit][i].translation.vector);
-        let before = [joint(0), joint(1), joint(2), ends[digit]];
-        // What pushes a segment moves both its ends and all beyond it.
-        let after = [
-            before[0] + push[0],
-            before[1] + longest(&push[..2]),
-            before[2] + longest(push),
-            before[3] + longest(push),
-        ];
-        std::array::from_fn(|i| {
-            let (old, new) = (before[i + 1] - before[i], after[i + 1] - after[i]);
-            let turn = UnitQuaternion::rotation_between(&old, &new).unwrap_or_default();
-            let rotation = turn * segments[digit][i].rotation;
-            Isometry3::from_parts(Translation3::from(after[i].coords), rotation)
-        })
-    })
-}
-
-fn longest(pushes: &[Vector3<f64>]) -> Vector3<f64> {
-    pushes.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default()
 }

@@ -9,7 +9,8 @@ use softgrasp_protocol::PathChoice;
 
 use crate::ask::digest::step_digest;
 use crate::ask::unanswered::Unanswered;
-use crate::run::contact_grasp::{ContactGrasp, StepWish, given_way};
+use crate::run::contact_grasp::{ContactGrasp, StepWish};
+use crate::run::given_way::given_way;
 use crate::run::holding::Holding;
 use crate::run::live_object::LiveObject;
 use crate::run::shown::Shown;
@@ -82,6 +83,7 @@ impl FrictionTick<'_> {
             Some(recorded) => recorded.gives_up_step,
             None => !questions.link().is_connected(),
         };
+        contact.feel_server(is_given_up);
         // A server that is gone answers nothing any more: of what it was asked the newest waits for the next.
         if is_given_up {
             outcome.gave_up_step |= contact.give_up_any();

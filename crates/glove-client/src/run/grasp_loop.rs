@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use softgrasp_force::{ForceReport, Renderer};
 use softgrasp_grasp::grasp::{
     Command, Contact, Grasp, GraspError, GraspEvent, HandSegments, StateName, StepInput,
     StepOutput, sense,
@@ -25,6 +26,7 @@ use crate::object::object_place::ObjectPlace;
 use crate::pace::Pace;
 use crate::run::changing::{Changing, Replacement};
 use crate::run::contact_grasp::{ContactGrasp, ContactScene};
+use crate::run::felt::FeltHand;
 use crate::run::friction::FrictionTick;
 use crate::run::holding::Holding;
 use crate::run::live_object::LiveObject;
@@ -77,6 +79,18 @@ impl GraspLoop {
     /// the thesis's rules.
     pub fn grasp_with_friction(&mut self, scene: ContactScene) {
         self.holding.by_friction(scene, &mut self.object.shown);
+    }
+
+    /// Lets the hand feel what a grasp by friction presses it with.
+    pub fn feel(&mut self, renderer: Renderer) {
+        if let Some(contact) = self.holding.friction_mut() {
+            contact.feel(FeltHand::new(renderer));
+        }
+    }
+
+    /// Ends the force and tells of it; `None` without any.
+    pub fn end_force(&mut self) -> Option<ForceReport> {
+        self.holding.friction_mut()?.end_force()
     }
 
     /// State of the grasp by friction, if there is one.

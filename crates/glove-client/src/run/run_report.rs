@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use serde::Serialize;
+use softgrasp_force::ForceReport;
 use softgrasp_grasp::grasp::{GraspEvent, StateName};
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_hand::hand_reader::DeviceFaults;
@@ -52,6 +53,8 @@ pub struct RunReport {
     pub frames_missing: Option<String>,
     /// The run in a few numbers.
     pub summary: RunSummary,
+    /// Forces that a device has rendered; null without one.
+    pub force: Option<ForceReport>,
     /// Comparison of a replay with its recording; null for other hands.
     pub replay: Option<ReplaySummary>,
     /// Reason why the recording of this run is incomplete; null if it is complete, or if there is none.
@@ -232,6 +235,7 @@ impl RunReport {
             played: PlayedTicks::default(),
             frames_missing: None,
             summary: RunSummary::default(),
+            force: None,
             replay: None,
             recording_failed: None,
             no_hand: None,

@@ -333,6 +333,7 @@ impl Session {
         self.report.interrupted = interrupted;
         self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
         self.report.summary.latency = self.latency.summary();
+        self.report.force = self.grasp_loop.end_force();
         let fit = self.grasp_loop.reader().fit_errors();
         self.report.summary.joint_fit = (fit.records > 0).then_some(fit);
         if let HandSource::Live(hand) = &self.hand {

@@ -9,6 +9,7 @@ use super::model::ModelHash;
 use super::object_state::{ObjectState, ObjectStatePart};
 use super::question::{NodeChoice, Precision};
 use super::rigid_body::{BodyMotion, check_bodies, count_of_bodies, read_bodies, write_bodies};
+use super::small_system::SmallSystem;
 use crate::block::Block;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
@@ -69,6 +70,8 @@ pub struct ContactAsk {
     /// Whether the step goes on with the shape, the factor and the plastic strain of the session's last step
     /// at large deformation, or finds the shape by the forces of the state from rest on.
     pub path: PathChoice,
+    /// Whether the small system of the step is wanted.
+    pub small_system: bool,
 }
 
 /// Answer to `ContactFrame`.
@@ -84,6 +87,8 @@ pub struct ContactAnswer {
     pub points: Vec<ContactPoint>,
     /// Force and torque of each body on the object, in the order of the bodies.
     pub loads: Vec<BodyLoad>,
+    /// How the forces of the bodies follow from their places, with as many contacts as the report says.
+    pub small_system: SmallSystem,
 }
 
 /// How well the answer of a step meets the law of contact.
@@ -117,6 +122,8 @@ pub struct ContactReport {
     pub factors: u32,
     /// Largest accumulated plastic strain, 0 without a yield stress.
     pub plastic_strain: f64,
+    /// Number of bodies of the small system; 0 where it was not asked for, or nothing presses.
+    pub small_contacts: u32,
 }
 
 /// A point of the object's surface that presses on a body.
@@ -180,6 +187,22 @@ const LOADS: &str = "loads of bodies";
 const POINT_NUMBERS: usize = 12;
 const LOAD_NUMBERS: usize = 7;
 
+impl ContactAsk {
+    /// The fields; one that asks for no small system is as short as it was before there were any.
+    fn block(&self) -> Result<Block, EncodeError> {
+        let block = Block::of(self)?;
+        Ok(if self.small_system { block } else { block.without_last(size_of::<bool>()) })
+    }
+}
+
+impl ContactReport {
+    /// The fields with the number of bodies of a small system, which is left out where it is 0.
+    fn block(&self, small_contacts: u32) -> Result<Block, EncodeError> {
+        let block = Block::of(&Self { small_contacts, ..*self })?;
+        Ok(if small_contacts > 0 { block } else { block.without_last(size_of::<u32>()) })
+    }
+}
+
 impl ContactFrame {
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
         let (count, expected) = (self.triangle_bodies.len(), self.triangles.len());
@@ -193,7 +216,7 @@ impl ContactFrame {
         };
         writer.part(&ContactFramePart {
             model: self.model,
-            ask: Block::of(&self.ask)?,
+            ask: self.ask.block()?,
             state: Block::of(&self.state.part()?)?,
             body_count: count_of_bodies(&self.bodies)?,
             triangle_count: count_of(TRIANGLES, expected)?,
@@ -243,7 +266,7 @@ impl ContactAnswer {
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
         writer.part(&ContactAnswerPart {
             answer: Block::of(&self.answer.part()?)?,
-            contact: Block::of(&self.contact)?,
+            contact: self.contact.block(self.small_system.count()?)?,
             state: Block::of(&self.state.part()?)?,
             point_count: count_of(POINTS, self.points.len())?,
             load_count: count_of(LOADS, self.loads.len())?,
@@ -264,6 +287,7 @@ impl ContactAnswer {
             .flat_map(|l| l.force.into_iter().chain(l.torque).chain([l.normal_force]))
             .collect();
         writer.array(&numbers);
+        self.small_system.write_arrays(writer);
         Ok(())
     }
 
@@ -304,6 +328,8 @@ impl ContactAnswer {
             contacts,
         });
         let (points, loads) = (points.collect(), loads.collect());
-        Ok(Self { answer, contact: part.contact.read()?, state, points, loads })
+        let contact: ContactReport = part.contact.read()?;
+        let small_system = SmallSystem::read_arrays(reader, contact.small_contacts)?;
+        Ok(Self { answer, contact, state, points, loads, small_system })
     }
 }

@@ -18,6 +18,7 @@ mod report;
 mod request;
 mod rigid_body;
 mod session;
+mod small_system;
 
 pub use answer::{Answer, CaseAnswer, Displacements};
 pub use ask::{Ask, Body, Subject};
@@ -41,3 +42,4 @@ pub use report::{ReportLevel, SolveReport, StageMs, Warning, WarningCode, Warnin
 pub use request::Request;
 pub use rigid_body::{BodyMotion, BodyShape, Pose};
 pub use session::{Hello, Welcome};
+pub use small_system::{BodyContact, SmallSystem};

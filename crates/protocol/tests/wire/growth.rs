@@ -91,3 +91,30 @@ fn report_of_another_level_is_shorter_and_says_what_it_leaves_out() {
     let none = answer.report.clone().at_level(ReportLevel::None);
     assert!(none.is_untold() && none.max_strain.is_nan() && none.error_bound_rel.is_none());
 }
+
+#[test]
+fn a_frame_without_a_small_system_is_what_it_was_before_there_were_any() {
+    let of = |name: &str| {
+        let found = variants().into_iter().find(|(known, _)| *known == name);
+        only_frame(&found.unwrap().1.encode()).payload.len()
+    };
+    let plain = |kind: Kind| only_frame(&sample(kind).encode()).payload.len();
+    // The part is padded, so that a field of one byte may cost nothing.
+    assert!((0..=8).contains(&(of("ContactFrame-small") - plain(Kind::ContactFrame))));
+    let arrays = 8 + 8 * 10 + 8 * 9;
+    let more = of("ContactAnswer-small") - plain(Kind::ContactAnswer);
+    assert!((arrays..=arrays + 8).contains(&more), "{more}");
+}
+
+#[test]
+fn a_small_system_without_its_compliance_is_not_sent() {
+    let Message::Reply(_, Reply::ContactAnswer(answer)) = sample(Kind::ContactAnswer) else {
+        unreachable!()
+    };
+    let body =
+        BodyContact { body: 0, place: [0.0; 3], normal: [0.0; 3], force: [0.0; 3], friction: 0.0 };
+    let small_system = SmallSystem { contacts: vec![body], compliance: vec![1.0] };
+    let reply = Reply::ContactAnswer(Box::new(ContactAnswer { small_system, ..*answer }));
+    let encoded = reply.encode_into(1, &Limits::default(), &mut Vec::new());
+    assert!(matches!(encoded, Err(EncodeError::CountMismatch { count: 1, expected: 9, .. })));
+}

@@ -11,13 +11,13 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
     let deformation =
         prop::option::of(prop_oneof![Just(Deformation::Large), Just(Deformation::Auto)]);
     let law = prop_oneof![Just(LawName::NeoHookean), Just(LawName::NeoHookeanLog)];
-    let equations = (deformation, law);
+    let equations = (deformation, law, any::<bool>());
     let ask = (prop::array::uniform5(number()), point(), any::<[u32; 2]>(), equations).prop_map(
         |(
             [seconds, density, viscosity, penetration_rel, residual_rel],
             gravity,
             [rounds, steps],
-            (deformation, law),
+            (deformation, law, small_system),
         )| {
             ContactAsk {
                 seconds,
@@ -32,6 +32,7 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
                 law,
                 yield_stress: (rounds % 3 == 0).then_some(seconds),
                 path: if steps % 2 == 0 { PathChoice::Continue } else { PathChoice::FromRest },
+                small_system,
             }
         },
     );
@@ -80,6 +81,7 @@ pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
                 shapes,
                 factors,
                 plastic_strain: slip_max,
+                small_contacts: 0,
             }
         },
     );
@@ -101,15 +103,31 @@ pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
             contacts,
         },
     );
-    (answer(), report, object_state(), vec(contact, 0..4), vec(load, 0..4)).prop_map(
-        |(answer, contact, state, points, loads)| ContactAnswer {
-            answer,
-            contact,
-            state,
-            points,
-            loads,
+    (answer(), report, object_state(), vec(contact, 0..4), vec(load, 0..4), small_system())
+        .prop_map(|(answer, contact, state, points, loads, small_system)| {
+            let small_contacts = small_system.contacts.len() as u32;
+            let contact = ContactReport { small_contacts, ..contact };
+            ContactAnswer { answer, contact, state, points, loads, small_system }
+        })
+}
+
+fn small_system() -> impl Strategy<Value = SmallSystem> {
+    let contact = (any::<u32>(), prop::array::uniform3(point()), number()).prop_map(
+        |(body, [place, normal, force], friction)| BodyContact {
+            body,
+            place,
+            normal,
+            force,
+            friction,
         },
-    )
+    );
+    vec(contact, 0..4).prop_flat_map(|contacts| {
+        let size = 9 * contacts.len() * contacts.len();
+        vec(number(), size).prop_map(move |compliance| {
+            let contacts = contacts.clone();
+            SmallSystem { contacts, compliance }
+        })
+    })
 }
 
 fn object_state() -> impl Strategy<Value = ObjectState> {

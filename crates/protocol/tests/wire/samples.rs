@@ -86,6 +86,8 @@ pub fn variants() -> Vec<(&'static str, Message)> {
         ("Answer-cases", reply(of_several)),
         ("Answer-untold", reply(untold)),
         ("Answer-fields", reply(with_fields)),
+        ("ContactFrame-small", Message::Request(1, Request::ContactFrame(Box::new(felt_frame())))),
+        ("ContactAnswer-small", Message::Reply(1, Reply::ContactAnswer(Box::new(felt_answer())))),
     ]
 }
 
@@ -334,6 +336,7 @@ fn contact_frame() -> ContactFrame {
             law: LawName::NeoHookeanLog,
             yield_stress: Some(750.0),
             path: PathChoice::FromRest,
+            small_system: false,
         },
         state: object_state(),
         bodies: vec![
@@ -384,9 +387,35 @@ fn contact_answer() -> ContactAnswer {
             shapes: 4,
             factors: 1,
             plastic_strain: 0.125,
+            small_contacts: 0,
         },
         state: object_state(),
         points: vec![point],
         loads: vec![BodyLoad::default(), load],
+        small_system: SmallSystem::default(),
+    }
+}
+
+/// A frame that asks for the small system of its step.
+fn felt_frame() -> ContactFrame {
+    let frame = contact_frame();
+    ContactFrame { ask: ContactAsk { small_system: true, ..frame.ask }, ..frame }
+}
+
+/// An answer with a small system of one body.
+fn felt_answer() -> ContactAnswer {
+    let answer = contact_answer();
+    let contact = BodyContact {
+        body: 1,
+        place: [0.25, 0.5, 0.0],
+        normal: [0.0, 0.0, 1.0],
+        force: [0.5, 0.0, 1.0],
+        friction: 0.5,
+    };
+    let compliance = vec![0.004, 0.0, 0.0, 0.0, 0.004, 0.0, 0.0, 0.0, 0.002];
+    ContactAnswer {
+        contact: ContactReport { small_contacts: 1, ..answer.contact },
+        small_system: SmallSystem { contacts: vec![contact], compliance },
+        ..answer
     }
 }

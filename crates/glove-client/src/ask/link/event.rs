@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use softgrasp_protocol::{
     BodyLoad, ContactReport, DofValue, LargeReport, ModelReady, NodeChoice, ObjectState,
-    SolveReport,
+    SmallSystem, SolveReport,
 };
 
 use crate::ask::unanswered::Unanswered;
@@ -77,4 +77,6 @@ pub struct ReachedStep {
     pub state: ObjectState,
     /// Force and torque of each body on the object, in the order of the request.
     pub loads: Vec<BodyLoad>,
+    /// How the forces of the bodies follow from their places; empty if not asked for.
+    pub small_system: SmallSystem,
 }

@@ -305,8 +305,9 @@ impl Session {
         let reached = match reply? {
             Reply::Answer(answer) => reached(*answer, None),
             Reply::ContactAnswer(answered) => {
-                let ContactAnswer { answer, contact, state, points: _, loads } = *answered;
-                reached(answer, Some(ReachedStep { contact, state, loads }))
+                let ContactAnswer { answer, contact, state, points: _, loads, small_system } =
+                    *answered;
+                reached(answer, Some(ReachedStep { contact, state, loads, small_system }))
             }
             other => return Err(unexpected("Ask", &other)),
         };
