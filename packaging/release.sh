@@ -81,6 +81,9 @@ archive() {
 
 # -- The Debian package
 
+# The program of this name; `install` is a word of tests/script.sh.
+lay() { command install "$@"; }
+
 # The oldest C library that has all that both programs ask for, as the wheel's name says it.
 libc_version() {
     local tag
@@ -92,25 +95,25 @@ libc_version() {
 debian_package() {
     local root="$work/deb" share
     share="$root/usr/share"
-    install -d "$root/DEBIAN" "$root/etc/default" "$share/applications" "$share/softgrasp"
-    install -d -m 700 "$root/etc/softgrasp"
-    install -D -t "$root/usr/bin" "$stage/bin/fea-server" "$stage/bin/glove-client"
-    install -m 644 packaging/debian/fea-server.default "$root/etc/default/fea-server"
-    install -D -m 644 /dev/stdin "$root/usr/lib/systemd/system/fea-server.service" \
+    lay -d "$root/DEBIAN" "$root/etc/default" "$share/applications" "$share/softgrasp"
+    lay -d -m 700 "$root/etc/softgrasp"
+    lay -D -t "$root/usr/bin" "$stage/bin/fea-server" "$stage/bin/glove-client"
+    lay -m 644 packaging/debian/fea-server.default "$root/etc/default/fea-server"
+    lay -D -m 644 /dev/stdin "$root/usr/lib/systemd/system/fea-server.service" \
         < <(sed 's|^ExecStart=/usr/local/bin/|ExecStart=/usr/bin/|' packaging/fea-server.service)
-    install -D -m 644 -t "$share/man/man1" "$stage"/man/*.1
+    lay -D -m 644 -t "$share/man/man1" "$stage"/man/*.1
     gzip -9n "$share"/man/man1/*.1
     for program in fea-server glove-client; do
-        install -D -m 644 "$stage/completions/$program.bash" "$share/bash-completion/completions/$program"
-        install -D -m 644 -t "$share/zsh/vendor-completions" "$stage/completions/_$program"
-        install -D -m 644 -t "$share/fish/vendor_completions.d" "$stage/completions/$program.fish"
+        lay -D -m 644 "$stage/completions/$program.bash" "$share/bash-completion/completions/$program"
+        lay -D -m 644 -t "$share/zsh/vendor-completions" "$stage/completions/_$program"
+        lay -D -m 644 -t "$share/fish/vendor_completions.d" "$stage/completions/$program.fish"
     done
-    install -m 644 -t "$share/applications" packaging/softgrasp.desktop
-    install -D -m 644 -t "$share/icons/hicolor/scalable/apps" packaging/softgrasp.svg
+    lay -m 644 -t "$share/applications" packaging/softgrasp.desktop
+    lay -D -m 644 -t "$share/icons/hicolor/scalable/apps" packaging/softgrasp.svg
     cp -r "$stage/scenes" "$share/softgrasp/"
-    install -D -m 644 -t "$share/doc/softgrasp" README.md CHANGELOG.md VERSIONING.md
+    lay -D -m 644 -t "$share/doc/softgrasp" README.md CHANGELOG.md VERSIONING.md
     cp -r packaging/grafana packaging/prometheus "$share/doc/softgrasp/"
-    install -m 644 "$stage/THIRD-PARTY-LICENSES.md" "$share/doc/softgrasp/"
+    lay -m 644 "$stage/THIRD-PARTY-LICENSES.md" "$share/doc/softgrasp/"
     gzip -9n "$share/doc/softgrasp/THIRD-PARTY-LICENSES.md"
     { echo "Softgrasp: MIT or Apache-2.0, as you like. What it contains of others is in"
       echo "THIRD-PARTY-LICENSES.md.gz beside this file."
@@ -118,7 +121,7 @@ debian_package() {
       cat LICENSE-MIT
       echo
       cat LICENSE-APACHE; } >"$share/doc/softgrasp/copyright"
-    install -m 755 -t "$root/DEBIAN" packaging/debian/postinst packaging/debian/prerm packaging/debian/postrm
+    lay -m 755 -t "$root/DEBIAN" packaging/debian/postinst packaging/debian/prerm packaging/debian/postrm
     echo /etc/default/fea-server >"$root/DEBIAN/conffiles"
     control "$root" >"$root/DEBIAN/control"
     (cd "$root" && find etc usr -type f | sort | xargs md5sum) >"$root/DEBIAN/md5sums"

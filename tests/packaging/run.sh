@@ -110,6 +110,7 @@ fi
 
 # The main job, with the programs of the package and nothing else.
 serve() {
+    : >"$work/out.txt"
     env -i PATH=/usr/bin:/bin "$root/usr/bin/fea-server" --listen 127.0.0.1:0 --threads 1 \
         >"$work/out.txt" 2>"$work/server.log" &
     pid=$!

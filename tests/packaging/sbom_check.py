@@ -47,5 +47,4 @@ licences = Path(licences_path).read_text()
 own = {name for name in listed if locked[name] is None}
 for name, version in listed.keys() - own:
     assert f"| {name} | {version} |" in licences, f"{name} {version}: no licence is told"
-assert "GNU GENERAL PUBLIC LICENSE" not in licences.upper(), "look at what brings this text"
 print(f"{len(listed)} packages, {len(own)} of them ours, as cargo and Cargo.lock have them")
