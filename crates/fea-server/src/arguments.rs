@@ -118,12 +118,11 @@ pub struct AccessArguments {
     insecure: bool,
 }
 
-/// Form of the log.
+/// Form of the log: lines for a person, or one object in a line for programs.
 #[derive(Clone, Copy, ValueEnum)]
+#[allow(missing_docs, reason = "a sentence here would be one more in --help")]
 pub enum LogForm {
-    /// Lines for a person.
     Text,
-    /// One object in a line, for programs.
     Json,
 }
 
