@@ -123,8 +123,8 @@ def bill(target):
         dependencies.append({"ref": purl(package), "dependsOn": refs})
     components = [component(package, sums) for package in packages]
     seconds = int(os.environ.get("SOURCE_DATE_EPOCH", "0")) or None
-    now = datetime.datetime.now(datetime.timezone.utc).timestamp()
-    time = datetime.datetime.fromtimestamp(seconds or now, datetime.timezone.utc)
+    now = datetime.datetime.now(datetime.UTC).timestamp()
+    time = datetime.datetime.fromtimestamp(seconds or now, datetime.UTC)
     # The same content has the same number, whenever it is made.
     number = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps([whole, components], sort_keys=True))
     return {

@@ -76,7 +76,7 @@ def queries_of_alerts(text):
         if match := re.match(r"( +)expr: (.*)", line):
             query = [] if match[2] == ">-" else [match[2]]
             for below in lines[number + 1 :]:
-                if query and match[2] != ">-" or not below.startswith(match[1] + "  "):
+                if (query and match[2] != ">-") or not below.startswith(match[1] + "  "):
                     break
                 query.append(below.strip())
             yield " ".join(query)
