@@ -6,7 +6,7 @@
 #   packaging/release.sh [OUT_DIR]                        builds in release mode; OUT_DIR is out/release
 #   FAST=1 BIN_DIR=target/debug packaging/release.sh …    takes programs that are there, and packs quickly
 #
-# The same sources, tools and SOURCE_DATE_EPOCH (without it the time of the last commit) give the same bytes.
+# The same programs, tools and SOURCE_DATE_EPOCH (else the time of the last commit) give the same bytes.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 out="${1:-$here/../out/release}"
