@@ -3,7 +3,7 @@
 # looks into the packages. Nothing is uploaded. Ends with 0 and one line where crates.io cannot be reached.
 #
 #   packaging/publish_check.sh           packs them (half a minute)
-#   FULL=1 packaging/publish_check.sh    builds every one of the packages too (many minutes)
+#   FULL=1 packaging/publish_check.sh    builds them too (long: each builds what it needs anew)
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=tests/script.sh
