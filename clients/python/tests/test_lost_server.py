@@ -17,6 +17,7 @@ from recorded import exactly, stand_in, welcome_payload
 import softgrasp
 from softgrasp import AsyncServer, Mesh, Model, Server, calls
 from softgrasp.framing import Kind, encode_frame
+from softgrasp.program import find_program
 
 AT_ONCE = 1.0
 """Seconds within which a lost server is noticed."""
@@ -190,3 +191,12 @@ def test_program_is_looked_for_on_the_path(monkeypatch, tmp_path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(softgrasp.ServerNotStarted, match="on the PATH"):
         Server.spawn()
+
+
+def test_program_is_found_beside_the_scripts_of_this_python(monkeypatch, tmp_path) -> None:
+    laid = tmp_path / "scripts" / "fea-server"
+    laid.parent.mkdir()
+    laid.symlink_to(find_program(PROGRAM))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr("sysconfig.get_path", lambda name: str(tmp_path / name))
+    assert find_program(None) == str(laid)

@@ -6,12 +6,15 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
-use fea_server::{Encryption, ServerConfig, Tokens};
 use softgrasp_core::solve::memory::Bytes;
+
+use crate::config::ServerConfig;
+use crate::encryption::Encryption;
+use crate::tokens::Tokens;
 
 /// Finite element server of Softgrasp: solves deformations over TCP, once per frame.
 #[derive(Parser)]
-#[command(version)]
+#[command(name = "fea-server", version)]
 pub struct Arguments {
     /// Address to listen on, HOST:PORT; port 0 picks a free one.
     #[arg(long, default_value = "127.0.0.1:7878", value_name = "ADDR")]
@@ -35,6 +38,7 @@ pub struct Arguments {
     pub drain: Duration,
     #[command(flatten)]
     limits: LimitArguments,
+    /// Who may come.
     #[command(flatten)]
     pub access: AccessArguments,
 }
@@ -114,7 +118,9 @@ pub struct AccessArguments {
     insecure: bool,
 }
 
+/// Form of the log: lines for a person, or one object in a line for programs.
 #[derive(Clone, Copy, ValueEnum)]
+#[allow(missing_docs, reason = "a sentence here would be one more in --help")]
 pub enum LogForm {
     Text,
     Json,

@@ -3,9 +3,8 @@
 use std::path::Path;
 use std::time::SystemTime;
 
+use fea_server::arguments::AccessArguments;
 use fea_server::{Encryption, ServerConfig, Tokens};
-
-use crate::arguments::AccessArguments;
 
 /// Tokens, and certificate with key, as far as the options ask for them.
 pub struct Credentials {

@@ -6,7 +6,7 @@
 //! take it from tokio to a rayon pool through a bounded queue, [`request`] checks what it names, [`plan`]
 //! decides by which method it is answered and reserves the memory, [`answer`] finds the model (in the
 //! [`store`] or in the request) and solves, and the session writes the reply. [`resources`] are what all
-//! requests share; [`status_pages`] tell of them.
+//! requests share; [`status_pages`] tell of them. [`arguments`] are what a person types.
 //!
 //! ```
 //! use std::net::SocketAddr;
@@ -22,6 +22,7 @@
 
 mod access;
 mod answer;
+pub mod arguments;
 mod attendance;
 mod awaited;
 mod budget;

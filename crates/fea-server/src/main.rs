@@ -1,6 +1,5 @@
 //! The `fea-server` program: log, signals, exit code.
 
-mod arguments;
 mod credentials;
 
 use std::io::{IsTerminal, Write};
@@ -8,9 +7,9 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::Context;
-use arguments::{Arguments, LogForm};
 use clap::Parser;
 use credentials::{Credentials, Renewal};
+use fea_server::arguments::{Arguments, LogForm};
 use fea_server::{Listening, StartError, make_certificate};
 use tokio::sync::watch;
 

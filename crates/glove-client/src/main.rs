@@ -3,48 +3,11 @@
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
-use glove_client::commands::align::AlignCommand;
-use glove_client::commands::calibrate::CalibrateCommand;
+use clap::{CommandFactory as _, Parser as _};
+use glove_client::commands::arguments::Arguments;
 use glove_client::commands::command_line::with_command;
-use glove_client::commands::devices::DevicesCommand;
-use glove_client::commands::emulate::EmulateCommand;
-use glove_client::commands::fill::FillCommand;
-use glove_client::commands::inspect::InspectCommand;
 use glove_client::commands::interruption;
-use glove_client::commands::mesh::MeshCommand;
-use glove_client::commands::press::PressCommand;
-use glove_client::commands::record::RecordCommand;
-use glove_client::commands::replay::ReplayCommand;
-use glove_client::commands::run::RunCommand;
-use glove_client::commands::solve::SolveCommand;
 use softgrasp_os::one_line;
-
-/// Grasp and squeeze a soft object with an instrumented glove.
-///
-/// Without a command it is `run`: `glove-client`, `glove-client --rate 8`, `glove-client mesh.msh`.
-#[derive(Parser)]
-#[command(version)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Option<Command>,
-}
-
-#[derive(Subcommand)]
-enum Command {
-    Run(RunCommand),
-    Solve(SolveCommand),
-    Inspect(InspectCommand),
-    Mesh(MeshCommand),
-    Fill(FillCommand),
-    Press(PressCommand),
-    Record(RecordCommand),
-    Replay(ReplayCommand),
-    Devices(DevicesCommand),
-    Emulate(EmulateCommand),
-    Calibrate(CalibrateCommand),
-    Align(AlignCommand),
-}
 
 fn main() -> ExitCode {
     let commands = Arguments::command();
@@ -52,21 +15,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse_from(with_command(std::env::args_os(), is_command));
     start_log();
     interruption::watch();
-    let outcome = match arguments.command.unwrap_or_else(|| Command::Run(RunCommand::default())) {
-        Command::Run(command) => command.run(),
-        Command::Solve(command) => command.run(),
-        Command::Inspect(command) => command.run(),
-        Command::Mesh(command) => command.run(),
-        Command::Fill(command) => command.run(),
-        Command::Press(command) => command.run(),
-        Command::Record(command) => command.run(),
-        Command::Replay(command) => command.run(),
-        Command::Devices(command) => command.run(),
-        Command::Emulate(command) => command.run(),
-        Command::Calibrate(command) => command.run(),
-        Command::Align(command) => command.run(),
-    };
-    match outcome {
+    match arguments.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("glove-client: {}", one_line(error.as_ref()));

@@ -8,6 +8,7 @@ import os
 import queue
 import shutil
 import subprocess
+import sysconfig
 import tempfile
 import threading
 from collections.abc import Sequence
@@ -39,7 +40,8 @@ class ServerProgram:
     ) -> None:
         """Starts the program and waits until it listens, at most `wait` seconds.
 
-        `program` is a path; without one the PATH is searched for `fea-server`. `arguments` stand
+        `program` is a path; without one the PATH is searched for `fea-server`, then the folder of
+        this Python's scripts. `arguments` stand
         behind `--listen 127.0.0.1:0`, and behind `--threads` where `threads` says how many. Raises
         `ServerNotStarted` with what the program said.
         """
@@ -124,7 +126,9 @@ def find_program(program: str | os.PathLike[str] | None) -> str:
         if not Path(program).is_file():
             raise ServerNotStarted(f"there is no program {os.fspath(program)}")
         return os.fspath(program)
-    found = shutil.which(NAME)
+    # Beside the scripts of this Python, where the package softgrasp-bin lays it: an environment that is
+    # not activated is not on the PATH.
+    found = shutil.which(NAME) or shutil.which(NAME, path=sysconfig.get_path("scripts"))
     if found is None:
         raise ServerNotStarted(
             f"there is no {NAME} on the PATH: name it, as in Server.spawn('target/release/{NAME}')"

@@ -2,6 +2,7 @@
 
 mod access_arguments;
 pub mod align;
+pub mod arguments;
 mod arm_recording;
 pub mod calibrate;
 mod collecting;
