@@ -13,9 +13,9 @@ use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{Contact, Elasticity};
 use softgrasp_protocol::{
-    Answer, BodyContact as ContactMessage, BodyLoad as LoadMessage, ContactAnswer, ContactAsk, ContactFrame,
-    ContactPoint, ContactReport, Deformation, Displacements, FieldSet, FieldValues, NodeChoice,
-    PathChoice, Precision, SmallSystem as SmallSystemMessage, SolveReport,
+    Answer, BodyContact as ContactMessage, BodyLoad as LoadMessage, ContactAnswer, ContactAsk,
+    ContactFrame, ContactPoint, ContactReport, Deformation, Displacements, FieldSet, FieldValues,
+    NodeChoice, PathChoice, Precision, SmallSystem as SmallSystemMessage, SolveReport,
 };
 
 use super::contact_large::{LargeWish, Made, PressedSeat};
