@@ -5,7 +5,7 @@ use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh};
 use softgrasp_protocol::{
     BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, Deformation, Field, FieldSet,
-    LawName, ModelHash, NodeChoice, ObjectState, Precision, Reply, Request,
+    LawName, ModelHash, NodeChoice, ObjectState, PathChoice, Precision, Reply, Request,
 };
 use softgrasp_tests::questions::{object, upload};
 

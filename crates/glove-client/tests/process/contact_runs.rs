@@ -7,8 +7,9 @@ use crate::start::{Folder, fail, succeed};
 /// Report of a run with a strawberry of 300 nodes.
 fn lifted(folder: &Folder, more: &[&str]) -> Value {
     let report = folder.path("lift.json");
-    let run = ["run", "--headless", "--nodes", "300", "--threads", "2", "--report", &report];
-    succeed(&[&run[..], more].concat());
+    let nodes: &[&str] = if more.contains(&"--nodes") { &[] } else { &["--nodes", "300"] };
+    let run = ["run", "--headless", "--threads", "2", "--report", &report];
+    succeed(&[&run[..], nodes, more].concat());
     serde_json::from_str(&folder.read("lift.json")).unwrap()
 }
 
@@ -63,6 +64,44 @@ fn grasp_by_friction_in_real_time_is_replayed_to_its_last_unanswered_step() {
     succeed(&["replay", &path, "--check", "--report", &report]);
     let replayed: Value = serde_json::from_str(&folder.read("replay.json")).unwrap();
     assert_eq!(replayed["replay"]["difference"], Value::Null);
+}
+
+/// A step goes on with the shape and the factor that the session keeps, and a replay keeps the same ones.
+#[test]
+fn grasp_at_large_deformation_lifts_and_is_replayed_bit_by_bit() {
+    let folder = Folder::new();
+    let path = folder.path("large.mcap");
+    let of_run =
+        ["--nodes", "200", "--grasp", "contact", "--deformation", "large", "--record", &path];
+    let report = lifted(&folder, &of_run);
+    let all = &report["summary"]["contact"];
+    assert_eq!(all["large"], all["steps"], "{all}");
+    let carried = report["frames"].as_array().unwrap().iter().filter(|frame| {
+        let step = &frame["contact"];
+        step["table_force_n"] == 0.0 && step["contacts"].as_u64() > Some(1)
+    });
+    assert!(carried.count() > 60, "the hand never carried it");
+    for threads in ["1", "3"] {
+        let told = folder.path("replay.json");
+        succeed(&["replay", &path, "--check", "--threads", threads, "--report", &told]);
+        let replayed: Value = serde_json::from_str(&folder.read("replay.json")).unwrap();
+        assert_eq!(replayed["replay"]["difference"], Value::Null);
+    }
+}
+
+#[test]
+fn grasp_of_clay_leaves_plastic_strain_and_says_how_much() {
+    let folder = Folder::new();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/clay-ball.toml");
+    let report = lifted(&folder, &["--scene", scene, "--nodes", "200"]);
+    let all = &report["summary"]["contact"];
+    assert_eq!(all["large"], all["steps"], "{all}");
+    assert!(all["plastic_strain_max"].as_f64().unwrap() > 0.02, "{all}");
+    let said = fail(
+        1,
+        &["run", "--headless", "--grasp", "contact", "--yield", "500", "--deformation", "linear"],
+    );
+    assert!(said.contains("a yield stress needs --deformation large or auto"), "{said}");
 }
 
 #[test]

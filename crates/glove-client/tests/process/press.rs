@@ -91,6 +91,34 @@ fn two_fingertips_lift_a_ball_and_let_it_slide_when_they_press_too_little() {
 }
 
 #[test]
+fn ball_that_yields_keeps_the_dents_of_a_press_and_an_elastic_one_does_not() {
+    let finger = |name: &str, side: f64| {
+        let row = |t: f64, x: f64| format!("[{t}, {}, 0, 0, 1, 0, 0, 0]", side * x);
+        let rows = [row(0.0, 0.046), row(0.2, 0.039), row(0.4, 0.05)].join(", ");
+        format!(
+            "[[body]]\nname = \"{name}\"\nshape = \"sphere\"\nradius = 0.01\nposes = [{rows}]\n"
+        )
+    };
+    let folder = folder(0.4, &(finger("left", -1.0) + &finger("right", 1.0)));
+    let out = folder.path("u.csv");
+    let mut dents = Vec::new();
+    for more in [&["--deformation", "large"][..], &["--yield", "400"]] {
+        let all = ["--gravity", "0,0,0", "--step", "0.02", "--out", &out];
+        let report = report(&folder, &[&all[..], more].concat());
+        let last = report["steps"].as_array().unwrap().last().unwrap();
+        assert_eq!(number(last, "/bodies/left/contacts"), 0.0);
+        assert_eq!(number(&report, "/steps_large"), 20.0);
+        let u = displacements(&folder.read("u.csv"));
+        let most = |sign: f64| u.iter().map(|(_, u)| sign * u[0]).fold(f64::MIN, f64::max);
+        // How much the nodes on both sides have come nearer to each other.
+        dents.push((most(1.0) + most(-1.0), number(last, "/plastic_strain")));
+    }
+    let [(elastic, none), (dent, flowed)] = dents[..] else { panic!("two presses") };
+    assert!(elastic < 1e-6 && none == 0.0, "{elastic} m, {none}");
+    assert!(dent > 2e-3 && flowed > 0.02, "{dent} m, {flowed}");
+}
+
+#[test]
 fn series_is_a_file_for_each_step_and_one_that_names_them_all() {
     let folder = folder(0.05, "");
     let series = folder.path("series");
