@@ -41,8 +41,6 @@ pub(super) struct ServedStep {
 
 /// A path of the finger, a place for each millisecond, and the answers along it.
 pub(super) struct ServedPath {
-    /// Frequency of the path, Hz.
-    pub frequency: f64,
     /// Place of the finger at each tick, m.
     pub places: Vec<Vector3<f64>>,
     /// Answers, one for every sixteen ticks.
@@ -101,7 +99,7 @@ impl Ball {
             steps.push(ServedStep { tick, system: served, force });
             (state, before) = (next, places[tick]);
         }
-        Ok(ServedPath { frequency, places, steps })
+        Ok(ServedPath { places, steps })
     }
 
     /// One step of the ball while the finger goes from one place to another.

@@ -188,7 +188,8 @@ impl Rendering {
     /// Why no force may act.
     fn fault(&self, moment: &Moment<'_>, is_placed: bool, found: &LocalForces) -> Option<Release> {
         let is_late = self.last_s.is_some_and(|last| moment.now_s - last > TICK_MAX);
-        let has_contacts = !self.model.system().is_empty();
+        // An object that lies still on its table is not asked about.
+        let is_felt = self.model.system().contacts().iter().any(|c| c.port.is_some());
         let is_old = moment.answer_s.is_none_or(|then| moment.now_s - then > ANSWER_AGE_MAX);
         let is_unseen = !is_placed || moment.now_s - moment.hand_s > HAND_AGE_MAX;
         let largest = found.forces.iter().map(Vector3::norm).fold(0.0, f64::max);
@@ -197,8 +198,8 @@ impl Rendering {
         match () {
             () if moment.fault.is_some() => moment.fault,
             () if is_late => Some(Release::TickLost),
-            () if has_contacts && is_old => Some(Release::StaleAnswer),
-            () if has_contacts && is_unseen => Some(Release::StaleHand),
+            () if is_felt && is_old => Some(Release::StaleAnswer),
+            () if is_felt && is_unseen => Some(Release::StaleHand),
             () if !is_solved => Some(Release::Unsolved),
             () => None,
         }
@@ -259,5 +260,62 @@ impl Rendering {
     /// Limits of the device.
     pub fn limits(&self) -> &DeviceLimits {
         &self.limits
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::small_system::SmallContact;
+
+    fn pressing(port: Option<usize>) -> SmallSystem {
+        let contact = SmallContact {
+            body: 0,
+            port,
+            place_in_body: Point3::origin(),
+            place: Point3::origin(),
+            normal: -Vector3::z(),
+            force: Vector3::new(0.0, 0.0, -0.1),
+            friction: 0.5,
+        };
+        SmallSystem::try_new(vec![contact], DMatrix::identity(3, 3) / 200.0).unwrap()
+    }
+
+    /// Releases in a second in which answer and hand grow old.
+    fn releases(port: Option<usize>, answers: bool, hands: bool) -> Vec<Release> {
+        let mut rendering = Rendering::new(DeviceLimits::brakes());
+        rendering.take(pressing(port));
+        for tick in 0..1000 {
+            let now_s = f64::from(tick) * 1e-3;
+            rendering.tick(&Moment {
+                now_s,
+                answer_s: Some(if answers { now_s } else { 0.0 }),
+                world_from_bodies: &[Isometry3::identity()],
+                hand_s: if hands { now_s } else { 0.0 },
+                device: None,
+                fault: None,
+            });
+        }
+        rendering.guard().releases().iter().map(|(_, why)| *why).collect()
+    }
+
+    #[test]
+    fn old_answers_and_old_hands_release_what_a_port_feels() {
+        assert_eq!(releases(Some(0), true, true), []);
+        assert_eq!(releases(Some(0), false, true), [Release::StaleAnswer]);
+        assert_eq!(releases(Some(0), true, false), [Release::StaleHand]);
+        assert_eq!(releases(None, false, false), [], "nobody feels the table");
+    }
+
+    #[test]
+    fn a_tick_that_comes_far_too_late_releases() {
+        let mut rendering = Rendering::new(DeviceLimits::brakes());
+        for now_s in [0.0, 0.001, 0.2, 0.201] {
+            rendering.tick(&Moment { now_s, ..Moment::default() });
+        }
+        let releases = rendering.guard().releases();
+        assert_eq!(releases, [(0.2, Release::TickLost)]);
     }
 }

@@ -292,12 +292,9 @@ impl RunArguments {
         let largest = regions.iter().map(|region| region.poisson).fold(material.poisson, f64::max);
         let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
         let is_xr = self.takes_headset(&hand)?;
-        let watched = self.is_watched();
         let (force, contact_scene) = self.felt.of_run(rule.scene)?;
         // Devices have a time of their own.
-        let is_timed = watched || hand.is_live() || force.is_some();
-        let rate = self.rate.or(is_timed.then_some(WATCHED_RATE_HZ));
-        let period = rate.map(|rate| Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)));
+        let period = self.period(hand.is_live() || force.is_some());
         let object_size =
             self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
@@ -331,6 +328,13 @@ impl RunArguments {
             world_from_sender: self.world_from_sender(is_xr),
             recording: None,
         })
+    }
+
+    /// Time from tick to tick, if a person watches or the hand `is_timed`.
+    fn period(&self, is_timed: bool) -> Option<Duration> {
+        let is_timed = is_timed || self.is_watched();
+        let rate = self.rate.or(is_timed.then_some(WATCHED_RATE_HZ))?;
+        Some(Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)))
     }
 
     /// Regions of flags and scene; a flag wins over the scene's region of its name, whose place it keeps.

@@ -96,3 +96,36 @@ fn series_of_a_run_has_every_tick_with_its_time() {
         }
     }
 }
+
+#[test]
+fn a_scripted_lift_is_felt_by_thumb_and_fingers() {
+    let folder = Folder::new();
+    let path = folder.path("force.csv");
+    let report = lifted(&folder, &["--force", &format!("record:{path}")]);
+    let force = &report["force"];
+    assert_eq!(force["device"], "record");
+    assert!(force["answers"].as_u64() > Some(20), "{force}");
+    assert_eq!(force["device_failed"], Value::Null);
+    let text = folder.read("force.csv");
+    let felt = |finger: &str| {
+        let cell = |line: &str, at: usize| line.split(',').nth(at).unwrap().to_owned();
+        let of_finger = text.lines().skip(1).filter(|line| cell(line, 1) == finger);
+        let size = |line: &str| {
+            let part = |at| cell(line, at).parse::<f64>().unwrap();
+            part(5).hypot(part(6)).hypot(part(7))
+        };
+        of_finger.map(size).fold(0.0, f64::max)
+    };
+    let fingers = ["1", "2", "3", "4"].map(felt);
+    assert!(felt("0") > 0.1, "the thumb feels {} N", felt("0"));
+    assert!(fingers.iter().any(|force| *force > 0.1), "{fingers:?}");
+    assert!(force["force_max_n"].as_f64().unwrap() <= 3.0 + 1e-9, "{force}");
+}
+
+#[test]
+fn forces_want_contact_with_friction_and_a_device() {
+    let said = fail(2, &["run", "--headless", "--force", "falcon"]);
+    assert!(said.contains("names no device"), "{said}");
+    let said = fail(1, &["run", "--headless", "--grasp", "thesis", "--force", "record:f.csv"]);
+    assert!(said.contains("--grasp contact"), "{said}");
+}
