@@ -3,9 +3,9 @@
 //! A body that presses holds its points: where it goes by δx, each point that it presses on goes by δx,
 //! so that `W δλ = S δx` with S from the bodies to their points, and the resultants change by
 //! `δF = Sᵀ δλ = K δx` with `K = Sᵀ W⁻¹ S`. The compliance is `C = K⁻¹`. W is the operator of the step,
-//! with viscosity, the object's mass and the compliances of the bodies in it; so K is the derivative of the
-//! forces of this very step by the places at which its bodies end, as long as no point opens, closes or
-//! slips.
+//! with viscosity, the object's mass and the compliances of the bodies in it. K says how the forces of this
+//! step follow the places at which its bodies end if all points that press stick to their bodies; how far
+//! steps are from that is in the tests.
 
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};

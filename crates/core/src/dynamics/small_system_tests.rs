@@ -52,12 +52,6 @@ fn ways(moved: &[Vector3<f64>; 2]) -> DVector<f64> {
 
 /// Both fingers close.
 const PINCH: [Vector3<f64>; 2] = [Vector3::new(1.0, 0.0, 0.0), Vector3::new(-1.0, 0.0, 0.0)];
-3] = [
-    [Vector3::new(1.0, 0.0, 0.0), Vector3::new(-1.0, 0.0, 0.0)],
-    [Vector3::new(0.3, 0.2, 0.5), Vector3::new(0.1, -0.4, 0.2)],
-    [Vector3::new(0.0, 0.0, 0.6), Vector3::new(0.0, 0.0, 0.6)],
-];
-
 /// How far the forces of steps that end a little elsewhere are from what the small system says, over how
 /// much they change.
 fn errors(
@@ -85,7 +79,7 @@ fn forces_of_a_step_that_ends_a_little_elsewhere_follow_the_small_system() {
     let state = ObjectState::at_rest(at(0.0, 0.0, 0.015));
     let (state, _) = settled(&object, state, 10);
     let mut step = |bodies: &[MovingBody]| object.advance(&state, bodies, settings());
-    // Points at the rim that slip give less than the small system says, in which all of them stick.
+    // The difference does not shrink with the way; its cause is not known.
     let found = errors(&mut step, 4.0, &PINCH, [1e-5, 2.5e-6]);
     assert!(found.iter().all(|error| *error < 0.15), "{found:?}");
 }
