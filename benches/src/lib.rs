@@ -18,6 +18,7 @@
 //! ```
 
 pub mod axis;
+mod ball;
 pub mod collision;
 pub mod command;
 pub mod contact;

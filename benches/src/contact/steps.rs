@@ -1,29 +1,19 @@
 //! Steps of an object that five fingers pinch, lift and hold by friction: time by phase, and the residual
-//! of the law of contact. of contact is met.
+//! of the law of contact.
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use softgrasp_core::dynamics::{
-    ContactStep, LargeBody, LargeStep, MovingBody, ObjectState, StepOutcome, StepSettings,
-    near_triangles, reach_of_step,
-};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use softgrasp_core::dynamics::{LargeBody, LargeStep, MovingBody, ObjectState, StepOutcome};
 use softgrasp_core::fem::hyperelastic::Law;
-use softgrasp_core::fem::{Element, Material};
-use softgrasp_core::mesh::{BuiltIn, Surface, generate};
-use softgrasp_core::model::Model;
 use softgrasp_core::rigid_body::RigidShape;
-use softgrasp_core::solve::condensed::{Base, Columns, Elasticity, FreeBody};
 
+use crate::ball::{Ball, SIZE, as_a_run};
 use crate::report::{ReportError, check, progress};
 use crate::sample::timed_ms;
 use crate::table::{Cell, Table};
 use crate::tail::Tail;
 
-/// Diameter of the ball, m, and its material.
-const SIZE: f64 = 0.07;
-const YOUNG: f64 = 5.0e4;
-const POISSON: f64 = 0.4;
 /// Radius of a fingertip, m, depth of its press, and height of the lift.
 const TIP: f64 = 0.008;
 const DEPTH: f64 = 0.008;
@@ -38,15 +28,6 @@ const RAISE: u32 = 60;
 const HOLD: u32 = 300;
 /// Largest relative difference between the sum of the forces on the held ball and its weight.
 const BALANCE_ALLOWED: f64 = 1e-3;
-
-/// Ball, and all that its steps need.
-struct Ball {
-    model: Model,
-    surface: Surface,
-    base: Base,
-    body: FreeBody,
-    columns: Columns,
-}
 
 /// The equations of a step, and the relative residual that is asked for.
 #[derive(Clone, Copy)]
@@ -77,25 +58,15 @@ struct Phase {
     factors: usize,
 }
 
-impl Ball {
-    fn try_new(nodes: usize) -> Result<Self, ReportError> {
-        let mesh = generate(BuiltIn::Sphere, nodes)?;
-        let (low, high) = mesh.bounds();
-        let scale = SIZE / (high - low).max();
-        let scaled = mesh.vertices().iter().map(|p| Point3::from(scale * p.coords)).collect();
-        let mesh = mesh.with_vertices(scaled)?;
-        let surface = Surface::from_mesh(&mesh);
-        let material = Material::try_new(YOUNG, POISSON)?;
-        let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {})?;
-        let base = model.condense(None, &mut |_| {})?;
-        let body = FreeBody::try_new(model.mesh(), &base)?;
-        Ok(Self { model, surface, base, body, columns: Columns::new(usize::MAX) })
-    }
+/// A ball, and a body of it at large deformation.
+struct Pinched(Ball);
 
+impl Pinched {
     /// Ball at large deformation, at rest.
     fn large(&self) -> Result<LargeBody, ReportError> {
-        let elements = Arc::new(self.model.hyperelastic(Law::NeoHookean)?);
-        Ok(LargeBody::at_rest(elements, Arc::clone(self.model.stiffness().pattern())))
+        let model = &self.0.model;
+        let elements = Arc::new(model.hyperelastic(Law::NeoHookean)?);
+        Ok(LargeBody::at_rest(elements, Arc::clone(model.stiffness().pattern())))
     }
 
     /// Makes a step; its time is measured without the search for triangles near the fingers.
@@ -105,35 +76,13 @@ impl Ball {
         bodies: &[MovingBody],
         (way, large): (Way, &mut LargeBody),
     ) -> Result<(f64, StepOutcome), ReportError> {
-        let vertices = self.model.mesh().vertices();
-        let triangles = &self.surface.triangles;
-        // As near as a run looks.
-        let h = 1.0 / RATE_HZ;
-        let speed = state.velocity.norm() + 9.81 * h;
-        let turning = state.angular_velocity.norm();
-        let reach = reach_of_step(SIZE, bodies, h, (speed, turning));
-        let near = near_triangles(vertices, triangles, &state.world_from_object, bodies, reach);
-        let step = ContactStep {
-            vertices,
-            triangles,
-            elasticity: Elasticity { base: &self.base, body: &self.body, columns: &self.columns },
-            bodies,
-            candidates: &near,
-            // As a run asks.
-            settings: StepSettings {
-                seconds: 1.0 / RATE_HZ,
-                gravity: Vector3::new(0.0, -9.81, 0.0),
-                viscosity: 0.02,
-                residual_rel: way.residual_rel,
-                rounds_max: 12,
-                newton_max: 80,
-                ..StepSettings::default()
-            },
-        };
-        let wanted = &self.surface.nodes;
-        let (ms, found) = timed_ms(|| match way.is_large {
-            true => LargeStep { step, body: large }.advance(state, wanted),
-            false => step.advance(state, wanted),
+        let settings = as_a_run(1.0 / RATE_HZ, way.residual_rel);
+        let wanted = &self.0.surface.nodes;
+        let (ms, found) = self.0.with_step(state, bodies, settings, |step| {
+            timed_ms(|| match way.is_large {
+                true => LargeStep { step, body: large }.advance(state, wanted),
+                false => step.advance(state, wanted),
+            })
         });
         Ok((ms, found?))
     }
@@ -224,8 +173,8 @@ pub(super) fn table(is_quick: bool) -> Result<Table, ReportError> {
     let title = "Steps of a ball that five fingers pinch, lift and hold by friction";
     let mut table = Table::new("contact-steps", title, &COLUMNS);
     for &nodes in sizes {
-        let ball = Ball::try_new(nodes)?;
-        let nodes = ball.model.mesh().node_count();
+        let ball = Pinched(Ball::try_new(nodes)?);
+        let nodes = ball.0.node_count();
         for way in WAYS.into_iter().filter(|way| !way.is_large || nodes <= LARGE_NODES_MAX) {
             let what = if way.is_large { "large" } else { "linear" };
             progress("contact", &format!("pinch, lift and hold, {nodes} nodes, {what}"));
@@ -236,9 +185,8 @@ pub(super) fn table(is_quick: bool) -> Result<Table, ReportError> {
 }
 
 /// Adds a row for each phase of one ball.
-fn play(ball: &Ball, way: Way, table: &mut Table) -> Result<(), ReportError> {
-    let nodes = ball.model.mesh().node_count();
-    let weight = 9.81 * 1000.0 * ball.body.volume();
+fn play(ball: &Pinched, way: Way, table: &mut Table) -> Result<(), ReportError> {
+    let (nodes, weight) = (ball.0.node_count(), ball.0.weight());
     let mut large = ball.large()?;
     let mut state = ObjectState::at_rest(Isometry3::identity());
     let mut step = 0;
@@ -248,7 +196,7 @@ fn play(ball: &Ball, way: Way, table: &mut Table) -> Result<(), ReportError> {
         let mut balance = 0.0f64;
         let factors = large.factors();
         for _ in 0..lasts {
-            let (ms, found) = ball.step(&state, &Ball::bodies(step), (way, &mut large))?;
+            let (ms, found) = ball.step(&state, &Pinched::bodies(step), (way, &mut large))?;
             step += 1;
             phase.add(ms, &found);
             let sum: Vector3<f64> = found.loads.iter().map(|load| load.force).sum();

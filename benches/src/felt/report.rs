@@ -5,7 +5,7 @@ use softgrasp_force::DeviceLimits;
 
 use super::rates;
 use super::rendered::{Felt, How, Wire, feel};
-use super::served::{Ball, ServedPath};
+use super::served::{Served, ServedPath};
 use crate::plot::{Mark, Plot, PlotPoint, Scale, Series};
 use crate::report::{Options, Report, ReportError, progress};
 use crate::table::{Cell, Table};
@@ -27,7 +27,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     let compliance = 1.0 / DeviceLimits::desktop().stiffness_max();
     let (nodes, frequencies): (usize, &[f64]) =
         if options.is_quick { (200, &[2.0]) } else { (1000, &[0.5, 1.0, 2.0, 5.0, 10.0]) };
-    let ball = Ball::try_new(nodes)?;
+    let ball = Served::try_new(nodes)?;
     let mut paths = Vec::new();
     for &frequency in frequencies {
         progress("felt", &format!("answers along a path of {frequency} Hz"));

@@ -1,22 +1,14 @@
 //! A soft ball that one finger presses on a closed path, and the answers of a server to it.
 
-use nalgebra::{Isometry3, Point3, Vector3};
-use softgrasp_core::dynamics::{
-    ContactStep, MovingBody, ObjectState, StepSettings, near_triangles, reach_of_step,
-};
-use softgrasp_core::fem::{Element, Material};
-use softgrasp_core::mesh::{BuiltIn, Surface, generate};
-use softgrasp_core::model::Model;
+use nalgebra::{Isometry3, Vector3};
+use softgrasp_core::dynamics::{MovingBody, ObjectState, StepSettings};
 use softgrasp_core::rigid_body::RigidShape;
-use softgrasp_core::solve::condensed::{Base, Columns, Elasticity, FreeBody};
 use softgrasp_force::{SmallContact, SmallSystem};
 
+use crate::ball::{Ball, SIZE, as_a_run};
 use crate::report::ReportError;
 
-/// Diameter of the ball, m, its material, and the radius of the fingertip, m.
-const SIZE: f64 = 0.07;
-const YOUNG: f64 = 5.0e4;
-const POISSON: f64 = 0.4;
+/// Radius of the fingertip, m, and the coefficient of friction.
 const TIP: f64 = 0.008;
 const FRICTION: f64 = 0.8;
 /// How far the finger begins above the ball, and how deep and how far aside it goes, m.
@@ -47,33 +39,17 @@ pub(super) struct ServedPath {
     pub steps: Vec<ServedStep>,
 }
 
-/// The ball.
-pub(super) struct Ball {
-    model: Model,
-    surface: Surface,
-    base: Base,
-    body: FreeBody,
-    columns: Columns,
-}
+/// The ball under the finger.
+pub(super) struct Served(Ball);
 
-impl Ball {
+impl Served {
     pub fn try_new(nodes: usize) -> Result<Self, ReportError> {
-        let mesh = generate(BuiltIn::Sphere, nodes)?;
-        let (low, high) = mesh.bounds();
-        let scale = SIZE / (high - low).max();
-        let scaled = mesh.vertices().iter().map(|p| Point3::from(scale * p.coords)).collect();
-        let mesh = mesh.with_vertices(scaled)?;
-        let surface = Surface::from_mesh(&mesh);
-        let material = Material::try_new(YOUNG, POISSON)?;
-        let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {})?;
-        let base = model.condense(None, &mut |_| {})?;
-        let body = FreeBody::try_new(model.mesh(), &base)?;
-        Ok(Self { model, surface, base, body, columns: Columns::new(usize::MAX) })
+        Ok(Self(Ball::try_new(nodes)?))
     }
 
     /// Number of nodes.
     pub fn node_count(&self) -> usize {
-        self.model.mesh().node_count()
+        self.0.node_count()
     }
 
     /// Plays cycles of a frequency with a finger of a compliance (m/N).
@@ -110,30 +86,9 @@ impl Ball {
         compliance: f64,
     ) -> Result<(ObjectState, SmallSystem), ReportError> {
         let bodies = bodies(from, to, compliance);
-        let vertices = self.model.mesh().vertices();
-        let triangles = &self.surface.triangles;
         let seconds = 1e-3 * STEP_TICKS as f64;
-        let speed = state.velocity.norm() + 9.81 * seconds;
-        let reach = reach_of_step(SIZE, &bodies, seconds, (speed, state.angular_velocity.norm()));
-        let near = near_triangles(vertices, triangles, &state.world_from_object, &bodies, reach);
-        let step = ContactStep {
-            vertices,
-            triangles,
-            elasticity: Elasticity { base: &self.base, body: &self.body, columns: &self.columns },
-            bodies: &bodies,
-            candidates: &near,
-            settings: StepSettings {
-                seconds,
-                gravity: Vector3::new(0.0, -9.81, 0.0),
-                viscosity: 0.02,
-                residual_rel: 1e-6,
-                rounds_max: 12,
-                newton_max: 80,
-                small_system: true,
-                ..StepSettings::default()
-            },
-        };
-        let found = step.advance(state, &[])?;
+        let settings = StepSettings { small_system: true, ..as_a_run(seconds, 1e-6) };
+        let found = self.0.with_step(state, &bodies, settings, |step| step.advance(state, &[]))?;
         let none = || ReportError::Failed { rows: vec!["a step without its small system".into()] };
         let system = found.small_system.as_ref().ok_or_else(none)?;
         let contact = |contact: &softgrasp_core::dynamics::BodyContact| {

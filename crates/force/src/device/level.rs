@@ -4,7 +4,7 @@ use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 
 use serde_json::json;
 
-use super::DeviceError;
+use super::error::DeviceError;
 use crate::rendering::PORTS;
 
 /// Sends levels to one address.

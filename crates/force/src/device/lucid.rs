@@ -1,29 +1,24 @@
 //! LucidGloves on a serial port: a line of servo levels for each line of the glove.
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serial2::SerialPort;
 
-use super::DeviceError;
+use super::error::DeviceError;
+use super::link::{Link, Said, is_later};
 use crate::rendering::PORTS;
 
 /// The glove's line, on a thread of its own.
 #[derive(Debug)]
-pub(crate) struct LucidLink {
-    shared: Arc<Mutex<Shared>>,
-    thread: Option<JoinHandle<()>>,
-}
+pub(crate) struct LucidLink(Link<Told>);
 
+/// What the line and the ticks tell each other.
 #[derive(Debug)]
-struct Shared {
+struct Told {
     /// Newest level of each finger, and when it was rendered.
     levels: ([f64; PORTS], Instant),
     heard: Option<Instant>,
-    ends: bool,
-    why_lost: Option<String>,
 }
 
 /// Speed of the glove, bits per second.
@@ -62,67 +57,35 @@ impl LucidLink {
             Ok(port)
         });
         let port = opened.map_err(|source| DeviceError::Port { path: path.to_owned(), source })?;
-        let levels = ([0.0; PORTS], Instant::now());
-        let shared = Shared { levels, heard: None, ends: false, why_lost: None };
-        let shared = Arc::new(Mutex::new(shared));
-        let line = Line { port, shared: Arc::clone(&shared) };
-        let thread = std::thread::Builder::new()
-            .name("lucid".to_owned())
-            .spawn(move || line.keep())
-            .map_err(DeviceError::Thread)?;
-        Ok(Self { shared, thread: Some(thread) })
-    }
-
-    fn shared(&self) -> MutexGuard<'_, Shared> {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+        let told = Told { levels: ([0.0; PORTS], Instant::now()), heard: None };
+        Link::start("LucidGloves", told, move |said| Line { port, said }.keep()).map(Self)
     }
 
     pub(super) fn is_lost(&self, now: Instant) -> bool {
-        let heard = self.shared().heard;
+        let heard = self.0.said().heard;
         heard.is_none_or(|at| now.saturating_duration_since(at) > SILENCE_MAX)
     }
 
     pub(super) fn render(&self, levels: [f64; PORTS]) {
-        self.shared().levels = (levels, Instant::now());
+        self.0.said().levels = (levels, Instant::now());
     }
 
-    pub(super) fn close(mut self) -> Option<String> {
-        self.end();
-        let shared = self.shared();
-        shared.why_lost.clone()
-    }
-
-    fn end(&mut self) {
-        self.shared().ends = true;
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
-            tracing::error!("the thread of the LucidGloves ended abnormally");
-        }
-    }
-}
-
-impl Drop for LucidLink {
-    fn drop(&mut self) {
-        self.end();
+    pub(super) fn close(self) -> Option<String> {
+        self.0.close()
     }
 }
 
 /// The side of the thread.
 struct Line {
     port: SerialPort,
-    shared: Arc<Mutex<Shared>>,
+    said: Said<Told>,
 }
 
 impl Line {
-    fn shared(&self) -> MutexGuard<'_, Shared> {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn keep(mut self) {
         if let Err(error) = self.speak() {
             tracing::warn!(%error, "the line of the LucidGloves is lost");
-            self.shared().why_lost = Some(error.to_string());
+            self.said.lock().why_lost = Some(error.to_string());
         }
         // A servo keeps its last angle: the fingers are freed in any case.
         let _ = self.port.write_all(line_of(&[0.0; PORTS]).as_bytes());
@@ -130,7 +93,7 @@ impl Line {
 
     fn speak(&mut self) -> std::io::Result<()> {
         let mut bytes = [0u8; 256];
-        while !self.shared().ends {
+        while !self.said.lock().ends {
             let count = match self.port.read(&mut bytes) {
                 Ok(0) => return Err(std::io::Error::other("the line was hung up")),
                 Ok(count) => count,
@@ -142,9 +105,9 @@ impl Line {
                 continue;
             }
             let levels = {
-                let mut shared = self.shared();
-                shared.heard = Some(Instant::now());
-                let (levels, at) = shared.levels;
+                let mut said = self.said.lock();
+                said.heard = Some(Instant::now());
+                let (levels, at) = said.levels;
                 if at.elapsed() < LEVEL_AGE_MAX { levels } else { [0.0; PORTS] }
             };
             match self.port.write_all(line_of(&levels).as_bytes()) {
@@ -156,11 +119,6 @@ impl Line {
         }
         Ok(())
     }
-}
-
-fn is_later(kind: std::io::ErrorKind) -> bool {
-    use std::io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
-    matches!(kind, Interrupted | TimedOut | WouldBlock)
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! Devices that take forces: each has a thread of its own, so that no tick waits for a line.
 
+mod error;
 mod haply;
 pub mod haply_message;
 mod level;
+mod link;
 mod lucid;
 mod recorder;
 
-use std::io;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use nalgebra::Vector3;
@@ -16,40 +16,9 @@ use crate::limits::FULL_LEVEL;
 use crate::rendering::{PORTS, Rendered};
 use crate::target::Target;
 
+pub use error::DeviceError;
 pub use level::datagram;
 pub use lucid::line_of;
-
-/// Why a device cannot be opened.
-#[derive(Debug, thiserror::Error)]
-pub enum DeviceError {
-    /// The serial port cannot be opened.
-    #[error("{path} cannot be opened as a serial port")]
-    Port {
-        /// The serial port.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: io::Error,
-    },
-    /// No datagram can be sent to an address.
-    #[error("no datagrams can be sent to {address}")]
-    Address {
-        /// Host and port.
-        address: String,
-        /// Error of the operating system.
-        source: io::Error,
-    },
-    /// The file cannot be written.
-    #[error("{path} cannot be written")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: io::Error,
-    },
-    /// The system gives no thread.
-    #[error("the system gives no thread for the device")]
-    Thread(#[source] io::Error),
-}
 
 /// A device that is open, or a file.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
-use super::DeviceError;
+use super::error::DeviceError;
 use crate::rendering::{PORTS, Rendered};
 
 /// Writes the ticks in which a finger feels something.

@@ -42,6 +42,9 @@ pub struct GraspLoop {
     object: LiveObject,
     /// Place where the object is put when the first hand comes.
     place: ObjectPlace,
+    /// Whether the table stops the hand: one that was put below an object in the hand is not there for the
+    /// hand.
+    stops_hand: bool,
     hand: Option<HandPose>,
     shown_segments: HandSegments,
     /// Devices that were silent in the last tick.
@@ -69,6 +72,7 @@ impl GraspLoop {
             holding: Holding::new(grasp),
             object: LiveObject { shown: Shown::new(object), questions, changing },
             place: ObjectPlace::Home,
+            stops_hand: true,
             hand: None,
             shown_segments: [[Isometry3::identity(); 3]; 5],
             silent: Vec::new(),
@@ -228,7 +232,8 @@ impl GraspLoop {
 
     /// The hand as the table lets it be: a table stops a hand as it stops an object.
     fn held_up(&self, measured: &HandPose) -> HandPose {
-        let table_y = self.holding.friction().and_then(|contact| contact.scene().table_y);
+        let contact = self.holding.friction().filter(|_| self.stops_hand);
+        let table_y = contact.and_then(|contact| contact.scene().table_y);
         let dimensions = &self.reader.setup().dimensions;
         table_y.map_or(*measured, |table_y| above_table(dimensions, measured, table_y))
     }
@@ -245,6 +250,7 @@ impl GraspLoop {
         if std::mem::take(&mut self.place) != ObjectPlace::Hand {
             return;
         }
+        self.stops_hand = false;
         let dimensions = self.reader.setup().dimensions;
         let home = where_it_closes(&dimensions, &angles, hand, self.object());
         if self.holding.set_home(home).is_ok() {
