@@ -71,6 +71,8 @@ def contact_frame() -> calls.Call:
         newton_max=400,
         deformation="auto",
         law="neo-hookean-log",
+        yield_stress=750.0,
+        from_rest=True,
     )
     mesh = Mesh(POINTS, [[0, 1, 2, 3]])
     return calls.contact_frame(NAME, mesh, state, bodies, step, [0, 3], "f64")
