@@ -146,69 +146,66 @@ fn packages() -> Vec<String> {
     folders
 }
 
+/// What each package may need of the others, and what it may not need at all.
+const RULES: [(&str, &[&str], &[&str]); 11] = [
+    // JSON is the text of glTF, no form of the wire: no type of core derives a form of it.
+    ("crates/core", &[], &["tokio", "serde"]),
+    ("crates/protocol", &[], &["nalgebra", "rayon"]),
+    ("crates/os", &[], &["nalgebra", "rayon"]),
+    ("crates/grasp", &["softgrasp-core"], &["tokio", "serde", "serde_json"]),
+    ("crates/hand", &["softgrasp-core", "softgrasp-grasp", "softgrasp-os"], &["tokio", "kiss3d"]),
+    (
+        "crates/window",
+        &[
+            "softgrasp-core",
+            "softgrasp-grasp",
+            "softgrasp-hand",
+            "softgrasp-os",
+            "softgrasp-protocol",
+        ],
+        &["tokio", "mcap", "serial2"],
+    ),
+    (
+        "crates/xr",
+        &["softgrasp-core", "softgrasp-grasp", "softgrasp-hand", "softgrasp-window"],
+        &["kiss3d", "egui", "wgpu", "serial2"],
+    ),
+    (
+        "crates/force",
+        &["softgrasp-core", "softgrasp-os"],
+        &["tokio", "kiss3d", "softgrasp-protocol"],
+    ),
+    ("crates/emulator", &["softgrasp-grasp", "softgrasp-hand"], &["tokio", "kiss3d"]),
+    (
+        "crates/fea-server",
+        &["softgrasp-core", "softgrasp-os", "softgrasp-protocol"],
+        &["kiss3d", "mcap", "serial2"],
+    ),
+    (
+        "crates/glove-client",
+        &[
+            "softgrasp-core",
+            "softgrasp-emulator",
+            "softgrasp-force",
+            "softgrasp-grasp",
+            "softgrasp-hand",
+            "softgrasp-os",
+            "softgrasp-protocol",
+            "softgrasp-window",
+            "softgrasp-xr",
+            "fea-server",
+        ],
+        &["tokio", "axum", "kiss3d", "egui", "wgpu"],
+    ),
+];
+
 #[test]
 fn crates_depend_downwards_only() {
-    // What each package may need of the others, and what it may not need at all.
-    let rules: [(&str, &[&str], &[&str]); 11] = [
-        // JSON is the text of glTF, no form of the wire: no type of core derives a form of it.
-        ("crates/core", &[], &["tokio", "serde"]),
-        ("crates/protocol", &[], &["nalgebra", "rayon"]),
-        ("crates/os", &[], &["nalgebra", "rayon"]),
-        ("crates/grasp", &["softgrasp-core"], &["tokio", "serde", "serde_json"]),
-        (
-            "crates/hand",
-            &["softgrasp-core", "softgrasp-grasp", "softgrasp-os"],
-            &["tokio", "kiss3d"],
-        ),
-        (
-            "crates/window",
-            &[
-                "softgrasp-core",
-                "softgrasp-grasp",
-                "softgrasp-hand",
-                "softgrasp-os",
-                "softgrasp-protocol",
-            ],
-            &["tokio", "mcap", "serial2"],
-        ),
-        (
-            "crates/xr",
-            &["softgrasp-core", "softgrasp-grasp", "softgrasp-hand", "softgrasp-window"],
-            &["kiss3d", "egui", "wgpu", "serial2"],
-        ),
-        (
-            "crates/force",
-            &["softgrasp-core", "softgrasp-os"],
-            &["tokio", "kiss3d", "softgrasp-protocol"],
-        ),
-        ("crates/emulator", &["softgrasp-grasp", "softgrasp-hand"], &["tokio", "kiss3d"]),
-        (
-            "crates/fea-server",
-            &["softgrasp-core", "softgrasp-os", "softgrasp-protocol"],
-            &["kiss3d", "mcap", "serial2"],
-        ),
-        (
-            "crates/glove-client",
-            &[
-                "softgrasp-core",
-                "softgrasp-emulator",
-                "softgrasp-force",
-                "softgrasp-grasp",
-                "softgrasp-hand",
-                "softgrasp-os",
-                "softgrasp-protocol",
-                "softgrasp-window",
-                "softgrasp-xr",
-                "fea-server",
-            ],
-            &["tokio", "axum", "kiss3d", "egui", "wgpu"],
-        ),
-    ];
     let mut faults = Vec::new();
-    let folders = rules.map(|(folder, _, _)| folder.to_owned());
+    let folders = RULES.map(|(folder, _, _)| folder.to_owned());
     let unruled = packages().into_iter().filter(|folder| !folders.contains(folder));
     faults.extend(unruled.map(|folder| format!("{folder} has no rule")));
-    for (folder, allowed, forbidden) in rules {
+    for (folder, allowed, forbidden) in RULES {
         let manifest = fs::read_to_string(root().join(folder).join("Cargo.toml"))
             .expect("every crate has a manifest");
         // Tests may need a package above: the drivers are tested against the emulator.
