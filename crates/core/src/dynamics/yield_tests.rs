@@ -20,15 +20,19 @@ fn lid(from: f64, to: f64) -> MovingBody {
     MovingBody { world_from_body_start: pose(from), world_from_body_end: pose(to), ..table(0.0) }
 }
 
-/// Height of an object's shape, m, in its own frame.
+/// Mean height of the nodes that are highest at rest above those that are lowest, m, in the object's frame.
 fn height_of(object: &Object, large: &LargeBody) -> f64 {
     let rest = object.model.mesh().vertices();
-    let z = |node: &u32| {
-        let node = *node as usize;
-        rest[node].z + large.displacement()[3 * node + 2]
+    let (low, high) = object.model.mesh().bounds();
+    let mean = |at: f64| {
+        let of_face =
+            object.surface.nodes.iter().filter(|&&n| (rest[n as usize].z - at).abs() < 1e-9);
+        let places =
+            of_face.map(|&n| rest[n as usize].z + large.displacement()[3 * n as usize + 2]);
+        let (sum, count) = places.fold((0.0, 0.0), |(sum, count), z| (sum + z, count + 1.0));
+        sum / count
     };
-    let nodes = &object.surface.nodes;
-    nodes.iter().map(z).fold(f64::MIN, f64::max) - nodes.iter().map(z).fold(f64::MAX, f64::min)
+    mean(high.z) - mean(low.z)
 }
 
 /// Uniaxial stress: Kirchhoff's stress stays at the yield stress `s`, so that the force is `s A / λ` at the
