@@ -56,8 +56,8 @@ fn play(device: &SerialPort, heard: &Mutex<Heard>) {
     let mut text = String::new();
     let mut bytes = [0u8; 256];
     while !heard.lock().expect("the test goes on").ends {
-        let _ = (&*device).write_all(b"A512B512C512D512E512F0G0\n");
-        if let Ok(count) = (&*device).read(&mut bytes) {
+        let _ = device.write_all(b"A512B512C512D512E512F0G0\n");
+        if let Ok(count) = device.read(&mut bytes) {
             text.push_str(&String::from_utf8_lossy(&bytes[..count]));
         }
         while let Some(end) = text.find('\n') {

@@ -10,7 +10,7 @@ use crate::spring::{Spring, press_until};
 const SPRING: Spring = Spring { stiffness: 200.0, port: 0 };
 
 fn renderer(haply: &EmulatedHaply) -> Renderer {
-    Renderer::start(Target::Haply { url: haply.url.clone() }).unwrap()
+    Renderer::start(Target::Haply { url: haply.url.clone() }).expect("the thread starts")
 }
 
 /// Moves the cursor with the hand: up is the third axis of the service.
