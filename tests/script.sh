@@ -48,3 +48,12 @@ wait_until() {
         sleep 0.05
     done
 }
+
+# ends_by FUNCTION: calls it once when the script ends, however that comes about, with the exit status,
+# which stays as it is.
+ends_by() {
+    # shellcheck disable=SC2064  # the name of the function is known now
+    trap "status=\$?; trap - EXIT INT TERM; $1 \"\$status\"; exit \"\$status\"" EXIT
+    trap 'exit 130' INT
+    trap 'exit 143' TERM
+}

@@ -29,19 +29,14 @@ stage_image="$name-stage"
 work="$(mktemp -d)"
 
 cleanup() {
-    status=$?
-    trap - EXIT INT TERM
     {
         timeout 60 "${compose[@]}" down --volumes --remove-orphans --timeout 2
         docker rmi --force "$SOFTGRASP_SERVER_IMAGE" "$SOFTGRASP_CLIENT_IMAGE" "$stage_image" \
             "$SOFTGRASP_BASE_BUILD" "$SOFTGRASP_BASE_RUN"
     } >"$work/cleanup.log" 2>&1 || true
     rm -rf "$work"
-    exit "$status"
 }
-trap cleanup EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
+ends_by cleanup
 
 # Runs a command quietly with a time limit; shows its output only when it fails.
 quietly() {

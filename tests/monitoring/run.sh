@@ -24,17 +24,12 @@ server="$bin_dir/fea-server"
 work="$(mktemp -d)"
 pid=
 cleanup() {
-    status=$?
-    trap - EXIT INT TERM
-    [ "$status" = 0 ] || tail -n 6 "$work/log" >&2 2>/dev/null || true
+    [ "$1" = 0 ] || tail -n 6 "$work/log" >&2 2>/dev/null || true
     [ -z "$pid" ] || kill -KILL "$pid" 2>/dev/null || true
     wait 2>/dev/null
     rm -rf "$work"
-    exit "$status"
 }
-trap cleanup EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
+ends_by cleanup
 
 promtool check config packaging/prometheus/prometheus.yml >"$work/told" 2>&1 ||
     fail "prometheus.yml: $(cat "$work/told")"

@@ -31,19 +31,14 @@ work="$(mktemp -d)"
 declare -A pid=() address=() metrics=()
 
 cleanup() {
-    status=$?
-    trap - EXIT INT TERM
-    [ "$status" = 0 ] || show_logs >&2
+    [ "$1" = 0 ] || show_logs >&2
     for name in "${!pid[@]}"; do
         kill -KILL "${pid[$name]}" || true
     done 2>/dev/null
     wait 2>/dev/null
     rm -rf "$work"
-    exit "$status"
 }
-trap cleanup EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
+ends_by cleanup
 
 show_logs() {
     for file in "$work"/*.log; do

@@ -21,17 +21,12 @@ command -v readelf >/dev/null || skip "there is no readelf (binutils)"
 work="$(mktemp -d)"
 pid=
 cleanup() {
-    status=$?
-    trap - EXIT INT TERM
-    [ "$status" = 0 ] || tail -n 20 "$work"/*.log >&2 2>/dev/null || true
+    [ "$1" = 0 ] || tail -n 20 "$work"/*.log >&2 2>/dev/null || true
     [ -z "$pid" ] || kill -KILL "$pid" 2>/dev/null || true
     wait 2>/dev/null
     rm -rf "$work"
-    exit "$status"
 }
-trap cleanup EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
+ends_by cleanup
 
 "$python" -m venv "$work/venv" 2>/dev/null || skip "$python makes no environments (python3-venv)"
 installed="$work/venv/bin/python"
