@@ -60,9 +60,7 @@ on() {
 }
 
 cleanup() {
-    status=$?
-    trap - EXIT INT TERM
-    [ "$status" = 0 ] || show_logs >&2
+    [ "$1" = 0 ] || show_logs >&2
     for process in "${!pid[@]}"; do
         kill -KILL "${pid[$process]}" || true
     done 2>/dev/null
@@ -71,11 +69,8 @@ cleanup() {
         ip netns del "$name-$host" 2>/dev/null || true
     done
     rm -rf "$work"
-    exit "$status"
 }
-trap cleanup EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
+ends_by cleanup
 
 show_logs() {
     for file in "$work"/*.log; do

@@ -22,8 +22,8 @@ pub struct LargeBody {
     shape: Shape,
     tangent: Option<Arc<FreeTangent>>,
     factors: usize,
-    /// Size of the forces without which a yielding body is called unloaded, N: yield stress times the
-    /// area that a cube of its volume has.
+    /// Size that the imbalance of a yielding body without forces is told relative to, N: its yield stress
+    /// times the area of [`area_of`]; 0 for a body that does not yield.
     unloaded: f64,
 }
 

@@ -23,8 +23,8 @@ const POINTS_MAX: usize = 200;
 /// operator without an inverse.
 const ADDED: f64 = 1e-7;
 
-/// The small system of the points that press at the end of a step; `None` where there are too many, or they have no
-/// inverse.
+/// The small system of the points that press at the end of a step; `None` where there are too many, or
+/// they have no inverse.
 pub(super) fn small_system(
     scene: &Scene<'_>,
     response: &Response<'_>,

@@ -78,8 +78,7 @@ impl ElasticityArguments {
     pub fn of_contact(&self, scene: &SceneFile) -> anyhow::Result<Elasticity> {
         let (deformation, law) = self.named(scene)?;
         let yield_stress = self.yield_stress.or(scene.yield_pa);
-        let usual = usual(yield_stress);
-        let deformation = deformation.unwrap_or(usual);
+        let deformation = deformation.unwrap_or(usual(yield_stress));
         checked(Elasticity { deformation, law, yield_stress })
     }
 
