@@ -5,7 +5,9 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use super::configuration::{Configuration, Scene};
 use super::features::{Gap, MaterialPoint};
 use super::rigid_motion::Wrench;
-use crate::contact::coulomb::{ContactProblem, FrictionCone, PointForce, ProblemError};
+use crate::contact::coulomb::{
+    ContactProblem, Delassus, FrictionCone, PointForce, PointPlace, ProblemError,
+};
 use crate::solve::condensed::{FreeBody, HeldCompliance, Relief, Response};
 
 /// A point in the problem.
@@ -54,6 +56,15 @@ impl ProblemPoint {
         }
     }
 
+    /// How far the point goes by a unit force along its normal, m/N, of its held displacement.
+    fn own_compliance(&self, scene: &Scene<'_>, held: Matrix3<f64>) -> f64 {
+        let elastic = held + FreeBody::relieved(&self.relief, &self.relief);
+        let yields = scene.bodies[usize::from(self.point.body)].compliance * Matrix3::identity();
+        let own = scene.answered() * elastic + scene.rigid.compliance(&self.arm) + yields;
+        let normal = self.frame.column(0);
+        normal.dot(&(own * normal))
+    }
+
     /// A force in the object's frame as normal and tangential parts.
     pub fn local(&self, force: &Vector3<f64>) -> PointForce {
         self.frame.transpose() * force
@@ -80,59 +91,101 @@ pub(super) fn problem(
     points: &[ProblemPoint],
 ) -> Result<ContactProblem, ProblemError> {
     let all: Vec<&ProblemPoint> = points.iter().collect();
-    let w = operator(scene, response, &all);
+    let w = operator(scene, response, about, &all)?;
     let b = free_motion(scene, response, (about, unpressed), points);
     let cones = points.iter().map(|point| point.cone(scene)).collect();
-    ContactProblem::try_new(w, b, cones)
+    ContactProblem::between_corners(w, b, cones)
 }
 
-/// `W`: place of every point per force at every point.
+/// A corner of the surface as one body presses on it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Corner {
+    body: u16,
+    node: u32,
+}
+
+/// `W`: place of every point per force at every point, by the compliance between the corners around them.
+///
+/// # Errors
+/// [`ProblemError::NotFinite`].
 pub(super) fn operator(
     scene: &Scene<'_>,
     response: &Response<'_>,
+    about: &Configuration,
     points: &[&ProblemPoint],
-) -> DMatrix<f64> {
-    let n = points.len();
-    let mut w = DMatrix::zeros(3 * n, 3 * n);
-    // Held displacement of every point under the force of one.
-    let mut moved = vec![Matrix3::zeros(); n];
-    for (j, force) in points.iter().enumerate() {
-        moved[j..].fill(Matrix3::zeros());
-        for (node, of_force) in force.point.weighted() {
-            let columns = response.held(node);
-            for (moved, point) in moved[j..].iter_mut().zip(&points[j..]) {
-                point.add_held(&columns, of_force, moved);
-            }
-        }
-        // Symmetric: what lies above the diagonal is what lies below.
-        for i in j..n {
-            let block = block(scene, points[i], force, &moved[i]);
-            w.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
-            if i != j {
-                w.fixed_view_mut::<3, 3>(3 * j, 3 * i).copy_from(&block.transpose());
-            }
-        }
-        let own = w.fixed_view::<3, 3>(3 * j, 3 * j).into_owned();
-        let symmetric = 0.5 * (own + own.transpose());
-        w.fixed_view_mut::<3, 3>(3 * j, 3 * j).copy_from(&symmetric);
-    }
-    w
+) -> Result<Delassus, ProblemError> {
+    let of = |p: &&ProblemPoint| {
+        let body = p.point.body;
+        p.point.weighted().map(move |(node, _)| Corner { body, node })
+    };
+    let mut corners: Vec<Corner> = points.iter().flat_map(of).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    let place = |p: &&ProblemPoint| {
+        let MaterialPoint { body, nodes, weights } = p.point;
+        let corner = |node: u32| corners.binary_search(&Corner { body, node }).unwrap_or(0) as u32;
+        PointPlace { corners: nodes.map(corner), weights, frame: p.frame }
+    };
+    let places = points.iter().map(place).collect();
+    Delassus::try_new(compliance(scene, response, about, &corners), places)
 }
 
-/// One block of `W`, in the frames of its points, from the held displacement of the first.
-fn block(
+/// Compliance between corners: the elastic one, the object's mass and inertia, and the bodies' own.
+fn compliance(
     scene: &Scene<'_>,
-    point: &ProblemPoint,
-    force: &ProblemPoint,
-    held: &Matrix3<f64>,
-) -> Matrix3<f64> {
-    let elastic = held + FreeBody::relieved(&point.relief, &force.relief);
-    let mut rigid = scene.rigid.compliance(&point.arm, &force.arm);
-    if point.point.body == force.point.body {
-        let yields = scene.bodies[usize::from(force.point.body)].compliance;
-        rigid += yields * Matrix3::identity();
+    response: &Response<'_>,
+    about: &Configuration,
+    corners: &[Corner],
+) -> DMatrix<f64> {
+    let rows = 3 * corners.len();
+    let mut k = relief_and_inertia(scene, response, about, corners);
+    let answered = scene.answered();
+    for (j, force) in corners.iter().enumerate() {
+        let columns = response.held(force.node);
+        for (i, corner) in corners.iter().enumerate().skip(j) {
+            let mut block = answered * columns.at(corner.node);
+            if corner.body == force.body {
+                let yields = scene.bodies[usize::from(force.body)].compliance;
+                (0..3).for_each(|axis| block[(axis, axis)] += yields);
+            }
+            let mut to = k.fixed_view_mut::<3, 3>(3 * i, 3 * j);
+            to += block;
+        }
     }
-    point.frame.transpose() * (scene.answered() * elastic + rigid) * force.frame
+    // Symmetric: what lies above the diagonal is what lies below.
+    for column in 0..rows {
+        for row in 0..column {
+            k[(row, column)] = k[(column, row)];
+        }
+    }
+    k
+}
+
+/// The parts of the compliance between corners that come from the motions of the whole object: what
+/// inertia relieves, and how mass and inertia yield. A product of two factors of eighteen columns.
+fn relief_and_inertia(
+    scene: &Scene<'_>,
+    response: &Response<'_>,
+    about: &Configuration,
+    corners: &[Corner],
+) -> DMatrix<f64> {
+    const PARTS: usize = 18;
+    let rows = 3 * corners.len();
+    let (mut left, mut right) = (DMatrix::zeros(rows, PARTS), DMatrix::zeros(PARTS, rows));
+    let (answered, rigid) = (scene.answered(), &scene.rigid);
+    for (i, corner) in corners.iter().enumerate() {
+        let (nodes, weights) = ([corner.node; 3], [1.0, 0.0, 0.0]);
+        let relief = response.relief_of(&nodes, &weights);
+        let arm = scene.place(response, &about.displacement, &nodes, &weights) - rigid.mass.centre;
+        let ([first, second], [to_first, to_second]) = (relief.rows(), relief.columns());
+        left.fixed_view_mut::<3, 6>(3 * i, 0).copy_from(&(answered * first));
+        left.fixed_view_mut::<3, 6>(3 * i, 6).copy_from(&(answered * second));
+        left.fixed_view_mut::<3, 6>(3 * i, 12).copy_from(&rigid.moved(&arm));
+        right.fixed_view_mut::<6, 3>(0, 3 * i).copy_from(&to_first);
+        right.fixed_view_mut::<6, 3>(6, 3 * i).copy_from(&to_second);
+        right.fixed_view_mut::<6, 3>(12, 3 * i).copy_from(&rigid.arms(&arm));
+    }
+    left * right
 }
 
 /// How far the forces of a configuration are from obeying the law there, N: the largest residual of the
@@ -150,11 +203,11 @@ pub(super) fn residual(
         for (node, of_force) in point.point.weighted() {
             point.add_held(&response.held(node), of_force, &mut held);
         }
-        let own = block(scene, point, point, &held);
+        let own = point.own_compliance(scene, held);
         let slip = point.frame.transpose() * point.slip(scene, response, about);
         let motion = PointForce::new(point.gap.distance, slip.y, slip.z);
         let force = PointForce::from_column_slice(force);
-        point.cone(scene).residual(force, motion, 1.0 / own[(0, 0)])
+        point.cone(scene).residual(force, motion, 1.0 / own)
     };
     let residuals = points.iter().zip(lambda.chunks_exact(3)).map(of_point);
     // A maximum passes over what is no number; here it must not.

@@ -1,6 +1,8 @@
 //! The rigid part of an object's motion: mass, inertia, and where forces of one step take it.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix3x6, Matrix6x3, Point3, Translation3, UnitQuaternion, Vector3,
+};
 
 use super::state::ObjectState;
 use crate::solve::condensed::FreeBody;
@@ -95,18 +97,35 @@ impl RigidStep<'_> {
         }
     }
 
-    /// What a change of the wrench changes in the place of a point, in the object's frame.
+    /// What a change of a force at a point changes in its place, in the object's frame.
     ///
     /// Units: `arm` from the centre of mass, m; result m/N.
-    pub fn compliance(
-        &self,
-        arm_of_point: &Vector3<f64>,
-        arm_of_force: &Vector3<f64>,
-    ) -> Matrix3<f64> {
-        let turning = arm_of_point.cross_matrix()
-            * self.mass.inverse_inertia
-            * arm_of_force.cross_matrix().transpose();
-        self.seconds.powi(2) * (Matrix3::identity() / self.mass.mass + turning)
+    pub fn compliance(&self, arm: &Vector3<f64>) -> Matrix3<f64> {
+        self.moved(arm) * self.arms(arm)
+    }
+
+    /// Place of a point per change of the wrench, in the object's frame: three columns by the force, three by
+    /// the torque.
+    ///
+    /// Units: `arm` from the centre of mass, m; result m/N, 1/N.
+    pub fn moved(&self, arm: &Vector3<f64>) -> Matrix3x6<f64> {
+        let square = self.seconds.powi(2);
+        let mut moved = Matrix3x6::zeros();
+        let shift = Matrix3::identity() * (square / self.mass.mass);
+        moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&shift);
+        let turning = -square * arm.cross_matrix() * self.mass.inverse_inertia;
+        moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&turning);
+        moved
+    }
+
+    /// Wrench of a force at a point: the force, and its torque.
+    ///
+    /// Units: `arm` from the centre of mass, m.
+    pub fn arms(&self, arm: &Vector3<f64>) -> Matrix6x3<f64> {
+        let mut arms = Matrix6x3::zeros();
+        arms.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+        arms.fixed_view_mut::<3, 3>(3, 0).copy_from(&arm.cross_matrix());
+        arms
     }
 }
 

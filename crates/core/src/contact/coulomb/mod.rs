@@ -1,6 +1,7 @@
 //! Contact with Coulomb friction between points: the cone, the problem, its solution, its residual.
 
 mod cone;
+mod delassus;
 mod newton;
 mod problem;
 mod solution;
@@ -9,6 +10,7 @@ mod splitting;
 mod sweeps;
 
 pub use cone::{FrictionCone, PointForce};
+pub use delassus::{Delassus, PointPlace};
 pub use problem::{ContactProblem, ProblemError};
 pub use solution::{PointState, Solution, SolveBudget, state_of};
 

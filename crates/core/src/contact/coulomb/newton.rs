@@ -7,10 +7,12 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor::{lu_in_place, lu_in_place_scratch};
-use faer::linalg::lu::partial_pivoting::solve::{solve_in_place, solve_in_place_scratch};
+use faer::linalg::lu::partial_pivoting::solve::{
+    solve_in_place as lu_solve, solve_in_place_scratch as lu_solve_scratch,
+};
 use faer::prelude::*;
 use faer::{MatMut, Par, Spec};
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2};
 
 use super::cone::PointForce;
 use super::problem::{ContactProblem, at};
@@ -34,6 +36,8 @@ pub(super) struct Step {
 
 /// Steps without a better residual after which no better one is expected.
 const STRAYING: usize = 4;
+/// Over the best residual, one from which Newton's method does not come back.
+const RUNAWAY: f64 = 30.0;
 
 impl<'a> Proximal<'a> {
     /// `share` of every point's own compliance is added to it.
@@ -58,7 +62,7 @@ impl<'a> Proximal<'a> {
             if residual < best.residual {
                 (best.lambda, best.residual, best_at) = (inside, residual, steps);
             }
-            let strays = steps >= best_at + STRAYING;
+            let strays = steps >= best_at + STRAYING || residual > RUNAWAY * best.residual;
             if best.residual <= tolerance || steps == steps_max || strays {
                 break;
             }
@@ -79,6 +83,10 @@ impl<'a> Proximal<'a> {
     }
 
     /// One step; `None` where it has none.
+    ///
+    /// Every pressed point answers a motion by a force, `δ = g − H (W δ)` with a block H of its own, so that
+    /// the motions `v = K B δ` of the corners obey `(I + K B H Bᵀ) v = K B g`: the size of the system is
+    /// that of the corners, however many points lie between them.
     fn step(&self, lambda: &[f64]) -> Option<Vec<f64>> {
         let problem = self.problem;
         let motion = self.motion(lambda);
@@ -95,49 +103,62 @@ impl<'a> Proximal<'a> {
             kept[3 * point..3 * point + 3].copy_from_slice(&lambda[3 * point..3 * point + 3]);
         }
         let free = self.motion(&kept);
-        let rows = 3 * pressed.len();
-        let row_of = |k: usize| 3 * pressed[k / 3] + k % 3;
-        let mut w = DMatrix::from_fn(rows, rows, |r, c| problem.w[(row_of(r), row_of(c))]);
-        (0..rows).for_each(|r| w[(r, r)] += self.added[pressed[r / 3]]);
-        let mut jacobian = w.clone();
-        let mut right = DVector::from_fn(rows, |r, _| -free[row_of(r)]);
-        for (k, &point) in pressed.iter().enumerate() {
-            let rho = problem.rho[point];
-            let slip = Slip::new(
-                problem.cones[point].friction,
-                rho,
-                &at(lambda, point),
-                &at(&motion, point),
-            );
+        let answer = |&point: &usize| {
+            let (rho, added) = (problem.rho[point], self.added[point]);
+            let force = at(lambda, point);
+            let slip = Slip::new(problem.cones[point].friction, rho, &force, &at(&motion, point));
             match slip {
-                Some(slip) => slip.fill(&mut jacobian, &mut right, &w, k),
-                None => continue,
+                Some(slip) => slip.answer(added, at(&free, point).x),
+                None => Answer::sticking(added, at(&free, point)),
             }
-        }
-        let change = solved(jacobian, right);
-        for r in 0..rows {
-            next[row_of(r)] = kept[row_of(r)] + change[r];
+        };
+        let answers: Vec<Answer> = pressed.iter().map(answer).collect();
+        let w = problem.w.of_points(&pressed);
+        let given: Vec<f64> = answers.iter().flat_map(|a| <[f64; 3]>::from(a.given)).collect();
+        let blocks: Vec<Matrix3<f64>> = answers.iter().map(|a| a.per_motion).collect();
+        let mut v = w.moved_corners(&given);
+        solve_in_place(w.coupled(&blocks), &mut v);
+        for (k, (&point, answer)) in pressed.iter().zip(&answers).enumerate() {
+            let change = answer.given - answer.per_motion * w.motion_of(k, &v);
+            let force = at(&kept, point) + change;
+            next[3 * point..3 * point + 3].copy_from_slice(force.as_slice());
         }
         next.iter().all(|x| x.is_finite()).then_some(next)
     }
 }
 
-/// The solution of a square system, by elimination with row exchanges on one thread: the same bits however
-/// many there are. Numbers that are not finite where it has none.
-fn solved(mut matrix: DMatrix<f64>, right: DVector<f64>) -> Vec<f64> {
-    let n = right.len();
-    let mut solution: Vec<f64> = right.data.into();
+/// Solves a square system for right sides one after another, by elimination with row exchanges on one
+/// thread: the same bits however many there are. Numbers that are not finite where it has no solution.
+pub(super) fn solve_in_place(mut matrix: DMatrix<f64>, right: &mut [f64]) {
+    let n = matrix.nrows();
+    if n == 0 {
+        return;
+    }
+    let sides = right.len() / n;
     let (mut rows, mut places) = (vec![0usize; n], vec![0usize; n]);
     let need = lu_in_place_scratch::<usize, f64>(n, n, Par::Seq, Spec::default())
-        .or(solve_in_place_scratch::<usize, f64>(n, 1, Par::Seq));
+        .or(lu_solve_scratch::<usize, f64>(n, sides, Par::Seq));
     let mut memory = MemBuffer::new(need);
     let stack = MemStack::new(&mut memory);
     let mut lu = MatMut::from_column_major_slice_mut(matrix.as_mut_slice(), n, n);
     let (_, order) =
         lu_in_place(lu.rb_mut(), &mut rows, &mut places, Par::Seq, stack, Spec::default());
-    let column = MatMut::from_column_major_slice_mut(&mut solution, n, 1);
-    solve_in_place(lu.rb(), lu.rb(), order, column, Par::Seq, stack);
-    solution
+    let right = MatMut::from_column_major_slice_mut(right, n, sides);
+    lu_solve(lu.rb(), lu.rb(), order, right, Par::Seq, stack);
+}
+
+/// How a point answers its motion u: a change of its force by `given − per_motion u`.
+struct Answer {
+    given: PointForce,
+    /// 3 × 3, N/m.
+    per_motion: Matrix3<f64>,
+}
+
+impl Answer {
+    /// A point that sticks: `added δ + W δ = −free`.
+    fn sticking(added: f64, free: PointForce) -> Self {
+        Self { given: -free / added, per_motion: Matrix3::identity() / added }
+    }
 }
 
 /// A slipping point: what its two tangential rows are made of.
@@ -166,31 +187,22 @@ impl Slip {
         })
     }
 
-    /// Rows `δ_t − μ d δ_n − r/‖a‖ (I − d dᵀ) (δ_t − ρ W_t δ) = μ λ_n d − λ_t`.
-    fn fill(
-        &self,
-        jacobian: &mut DMatrix<f64>,
-        right: &mut DVector<f64>,
-        w: &DMatrix<f64>,
-        k: usize,
-    ) {
-        let d = self.direction;
-        let turned = (Matrix2::identity() - d * d.transpose()) * self.share;
-        for c in 0..jacobian.ncols() {
-            let tangential = Vector2::new(w[(3 * k + 1, c)], w[(3 * k + 2, c)]);
-            let row = self.rho * (turned * tangential);
-            jacobian[(3 * k + 1, c)] = row.x;
-            jacobian[(3 * k + 2, c)] = row.y;
-        }
-        let missing = self.friction * self.force.x.max(0.0) * d - self.force.yz();
-        for axis in 0..2 {
-            let row = 3 * k + 1 + axis;
-            jacobian[(row, row)] += 1.0;
-            for other in 0..2 {
-                jacobian[(row, 3 * k + 1 + other)] -= turned[(axis, other)];
-            }
-            jacobian[(row, 3 * k)] -= self.friction * d[axis];
-            right[row] = missing[axis];
-        }
+    /// Of `added δ_n + (W δ)_n = −free_n` and, with `T = r/‖a‖ (I − d dᵀ)`,
+    /// `δ_t − μ d δ_n − T (δ_t − ρ (added δ_t + (W δ)_t)) = μ λ_n d − λ_t`.
+    ///
+    /// Units: `added` m/N, `free` m, the normal motion without a change.
+    fn answer(&self, added: f64, free: f64) -> Answer {
+        let Self { direction: d, share, friction, rho, .. } = *self;
+        let along = d * d.transpose();
+        let across = Matrix2::identity() - along;
+        let inverse = along + across / (1.0 - share * (1.0 - rho * added));
+        let normal = -free / added;
+        let missing = friction * self.force.x.max(0.0) * d - self.force.yz();
+        let tangential = inverse * (missing + friction * normal * d);
+        let mut per_motion = Matrix3::zeros();
+        per_motion[(0, 0)] = 1.0 / added;
+        per_motion.fixed_view_mut::<2, 1>(1, 0).copy_from(&(inverse * (friction / added * d)));
+        per_motion.fixed_view_mut::<2, 2>(1, 1).copy_from(&(inverse * (rho * share * across)));
+        Answer { given: PointForce::new(normal, tangential.x, tangential.y), per_motion }
     }
 }

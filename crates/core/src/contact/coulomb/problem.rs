@@ -3,17 +3,18 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::cone::{FrictionCone, PointForce};
+use super::delassus::{Delassus, PointPlace};
 
 /// Points in contact, or nearly so: `u = W λ + b`, and a cone for each.
 ///
-/// Shapes: n points; `w` 3n × 3n, symmetric, positive semidefinite (the Delassus operator); `b` 3n;
-/// each point has three rows: normal, and two tangents.
+/// Shapes: n points; the Delassus operator W 3n × 3n, symmetric, positive semidefinite; `b` 3n; each
+/// point has three rows: normal, and two tangents.
 /// Units: `w` m/N, `b` m (gap and slip without contact forces), λ N.
 ///
 /// Source: Moreau's implicit contact at position level; Alart and Curnier (1991).
 #[derive(Clone, Debug)]
 pub struct ContactProblem {
-    pub(super) w: DMatrix<f64>,
+    pub(super) w: Delassus,
     pub(super) b: Vec<f64>,
     pub(super) cones: Vec<FrictionCone>,
     /// A stiffness for each point, N/m: it turns metres into newtons in the residual.
@@ -53,6 +54,8 @@ pub enum ProblemError {
 }
 
 impl ContactProblem {
+    /// Points that are each a corner of their own: W is the compliance between them.
+    ///
     /// Shapes and units as in [`ContactProblem`].
     ///
     /// # Errors
@@ -62,18 +65,33 @@ impl ContactProblem {
         b: Vec<f64>,
         cones: Vec<FrictionCone>,
     ) -> Result<Self, ProblemError> {
+        let points = (0..cones.len() as u32).map(PointPlace::corner).collect();
+        Self::between_corners(Delassus::try_new(w, points)?, b, cones)
+    }
+
+    /// Points that lie between the corners of a surface.
+    ///
+    /// Shapes and units as in [`ContactProblem`].
+    ///
+    /// # Errors
+    /// [`ProblemError`].
+    pub fn between_corners(
+        w: Delassus,
+        b: Vec<f64>,
+        cones: Vec<FrictionCone>,
+    ) -> Result<Self, ProblemError> {
         let points = cones.len();
         let expected = 3 * points;
-        if w.nrows() != expected || w.ncols() != expected || b.len() != expected {
-            let (rows, motion) = (w.nrows(), b.len());
-            return Err(ProblemError::Sizes { points, expected, rows, motion });
+        let rows = 3 * w.point_count();
+        if rows != expected || b.len() != expected {
+            return Err(ProblemError::Sizes { points, expected, rows, motion: b.len() });
         }
-        if !w.iter().chain(&b).all(|x| x.is_finite()) {
+        if !b.iter().all(|x| x.is_finite()) {
             return Err(ProblemError::NotFinite);
         }
         let mut rho = Vec::with_capacity(points);
         for point in 0..points {
-            let compliance = w[(3 * point, 3 * point)];
+            let compliance = w.own(point)[(0, 0)];
             // Written so that a NaN is refused too.
             let is_soft = compliance > 0.0;
             if !is_soft {
@@ -91,17 +109,10 @@ impl ContactProblem {
 
     /// Gap and slip `W λ + b` of every point, m.
     ///
-    /// Shapes: `lambda` and result 3n.
+    /// Shapes: `lambda` and result 3n; no forces at all may be given as none.
     pub fn motion(&self, lambda: &[f64]) -> Vec<f64> {
-        let mut motion = self.b.clone();
-        for (column, &force) in lambda.iter().enumerate() {
-            // Open points have no force, and most of a margin is open.
-            if force != 0.0 {
-                let w = self.w.column(column);
-                motion.iter_mut().zip(w.iter()).for_each(|(u, w)| *u += w * force);
-            }
-        }
-        motion
+        let moved = self.w.apply(lambda);
+        moved.iter().zip(&self.b).map(|(w, b)| w + b).collect()
     }
 
     /// Largest residual of the natural map over all points, N.
@@ -127,7 +138,7 @@ impl ContactProblem {
         let row = |k: usize| 3 * points[k / 3] + k % 3;
         let rows = 3 * points.len();
         Self {
-            w: DMatrix::from_fn(rows, rows, |r, c| self.w[(row(r), row(c))]),
+            w: self.w.of_points(points),
             b: (0..rows).map(|k| self.b[row(k)]).collect(),
             cones: points.iter().map(|&i| self.cones[i]).collect(),
             rho: points.iter().map(|&i| self.rho[i]).collect(),

@@ -70,7 +70,7 @@ const LEFT: f64 = 0.3;
 /// Sweeps of the splitting after Newton's method has strayed, and the shares of compliance that they are
 /// made with in turn: no single one suits far and near, and every system of points.
 const SWEEPS: usize = 150;
-const SPLITTING_SHARES: [f64; 3] = [1.0, 0.03, 0.005];
+const SPLITTING_SHARES: [f64; 3] = [1.0, 0.1, 0.005];
 /// The first of these shares is left out where the residual is below this part of the largest force.
 const NEAR: f64 = 0.1;
 /// The splitting begins anew at what Newton's method found where that left no more than this.

@@ -6,10 +6,11 @@
 //! here.
 
 use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{DenseSolveCore, Llt};
-use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+use faer::{Accum, MatMut, MatRef, Par};
+use nalgebra::{DMatrix, Matrix3};
 
 use super::cone::PointForce;
+use super::newton::solve_in_place;
 use super::problem::{ContactProblem, at};
 
 /// A state of the alternating direction method of multipliers on a contact problem.
@@ -22,8 +23,8 @@ pub(super) struct Splitting<'a> {
     pushed: Vec<f64>,
     /// Compliance added at each point, m/N: it turns motions into forces.
     added: Vec<f64>,
-    /// Inverse of `W` with the added compliance, 3n × 3n, N/m.
-    inverse: Mat<f64>,
+    /// Compliance of the corners if every point yields by what is added to it, 3m × 3m, m/N.
+    compliance: DMatrix<f64>,
 }
 
 /// Over-relaxation: so far is gone towards agreement, and beyond.
@@ -35,8 +36,8 @@ impl<'a> Splitting<'a> {
     ///
     /// Shapes: `lambda` 3n, N.
     pub fn new(problem: &'a ContactProblem, lambda: &[f64], share: f64) -> Option<Self> {
-        let (added, inverse) = added_and_inverse(problem, share)?;
-        let mut splitting = Self { problem, pushed: Vec::new(), added, inverse };
+        let (added, compliance) = added_and_compliance(problem, share)?;
+        let mut splitting = Self { problem, pushed: Vec::new(), added, compliance };
         splitting.begin_at(lambda);
         Some(splitting)
     }
@@ -54,18 +55,17 @@ impl<'a> Splitting<'a> {
 
     /// Goes on with another share of every point's own compliance; as it is where that has no inverse.
     pub fn change_share(&mut self, share: f64) {
-        let Some((added, inverse)) = added_and_inverse(self.problem, share) else { return };
+        let Some((added, compliance)) = added_and_compliance(self.problem, share) else { return };
         let inside = self.problem.projected(&self.pushed);
         for (k, (pushed, inside)) in self.pushed.iter_mut().zip(&inside).enumerate() {
             *pushed = inside + (*pushed - inside) * self.added[k / 3] / added[k / 3];
         }
-        (self.added, self.inverse) = (added, inverse);
+        (self.added, self.compliance) = (added, compliance);
     }
 
     /// Goes on for some sweeps; the forces then, each in its cone, 3n, N.
     pub fn advance(&mut self, sweeps: usize) -> Vec<f64> {
-        let rows = self.pushed.len();
-        let (mut right, mut agreed) = (vec![0.0; rows], vec![0.0; rows]);
+        let mut wanted = vec![0.0; self.pushed.len()];
         for _ in 0..sweeps {
             let inside = self.problem.projected(&self.pushed);
             for (point, &added) in self.added.iter().enumerate() {
@@ -74,22 +74,36 @@ impl<'a> Splitting<'a> {
                 let motion = added * (force - at(&self.pushed, point));
                 let mut free = at(&self.problem.b, point);
                 free.x += self.correction(point, &motion);
-                let wanted = added * force + motion - free;
-                right[3 * point..3 * point + 3].copy_from_slice(wanted.as_slice());
+                let force = force + (motion - free) / added;
+                wanted[3 * point..3 * point + 3].copy_from_slice(force.as_slice());
             }
-            matmul(
-                MatMut::from_column_major_slice_mut(&mut agreed, rows, 1),
-                Accum::Replace,
-                self.inverse.as_ref(),
-                MatRef::from_column_major_slice(&right, rows, 1),
-                1.0,
-                Par::Seq,
-            );
-            for ((pushed, agreed), inside) in self.pushed.iter_mut().zip(&agreed).zip(&inside) {
+            self.yield_to_compliance(&mut wanted);
+            for ((pushed, agreed), inside) in self.pushed.iter_mut().zip(&wanted).zip(&inside) {
                 *pushed += RELAXATION * (agreed - inside);
             }
         }
         self.problem.projected(&self.pushed)
+    }
+
+    /// Of forces the added compliances alone would have, those that W with the added compliances has:
+    /// `(W + D)⁻¹ D λ = λ − D⁻¹ Bᵀ N B λ`, N the compliance of the corners.
+    fn yield_to_compliance(&self, lambda: &mut [f64]) {
+        let w = &self.problem.w;
+        let spread = w.spread(lambda);
+        let rows = spread.len();
+        let mut moved = vec![0.0; rows];
+        matmul(
+            MatMut::from_column_major_slice_mut(&mut moved, rows, 1),
+            Accum::Replace,
+            MatRef::from_column_major_slice(self.compliance.as_slice(), rows, rows),
+            MatRef::from_column_major_slice(&spread, rows, 1),
+            1.0,
+            Par::Seq,
+        );
+        for (point, added) in self.added.iter().enumerate() {
+            let less = w.motion_of(point, &moved) / *added;
+            (0..3).for_each(|axis| lambda[3 * point + axis] -= less[axis]);
+        }
     }
 
     /// De Saxcé's correction of a gap, m: with it a slip is complementary to the force that opposes it.
@@ -98,10 +112,11 @@ impl<'a> Splitting<'a> {
     }
 }
 
-fn added_and_inverse(problem: &ContactProblem, share: f64) -> Option<(Vec<f64>, Mat<f64>)> {
+/// What a share adds to each point, m/N, and the compliance `(I + K B D⁻¹ Bᵀ)⁻¹ K` of the corners with it.
+fn added_and_compliance(problem: &ContactProblem, share: f64) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let added: Vec<f64> = problem.rho.iter().map(|rho| share / rho).collect();
-    let (rows, w) = (problem.w.nrows(), &problem.w);
-    let entry = |r, c| w[(r, c)] + if r == c { added[r / 3] } else { 0.0 };
-    let inverse = Llt::new(Mat::from_fn(rows, rows, entry).as_ref(), Side::Lower).ok()?.inverse();
-    Some((added, inverse))
+    let blocks: Vec<Matrix3<f64>> = added.iter().map(|a| Matrix3::identity() / *a).collect();
+    let mut compliance = problem.w.compliance().clone();
+    solve_in_place(problem.w.coupled(&blocks), compliance.as_mut_slice());
+    compliance.iter().all(|x| x.is_finite()).then_some((added, compliance))
 }

@@ -2,7 +2,7 @@
 //! the others stand still.
 
 use super::problem::{ContactProblem, at};
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{DMatrix, Matrix3, Vector2};
 
 use super::cone::PointForce;
 
@@ -121,20 +121,21 @@ impl PointProblem {
 /// Block Gauss–Seidel on a contact problem.
 ///
 /// Source: Jourdan, Alart and Jean (1998), the nonlinear Gauss–Seidel method.
-pub(super) struct Sweeps<'a> {
-    problem: &'a ContactProblem,
+pub(super) struct Sweeps {
+    w: DMatrix<f64>,
     points: Vec<PointProblem>,
 }
 
-impl<'a> Sweeps<'a> {
-    pub fn new(problem: &'a ContactProblem) -> Self {
+impl Sweeps {
+    pub fn new(problem: &ContactProblem) -> Self {
+        let w = problem.w.to_matrix();
         let points = (0..problem.point_count())
             .map(|i| {
-                let own = problem.w.fixed_view::<3, 3>(3 * i, 3 * i).into_owned();
+                let own = w.fixed_view::<3, 3>(3 * i, 3 * i).into_owned();
                 PointProblem::new(own, problem.cones[i].friction)
             })
             .collect();
-        Self { problem, points }
+        Self { w, points }
     }
 
     /// One sweep over all points in their order; `motion` stays `W λ + b`.
@@ -150,7 +151,7 @@ impl<'a> Sweeps<'a> {
             for axis in 0..3 {
                 lambda[3 * i + axis] = new[axis];
                 if change[axis] != 0.0 {
-                    let w = self.problem.w.column(3 * i + axis);
+                    let w = self.w.column(3 * i + axis);
                     motion.iter_mut().zip(w.iter()).for_each(|(u, w)| *u += w * change[axis]);
                 }
             }

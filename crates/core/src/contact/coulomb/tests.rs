@@ -189,3 +189,102 @@ fn a_point_without_friction_presses_only() {
     let force = PointProblem::new(w, 0.0).solve(Vector3::new(-0.5, 0.2, 0.0));
     assert_eq!(force, Vector3::new(0.5, 0.0, 0.0));
 }
+
+/// Points between corners: each within a triangle of three, on an edge or at a corner, its normal turned.
+fn between(corners: usize, seed: &[f64]) -> Vec<PointPlace> {
+    let numbers = |i: usize| &seed[4 * i..4 * i + 4];
+    let place = |i: usize| {
+        let [a, b, turn, kind] = numbers(i) else { unreachable!("four numbers a point") };
+        let first = i % corners;
+        let others = [(first + 1) % corners, (first + 2) % corners];
+        let weights = match (3.0 * kind.abs()) as usize {
+            0 => [1.0, 0.0, 0.0],
+            1 => [0.5 + 0.4 * a, 0.5 - 0.4 * a, 0.0],
+            _ => [0.4 + 0.2 * a, 0.3 + 0.2 * b, 0.3 - 0.2 * a - 0.2 * b],
+        };
+        let axis = nalgebra::Vector3::new(*a, *b, 0.3);
+        let frame = nalgebra::Rotation3::from_scaled_axis(*turn * axis).into_inner();
+        PointPlace { corners: [first, others[0], others[1]].map(|c| c as u32), weights, frame }
+    };
+    (0..seed.len() / 4).map(place).collect()
+}
+
+/// B: weight times frame for each corner, rows, and point, columns.
+fn spread(corners: usize, points: &[PointPlace]) -> DMatrix<f64> {
+    let mut b = DMatrix::zeros(3 * corners, 3 * points.len());
+    for (i, point) in points.iter().enumerate() {
+        for (corner, weight) in point.weighted() {
+            let mut block = b.fixed_view_mut::<3, 3>(3 * corner, 3 * i);
+            block += weight * point.frame;
+        }
+    }
+    b
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn operator_between_corners_is_that_of_its_matrices(
+        corners in 3usize..9,
+        seed in prop::collection::vec(-1.0..1.0f64, 27),
+        points in prop::collection::vec(-1.0..1.0f64, 4 * 11),
+    ) {
+        let (k, points) = (compliance(corners, &seed), between(corners, &points));
+        let b = spread(corners, &points);
+        let w = Delassus::try_new(k.clone(), points.clone()).unwrap();
+        let dense = b.transpose() * &k * &b;
+        prop_assert!((w.to_matrix() - &dense).norm() < 1e-12 * dense.norm());
+        for i in 0..points.len() {
+            prop_assert!((w.own(i) - dense.fixed_view::<3, 3>(3 * i, 3 * i)).norm() < 1e-12 * dense.norm());
+        }
+        // A stiffness of every point couples the corners.
+        let answers: Vec<_> = (0..points.len()).map(|i| w.own(i) * (1.0 + i as f64)).collect();
+        let mut h = DMatrix::zeros(3 * points.len(), 3 * points.len());
+        for (i, answer) in answers.iter().enumerate() {
+            h.fixed_view_mut::<3, 3>(3 * i, 3 * i).copy_from(answer);
+        }
+        let coupled = DMatrix::identity(3 * corners, 3 * corners) + &k * &b * h * b.transpose();
+        prop_assert!((w.coupled(&answers) - &coupled).norm() < 1e-12 * coupled.norm());
+        // Of some points alone it is the part of the whole.
+        let some = [1, 4, 5, 9];
+        let part = w.of_points(&some).to_matrix();
+        for (r, &i) in some.iter().enumerate() {
+            for (c, &j) in some.iter().enumerate() {
+                let off = part.fixed_view::<3, 3>(3 * r, 3 * c) - dense.fixed_view::<3, 3>(3 * i, 3 * j);
+                prop_assert!(off.norm() < 1e-12 * dense.norm());
+            }
+        }
+    }
+
+    #[test]
+    fn more_points_than_corners_move_as_in_the_problem_of_their_matrix(
+        corners in 3usize..7,
+        seed in prop::collection::vec(-1.0..1.0f64, 21),
+        points in prop::collection::vec(-1.0..1.0f64, 4 * 14),
+        pushed in prop::collection::vec(-1.0..0.5f64, 3 * 14),
+        friction in 0.0..0.9f64,
+    ) {
+        let mut points = between(corners, &points);
+        // Normals that hardly differ, as those of a patch.
+        points.iter_mut().for_each(|point| point.frame = nalgebra::Matrix3::identity());
+        let cones = vec![FrictionCone { friction }; points.len()];
+        let w = Delassus::try_new(compliance(corners, &seed), points).unwrap();
+        let dense = ContactProblem::try_new(w.to_matrix(), pushed.clone(), cones.clone()).unwrap();
+        let problem = ContactProblem::between_corners(w, pushed, cones).unwrap();
+        let budget = SolveBudget { residual_rel: 1e-8, residual: 0.0, attempts_max: 40 };
+        let (ours, theirs) = (Solution::of(&problem, &[], budget), Solution::of(&dense, &[], budget));
+        prop_assert!(ours.is_converged, "residual {:e} of {:e} N", ours.residual, ours.force_max());
+        prop_assume!(theirs.is_converged);
+        // Forces that shear every point can have more than one answer; without friction motions have one.
+        let off = ours.motion.iter().zip(&theirs.motion).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        prop_assert!(friction > 0.3 || off < 1e-4, "{off:e}");
+    }
+}
+
+#[test]
+fn points_at_corners_that_are_not_there_are_refused() {
+    let points = vec![PointPlace::corner(2)];
+    let refused = Delassus::try_new(DMatrix::identity(6, 6), points).err();
+    assert!(matches!(refused, Some(ProblemError::Sizes { .. })), "{refused:?}");
+}

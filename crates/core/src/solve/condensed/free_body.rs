@@ -258,7 +258,8 @@ impl FreeBody {
     ///
     /// Units: m/N. Shapes: rows displacement at `a`, columns force at `b`.
     pub fn relieved(a: &Relief, b: &Relief) -> Matrix3<f64> {
-        a.acceleration.transpose() * b.left - a.response * b.acceleration
+        let ([a_first, a_second], [b_first, b_second]) = (a.rows(), b.columns());
+        a_first * b_first + a_second * b_second
     }
 
     /// Displacement of node `a` under a unit force along each axis at the node of some columns.
@@ -313,6 +314,19 @@ impl Relief {
             response: Matrix3x6::zeros(),
             left: Matrix6x3::zeros(),
         }
+    }
+}
+
+impl Relief {
+    /// Displacement of the point by what inertia takes from the compliance, as the product of two factors:
+    /// those of the row.
+    pub fn rows(&self) -> [Matrix3x6<f64>; 2] {
+        [self.acceleration.transpose(), -self.response]
+    }
+
+    /// Those of the column, for a force at the point.
+    pub fn columns(&self) -> [Matrix6x3<f64>; 2] {
+        [self.left, self.acceleration]
     }
 }
 

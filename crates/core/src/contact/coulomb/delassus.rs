@@ -1,0 +1,268 @@
+//! The Delassus operator `W = Bᵀ K B`: a compliance K between corners of the surface, and points that lie
+//! between corners.
+//!
+//! A patch of surface has more points in contact than corners, and each point is a mean of three of them
+//! at most. So what costs the square or the cube of a size is done between corners, and points are local.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::cone::PointForce;
+use super::problem::{ProblemError, at};
+
+/// A contact point as a mean of corners, and the frame that its force is written in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointPlace {
+    /// Corners, by their position in the compliance.
+    pub corners: [u32; 3],
+    /// Weights of the corners; where one is zero its corner does not matter.
+    pub weights: [f64; 3],
+    /// Normal and two tangents as columns, in the frame of the compliance.
+    pub frame: Matrix3<f64>,
+}
+
+/// `W = Bᵀ K B`.
+///
+/// Shapes: m corners; `compliance` K 3m × 3m, symmetric, positive semidefinite; n points. B has a block
+/// of weight times frame for each corner and point. Units: m/N.
+///
+/// Source: Delassus (1917); Jourdan, Alart and Jean (1998).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Delassus {
+    compliance: DMatrix<f64>,
+    points: Vec<PointPlace>,
+}
+
+impl PointPlace {
+    /// The point at a corner, in the frame of the compliance.
+    pub fn corner(corner: u32) -> Self {
+        Self { corners: [corner; 3], weights: [1.0, 0.0, 0.0], frame: Matrix3::identity() }
+    }
+
+    /// Corners with a weight.
+    pub fn weighted(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
+        let corners = self.corners.into_iter().zip(self.weights);
+        corners.filter(|(_, weight)| *weight != 0.0).map(|(corner, w)| (corner as usize, w))
+    }
+}
+
+impl Delassus {
+    /// Shapes and units as in [`Delassus`].
+    ///
+    /// # Errors
+    /// [`ProblemError::Sizes`] where the compliance is not square in threes, or a point names a corner
+    /// that is not there; [`ProblemError::NotFinite`].
+    pub fn try_new(
+        compliance: DMatrix<f64>,
+        points: Vec<PointPlace>,
+    ) -> Result<Self, ProblemError> {
+        let rows = compliance.nrows();
+        let last = points.iter().flat_map(PointPlace::weighted).map(|(corner, _)| corner).max();
+        let corners = last.map_or(0, |last| last + 1);
+        if compliance.ncols() != rows || rows % 3 != 0 || rows < 3 * corners {
+            let (points, expected, motion) = (points.len(), 3 * corners, compliance.ncols());
+            return Err(ProblemError::Sizes { points, expected, rows, motion });
+        }
+        let places = points.iter().flat_map(|p| p.frame.iter().chain(&p.weights));
+        if !compliance.iter().chain(places).all(|x| x.is_finite()) {
+            return Err(ProblemError::NotFinite);
+        }
+        Ok(Self { compliance, points })
+    }
+
+    /// Number of points.
+    pub fn point_count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Rows of the compliance: three for each corner.
+    pub(super) fn corner_rows(&self) -> usize {
+        self.compliance.nrows()
+    }
+
+    pub(super) fn compliance(&self) -> &DMatrix<f64> {
+        &self.compliance
+    }
+
+    /// How a point yields to its own force, 3 × 3, m/N.
+    pub(super) fn own(&self, point: usize) -> Matrix3<f64> {
+        let place = &self.points[point];
+        let mut own = Matrix3::zeros();
+        for (row, of_row) in place.weighted() {
+            for (column, of_column) in place.weighted() {
+                let k = self.compliance.fixed_view::<3, 3>(3 * row, 3 * column);
+                own += of_row * of_column * k;
+            }
+        }
+        place.frame.transpose() * own * place.frame
+    }
+
+    /// Forces of points as forces at corners: `B λ`.
+    ///
+    /// Shapes: `lambda` 3n, result 3m. Units: N.
+    pub(super) fn spread(&self, lambda: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; self.corner_rows()];
+        for (place, force) in self.points.iter().zip(lambda.chunks_exact(3)) {
+            // Open points have no force, and most of a margin is open.
+            if force.iter().any(|f| *f != 0.0) {
+                let force = place.frame * Vector3::from_column_slice(force);
+                for (corner, weight) in place.weighted() {
+                    (0..3).for_each(|axis| y[3 * corner + axis] += weight * force[axis]);
+                }
+            }
+        }
+        y
+    }
+
+    /// Motion of one point by those of the corners: its rows of `Bᵀ v`.
+    pub(super) fn motion_of(&self, point: usize, v: &[f64]) -> PointForce {
+        let place = &self.points[point];
+        let mut moved = Vector3::zeros();
+        for (corner, weight) in place.weighted() {
+            moved += weight * at(v, corner);
+        }
+        place.frame.tr_mul(&moved)
+    }
+
+    /// Motions of the corners under forces at the points: `K B λ`.
+    ///
+    /// Shapes: `lambda` 3n, result 3m. Units: N, m.
+    pub(super) fn moved_corners(&self, lambda: &[f64]) -> Vec<f64> {
+        let (rows, spread) = (self.corner_rows(), self.spread(lambda));
+        let mut v = vec![0.0; rows];
+        matmul(
+            MatMut::from_column_major_slice_mut(&mut v, rows, 1),
+            Accum::Replace,
+            MatRef::from_column_major_slice(self.compliance.as_slice(), rows, rows),
+            MatRef::from_column_major_slice(&spread, rows, 1),
+            1.0,
+            Par::Seq,
+        );
+        v
+    }
+
+    /// `W λ`.
+    ///
+    /// Shapes: `lambda` and result 3n. Units: N, m.
+    pub(super) fn apply(&self, lambda: &[f64]) -> Vec<f64> {
+        let v = self.moved_corners(lambda);
+        (0..self.point_count()).flat_map(|i| <[f64; 3]>::from(self.motion_of(i, &v))).collect()
+    }
+
+    /// `S = B diag(H) Bᵀ`, and then `I + K S`: what couples corners if every point answers a motion by a
+    /// force.
+    ///
+    /// Shapes: `answers` n blocks 3 × 3, N/m.
+    pub(super) fn coupled(&self, answers: &[Matrix3<f64>]) -> DMatrix<f64> {
+        let rows = self.corner_rows();
+        let mut coupled = DMatrix::identity(rows, rows);
+        let mut s = BlockColumns::new(rows / 3);
+        for (place, answer) in self.points.iter().zip(answers) {
+            let turned = place.frame * answer * place.frame.transpose();
+            for (row, of_row) in place.weighted() {
+                for (column, of_column) in place.weighted() {
+                    s.add(row, column, of_row * of_column * turned);
+                }
+            }
+        }
+        let arch = pulp::Arch::new();
+        let k = self.compliance.as_slice();
+        for (to, blocks) in coupled.as_mut_slice().chunks_exact_mut(3 * rows).zip(&s.0) {
+            for (row, block) in blocks {
+                let from = &k[3 * row * rows..3 * (row + 1) * rows];
+                arch.dispatch(AddBlock { from, block, to });
+            }
+        }
+        coupled
+    }
+
+    /// The operator of some points alone, between their own corners.
+    pub(super) fn of_points(&self, points: &[usize]) -> Self {
+        let of = |&point: &usize| self.points[point].weighted().map(|(corner, _)| corner);
+        let mut corners: Vec<usize> = points.iter().flat_map(of).collect();
+        corners.sort_unstable();
+        corners.dedup();
+        let mut position = vec![0u32; self.corner_rows() / 3];
+        corners.iter().enumerate().for_each(|(at, &corner)| position[corner] = at as u32);
+        let renamed = |&point: &usize| {
+            let mut place = self.points[point];
+            place.corners = std::array::from_fn(|k| match place.weights[k] == 0.0 {
+                true => 0,
+                false => position[place.corners[k] as usize],
+            });
+            place
+        };
+        let row = |k: usize| 3 * corners[k / 3] + k % 3;
+        let rows = 3 * corners.len();
+        Self {
+            compliance: DMatrix::from_fn(rows, rows, |r, c| self.compliance[(row(r), row(c))]),
+            points: points.iter().map(renamed).collect(),
+        }
+    }
+
+    /// W as a matrix, 3n × 3n.
+    pub fn to_matrix(&self) -> DMatrix<f64> {
+        let n = 3 * self.point_count();
+        let mut w = DMatrix::zeros(n, n);
+        let mut unit = vec![0.0; n];
+        for column in 0..n {
+            unit[column] = 1.0;
+            w.column_mut(column).copy_from_slice(&self.apply(&unit));
+            unit[column] = 0.0;
+        }
+        w
+    }
+}
+
+/// A sparse matrix of blocks by columns, in the order in which they come.
+struct BlockColumns(Vec<Vec<(usize, Matrix3<f64>)>>);
+
+impl BlockColumns {
+    fn new(columns: usize) -> Self {
+        Self(vec![Vec::new(); columns])
+    }
+
+    fn add(&mut self, row: usize, column: usize, block: Matrix3<f64>) {
+        let column = &mut self.0[column];
+        match column.iter_mut().find(|(at, _)| *at == row) {
+            Some((_, sum)) => *sum += block,
+            None => column.push((row, block)),
+        }
+    }
+}
+
+/// Adds three columns times a block to three columns.
+struct AddBlock<'a> {
+    from: &'a [f64],
+    block: &'a Matrix3<f64>,
+    to: &'a mut [f64],
+}
+
+impl pulp::WithSimd for AddBlock<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let rows = self.to.len() / 3;
+        let b = self.block;
+        let (x, yz) = self.from.split_at(rows);
+        let (y, z) = yz.split_at(rows);
+        let (x, x_tail) = S::as_simd_f64s(x);
+        let (y, y_tail) = S::as_simd_f64s(y);
+        let (z, z_tail) = S::as_simd_f64s(z);
+        for (axis, to) in self.to.chunks_exact_mut(rows).enumerate() {
+            let (bx, by, bz) = (b[(0, axis)], b[(1, axis)], b[(2, axis)]);
+            let (sx, sy, sz) = (simd.splat_f64s(bx), simd.splat_f64s(by), simd.splat_f64s(bz));
+            let (to, tail) = S::as_mut_simd_f64s(to);
+            for (((to, x), y), z) in to.iter_mut().zip(x).zip(y).zip(z) {
+                let sum = simd.mul_add_f64s(*x, sx, *to);
+                let sum = simd.mul_add_f64s(*y, sy, sum);
+                *to = simd.mul_add_f64s(*z, sz, sum);
+            }
+            for (((to, x), y), z) in tail.iter_mut().zip(x_tail).zip(y_tail).zip(z_tail) {
+                *to += x * bx + y * by + z * bz;
+            }
+        }
+    }
+}
