@@ -5,10 +5,10 @@ import numpy as np
 import task
 
 
-def deepest(points, triangles, tips, table, skin=0.0):
+def deepest(points, triangles, tips, skin=0.0):
     """Depth of the deepest point, m; `skin` is the thickness of the surface. 0 where none is in."""
     corners = points[triangles]
-    depth = table + skin - points[np.unique(triangles), 2].min()
+    depth = skin - points[np.unique(triangles), 2].min()
     for tip in tips:
         near = np.linalg.norm(corners - tip, axis=2).min(axis=1) < 3.0 * task.TIP
         if near.any():

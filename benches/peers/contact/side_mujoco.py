@@ -15,9 +15,7 @@ MODEL = """
           tolerance="{tolerance}" noslip_iterations="{noslip}" noslip_tolerance="1e-10"/>
   <size memory="400M"/>
   <worldbody>
-    <body name="table" mocap="true">
-      <geom type="plane" size="1 1 0.1" contype="0" conaffinity="1" {surface}/>
-    </body>
+    <geom name="table" type="plane" size="1 1 0.1" contype="0" conaffinity="1" {surface}/>
     {tips}
     {ball}
   </worldbody>
@@ -42,7 +40,7 @@ RIGID = """
 FLEX = """
 <flexcomp name="ball" type="direct" dim="3" radius="{skin}" mass="{mass}" point="{points}"
           element="{elements}" {dof}>
-  <contact selfcollide="none" internal="false" contype="1" conaffinity="1" {surface}/>
+  <contact selfcollide="none" contype="1" conaffinity="1" {surface}/>
   <edge equality="false"/>
   <elasticity young="{young}" poisson="{poisson}" damping="{damping}"/>
 </flexcomp>
@@ -106,30 +104,28 @@ class MuJoCo:
         dofs = first[:, None] + np.arange(3)
         weights = self.weights(model)
         places, frames = scene.tips(0), []
-        before = self.height(data, weights)
         for number in range(scene.frames):
             begin, end = scene.tips(number) - places, scene.tips(number + 1) - places
-            data.mocap_pos[0, 2] = scene.table(number + 1)
-            spent = 0.0
+            spent = cpu = 0.0
             for step in range(1, substeps + 1):
                 data.ctrl[:] = (begin + (end - begin) * step / substeps).ravel()
-                start = time.perf_counter()
+                start, cpu_start = time.perf_counter(), time.thread_time()
                 mujoco.mj_step(model, data)
                 spent += time.perf_counter() - start
-                if step == substeps - 1:
-                    last = self.height(data, weights)
+                cpu += time.thread_time() - cpu_start
             height = self.height(data, weights)
-            last = before if substeps == 1 else last
             depths = [0.0] if data.ncon == 0 else -data.contact.dist
             forces = -data.qfrc_constraint[dofs]
             frames.append(Frame(
-                ms=spent * 1e3, height=height, speed=(height - last) / model.opt.timestep,
+                ms=spent * 1e3, height=height,
                 tips=places + data.qpos[dofs_to_places(model, dofs)], forces=forces,
                 table=self.table_force(model, data, forces),
                 penetration=float(np.max(depths)),
-                more={"points": data.ncon, "iterations": int(data.solver_niter[0])},
+                more={
+                    "points": data.ncon, "warnings": data.warning[INERTIA].number,
+                    "cpu_ms": cpu * 1e3,
+                },
             ))
-            before = height
             if not np.isfinite(height) or any(data.warning[k].number for k in UNSTABLE):
                 frames[-1].height = float("nan")
                 break
@@ -160,6 +156,9 @@ class MuJoCo:
         return total
 
 
+# Its warnings are counted by `MjData`; those of a flex would fill the screen.
+mujoco.set_mju_user_warning(lambda text: None)
+INERTIA = mujoco.mjtWarning.mjWARN_INERTIA
 UNSTABLE = (
     mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
     mujoco.mjtWarning.mjWARN_BADQACC,

@@ -15,7 +15,8 @@ HERE = Path(__file__).resolve().parent
 TARGET = HERE / "rapier" / "target"
 SETTINGS = (
     "solver_iterations", "pgs_iterations", "stabilization_iterations", "length_unit",
-    "contact_frequency", "contact_damping_ratio",
+    "contact_frequency", "contact_damping_ratio", "factored_dofs", "linear_iterations",
+    "linear_tolerance",
 )
 
 
@@ -69,7 +70,6 @@ class Rapier:
         told = self.program.ask(
             "play", mass=task.MASS, radius=task.RADIUS, soft=self.soft, friction=scene.friction,
             tips=[scene.tips(frame).tolist() for frame in moments],
-            table=[scene.table(frame) for frame in moments],
             tip={
                 "radius": task.TIP, "mass": task.TIP_MASS, "stiffness": task.SPRING,
                 "damping": task.TIP_DAMPING,
@@ -79,18 +79,18 @@ class Rapier:
         return Outcome([self.frame(scene, k, one) for k, one in enumerate(told)], scene)
 
     def frame(self, scene, number, told):
-        tips, table = np.array(told["tips"]), scene.table(number + 1)
+        tips = np.array(told["tips"])
         # What the springs say: right as long as nothing moves.
         forces = task.SPRING * (scene.tips(number + 1) - tips)
         height = told["height"] if told["height"] is not None else float("nan")
         if self.mesh is None:
             middle = np.array([0.0, 0.0, height])
             away = np.linalg.norm(tips - middle, axis=1).min()
-            depth = max(task.RADIUS + task.TIP - away, table + task.RADIUS - height, 0.0)
+            depth = max(task.RADIUS + task.TIP - away, task.RADIUS - height, 0.0)
         else:
             points = np.array(told["points"], dtype=float)
-            depth = deepest(points, self.mesh.boundary, tips, table, self.skin)
-        return Frame(told["ms"], height, told["speed"], tips, forces, 0.0, depth)
+            depth = deepest(points, self.mesh.boundary, tips, self.skin)
+        return Frame(told["ms"], height, tips, forces, 0.0, depth, {"cpu_ms": told["cpu_ms"]})
 
 
 def masses(mesh):

@@ -1,5 +1,6 @@
 """Our side of the lift: contact frames of a server, by the Python client."""
 
+import contextlib
 import sys
 import time
 from pathlib import Path
@@ -10,8 +11,10 @@ ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "clients" / "python" / "src"))
 
 from softgrasp import (  # noqa: E402
-    Body, ContactStep, Material, Model, ObjectState, Plane, Pose, Server, Sphere,
+    Body, ContactStep, Material, Mesh, Model, ObjectState, Plane, Pose, Server, Sphere,
 )
+
+from softgrasp.program import ServerProgram  # noqa: E402
 
 import task  # noqa: E402
 from task import Frame, Outcome  # noqa: E402
@@ -26,12 +29,14 @@ class Softgrasp:
         self.mesh = mesh
         self.large = large
         self.density = task.MASS / mesh.volume
-        self.server = Server.spawn(program, threads=2)
+        self.program = ServerProgram(program, threads=2)
+        self.server = Server(self.program.address)
         model = Model(mesh, Material(task.YOUNG, task.POISSON), "t4")
         self.kept = self.server.keep(model)
 
     def close(self):
         self.server.close()
+        self.program.end()
 
     def step(self):
         """As `run --grasp contact` asks: what is asked for, and how much effort it is worth."""
@@ -41,13 +46,21 @@ class Softgrasp:
             deformation="large" if self.large else None,
         )
 
+    def cpu_time_ms(self):
+        """What the threads of the server have computed so far."""
+        found = 0.0
+        for path in Path(f"/proc/{self.program.pid}/task").glob("*/schedstat"):
+            with contextlib.suppress(OSError):
+                found += float(path.read_text().split()[0]) * 1e-6
+        return found
+
     def play(self, scene):
         mesh, step = self.mesh, self.step()
         middle = centre(mesh)
         state, frames = ObjectState(), []
         for number in range(scene.frames):
-            bodies = [table(scene, number), *tips(scene, number)]
-            start = time.perf_counter()
+            bodies = [table(scene), *tips(scene, number)]
+            cpu, start = self.cpu_time_ms(), time.perf_counter()
             answer = self.kept.contact_frame(state, bodies, step, nodes=mesh.boundary_nodes)
             call_ms = (time.perf_counter() - start) * 1e3
             state = answer.state
@@ -55,13 +68,13 @@ class Softgrasp:
             frames.append(Frame(
                 ms=sum(getattr(stages, name) for name in STAGES),
                 height=float(state.pose.to_world(middle[None])[0, 2]),
-                speed=float(state.velocity[2]),
                 tips=scene.tips(number + 1) - forces[1:] / task.SPRING,
                 forces=forces[1:],
                 table=float(forces[0, 2]),
                 penetration=contact.penetration_max,
                 more={
-                    "call_ms": call_ms, "residual_rel": contact.residual_rel,
+                    "call_ms": call_ms, "cpu_ms": self.cpu_time_ms() - cpu,
+                    "residual_rel": contact.residual_rel,
                     "converged": contact.is_converged, "points": int(answer.loads.contacts.sum()),
                     "elastic_rel": answer.report.residual_rel,
                 },
@@ -77,9 +90,8 @@ def centre(mesh):
     return (volumes[:, None] * corners.mean(axis=1)).sum(axis=0) / volumes.sum()
 
 
-def table(scene, number):
-    start, end = (Pose((0.0, 0.0, scene.table(frame))) for frame in (number, number + 1))
-    return Body(Plane((0.0, 0.0, 1.0)), start, end, friction=scene.friction)
+def table(scene):
+    return Body(Plane((0.0, 0.0, 1.0)), friction=scene.friction)
 
 
 def tips(scene, number):

@@ -23,16 +23,17 @@ SPRING = 1000.0
 # Of a side whose fingertips have mass, kg, and the damping of their springs, N s/m (critical).
 TIP_MASS = 0.01
 TIP_DAMPING = 2.0 * math.sqrt(SPRING * TIP_MASS)
-# Frames: the ball settles, the fingers close, lift, hold.
+# Frames: the ball settles, the fingers close, wait, lift, hold.
 RATE_HZ = 60
-SETTLE, CLOSE, RAISE, HOLD = 30, 60, 60, 600
+SETTLE, CLOSE, WAIT, RAISE, HOLD = 30, 60, 30, 60, 600
+READY = SETTLE + CLOSE + WAIT
 LIFT = 0.04
 # Distance of a fingertip from the ball before it closes, m.
 BEGIN = 0.003
+# Depths that are tried to meet a force, and how far off it may be after the last, relative.
+TRIES, ROUGH = 12, 0.05
 # Frames of the hold that pass before creep is measured: the swing of the lift dies away.
 REST = 120
-# Frames without a table, where it is taken away.
-FALL = 2
 
 
 def smooth(share):
@@ -49,24 +50,20 @@ class Scene:
     friction: float = FRICTION
     raise_frames: int = RAISE
     hold_frames: int = HOLD
-    # Whether the table is taken away when the fingers have closed, instead of a lift.
-    drops: bool = False
+    # Frames after which the scene ends, if it does not go on to its end.
+    stop: int | None = None
 
     @property
     def frames(self):
-        return SETTLE + CLOSE + (FALL if self.drops else self.raise_frames + self.hold_frames)
-
-    def table(self, frame):
-        """Height of the table when a frame begins."""
-        return -1.0 if self.drops and frame > SETTLE + CLOSE else 0.0
+        return self.stop or READY + self.raise_frames + self.hold_frames
 
     def tips(self, frame):
         """Where the springs hold the fingertips when a frame begins; shape (2, 3)."""
         closed = smooth((frame - SETTLE) / CLOSE)
         away = RADIUS + TIP + BEGIN - closed * (BEGIN + self.depth)
         raised = 0.0
-        if not self.drops and self.raise_frames:
-            raised = LIFT * smooth((frame - SETTLE - CLOSE) / self.raise_frames)
+        if self.raise_frames:
+            raised = LIFT * smooth((frame - READY) / self.raise_frames)
         return np.array([[-away, 0.0, RADIUS + raised], [away, 0.0, RADIUS + raised]])
 
 
@@ -75,9 +72,8 @@ class Frame:
     """What a side tells about one frame."""
 
     ms: float
-    # Centre of mass, and its velocity, upwards; places of the tips; forces on the ball; N of the table.
+    # Height of the centre of mass; places of the tips and their forces on the ball; N of the table.
     height: float
-    speed: float
     tips: np.ndarray
     forces: np.ndarray
     table: float
@@ -106,8 +102,8 @@ class Outcome:
         return self.frames[-(self.scene.hold_frames - REST):]
 
     def squeeze(self):
-        """Mean normal force of the fingertips when they have closed, N."""
-        return normal(self.frames[SETTLE + CLOSE - 1])
+        """Mean normal force of the fingertips when they have closed and waited, N."""
+        return normal(self.frames[READY - 1])
 
     def sink(self):
         """How fast the ball sinks while it is held, m/s."""
@@ -121,7 +117,7 @@ class Outcome:
 
     def rise(self):
         """How much higher the ball is at the end than before the lift, m."""
-        return self.frames[-1].height - self.frames[SETTLE + CLOSE - 1].height
+        return self.frames[-1].height - self.frames[READY - 1].height
 
     def penetration(self):
         """Of all frames since the fingers touch."""
@@ -139,13 +135,6 @@ class Outcome:
             return float(np.linalg.norm(total)) / WEIGHT
         return max(off(frame) for frame in self.hold)
 
-    def fall(self):
-        """Acceleration downwards without a table: by the side, and by Coulomb, m/s²."""
-        before = self.frames[SETTLE + CLOSE - 1]
-        seconds = FALL / RATE_HZ
-        found = (before.speed - self.frames[-1].speed) / seconds
-        return found, GRAVITY - 2.0 * self.scene.friction * normal(before) / MASS
-
 
 def normal(frame):
     """Mean of the fingertips' forces along the line that joins them, N."""
@@ -159,20 +148,29 @@ def hertz(force):
     return (0.75 * force / (modulus * math.sqrt(round_radius))) ** (2.0 / 3.0)
 
 
-def depth_for(side, force, tolerance=1e-3):
-    """How far the tips must close for a normal force, by the secant rule, on the table."""
-    depths = [force / SPRING, force / SPRING + hertz(force)]
-    forces = []
-    for number in range(12):
-        outcome = side.play(Scene(depths[number], raise_frames=0, hold_frames=0))
+def depth_for(side, force, tolerance, depth=None):
+    """How far the tips must close for a normal force; None where that leads to no force.
+
+    The rule of the secant, within what is known to be too little and too much.
+    """
+    low, high = (0.0, 0.0), None
+    depth = depth or force / SPRING + (0.0 if side.mesh is None else 0.7 * hertz(force))
+    best = None
+    for _ in range(TRIES):
+        outcome = side.play(Scene(depth, raise_frames=0, hold_frames=0))
         if not outcome.is_finite:
             return None
-        forces.append(outcome.squeeze())
-        if abs(forces[-1] - force) < tolerance * force:
-            return depths[number]
-        if number > 0:
-            slope = (forces[-1] - forces[-2]) / (depths[number] - depths[number - 1])
-            if not 1.0 < slope:
-                return None
-            depths.append(depths[number] + (force - forces[-1]) / slope)
-    return depths[-1]
+        found = (depth, outcome.squeeze())
+        if best is None or abs(found[1] - force) < abs(best[1] - force):
+            best = found
+        if abs(found[1] - force) < tolerance * force:
+            break
+        low, high = (found, high) if found[1] < force else (low, found)
+        if high is None:
+            depth += max((force - found[1]) / SPRING, 0.1 * depth)
+        elif high[1] <= low[1]:
+            depth = (low[0] + high[0]) / 2.0
+        else:
+            share = (force - low[1]) / (high[1] - low[1])
+            depth = low[0] + min(max(share, 0.05), 0.95) * (high[0] - low[0])
+    return best[0] if abs(best[1] - force) < ROUGH * force else None

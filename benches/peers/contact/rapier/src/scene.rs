@@ -21,8 +21,6 @@ pub struct Scene {
     pub friction: f64,
     /// Where the springs of both tips hold them when each frame begins, and when the last ends.
     pub tips: Vec<[[f64; 3]; 2]>,
-    /// Height of the table at the same moments.
-    pub table: Vec<f64>,
     pub tip: Tip,
     pub settings: Settings,
 }
@@ -62,14 +60,20 @@ pub struct Settings {
     pub length_unit: Option<f64>,
     pub contact_frequency: Option<f64>,
     pub contact_damping_ratio: Option<f64>,
+    /// Degrees of freedom up to which the matrix of a soft body is factored.
+    pub factored_dofs: Option<usize>,
+    /// Steps of conjugate gradients beyond that, and where they may end.
+    pub linear_iterations: Option<usize>,
+    pub linear_tolerance: Option<f64>,
 }
 
 /// What is told about a frame.
 #[derive(serde::Serialize)]
 pub struct Told {
+    /// Time on the clock, and of all processors together.
     pub ms: f64,
+    pub cpu_ms: f64,
     pub height: f64,
-    pub speed: f64,
     pub tips: [[f64; 3]; 2],
     /// Places of the nodes of a soft ball.
     pub points: Vec<[f64; 3]>,

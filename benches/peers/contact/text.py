@@ -1,0 +1,3 @@
+"""Text."""
+
+TASK = SPEEDS = RESULTS = TRIED = ""
