@@ -33,7 +33,6 @@ LIMIT = task.WEIGHT / (2.0 * task.FRICTION)
 FORCES = {"firm": 2.0, "near the limit": 1.3 * LIMIT, "too little": 0.8 * LIMIT}
 PARTS = ("fast", "slow-rapier", "slow-mujoco", "tried")
 SHORT_HOLD = 180
-ROUNDS = 3
 BEGIN_ONLY = 40
 
 
@@ -66,7 +65,8 @@ def play(way, case, hold):
     side = way.make()
     try:
         depth = depth_for(
-            side, FORCES[case], 0.05 if way.slow else 1e-3, way.depths.get(case)
+            side, FORCES[case], 0.1 if way.slow else 1e-3, 3 if way.slow else 12,
+            way.depths.get(case),
         )
         if depth is None:
             return None
@@ -118,9 +118,8 @@ def measure(all_ways, results, speeds):
             say(f"{way.name}, {way.nodes}, {case}: {results.rows[-1][4:]}")
             if case == "firm":
                 rounds[number] = [] if outcome is None else [(times(outcome), call_ms(outcome))]
-    fast = [number for number, way in enumerate(all_ways) if not way.slow and rounds[number]]
-    for _ in range(ROUNDS - 1):
-        for number in fast:
+    for turn in range(1, max(way.rounds for way in all_ways)):
+        for number in [k for k, way in enumerate(all_ways) if rounds[k] and way.rounds > turn]:
             outcome = play(all_ways[number], "firm", task.HOLD)
             rounds[number].append((times(outcome), call_ms(outcome)))
     for number, way in enumerate(all_ways):

@@ -42,8 +42,8 @@ class Softgrasp:
         """As `run --grasp contact` asks: what is asked for, and how much effort it is worth."""
         return ContactStep(
             seconds=1.0 / task.RATE_HZ, density=self.density, viscosity=task.VISCOSITY,
-            residual_rel=1e-4 if self.large else 1e-6, rounds_max=12, newton_max=80,
-            deformation="large" if self.large else None,
+            penetration_rel=1e-6, residual_rel=1e-4 if self.large else 1e-6, rounds_max=12,
+            newton_max=80, deformation="large" if self.large else None,
         )
 
     def cpu_time_ms(self):

@@ -30,8 +30,8 @@ READY = SETTLE + CLOSE + WAIT
 LIFT = 0.04
 # Distance of a fingertip from the ball before it closes, m.
 BEGIN = 0.003
-# Depths that are tried to meet a force, and how far off it may be after the last, relative.
-TRIES, ROUGH = 12, 0.05
+# How far off a force may be after the last depth that is tried, relative.
+ROUGH = 0.15
 # Frames of the hold that pass before creep is measured: the swing of the lift dies away.
 REST = 120
 
@@ -148,7 +148,7 @@ def hertz(force):
     return (0.75 * force / (modulus * math.sqrt(round_radius))) ** (2.0 / 3.0)
 
 
-def depth_for(side, force, tolerance, depth=None):
+def depth_for(side, force, tolerance, tries, depth=None):
     """How far the tips must close for a normal force; None where that leads to no force.
 
     The rule of the secant, within what is known to be too little and too much.
@@ -156,7 +156,7 @@ def depth_for(side, force, tolerance, depth=None):
     low, high = (0.0, 0.0), None
     depth = depth or force / SPRING + (0.0 if side.mesh is None else 0.7 * hertz(force))
     best = None
-    for _ in range(TRIES):
+    for _ in range(tries):
         outcome = side.play(Scene(depth, raise_frames=0, hold_frames=0))
         if not outcome.is_finite:
             return None
