@@ -31,7 +31,7 @@ from task import Scene, depth_for, normal  # noqa: E402
 # Normal force of each tip, N: firm; and as parts of the least that holds the weight by friction.
 LIMIT = task.WEIGHT / (2.0 * task.FRICTION)
 FORCES = {"firm": 2.0, "near the limit": 1.3 * LIMIT, "too little": 0.8 * LIMIT}
-PARTS = ("fast", "slow-rapier", "slow-mujoco", "tried")
+PARTS = ("fast", "slow-rapier", "slow-more", "slow-mujoco", "tried")
 SHORT_HOLD = 180
 BEGIN_ONLY = 40
 
@@ -65,7 +65,7 @@ def play(way, case, hold):
     side = way.make()
     try:
         depth = depth_for(
-            side, FORCES[case], 0.1 if way.slow else 1e-3, 3 if way.slow else 12,
+            side, FORCES[case], 0.1 if way.slow else 1e-3, 2 if way.slow else 12,
             way.depths.get(case),
         )
         if depth is None:
@@ -91,7 +91,10 @@ def result(way, case, outcome):
     """A row of what came out."""
     should = "slides" if case == "too little" else "is lifted"
     if outcome is None:
-        return (way.name, way.nodes, case, FORCES[case], *[None] * 4, "fails", should, *[None] * 6)
+        return (
+            way.name, way.nodes, case, FORCES[case], *[None] * 4, "fails", should,
+            *[None] * 6,
+        )
     held = outcome.rise() > 0.5 * task.LIFT
     last = outcome.hold[-1]
     more = [frame.more for frame in outcome.frames]
@@ -107,31 +110,35 @@ def result(way, case, outcome):
     )
 
 
-def measure(all_ways, results, speeds):
-    """Cases of every way, then more rounds of the firm one by those that are fast, in turn."""
-    rounds = {}
-    for number, way in enumerate(all_ways):
-        for case in way.cases:
-            hold = SHORT_HOLD if way.slow else task.HOLD
-            outcome = play(way, case, hold)
-            results.push(*result(way, case, outcome))
-            say(f"{way.name}, {way.nodes}, {case}: {results.rows[-1][4:]}")
-            if case == "firm":
-                rounds[number] = [] if outcome is None else [(times(outcome), call_ms(outcome))]
-    for turn in range(1, max(way.rounds for way in all_ways)):
-        for number in [k for k, way in enumerate(all_ways) if rounds[k] and way.rounds > turn]:
-            outcome = play(all_ways[number], "firm", task.HOLD)
-            rounds[number].append((times(outcome), call_ms(outcome)))
-    for number, way in enumerate(all_ways):
-        if not rounds[number]:
-            continue
-        found, calls = zip(*rounds[number])
-        median, tail, longest, cpu, closing, frames = zip(*found)
-        speeds.push(
-            way.name, way.nodes, way.settings, way.steps, page.Spread(median),
-            page.Spread(cpu), page.Spread(tail), max(longest), max(closing),
-            None if calls[0] is None else statistics.median(calls), frames[0], len(found),
-        )
+def measure(all_ways, tables, keep):
+    """Cases of every way, firm ones first; `keep` puts down what is there so far."""
+    for way in [way for way in all_ways if not way.cases]:
+        begin_only(way, tables["speeds"])
+        keep()
+    turns = [(way, "firm") for way in all_ways if "firm" in way.cases]
+    turns += [(way, case) for way in all_ways for case in way.cases if case != "firm"]
+    for way, case in turns:
+        outcome = play(way, case, SHORT_HOLD if way.slow else task.HOLD)
+        tables["results"].push(*result(way, case, outcome))
+        say(f"{way.name}, {way.nodes}, {case}: {tables['results'].rows[-1][4:]}")
+        if case == "firm" and outcome is not None:
+            rounds = [(times(outcome), call_ms(outcome))]
+            for _ in range(way.rounds - 1):
+                outcome = play(way, "firm", task.HOLD)
+                rounds.append((times(outcome), call_ms(outcome)))
+            push_times(tables["speeds"], way, rounds)
+        keep()
+
+
+def push_times(speeds, way, rounds):
+    found, calls = zip(*rounds)
+    median, tail, longest, cpu, closing, frames = zip(*found)
+    speeds.push(
+        way.name, way.nodes, way.settings, way.steps, page.Spread(median),
+        page.Spread(cpu) if min(cpu) > 0.0 else None,
+        page.Spread(tail), max(longest), max(closing),
+        None if calls[0] is None else statistics.median(calls), frames[0], len(found),
+    )
 
 
 def call_ms(outcome):
@@ -166,8 +173,10 @@ def begin_only(way, speeds):
 
 
 def part_of(way):
-    if not way.slow:
+    if not way.slow or way.name.startswith("Softgrasp"):
         return "fast"
+    if "inner" in way.settings:
+        return "slow-more"
     return "slow-rapier" if way.name.startswith("Rapier") else "slow-mujoco"
 
 
@@ -188,11 +197,13 @@ def measured(options):
             chosen = ways.rigid_ways(program) + ways.our_ways(server, meshes)
             chosen += ways.soft_ways(program, meshes)
             chosen = [way for way in chosen if part_of(way) == options.part]
-            measure([way for way in chosen if way.cases], tables["results"], tables["speeds"])
-            for way in chosen:
-                if not way.cases:
-                    begin_only(way, tables["speeds"])
+            measure(chosen, tables, lambda: put_down(options, head, tables))
     program.close()
+    put_down(options, head, tables)
+
+
+def put_down(options, head, tables):
+    """The rows that there are so far."""
     head["load after"] = page.load()
     options.rows.mkdir(parents=True, exist_ok=True)
     rows = {name: [[flat(cell) for cell in row] for row in table.rows]
@@ -212,15 +223,16 @@ def main():
         measured(options)
         return
     tables, heads = written.tables(), []
-    for part in PARTS:
+    parts = [part for part in PARTS if (options.rows / f"{part}.json").exists()]
+    for part in parts:
         found = json.loads((options.rows / f"{part}.json").read_text())
         heads.append(found["head"])
         for name, table in tables.items():
             for row in found[name]:
                 table.push(*(page.Spread(c) if isinstance(c, list) else c for c in row))
-    head = heads[0]
+    head = {**heads[0], "commit": page.commit()}
     for name in ("load before", "load after"):
-        head[name] = ", ".join(f"{one[name]} ({part})" for one, part in zip(heads, PARTS))
+        head[name] = ", ".join(f"{one[name]} ({part})" for one, part in zip(heads, parts))
     if options.note:
         head["note"] = options.note
     options.out.mkdir(parents=True, exist_ok=True)

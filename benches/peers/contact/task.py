@@ -31,7 +31,7 @@ LIFT = 0.04
 # Distance of a fingertip from the ball before it closes, m.
 BEGIN = 0.003
 # How far off a force may be after the last depth that is tried, relative.
-ROUGH = 0.15
+ROUGH = 0.5
 # Frames of the hold that pass before creep is measured: the swing of the lift dies away.
 REST = 120
 

@@ -1,7 +1,8 @@
 """The report of the lift: its tables, its text, its picture."""
 
 import page
-import task
+import picture
+import text
 
 TITLE = "Contact: the same lift in MuJoCo, Rapier and Softgrasp"
 
@@ -24,20 +25,42 @@ def tables():
     }
 
 
+STEMS = {"speeds": "contact-peers-frames", "results": "contact-peers",
+         "tried": "contact-peers-tried"}
+
+
+def rows_of(table):
+    """Rows as dictionaries."""
+    return [dict(zip(table.columns, row)) for row in table.rows]
+
+
+def lifted(tables):
+    """Name, nodes, ms and m/s of what lifts the ball firmly, once for each way."""
+    speeds, points = rows_of(tables["speeds"]), []
+    for row in rows_of(tables["results"]):
+        if row["case"] != "firm" or row["outcome"] != "is lifted":
+            continue
+        of_way = [one for one in speeds
+                  if (one["side"], one["nodes"]) == (row["side"], row["nodes"])]
+        points += [(row["side"], row["nodes"], one["p50_ms"].median, row["sink_m_per_s"])
+                   for one in of_way[:1]]
+    return points
+
+
 def write(folder, head, tables):
-    import text
-    sections = [text.TASK, tables["speeds"], text.SPEEDS, tables["results"], text.RESULTS,
-                tables["tried"], text.TRIED]
-    stems = {"speeds": "contact-peers-frames", "results": "contact-peers", "tried":
-             "contact-peers-tried"}
-    for name, stem in stems.items():
+    picture.draw(lifted(tables), folder / "contact-peers.svg")
+    sections = [
+        text.TASK, text.findings(rows_of(tables["speeds"]), rows_of(tables["results"])),
+        text.PICTURE, tables["results"], text.RESULTS, tables["speeds"], text.SPEEDS,
+        tables["tried"], text.TRIED,
+    ]
+    for name, stem in STEMS.items():
         page.write(folder, stem, TITLE, head, [tables[name]])
+        (folder / f"{stem}.md").unlink()
     lines = [f"# {TITLE}", ""]
     for name, value in head.items():
         lines.append(f"- {name}: `{value}`" if name == "command" else f"- {name}: {value}")
     for section in sections:
         lines += ["", section.markdown() if isinstance(section, page.Table) else section.strip()]
-    lines += ["", ", ".join(f"[{stem}.csv]({stem}.csv)" for stem in stems.values()), ""]
-    for stem in stems.values():
-        (folder / f"{stem}.md").unlink()
+    lines += ["", ", ".join(f"[{stem}.csv]({stem}.csv)" for stem in STEMS.values()), ""]
     (folder / "contact-peers.md").write_text("\n".join(lines))
