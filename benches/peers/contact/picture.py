@@ -8,8 +8,8 @@ COLOURS = {"Softgrasp": "#1b6ca8", "MuJoCo": "#c8553d", "Rapier": "#3c7a3f"}
 
 
 def draw(points, path):
-    """`points` are name, nodes, ms and m/s; what sinks slower than the scale lies on its edge."""
-    x_low, x_high, y_low, y_high = -2, 4, -10, -2
+    """`points` are name, nodes, ms and m/s; what moves slower than the scale lies on its edge."""
+    x_low, x_high, y_low, y_high = -3, 3, -10, -2
     floor = 10.0**y_low
 
     def x(ms):
@@ -43,7 +43,7 @@ def draw(points, path):
         f'<text x="{middle_x:.0f}" y="{HEIGHT - 16}" text-anchor="middle">'
         "ms for a frame (median); dashed: a sixtieth of a second</text>",
         f'<text x="18" y="{middle_y:.0f}" text-anchor="middle" '
-        f'transform="rotate(-90 18 {middle_y:.0f})">sinks while held, m/s</text>',
+        f'transform="rotate(-90 18 {middle_y:.0f})">sinks or rises while held, m/s</text>',
     ]
     for number, (name, nodes, ms, sink) in enumerate(points, 1):
         colour = COLOURS[name.split(",")[0].split()[0]]

@@ -93,7 +93,8 @@ class MuJoCo:
             for side in range(2) for axis in "xyz"
         )
         return mujoco.MjModel.from_xml_string(MODEL.format(
-            gravity=-task.GRAVITY, tips=tips, ball=ball, springs=springs, surface=surface, **settings
+            gravity=-task.GRAVITY, tips=tips, ball=ball, springs=springs, surface=surface,
+            **settings,
         ))
 
     def play(self, scene):

@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             Request::Play(scene) => {
                 let mut lift = Lift::new(&scene)?;
-                let frames: Vec<_> = (0..scene.tips.len() - 1).map(|k| lift.frame(&scene, k)).collect();
+                let frames: Vec<_> =
+                    (0..scene.tips.len() - 1).map(|k| lift.frame(&scene, k)).collect();
                 serde_json::json!({ "frames": frames })
             }
         };

@@ -33,18 +33,23 @@ impl Lift {
         parameters.dt = 1.0 / 60.0 / f64::from(settings.substeps);
         set(&mut parameters.num_solver_iterations, settings.solver_iterations);
         set(&mut parameters.num_internal_pgs_iterations, settings.pgs_iterations);
-        set(&mut parameters.num_internal_stabilization_iterations, settings.stabilization_iterations);
+        set(
+            &mut parameters.num_internal_stabilization_iterations,
+            settings.stabilization_iterations,
+        );
         set(&mut parameters.length_unit, settings.length_unit);
         let fem = &mut parameters.soft_bodies.fem;
         set(&mut fem.max_dense_dofs, settings.factored_dofs);
         set(&mut fem.max_linear_iterations, settings.linear_iterations);
         set(&mut fem.linear_tolerance, settings.linear_tolerance);
-        for softness in [&mut parameters.contact_softness, &mut parameters.static_contact_softness] {
+        for softness in [&mut parameters.contact_softness, &mut parameters.static_contact_softness]
+        {
             set(&mut softness.natural_frequency, settings.contact_frequency);
             set(&mut softness.damping_ratio, settings.contact_damping_ratio);
         }
         let table = world.bodies.insert(RigidBodyBuilder::fixed());
-        let plane = ColliderBuilder::halfspace(Unit::new_unchecked(Vector::Z)).friction(scene.friction);
+        let plane =
+            ColliderBuilder::halfspace(Unit::new_unchecked(Vector::Z)).friction(scene.friction);
         world.colliders.insert_with_parent(plane, table, &mut world.bodies);
         let mut tip = |side: usize| {
             let place = Vector::from(scene.tips[0][side]);
@@ -60,11 +65,15 @@ impl Lift {
                 .mass(scene.tip.mass)
                 .friction(scene.friction);
             world.colliders.insert_with_parent(ball, tip, &mut world.bodies);
-            let mut spring = GenericJointBuilder::new(JointAxesMask::empty()).contacts_enabled(false);
+            let mut spring =
+                GenericJointBuilder::new(JointAxesMask::empty()).contacts_enabled(false);
             for axis in [JointAxis::LinX, JointAxis::LinY, JointAxis::LinZ] {
-                spring = spring
-                    .motor_model(axis, MotorModel::ForceBased)
-                    .motor_position(axis, 0.0, scene.tip.stiffness, scene.tip.damping);
+                spring = spring.motor_model(axis, MotorModel::ForceBased).motor_position(
+                    axis,
+                    0.0,
+                    scene.tip.stiffness,
+                    scene.tip.damping,
+                );
             }
             world.impulse_joints.insert(anchor, tip, spring.build(), true);
             (anchor, tip)
@@ -154,9 +163,8 @@ impl Lift {
 /// What the threads of this process have computed so far, on Linux; elsewhere 0.
 fn cpu_time_ms() -> f64 {
     let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
-    let texts = threads.flatten().flat_map(|one| {
-        std::fs::read_to_string(one.path().join("schedstat"))
-    });
+    let texts =
+        threads.flatten().flat_map(|one| std::fs::read_to_string(one.path().join("schedstat")));
     let nanoseconds = texts.filter_map(|text| text.split(' ').next()?.parse::<f64>().ok());
     nanoseconds.sum::<f64>() * 1e-6
 }
