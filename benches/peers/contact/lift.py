@@ -230,7 +230,7 @@ def main():
         for name, table in tables.items():
             for row in found[name]:
                 table.push(*(page.Spread(c) if isinstance(c, list) else c for c in row))
-    head = {**heads[0], "commit": page.commit()}
+    head = heads[0]
     for name in ("load before", "load after"):
         head[name] = ", ".join(f"{one[name]} ({part})" for one, part in zip(heads, parts))
     if options.note:
