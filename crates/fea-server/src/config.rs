@@ -1,12 +1,14 @@
 //! The settings of a server, checked before it starts.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use softgrasp_protocol::Limits;
 
 use crate::clock::StageWatch;
 use crate::encryption::Encryption;
+use crate::engine::Engine;
 use crate::tokens::Tokens;
 
 /// Settings of one server.
@@ -61,6 +63,8 @@ pub struct ServerConfig {
     pub metrics: Option<SocketAddr>,
     /// Stage of the newest request, for the program that started the server.
     pub stage: StageWatch,
+    /// Answers what this server cannot, or everything; `None`: there is no other.
+    pub engine: Option<Arc<dyn Engine>>,
 }
 
 /// Why settings are refused.
@@ -134,6 +138,7 @@ impl Default for ServerConfig {
             drain: Duration::ZERO,
             metrics: None,
             stage: StageWatch::default(),
+            engine: None,
         }
     }
 }
