@@ -43,8 +43,8 @@ int sg_tell(long long *number) {
     MPI_Request request;
     const struct timespec pause = {0, 1000000};
     int is_done = 0;
-    if (my_rank == 0) return MPI_Bcast(number, 1, MPI_LONG_LONG, 0, PETSC_COMM_WORLD);
     if (MPI_Ibcast(number, 1, MPI_LONG_LONG, 0, PETSC_COMM_WORLD, &request)) return 1;
+    if (my_rank == 0) return MPI_Wait(&request, MPI_STATUS_IGNORE);
     for (;;) {
         if (MPI_Test(&request, &is_done, MPI_STATUS_IGNORE)) return 1;
         if (is_done) return 0;
