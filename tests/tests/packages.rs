@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Packages that belong to the repository only.
-const PRIVATE: [&str; 5] =
-    ["tests", "tests/verification", "benches", "fuzz", "cluster/fea-worker"];
+const PRIVATE: [&str; 5] = ["tests", "tests/verification", "benches", "fuzz", "cluster/fea-worker"];
 /// Categories that our crates are in, as crates.io writes them (its file `categories.toml`, 2026-11-26).
 const CATEGORIES: [&str; 14] = [
     "command-line-utilities",

@@ -218,8 +218,8 @@ fn crates_depend_downwards_only() {
         let shipped = manifest.split("[dev-dependencies]").next().unwrap_or("");
         for line in shipped.lines() {
             let name = line.split(['.', ' ', '=']).next().unwrap_or("");
-            let is_ours =
-                name.starts_with("softgrasp-") || ["fea-server", "fea-worker", "glove-client"].contains(&name);
+            let is_ours = name.starts_with("softgrasp-")
+                || ["fea-server", "fea-worker", "glove-client"].contains(&name);
             if forbidden.contains(&name) || (is_ours && !allowed.contains(&name)) {
                 faults.push(format!("{folder} depends on {name}"));
             }

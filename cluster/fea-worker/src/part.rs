@@ -96,7 +96,11 @@ impl Part {
             cases: whole.known.len() as u32,
             forces: match whole.forces {
                 [] => Vec::new(),
-                forces => nodes.iter().flat_map(|&n| forces[3 * n as usize..][..3].iter()).copied().collect(),
+                forces => nodes
+                    .iter()
+                    .flat_map(|&n| forces[3 * n as usize..][..3].iter())
+                    .copied()
+                    .collect(),
             },
             nodes,
         }

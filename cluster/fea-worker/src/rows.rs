@@ -113,7 +113,8 @@ impl Rows {
             let mut of_row = mixed(0x9e37_79b9_7f4a_7c15, u64::from(part.nodes[node as usize]));
             for at in self.start[row] as usize..self.start[row + 1] as usize {
                 of_row = mixed(of_row, u64::from(part.nodes[self.columns[at] as usize]));
-                of_row = self.blocks[at].iter().fold(of_row, |sum, entry| mixed(sum, entry.to_bits()));
+                of_row =
+                    self.blocks[at].iter().fold(of_row, |sum, entry| mixed(sum, entry.to_bits()));
             }
             digest ^= of_row;
         }
@@ -160,8 +161,10 @@ mod tests {
     fn parts(element: Element, ranks: usize) -> (Model, Vec<Part>) {
         let mesh = generate(BuiltIn::Strawberry, 600).unwrap();
         let regions: Vec<u32> = (0..mesh.tets().len() as u32).map(|tet| tet % 2).collect();
-        let mesh = TetMesh::try_new(mesh.vertices().to_vec(), mesh.tets().to_vec(), regions).unwrap();
-        let materials = [Material::try_new(1e4, 0.3).unwrap(), Material::try_new(3e4, 0.45).unwrap()];
+        let mesh =
+            TetMesh::try_new(mesh.vertices().to_vec(), mesh.tets().to_vec(), regions).unwrap();
+        let materials =
+            [Material::try_new(1e4, 0.3).unwrap(), Material::try_new(3e4, 0.45).unwrap()];
         let known = Known { dofs: vec![], q_known: vec![] };
         let numbering = Numbering::new(mesh.vertices(), &mesh.used_nodes(), ranks);
         let whole =
@@ -181,7 +184,8 @@ mod tests {
                     for (row, &at) in rows.nodes.iter().enumerate() {
                         let node = part.nodes[at as usize] as usize;
                         let range = rows.start[row] as usize..rows.start[row + 1] as usize;
-                        let blocks = range.map(|at| (part.nodes[rows.columns[at] as usize], rows.blocks[at]));
+                        let blocks = range
+                            .map(|at| (part.nodes[rows.columns[at] as usize], rows.blocks[at]));
                         let whole = model.stiffness().row(node);
                         let whole = whole.map(|(column, block)| (column as u32, *block));
                         assert!(blocks.eq(whole), "{element:?} on {ranks}: row {node}");

@@ -86,14 +86,16 @@ impl Settings {
         }
         let (cases, pays) = (size.cases, size.cases_that_pay());
         let fits = need(ClusterMethod::Factor) <= limit;
-        let sides = if cases == 1 { "1 right-hand side" } else { &format!("{cases} right-hand sides") };
+        let sides =
+            if cases == 1 { "1 right-hand side" } else { &format!("{cases} right-hand sides") };
         match cases >= pays {
             true if fits => {
                 let why = format!("{sides}; a factor pays from {pays} on");
                 checked(ClusterMethod::Factor, why)
             }
             true => {
-                let why = format!("{sides}; a factor would pay but does not fit into the ranks' memory");
+                let why =
+                    format!("{sides}; a factor would pay but does not fit into the ranks' memory");
                 checked(ClusterMethod::Cg, why)
             }
             false => {

@@ -233,9 +233,11 @@ impl Work<'_> {
                 return Ok(Err(None));
             }
             let is_free = self.is_held.iter().map(|is_held| !is_held);
-            u.iter_mut().zip(&step).zip(is_free).filter(|(_, free)| *free).for_each(
-                |((u, step), _)| *u += step,
-            );
+            u.iter_mut()
+                .zip(&step)
+                .zip(is_free)
+                .filter(|(_, free)| *free)
+                .for_each(|((u, step), _)| *u += step);
             let largest = |v: &[f64]| v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             let [most, of_step] = self.ranks.max([largest(&u), largest(&step)])?;
             if round > 0 && most > 0.0 {
@@ -251,7 +253,8 @@ impl Work<'_> {
         let residual_rel = if given > 0.0 { left / given } else { left };
         // One that is not a number is not accepted.
         if !(residual_rel <= ACCEPTED) {
-            let text = format!("after {steps} steps the residual is {residual_rel:.1e} of the forces");
+            let text =
+                format!("after {steps} steps the residual is {residual_rel:.1e} of the forces");
             return Ok(Err(Some(text)));
         }
         self.note(solved, (steps, residual_rel, error_rel), &local)?;

@@ -12,8 +12,8 @@ use tokio::task::JoinHandle;
 
 use crate::answer::{
     KeptQuestion, Placed, PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases,
-    answer_large_frame, is_elsewhere, is_finite, place_kept, place_once, place_upload, prefetch, prove, readiness,
-    reserve_fields, solve_large,
+    answer_large_frame, is_elsewhere, is_finite, place_kept, place_once, place_upload, prefetch,
+    prove, readiness, reserve_fields, solve_large,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;

@@ -59,14 +59,16 @@ pub(crate) fn place_once(
     let Some((engine, why)) = engine_for(resources, &body, &message, &reservation)? else {
         let answer = match cases.is_empty() && estimate {
             true => solve_once(resources, body, message, reservation, clock),
-            false => solve_several(resources, (body, message), (cases, estimate), reservation, clock),
+            false => {
+                solve_several(resources, (body, message), (cases, estimate), reservation, clock)
+            }
         };
         return answer.map(|answer| Placed::Here(Box::new(answer)));
     };
     check_node_count(&body.mesh, resources.config.max_nodes)?;
     let Body { mesh, materials, element } = body;
-    let element = element_given(element)
-        .unwrap_or_else(|| cheapest_element(poisson_max(&materials)));
+    let element =
+        element_given(element).unwrap_or_else(|| cheapest_element(poisson_max(&materials)));
     let model = UploadModel { mesh, materials, element: name_of(element), fixed: Vec::new() };
     let task = Task {
         model: Arc::new(model),
@@ -173,7 +175,8 @@ fn engine_for(
         return found("asked for".to_owned());
     }
     // What is wrong with the question, the server's own way says.
-    let is_open = matches!(question_of(message, None, 0.0), Ok(question) if question.method.is_none());
+    let is_open =
+        matches!(question_of(message, None, 0.0), Ok(question) if question.method.is_none());
     if !is_open || !message.masks.is_empty() || !message.want.fields.is_empty() {
         return Ok(None);
     }
@@ -190,12 +193,12 @@ fn engine_for(
 fn shortage(subject: &Subject, element: Element, reservation: &Reservation) -> Option<String> {
     let needs = subject.predict(element, &[Method::Front, Method::FrontMixed, Method::Multigrid]);
     let free = reservation.free().min(available_bytes().unwrap_or(u64::MAX));
-    let smallest = needs.iter().min_by_key(|need| need.bytes_min())?;
-    (smallest.bytes_min() > free).then(|| {
+    let smallest = needs.iter().min_by_key(|need| need.bytes())?;
+    (smallest.bytes() > free).then(|| {
         format!(
-            "no method fits into this server's memory ({} needs {} at the least, {} are free)",
+            "no method fits into this server's memory ({} is predicted to need {}, {} are free)",
             smallest.method,
-            Bytes(smallest.bytes_min()),
+            Bytes(smallest.bytes()),
             Bytes(free)
         )
     })
@@ -216,10 +219,9 @@ fn handed_over(
         return refused("fields of strain and stress", "ask for displacements and reactions");
     }
     // Deadline and error budget are checked as everywhere; a name may be one of the engine's.
-    if let Err(refusal) = question_of(question, None, 0.0)
-        && ClusterMethod::named(question.method.as_str()).is_none()
-    {
-        return Err(refusal);
+    match question_of(question, None, 0.0) {
+        Err(Refusal::Method(_)) if ClusterMethod::named(question.method.as_str()).is_some() => {}
+        checked => drop(checked?),
     }
     let poisson_max = poisson_max(&task.model.materials);
     Ok(Box::new(HandedOver { engine, task, why, clock, poisson_max, _reservation: reservation }))

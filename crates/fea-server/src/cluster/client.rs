@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use softgrasp_protocol::{
-    Answer, Ask, Body, ElementChoice, ElementName, EncodeError, Limits, RejectCode, Rejected, Reply,
-    Request, Subject, UploadModel,
+    Answer, Ask, Body, ElementChoice, ElementName, EncodeError, Limits, RejectCode, Rejected,
+    Reply, Request, Subject, UploadModel,
 };
 use tokio::time::{Instant, sleep};
 
@@ -17,6 +17,8 @@ use crate::engine::{Answered, Engine, Task};
 #[derive(Debug)]
 pub struct Cluster {
     endpoint: ClusterEndpoint,
+    /// Time in which a cluster that was lost may come back.
+    patience: Duration,
 }
 
 /// The requests that one task takes.
@@ -41,7 +43,13 @@ const ATTEMPTS: usize = 2;
 impl Cluster {
     /// The cluster at an address; nothing is sent before the first question.
     pub fn new(endpoint: ClusterEndpoint) -> Self {
-        Self { endpoint }
+        Self { endpoint, patience: BACK_WITHIN }
+    }
+
+    /// The same, that waits so long for a cluster which is being started.
+    #[must_use]
+    pub fn with_patience(self, patience: Duration) -> Self {
+        Self { patience, ..self }
     }
 
     async fn asked(&self, task: Task) -> Result<Answer, Rejected> {
@@ -49,11 +57,21 @@ impl Cluster {
         let requests = match encoding.await {
             Ok(Ok(requests)) => requests,
             Ok(Err(error)) => return Err(Rejected::new(RejectCode::TooLarge, error.to_string())),
-            Err(_) => return Err(Rejected::new(RejectCode::Internal, "the request was not encoded")),
+            Err(_) => {
+                return Err(Rejected::new(RejectCode::Internal, "the request was not encoded"));
+            }
         };
         let mut lost = Lost::Closed;
         for attempt in 1..=ATTEMPTS {
-            lost = match self.attempt(&requests).await {
+            let reached = match self.reach().await {
+                Ok(reached) => reached?,
+                // It has had its time to come back.
+                Err(why) => {
+                    lost = why;
+                    break;
+                }
+            };
+            lost = match attempted(reached, &requests).await {
                 Ok(replied) => return replied,
                 Err(lost) => lost,
             };
@@ -65,39 +83,9 @@ impl Cluster {
         Err(Rejected { retry_after_ms: AGAIN_AFTER_MS, ..rejected })
     }
 
-    /// Asks once, over a connection of its own; uploads the model if the cluster does not have it.
-    async fn attempt(&self, requests: &Requests) -> Result<Result<Answer, Rejected>, Lost> {
-        let mut conversation = match self.reach().await? {
-            Ok(conversation) => conversation,
-            Err(rejected) => return Ok(Err(rejected)),
-        };
-        let mut reply = conversation.ask(&requests.ask, ASK).await?;
-        if let (Reply::Rejected(rejected), Some(model)) = (&reply, &requests.model)
-            && rejected.code == RejectCode::UnknownModel
-        {
-            let model = Arc::clone(model);
-            let encoding = tokio::task::spawn_blocking(move || {
-                encoded(&Request::UploadModel((*model).clone()), UPLOAD)
-            });
-            let bytes = match encoding.await {
-                Ok(Ok(bytes)) => bytes,
-                _ => return Err(Lost::Foreign),
-            };
-            if let Reply::Rejected(rejected) = conversation.ask(&bytes, UPLOAD).await? {
-                return Ok(Err(rejected));
-            }
-            reply = conversation.ask(&requests.ask, ASK).await?;
-        }
-        match reply {
-            Reply::Answer(answer) => Ok(Ok(*answer)),
-            Reply::Rejected(rejected) => Ok(Err(rejected)),
-            _ => Err(Lost::Foreign),
-        }
-    }
-
     /// A connection on which this server is known; waits for a cluster that is being started again.
     async fn reach(&self) -> Result<Result<Conversation, Rejected>, Lost> {
-        let until = Instant::now() + BACK_WITHIN;
+        let until = Instant::now() + self.patience;
         let (conversation, reply) = loop {
             match Conversation::open(&self.endpoint).await {
                 Err(lost) if Instant::now() + PAUSE > until => return Err(lost),
@@ -115,6 +103,36 @@ impl Cluster {
             Reply::Rejected(rejected) => Ok(Err(rejected)),
             _ => Err(Lost::Foreign),
         }
+    }
+}
+
+/// Asks once; uploads the model if the cluster does not have it.
+async fn attempted(
+    mut conversation: Conversation,
+    requests: &Requests,
+) -> Result<Result<Answer, Rejected>, Lost> {
+    let mut reply = conversation.ask(&requests.ask, ASK).await?;
+    if let (Reply::Rejected(rejected), Some(model)) = (&reply, &requests.model)
+        && rejected.code == RejectCode::UnknownModel
+    {
+        let model = Arc::clone(model);
+        let encoding = tokio::task::spawn_blocking(move || {
+            encoded(&Request::UploadModel((*model).clone()), UPLOAD)
+        });
+        let bytes = match encoding.await {
+            Ok(Ok(bytes)) => bytes,
+            _ => return Err(Lost::Foreign),
+        };
+        if let Reply::Rejected(rejected) = conversation.ask(&bytes, UPLOAD).await? {
+            return Ok(Err(rejected));
+        }
+        reply = conversation.ask(&requests.ask, ASK).await?;
+    }
+    conversation.end().await;
+    match reply {
+        Reply::Answer(answer) => Ok(Ok(*answer)),
+        Reply::Rejected(rejected) => Ok(Err(rejected)),
+        _ => Err(Lost::Foreign),
     }
 }
 

@@ -3,9 +3,12 @@
 
 use std::time::Duration;
 
+use socket2::SockRef;
 use softgrasp_protocol::asynchronous::Connection;
-use softgrasp_protocol::{ConnectionError, DecodeError, Hello, Limits, RejectCode, Reply, Request};
-use tokio::io::{AsyncRead, AsyncWrite};
+use softgrasp_protocol::{
+    ConnectionError, DecodeError, Frame, Hello, Limits, RejectCode, Reply, Request,
+};
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
@@ -57,6 +60,9 @@ impl Conversation {
             .map_err(|_| Lost::Silent(CONNECT_MAX))?
             .map_err(Lost::Connect)?;
         socket.set_nodelay(true).map_err(Lost::Connect)?;
+        // Dropped in the middle it tells at once that nobody waits any more.
+        let on_the_socket = SockRef::from(&socket);
+        on_the_socket.set_linger(Some(Duration::ZERO)).map_err(Lost::Connect)?;
         let stream: Box<dyn Stream> = match &endpoint.tls {
             None => Box::new(socket),
             Some((connector, name)) => {
@@ -68,7 +74,8 @@ impl Conversation {
                 Box::new(stream)
             }
         };
-        let mut conversation = Self { connection: Connection::new(stream, Limits::default()) };
+        let connection = Connection::new(stream, Limits::default());
+        let mut conversation = Self { connection };
         let hello = Hello {
             alive_every_ms: ALIVE_EVERY_MS,
             ..Hello::new("fea-server", endpoint.token.clone())
@@ -107,8 +114,14 @@ impl Conversation {
         }
     }
 
+    /// Ends the connection with a farewell; without it, its end is a cut.
+    pub async fn end(mut self) {
+        // Whoever does not take it has what was asked for all the same.
+        let _ = timeout(CONNECT_MAX, self.connection.stream_mut().shutdown()).await;
+    }
+
     /// The next frame, or `None` after some bytes of one: silence is what lasts.
-    async fn next_bytes(&mut self) -> Result<Option<softgrasp_protocol::Frame>, Lost> {
+    async fn next_bytes(&mut self) -> Result<Option<Frame>, Lost> {
         if let Some(frame) = self.connection.frame_received().map_err(ConnectionError::from)? {
             return Ok(Some(frame));
         }

@@ -31,7 +31,9 @@ pub enum EndpointError {
     #[error("--cluster-token-file: {0}")]
     Token(#[from] TokenFileError),
     /// The certificates cannot be used.
-    #[error("--cluster-tls-ca {path} cannot be used: {reason}; a PEM file with certificates is expected")]
+    #[error(
+        "--cluster-tls-ca {path} cannot be used: {reason}; a PEM file with certificates is expected"
+    )]
     Certificates {
         /// Path of the file.
         path: PathBuf,

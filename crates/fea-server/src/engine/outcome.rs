@@ -1,9 +1,7 @@
 //! What an engine found, and the answer that is made of it.
 
 use softgrasp_core::solve::Certainty;
-use softgrasp_protocol::{
-    Answer, CaseAnswer, Displacements, DofValue, NodeChoice, SolveReport,
-};
+use softgrasp_protocol::{Answer, CaseAnswer, Displacements, DofValue, NodeChoice, SolveReport};
 
 use super::equations::Equations;
 use super::task::Task;
