@@ -246,13 +246,15 @@ impl Work<'_> {
             (residual, local) = self.residual(&u)?;
             let before = std::mem::replace(&mut left, self.norm(&residual)?);
             // Rounding has its say, or it has failed: more rounds would not help.
-            if round > 0 && !(left < 0.5 * before) {
+            let is_nearer = left < 0.5 * before;
+            if round > 0 && !is_nearer {
                 break;
             }
         }
         let residual_rel = if given > 0.0 { left / given } else { left };
         // One that is not a number is not accepted.
-        if !(residual_rel <= ACCEPTED) {
+        let is_accepted = residual_rel <= ACCEPTED;
+        if !is_accepted {
             let text =
                 format!("after {steps} steps the residual is {residual_rel:.1e} of the forces");
             return Ok(Err(Some(text)));

@@ -23,6 +23,7 @@ use crate::log_line::foreign_name;
 use crate::paths::Paths;
 use crate::plan::{large_frame_ms, request_ms};
 use crate::refusal::Refusal;
+use crate::resources::Resources;
 use crate::room::{OWN_BYTES, reserve_for_reading};
 use crate::server_handle::{Grasping, ServerHandle};
 use crate::tokens::Bearer;
@@ -192,8 +193,11 @@ impl RequestHandler {
         if large.is_some() && !cases.is_empty() {
             return Err(Refusal::SeveralLarge);
         }
-        if let (Subject::Model(model), true) = (&subject, large.is_some()) {
-            self.check_is_here(*model)?;
+        if large.is_some() {
+            self.check_is_here(match &subject {
+                Subject::Model(model) => Some(*model),
+                Subject::Mesh(_) => None,
+            })?;
         }
         match (subject, large) {
             (Subject::Mesh(body), large) => {
@@ -233,9 +237,11 @@ impl RequestHandler {
         workers.run(turn, work).await?
     }
 
-    /// Refuses what only a server answers, about a model that its engine answers for.
-    fn check_is_here(&self, model: ModelHash) -> Result<(), Refusal> {
-        match self.server.resources.meshes.find(model).is_some() {
+    /// Refuses large deformation and contact where the engine answers: for everything, or for this model.
+    fn check_is_here(&self, model: Option<ModelHash>) -> Result<(), Refusal> {
+        let Resources { config, meshes, .. } = &*self.server.resources;
+        let takes_all = config.engine.as_ref().is_some_and(|engine| engine.takes_all());
+        match takes_all || model.is_some_and(|model| meshes.find(model).is_some()) {
             true => Err(Refusal::NotByCluster {
                 what: "large deformation and contact",
                 instead: "ask a server with memory for the model",
@@ -389,7 +395,7 @@ impl RequestHandler {
         frame: ContactFrame,
         clock: impl FnOnce() -> StageClock + Send + 'static,
     ) -> Result<ContactAnswer, Refusal> {
-        self.check_is_here(frame.model)?;
+        self.check_is_here(Some(frame.model))?;
         self.held.hold(frame.model);
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;

@@ -42,6 +42,9 @@ pub(crate) struct HandedOver {
     _reservation: Reservation,
 }
 
+/// The engine that a question goes to, and why.
+type Chosen = (Arc<dyn Engine>, String);
+
 /// What a kept model is asked: a question and further cases of its known displacements.
 pub(crate) type KeptQuestion = (ModelHash, Question, Vec<Vec<f64>>);
 
@@ -159,7 +162,7 @@ fn engine_for(
     body: &Body,
     message: &Question,
     reservation: &Reservation,
-) -> Result<Option<(Arc<dyn Engine>, String)>, Refusal> {
+) -> Result<Option<Chosen>, Refusal> {
     let method = ClusterMethod::named(message.method.as_str());
     let Some(engine) = &resources.config.engine else {
         return match method {
