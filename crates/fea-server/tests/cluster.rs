@@ -1,6 +1,8 @@
 //! Questions that are too large for a server go to its cluster, and what happens when that is lost. The
 //! cluster here is a server of this process with an engine that answers by a factor.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail like tests")]
+
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
