@@ -22,7 +22,11 @@ missing() {
     has_python 3.10 || echo "python3 of 3.10"
 }
 
-[ -z "$(missing)" ] || install libpetsc-real-dev libopenmpi-dev openmpi-bin pkg-config python3
+if [ -n "$(missing)" ]; then
+    install libpetsc-real-dev libopenmpi-dev openmpi-bin pkg-config python3
+    # Where pkg-config itself was missing, nobody has seen that there is something new.
+    cargo clean --quiet --package fea-worker
+fi
 [ -z "$(missing)" ] || skip "$(missing) is not there and could not be installed"
 mpirun --version | grep -q 'Open MPI' || skip "mpirun is not that of Open MPI"
 take_programs fea-server glove-client
