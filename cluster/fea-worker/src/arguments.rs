@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::Parser;
 use fea_server::{Encryption, ServerConfig, Tokens};
 use softgrasp_core::solve::memory::Bytes;
+use softgrasp_protocol::Limits;
 
 use crate::settings::Settings;
 
@@ -25,7 +26,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub threads: usize,
     /// Nodes of a mesh.
-    #[arg(long, value_name = "N", default_value_t = ServerConfig::default().max_nodes)]
+    #[arg(long, value_name = "N", default_value_t = Limits::LARGEST.node_count_max)]
     max_nodes: u32,
     /// Answers that have the same bits each time on the same number of ranks, at about twice the time.
     #[arg(long)]
@@ -73,6 +74,7 @@ impl Arguments {
             listen: address(&self.listen)?,
             threads: self.threads,
             max_nodes: self.max_nodes,
+            max_elements: Limits::LARGEST.tet_count_max,
             memory_limit: self.memory_per_rank.0,
             tokens: self.token_file.as_deref().map(Tokens::read).transpose()?,
             encryption,

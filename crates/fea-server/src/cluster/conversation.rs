@@ -97,7 +97,7 @@ impl Conversation {
                 .map_err(|_| Lost::Silent(SILENCE_MAX))??;
             let Some(frame) = frame else { continue };
             let from = frame.request_id();
-            let decoding = move || Reply::decode(&frame, &Limits::default());
+            let decoding = move || Reply::decode(&frame, &Limits::LARGEST);
             // A million nodes are 24 MB, and other sessions share this thread.
             let decoded = tokio::task::spawn_blocking(decoding).await;
             let reply = decoded.map_err(|_| Lost::Foreign)??;
