@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Packages that belong to the repository only.
-const PRIVATE: [&str; 4] = ["tests", "tests/verification", "benches", "fuzz"];
+const PRIVATE: [&str; 5] = ["tests", "tests/verification", "benches", "fuzz", "cluster/fea-worker"];
 /// Categories that our crates are in, as crates.io writes them (its file `categories.toml`, 2026-11-26).
 const CATEGORIES: [&str; 14] = [
     "command-line-utilities",
@@ -134,6 +134,26 @@ fn versions_beside_paths_are_that_of_the_workspace() {
     assert_eq!(count, published().len());
     let python: Table = toml::from_str(&read("clients/python/pyproject.toml")).expect("a project");
     assert_eq!(&python["project"]["version"], version);
+}
+
+#[test]
+fn what_is_built_without_being_asked_for_needs_nothing_outside_rust() {
+    let worker = "cluster/fea-worker";
+    let workspace = manifest(".")["workspace"].clone();
+    let members = texts(&workspace["members"]);
+    let mut built = texts(&workspace["default-members"]);
+    built.push(worker);
+    assert_eq!(built, members, "all members but the worker, in the same order");
+    for folder in members.iter().filter(|folder| **folder != worker) {
+        let manifest = manifest(folder);
+        for kind in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let needed = manifest.get(kind).and_then(Value::as_table);
+            for name in needed.into_iter().flat_map(Table::keys) {
+                let outside = ["fea-worker", "cc", "pkg-config", "mpi", "mpi-sys"];
+                assert!(!outside.contains(&name.as_str()), "{folder} needs {name}");
+            }
+        }
+    }
 }
 
 #[test]

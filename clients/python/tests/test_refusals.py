@@ -13,7 +13,7 @@ from softgrasp.framing import Kind, encode_frame
 
 
 def test_every_number_has_its_exception() -> None:
-    assert sorted(softgrasp.REFUSALS) == list(range(1, 17))
+    assert sorted(softgrasp.REFUSALS) == list(range(1, 18))
     for code, kind in softgrasp.REFUSALS.items():
 
         def refuse(stream, header, code=code) -> None:

@@ -2,14 +2,17 @@
 
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
 use softgrasp_core::solve::memory::Bytes;
 
+use crate::cluster::{Cluster, ClusterEndpoint, EndpointError};
 use crate::config::ServerConfig;
 use crate::encryption::Encryption;
+use crate::engine::Engine;
 use crate::tokens::Tokens;
 
 /// Finite element server of Softgrasp: solves deformations over TCP, once per frame.
@@ -41,6 +44,31 @@ pub struct Arguments {
     /// Who may come.
     #[command(flatten)]
     pub access: AccessArguments,
+    #[command(flatten)]
+    cluster: ClusterArguments,
+}
+
+/// Who answers what is too large for this server.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Cluster")]
+struct ClusterArguments {
+    /// Hand what does not fit into memory over to the fea-worker at this address.
+    #[arg(long, value_name = "HOST:PORT")]
+    cluster: Option<String>,
+    /// File whose first line is the token that the cluster wants.
+    #[arg(long, value_name = "F", requires = "cluster")]
+    cluster_token_file: Option<PathBuf>,
+    /// Encrypt what goes to the cluster, and trust the certificates of this PEM file.
+    #[arg(long, value_name = "F", requires = "cluster")]
+    cluster_tls_ca: Option<PathBuf>,
+}
+
+impl ClusterArguments {
+    fn engine(&self) -> Result<Option<Arc<dyn Engine>>, EndpointError> {
+        let Some(address) = &self.cluster else { return Ok(None) };
+        let (token, tls) = (self.cluster_token_file.as_deref(), self.cluster_tls_ca.as_deref());
+        Ok(Some(Arc::new(Cluster::new(ClusterEndpoint::read(address, token, tls)?))))
+    }
 }
 
 /// Everything that a client can use up, and how far.
@@ -142,7 +170,7 @@ impl Arguments {
     /// The settings, with what the files of [`AccessArguments`] held.
     ///
     /// # Errors
-    /// An address that is none.
+    /// An address that is none, and files of `--cluster` that cannot be used.
     pub fn config(
         &self,
         tokens: Option<Tokens>,
@@ -174,6 +202,7 @@ impl Arguments {
             is_insecure: access.insecure,
             measure_at_start: true,
             real_time: self.real_time,
+            engine: self.cluster.engine()?,
             ..usual
         })
     }

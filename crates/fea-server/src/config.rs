@@ -1,12 +1,14 @@
 //! The settings of a server, checked before it starts.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use softgrasp_protocol::Limits;
 
 use crate::clock::StageWatch;
 use crate::encryption::Encryption;
+use crate::engine::Engine;
 use crate::tokens::Tokens;
 
 /// Settings of one server.
@@ -61,6 +63,8 @@ pub struct ServerConfig {
     pub metrics: Option<SocketAddr>,
     /// Stage of the newest request, for the program that started the server.
     pub stage: StageWatch,
+    /// Answers what this server cannot, or everything; `None`: there is no other.
+    pub engine: Option<Arc<dyn Engine>>,
 }
 
 /// Why settings are refused.
@@ -134,6 +138,7 @@ impl Default for ServerConfig {
             drain: Duration::ZERO,
             metrics: None,
             stage: StageWatch::default(),
+            engine: None,
         }
     }
 }
@@ -189,15 +194,15 @@ impl ServerConfig {
 
     /// Limits on what is read from a client.
     pub fn limits(&self) -> Limits {
-        let usual = Limits::default();
-        let nodes = self.max_nodes.min(usual.node_count_max);
-        let elements = self.max_elements.min(usual.tet_count_max);
+        let largest = Limits::LARGEST;
+        let nodes = self.max_nodes.min(largest.node_count_max);
+        let elements = self.max_elements.min(largest.tet_count_max);
         Limits {
-            payload_len_max: self.max_frame.min(usual.payload_len_max),
+            payload_len_max: self.max_frame.min(largest.payload_len_max),
             node_count_max: nodes,
             tet_count_max: elements.min(nodes.saturating_mul(8)),
             dof_count_max: nodes.saturating_mul(3),
-            ..usual
+            ..largest
         }
     }
 }
@@ -205,6 +210,17 @@ impl ServerConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_server_can_be_told_to_read_as_much_as_one_message_holds() {
+        assert_eq!(ServerConfig::default().limits(), Limits::default());
+        let (max_nodes, max_elements) = (u32::MAX, u32::MAX);
+        let most = ServerConfig { max_nodes, max_elements, ..ServerConfig::default() };
+        assert_eq!(most.limits(), Limits::LARGEST);
+        let Limits { node_count_max, tet_count_max, payload_len_max, .. } = Limits::LARGEST;
+        let bytes = 24 * u64::from(node_count_max) + 16 * u64::from(tet_count_max);
+        assert!(bytes < u64::from(payload_len_max));
+    }
 
     #[test]
     fn an_address_that_others_can_reach_wants_token_and_encryption_or_a_word() {

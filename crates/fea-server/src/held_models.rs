@@ -21,11 +21,11 @@ impl HeldModels {
 
     /// Holds a model if the server keeps it; returns whether it does.
     pub fn hold(&mut self, model: ModelHash) -> bool {
-        let models = &self.resources.models;
+        let Resources { models, meshes, .. } = &*self.resources;
         match self.held.contains(&model) {
-            true => models.find(model).is_some(),
+            true => models.find(model).is_some() || meshes.find(model).is_some(),
             false => {
-                let is_kept = models.hold(model);
+                let is_kept = models.hold(model) || meshes.hold(model);
                 if is_kept {
                     self.held.insert(model);
                 }
@@ -37,8 +37,11 @@ impl HeldModels {
     /// Releases a model that this session holds; the server forgets it unless another session holds it.
     pub fn drop_model(&mut self, model: ModelHash) {
         if self.held.remove(&model) {
-            self.resources.models.release(model);
-            self.resources.models.forget(model);
+            let Resources { models, meshes, .. } = &*self.resources;
+            models.release(model);
+            meshes.release(model);
+            models.forget(model);
+            meshes.forget(model);
         }
     }
 }
@@ -47,6 +50,7 @@ impl Drop for HeldModels {
     fn drop(&mut self) {
         for model in &self.held {
             self.resources.models.release(*model);
+            self.resources.meshes.release(*model);
         }
     }
 }

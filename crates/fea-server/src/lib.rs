@@ -6,7 +6,8 @@
 //! take it from tokio to a rayon pool through a bounded queue, [`request`] checks what it names, [`plan`]
 //! decides by which method it is answered and reserves the memory, [`answer`] finds the model (in the
 //! [`store`] or in the request) and solves, and the session writes the reply. [`resources`] are what all
-//! requests share; [`status_pages`] tell of them. [`arguments`] are what a person types.
+//! requests share; [`status_pages`] tell of them. [`arguments`] are what a person types. What is too large
+//! for this server goes to an [`engine`]: to a [`cluster`], or to the program that has this library.
 //!
 //! ```
 //! use std::net::SocketAddr;
@@ -29,8 +30,10 @@ mod budget;
 mod certificate;
 mod client_connection;
 mod clock;
+pub mod cluster;
 mod config;
 mod encryption;
+pub mod engine;
 mod held_models;
 mod local_server;
 mod lock;

@@ -9,6 +9,7 @@ use softgrasp_core::solve::equilibrium::NoEquilibrium;
 use softgrasp_core::solve::{Method, SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, Field, ModelHash, RejectCode, Rejected, VERSION};
 
+use crate::engine::ClusterMethod;
 use crate::no_room::NoRoom;
 use crate::plan::PlanError;
 use crate::workers::EndedAbnormally;
@@ -127,6 +128,15 @@ pub(crate) enum Refusal {
     Barred { seconds: u64 },
     #[error(transparent)]
     NoRoom(#[from] NoRoom),
+    #[error("{}", .0.text)]
+    Elsewhere(Rejected),
+    #[error(
+        "{method} is answered by a cluster, for questions about a mesh that comes along and models \
+         that are too large for this server; start it with --cluster HOST:PORT"
+    )]
+    NoCluster { method: ClusterMethod },
+    #[error("{what} cannot be answered by a cluster: {instead}")]
+    NotByCluster { what: &'static str, instead: &'static str },
     #[error(
         "the answer is not finite: displacements, forces or sizes of this request are out of \
          the range of double precision; scale them, for example to metres and pascals"
@@ -182,6 +192,8 @@ impl Refusal {
             Self::Limit(_) => RejectCode::TooLarge,
             Self::Cancelled => RejectCode::Cancelled,
             Self::Superseded => RejectCode::Superseded,
+            Self::Elsewhere(rejected) => rejected.code,
+            Self::NoCluster { .. } => RejectCode::UnknownMethod,
             Self::NoCommonVersion { .. } => RejectCode::UnsupportedVersion,
             _ => RejectCode::BadRequest,
         }
@@ -191,11 +203,13 @@ impl Refusal {
     pub fn to_message(&self) -> Rejected {
         let detail = match self {
             Self::Plan(PlanError::Memory(shortage)) => shortage.detail(),
+            Self::Elsewhere(rejected) => rejected.detail.clone(),
             _ => String::new(),
         };
         let retry_after_ms = match self {
             Self::Barred { seconds } => u32::try_from(1000 * seconds).unwrap_or(u32::MAX),
             Self::NoRoom(NoRoom::Now { .. }) => NO_ROOM_MS,
+            Self::Elsewhere(rejected) => rejected.retry_after_ms,
             _ => 0,
         };
         Rejected { code: self.code(), text: self.to_string(), detail, retry_after_ms }

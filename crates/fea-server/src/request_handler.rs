@@ -11,8 +11,9 @@ use softgrasp_protocol::{
 use tokio::task::JoinHandle;
 
 use crate::answer::{
-    PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases, answer_large_frame, is_finite,
-    prefetch, prove, readiness, reserve_fields, solve_large, solve_once, solve_several, upload,
+    KeptQuestion, Placed, PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases,
+    answer_large_frame, is_elsewhere, is_finite, place_kept, place_once, place_upload, prefetch,
+    prove, readiness, reserve_fields, solve_large,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;
@@ -22,6 +23,7 @@ use crate::log_line::foreign_name;
 use crate::paths::Paths;
 use crate::plan::{large_frame_ms, request_ms};
 use crate::refusal::Refusal;
+use crate::resources::Resources;
 use crate::room::{OWN_BYTES, reserve_for_reading};
 use crate::server_handle::{Grasping, ServerHandle};
 use crate::tokens::Bearer;
@@ -64,6 +66,8 @@ const CAPABILITIES: [&str; 9] = [
     "contact-yield",
     "small-system",
 ];
+/// The capability of a server with an engine beside it.
+const CLUSTER: &str = "cluster";
 /// Shortest time between two `Alive`.
 const ALIVE_MIN: Duration = Duration::from_millis(100);
 
@@ -189,6 +193,12 @@ impl RequestHandler {
         if large.is_some() && !cases.is_empty() {
             return Err(Refusal::SeveralLarge);
         }
+        if large.is_some() {
+            self.check_is_here(match &subject {
+                Subject::Model(model) => Some(*model),
+                Subject::Mesh(_) => None,
+            })?;
+        }
         match (subject, large) {
             (Subject::Mesh(body), large) => {
                 let how = (large, cases, !without_estimate);
@@ -197,16 +207,46 @@ impl RequestHandler {
             (Subject::Model(model), Some(large)) => {
                 self.large_frame((model, large, question), clock).await
             }
-            (Subject::Model(model), None) if cases.is_empty() => {
-                self.frame(model, question, clock).await
-            }
             (Subject::Model(model), None) => {
-                self.held.hold(model);
-                let resources = Arc::clone(&self.server.resources);
-                let workers = &self.server.resources.workers;
-                let work = move || answer_cases(&resources, model, (question, cases), &clock());
-                workers.run(turn, work).await?
+                let asked = (model, question, cases);
+                self.about_kept(asked, without_estimate, turn, clock).await
             }
+        }
+    }
+
+    /// Answers a linear question about a kept model, in one case or several.
+    async fn about_kept(
+        &mut self,
+        asked: KeptQuestion,
+        without_estimate: bool,
+        turn: Turn,
+        clock: impl FnOnce() -> StageClock + Send + 'static,
+    ) -> Result<Answer, Refusal> {
+        let resources = Arc::clone(&self.server.resources);
+        let (model, question, cases) = asked;
+        self.held.hold(model);
+        if is_elsewhere(&resources, model, &question)? {
+            let asked = (model, question, cases);
+            return place_kept(&resources, asked, without_estimate, clock())?.answer().await;
+        }
+        if cases.is_empty() {
+            return self.frame(model, question, clock).await;
+        }
+        let workers = &self.server.resources.workers;
+        let work = move || answer_cases(&resources, model, (question, cases), &clock());
+        workers.run(turn, work).await?
+    }
+
+    /// Refuses large deformation and contact where the engine answers: for everything, or for this model.
+    fn check_is_here(&self, model: Option<ModelHash>) -> Result<(), Refusal> {
+        let Resources { config, meshes, .. } = &*self.server.resources;
+        let takes_all = config.engine.as_ref().is_some_and(|engine| engine.takes_all());
+        match takes_all || model.is_some_and(|model| meshes.find(model).is_some()) {
+            true => Err(Refusal::NotByCluster {
+                what: "large deformation and contact",
+                instead: "ask a server with memory for the model",
+            }),
+            false => Ok(()),
         }
     }
 
@@ -221,14 +261,14 @@ impl RequestHandler {
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
         let work = move || match large {
-            Some(large) => solve_large(&resources, asked, large, received, clock()),
-            None if cases.is_empty() && estimate => {
-                let (body, question) = asked;
-                solve_once(&resources, body, question, received, clock())
-            }
-            None => solve_several(&resources, asked, (cases, estimate), received, clock()),
+            Some(large) => solve_large(&resources, asked, large, received, clock())
+                .map(|answer| Placed::Here(Box::new(answer))),
+            None => place_once(&resources, asked, (cases, estimate), received, clock()),
         };
-        workers.run(turn, work).await?
+        match workers.run(turn, work).await?? {
+            Placed::Here(answer) => Ok(*answer),
+            Placed::Elsewhere(handed) => handed.answer().await,
+        }
     }
 
     /// Turn of this session's work in the fair queue, with its predicted cost.
@@ -273,7 +313,7 @@ impl RequestHandler {
         let (hash, model) = workers.run(turn, named).await?;
         let right = uploads.turn(hash).await;
         let (shared, later) = (Arc::clone(resources), Arc::clone(resources));
-        let work = move || upload(&shared, hash, model, received, clock());
+        let work = move || place_upload(&shared, hash, model, received, clock());
         let ready = workers.run(turn, work).await??;
         drop(right);
         self.held.hold(hash);
@@ -355,6 +395,7 @@ impl RequestHandler {
         frame: ContactFrame,
         clock: impl FnOnce() -> StageClock + Send + 'static,
     ) -> Result<ContactAnswer, Refusal> {
+        self.check_is_here(Some(frame.model))?;
         self.held.hold(frame.model);
         let resources = Arc::clone(&self.server.resources);
         let workers = &self.server.resources.workers;
@@ -402,9 +443,14 @@ impl RequestHandler {
             threads: self.server.resources.workers.threads() as u32,
             limits: self.limits,
             wire,
-            capabilities: CAPABILITIES.map(str::to_owned).to_vec(),
+            capabilities: self.capabilities(),
             idle_ms: idle.map_or(0, |limit| limit.as_millis() as u64),
         }))
+    }
+
+    fn capabilities(&self) -> Vec<String> {
+        let of_engine = self.server.resources.config.engine.as_ref().map(|_| CLUSTER);
+        CAPABILITIES.into_iter().chain(of_engine).map(str::to_owned).collect()
     }
 
     fn check_token(&mut self, hello: &Hello) -> Result<(), Refusal> {

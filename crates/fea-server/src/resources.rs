@@ -6,7 +6,7 @@ use crate::config::ServerConfig;
 use crate::log_line::LogLines;
 use crate::metrics::Metrics;
 use crate::plan::MeasuredRates;
-use crate::store::ModelStore;
+use crate::store::{MeshStore, ModelStore};
 use crate::workers::Workers;
 
 /// Settings, kept models, memory budget, solving threads, their measured rates, counters and log limits.
@@ -14,6 +14,8 @@ pub(crate) struct Resources {
     pub config: ServerConfig,
     pub access: Access,
     pub models: ModelStore,
+    /// Models that the engine answers for.
+    pub meshes: MeshStore,
     pub budget: Budget,
     pub workers: Workers,
     pub rates: MeasuredRates,
@@ -28,7 +30,7 @@ impl Resources {
         let models = ModelStore::new(budget.clone());
         let access = Access::new(config.tokens.clone());
         let (rates, metrics) = (MeasuredRates::default(), Metrics::default());
-        let log_lines = LogLines::default();
-        Self { config, access, models, budget, workers, rates, metrics, log_lines }
+        let (log_lines, meshes) = (LogLines::default(), MeshStore::default());
+        Self { config, access, models, meshes, budget, workers, rates, metrics, log_lines }
     }
 }

@@ -158,6 +158,7 @@ async fn forget_unused_models(resources: Arc<Resources>) {
         tokio::time::sleep((limit / 4).clamp(FORGET_EVERY_MIN, FORGET_EVERY_MAX)).await;
         if let Some(then) = Instant::now().checked_sub(limit) {
             resources.models.forget_unused_since(then);
+            resources.meshes.forget_unused_since(then);
         }
     }
 }

@@ -39,6 +39,17 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// The most that a server can be told to read, and that a client reads: two million nodes and six
+    /// elements for each come to 229 MiB, which one payload holds.
+    pub const LARGEST: Self = Self {
+        payload_len_max: 256 * 1024 * 1024,
+        node_count_max: 2_000_000,
+        tet_count_max: 12_000_000,
+        dof_count_max: 6_000_000,
+        material_count_max: 65_536,
+        text_len_max: 16 * 1024,
+    };
+
     /// Checks that a text is not longer than `text_len_max`.
     ///
     /// # Errors

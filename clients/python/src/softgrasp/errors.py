@@ -150,6 +150,12 @@ class Superseded(Refused):
     code = 16
 
 
+class ClusterLost(Refused):
+    """17: the cluster behind the server was lost; ask again after `retry_after`."""
+
+    code = 17
+
+
 REFUSALS: dict[int, type[Refused]] = {refusal.code: refusal for refusal in Refused.__subclasses__()}
 """The exception of every reject code."""
 

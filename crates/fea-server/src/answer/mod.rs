@@ -4,6 +4,7 @@ mod condensed;
 mod contact_frame;
 mod contact_large;
 mod direct;
+mod elsewhere;
 mod factor;
 mod fields;
 mod finite;
@@ -18,11 +19,12 @@ mod warnings;
 
 pub(crate) use contact_frame::PosedContact;
 pub(crate) use contact_large::PressedSeat;
+pub(crate) use elsewhere::{
+    KeptQuestion, Placed, is_elsewhere, place_kept, place_once, place_upload,
+};
 pub(crate) use fields::reserve_fields;
 pub(crate) use finite::is_finite;
 pub(crate) use frame::{PosedFrame, Readiness, answer_cases, readiness};
 pub(crate) use large_frame::answer_large_frame;
 pub(crate) use large_once::solve_large;
-pub(crate) use once::solve_once;
-pub(crate) use several::solve_several;
-pub(crate) use upload::{prefetch, prove, upload};
+pub(crate) use upload::{prefetch, prove};

@@ -46,12 +46,16 @@ pub(crate) fn checked_forces(
     known: &Known,
     question: &Question,
 ) -> Result<Vec<f64>, Refusal> {
-    check_nodes(&question.want, model)?;
-    scatter_forces(model, known, &question.forces)
+    let node_count = model.mesh().node_count();
+    check_nodes(&question.want, node_count)?;
+    scatter_forces((node_count, model.system_node_count()), known, &question.forces)
 }
 
-fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {
-    let node_count = model.mesh().node_count();
+/// Refuses wanted nodes that are not there.
+///
+/// # Errors
+/// [`Refusal::NoSuchNode`].
+pub(crate) fn check_nodes(want: &Want, node_count: usize) -> Result<(), Refusal> {
     let NodeChoice::Nodes(nodes) = &want.nodes else { return Ok(()) };
     match nodes.iter().find(|&&n| n as usize >= node_count) {
         Some(&node) => {
@@ -61,13 +65,19 @@ fn check_nodes(want: &Want, model: &Model) -> Result<(), Refusal> {
     }
 }
 
-/// Forces by degree of freedom, N; empty if the question has none.
-fn scatter_forces(model: &Model, known: &Known, forces: &[DofValue]) -> Result<Vec<f64>, Refusal> {
+/// Forces by degree of freedom of the system, N; empty if the question has none.
+///
+/// # Errors
+/// [`Refusal`] that names the node.
+pub(crate) fn scatter_forces(
+    (node_count, system_node_count): (usize, usize),
+    known: &Known,
+    forces: &[DofValue],
+) -> Result<Vec<f64>, Refusal> {
     if forces.is_empty() {
         return Ok(Vec::new());
     }
-    let node_count = model.mesh().node_count();
-    let mut scattered = vec![0.0; 3 * model.system_node_count()];
+    let mut scattered = vec![0.0; 3 * system_node_count];
     for &DofValue { dof, value } in forces {
         let node = dof / 3;
         if !value.is_finite() {

@@ -5,9 +5,11 @@ mod contact;
 mod model;
 mod question;
 
-pub(crate) use checks::{checked_forces, checked_masks, paired, pairs};
+pub(crate) use checks::{
+    check_nodes, checked_forces, checked_masks, paired, pairs, scatter_forces,
+};
 pub(crate) use contact::{bodies_of, settings_of, state_message, state_of};
 pub(crate) use model::{
-    check_node_count, element_given, element_of, model_of, name_of, poisson_max,
+    check_node_count, element_given, element_of, mesh_of, model_of, name_of, poisson_max,
 };
 pub(crate) use question::question_of;

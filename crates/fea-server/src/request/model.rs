@@ -20,6 +20,18 @@ pub(crate) fn model_of(
     fixed: Vec<u32>,
     clock: &mut StageClock,
 ) -> Result<Model, Refusal> {
+    let (mesh, materials) = mesh_of(mesh, materials)?;
+    Ok(Model::try_new(mesh, element, &materials, fixed, &mut |stage| clock.begin(stage))?)
+}
+
+/// Makes mesh and materials and checks them.
+///
+/// # Errors
+/// [`Refusal`] that names the fault of mesh or materials.
+pub(crate) fn mesh_of(
+    mesh: MeshData,
+    materials: &[MaterialMessage],
+) -> Result<(TetMesh, Vec<Material>), Refusal> {
     if materials.is_empty() {
         return Err(Refusal::NoMaterial);
     }
@@ -30,8 +42,7 @@ pub(crate) fn model_of(
     let regions = ranks(&mesh.regions, materials.len())?;
     let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
     let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
-    let mesh = TetMesh::try_new(vertices, tets, regions)?;
-    Ok(Model::try_new(mesh, element, &materials, fixed, &mut |stage| clock.begin(stage))?)
+    Ok((TetMesh::try_new(vertices, tets, regions)?, materials))
 }
 
 /// Refuses a mesh of more nodes than the server takes, before anything is allocated for it.

@@ -296,7 +296,7 @@ impl ServerConnection {
                 continue;
             }
             self.reply_bytes = HEADER_LEN + frame.payload.len();
-            return match Reply::decode(&frame, &Limits::default())? {
+            return match Reply::decode(&frame, &Limits::LARGEST)? {
                 Reply::Rejected(rejected) => Err(LinkError::Rejected(rejected)),
                 Reply::Alive => continue,
                 reply => Ok(reply),

@@ -44,13 +44,15 @@ pub enum RejectCode {
     Cancelled,
     /// A newer request of the client has made this one needless.
     Superseded,
+    /// The processes that answer together have gone; the server asked twice.
+    ClusterLost,
     /// A reason that this version of the crate does not know, by its number.
     Other(u16),
 }
 
 impl RejectCode {
     /// All codes that this version knows, in the order of their numbers, which count from 1.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::BadRequest,
         Self::UnknownModel,
         Self::RigidMotionFree,
@@ -67,6 +69,7 @@ impl RejectCode {
         Self::Uncertain,
         Self::Cancelled,
         Self::Superseded,
+        Self::ClusterLost,
     ];
 
     /// Number of the code on the wire.
