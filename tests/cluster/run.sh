@@ -30,7 +30,8 @@ fi
 [ -z "$(missing)" ] || skip "$(missing) is not there and could not be installed"
 mpirun --version | grep -q 'Open MPI' || skip "mpirun is not that of Open MPI"
 take_programs fea-server glove-client
-cargo build --locked --quiet --package fea-worker || fail "fea-worker is not built"
+# Of the workspace: by its name alone it would get other features, and with them all it needs anew.
+cargo build --locked --quiet --workspace --bin fea-worker || fail "fea-worker is not built"
 worker="$(pwd)/${CARGO_TARGET_DIR:-target}/debug/fea-worker"
 case "${CARGO_TARGET_DIR:-}" in /*) worker="$CARGO_TARGET_DIR/debug/fea-worker" ;; esac
 "$worker" --version >/dev/null || fail "fea-worker does not start"

@@ -1,5 +1,5 @@
 //! Reports that README quotes are of a clean commit, and the reports' page lists those that are older
-//! than the code that they measure. that they measure.
+//! than the code that they measure.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -52,6 +52,11 @@ impl FrictionCone {
     }
 }
 
+/// The three numbers of a point.
+pub(super) fn at(numbers: &[f64], point: usize) -> PointForce {
+    Vector3::new(numbers[3 * point], numbers[3 * point + 1], numbers[3 * point + 2])
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

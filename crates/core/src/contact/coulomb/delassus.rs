@@ -8,8 +8,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::cone::PointForce;
-use super::problem::{ProblemError, at};
+use super::cone::{PointForce, at};
 
 /// A contact point as a mean of corners, and the frame that its force is written in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +31,38 @@ pub struct PointPlace {
 pub struct Delassus {
     compliance: DMatrix<f64>,
     points: Vec<PointPlace>,
+}
+
+/// Why numbers make no contact problem.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProblemError {
+    /// Sizes that do not fit each other.
+    #[error(
+        "{points} points need {expected} rows, but the operator has {rows} and the motion {motion}"
+    )]
+    Sizes {
+        /// Number of points.
+        points: usize,
+        /// Rows that the points need: three each.
+        expected: usize,
+        /// Rows of the operator.
+        rows: usize,
+        /// Entries of the motion.
+        motion: usize,
+    },
+    /// A point that no force moves along its own normal.
+    #[error(
+        "contact point {point} has the compliance {compliance:e} m/N along its normal; it must be positive"
+    )]
+    Rigid {
+        /// The point, from 0.
+        point: usize,
+        /// Its compliance along the normal, m/N.
+        compliance: f64,
+    },
+    /// A number that is not finite.
+    #[error("a number of the contact problem is not finite")]
+    NotFinite,
 }
 
 impl PointPlace {

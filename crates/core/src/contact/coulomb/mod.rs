@@ -10,8 +10,8 @@ mod splitting;
 mod sweeps;
 
 pub use cone::{FrictionCone, PointForce};
-pub use delassus::{Delassus, PointPlace};
-pub use problem::{ContactProblem, ProblemError};
+pub use delassus::{Delassus, PointPlace, ProblemError};
+pub use problem::ContactProblem;
 pub use solution::{PointState, Solution, SolveBudget, state_of};
 
 #[cfg(test)]

@@ -14,8 +14,8 @@ use faer::prelude::*;
 use faer::{MatMut, Par, Spec};
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2};
 
-use super::cone::PointForce;
-use super::problem::{ContactProblem, at};
+use super::cone::{PointForce, at};
+use super::problem::ContactProblem;
 
 /// A problem with a little compliance at every point, counted from given forces.
 pub(super) struct Proximal<'a> {

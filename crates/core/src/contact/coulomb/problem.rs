@@ -1,9 +1,9 @@
 //! The linear contact problem: gaps and slips of points as a function of their forces.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 
-use super::cone::{FrictionCone, PointForce};
-use super::delassus::{Delassus, PointPlace};
+use super::cone::{FrictionCone, at};
+use super::delassus::{Delassus, PointPlace, ProblemError};
 
 /// Points in contact, or nearly so: `u = W λ + b`, and a cone for each.
 ///
@@ -19,38 +19,6 @@ pub struct ContactProblem {
     pub(super) cones: Vec<FrictionCone>,
     /// A stiffness for each point, N/m: it turns metres into newtons in the residual.
     pub(super) rho: Vec<f64>,
-}
-
-/// Why numbers make no contact problem.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ProblemError {
-    /// Sizes that do not fit each other.
-    #[error(
-        "{points} points need {expected} rows, but the operator has {rows} and the motion {motion}"
-    )]
-    Sizes {
-        /// Number of points.
-        points: usize,
-        /// Rows that the points need: three each.
-        expected: usize,
-        /// Rows of the operator.
-        rows: usize,
-        /// Entries of the motion.
-        motion: usize,
-    },
-    /// A point that no force moves along its own normal.
-    #[error(
-        "contact point {point} has the compliance {compliance:e} m/N along its normal; it must be positive"
-    )]
-    Rigid {
-        /// The point, from 0.
-        point: usize,
-        /// Its compliance along the normal, m/N.
-        compliance: f64,
-    },
-    /// A number that is not finite.
-    #[error("a number of the contact problem is not finite")]
-    NotFinite,
 }
 
 impl ContactProblem {
@@ -144,9 +112,4 @@ impl ContactProblem {
             rho: points.iter().map(|&i| self.rho[i]).collect(),
         }
     }
-}
-
-/// The three numbers of a point.
-pub(super) fn at(numbers: &[f64], point: usize) -> PointForce {
-    Vector3::new(numbers[3 * point], numbers[3 * point + 1], numbers[3 * point + 2])
 }

@@ -1,9 +1,9 @@
 //! The solution of a contact problem: of the points that press, or would be pressed into, and of all
 //! points at once, by Newton's method with sweeps of a splitting where it strays.
 
-use super::cone::PointForce;
+use super::cone::{PointForce, at};
 use super::newton::Proximal;
-use super::problem::{ContactProblem, at};
+use super::problem::ContactProblem;
 use super::splitting::Splitting;
 
 /// How exactly and how long to solve.

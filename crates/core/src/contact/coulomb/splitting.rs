@@ -9,9 +9,9 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, Matrix3};
 
-use super::cone::PointForce;
+use super::cone::{PointForce, at};
 use super::newton::solve_in_place;
-use super::problem::{ContactProblem, at};
+use super::problem::ContactProblem;
 
 /// A state of the alternating direction method of multipliers on a contact problem.
 ///

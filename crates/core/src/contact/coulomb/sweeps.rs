@@ -1,10 +1,10 @@
 //! Sweeps over all points, the oracle of the solution: each point obeys the law exactly while the forces of
 //! the others stand still.
 
-use super::problem::{ContactProblem, at};
+use super::problem::ContactProblem;
 use nalgebra::{DMatrix, Matrix3, Vector2};
 
-use super::cone::PointForce;
+use super::cone::{PointForce, at};
 
 /// One point whose neighbours' forces are given: `u = W λ + b` with three rows.
 #[derive(Clone, Copy, Debug)]

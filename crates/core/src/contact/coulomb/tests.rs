@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 use proptest::prelude::*;
 
-use super::problem::at;
+use super::cone::at;
 use super::sweeps::PointProblem;
 use super::sweeps::Sweeps;
 use super::*;
