@@ -132,7 +132,7 @@ impl Delassus {
     /// Forces of points as forces at corners: `B λ`.
     ///
     /// Shapes: `lambda` 3n, result 3m. Units: N.
-    pub(super) fn spread(&self, lambda: &[f64]) -> Vec<f64> {
+    fn spread(&self, lambda: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; self.corner_rows()];
         for (place, force) in self.points.iter().zip(lambda.chunks_exact(3)) {
             // Open points have no force, and most of a margin is open.
@@ -160,12 +160,19 @@ impl Delassus {
     ///
     /// Shapes: `lambda` 3n, result 3m. Units: N, m.
     pub(super) fn moved_corners(&self, lambda: &[f64]) -> Vec<f64> {
+        self.moved_by(&self.compliance, lambda)
+    }
+
+    /// Motions of the corners under forces at the points if the corners had another compliance.
+    ///
+    /// Shapes: `compliance` 3m × 3m, `lambda` 3n, result 3m. Units: m/N, N, m.
+    pub(super) fn moved_by(&self, compliance: &DMatrix<f64>, lambda: &[f64]) -> Vec<f64> {
         let (rows, spread) = (self.corner_rows(), self.spread(lambda));
         let mut v = vec![0.0; rows];
         matmul(
             MatMut::from_column_major_slice_mut(&mut v, rows, 1),
             Accum::Replace,
-            MatRef::from_column_major_slice(self.compliance.as_slice(), rows, rows),
+            MatRef::from_column_major_slice(compliance.as_slice(), rows, rows),
             MatRef::from_column_major_slice(&spread, rows, 1),
             1.0,
             Par::Seq,

@@ -5,8 +5,6 @@
 //! circles: points that say nearly the same leave the compliance without an inverse, and none is needed
 //! here.
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, Matrix3};
 
 use super::cone::{PointForce, at};
@@ -89,17 +87,7 @@ impl<'a> Splitting<'a> {
     /// `(W + D)⁻¹ D λ = λ − D⁻¹ Bᵀ N B λ`, N the compliance of the corners.
     fn yield_to_compliance(&self, lambda: &mut [f64]) {
         let w = &self.problem.w;
-        let spread = w.spread(lambda);
-        let rows = spread.len();
-        let mut moved = vec![0.0; rows];
-        matmul(
-            MatMut::from_column_major_slice_mut(&mut moved, rows, 1),
-            Accum::Replace,
-            MatRef::from_column_major_slice(self.compliance.as_slice(), rows, rows),
-            MatRef::from_column_major_slice(&spread, rows, 1),
-            1.0,
-            Par::Seq,
-        );
+        let moved = w.moved_by(&self.compliance, lambda);
         for (point, added) in self.added.iter().enumerate() {
             let less = w.motion_of(point, &moved) / *added;
             (0..3).for_each(|axis| lambda[3 * point + axis] -= less[axis]);
