@@ -49,6 +49,16 @@ wait_until() {
     done
 }
 
+# show_logs: the ends of all logs in the script's own folder, which it names `work`.
+show_logs() {
+    local file
+    for file in "$work"/*.log; do
+        [ -e "$file" ] || continue
+        say "the end of ${file##*/}:"
+        tail -n 8 "$file"
+    done
+}
+
 # ends_by FUNCTION: calls it once when the script ends, however that comes about, with the exit status,
 # which stays as it is.
 ends_by() {

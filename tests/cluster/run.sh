@@ -56,14 +56,6 @@ cleanup() {
 }
 ends_by cleanup
 
-show_logs() {
-    for file in "$work"/*.log; do
-        [ -e "$file" ] || continue
-        say "the end of ${file##*/}:"
-        tail -n 8 "$file"
-    done
-}
-
 # start NAME COMMAND...: in the background; `address` is where it listens.
 start() {
     local process=$1

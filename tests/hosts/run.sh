@@ -72,14 +72,6 @@ cleanup() {
 }
 ends_by cleanup
 
-show_logs() {
-    for file in "$work"/*.log; do
-        [ -e "$file" ] || continue
-        say "the end of ${file##*/}:"
-        tail -n 6 "$file"
-    done
-}
-
 make_hosts() {
     local host
     ip netns add "$name-net" 2>/dev/null || skip "network namespaces are not permitted here"

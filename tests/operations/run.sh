@@ -40,14 +40,6 @@ cleanup() {
 }
 ends_by cleanup
 
-show_logs() {
-    for file in "$work"/*.log; do
-        [ -e "$file" ] || continue
-        say "the end of ${file##*/}:"
-        tail -n 6 "$file"
-    done
-}
-
 # The exit code of a process of ours, which must end within so many seconds.
 exit_code() {
     local name=$1 seconds=$2 code=0
