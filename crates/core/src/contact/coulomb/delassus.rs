@@ -91,7 +91,7 @@ impl Delassus {
         let rows = compliance.nrows();
         let last = points.iter().flat_map(PointPlace::weighted).map(|(corner, _)| corner).max();
         let corners = last.map_or(0, |last| last + 1);
-        if compliance.ncols() != rows || rows % 3 != 0 || rows < 3 * corners {
+        if compliance.ncols() != rows || !rows.is_multiple_of(3) || rows < 3 * corners {
             let (points, expected, motion) = (points.len(), 3 * corners, compliance.ncols());
             return Err(ProblemError::Sizes { points, expected, rows, motion });
         }
