@@ -182,7 +182,7 @@ fn told(
     equations: &Equations,
     numbering: &Numbering,
 ) -> Result<Answer, Rejected> {
-    let outcome: Outcome = outcome(solved, choice, ranks, equations);
+    let outcome: Outcome = outcome(solved, (choice, ranks), (task, equations));
     let nodes = numbering.start.last().copied().unwrap_or(0);
     tracing::info!(
         nodes,

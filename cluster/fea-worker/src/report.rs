@@ -1,9 +1,7 @@
 //! The report of an answer that all ranks found, and the refusal where they found none.
 
-use fea_server::engine::{Case, Equations, Outcome};
-use softgrasp_protocol::{ElementName, RejectCode, Rejected, SolveReport, StageMs};
-
-use softgrasp_core::fem::Element;
+use fea_server::engine::{Case, Equations, Outcome, Task};
+use softgrasp_protocol::{RejectCode, Rejected, SolveReport, StageMs};
 
 use crate::order::Preparation;
 use crate::settings::Choice;
@@ -14,7 +12,11 @@ const NO_BOUND: &str = "no smallest eigenvalue is proven over several processes;
                         largest correction that a further solve made";
 
 /// Displacements, reactions and report of what was found.
-pub fn outcome(solved: &Solved, choice: &Choice, ranks: usize, equations: &Equations) -> Outcome {
+pub fn outcome(
+    solved: &Solved,
+    (choice, ranks): (&Choice, usize),
+    (task, equations): (&Task, &Equations),
+) -> Outcome {
     let mut cases = solved.cases.iter().map(|found| case(found, equations));
     let none = || Case { displacement: vec![0.0; 3 * equations.used.len()], reaction: Vec::new() };
     let first = cases.next().unwrap_or_else(none);
@@ -23,14 +25,9 @@ pub fn outcome(solved: &Solved, choice: &Choice, ranks: usize, equations: &Equat
     let known_dofs = equations.known.dofs.len() as u64;
     let [assemble, factor, solve] = solved.ms;
     let (rotation, strain) = solved.strain.unwrap_or((f64::NAN, f64::NAN));
-    let element = match equations.element {
-        Element::Tet4 => ElementName::T4,
-        Element::Tet4Anp => ElementName::T4Anp,
-        Element::Tet10 => ElementName::T10,
-    };
     let report = SolveReport {
         method: choice.method.name().to_owned(),
-        element: element.into(),
+        element: task.model.element.into(),
         unknown_dofs: 3 * used - known_dofs,
         known_dofs,
         stage_ms: StageMs { assemble, factor, solve, ..StageMs::default() },

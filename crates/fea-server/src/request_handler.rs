@@ -12,7 +12,7 @@ use tokio::task::JoinHandle;
 
 use crate::answer::{
     KeptQuestion, Placed, PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases,
-    answer_large_frame, is_elsewhere, is_finite, place_kept, place_once, place_upload, prefetch,
+    answer_large_frame, is_finite, kept_elsewhere, place_kept, place_once, place_upload, prefetch,
     prove, readiness, reserve_fields, solve_large,
 };
 use crate::awaited::Waiting;
@@ -222,17 +222,19 @@ impl RequestHandler {
         turn: Turn,
         clock: impl FnOnce() -> StageClock + Send + 'static,
     ) -> Result<Answer, Refusal> {
-        let resources = Arc::clone(&self.server.resources);
+        let resources = &self.server.resources;
         let (model, question, cases) = asked;
-        self.held.hold(model);
-        if is_elsewhere(&resources, model, &question)? {
+        if let Some(elsewhere) = kept_elsewhere(resources, model, &question)? {
+            self.held.hold(model);
             let asked = (model, question, cases);
-            return place_kept(&resources, asked, without_estimate, clock())?.answer().await;
+            let handed = place_kept(resources, elsewhere, asked, without_estimate, clock())?;
+            return handed.answer().await;
         }
         if cases.is_empty() {
             return self.frame(model, question, clock).await;
         }
-        let workers = &self.server.resources.workers;
+        self.held.hold(model);
+        let (resources, workers) = (Arc::clone(resources), &resources.workers);
         let work = move || answer_cases(&resources, model, (question, cases), &clock());
         workers.run(turn, work).await?
     }
@@ -240,8 +242,8 @@ impl RequestHandler {
     /// Refuses large deformation and contact where the engine answers: for everything, or for this model.
     fn check_is_here(&self, model: Option<ModelHash>) -> Result<(), Refusal> {
         let Resources { config, meshes, .. } = &*self.server.resources;
-        let takes_all = config.engine.as_ref().is_some_and(|engine| engine.takes_all());
-        match takes_all || model.is_some_and(|model| meshes.find(model).is_some()) {
+        let Some(engine) = &config.engine else { return Ok(()) };
+        match engine.takes_all() || model.is_some_and(|model| meshes.find(model).is_some()) {
             true => Err(Refusal::NotByCluster {
                 what: "large deformation and contact",
                 instead: "ask a server with memory for the model",

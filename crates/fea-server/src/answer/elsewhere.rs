@@ -45,6 +45,9 @@ pub(crate) struct HandedOver {
 /// The engine that a question goes to, and why.
 type Chosen = (Arc<dyn Engine>, String);
 
+/// The engine that answers for a kept model, and the model.
+pub(crate) type KeptElsewhere = (Arc<dyn Engine>, Arc<UploadModel>);
+
 /// What a kept model is asked: a question and further cases of its known displacements.
 pub(crate) type KeptQuestion = (ModelHash, Question, Vec<Vec<f64>>);
 
@@ -83,21 +86,23 @@ pub(crate) fn place_once(
     handed_over(engine, task, why, (clock, reservation)).map(Placed::Elsewhere)
 }
 
-/// Whether the engine answers for a kept model.
+/// The engine and the model if the engine answers for a kept model.
 ///
 /// # Errors
 /// [`Refusal::NoCluster`] if it does not, and the question names one of its methods.
-pub(crate) fn is_elsewhere(
+pub(crate) fn kept_elsewhere(
     resources: &Resources,
     hash: ModelHash,
     question: &Question,
-) -> Result<bool, Refusal> {
-    if resources.config.engine.is_some() && resources.meshes.find(hash).is_some() {
-        return Ok(true);
+) -> Result<Option<KeptElsewhere>, Refusal> {
+    if let Some(engine) = &resources.config.engine
+        && let Some(model) = resources.meshes.find(hash)
+    {
+        return Ok(Some((Arc::clone(engine), model)));
     }
     match ClusterMethod::named(question.method.as_str()) {
         Some(method) => Err(Refusal::NoCluster { method }),
-        None => Ok(false),
+        None => Ok(None),
     }
 }
 
@@ -107,13 +112,11 @@ pub(crate) fn is_elsewhere(
 /// [`Refusal`] if the question cannot be answered there.
 pub(crate) fn place_kept(
     resources: &Resources,
+    (engine, model): KeptElsewhere,
     (hash, question, cases): KeptQuestion,
     without_estimate: bool,
     clock: StageClock,
 ) -> Result<Box<HandedOver>, Refusal> {
-    let unknown = || Refusal::UnknownModel(hash);
-    let engine = Arc::clone(resources.config.engine.as_ref().ok_or_else(unknown)?);
-    let model = resources.meshes.find(hash).ok_or_else(unknown)?;
     let why = match engine.takes_all() {
         true => String::new(),
         false => "the model is too large for this server's memory".to_owned(),

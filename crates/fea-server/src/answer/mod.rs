@@ -20,7 +20,7 @@ mod warnings;
 pub(crate) use contact_frame::PosedContact;
 pub(crate) use contact_large::PressedSeat;
 pub(crate) use elsewhere::{
-    KeptQuestion, Placed, is_elsewhere, place_kept, place_once, place_upload,
+    KeptQuestion, Placed, kept_elsewhere, place_kept, place_once, place_upload,
 };
 pub(crate) use fields::reserve_fields;
 pub(crate) use finite::is_finite;

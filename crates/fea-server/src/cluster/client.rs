@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use softgrasp_protocol::{
-    Answer, Ask, Body, ElementChoice, ElementName, EncodeError, Limits, RejectCode, Rejected,
-    Reply, Request, Subject, UploadModel,
+    Answer, Ask, Body, EncodeError, Limits, RejectCode, Rejected, Reply, Request, Subject,
+    UploadModel,
 };
 use tokio::time::{Instant, sleep};
 
@@ -154,12 +154,7 @@ impl Requests {
             None => {
                 let model = Arc::try_unwrap(model).unwrap_or_else(|shared| (*shared).clone());
                 let UploadModel { mesh, materials, element, .. } = model;
-                let element = match element {
-                    ElementName::T4 => ElementChoice::T4,
-                    ElementName::T10 => ElementChoice::T10,
-                    ElementName::T4Anp => ElementChoice::T4Anp,
-                };
-                (Body { mesh, materials, element }.into(), None)
+                (Body { mesh, materials, element: element.into() }.into(), None)
             }
         };
         let ask = Ask { cases, without_estimate, ..Ask::new(subject, question) };
