@@ -70,12 +70,12 @@ impl Lift {
     }
 
     /// Height of the object above its first position, m.
-    fn height(&self) -> f64 {
+    pub fn height(&self) -> f64 {
         self.grasp_loop.world_from_object().translation.y
     }
 
     /// Height of the lowest point of the shown object above the table, m.
-    fn above_table(&self) -> f64 {
+    pub fn above_table(&self) -> f64 {
         let (grasp_loop, object) = (&self.grasp_loop, self.grasp_loop.object());
         let heights = object
             .surface()

@@ -22,6 +22,7 @@ mod fields;
 mod forces;
 mod keep_shape;
 mod lift;
+mod lift_again;
 mod live_grip;
 mod many_clients;
 mod masks;

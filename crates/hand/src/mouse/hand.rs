@@ -279,6 +279,7 @@ impl MouseHand {
                 contact: self.contact,
                 avoid_gaze: last,
                 turn,
+                has_slipped: false,
             });
             self.planning_for = Some((rest_shape, turn));
         }

@@ -16,7 +16,10 @@ pub struct GraspPlan {
     pub path: PalmPath,
     /// Posture of the hand before its fingers close.
     pub posture: Posture,
-    /// Closure (0 open, 1 closed) at which each tip touches, thumb first.
+    /// Closure (0 open, 1 closed) of each finger when the palm has come to its pose, thumb first: a hand that
+    /// reaches for a thing which lies low comes half closed, to stay above the table.
+    pub reach: [f64; 5],
+    /// Closure at which each tip touches.
     pub touch: [f64; 5],
     /// Closure at which each tip has moved on by the depth asked for.
     pub press: [f64; 5],
@@ -40,9 +43,9 @@ impl GraspPlan {
         self
     }
 
-    /// Whether the open hand, and the hand that nearly touches, are outside of the object.
+    /// Whether the hand that has come, and the hand that nearly touches, are outside of the object.
     pub(super) fn has_room(&self, setup: &HandSetup, object: &RestShape) -> bool {
-        [self.touch.map(|_| 0.0), self.touch.map(|touch| NEARLY * touch)].iter().all(|closure| {
+        [self.reach, self.touch.map(|touch| NEARLY * touch)].iter().all(|closure| {
             let angles = setup.felt(&angles(closure, self.posture));
             let palm = self.path.world_from_palm(object.centre());
             let hand = pose(&setup.dimensions, &angles, palm);
@@ -55,15 +58,16 @@ impl GraspPlan {
 
     /// Whether the hand stays above a table while it reaches, touches and presses.
     pub(super) fn is_above(&self, setup: &HandSetup, centre: Point3<f64>, table_y: f64) -> bool {
+        let halfway = std::array::from_fn(|digit| 0.5 * (self.reach[digit] + self.touch[digit]));
         let moments = [
             (self.path.backed_off(BACK_OFF), [0.0; 5], Posture::OPEN),
             (
                 self.path.backed_off(0.5 * BACK_OFF),
-                [0.0; 5],
+                self.reach.map(|reach| 0.5 * reach),
                 Posture::OPEN.toward(&self.posture, 0.5),
             ),
-            (self.path, [0.0; 5], self.posture),
-            (self.path, self.touch.map(|touch| 0.5 * touch), self.posture),
+            (self.path, self.reach, self.posture),
+            (self.path, halfway, self.posture),
             (self.path, self.touch, self.posture),
             (self.path, self.press, self.posture),
         ];
@@ -83,9 +87,15 @@ const NEARLY: f64 = 0.85;
 /// Depth in the object that is no collision of a hand that does not touch yet, m.
 const ROOM: f64 = 1e-3;
 
-/// Ends of the capsules of an open hand without its thumb, in the palm frame, and their radii.
-pub(super) fn open_outline(setup: &HandSetup, gather: f64) -> Vec<(Point3<f64>, f64)> {
-    let angles = setup.felt(&angles(&[0.0; 5], Posture { gather, ..Posture::OPEN }));
+/// Ends of the capsules of a hand without its thumb, in the palm frame, and their radii.
+///
+/// Shapes: `closure` of all fingers, 0 open, 1 closed.
+pub(super) fn outline_without_thumb(
+    setup: &HandSetup,
+    posture: Posture,
+    closure: f64,
+) -> Vec<(Point3<f64>, f64)> {
+    let angles = setup.felt(&angles(&[closure; 5], posture));
     let hand = pose(&setup.dimensions, &angles, Isometry3::identity());
     let bodies = hand_bodies(&setup.dimensions, &hand);
     let without_thumb = bodies.iter().filter(|body| body.finger != Some(Finger::Thumb));

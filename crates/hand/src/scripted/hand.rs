@@ -99,6 +99,10 @@ pub struct ScriptedHand {
     weight_n: f64,
     /// How the object lay that the plan was made for, where it had rolled.
     planned_for: Option<UnitQuaternion<f64>>,
+    /// Height of the object's origin, world, when the hand came for it, m.
+    lay_y: f64,
+    /// Whether the object has slipped out of the hand once.
+    has_slipped: bool,
 }
 
 /// Most ticks for which the hand holds still while it waits.
@@ -118,6 +122,8 @@ const CLOSE_SLOW: f64 = 0.008;
 const CLOSE_TIGHT: f64 = 0.003;
 /// A grip presses so many times as hard as friction needs to hold the weight.
 const GRIP_MARGIN: f64 = 2.5;
+/// … and so many times as hard once the object has slipped.
+const GRIP_MARGIN_AGAIN: f64 = 4.0;
 /// How much further than expected a finger closes while it looks for the touch.
 const CLOSE_BEYOND: f64 = 0.15;
 impl ScriptedHand {
@@ -161,6 +167,8 @@ impl ScriptedHand {
             came_for: None,
             planned_for: None,
             weight_n: 0.0,
+            lay_y: 0.0,
+            has_slipped: false,
         }
     }
 
@@ -174,6 +182,7 @@ impl ScriptedHand {
         (self.at, self.step_tick, self.progress, self.rested) = (0, 0, 0.0, 0);
         (self.closure, self.closure_before, self.lift) = ([0.0; 5], [0.0; 5], 0.0);
         (self.came_for, self.planned_for) = (None, None);
+        (self.steps, self.has_slipped) = (self.name.steps(), false);
     }
 
     /// The script that the hand plays.
@@ -252,6 +261,7 @@ impl ScriptedHand {
             // Until the fingers close the hand goes to where the object is.
             if matches!(step, Some(Step::Look | Step::Reach)) {
                 self.came_for = Some(seen.world_from_object * centre);
+                self.lay_y = seen.world_from_object.translation.y;
                 if seen.finger_forces_n == [0.0; 5] {
                     self.weight_n = seen.table_force_n;
                 }
@@ -290,8 +300,26 @@ impl ScriptedHand {
         if self.step_tick >= ticks_max || self.is_done(step, seen) {
             self.at += 1;
             self.step_tick = 0;
+            let lifts = matches!(step, Step::Raise | Step::Hold | Step::Squeeze);
+            if lifts && !self.has_slipped && self.has_lost(seen) {
+                self.try_again();
+            }
         }
         step == Step::Keep
+    }
+
+    /// Whether the object, as far as it can move, has not come up with the hand that lifts it.
+    fn has_lost(&self, seen: &Seen) -> bool {
+        let risen = seen.world_from_object.translation.y - self.lay_y;
+        seen.friction > 0.0 && risen < 0.5 * self.lift
+    }
+
+    /// Lets the hand open, go back and lift in another way, as a person does from whose hand a thing slips.
+    fn try_again(&mut self) {
+        self.has_slipped = true;
+        self.steps = vec![Step::Open, Step::Retreat, Step::TurnToOtherSide];
+        self.steps.extend(self.name.steps());
+        (self.at, self.step_tick) = (0, 0);
     }
 
     /// Whether the step can go on: it may need a plan for the other side, or for an object that has
@@ -299,11 +327,15 @@ impl ScriptedHand {
     fn is_ready_for(&mut self, step: Step, seen: &Seen, object: &SoftObject) -> bool {
         let begins = self.plans_first && self.at == 0;
         let turn = seen.world_from_object.rotation;
-        let rolled = self.name == ScriptName::Lift && step == Step::Reach && turn.angle() > ROLLED;
+        let lifts = self.name == ScriptName::Lift;
+        let regrasps = step == Step::TurnToOtherSide && !lifts;
+        let rolled =
+            lifts && matches!(step, Step::Reach | Step::TurnToOtherSide) && turn.angle() > ROLLED;
         if self.step_tick > 0 || !(begins || rolled || step == Step::TurnToOtherSide) {
             return true;
         }
-        if rolled && self.planned_for.is_some_and(|lay| lay.angle_to(&turn) < ROLLED) {
+        let is_planned = self.planned_for.is_some_and(|lay| lay.angle_to(&turn) < ROLLED);
+        if step == Step::Reach && rolled && is_planned {
             return true;
         }
         if !self.planning {
@@ -314,8 +346,9 @@ impl ScriptedHand {
                 object: Arc::clone(object.rest_shape()),
                 setup: self.setup.clone(),
                 contact: self.contact,
-                avoid_gaze: (step == Step::TurnToOtherSide).then(|| self.plan.path.gaze()),
+                avoid_gaze: regrasps.then(|| self.plan.path.gaze()),
                 turn: if rolled { turn } else { UnitQuaternion::identity() },
+                has_slipped: self.has_slipped,
             });
         }
         let Some(planned) = self.planner.take() else { return false };
@@ -349,13 +382,10 @@ impl ScriptedHand {
             }
             Step::Raise => self.lift = RAISE * progress,
             Step::Lower => self.lift = RAISE * (1.0 - progress),
-            Step::Open => {
-                for digit in 0..5 {
-                    self.closure[digit] = self.closure_before[digit] * (1.0 - progress);
-                }
-            }
+            Step::Reach | Step::Open => self.close_to(&plan.reach, progress),
             Step::TurnToOtherSide => self.lift = self.lift.min(LIFT * (1.0 - progress)),
-            Step::Look | Step::Reach | Step::Hold | Step::Keep | Step::Retreat => {}
+            Step::Retreat => self.close_to(&[0.0; 5], progress),
+            Step::Look | Step::Hold | Step::Keep => {}
         }
     }
 
@@ -388,7 +418,8 @@ impl ScriptedHand {
             return [false; 2];
         }
         // Each side holds half of the weight.
-        let needed = GRIP_MARGIN * 0.5 * self.weight_n / seen.friction;
+        let margin = if self.has_slipped { GRIP_MARGIN_AGAIN } else { GRIP_MARGIN };
+        let needed = margin * 0.5 * self.weight_n / seen.friction;
         let [thumb, fingers @ ..] = seen.finger_forces_n;
         [thumb < needed, fingers.iter().sum::<f64>() < needed]
     }

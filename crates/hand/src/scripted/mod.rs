@@ -3,11 +3,14 @@
 mod approach;
 mod grasp_plan;
 mod hand;
+mod opposed;
+mod pinch;
 mod plan;
 mod planner;
 mod posture;
 mod rehearsal;
 mod script;
+mod tip_paths;
 
 pub use approach::PalmPath;
 pub use grasp_plan::GraspPlan;

@@ -4,18 +4,17 @@
 //! worked out once, with the angles that survive the glove's sensors, and then only moved.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use softgrasp_grasp::hand::{HandColliders, pose};
 use softgrasp_grasp::object::RestShape;
 use softgrasp_grasp::shape::Sphere;
 use softgrasp_grasp::sphere_tree::{ContactHit, tip_hits};
 
 use super::approach::PalmPath;
-use super::grasp_plan::{GraspPlan, is_over, open_outline};
-use super::posture::{Posture, angles};
+use super::grasp_plan::{GraspPlan, is_over, outline_without_thumb};
+use super::pinch::plan_pinch;
+use super::posture::Posture;
+use super::tip_paths::{STEPS, TipPath, closures, finger_paths, thumb_paths, tips};
 use crate::hand_reader::HandSetup;
 
-/// Steps from open to closed while a contact is looked for.
-const STEPS: usize = 40;
 /// Closure of the first and the last contact that count: there must be room to open and to press.
 const TOUCH_RANGE: (f64, f64) = (0.08, 0.80);
 /// A tip that meets the surface at a flatter angle than this would slide and not press.
@@ -27,10 +26,8 @@ const ALONG: f64 = 0.8;
 const GRIP_STRAIGHT_MIN: f64 = 0.85;
 /// The palm of a hand above a table looks up by no more than this (sine of the angle).
 const GAZE_UP_MAX: f64 = 0.3;
-/// Postures that are tried: how far the fingers are gathered, rotation and abduction of the thumb, rad.
+/// How far the fingers are gathered.
 const GATHERS: [f64; 3] = [0.0, 0.5, 1.0];
-const THUMB_ROTATIONS: [f64; 4] = [0.4, 0.7, 1.0, 1.3];
-const THUMB_ABDUCTIONS: [f64; 3] = [0.1, 0.4, 0.7];
 /// Tilts of the palm against the axes of the object, rad: the few that suffice for a round object,
 /// and the many that a thin or a branched one may need.
 const TILTS_FEW: [f64; 2] = [0.0, 0.45];
@@ -48,6 +45,8 @@ pub struct GraspWish {
     pub table_y: Option<f64>,
     /// Whether only grasps count that friction can hold.
     pub holds_well: bool,
+    /// Whether opposed places of the surface are looked for first, to pinch the object there.
+    pub pinches_first: bool,
 }
 
 /// Best palm pose for grasping an object whose frame is the world's, or `None` if no pose tried
@@ -57,12 +56,19 @@ pub fn plan_grasp(object: &RestShape, setup: &HandSetup, wish: &GraspWish) -> Op
     if object.surface().nodes.len() < 5 {
         return None;
     }
-    let few = search(object, setup, wish, &TILTS_FEW);
-    let many = few.or_else(|| search(object, setup, wish, &TILTS_MANY));
+    let pinch = || plan_pinch(object, setup, (wish.press_depth, wish.table_y?));
+    let searched = || {
+        let few = search(object, setup, wish, &TILTS_FEW);
+        few.or_else(|| search(object, setup, wish, &TILTS_MANY))
+    };
+    let found = match wish.pinches_first {
+        true => pinch().or_else(searched),
+        false => searched().or_else(|| wish.holds_well.then(pinch)?),
+    };
     // An object that friction cannot hold in this hand is grasped as it can be.
-    many.or_else(|| {
-        wish.holds_well
-            .then(|| plan_grasp(object, setup, &GraspWish { holds_well: false, ..*wish }))?
+    found.or_else(|| {
+        let anyhow = GraspWish { holds_well: false, pinches_first: false, ..*wish };
+        wish.holds_well.then(|| plan_grasp(object, setup, &anyhow))?
     })
 }
 
@@ -73,12 +79,12 @@ fn search(
     tilts: &[f64],
 ) -> Option<GraspPlan> {
     let (centre, size) = (object.centre(), object.mesh().size());
-    let thumbs = thumb_paths(setup);
+    let thumbs = thumb_paths(setup, 1.0);
     let orientations = orientations(tilts);
     let mut best: Option<(f64, GraspPlan)> = None;
     for gather in GATHERS {
-        let fingers = finger_paths(setup, gather);
-        let outline = open_outline(setup, gather);
+        let fingers = finger_paths(setup, gather, 1.0);
+        let outline = outline_without_thumb(setup, Posture { gather, ..Posture::OPEN }, 0.0);
         for &rotation in &orientations {
             let gaze = rotation * -Vector3::z();
             if wish.table_y.is_some() && gaze.y > GAZE_UP_MAX {
@@ -106,7 +112,8 @@ fn search(
                 }
                 let posture = Posture { gather, ..found.0 };
                 let touch = found.1.map(|t| t.closure);
-                let touching = GraspPlan { path, posture, touch, press: touch };
+                let opened = [0.0; 5];
+                let touching = GraspPlan { path, posture, reach: opened, touch, press: touch };
                 let is_possible =
                     |y| touching.is_above(setup, centre, y) && touching.has_room(setup, object);
                 if !wish.table_y.is_none_or(is_possible) {
@@ -123,46 +130,6 @@ fn search(
         }
     }
     best.map(|(_, plan)| plan)
-}
-
-/// One fingertip at every closure, in the palm frame.
-type TipPath = Vec<Tip>;
-
-#[derive(Clone, Copy)]
-struct Tip {
-    sphere: Sphere,
-    contact_point: Point3<f64>,
-}
-
-fn tips(setup: &HandSetup, closure: &[f64; 5], posture: Posture) -> [Tip; 5] {
-    let angles = setup.felt(&angles(closure, posture));
-    let pose = pose(&setup.dimensions, &angles, Isometry3::identity());
-    HandColliders::new(&setup.dimensions, &pose)
-        .fingers
-        .map(|f| Tip { sphere: f.tip, contact_point: f.contact_point })
-}
-
-fn closures() -> impl Iterator<Item = f64> {
-    (0..=STEPS).map(|step| step as f64 / STEPS as f64)
-}
-
-/// Paths of index, middle, ring and little finger.
-fn finger_paths(setup: &HandSetup, gather: f64) -> [TipPath; 4] {
-    let posture = Posture { gather, ..Posture::OPEN };
-    let steps: Vec<[Tip; 5]> = closures().map(|s| tips(setup, &[s; 5], posture)).collect();
-    std::array::from_fn(|finger| steps.iter().map(|tips| tips[finger + 1]).collect())
-}
-
-/// Paths of the thumb in each of its postures.
-fn thumb_paths(setup: &HandSetup) -> Vec<(Posture, TipPath)> {
-    let mut all = Vec::new();
-    for thumb_rotation in THUMB_ROTATIONS {
-        for thumb_abduction in THUMB_ABDUCTIONS {
-            let posture = Posture { thumb_rotation, thumb_abduction, gather: 0.0 };
-            all.push((posture, closures().map(|s| tips(setup, &[s; 5], posture)[0]).collect()));
-        }
-    }
-    all
 }
 
 /// The 24 rotations of a cube, each straight and tilted; palm down and fingers forward comes first.

@@ -24,6 +24,8 @@ pub struct PlanRequest {
     /// How the object has been turned since it was at home, for fingertips that press with friction: the
     /// plan is then for the turned object, and above the table that it lies on.
     pub turn: UnitQuaternion<f64>,
+    /// Whether the object has slipped out of an earlier grasp: another way is looked for first.
+    pub has_slipped: bool,
 }
 
 /// Why the hand has no plan to grasp the object.
@@ -49,7 +51,14 @@ pub enum NoGrasp {
 impl PlanRequest {
     /// An approach to an object at home, from wherever is best.
     pub fn new(object: Arc<RestShape>, setup: HandSetup, contact: ContactModel) -> Self {
-        Self { object, setup, contact, avoid_gaze: None, turn: UnitQuaternion::identity() }
+        Self {
+            object,
+            setup,
+            contact,
+            avoid_gaze: None,
+            turn: UnitQuaternion::identity(),
+            has_slipped: false,
+        }
     }
 
     /// The best plan; one that does not avoid the gaze where no other is found; `None` where the
@@ -66,6 +75,7 @@ impl PlanRequest {
             avoid_gaze: self.avoid_gaze,
             table_y: by_friction.then(|| object.bottom()),
             holds_well: by_friction,
+            pinches_first: by_friction && self.has_slipped,
         };
         let planned = plan_grasp(object, &self.setup, &wish).or_else(|| {
             self.avoid_gaze?;
@@ -228,6 +238,7 @@ mod tests {
             contact: ContactModel::default(),
             avoid_gaze,
             turn: UnitQuaternion::identity(),
+            has_slipped: false,
         };
         // Plans are told apart by whether there is one; a real plan is made once.
         let plan = request(None).plan();

@@ -11,11 +11,15 @@ pub struct Posture {
     pub thumb_abduction: f64,
     /// How far the fingers are brought together, 0 fanned out to 1 side by side.
     pub gather: f64,
+    /// How far the outer joints bend with the knuckles: 1 as fingers curl into a fist, less for fingers
+    /// that stay long and point down at what lies low.
+    pub curl: f64,
 }
 
 impl Posture {
     /// Posture of the open hand.
-    pub const OPEN: Self = Self { thumb_rotation: 0.1, thumb_abduction: 0.6, gather: 0.0 };
+    pub const OPEN: Self =
+        Self { thumb_rotation: 0.1, thumb_abduction: 0.6, gather: 0.0, curl: 1.0 };
 
     /// Part of the way to another posture.
     #[must_use]
@@ -25,6 +29,7 @@ impl Posture {
             thumb_rotation: mix(self.thumb_rotation, other.thumb_rotation),
             thumb_abduction: mix(self.thumb_abduction, other.thumb_abduction),
             gather: mix(self.gather, other.gather),
+            curl: mix(self.curl, other.curl),
         }
     }
 }
@@ -35,8 +40,8 @@ pub fn angles(closure: &[f64; 5], posture: Posture) -> JointAngles {
         let s = closure[finger.index()];
         FingerAngles {
             mcp_flexion: 0.05 + 1.35 * s,
-            pip_flexion: 0.10 + 1.45 * s,
-            dip_flexion: 0.05 + 0.75 * s,
+            pip_flexion: 0.10 + 1.45 * posture.curl * s,
+            dip_flexion: 0.05 + 0.75 * posture.curl * s,
             abduction: gathered * posture.gather,
         }
     };
@@ -46,7 +51,7 @@ pub fn angles(closure: &[f64; 5], posture: Posture) -> JointAngles {
             rotation: posture.thumb_rotation,
             abduction: posture.thumb_abduction * (1.0 - s),
             mcp_flexion: 0.7 * s,
-            ip_flexion: 0.9 * s,
+            ip_flexion: 0.9 * posture.curl * s,
         },
         index: finger(Finger::Index, -0.16),
         middle: finger(Finger::Middle, 0.0),

@@ -68,8 +68,8 @@ pub struct Response<'a> {
     kept: BTreeMap<u32, Arc<ContactColumns>>,
 }
 
-/// Rows of a displacement that one task sums.
-const TASK_ROWS: usize = 512;
+/// Nodes whose displacement one task sums.
+const TASK_NODES: usize = 256;
 
 impl<'a> Response<'a> {
     /// Shapes: `rows` ascending nodes.
@@ -183,34 +183,42 @@ impl<'a> Response<'a> {
     }
 
     fn moved_rows(&self, forces: &[NodeForce]) -> Vec<[f64; 3]> {
-        let mut u = vec![[0.0; 3]; self.rows.len()];
-        for (node, force) in forces {
-            let columns = self.held(*node);
-            for ((u, &node), place) in u.iter_mut().zip(&self.rows).zip(&self.places) {
-                match place {
-                    Some(place) => add_moved(u, force, &columns.surface[*place]),
-                    None => add_moved(u, force, &columns.block(node)),
-                }
-            }
-        }
-        self.relieve(forces, &self.rows, &mut u);
-        u
+        self.moved_nodes(&self.rows, &self.places, forces)
     }
 
     /// Displacement of any nodes under forces at needed nodes, on the current rayon pool.
     ///
     /// Units: N, m. Frame: the object's.
     pub fn displacement_of(&self, nodes: &[u32], forces: &[NodeForce]) -> Vec<[f64; 3]> {
-        let mut u = vec![[0.0; 3]; nodes.len()];
+        let surface = &self.source.base().surface;
+        let places: Vec<Option<usize>> = nodes.iter().map(|&node| surface.place_of(node)).collect();
+        let mut u = self.moved_nodes(nodes, &places, forces);
+        self.add_offset(nodes, &mut u);
+        u
+    }
+
+    /// The part of the displacement of some nodes that is in proportion to forces, in balance with inertia.
+    ///
+    /// Shapes: `places` of the nodes among those of the surface, in one order with them.
+    fn moved_nodes(
+        &self,
+        nodes: &[u32],
+        places: &[Option<usize>],
+        forces: &[NodeForce],
+    ) -> Vec<[f64; 3]> {
         let columns: Vec<(HeldCompliance<'_>, &Vector3<f64>)> =
             forces.iter().map(|(node, force)| (self.held(*node), force)).collect();
-        u.par_chunks_mut(TASK_ROWS).zip(nodes.par_chunks(TASK_ROWS)).for_each(|(u, nodes)| {
+        let mut u = vec![[0.0; 3]; nodes.len()];
+        // Every node is summed by one task, in the order of the forces.
+        let tasks = u
+            .par_chunks_mut(TASK_NODES)
+            .zip(nodes.par_chunks(TASK_NODES).zip(places.par_chunks(TASK_NODES)));
+        tasks.for_each(|(u, (nodes, places))| {
             for (columns, force) in &columns {
-                columns.add(force, nodes, u);
+                columns.add(force, (nodes, places), u);
             }
         });
         self.relieve(forces, nodes, &mut u);
-        self.add_offset(nodes, &mut u);
         u
     }
 
@@ -255,10 +263,18 @@ impl HeldCompliance<'_> {
         }
     }
 
-    /// Adds what a force does to some nodes.
-    fn add(&self, force: &Vector3<f64>, nodes: &[u32], displacement: &mut [[f64; 3]]) {
-        for (u, &node) in displacement.iter_mut().zip(nodes) {
-            add_moved(u, force, &self.block(node));
+    /// Adds what a force does to some nodes, whose places among those of the surface are known.
+    fn add(
+        &self,
+        force: &Vector3<f64>,
+        (nodes, places): (&[u32], &[Option<usize>]),
+        displacement: &mut [[f64; 3]],
+    ) {
+        for ((u, &node), place) in displacement.iter_mut().zip(nodes).zip(places) {
+            match place {
+                Some(place) => add_moved(u, force, &self.surface[*place]),
+                None => add_moved(u, force, &self.block(node)),
+            }
         }
     }
 }
