@@ -23,6 +23,7 @@ mod forces;
 mod keep_shape;
 mod lift;
 mod live_grip;
+mod loads;
 mod many_clients;
 mod masks;
 mod memory;

@@ -22,6 +22,7 @@ pub mod inspect;
 pub mod interruption;
 mod key_frames;
 mod live_samples;
+mod load_arguments;
 pub mod mesh;
 mod numbers;
 mod output;

@@ -19,6 +19,7 @@ use softgrasp_protocol::{
 use super::access_arguments::AccessArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::field_arguments::FieldArguments;
+use super::load_arguments::{LoadArguments, check_server, on_nodes};
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
 use super::region_arguments::RegionArguments;
@@ -48,6 +49,8 @@ pub struct SolveCommand {
     /// External forces: node,fx,fy,fz.
     #[arg(long, value_name = "F.csv")]
     forces: Option<PathBuf>,
+    #[command(flatten)]
+    loads: LoadArguments,
     /// Where to solve: HOST:PORT, or embedded.
     #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
     server: ServerChoice,
@@ -185,6 +188,7 @@ impl SolveCommand {
         progress.now("starting");
         let host = self.open_host()?;
         let mut connection = host.connect()?;
+        check_server(&question.spread, connection.welcome())?;
         let nodes = file.mesh.node_count();
         progress.now(&match &self.server {
             ServerChoice::Embedded => format!("{nodes} nodes:"),
@@ -311,6 +315,7 @@ impl SolveCommand {
             },
             max_error: self.max_error,
             deadline_ms: self.deadline,
+            spread: self.loads.of_mesh(mesh)?,
             ..Question::default()
         })
     }
@@ -358,6 +363,7 @@ impl SolveCommand {
         if elasticity.yield_stress.is_some() {
             bail!("--export-deck has no yield stress; leave out --yield or the deck");
         }
+        let forces = on_nodes(mesh, element, (&question.forces, &question.spread))?;
         let is_linear = elasticity.deformation == Deformation::Linear;
         let deck = CalculixDeck {
             mesh,
@@ -365,7 +371,7 @@ impl SolveCommand {
             materials,
             law: (!is_linear).then_some(elasticity.law),
             known: &question.known,
-            forces: &question.forces,
+            forces: &forces,
         };
         Ok(deck.text()?)
     }

@@ -19,6 +19,7 @@ mod full_disk;
 mod interruption;
 mod joint_runs;
 mod killed_server;
+mod loads;
 mod numbers;
 #[cfg(feature = "xr")]
 mod page;
