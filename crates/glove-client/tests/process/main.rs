@@ -16,6 +16,7 @@ mod discretisation;
 mod emulator;
 mod fill;
 mod full_disk;
+mod gradient;
 mod interruption;
 mod joint_runs;
 mod killed_server;
