@@ -43,7 +43,7 @@ impl Bench {
         let mut known = BTreeMap::new();
         for (node, p) in cube.vertices().iter().enumerate() {
             if p.z < low.z + 1e-9 {
-                (0..3).for_each(|axis| drop(known.insert((node, axis), 0.0)));
+                known.extend((0..3).map(|axis| ((node, axis), 0.0)));
             } else if p.z > high.z - 1e-9 {
                 known.insert((node, 2), -1e-3);
             }
