@@ -271,6 +271,9 @@ fn a_path_at_large_deformation_follows_loads_that_change() {
     }
 }
 
+/// What makes loads that do not fit of those that do.
+type Change = fn(&mut SpreadLoads);
+
 #[test]
 fn loads_that_do_not_fit_are_refused_and_the_session_lives() {
     let server = server(1);
@@ -279,7 +282,7 @@ fn loads_that_do_not_fit_are_refused_and_the_session_lives() {
     let model = keep(&mut connection, upload(&mesh));
     let known = squeeze(&mesh, 0.2);
     let sound = Question { spread: spread(&mesh, 0.0), ..question(known, "auto") };
-    let changes: [(fn(&mut SpreadLoads), &str); 6] = [
+    let changes: [(Change, &str); 6] = [
         (|s| s.pressures[0].triangles.push([0, 1, 64]), "no face of the boundary"),
         (|s| s.pressures[0].triangles = vec![[0, 0, 0]], "no face of the boundary"),
         (|s| s.pressures[0].pressure = f64::NAN, "the pressure is NaN"),
