@@ -35,13 +35,18 @@ from softgrasp.conversation import Conversation
 from softgrasp.framing import HEADER_LEN, Kind, encode_frame
 
 REQUESTS = ["Hello", "Ask", "Ask-model", "Ask-large", "Ask-cases", "HaveModel", "UploadModel"]
-REQUESTS += ["Ask-fields", "Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
+REQUESTS += ["Ask-fields", "Ask-loads", "Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
 NAME = bytes(0xA0 ^ k for k in range(32))
 POINTS = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0, 0, 0]]
 MATERIAL = Material(20_000.0, 0.45)
 HELD = LoadCase([9, 2], [0.0, -0.001], [4], [0.5])
 MASKED = HELD.mask([0, 2], (0, -0.001, 0), [0.25, 0.75]).mask([1], (0.0005, 0, 0))
 LARGE = LargeDeformation("auto", "neo-hookean-log", 1500.0, "from-rest", "timely")
+
+
+def loaded() -> LoadCase:
+    case = MASKED.weight(1000.0, (0.0, -9.81, 0.5)).pressure([[0, 1, 2], [3, 1, 0]], 250.0)
+    return case.pressure([[2, 3, 1]], -40.0)
 
 
 def labelled() -> Model:
@@ -98,6 +103,7 @@ def requests() -> dict[str, calls.Call]:
         "Ask-model": calls.frame(NAME, MASKED, newest),
         "Ask-large": calls.large_frame(NAME, HELD, LARGE, frame),
         "Ask-fields": calls.frame(NAME, MASKED, with_fields),
+        "Ask-loads": calls.frame(NAME, loaded(), frame),
         "Ask-cases": calls.solve_several(labelled(), HELD, cases, False, once),
         "HaveModel": calls.have_model(NAME),
         "UploadModel": calls.upload_model(plain, plain.fixed_dofs([3])),

@@ -1,12 +1,13 @@
 """Gradients against central differences, and against a bar that is pulled."""
 
+import asyncio
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import softgrasp
-from softgrasp import LoadCase, Material, Mesh, Model, Server
+from softgrasp import AsyncServer, LoadCase, Material, Mesh, Model, Pressure, Server
 
 RANDOM = np.random.default_rng(20261125)
 
@@ -25,6 +26,10 @@ class Pressed:
         self.materials = {0: Material(2e4, 0.3), 1: Material(6e4, 0.4)}
         case = LoadCase().prescribe(self.bottom, (0.0, 0.0, 0.0))
         case = case.prescribe(self.top, (0.0005, None, -0.001))
+        case = case.weight({0: 1000.0, 1: 3000.0}, (3.0, 1.0, -9.81))
+        # The corners in another order than seen from outside.
+        front = self.mesh.boundary_of(block.nodes_at(y=0.0))[:, ::-1]
+        case = case.pressure(front, 300.0).pressure(self.mesh.boundary_of(self.bottom), 50.0)
         self.case = case.force(self.side, (0.1, 0.02, -0.05))
         self.linear = RANDOM.standard_normal((self.mesh.node_count, 3))
         self.of_reactions = 1e-3 * RANDOM.standard_normal(len(case.known_dofs))
@@ -121,6 +126,54 @@ def test_gradient_by_materials_of_regions_is_that_of_central_differences(server:
                 for s in (step, -step)
             )
             assert differs(own, up, down, step) < 1e-6, (label, name)
+
+
+def test_gradient_by_weight_and_pressures_is_that_of_central_differences(server: Server) -> None:
+    pressed = Pressed()
+    found, model, case = pressed.gradient(server), pressed.model(), pressed.case
+    assert found.acceleration is not None and found.pressures is not None
+    for axis in range(3):
+        step = np.zeros(3)
+        step[axis] = 1.0
+        up, down = (
+            pressed.quantity(server, model, replace(case, acceleration=case.acceleration + s))
+            for s in (step, -step)
+        )
+        assert differs(found.acceleration[axis], up, down, 1.0) < 1e-6
+    for k, pressure in enumerate(case.pressures):
+        others = [p for p in case.pressures if p is not pressure]
+        up, down = (
+            pressed.quantity(
+                server,
+                model,
+                replace(case, pressures=(*others, Pressure(pressure.triangles, value))),
+            )
+            for value in (pressure.pressure + 10.0, pressure.pressure - 10.0)
+        )
+        assert differs(found.pressures[k], up, down, 10.0) < 1e-6
+
+
+def test_awaited_gradient_is_the_same(server: Server) -> None:
+    pressed = Pressed()
+    kept = server.keep(pressed.model())
+    slope = np.ones((pressed.mesh.node_count, 3))
+    expected = kept.gradient(pressed.case, by_displacements=slope)
+
+    async def ask() -> softgrasp.Gradient:
+        async with await AsyncServer.connect(server.address, timeout=60.0) as other:
+            awaited = await other.keep(pressed.model())
+            answer = await awaited.frame(pressed.case)
+            again = await awaited.gradient(
+                pressed.case, by_displacements=slope, answer=answer
+            )
+            found = await awaited.gradient(pressed.case, by_displacements=slope)
+            assert np.array_equal(again.forces, found.forces)
+            return found
+
+    found = asyncio.run(ask())
+    assert np.array_equal(found.known_displacements, expected.known_displacements)
+    assert found.points is not None and np.array_equal(found.points, expected.points)
+    assert found.young == expected.young and found.poisson == expected.poisson
 
 
 def test_force_of_a_pulled_bar_grows_with_young_s_modulus_as_the_closed_form(

@@ -13,8 +13,9 @@ use crate::fem::fields::{
 };
 use crate::fem::hyperelastic::{Elements, Law};
 use crate::fem::{
-    Material, NodalPatches, QuadraticMesh, Stiffness, StiffnessPattern, StrainSummary, assemble,
-    assemble_nodal_pressure, assemble_quadratic, summarise_strain, summarise_strain_quadratic,
+    Material, NodalPatches, QuadraticMesh, SpreadLoads, Stiffness, StiffnessPattern, StrainSummary,
+    assemble, assemble_nodal_pressure, assemble_quadratic, summarise_strain,
+    summarise_strain_quadratic,
 };
 use crate::mesh::{Bodies, TetMesh};
 use crate::solve::condensed::Base;
@@ -123,6 +124,11 @@ impl Model {
     /// The mesh that the model was made of.
     pub fn mesh(&self) -> &TetMesh {
         &self.mesh
+    }
+
+    /// The body as loads are spread over it.
+    pub fn spread_loads(&self) -> SpreadLoads<'_> {
+        SpreadLoads::new(&self.mesh, self.quadratic.as_ref())
     }
 
     /// The stiffness `kᵍ`.

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where it unwraps")]
 
 use nalgebra::{Point3, Vector3};
-use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
-use softgrasp_core::{Axis, Inexactness, Law, LoadCase, Material, SoftBody, SoftBodyError};
+use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
+use softgrasp_core::{Answer, Axis, Inexactness, Law, LoadCase, Material, SoftBody};
 
 const YOUNG: f64 = 2.0e4;
 const POISSON: f64 = 0.3;
@@ -148,9 +148,40 @@ fn what_cannot_be_asked_is_refused_with_the_node() {
     held(&mut case);
     case.prescribe(20, Vector3::new(f64::NAN, 0.0, 0.0));
     assert!(body.solve(&case).is_err() && body.equilibrium(&case, Law::NeoHookean).is_err());
-    case.force(20, Vector3::x());
-    let in_frame = body.frames().unwrap().answer(&case).unwrap_err();
-    assert_eq!(in_frame, SoftBodyError::ForceInFrame);
+}
+
+#[test]
+fn frames_with_forces_weight_and_pressure_are_those_of_one_request() {
+    let mesh = cube(125);
+    let (low, high) = mesh.bounds();
+    let at = |z: f64| nodes_where(&mesh, move |p| (p.z - z).abs() < 1e-9);
+    let top = at(high.z);
+    let on_top = |triangle: &[u32; 3]| triangle.iter().all(|node| top.contains(node));
+    let lid: Vec<[u32; 3]> =
+        Surface::from_mesh(&mesh).triangles.into_iter().filter(on_top).collect();
+    let body = body(&mesh);
+    let mut frames = body.frames().unwrap();
+    for tick in 0..6 {
+        let mut case = LoadCase::new();
+        case.hold(at(low.z));
+        // The same loads twice, then others; held otherwise, then as before.
+        if tick != 3 {
+            case.prescribe(top[0], Vector3::new(1e-3, 0.0, 1e-4 * f64::from(tick)));
+        }
+        case.weight(&[1000.0], Vector3::new(0.0, f64::from(tick / 2), -9.81));
+        case.pressure(&lid, 200.0).force(top[7], Vector3::new(0.01, 0.0, -0.02));
+        let (frame, once) = (frames.answer(&case).unwrap(), body.solve(&case).unwrap());
+        let Inexactness::Proven(bound) = frame.inexactness else { panic!("{frame:?}") };
+        let of =
+            |answer: &Answer| answer.displacements.iter().map(|u| u.norm_squared()).sum::<f64>();
+        let size = of(&once).sqrt();
+        let pairs = frame.displacements.iter().zip(&once.displacements);
+        let apart = pairs.map(|(a, b)| (a - b).norm_squared()).sum::<f64>().sqrt();
+        assert!(apart <= bound * size && bound < 1e-6, "{apart:e}, bound {bound:e} of {size:e}");
+        let carried: Vector3<f64> = frame.reactions.values().sum();
+        let held: Vector3<f64> = once.reactions.values().sum();
+        assert!((carried - held).norm() < 1e-9 * held.norm(), "{carried} and {held}");
+    }
 }
 
 #[test]

@@ -221,9 +221,7 @@ fn code_of_plan(error: &PlanError) -> RejectCode {
         PlanError::MasksNotCondensed(reason) => code_of_plan(reason),
         PlanError::Memory(_) => RejectCode::MemoryLimit,
         PlanError::Model(error) => code_of_model(error),
-        PlanError::CondensedForces
-        | PlanError::FixedMoved { .. }
-        | PlanError::MasksDirect { .. } => RejectCode::BadRequest,
+        PlanError::FixedMoved { .. } | PlanError::MasksDirect { .. } => RejectCode::BadRequest,
     }
 }
 

@@ -55,7 +55,7 @@ pub(crate) struct RequestHandler {
 }
 
 /// Names of this server's capabilities, for `Welcome`.
-const CAPABILITIES: [&str; 9] = [
+const CAPABILITIES: [&str; 10] = [
     "large",
     "cases",
     "contact",
@@ -65,6 +65,7 @@ const CAPABILITIES: [&str; 9] = [
     "fields",
     "contact-yield",
     "small-system",
+    "loads",
 ];
 /// The capability of a server with an engine beside it.
 const CLUSTER: &str = "cluster";

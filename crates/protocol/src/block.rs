@@ -35,6 +35,33 @@ impl Block {
         Ok(Self(bytes))
     }
 
+    /// The block with the encoded fields of a further structure behind its own.
+    ///
+    /// # Errors
+    /// [`EncodeError::Part`] for a text or list that is too long.
+    pub(crate) fn and<T>(mut self, fields: &T) -> Result<Self, EncodeError>
+    where
+        T: SchemaWrite<PartFormat, Src = T>,
+    {
+        self.0.extend(Self::of(fields)?.0);
+        Ok(self)
+    }
+
+    /// Structure that the block begins with, and the bytes behind it.
+    ///
+    /// # Errors
+    /// [`DecodeError::Part`] for a value that does not exist, as an unknown enum tag.
+    pub(crate) fn read_first<T>(&self) -> Result<(T, &[u8]), DecodeError>
+    where
+        T: SchemaReadOwned<PartFormat> + for<'a> SchemaRead<'a, PartFormat, Dst = T>,
+    {
+        let mut window = self.0.as_slice();
+        match T::get(&mut window) {
+            Ok(fields) => Ok((fields, window)),
+            Err(_) => Ok((read_fields(&self.0)?, &[])),
+        }
+    }
+
     /// Structure that the block holds.
     ///
     /// # Errors
@@ -107,6 +134,9 @@ mod tests {
             let read: New = Block::of(&old).unwrap().read().unwrap();
             let bare = New { is_flagged: false, share: None, notes: vec![], ..new };
             prop_assert_eq!(read, bare);
+            let both = Block::of(&old).unwrap().and(&7_u32).unwrap();
+            let (read, rest) = both.read_first::<Old>().unwrap();
+            prop_assert_eq!((read, read_fields::<u32>(rest).unwrap()), (old, 7));
         }
 
         #[test]

@@ -143,6 +143,14 @@ pub enum DecodeError {
         /// Announced number of nodes of all masks together.
         entry_count: u32,
     },
+    /// The numbers of triangles do not add up to the announced number of all.
+    #[error("the pressures are on {lens_sum} triangles in all, {triangle_count} are announced")]
+    PressureLengths {
+        /// Sum of the numbers of triangles.
+        lens_sum: u64,
+        /// Announced number of all triangles.
+        triangle_count: u32,
+    },
     /// Padding bytes, which fill an array up to the next multiple of eight, are not zero.
     #[error("padding before byte {position} of the payload is not zero")]
     Padding {

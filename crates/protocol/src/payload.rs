@@ -23,6 +23,9 @@ impl Flat for f64 {
     const SCALAR_LEN: usize = 8;
 }
 
+impl Flat for [u32; 3] {
+    const SCALAR_LEN: usize = 4;
+}
 impl Flat for [u32; 4] {
     const SCALAR_LEN: usize = 4;
 }

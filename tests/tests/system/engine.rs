@@ -6,8 +6,8 @@ use fea_server::{RunningServer, ServerConfig};
 use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{
-    Answer, Ask, DofValue, ElementName, Masks, ModelHash, NodeChoice, Precision, Prefetch,
-    Question, RejectCode, Reply, Request, UploadModel,
+    Answer, Ask, Displacements, DofValue, ElementName, Masks, ModelHash, NodeChoice, Precision,
+    Prefetch, Question, RejectCode, Reply, Request, UploadModel,
 };
 use softgrasp_tests::questions::{cube, once, question, upload};
 use softgrasp_tests::watchdog::until;
@@ -158,18 +158,25 @@ fn column_cache_smaller_than_one_grip_is_told_and_the_session_lives() {
 }
 
 #[test]
-fn forces_are_refused_by_condensed_and_solved_by_auto() {
+fn forces_are_answered_by_condensed_as_by_a_factor() {
     let server = server(1);
     let mut scene = Scene::new(&server, 216);
     let mut asked = question(contacts(&scene.mesh, 1.0), "condensed");
     asked.forces = vec![DofValue { dof: 3 * 77, value: 2.0 }];
-    let request = asking(scene.model, asked.clone());
-    let (code, text) = refusal(&mut scene.connection, &request);
-    assert!(code == RejectCode::BadRequest && text.contains("auto"), "{text}");
-    asked.method = "auto".parse().unwrap();
-    let solved = answer(&mut scene.connection, &asking(scene.model, asked));
-    assert_eq!(solved.report.method, "front");
-    assert!(solved.report.chosen_because.contains("forces"), "{}", solved.report.chosen_because);
+    let mut solved = ["condensed", "auto", "front"].map(|method| {
+        asked.method = method.parse().unwrap();
+        answer(&mut scene.connection, &asking(scene.model, asked.clone()))
+    });
+    let methods = solved.each_ref().map(|answer| answer.report.method.clone());
+    assert_eq!(methods, ["condensed", "condensed", "front"]);
+    let [by_columns, left_to_the_server, by_factor] = solved.each_mut().map(|answer| {
+        std::mem::replace(&mut answer.displacements, Displacements::F64(Vec::new())).into_f64()
+    });
+    assert_eq!(by_columns, left_to_the_server);
+    let pairs = by_columns.as_flattened().iter().zip(by_factor.as_flattened());
+    let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let largest = by_factor.as_flattened().iter().fold(0.0f64, |most, u| most.max(u.abs()));
+    assert!(apart < 1e-10 * largest, "{apart:e} of {largest:e}");
 }
 
 #[test]

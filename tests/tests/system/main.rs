@@ -24,6 +24,7 @@ mod keep_shape;
 mod lift;
 mod lift_again;
 mod live_grip;
+mod loads;
 mod many_clients;
 mod masks;
 mod memory;

@@ -229,11 +229,6 @@ fn what_cannot_be_condensed_is_refused_with_masks_and_says_what_to_do() {
         scene.refuses(holding(&FOUR, method), BadRequest, &says);
     }
     scene.refuses(holding(&FOUR, "cramers-rule"), UnknownMethod, &["cramers-rule"]);
-    for method in ["auto", "condensed"] {
-        let mut asked = holding(&FOUR, method);
-        asked.forces = vec![DofValue { dof: 300, value: 1.0 }];
-        scene.refuses(asked, BadRequest, &["masks", "not forces"]);
-    }
     let crowd: Vec<[(u32, f64); 1]> = (0..201).map(|n| [(n, 1.0)]).collect();
     let crowd: Vec<&[(u32, f64)]> = crowd.iter().map(|l| l.as_slice()).collect();
     scene.refuses(holding(&crowd, "auto"), BadRequest, &["603", "600", "fixing"]);

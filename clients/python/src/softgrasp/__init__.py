@@ -31,6 +31,7 @@ from .errors import (
     MeshFileError,
     NoAnswerInTime,
     NotAuthorised,
+    NotCapable,
     NotPositiveDefinite,
     Refused,
     RigidMotionFree,
@@ -48,7 +49,7 @@ from .field_values import FieldName, FieldValues, PlacedFields, WantedFields, ma
 from .gradient import Gradient
 from .large import LargeDeformation
 from .limits import Limits
-from .load_case import LoadCase, Mask
+from .load_case import LoadCase, Mask, Pressure
 from .mesh import Mesh
 from .model import Element, Material, Model
 from .pose import Pose
@@ -100,12 +101,14 @@ __all__ = [
     "ModelReady",
     "NoAnswerInTime",
     "NotAuthorised",
+    "NotCapable",
     "NotPositiveDefinite",
     "ObjectState",
     "PlacedFields",
     "Plane",
     "Pose",
     "Precision",
+    "Pressure",
     "Question",
     "REFUSALS",
     "Reactions",

@@ -19,6 +19,7 @@ from .calls import Call, ModelReady
 from .contact import ContactAnswer, ContactStep, ObjectState
 from .errors import UnknownModel
 from .field_values import WantedFields
+from .gradient import Gradient, GradientQuestion
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
@@ -162,6 +163,7 @@ class AsyncServer(Session):
         connection.conversation.server_limits = self._welcome.limits
 
     async def _ask(self, call: Call[T]) -> T:
+        self._check(call)
         return await self._connection.ask(call)
 
     async def _tell(self, call: Call[None]) -> None:
@@ -198,6 +200,26 @@ class AsyncKeptModel(NamedModel):
         """As `KeptModel.solve_several`."""
         call = calls.solve_several(self.hash, case, displacements, True, Question(**options))
         return await self._ask(call)
+
+    async def gradient(
+        self,
+        case: LoadCase,
+        *,
+        by_displacements: ArrayLike | None = None,
+        by_reactions: ArrayLike | None = None,
+        answer: Answer | None = None,
+    ) -> Gradient:
+        """As `KeptModel.gradient`."""
+        question = GradientQuestion(
+            self.model, self.fixed_dofs, case, by_displacements, by_reactions
+        )
+        adjoint = self.frame(question.adjoint)
+        if answer is None and question.needs_answer:
+            # Both travel at once.
+            of_adjoint, answer = await asyncio.gather(adjoint, self.frame(case))
+        else:
+            of_adjoint = await adjoint
+        return question.gradient(of_adjoint, answer)
 
     async def contact_frame(
         self,

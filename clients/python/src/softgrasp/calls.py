@@ -55,6 +55,8 @@ class Call(Generic[T]):
     """Kind of the reply; None for a request that has none."""
     read: Callable[[PayloadReader], T]
     """Reads the reply."""
+    needs: str | None = None
+    """Capability without which a server does not understand the request."""
 
 
 @dataclass(frozen=True)
@@ -260,7 +262,8 @@ def _ask(
     level = REPORTS.index(question.report)
     part.fields("I?I", len(further), not estimate, level)
     payload = payload_of(part, *mesh, *question.arrays(case), further)
-    return Call(Kind.ASK, payload, Kind.ANSWER, read)
+    needs = "loads" if case.has_spread_loads else None
+    return Call(Kind.ASK, payload, Kind.ANSWER, read, needs)
 
 
 def _read_welcome(reader: PayloadReader) -> Welcome:

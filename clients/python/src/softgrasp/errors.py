@@ -15,6 +15,10 @@ class ServerNotStarted(SoftgraspError):
     """No server program was found, or it ended before it listened."""
 
 
+class NotCapable(SoftgraspError):
+    """The server is an older one and lacks what a request needs; nothing was sent."""
+
+
 class BadStream(SoftgraspError):
     """The other side sent bytes that are no message of this protocol; the connection is closed."""
 

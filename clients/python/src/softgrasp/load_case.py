@@ -1,14 +1,15 @@
-"""A load case: prescribed displacements, forces, and masks that hold means of nodes."""
+"""A load case: prescribed displacements, forces, weight, pressure, and masks that hold means."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import F64, NO_FLOATS, NO_NUMBERS, U32, Floats, Numbers, floats, numbers, vector
+from .fields import Part
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,22 @@ class Mask:
 
 
 @dataclass(frozen=True, eq=False)
+class Pressure:
+    """An even pressure on triangles of the boundary. Raises `ValueError` for other shapes."""
+
+    triangles: Numbers
+    """Nodes of the triangles, in any order; shape (triangles, 3)."""
+    pressure: float
+    """Pressure against the outward normal at rest, Pa."""
+
+    def __init__(self, triangles: ArrayLike, pressure: float) -> None:
+        chosen = numbers(triangles, "triangles under pressure", 3)
+        given = float(floats([pressure], "the pressure")[0])
+        object.__setattr__(self, "triangles", chosen)
+        object.__setattr__(self, "pressure", given)
+
+
+@dataclass(frozen=True, eq=False)
 class LoadCase:
     """What is known and what acts; cannot be changed, each method gives a new one.
 
@@ -61,6 +78,12 @@ class LoadCase:
     """These forces, N."""
     masks: tuple[Mask, ...] = ()
     """Contacts that are held by means. Only the method `condensed` takes them."""
+    densities: Floats = field(default_factory=lambda: NO_FLOATS)
+    """Density of the body, kg/m³, or one for each material by ascending label; none: no weight."""
+    acceleration: Floats = field(default_factory=lambda: np.zeros(3))
+    """What draws the body where it has weight, m/s²."""
+    pressures: tuple[Pressure, ...] = ()
+    """Pressures on parts of the boundary; they add up."""
 
     def __post_init__(self) -> None:
         pairs = [("known", "known_dofs", "known_displacements"), ("force", "force_dofs", "forces")]
@@ -71,6 +94,10 @@ class LoadCase:
                 raise ValueError(f"{len(values)} {what} values for {len(dofs)} degrees of freedom")
             object.__setattr__(self, of_dofs, dofs)
             object.__setattr__(self, of_values, values)
+        object.__setattr__(self, "densities", floats(self.densities, "densities"))
+        object.__setattr__(self, "acceleration", vector(self.acceleration, "the acceleration"))
+        if len(self.densities) and self.densities.min() < 0.0:
+            raise ValueError("densities are not negative")
 
     def prescribe(self, nodes: ArrayLike, displacement: ArrayLike) -> LoadCase:
         """This case and prescribed displacements of nodes, m.
@@ -94,6 +121,37 @@ class LoadCase:
             forces=np.concatenate([self.forces, values]),
         )
 
+    def weight(
+        self,
+        density: float | Mapping[int, float],
+        acceleration: ArrayLike = (0.0, 0.0, -9.81),
+    ) -> LoadCase:
+        """This case and the weight of the body, which takes the place of an earlier one.
+
+        `density` (kg/m³) is that of the whole body, or `{label: density}` for all regions that
+        have materials of their own. `acceleration` is in m/s², in the frame of the mesh. In frames
+        another acceleration is a product.
+        """
+        if isinstance(density, Mapping):
+            densities = np.array([density[label] for label in sorted(density)], dtype=F64)
+        else:
+            densities = np.array([density], dtype=F64)
+        drawn = vector(acceleration, "the acceleration")
+        return replace(self, densities=densities, acceleration=drawn)
+
+    def pressure(self, triangles: ArrayLike, pressure: float) -> LoadCase:
+        """This case and an even pressure (Pa) on triangles of the boundary, inwards where positive.
+
+        `mesh.boundary_of(nodes)` has the triangles between nodes. The pressure keeps its direction
+        and its force: normal and area are those at rest.
+        """
+        return replace(self, pressures=(*self.pressures, Pressure(triangles, pressure)))
+
+    @property
+    def has_spread_loads(self) -> bool:
+        """Whether weight or pressure acts."""
+        return len(self.densities) > 0 or len(self.pressures) > 0
+
     def mask(
         self,
         nodes: ArrayLike,
@@ -115,13 +173,15 @@ class LoadCase:
         return other
 
     def scaled(self, factor: float) -> LoadCase:
-        """This case with displacements, forces and those of masks times a factor."""
+        """This case with displacements, forces, weight and pressures times a factor."""
         masks = [Mask(m.nodes, m.weights, m.displacement * factor) for m in self.masks]
         return replace(
             self,
             known_displacements=self.known_displacements * factor,
             forces=self.forces * factor,
             masks=tuple(masks),
+            acceleration=self.acceleration * factor,
+            pressures=tuple(Pressure(p.triangles, p.pressure * factor) for p in self.pressures),
         )
 
 
@@ -150,4 +210,27 @@ def mask_arrays(masks: Iterable[Mask]) -> tuple[Numbers, Numbers, Floats, Floats
         np.concatenate([mask.nodes for mask in masks]),
         np.concatenate([mask.weights for mask in masks]),
         np.concatenate([mask.displacement for mask in masks]),
+    )
+
+
+def spread_part(case: LoadCase) -> Part:
+    """The fields of weight and pressure on the wire; none where nothing acts."""
+    part = Part()
+    if case.has_spread_loads:
+        triangles = sum(len(pressure.triangles) for pressure in case.pressures)
+        counts = (len(case.densities), len(case.pressures), triangles)
+        part.fields("3d3I", *case.acceleration.tolist(), *counts)
+    return part
+
+
+def spread_arrays(case: LoadCase) -> tuple[Floats, Floats, Numbers, Numbers]:
+    """Densities, pressures, and numbers and nodes of the triangles, as they travel."""
+    pressures = case.pressures
+    if not pressures:
+        return case.densities, NO_FLOATS, NO_NUMBERS, NO_NUMBERS
+    return (
+        case.densities,
+        np.array([pressure.pressure for pressure in pressures], dtype=F64),
+        np.array([len(pressure.triangles) for pressure in pressures], dtype=U32),
+        np.concatenate([pressure.triangles for pressure in pressures]),
     )

@@ -120,6 +120,12 @@ class Mesh:
             self._cache["nodes"] = np.unique(self.boundary)
         return self._cache["nodes"]
 
+    def boundary_of(self, nodes: ArrayLike) -> Numbers:
+        """Triangles of the boundary whose corners are all among `nodes`; shape (triangles, 3)."""
+        chosen = np.zeros(self.node_count, dtype=bool)
+        chosen[numbers(nodes, "nodes")] = True
+        return self.boundary[chosen[self.boundary].all(axis=1)]
+
     def nodes_at(
         self,
         x: float | None = None,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .arrays import NO_NUMBERS, Numbers, numbers, positive
 from .field_values import WantedFields, field_bits
 from .fields import Part
-from .load_case import LoadCase, mask_arrays
+from .load_case import LoadCase, mask_arrays, spread_arrays, spread_part
 
 Precision = Literal["f64", "f32"]
 """How displacements travel: in double precision, or in half the bytes, to 2⁻²⁴ of the largest."""
@@ -89,7 +89,8 @@ class Question:
         part.option(self.max_error).option(self.deadline_ms)
         mask_nodes = sum([len(mask.nodes) for mask in case.masks])
         counts = (len(case.known_dofs), len(case.force_dofs), len(case.masks), mask_nodes)
-        return part.fields("5I", *counts, field_bits(self.fields))
+        part.fields("5I", *counts, field_bits(self.fields))
+        return part.join(spread_part(case)) if case.has_spread_loads else part
 
     def arrays(self, case: LoadCase) -> tuple[NDArray[Any], ...]:
         """The arrays of the question on the wire."""
@@ -100,6 +101,7 @@ class Question:
             case.forces,
             self._wanted(),
             *mask_arrays(case.masks),
+            *(spread_arrays(case) if case.has_spread_loads else ()),
         )
 
     def _wanted(self) -> Numbers:

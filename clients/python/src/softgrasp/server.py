@@ -18,7 +18,7 @@ from .connection import Connection
 from .contact import ContactAnswer, ContactStep, ObjectState
 from .errors import UnknownModel
 from .field_values import WantedFields
-from .gradient import Gradient, gradient
+from .gradient import Gradient, GradientQuestion
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
@@ -183,6 +183,7 @@ class Server(Session):
         self._connection.conversation.server_limits = self._welcome.limits
 
     def _ask(self, call: Call[T]) -> T:
+        self._check(call)
         return self._connection.ask(call)
 
     def _tell(self, call: Call[None]) -> None:
@@ -244,9 +245,13 @@ class KeptModel(NamedModel):
         is that to the case, of all nodes; without it the case is asked once more. Linear elasticity;
         by places of nodes and materials with `t4` only. `ValueError` for masks and other shapes.
         """
-        return gradient(
-            self.model, self.fixed_dofs, self.frame, case, by_displacements, by_reactions, answer
+        question = GradientQuestion(
+            self.model, self.fixed_dofs, case, by_displacements, by_reactions
         )
+        adjoint = self.frame(question.adjoint)
+        if answer is None and question.needs_answer:
+            answer = self.frame(case)
+        return question.gradient(adjoint, answer)
 
     def contact_frame(
         self,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from numpy.typing import ArrayLike
 
 from . import calls
 from .address import Tls
 from .arrays import positive
 from .calls import Call, Welcome
+from .errors import NotCapable
 from .limits import Limits
 from .model import Model
 from .patience import Patience
@@ -54,6 +57,12 @@ class Session:
     def program(self) -> ServerProgram | None:
         """The program of a server that was spawned."""
         return self._program
+
+    def _check(self, call: Call[Any]) -> None:
+        """Raises `NotCapable` where the server does not know what a request needs."""
+        if call.needs is not None and call.needs not in self._welcome.capabilities:
+            welcome = self._welcome
+            raise NotCapable(f"{welcome.server} {welcome.version} does not know {call.needs!r}")
 
     def _hello(self) -> Call[Welcome]:
         return calls.hello(CLIENT, self._token, self._patience.alive_every)

@@ -2,7 +2,7 @@
 
 use crate::contact::MaskError;
 use crate::fem::hyperelastic::YieldError;
-use crate::fem::{AssemblyError, TooManyNodes};
+use crate::fem::{AssemblyError, SpreadLoadError, TooManyNodes};
 use crate::solve::condensed::CondensedError;
 use crate::solve::equilibrium::Dependent;
 use crate::solve::{FreeMotion, KnownError, PartitionError, SolveError};
@@ -53,6 +53,9 @@ pub enum ModelError {
     /// Elements that cannot yield, or not so.
     #[error(transparent)]
     Yield(#[from] YieldError),
+    /// A weight or a pressure that does not fit the body.
+    #[error(transparent)]
+    SpreadLoad(#[from] SpreadLoadError),
     /// A mask that says what is said already.
     #[error(transparent)]
     Dependent(#[from] Dependent),

@@ -1,10 +1,14 @@
 //! Frames: answers for one prescribed displacement after the other, with a proven bound of the error.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::load_case::{Answer, Inexactness, LoadCase, SoftBodyError, reactions};
-use crate::model::Model;
-use crate::solve::condensed::{Base, Columns, ContactSet, Delivery, Touched};
+use crate::model::{Known, Model};
+use crate::solve::condensed::{
+    Base, Certificate, Columns, ContactSet, Delivery, LoadColumn, LoadedSet, Touched, UnitLoad,
+};
 
 /// Memory that columns of the compliance may take, bytes.
 const COLUMNS_BYTES: usize = 512 << 20;
@@ -43,7 +47,11 @@ pub struct Frames<'a> {
     base: Base,
     columns: Columns,
     /// The small system of the newest frame.
-    set: Option<ContactSet>,
+    set: Option<Arc<ContactSet>>,
+    /// Forces of the newest frame on which some acted, and what they do to the held shape.
+    load: Option<(Vec<f64>, Arc<LoadColumn>)>,
+    /// The small system with these forces.
+    loaded: Option<LoadedSet>,
     nodes: Vec<u32>,
 }
 
@@ -53,44 +61,86 @@ impl<'a> Frames<'a> {
         let base = model.condense(None, &mut |_| {})?;
         base.prove_eigenvalue_min();
         let nodes = (0..).take(model.mesh().node_count()).collect();
-        Ok(Self { model, base, columns: Columns::new(COLUMNS_BYTES), set: None, nodes })
+        let (set, load, loaded) = (None, None, None);
+        Ok(Self { model, base, columns: Columns::new(COLUMNS_BYTES), set, load, loaded, nodes })
     }
 
-    /// Displacements under prescribed displacements. A node that is touched for the first time costs
-    /// three solves, other values of the same nodes a product only.
+    /// Displacements under prescribed displacements and forces. A node that is touched for the first time
+    /// costs three solves, other forces than in the last frame one; other values of the same nodes cost a
+    /// product only.
     ///
     /// # Errors
-    /// [`SoftBodyError`]: forces, nodes that are not there, a body that can still move.
+    /// [`SoftBodyError`]: nodes that are not there, a body that can still move.
     pub fn answer(&mut self, case: &LoadCase) -> Result<Answer, SoftBodyError> {
-        if case.has_forces() {
-            return Err(SoftBodyError::ForceInFrame);
+        let (known, forces) = case.of(self.model)?;
+        let set = self.set_of(&known.dofs)?;
+        match forces.is_empty() {
+            true => self.unloaded(&set, &known),
+            false => self.loaded(&set, &known, forces),
         }
-        let (known, _) = case.of(self.model)?;
-        let kept = self.set.take().filter(|set| set.dofs() == known.dofs);
-        let set = match kept {
-            Some(set) => set,
-            None => {
-                self.model.check_held(&known.dofs, &[])?;
-                let touched = Touched::of_dofs(&known.dofs);
-                let mut set = ContactSet::try_new(&self.base, &self.columns, &touched)?;
-                set.want(&self.base, &self.nodes);
-                set.refine(&self.base);
-                set
-            }
-        };
+    }
+
+    /// The small system of some known degrees of freedom, kept from the last frame or made now.
+    fn set_of(&mut self, dofs: &[u32]) -> Result<Arc<ContactSet>, SoftBodyError> {
+        if let Some(set) = self.set.as_ref().filter(|set| set.dofs() == dofs) {
+            return Ok(Arc::clone(set));
+        }
+        self.model.check_held(dofs, &[])?;
+        let touched = Touched::of_dofs(dofs);
+        let mut set = ContactSet::try_new(&self.base, &self.columns, &touched)?;
+        set.want(&self.base, &self.nodes);
+        set.refine(&self.base);
+        let set = Arc::new(set);
+        self.set = Some(Arc::clone(&set));
+        self.loaded = None;
+        Ok(set)
+    }
+
+    fn unloaded(&self, set: &ContactSet, known: &Known) -> Result<Answer, SoftBodyError> {
         let found = set.solve(&known.q_known)?;
         let displacements = set.wanted_displacements(&found);
         let delivery = Delivery::Double;
         let certificate = set.certify(&self.base, &known.q_known, &found, &displacements, delivery);
-        self.set = Some(set);
-        Ok(Answer {
-            displacements: displacements.into_iter().map(Vector3::from).collect(),
-            reactions: reactions(&known.dofs, &found.lambda),
-            residual_rel: certificate.residual_rel,
-            inexactness: match certificate.error_bound_rel {
-                Ok(error) => Inexactness::Proven(error),
-                Err(reason) => Inexactness::Unknown(reason),
-            },
-        })
+        Ok(answer(known, displacements, &found.lambda, certificate))
+    }
+
+    fn loaded(
+        &mut self,
+        set: &Arc<ContactSet>,
+        known: &Known,
+        forces: Vec<f64>,
+    ) -> Result<Answer, SoftBodyError> {
+        if self.load.as_ref().is_none_or(|(kept, _)| *kept != forces) {
+            let column = Arc::new(LoadColumn::new(&self.base, &forces));
+            self.load = Some((forces, column));
+            self.loaded = None;
+        }
+        let loads = self.load.iter().map(|(_, column)| UnitLoad::Forces(Arc::clone(column)));
+        let base = &self.base;
+        let loaded = self
+            .loaded
+            .get_or_insert_with(|| LoadedSet::new(base, Arc::clone(set), loads.collect()));
+        let found = loaded.solve(&known.q_known, &[1.0])?;
+        let displacements = loaded.wanted_displacements(&found);
+        let delivery = Delivery::Double;
+        let certificate = loaded.certify(base, &known.q_known, &found, &displacements, delivery);
+        Ok(answer(known, displacements, &found.contact.lambda, certificate))
+    }
+}
+
+fn answer(
+    known: &Known,
+    displacements: Vec<[f64; 3]>,
+    forces: &[f64],
+    certificate: Certificate,
+) -> Answer {
+    Answer {
+        displacements: displacements.into_iter().map(Vector3::from).collect(),
+        reactions: reactions(&known.dofs, forces),
+        residual_rel: certificate.residual_rel,
+        inexactness: match certificate.error_bound_rel {
+            Ok(error) => Inexactness::Proven(error),
+            Err(reason) => Inexactness::Unknown(reason),
+        },
     }
 }

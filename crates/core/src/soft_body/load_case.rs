@@ -53,6 +53,10 @@ pub enum Axis {
 pub struct LoadCase {
     prescribed: BTreeMap<u32, [Option<f64>; 3]>,
     forces: BTreeMap<u32, Vector3<f64>>,
+    /// Densities, kg/m³, and acceleration, m/s².
+    weight: Option<(Vec<f64>, Vector3<f64>)>,
+    /// Triangles of the boundary and the pressure on them, Pa.
+    pressures: Vec<(Vec<[u32; 3]>, f64)>,
 }
 
 impl LoadCase {
@@ -84,9 +88,36 @@ impl LoadCase {
         self
     }
 
-    /// Whether forces act.
-    pub(super) fn has_forces(&self) -> bool {
-        !self.forces.is_empty()
+    /// The weight of the body: its density (kg/m³), or one for each region of the mesh, in an even field of
+    /// acceleration, m/s².
+    ///
+    /// ```
+    /// use nalgebra::Vector3;
+    /// use softgrasp_core::mesh::{BuiltIn, generate};
+    /// use softgrasp_core::{LoadCase, Material, SoftBody};
+    ///
+    /// // A cube of 64 nodes stands on its lowest 16 and carries its own weight.
+    /// let cube = generate(BuiltIn::Cube, 64)?;
+    /// let volume: f64 = (0..cube.tets().len()).map(|tet| cube.signed_volume(tet).abs()).sum();
+    /// let body = SoftBody::try_new(cube, Material::try_new(2.0e4, 0.3)?)?;
+    /// let mut standing = LoadCase::new();
+    /// standing.hold(0..16).weight(&[1000.0], Vector3::new(0.0, 0.0, -9.81));
+    /// let answer = body.solve(&standing)?;
+    /// let held = answer.reactions.values().map(|force| force.z).sum::<f64>();
+    /// assert!((held - 9810.0 * volume).abs() < 1e-9 * held);
+    /// assert!(answer.displacements[63].z < 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn weight(&mut self, densities: &[f64], acceleration: Vector3<f64>) -> &mut Self {
+        self.weight = Some((densities.to_vec(), acceleration));
+        self
+    }
+
+    /// An even pressure (Pa) on triangles of the boundary, against their outward normal at rest. Several add
+    /// up.
+    pub fn pressure(&mut self, triangles: &[[u32; 3]], pressure: f64) -> &mut Self {
+        self.pressures.push((triangles.to_vec(), pressure));
+        self
     }
 
     /// Known degrees of freedom with their values, and forces on all degrees of freedom of a model.
@@ -104,10 +135,20 @@ impl LoadCase {
     }
 
     fn forces_on(&self, model: &Model) -> Result<Vec<f64>, SoftBodyError> {
-        if self.forces.is_empty() {
+        if self.forces.is_empty() && self.weight.is_none() && self.pressures.is_empty() {
             return Ok(Vec::new());
         }
-        let mut forces = vec![0.0; 3 * model.system_node_count()];
+        let body = model.spread_loads();
+        let mut forces = match &self.weight {
+            Some((densities, acceleration)) => {
+                body.weight(densities, *acceleration).map_err(ModelError::from)?
+            }
+            None => vec![0.0; 3 * model.system_node_count()],
+        };
+        for (triangles, pressure) in &self.pressures {
+            let pressed = body.pressure(triangles, *pressure).map_err(ModelError::from)?;
+            forces.iter_mut().zip(pressed).for_each(|(sum, f)| *sum += f);
+        }
         for (&node, force) in &self.forces {
             let at = node as usize;
             if at >= model.mesh().node_count() || !model.is_used(at) {
@@ -117,7 +158,7 @@ impl LoadCase {
             if values.iter().zip(force.iter()).any(|(value, f)| value.is_some() && *f != 0.0) {
                 return Err(SoftBodyError::ForceOnPrescribed { node });
             }
-            forces[3 * at..3 * at + 3].copy_from_slice(force.as_slice());
+            forces[3 * at..3 * at + 3].iter_mut().zip(force.iter()).for_each(|(sum, f)| *sum += f);
         }
         Ok(forces)
     }
@@ -248,9 +289,6 @@ pub enum SoftBodyError {
         /// Node, from 0.
         node: u32,
     },
-    /// Forces in a frame.
-    #[error("frames take prescribed displacements only; use SoftBody::solve for forces")]
-    ForceInFrame,
 }
 
 impl Inexactness {

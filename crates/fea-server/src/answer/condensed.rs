@@ -5,23 +5,22 @@ use std::time::Instant;
 
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Known, ModelError};
-use softgrasp_core::solve::condensed::{
-    Base, Certificate, ContactAnswer, ContactSet, Delivery, Touched,
-};
+use softgrasp_core::solve::condensed::{Base, Certificate, ContactSet, Delivery, Touched};
 use softgrasp_core::solve::{Method, Stage};
 use softgrasp_protocol::{
     Answer, Displacements, DofValue, NodeChoice, Precision, Question, SolveReport, Warning,
     WarningCode,
 };
 
+use super::contact_solution::{PreparedSet, Solved};
 use super::fields::{Shape, field_values};
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::{last_peak_rss_bytes, peak_rss_bytes};
 use crate::refusal::Refusal;
-use crate::request::{checked_masks, name_of};
+use crate::request::{checked_masks, frame_loads, name_of};
 use crate::resources::Resources;
-use crate::store::StoredModel;
+use crate::store::{Asked, StoredModel};
 use crate::workers::{Rest, Workers};
 
 /// Condition number of the small system above which the touched nodes hold the body only weakly.
@@ -42,29 +41,22 @@ pub(super) enum StrainOf<'a> {
     Beside(&'a Resources),
 }
 
-/// Touched degrees of freedom and masks of one question about a model that has a base.
+/// Touched degrees of freedom, masks and loads of one question about a model that has a base.
 pub(crate) struct Contacts {
     stored: Arc<StoredModel>,
     base: Arc<Base>,
     known: Known,
-    touched: Touched,
-    /// Prescribed displacement of every touched degree of freedom, then three for each mask, m.
-    q: Vec<f64>,
+    /// Its displacements are those of every touched degree of freedom, then three for each mask, m.
+    asked: Asked,
     /// Nodes whose displacements are wanted.
     nodes: Vec<u32>,
-}
-
-/// Small system of a set of contacts, and whether it was kept from an earlier frame question.
-pub(super) struct PreparedSet {
-    pub set: Arc<ContactSet>,
-    pub is_kept: bool,
 }
 
 impl Contacts {
     /// Collects what the question touches, without the degrees of freedom that the model fixes.
     ///
     /// # Errors
-    /// [`Refusal`] where the model has no base, or a mask does not fit it.
+    /// [`Refusal`] where the model has no base, or a mask or a load does not fit it.
     pub fn new(
         stored: Arc<StoredModel>,
         question: &Question,
@@ -73,6 +65,7 @@ impl Contacts {
         let base = stored.base()?;
         let fixed = base.fixed();
         let (masks, of_masks) = checked_masks(&stored.model, question)?;
+        let loads = frame_loads(&stored.model, &known, question)?;
         let pairs = known.dofs.iter().zip(&known.q_known);
         let free = pairs.filter(|(dof, _)| fixed.binary_search(dof).is_err());
         let (dofs, mut q): (Vec<u32>, Vec<f64>) = free.map(|(d, q)| (*d, *q)).unzip();
@@ -81,13 +74,18 @@ impl Contacts {
             NodeChoice::All => (0..stored.model.mesh().node_count() as u32).collect(),
             NodeChoice::Nodes(nodes) => nodes.clone(),
         };
-        Ok(Self { stored, base, known, touched: Touched { dofs, masks }, q, nodes })
+        let asked = Asked { touched: Touched { dofs, masks }, q, loads };
+        Ok(Self { stored, base, known, asked, nodes })
     }
 
-    /// Small system kept from an earlier question about the same contacts and wanted nodes.
+    /// Small system kept from an earlier question about the same contacts, loads and wanted nodes.
     pub fn kept_set(&self) -> Option<PreparedSet> {
-        let set = self.stored.set_for(&self.touched, &self.nodes)?;
-        Some(PreparedSet { set, is_kept: true })
+        let set = self.stored.set_for(&self.asked.touched, &self.nodes)?;
+        let loaded = match &self.asked.loads {
+            Some(loads) => Some(self.stored.loaded_set_for(&set, &loads.units)?),
+            None => None,
+        };
+        Some(PreparedSet { set, loaded, is_kept: true })
     }
 
     /// Whether reaction forces are wanted at nodes that the model fixes; they take a product with the
@@ -98,14 +96,27 @@ impl Contacts {
 
     fn made_set(&self, clock: &mut StageClock) -> Result<PreparedSet, Refusal> {
         clock.begin(Stage::Factor);
-        let Self { stored, base, known, touched, nodes, .. } = self;
+        let Self { stored, base, asked, nodes, .. } = self;
+        let set = match stored.set_for(&asked.touched, nodes) {
+            Some(set) => set,
+            None => self.made_contact_set()?,
+        };
+        let loaded = match &asked.loads {
+            Some(loads) => Some(stored.make_loaded_set(base, &set, &loads.units)?),
+            None => None,
+        };
+        Ok(PreparedSet { set, loaded, is_kept: false })
+    }
+
+    fn made_contact_set(&self) -> Result<Arc<ContactSet>, Refusal> {
+        let Self { stored, base, known, asked: Asked { touched, .. }, nodes } = self;
         stored.model.check_held(&known.dofs, &touched.masks)?;
         let mut set =
             ContactSet::try_new(base, &stored.columns, touched).map_err(ModelError::from)?;
         set.want(base, nodes);
         let set = Arc::new(set);
         stored.keep_set(nodes.clone(), Arc::clone(&set));
-        Ok(PreparedSet { set, is_kept: false })
+        Ok(set)
     }
 
     /// Answers the question by a kept small system, or by one made now.
@@ -132,16 +143,16 @@ impl Contacts {
     /// [`Refusal`] if the request cannot be answered.
     pub fn answer_with(
         &self,
-        PreparedSet { set, is_kept }: &PreparedSet,
+        prepared: &PreparedSet,
         question: &Question,
         why: &str,
         strain: StrainOf<'_>,
         mut clock: StageClock,
     ) -> Result<Answer, Refusal> {
-        let Self { stored, base, known, q, .. } = self;
+        let (Self { stored, base, known, asked, .. }, set) = (self, &prepared.set);
         clock.begin(Stage::Solve);
-        let solved = set.solve(q).map_err(ModelError::from)?;
-        let displacement = set.wanted_displacements(&solved);
+        let solved = prepared.solve(asked).map_err(ModelError::from)?;
+        let displacement = solved.wanted_displacements(set);
         if let StrainOf::ThisAnswer { may_prove: true } = strain {
             // One request has no later frames that a proof in the background could serve.
             base.estimate_condition();
@@ -152,33 +163,33 @@ impl Contacts {
             }
         }
         let delivery = delivery(question.want.precision);
-        let certificate = set.certify(base, q, &solved, &displacement, delivery);
+        let certificate = solved.certify((base, set), &asked.q, &displacement, delivery);
         let mut stage_ms = clock.finish();
         let start = Instant::now();
         let (mut reactions, mut mask_forces) = (Vec::new(), Vec::new());
         if question.want.reactions {
             reactions = reactions_of(known, base, set, &solved);
-            let (of_masks, _) = solved.lambda[set.dofs().len()..].as_chunks();
+            let (of_masks, _) = solved.lambda()[set.dofs().len()..].as_chunks();
             mask_forces = of_masks.to_vec();
         }
         let displacements = Displacements::of(displacement, question.want.precision);
         let has_fields = !question.want.fields.is_empty();
-        let all = has_fields.then(|| set.full_displacement(base, &solved));
+        let all = has_fields.then(|| solved.full_displacement(base, set));
         let fields = all.as_ref().map_or_else(Vec::new, |all| {
             field_values(&stored.model, &Shape::Linear(all), &question.want)
         });
         stage_ms.encode = ms_since(start);
         let its_strain = match strain {
             StrainOf::ThisAnswer { .. } => {
-                let all = all.unwrap_or_else(|| set.full_displacement(base, &solved));
+                let all = all.unwrap_or_else(|| solved.full_displacement(base, set));
                 Some(stored.model.strain(&all, &mut || {}))
             }
-            StrainOf::Beside(_) => stored.strain_of(&self.touched, q),
+            StrainOf::Beside(_) => stored.strain_of(asked),
         };
         let mut report = self.report(set, &certificate, (why, its_strain));
         report.stage_ms = stage_ms;
-        report.factor_reused = *is_kept;
-        report.peak_rss_bytes = match is_kept {
+        report.factor_reused = prepared.is_kept;
+        report.peak_rss_bytes = match prepared.is_kept {
             true => last_peak_rss_bytes(),
             false => peak_rss_bytes(),
         };
@@ -187,7 +198,8 @@ impl Contacts {
         }
         add_unmet_wishes(question, &mut report);
         if let StrainOf::Beside(resources) = strain {
-            if *is_kept {
+            // A second solve sharpens no bound of an answer with loads.
+            if prepared.is_kept && prepared.loaded.is_none() {
                 self.sharpen(resources, set);
             }
             if its_strain.is_none() {
@@ -254,15 +266,15 @@ impl Contacts {
 
     /// Computes rotation and strain of an answer in the background, one answer at a time, on a thread
     /// that rests for nine tenths of the time.
-    fn watch_strain(&self, workers: &Workers, set: Arc<ContactSet>, solved: ContactAnswer) {
+    fn watch_strain(&self, workers: &Workers, set: Arc<ContactSet>, solved: Solved) {
         let Some(claimed) = self.stored.strain_under_way.take() else { return };
         let (stored, base) = (Arc::clone(&self.stored), Arc::clone(&self.base));
-        let (touched, q) = (self.touched.clone(), self.q.clone());
+        let asked = self.asked.clone();
         workers.beside(move || {
             let mut rest = Rest::new();
-            let displacement = set.full_displacement(&base, &solved);
+            let displacement = solved.full_displacement(&base, &set);
             let strain = stored.model.strain(&displacement, &mut || rest.rest());
-            stored.keep_strain(touched, q, strain);
+            stored.keep_strain(asked, strain);
             drop(claimed);
         });
     }
@@ -276,21 +288,18 @@ fn delivery(precision: Precision) -> Delivery {
     }
 }
 
-/// Reaction forces at all known degrees of freedom (3.43b): λ where touched, `K u` where the model fixes.
-fn reactions_of(
-    known: &Known,
-    base: &Base,
-    set: &ContactSet,
-    solved: &ContactAnswer,
-) -> Vec<DofValue> {
+/// Reaction forces at all known degrees of freedom (3.43b): λ where touched, `K u` less the loads where the
+/// model fixes.
+fn reactions_of(known: &Known, base: &Base, set: &ContactSet, solved: &Solved) -> Vec<DofValue> {
     let fixed = base.fixed();
     let mut at_fixed = match fixed.is_empty() {
         true => Vec::new(),
-        false => base.forces_of(&set.full_displacement(base, solved)),
+        false => base.forces_of(&solved.full_displacement(base, set)),
     };
-    // What a mask presses onto a fixed node is not the support's force.
+    // What loads and masks press onto a fixed node is not the support's force.
     if !at_fixed.is_empty() {
-        let (of_masks, _) = solved.lambda[set.dofs().len()..].as_chunks::<3>();
+        solved.subtract_loads(&mut at_fixed);
+        let (of_masks, _) = solved.lambda()[set.dofs().len()..].as_chunks::<3>();
         for (mask, force) in set.touched().masks.iter().zip(of_masks) {
             for &(node, weight) in mask.entries() {
                 for (axis, force) in force.iter().enumerate() {
@@ -300,7 +309,7 @@ fn reactions_of(
         }
     }
     let force = |dof: &u32| match set.dofs().binary_search(dof) {
-        Ok(at) => solved.lambda[at],
+        Ok(at) => solved.lambda()[at],
         Err(_) => at_fixed.get(*dof as usize).copied().unwrap_or(0.0),
     };
     known.dofs.iter().map(|dof| DofValue { dof: *dof, value: force(dof) }).collect()

@@ -8,7 +8,8 @@ use softgrasp_core::solve::choose::{Plan, Question, SMALLER_THAN_FRONT};
 use softgrasp_core::solve::{Factored, Method};
 use softgrasp_protocol::{Answer, CaseAnswer, ModelHash, NodeChoice, Question as QuestionMessage};
 
-use super::condensed::{Contacts, PreparedSet, StrainOf};
+use super::condensed::{Contacts, StrainOf};
+use super::contact_solution::PreparedSet;
 use super::direct::{self, Posed};
 use super::factor::{FactorRequest, because_of_memory};
 use super::finite::answer_is_finite;
@@ -16,7 +17,7 @@ use super::several::check_cases;
 use crate::clock::StageClock;
 use crate::plan::{Subject, columns_ms, factor_ms, plan_frame};
 use crate::refusal::Refusal;
-use crate::request::{checked_forces, name_of, pairs, question_of};
+use crate::request::{check_frame, checked_forces, name_of, pairs, question_of};
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
@@ -33,7 +34,6 @@ pub(crate) struct PosedFrame {
     message: QuestionMessage,
     question: Question,
     known: Known,
-    forces: Vec<f64>,
     plan: Plan,
 }
 
@@ -88,7 +88,7 @@ fn kept_frame(
     let contacts = Contacts::new(stored, &frame.message, frame.known.clone()).ok()?;
     let prepared = contacts.kept_set()?;
     let is_small =
-        prepared.set.products() <= SMALL_PRODUCTS && !contacts.has_large_product(&frame.message);
+        prepared.products() <= SMALL_PRODUCTS && !contacts.has_large_product(&frame.message);
     is_small.then_some(KeptFrame { frame, contacts, prepared })
 }
 
@@ -172,10 +172,9 @@ impl PosedFrame {
         let model = &stored.model;
         let question = question_of(&message, Some(model.element()), 0.0)?;
         let known = model.known(pairs(&message.known))?;
-        let forces = checked_forces(model, &known, &message)?;
-        let has = (!message.masks.is_empty(), !message.forces.is_empty());
-        let plan = plan_frame(&question, &stored, &known, has)?;
-        Ok(Self { hash, stored, message, question, known, forces, plan })
+        check_frame(model, &known, &message)?;
+        let plan = plan_frame(&question, &stored, &known, !message.masks.is_empty())?;
+        Ok(Self { hash, stored, message, question, known, plan })
     }
 
     /// Whether the contact set or factor of the plan is kept. If so the answer takes a product or a
@@ -202,7 +201,8 @@ impl PosedFrame {
                 let fixed = stored.model.fixed().len().min(known.dofs.len());
                 let nodes = (known.dofs.len() - fixed).div_ceil(3);
                 let entries = base.bytes() as f64 / size_of::<f64>() as f64;
-                columns_ms(entries, nodes + message.masks.len(), &rates)
+                let loads = message.forces.len().div_ceil(3) + message.spread.pressures.len();
+                columns_ms(entries, nodes + message.masks.len() + loads, &rates)
             }
             (method, _) => factor_ms(&stored.model, method, &rates),
         }
@@ -249,13 +249,15 @@ impl PosedFrame {
     }
 
     fn by_factor(self, resources: &Resources, mut clock: StageClock) -> Result<Answer, Refusal> {
+        // What does not fit the model is refused before a factor is made.
+        let forces = checked_forces(&self.stored.model, &self.known, &self.message)?;
         let kept = self.kept_factor();
         let factor_reused = kept.is_some();
         let factored = match kept {
             Some(factored) => factored,
             None => self.made_factor(resources, &mut clock)?,
         };
-        let Self { stored, message, known, forces, plan, .. } = self;
+        let Self { stored, message, known, plan, .. } = self;
         let posed = Posed {
             question: &message,
             known,

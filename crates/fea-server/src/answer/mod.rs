@@ -3,6 +3,7 @@
 mod condensed;
 mod contact_frame;
 mod contact_large;
+mod contact_solution;
 mod direct;
 mod elsewhere;
 mod factor;

@@ -50,7 +50,6 @@ pub(crate) fn solve_once(
         question,
         subject: Subject::once(&mesh, message.known.len()),
         has_masks: !message.masks.is_empty(),
-        has_forces: !message.forces.is_empty(),
     };
     let models = &resources.models;
     let plan = plan_once(&request, models, &reservation, &resources.rates, || clock.elapsed_ms())?;

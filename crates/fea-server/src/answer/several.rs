@@ -45,7 +45,6 @@ pub(crate) fn solve_several(
         question,
         subject: Subject::once(&mesh, message.known.len()),
         has_masks: false,
-        has_forces: !message.forces.is_empty(),
     };
     let models = &resources.models;
     let plan = plan_once(&request, models, &reservation, &resources.rates, || clock.elapsed_ms())?;

@@ -55,6 +55,10 @@ impl Equations {
             joined(&given, &model.fixed, node_count)
         };
         let cases = task.cases.iter().map(of_case).collect::<Result<Vec<Known>, Refusal>>()?;
+        if !task.question.spread.is_empty() {
+            let (what, instead) = ("weight and pressure", "give their forces on nodes");
+            return Err(Refusal::NotByCluster { what, instead });
+        }
         let forces = scatter_forces((node_count, node_count), &known, &task.question.forces)?;
         let used = mesh.used_nodes();
         let body_count = held_by(&mesh, &used, &known.dofs)?;

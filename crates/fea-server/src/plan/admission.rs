@@ -105,8 +105,6 @@ fn size_of(mesh: &MeshData) -> MeshSize {
 /// Why a question cannot be answered as it was asked.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlanError {
-    #[error("condensed takes known displacements only, not forces; use front or auto")]
-    CondensedForces,
     #[error("node {node} is fixed by the model and moved by the question; use front or auto")]
     FixedMoved { node: u32 },
     #[error("{method} does not answer masks; ask for condensed or auto")]

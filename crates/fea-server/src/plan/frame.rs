@@ -19,7 +19,7 @@ pub(crate) fn plan_frame(
     question: &Question,
     stored: &StoredModel,
     known: &Known,
-    (has_masks, has_forces): (bool, bool),
+    has_masks: bool,
 ) -> Result<Plan, PlanError> {
     let element = stored.model.element();
     let asked = question.method;
@@ -28,7 +28,6 @@ pub(crate) fn plan_frame(
     }
     let obstacle = match stored.base() {
         Err(error) => Some(PlanError::Model(error)),
-        Ok(_) if has_forces => Some(PlanError::CondensedForces),
         Ok(_) => moved_fixed_node(stored, known).map(|node| PlanError::FixedMoved { node }),
     };
     if has_masks {

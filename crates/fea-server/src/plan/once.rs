@@ -26,7 +26,6 @@ pub(crate) struct OnceRequest {
     pub question: Question,
     pub subject: Subject,
     pub has_masks: bool,
-    pub has_forces: bool,
 }
 
 impl OnceRequest {
@@ -76,14 +75,12 @@ pub(crate) fn plan_once(
 fn plan_as_asked(request: &OnceRequest) -> Result<Plan, PlanError> {
     let question = &request.question;
     let element = question.element.unwrap_or_else(|| cheapest_element(question.poisson_max));
-    let obstacle = request.has_forces.then_some(PlanError::CondensedForces);
     if request.has_masks {
-        return plan_for_masks(question, element, obstacle);
+        return plan_for_masks(question, element, None);
     }
-    match (question.method, obstacle) {
-        (Some(Method::Condensed), Some(obstacle)) => Err(obstacle),
-        (Some(method), _) => Ok(question.plan(element, method, ASKED)),
-        (None, _) => {
+    match question.method {
+        Some(method) => Ok(question.plan(element, method, ASKED)),
+        None => {
             let why = "one request: the parallel exact factor is the fastest";
             let plan = question.plan(element, Method::Front, why);
             Ok(Plan { instead: SMALLER_THAN_FRONT, ..plan })

@@ -36,21 +36,6 @@ pub(crate) fn checked_masks(
     Ok((model.masks(question.masks.iter().map(paired))?, q.to_vec()))
 }
 
-/// Forces by degree of freedom, N, after all nodes that the question names were checked; called before a
-/// factor is made, which is the costly part.
-///
-/// # Errors
-/// [`Refusal`] that names the node.
-pub(crate) fn checked_forces(
-    model: &Model,
-    known: &Known,
-    question: &Question,
-) -> Result<Vec<f64>, Refusal> {
-    let node_count = model.mesh().node_count();
-    check_nodes(&question.want, node_count)?;
-    scatter_forces((node_count, model.system_node_count()), known, &question.forces)
-}
-
 /// Refuses wanted nodes that are not there.
 ///
 /// # Errors
@@ -65,6 +50,30 @@ pub(crate) fn check_nodes(want: &Want, node_count: usize) -> Result<(), Refusal>
     }
 }
 
+/// Refuses forces on nodes that are not there, on known degrees of freedom, and that are no numbers.
+///
+/// # Errors
+/// [`Refusal`] that names the node.
+pub(super) fn check_forces(
+    node_count: usize,
+    known: &Known,
+    forces: &[DofValue],
+) -> Result<(), Refusal> {
+    for &DofValue { dof, value } in forces {
+        let node = dof / 3;
+        if !value.is_finite() {
+            return Err(Refusal::ForceNotFinite { node, value });
+        }
+        if value != 0.0 && known.dofs.binary_search(&dof).is_ok() {
+            return Err(Refusal::ForceOnKnown { node });
+        }
+        if node as usize >= node_count {
+            return Err(Refusal::NoSuchNode { what: "the list of forces", node, node_count });
+        }
+    }
+    Ok(())
+}
+
 /// Forces by degree of freedom of the system, N; empty if the question has none.
 ///
 /// # Errors
@@ -74,24 +83,11 @@ pub(crate) fn scatter_forces(
     known: &Known,
     forces: &[DofValue],
 ) -> Result<Vec<f64>, Refusal> {
+    check_forces(node_count, known, forces)?;
     if forces.is_empty() {
         return Ok(Vec::new());
     }
     let mut scattered = vec![0.0; 3 * system_node_count];
-    for &DofValue { dof, value } in forces {
-        let node = dof / 3;
-        if !value.is_finite() {
-            return Err(Refusal::ForceNotFinite { node, value });
-        }
-        if value != 0.0 && known.dofs.binary_search(&dof).is_ok() {
-            return Err(Refusal::ForceOnKnown { node });
-        }
-        match scattered[..3 * node_count].get_mut(dof as usize) {
-            Some(force) => *force += value,
-            None => {
-                return Err(Refusal::NoSuchNode { what: "the list of forces", node, node_count });
-            }
-        }
-    }
+    forces.iter().for_each(|force| scattered[force.dof as usize] += force.value);
     Ok(scattered)
 }

@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Model, ModelError};
 use softgrasp_core::solve::condensed::{
-    Base, Columns, CondensedError, ContactSet, FreeBody, Touched,
+    Base, Columns, CondensedError, ContactSet, FreeBody, LoadedSet, Touched,
 };
 use softgrasp_core::solve::{Factored, Method, Stage};
 
+use super::kept_loads::{FrameLoads, KeptLoads, UnitKey};
 use super::recent::Recent;
 use crate::lock::Lock;
 
@@ -24,6 +25,7 @@ pub(crate) struct StoredModel {
     /// Whether a factor in double precision needed more memory than allowed.
     pub single_only: AtomicBool,
     sets: Lock<Recent<KeptSet>>,
+    loads: KeptLoads,
     strain: Lock<Option<KeptStrain>>,
     /// Held by the thread that computes the strain of an answer.
     pub strain_under_way: Claim,
@@ -72,11 +74,18 @@ struct KeptSet {
     set: Arc<ContactSet>,
 }
 
-/// Strain of one answer, with the contacts and displacements that it belongs to.
+/// Strain of one answer, with the question that it belongs to.
 struct KeptStrain {
-    touched: Touched,
-    q: Vec<f64>,
+    asked: Asked,
     strain: StrainSummary,
+}
+
+/// Contacts, their displacements and the loads of one question.
+#[derive(Clone, PartialEq)]
+pub(crate) struct Asked {
+    pub touched: Touched,
+    pub q: Vec<f64>,
+    pub loads: Option<FrameLoads>,
 }
 
 /// Largest number of factors kept for each model: one for a grasp, a second for a change of grip.
@@ -100,6 +109,7 @@ impl StoredModel {
             free_body: Lock::default(),
             single_only: AtomicBool::default(),
             sets: Lock::default(),
+            loads: KeptLoads::default(),
             strain: Lock::default(),
             strain_under_way: Claim::default(),
             proof_under_way: Claim::default(),
@@ -145,15 +155,37 @@ impl StoredModel {
         });
     }
 
-    /// Strain of an earlier answer with these contacts and displacements, if it is kept.
-    pub fn strain_of(&self, touched: &Touched, q: &[f64]) -> Option<StrainSummary> {
-        let is_it = |kept: &&KeptStrain| kept.q == q && kept.touched == *touched;
+    /// Contact set with loads beside it, if it is kept.
+    pub fn loaded_set_for(
+        &self,
+        set: &Arc<ContactSet>,
+        units: &[UnitKey],
+    ) -> Option<Arc<LoadedSet>> {
+        self.loads.set_for(set, units)
+    }
+
+    /// Contact set with loads beside it, made now and kept.
+    ///
+    /// # Errors
+    /// [`ModelError`] for a load that does not fit the model.
+    pub fn make_loaded_set(
+        &self,
+        base: &Base,
+        set: &Arc<ContactSet>,
+        units: &[UnitKey],
+    ) -> Result<Arc<LoadedSet>, ModelError> {
+        self.loads.make_set((&self.model, base, &self.columns), set, units)
+    }
+
+    /// Strain of an earlier answer to the same question, if it is kept.
+    pub fn strain_of(&self, asked: &Asked) -> Option<StrainSummary> {
+        let is_it = |kept: &&KeptStrain| kept.asked == *asked;
         self.strain.with(|kept| kept.as_ref().filter(is_it).map(|kept| kept.strain))
     }
 
     /// Keeps the strain of an answer.
-    pub fn keep_strain(&self, touched: Touched, q: Vec<f64>, strain: StrainSummary) {
-        self.strain.with(|kept| *kept = Some(KeptStrain { touched, q, strain }));
+    pub fn keep_strain(&self, asked: Asked, strain: StrainSummary) {
+        self.strain.with(|kept| *kept = Some(KeptStrain { asked, strain }));
     }
 
     /// Factor by a method for a set of known degrees of freedom, if it is kept.
@@ -185,18 +217,20 @@ impl StoredModel {
             self.factors.with(|factors| factors.iter().map(|kept| kept.factored.bytes()).sum());
         let sets: usize = self.sets.with(|sets| sets.iter().map(|kept| kept.set.bytes()).sum());
         let free = self.free_body.with(|kept| kept.as_ref().map_or(0, |body| body.bytes()));
-        self.lasting_bytes() + (free + columns + factors + sets) as u64
+        self.lasting_bytes() + (free + columns + factors + sets + self.loads.bytes()) as u64
     }
 
     /// Drops factors and contact sets, which can be made again.
     pub fn drop_factors_and_sets(&self) {
         self.factors.with(Recent::clear);
         self.sets.with(Recent::clear);
+        self.loads.drop_sets();
     }
 
-    /// Drops the columns, which can be made again.
+    /// Drops the columns of contacts and loads, which can be made again.
     pub fn drop_columns(&self) {
         self.columns.clear();
+        self.loads.drop_columns();
     }
 }
 

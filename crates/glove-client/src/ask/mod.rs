@@ -7,6 +7,7 @@ pub mod digest;
 pub mod discretisation;
 pub mod displacement_table;
 pub mod endpoint;
+pub mod gradient;
 pub mod held_nodes;
 pub mod link;
 pub mod model_upload;

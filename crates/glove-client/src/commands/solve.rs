@@ -19,10 +19,13 @@ use softgrasp_protocol::{
 use super::access_arguments::AccessArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::field_arguments::FieldArguments;
+use super::gradient_arguments::GradientArguments;
+use super::load_arguments::{LoadArguments, check_server, on_nodes};
 use super::numbers::{count, poisson, positive};
 use super::output::{print, write_json};
 use super::region_arguments::RegionArguments;
 use super::solve_cases::{CaseFiles, CaseMesh, CaseResult, read_values};
+use super::solve_words::{describe, describe_discretisation};
 use crate::ask::calculix_deck::CalculixDeck;
 use crate::ask::connection::{Host, ServerChoice};
 use crate::ask::discretisation::DiscretisationEstimate;
@@ -48,6 +51,8 @@ pub struct SolveCommand {
     /// External forces: node,fx,fy,fz.
     #[arg(long, value_name = "F.csv")]
     forces: Option<PathBuf>,
+    #[command(flatten)]
+    loads: LoadArguments,
     /// Where to solve: HOST:PORT, or embedded.
     #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
     server: ServerChoice,
@@ -98,6 +103,8 @@ pub struct SolveCommand {
     /// displacement, N; one for each --known, or none.
     #[arg(long, value_name = "R.csv")]
     reactions: Vec<PathBuf>,
+    #[command(flatten)]
+    gradient: GradientArguments,
     /// Leave out what only informs: condition, estimated error, rotation and strain.
     #[arg(long, conflicts_with = "estimate_discretisation")]
     no_estimate: bool,
@@ -185,6 +192,7 @@ impl SolveCommand {
         progress.now("starting");
         let host = self.open_host()?;
         let mut connection = host.connect()?;
+        check_server(&question.spread, connection.welcome())?;
         let nodes = file.mesh.node_count();
         progress.now(&match &self.server {
             ServerChoice::Embedded => format!("{nodes} nodes:"),
@@ -192,8 +200,9 @@ impl SolveCommand {
         });
         progress.watch(host.stage());
         let body = Body { mesh: mesh_data(&file.mesh), materials, element: self.element };
-        // A second solve asks about the same body.
-        let again = self.estimate_discretisation.then(|| (body.clone(), question.clone()));
+        // A further solve asks about the same body.
+        let is_again = self.estimate_discretisation || self.gradient.is_wanted();
+        let again = is_again.then(|| (body.clone(), question.clone()));
         let start = Instant::now();
         let ask = Ask {
             large: elasticity.ask(PathChoice::FromRest, Pace::Repeatable),
@@ -213,14 +222,16 @@ impl SolveCommand {
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
         let displacements = displacements.into_f64();
         self.write_cases(&file, &displacements, &answer)?;
-        let discretisation = match again {
-            Some((body, question)) => {
-                progress.now("solving again with the other element");
-                let again = (&body, &question);
-                DiscretisationEstimate::of(&mut connection, again, &answer, &displacements)
+        let mut discretisation = DiscretisationEstimate::not_asked();
+        if let Some((body, question)) = &again {
+            progress.now("solving again");
+            let again = (body, question);
+            self.gradient.write(&mut connection, &file.mesh, again)?;
+            if self.estimate_discretisation {
+                discretisation =
+                    DiscretisationEstimate::of(&mut connection, again, &answer, &displacements);
             }
-            None => DiscretisationEstimate::not_asked(),
-        };
+        }
         if let Some(path) = &self.report {
             let mut report = self.report(&file, &host, summary.clone(), discretisation.clone());
             report.add_fields(answer.fields.first());
@@ -311,6 +322,7 @@ impl SolveCommand {
             },
             max_error: self.max_error,
             deadline_ms: self.deadline,
+            spread: self.loads.of_mesh(mesh)?,
             ..Question::default()
         })
     }
@@ -323,6 +335,8 @@ impl SolveCommand {
     /// Refuses options that do not go together.
     fn check_cases(&self, elasticity: &Elasticity) -> anyhow::Result<()> {
         self.cases().check()?;
+        let is_linear = elasticity.deformation == Deformation::Linear;
+        self.gradient.check(self.known.len(), is_linear)?;
         if self.is_several() && elasticity.deformation != Deformation::Linear {
             bail!(
                 "several --known and --no-estimate are for linear answers; leave out --deformation"
@@ -358,6 +372,7 @@ impl SolveCommand {
         if elasticity.yield_stress.is_some() {
             bail!("--export-deck has no yield stress; leave out --yield or the deck");
         }
+        let forces = on_nodes(mesh, element, (&question.forces, &question.spread))?;
         let is_linear = elasticity.deformation == Deformation::Linear;
         let deck = CalculixDeck {
             mesh,
@@ -365,7 +380,7 @@ impl SolveCommand {
             materials,
             law: (!is_linear).then_some(elasticity.law),
             known: &question.known,
-            forces: &question.forces,
+            forces: &forces,
         };
         Ok(deck.text()?)
     }
@@ -406,72 +421,4 @@ impl SolveCommand {
             },
         }
     }
-}
-
-fn describe_discretisation(estimate: &DiscretisationEstimate) -> String {
-    match estimate.rel {
-        Some(rel) => format!(
-            "discretisation: about {:.2} % between linear and ten-node elements (an estimate, not \
-             a bound)\n",
-            100.0 * rel
-        ),
-        None => format!("discretisation: no estimate: {}\n", estimate.why),
-    }
-}
-
-fn describe(file: &MeshFile, summary: &SolveSummary, outs: &[PathBuf]) -> String {
-    let mut text = format!(
-        "{}: {} nodes, {} tetrahedra\n{} on {}: {} unknown and {} prescribed degrees of freedom, \
-         {:.1} ms, residual {:.1e}\n",
-        file.format,
-        file.mesh.node_count(),
-        file.mesh.tets().len(),
-        summary.report.method,
-        summary.report.element,
-        summary.report.unknown_dofs,
-        summary.report.known_dofs,
-        summary.round_trip_ms,
-        summary.report.residual_rel,
-    );
-    if summary.report.max_rotation_deg.is_finite() {
-        text.push_str(&format!(
-            "largest element rotation {:.2} degrees, strain {:.2} %\n",
-            summary.report.max_rotation_deg,
-            100.0 * summary.report.max_strain,
-        ));
-    }
-    text.push_str(&describe_large(summary));
-    let findings = &file.findings;
-    for (count, what) in [
-        (findings.flipped.len(), "inverted tetrahedra were turned"),
-        (findings.degenerate.len(), "tetrahedra without volume were dropped"),
-        (findings.repeated.len(), "tetrahedra that repeat an earlier one were dropped"),
-        (findings.orphans, "nodes belong to no tetrahedron and stay where they are"),
-    ] {
-        if count > 0 {
-            text.push_str(&format!("{count} {what}\n"));
-        }
-    }
-    for out in outs {
-        text.push_str(&format!("displacements written to {}\n", out.display()));
-    }
-    text
-}
-
-/// Sentences on the equilibrium at large deformation.
-fn describe_large(summary: &SolveSummary) -> String {
-    let Some(large) = &summary.large else { return String::new() };
-    if summary.deformation == Deformation::Linear.as_str() {
-        return format!("linear, because {}\n", summary.report.chosen_because);
-    }
-    format!(
-        "large deformation: {} pieces, {} steps, {} solves; estimated error {:.1e}; stretch up to \
-         {:.2}, volumes down to {:.2} of those at rest\n",
-        large.substeps,
-        large.newton_steps,
-        large.linear_solves,
-        summary.report.error_estimate_rel.unwrap_or(0.0),
-        large.max_stretch,
-        large.min_jacobian,
-    )
 }

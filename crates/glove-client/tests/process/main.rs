@@ -16,9 +16,11 @@ mod discretisation;
 mod emulator;
 mod fill;
 mod full_disk;
+mod gradient;
 mod interruption;
 mod joint_runs;
 mod killed_server;
+mod loads;
 mod numbers;
 #[cfg(feature = "xr")]
 mod page;

@@ -6,7 +6,7 @@ use super::large::LargeAsk;
 use super::mesh::{Material, MeshData, MeshPart, read_mesh, write_mesh};
 use super::model::ModelHash;
 use super::names::ElementChoice;
-use super::question::{Question, QuestionPart};
+use super::question::{Question, QuestionParts};
 use super::report::ReportLevel;
 use crate::block::Block;
 use crate::limits::check_count;
@@ -131,7 +131,7 @@ impl Ask {
                 Subject::Model(model) => SubjectPart::Model { model: *model },
             },
             newest_wins: self.newest_wins,
-            question: Block::of(&self.question.part()?)?,
+            question: self.question.block()?,
             large: self.large.as_ref().map(Block::of).transpose()?,
             case_count: count_of(CASES, self.cases.len())?,
             without_estimate: self.without_estimate,
@@ -152,8 +152,7 @@ impl Ask {
         limits: &Limits,
     ) -> Result<Self, DecodeError> {
         let part: AskPart = reader.part()?;
-        let question: QuestionPart = part.question.read()?;
-        question.check(limits)?;
+        let question = QuestionParts::read(&part.question, limits)?;
         let large = part.large.map(|block| block.read()).transpose()?;
         let case_count = check_count(CASES, part.case_count, limits.dof_count_max)?;
         let subject = match part.subject {

@@ -19,6 +19,7 @@ mod request;
 mod rigid_body;
 mod session;
 mod small_system;
+mod spread_loads;
 
 pub use answer::{Answer, CaseAnswer, Displacements};
 pub use ask::{Ask, Body, Subject};
@@ -43,3 +44,4 @@ pub use request::Request;
 pub use rigid_body::{BodyMotion, BodyShape, Pose};
 pub use session::{Hello, Welcome};
 pub use small_system::{BodyContact, SmallSystem};
+pub use spread_loads::{SpreadLoads, SurfacePressure};

@@ -6,6 +6,8 @@ use super::dof_value::DofValue;
 use super::fields::FieldSet;
 use super::masks::{Masks, MasksPart};
 use super::names::MethodName;
+use super::spread_loads::{SpreadLoads, SpreadLoadsPart};
+use crate::block::{Block, read_fields};
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
 use crate::{DecodeError, EncodeError, Limits};
@@ -67,11 +69,13 @@ pub struct Question {
     pub max_error: Option<f64>,
     /// Time after which the answer is of little use, ms; `None` for no deadline.
     pub deadline_ms: Option<f64>,
+    /// Weight and pressure. A server without the capability `loads` refuses them as `BadRequest`.
+    pub spread: SpreadLoads,
 }
 
 /// Announces the arrays of a [`Question`].
 #[derive(Clone, Debug, SchemaRead, SchemaWrite)]
-pub(super) struct QuestionPart {
+struct QuestionPart {
     method: String,
     nodes: NodeChoicePart,
     reactions: bool,
@@ -84,6 +88,12 @@ pub(super) struct QuestionPart {
     fields: FieldSet,
 }
 
+/// Announces the arrays of a [`Question`] and, in fields that came later, those of its loads.
+pub(super) struct QuestionParts {
+    question: QuestionPart,
+    spread: SpreadLoadsPart,
+}
+
 #[derive(Clone, Copy, Debug, SchemaRead, SchemaWrite)]
 enum NodeChoicePart {
     All,
@@ -91,7 +101,16 @@ enum NodeChoicePart {
 }
 
 impl Question {
-    pub(super) fn part(&self) -> Result<QuestionPart, EncodeError> {
+    /// The block of the part's fields; loads that are none take no bytes.
+    pub(super) fn block(&self) -> Result<Block, EncodeError> {
+        let block = Block::of(&self.part()?)?;
+        match self.spread.is_empty() {
+            true => Ok(block),
+            false => block.and(&self.spread.part()?),
+        }
+    }
+
+    fn part(&self) -> Result<QuestionPart, EncodeError> {
         let nodes = match &self.want.nodes {
             NodeChoice::All => NodeChoicePart::All,
             NodeChoice::Nodes(nodes) => {
@@ -118,7 +137,7 @@ impl Question {
     }
 
     /// Writes the arrays: known displacements, forces, wanted nodes if listed, masks and their
-    /// displacements.
+    /// displacements, weight and pressure.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         writer.dof_values(&self.known);
         writer.dof_values(&self.forces);
@@ -127,12 +146,13 @@ impl Question {
         }
         self.masks.write_arrays(writer);
         writer.array(&self.mask_displacements);
+        self.spread.write_arrays(writer);
     }
 
     /// Reads the arrays that [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
     pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
-        part: QuestionPart,
+        QuestionParts { question: part, spread }: QuestionParts,
     ) -> Result<Self, DecodeError> {
         let method = MethodName::try_new(part.method)?;
         let known = reader.dof_values("known displacements", part.known_count as usize)?;
@@ -147,13 +167,38 @@ impl Question {
         let want = Want { nodes, reactions, precision, fields };
         let masks = Masks::read_arrays(reader, part.masks)?;
         let mask_displacements = reader.array("displacements of masks", masks.len())?;
+        let spread = SpreadLoads::read_arrays(reader, spread)?;
         let (max_error, deadline_ms) = (part.max_error, part.deadline_ms);
-        Ok(Self { known, forces, masks, mask_displacements, method, want, max_error, deadline_ms })
+        Ok(Self {
+            known,
+            forces,
+            masks,
+            mask_displacements,
+            method,
+            want,
+            max_error,
+            deadline_ms,
+            spread,
+        })
+    }
+}
+
+impl QuestionParts {
+    /// The parts that a block holds, checked against the limits.
+    pub(super) fn read(block: &Block, limits: &Limits) -> Result<Self, DecodeError> {
+        let (question, rest): (QuestionPart, &[u8]) = block.read_first()?;
+        let spread = match rest.is_empty() {
+            true => SpreadLoadsPart::default(),
+            false => read_fields(rest)?,
+        };
+        question.check(limits)?;
+        spread.check(limits)?;
+        Ok(Self { question, spread })
     }
 }
 
 impl QuestionPart {
-    pub(super) fn check(&self, limits: &Limits) -> Result<(), DecodeError> {
+    fn check(&self, limits: &Limits) -> Result<(), DecodeError> {
         limits.check_text("method", &self.method)?;
         check_count("known displacements", self.known_count, limits.dof_count_max)?;
         check_count("forces", self.force_count, limits.dof_count_max)?;

@@ -118,3 +118,25 @@ fn a_small_system_without_its_compliance_is_not_sent() {
     let encoded = reply.encode_into(1, &Limits::default(), &mut Vec::new());
     assert!(matches!(encoded, Err(EncodeError::CountMismatch { count: 1, expected: 9, .. })));
 }
+
+#[test]
+fn loads_cost_nothing_where_there_are_none_and_an_older_server_refuses_them() {
+    let payload = |ask: Ask| {
+        let mut bytes = Vec::new();
+        Request::from(ask).encode_into(1, &Limits::default(), &mut bytes).unwrap();
+        only_frame(&bytes).payload
+    };
+    let loads = SpreadLoads { densities: vec![1.0], ..SpreadLoads::default() };
+    let ask = |spread: SpreadLoads| {
+        Ask::new(ModelHash([7; 32]), Question { spread, ..Question::default() })
+    };
+    let (plain, loaded) = (payload(ask(SpreadLoads::default())), payload(ask(loads)));
+    // Three doubles, three counts and one density, up to the padding of the part.
+    let more = loaded.len() - plain.len();
+    assert!((32 + 8..=40 + 8).contains(&more), "{more}");
+    // Who skips the fields finds the bytes of the arrays behind the last one that it knows.
+    let seen = [&plain[..], &1.0_f64.to_le_bytes()].concat();
+    assert!(decode(Kind::Ask, &plain).is_ok());
+    let error = decode(Kind::Ask, &seen).unwrap_err();
+    assert!(!matches!(error, DecodeError::TooMany { .. }), "{error}");
+}

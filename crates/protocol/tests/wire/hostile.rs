@@ -222,3 +222,24 @@ fn large_arrays_are_copied_once_each_way() {
     assert!(asked < array_len + 4096, "{asked} bytes of memory for {array_len}");
     assert_eq!(decoded, request);
 }
+
+#[test]
+fn pressures_that_say_other_numbers_of_triangles_than_they_have_are_refused() {
+    let on = SurfacePressure { pressure: 1.0, triangles: vec![[0, 1, 2], [1, 2, 3]] };
+    let spread = SpreadLoads { pressures: vec![on], ..SpreadLoads::default() };
+    let question = Question { spread, ..Question::default() };
+    let mut bytes = Vec::new();
+    let ask = Request::from(Ask::new(ModelHash([7; 32]), question));
+    ask.encode_into(1, &Limits::default(), &mut bytes).unwrap();
+    let payload = only_frame(&bytes).payload.to_vec();
+    // The last arrays: one number with its padding, two triangles.
+    let at = payload.len() - 24 - 8;
+    assert_eq!(payload[at..at + 4], 2_u32.to_le_bytes());
+    for lie in [0, 1, 3, u32::MAX] {
+        let mut hostile = payload.clone();
+        hostile[at..at + 4].copy_from_slice(&u32::to_le_bytes(lie));
+        let error = decode(Kind::Ask.number(), &hostile).unwrap_err();
+        let expected = DecodeError::PressureLengths { lens_sum: u64::from(lie), triangle_count: 2 };
+        assert_eq!(error.to_string(), expected.to_string());
+    }
+}

@@ -259,8 +259,8 @@ fn question() -> impl Strategy<Value = Question> {
     let method = prop::sample::select(vec!["auto", "gauss-jordan", "pcg", "a_b-9"])
         .prop_map(|name| name.parse().unwrap());
     let bounds = (option::of(number()), option::of(number()));
-    (dof_values(), dof_values(), masks(), method, want, bounds).prop_map(
-        |(known, forces, masks, method, want, (max_error, deadline_ms))| Question {
+    (dof_values(), dof_values(), masks(), method, want, bounds, spread()).prop_map(
+        |(known, forces, masks, method, want, (max_error, deadline_ms), spread)| Question {
             known,
             forces,
             mask_displacements: (0..masks.len()).map(|i| [i as f64, -0.5, 1e-3]).collect(),
@@ -269,8 +269,26 @@ fn question() -> impl Strategy<Value = Question> {
             want,
             max_error,
             deadline_ms,
+            spread,
         },
     )
+}
+
+fn spread() -> impl Strategy<Value = SpreadLoads> {
+    let pressure = (number(), vec(any::<[u32; 3]>(), 0..4))
+        .prop_map(|(pressure, triangles)| SurfacePressure { pressure, triangles });
+    let some = (point(), vec(number(), 0..4), vec(pressure, 0..4)).prop_map(
+        |(gravity, densities, pressures)| SpreadLoads {
+            // What draws nothing does not travel.
+            gravity: match densities.is_empty() && pressures.is_empty() {
+                true => [0.0; 3],
+                false => gravity,
+            },
+            densities,
+            pressures,
+        },
+    );
+    prop_oneof![Just(SpreadLoads::default()), some]
 }
 
 fn masks() -> impl Strategy<Value = Masks> {

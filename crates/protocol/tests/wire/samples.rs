@@ -65,6 +65,7 @@ pub fn variants() -> Vec<(&'static str, Message)> {
         Ask { cases: vec![values(2.0), values(-1.0)], without_estimate: true, ..*ask.clone() };
     let with_fields = Want { fields: asked_fields(), ..question().want };
     let of_fields = Ask::new(hash(), Question { want: with_fields, ..question() });
+    let of_loads = Ask::new(hash(), Question { spread: spread(), ..question() });
     let case = CaseAnswer { displacements: vec![[1.0, -2.0, 0.25]; 3], reactions: vec![4.5] };
     let of_several = Answer {
         displacements: Displacements::F64(vec![[0.5, 0.0, 0.0]; 3]),
@@ -82,6 +83,7 @@ pub fn variants() -> Vec<(&'static str, Message)> {
         ("Ask-large", request(of_large)),
         ("Ask-cases", request(of_cases)),
         ("Ask-fields", request(of_fields)),
+        ("Ask-loads", request(of_loads)),
         ("Answer-large", reply(large_answer())),
         ("Answer-cases", reply(of_several)),
         ("Answer-untold", reply(untold)),
@@ -130,6 +132,19 @@ fn question() -> Question {
         },
         max_error: Some(0.01),
         deadline_ms: None,
+        spread: SpreadLoads::default(),
+    }
+}
+
+/// Weight and two pressures.
+fn spread() -> SpreadLoads {
+    SpreadLoads {
+        gravity: [0.0, -9.81, 0.5],
+        densities: vec![1000.0],
+        pressures: vec![
+            SurfacePressure { pressure: 250.0, triangles: vec![[0, 1, 2], [3, 1, 0]] },
+            SurfacePressure { pressure: -40.0, triangles: vec![[2, 3, 1]] },
+        ],
     }
 }
 

@@ -34,11 +34,30 @@ pub enum Delivery {
 /// double precision around it and the smallest single numbers can add.
 const SINGLE: f64 = 5.960_464_477_539_063e-8 * (1.0 + 1e-6);
 
+const NOTHING_MOVES: &str = "nothing moves";
 const NOT_PROVEN: &str = "no lower bound of the smallest eigenvalue has been proven for this shape";
 const OUT_OF_RANGE: &str = "the numbers are too large or too small for a bound in double precision";
 const WEAKLY_HELD: &str =
     "the contacts hold the body so weakly that double precision proves no bound";
 const NO_USE: &str = "the proven error is as large as the displacements";
+
+/// What loads add to an answer and to its errors.
+///
+/// Units: m, N.
+pub(super) struct LoadTerms<'a> {
+    /// Number of loads.
+    pub count: usize,
+    /// Bound of the displacements of the held shape under the loads, as a norm.
+    pub size: f64,
+    /// Residual of these displacements as computed, as a norm, and a bound of it.
+    pub residual: f64,
+    pub residual_bound: f64,
+    /// Right side of the small system, m, and a bound on the norm of what it is off.
+    pub right: &'a DVector<f64>,
+    pub right_off: f64,
+    /// Norm of the right side of (3.42a).
+    pub load_size: f64,
+}
 
 /// What answers of one contact set are judged by.
 #[derive(Clone, Copy)]
@@ -67,7 +86,51 @@ impl Judge<'_> {
         }
     }
 
-    fn residual_rel(self, q: &[f64], answer: &ContactAnswer) -> f64 {
+    /// The same for an answer on which loads act, by the residuals of the columns alone
+    /// (`docs/bound.md`, section 8).
+    pub fn loaded(
+        self,
+        q: &[f64],
+        answer: &ContactAnswer,
+        loads: LoadTerms<'_>,
+        delivered: f64,
+        delivery: Delivery,
+    ) -> Certificate {
+        let residual = self.residual(answer) + loads.residual;
+        let b = loads.load_size;
+        Certificate {
+            residual_rel: if b > 0.0 { residual / b } else { residual },
+            error_bound_rel: self.loaded_bound(norm(q), answer, &loads, (delivered, delivery)),
+        }
+    }
+
+    fn loaded_bound(
+        self,
+        asked: f64,
+        answer: &ContactAnswer,
+        loads: &LoadTerms<'_>,
+        (delivered, delivery): (f64, Delivery),
+    ) -> Result<f64, &'static str> {
+        let Self { base, verified, .. } = self;
+        let eigenvalue = base.eigenvalue_min().ok_or(NOT_PROVEN)?;
+        if asked == 0.0 && loads.size == 0.0 {
+            return Err(NOTHING_MOVES);
+        }
+        let sizes = [asked, loads.size, delivered].into_iter().filter(|size| *size != 0.0);
+        let sizes = sizes.chain([eigenvalue, base.stiffest, verified.scale]);
+        if !sizes.into_iter().all(|x| SAFE.contains(&x)) {
+            return Err(OUT_OF_RANGE);
+        }
+        let factors = verified.amplification(base, eigenvalue).ok_or(WEAKLY_HELD)?;
+        let x = self.scaled(answer);
+        let missed = verified.missed(loads.right, &x) + loads.right_off;
+        let error = self.plain(&x, missed, factors, Some(loads)).ok_or(WEAKLY_HELD)?;
+        let size = (asked / self.overlap.stretch).max(delivered / SLACK - error) / SLACK;
+        relative(error, size, delivered, delivery)
+    }
+
+    /// Bound of the residual's norm by the residuals of columns and motions as computed.
+    fn residual(self, answer: &ContactAnswer) -> f64 {
         let Self { base, small, .. } = self;
         let places = small.places.iter().map(|&(at, axis)| small.columns[at].residuals[axis]);
         let residuals = places.chain(base.modes.iter().map(|m| m.residual));
@@ -76,8 +139,19 @@ impl Judge<'_> {
         // What the contacts are off moves their neighbours by at most so much force.
         let stiffest = (base.stiffest * self.overlap.lift).max(small.scale);
         residual += stiffest * answer.mismatch;
-        let b = self.load.size(q);
+        residual
+    }
+
+    fn residual_rel(self, q: &[f64], answer: &ContactAnswer) -> f64 {
+        let (residual, b) = (self.residual(answer), self.load.size(q));
         if b > 0.0 { residual / b } else { residual }
+    }
+
+    /// Unknowns of the small system, k.
+    fn scaled(self, answer: &ContactAnswer) -> DVector<f64> {
+        let of_lambda = answer.lambda.iter().map(|x| x / self.verified.scale);
+        let x: Vec<f64> = of_lambda.chain(answer.amounts.iter().copied()).collect();
+        DVector::from_vec(x)
     }
 
     fn bound(
@@ -91,17 +165,15 @@ impl Judge<'_> {
         let eigenvalue = base.eigenvalue_min().ok_or(NOT_PROVEN)?;
         let asked = norm(q);
         if asked == 0.0 {
-            return Err("nothing moves");
+            return Err(NOTHING_MOVES);
         }
         if ![asked, eigenvalue, base.stiffest, verified.scale].iter().all(|x| SAFE.contains(x)) {
             return Err(OUT_OF_RANGE);
         }
         let factors = verified.amplification(base, eigenvalue).ok_or(WEAKLY_HELD)?;
-        let of_lambda = answer.lambda.iter().map(|x| x / verified.scale);
-        let x: Vec<f64> = of_lambda.chain(answer.amounts.iter().copied()).collect();
-        let x = DVector::from_vec(x);
+        let x = self.scaled(answer);
         let missed = verified.mismatch(q, &x);
-        let plain = self.plain(&x, missed, factors);
+        let plain = self.plain(&x, missed, factors, None);
         let refined = self.refined(&x, missed, factors);
         let error = match (plain, refined) {
             (Some(plain), Some(refined)) => plain.min(refined),
@@ -111,28 +183,30 @@ impl Judge<'_> {
         let by_contacts = asked / self.overlap.stretch;
         let by_all = self.correction.map_or(0.0, |c| c.size.at_least(&x));
         let size = by_contacts.max((delivered / SLACK).max(by_all) - error) / SLACK;
-        let rounded = match delivery {
-            Delivery::Double => 0.0,
-            Delivery::Single => SINGLE * delivered,
-        };
-        let bound = (error + rounded * SLACK) / size * SLACK;
-        // Written so that a NaN is refused too.
-        if bound < 1.0 { Ok(bound) } else { Err(NO_USE) }
+        relative(error, size, delivered, delivery)
     }
 
     /// The bound from the columns' residuals.
-    fn plain(self, x: &DVector<f64>, missed: f64, factors: Amplification) -> Option<f64> {
+    fn plain(
+        self,
+        x: &DVector<f64>,
+        missed: f64,
+        factors: Amplification,
+        loads: Option<&LoadTerms<'_>>,
+    ) -> Option<f64> {
+        let (count, size, residual) =
+            loads.map_or((0, 0.0, 0.0), |l| (l.count, l.size, l.residual_bound));
         let v = self.verified;
         // Written so that a NaN is refused too.
         let is_verified = v.eta < 0.5;
         let step = missed / (1.0 - v.eta);
-        let residual = Verified::sum(&v.residuals, x) + v.left * step;
-        let size = Verified::sum(&v.norms, x);
+        let residual = Verified::sum(&v.residuals, x) + residual + v.left * step;
+        let size = Verified::sum(&v.norms, x) + size;
         let moments = self.base.rigid.as_ref().map_or(0.0, |rigid| rigid.stiffness);
         let error = factors.of_residual * residual
             + factors.of_moment * moments * (size + v.moved * step)
             + v.moved * step
-            + gamma(x.len() + 6) * size;
+            + gamma(x.len() + count + 6) * size;
         is_verified.then_some(error * SLACK)
     }
 
@@ -163,6 +237,22 @@ impl Judge<'_> {
         let known = c.moved * missed + gamma(v.norms.len() + 8) * c.sizes.at_most(&x.abs());
         Some((said + known) * SLACK)
     }
+}
+
+/// Bound of the error, rounded as it is delivered, over a lower bound of the answer's size.
+fn relative(
+    error: f64,
+    size: f64,
+    delivered: f64,
+    delivery: Delivery,
+) -> Result<f64, &'static str> {
+    let rounded = match delivery {
+        Delivery::Double => 0.0,
+        Delivery::Single => SINGLE * delivered,
+    };
+    let bound = (error + rounded * SLACK) / size * SLACK;
+    // Written so that a NaN is refused too.
+    if (0.0..1.0).contains(&bound) { Ok(bound) } else { Err(NO_USE) }
 }
 
 /// A bound is at least so many times the error that rounding of one unit in the stiffness makes.

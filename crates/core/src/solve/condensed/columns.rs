@@ -238,15 +238,19 @@ fn unit_loads(base: &Base, contact: &Contact) -> [Load; 3] {
 }
 
 /// One column and how well it solves its equations.
-struct Field {
-    field: Vec<f64>,
-    norm: f64,
-    residual: f64,
-    residual_bound: f64,
+pub(super) struct Field {
+    /// Displacement of every degree of freedom, 3N.
+    pub field: Vec<f64>,
+    pub norm: f64,
+    /// Norm of `f − K_B g` over the free degrees of freedom, as computed.
+    pub residual: f64,
+    /// Bound on the same norm, rounding of the computation included.
+    pub residual_bound: f64,
 }
 
 impl Field {
-    fn check(base: &Base, load: &Load, field: Vec<f64>) -> Self {
+    /// Shapes: `load` rows of `K_B` and forces, each row once; `field` 3N.
+    pub fn check(base: &Base, load: &[(usize, f64)], field: Vec<f64>) -> Self {
         let f = base.stiffness.mul(&field);
         let unknown = base.partition.unknown();
         let mut residual: Vec<f64> = unknown.iter().map(|&d| -f[d as usize]).collect();

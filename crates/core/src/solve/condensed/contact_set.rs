@@ -2,12 +2,14 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use nalgebra::DVector;
+
 use super::base::Base;
 use super::certificate::{Certificate, Delivery, Judge};
 use super::columns::Columns;
 use super::correction::Correction;
 use super::error::CondensedError;
-use super::overlap::{LoadSize, Overlap};
+use super::overlap::{LoadProducts, LoadSize, Overlap};
 use super::small_system::{ContactAnswer, SmallSystem, WantedRows};
 use super::touched::Touched;
 use super::verified::Verified;
@@ -167,9 +169,36 @@ impl ContactSet {
             Some(rows) => rows.size_of(delivered),
             None => norm(delivered.as_flattened()),
         };
+        self.judge(base).certificate(q, answer, delivered, delivery)
+    }
+
+    /// What answers of the set are judged by.
+    pub(super) fn judge<'a>(&'a self, base: &'a Base) -> Judge<'a> {
         let Self { small, overlap, verified, load, .. } = self;
         let correction = self.correction.get_ref();
-        let judge = Judge { base, small, overlap, verified, load, correction };
-        judge.certificate(q, answer, delivered, delivery)
+        Judge { base, small, overlap, verified, load, correction }
+    }
+
+    /// Forces and motions for any right side of the small system; see [`SmallSystem::solve_right`].
+    pub(super) fn solve_right(
+        &self,
+        right: &DVector<f64>,
+    ) -> Result<ContactAnswer, CondensedError> {
+        self.small.solve_right(right)
+    }
+
+    /// Scale of the forces in the small system, N/m.
+    pub(super) fn scale(&self) -> f64 {
+        self.small.scale
+    }
+
+    /// Nodes that answers are wanted for, if some were named.
+    pub(super) fn wanted_nodes(&self) -> Option<&[u32]> {
+        self.rows.as_ref().map(|rows| rows.nodes.as_slice())
+    }
+
+    /// Products of loads with each other and with the contacts.
+    pub(super) fn load_products(&self, base: &Base, forces: &[Vec<(u32, f64)>]) -> LoadProducts {
+        LoadProducts::new(base, &self.touched, &self.overlap, forces)
     }
 }

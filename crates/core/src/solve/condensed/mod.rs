@@ -15,7 +15,7 @@
 //!
 //! λ balances itself, so the artificial base carries nothing and `K u = E λ`, `Eᵀu = q` hold exactly;
 //! for single nodes that is (3.43a), and λ are the reactions (3.43b). Nodes that the scene fixes are
-//! a true base and need no R.
+//! a true base and need no R. Loads change the right side only ([`LoadedSet`]).
 
 mod base;
 #[cfg(test)]
@@ -28,6 +28,10 @@ mod error;
 mod free_body;
 mod free_response;
 mod free_tangent;
+mod load_column;
+#[cfg(test)]
+mod load_tests;
+mod loaded_set;
 #[cfg(test)]
 mod mask_tests;
 mod overlap;
@@ -46,5 +50,7 @@ pub use error::CondensedError;
 pub use free_body::{FreeBody, Relief};
 pub use free_response::{Elasticity, HeldCompliance, NodeForce, Response, ShapeResponse};
 pub use free_tangent::FreeTangent;
+pub use load_column::{LoadColumn, UnitLoad};
+pub use loaded_set::{LoadedAnswer, LoadedSet};
 pub use small_system::ContactAnswer;
 pub use touched::{Contact, Touched};

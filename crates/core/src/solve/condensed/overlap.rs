@@ -128,14 +128,8 @@ pub(super) struct LoadSize {
 impl LoadSize {
     /// Shapes: `overlap` that of `touched`.
     pub fn new(base: &Base, touched: &Touched, overlap: &Overlap) -> Self {
-        let is_known = |set: &[u32], row: u32| set.binary_search(&row).is_ok();
-        let has_masks = !touched.masks.is_empty();
         let mut loads = loads_of(base, &touched.columns());
-        for load in &mut loads {
-            load.retain(|&(row, _)| {
-                (has_masks || !is_known(&touched.dofs, row)) && !is_known(&base.fixed, row)
-            });
-        }
+        loads.iter_mut().for_each(|load| load.retain(|&(row, _)| is_counted(base, touched, row)));
         let count = loads.len();
         let mut products = DMatrix::zeros(count, count);
         for j in 0..count {
@@ -155,6 +149,66 @@ impl LoadSize {
         let columns = self.products.column_iter().zip(q);
         let along = |column: &[f64]| column.iter().zip(q).map(|(p, q)| p * q).sum::<f64>();
         columns.map(|(p, q_j)| along(p.as_slice()) * q_j).sum::<f64>().max(0.0).sqrt()
+    }
+}
+
+/// Whether a row counts in the size of the right side: not what the scene fixes, nor, without masks, what
+/// is touched.
+fn is_counted(base: &Base, touched: &Touched, row: u32) -> bool {
+    let is_known = |set: &[u32]| set.binary_search(&row).is_ok();
+    (!touched.masks.is_empty() || !is_known(&touched.dofs)) && !is_known(&base.fixed)
+}
+
+/// Products of loads with each other and with what the contacts' displacements are equal to, so that the
+/// size of `b = f − K12 q` is known for any amounts and any `q`.
+pub(super) struct LoadProducts {
+    /// Loads with each other, l × l.
+    own: DMatrix<f64>,
+    /// Contacts with loads, c × l.
+    mixed: DMatrix<f64>,
+}
+
+impl LoadProducts {
+    /// Shapes: `forces` one sparse column for each load, ascending by degree of freedom.
+    pub fn new(
+        base: &Base,
+        touched: &Touched,
+        overlap: &Overlap,
+        forces: &[Vec<(u32, f64)>],
+    ) -> Self {
+        let counted = |column: &Vec<(u32, f64)>| {
+            let rows = column.iter().copied();
+            rows.filter(|&(row, _)| is_counted(base, touched, row)).collect::<Vec<_>>()
+        };
+        let forces: Vec<Vec<(u32, f64)>> = forces.iter().map(counted).collect();
+        let of_contacts: Vec<_> = loads_of(base, &touched.columns()).iter().map(counted).collect();
+        let (c, l) = (of_contacts.len(), forces.len());
+        let mixed = DMatrix::from_fn(c, l, |i, j| product(&of_contacts[i], &forces[j]));
+        Self {
+            own: DMatrix::from_fn(l, l, |i, j| product(&forces[i.min(j)], &forces[i.max(j)])),
+            mixed: match overlap.inverse() {
+                Some(inverse) => inverse * mixed,
+                None => mixed,
+            },
+        }
+    }
+
+    /// Numbers kept.
+    pub fn len(&self) -> usize {
+        self.own.len() + self.mixed.len()
+    }
+
+    /// Norm `‖b‖` for displacements `q` of the contacts and amounts of the loads; `of_contacts` is that
+    /// without loads.
+    pub fn size(&self, of_contacts: f64, q: &[f64], amounts: &[f64]) -> f64 {
+        let product = |matrix: &DMatrix<f64>, left: &[f64]| {
+            let columns = matrix.column_iter().zip(amounts);
+            let along = |column: &[f64]| column.iter().zip(left).map(|(p, x)| p * x).sum::<f64>();
+            columns.map(|(column, amount)| along(column.as_slice()) * amount).sum::<f64>()
+        };
+        let square =
+            of_contacts.powi(2) + product(&self.own, amounts) - 2.0 * product(&self.mixed, q);
+        square.max(0.0).sqrt()
     }
 }
 

@@ -154,6 +154,24 @@ fn sign_of(i: usize, j: usize) -> f64 {
     if (mixed ^ (mixed >> 33)) & 1 == 0 { 1.0 } else { -1.0 }
 }
 
+/// Sum of products as if computed in twice the working precision, and a bound on how far it is off.
+///
+/// Source: Ogita, Rump, Oishi, Accurate sum and dot product (2005), algorithm 5.3 and (5.8).
+pub(super) fn accurate_dot(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let (mut high, mut low, mut sizes, mut count) = (0.0, 0.0, 0.0, 0);
+    for (a, b) in pairs {
+        let (product, rest) = two_product(a, b);
+        let (sum, lost) = two_sum(high, product);
+        high = sum;
+        low += lost + rest;
+        sizes += (a * b).abs();
+        count += 1;
+    }
+    let value: f64 = high + low;
+    let terms = gamma(count + 1);
+    (value, (UNIT * value.abs() + terms * terms * sizes) * SLACK)
+}
+
 /// Rounded sum and what rounding lost (Knuth).
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;

@@ -114,17 +114,28 @@ impl SmallSystem {
     /// # Errors
     /// [`CondensedError::NotHeld`], [`CondensedError::NotFinite`].
     pub fn solve(&self, q: &[f64]) -> Result<ContactAnswer, CondensedError> {
-        let c = self.places.len();
         let right = DVector::from_fn(self.matrix.nrows(), |i, _| q.get(i).copied().unwrap_or(0.0));
+        self.solve_right(&right)
+    }
+
+    /// Forces and motions for any right side.
+    ///
+    /// Shapes: `right` displacements of the contacts, then moments along the motions over the scale of the
+    /// forces; c + z. Units: m.
+    ///
+    /// # Errors
+    /// [`CondensedError::NotHeld`], [`CondensedError::NotFinite`].
+    pub fn solve_right(&self, right: &DVector<f64>) -> Result<ContactAnswer, CondensedError> {
+        let c = self.places.len();
         let solve = |right: &DVector<f64>| match &self.lu {
             Some(lu) => lu.solve(right).ok_or(CondensedError::NotHeld),
             None => Ok(right.clone()),
         };
-        let mut x = solve(&right)?;
+        let mut x = solve(right)?;
         // One step of refinement takes out the rounding of the elimination and of the symmetry.
-        let miss = &right - &self.matrix * &x;
+        let miss = right - &self.matrix * &x;
         x += solve(&miss)?;
-        let mismatch = (&right - &self.matrix * &x).norm();
+        let mismatch = (right - &self.matrix * &x).norm();
         if !x.iter().all(|v| v.is_finite()) {
             return Err(CondensedError::NotFinite);
         }
@@ -190,12 +201,17 @@ impl WantedRows {
     /// Displacements of an answer, 3 per node, m.
     pub fn displacements(&self, answer: &ContactAnswer) -> Vec<[f64; 3]> {
         let x: Vec<f64> = answer.lambda.iter().chain(&answer.amounts).copied().collect();
+        self.product(&x)
+    }
+
+    /// The rows times some amounts of their fields, 3 per node.
+    pub fn product(&self, x: &[f64]) -> Vec<[f64; 3]> {
         let mut u = vec![[0.0; 3]; self.nodes.len()];
         let parts = u.chunks_mut(ROWS_TOGETHER / 3).map(|part| part.as_flattened_mut());
         let blocks = self.blocks.chunks((ROWS_TOGETHER * x.len()).max(1));
         match self.blocks.len() < SHARED_PRODUCT {
-            true => parts.zip(blocks).for_each(|(u, block)| multiply(block, &x, u)),
-            false => parts.zip(blocks).par_bridge().for_each(|(u, block)| multiply(block, &x, u)),
+            true => parts.zip(blocks).for_each(|(u, block)| multiply(block, x, u)),
+            false => parts.zip(blocks).par_bridge().for_each(|(u, block)| multiply(block, x, u)),
         }
         u
     }

@@ -110,7 +110,14 @@ impl Verified {
     /// Shapes: `x` scaled unknowns, k; `q` displacements of the contacts, c.
     pub fn mismatch(&self, q: &[f64], x: &DVector<f64>) -> f64 {
         let right = DVector::from_fn(x.len(), |i, _| q.get(i).copied().unwrap_or(0.0));
-        let missed = (&right - &self.small.middle * x).norm();
+        self.missed(&right, x)
+    }
+
+    /// The same for any right side that is exact.
+    ///
+    /// Shapes: k.
+    pub fn missed(&self, right: &DVector<f64>, x: &DVector<f64>) -> f64 {
+        let missed = (right - &self.small.middle * x).norm();
         let lost = (&self.lost * x.abs() + right.abs() * gamma(2)).norm();
         settled(missed, lost) * SLACK
     }

@@ -208,9 +208,12 @@ impl<'a> Block<'a> {
         if has_stalled || !displacement.iter().all(|q| q.is_finite()) {
             return None;
         }
-        let forces = &self.products.forces;
-        let reaction =
-            self.partition.known().iter().map(|&dof| forces[dof as usize * self.columns + j]);
+        let internal = &self.products.forces;
+        let external = |at: usize| self.forces.as_ref().map_or(0.0, |forces| forces[at]);
+        let reaction = self.partition.known().iter().map(|&dof| {
+            let at = dof as usize * self.columns + j;
+            internal[at] - external(at)
+        });
         let (residual, b_norm) = (progress.residual_norms[j], self.b_norms[j]);
         Some(Solution {
             displacement,

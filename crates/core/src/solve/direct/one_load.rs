@@ -80,7 +80,7 @@ pub(super) fn solve(
     partition.scatter_unknown(&x, &mut q);
     system.check_finite(&q)?;
     let solution = Solution {
-        reaction: system.reactions(&q),
+        reaction: system.reactions(&q, loads.forces),
         displacement: q,
         residual_rel: if b_norm > 0.0 { norm(&residual) / b_norm } else { norm(&residual) },
         backward_error,
@@ -143,7 +143,7 @@ fn solve_by_cycles(
     let residual: Vec<f64> =
         partition.unknown().iter().map(|&dof| found.residual[dof as usize]).collect();
     Ok(Solution {
-        reaction: system.reactions(&q),
+        reaction: system.reactions(&q, loads.forces),
         backward_error: backward_error(stiffness, partition, &q, &residual, loads.forces),
         displacement: q,
         residual_rel: found.residual_rel,

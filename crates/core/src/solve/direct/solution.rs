@@ -10,12 +10,12 @@ use crate::solve::{Method, Partition};
 /// One load case: prescribed displacements (Dirichlet values) and external forces.
 ///
 /// Shapes: `q_known` one per known degree of freedom of the partition, in its order; `forces`
-/// empty or 3N (entries on known degrees of freedom must be zero). Units: m, N.
+/// empty or 3N. Units: m, N.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Loads<'a> {
     /// Prescribed displacements (Dirichlet values) `Q_k`.
     pub q_known: &'a [f64],
-    /// `f₁` of (3.7), scattered over all degrees of freedom.
+    /// `f` of (3.7). What acts on a known degree of freedom moves nothing: its support carries it.
     pub forces: &'a [f64],
     /// Relative residual and estimated relative error that are good enough, both, for a method that
     /// can stop early ([`Method::Pcg`](crate::solve::Method::Pcg)); zero asks for all there is.
@@ -46,7 +46,8 @@ impl fmt::Display for Fallback {
 pub struct Solution {
     /// Displacement of every degree of freedom, 3N, m; zero at orphan nodes.
     pub displacement: Vec<f64>,
-    /// Reaction `F_u` (3.43b) of every known degree of freedom, in the partition's order, N.
+    /// Reaction `F_u` (3.43b) of every known degree of freedom, in the partition's order, N: the force of
+    /// its support.
     pub reaction: Vec<f64>,
     /// `‖K11 Q_u − b‖₂ / ‖b‖₂`, zero when `b` is.
     pub residual_rel: f64,
@@ -120,9 +121,10 @@ impl System<'_> {
         }
     }
 
-    /// Reactions (3.43b) at the known degrees of freedom.
-    pub fn reactions(self, q: &[f64]) -> Vec<f64> {
+    /// Reactions (3.43b) at the known degrees of freedom: what the supports give beside the loads.
+    pub fn reactions(self, q: &[f64], forces: &[f64]) -> Vec<f64> {
         let f = self.stiffness.mul(q);
-        self.partition.known().iter().map(|&dof| f[dof as usize]).collect()
+        let external = |dof: usize| forces.get(dof).copied().unwrap_or(0.0);
+        self.partition.known().iter().map(|&dof| f[dof as usize] - external(dof as usize)).collect()
     }
 }

@@ -131,7 +131,9 @@ impl Followed {
         let error = error + missing;
         // A shape that has hardly set out is measured by the way that it has to go.
         let largest = self.shape.size().max(missing);
-        let reactions = self.shape.hold.dofs().iter().map(|&dof| evaluated.forces[dof as usize]);
+        let external = |dof: usize| self.forces.get(dof).copied().unwrap_or(0.0);
+        let of_support = |&dof: &u32| evaluated.forces[dof as usize] - external(dof as usize);
+        let reactions = self.shape.hold.dofs().iter().map(of_support);
         let stored = (2.0 * evaluated.energy).max(0.0).sqrt();
         Equilibrium {
             reactions: reactions.collect(),

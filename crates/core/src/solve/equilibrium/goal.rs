@@ -13,7 +13,8 @@ pub struct Goal<'a> {
     pub q_known: &'a [f64],
     /// Mean displacement of each mask.
     pub mask_q: &'a [f64],
-    /// Forces on unknown degrees of freedom, which keep their directions.
+    /// Forces, which keep their directions. What acts on a known degree of freedom moves nothing: its
+    /// support carries it.
     pub forces: &'a [f64],
 }
 

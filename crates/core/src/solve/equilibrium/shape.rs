@@ -118,8 +118,7 @@ impl Shape {
         hold.subtract_mask_forces(&mask_forces, &mut residual);
         let left = norm(&residual);
         let of_masks = (before * before - left * left).max(0.0).sqrt();
-        let reactions: Vec<f64> =
-            hold.partition.known().iter().map(|&dof| evaluated.forces[dof as usize]).collect();
+        let reactions: Vec<f64> = hold.partition.known().iter().map(out_of_balance).collect();
         let loads = norm(goal.forces);
         let held_by = norm(&[of_masks, norm(&reactions), loads]);
         // Forces of a body that nothing presses are rounding, and so is what they are off by.
