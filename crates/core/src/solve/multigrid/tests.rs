@@ -55,7 +55,8 @@ fn check_against(model: &Model, pairs: &[(u32, f64)], method: Method) -> u32 {
     let found = answer(model, pairs, Method::Multigrid).unwrap();
     let error = off(&found.displacement, &dense.displacement);
     let estimate = found.error_estimate_rel.unwrap();
-    assert!(error <= estimate + 1e-13 && error <= 1e-9, "{error:e}, estimated {estimate:e}");
+    // Rounding of either answer is not in the estimate.
+    assert!(error <= estimate + 1e-12 && error <= 1e-9, "{error:e}, estimated {estimate:e}");
     let forces = off(&found.reaction, &dense.reaction);
     assert!(forces <= 1e-7, "reactions off by {forces:e}");
     found.refinement_steps
