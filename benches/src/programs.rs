@@ -112,7 +112,8 @@ impl Programs {
 
 /// Starts a command and waits until it listens.
 fn listening(what: &str, mut command: Command, is_job: bool) -> Result<Server, ReportError> {
-    let failed = |source| ReportError::Process { what: what.to_owned(), source };
+    let started = command.get_program().display().to_string();
+    let failed = |source| ReportError::Process { what: started.clone(), source };
     let mut said = tempfile::tempfile().map_err(failed)?;
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(match is_job {
         true => Stdio::from(said.try_clone().map_err(failed)?),
@@ -127,18 +128,20 @@ fn listening(what: &str, mut command: Command, is_job: bool) -> Result<Server, R
     match address {
         Some(address) => Ok(Server { address, process }),
         None => {
-            let said = first_line(&mut said).unwrap_or_default();
+            let said = words_of(what, &mut said).unwrap_or_default();
             Err(ReportError::Ended { what: what.to_owned(), said })
         }
     }
 }
 
-/// First line of a file that is not empty.
-fn first_line(file: &mut File) -> Option<String> {
+/// The line of a file that a program has written under its own name, or else the first with words.
+fn words_of(program: &str, file: &mut File) -> Option<String> {
     let mut text = String::new();
     file.rewind().ok()?;
     file.read_to_string(&mut text).ok()?;
-    text.lines().map(str::trim).find(|line| !line.is_empty()).map(str::to_owned)
+    let lines = || text.lines().map(str::trim).filter(|line| line.contains(char::is_alphanumeric));
+    let own = lines().find_map(|line| line.strip_prefix(program)?.strip_prefix(": "));
+    own.or_else(|| lines().next()).map(str::to_owned)
 }
 
 /// Process that is ended when this is dropped.

@@ -72,6 +72,14 @@ fn peak_gib() -> f64 {
     kib.unwrap_or(f64::NAN) / (1 << 20) as f64
 }
 
+/// Processor time that the process has used, s: what other programs on the machine do is not in it.
+fn busy_s() -> f64 {
+    const TICKS: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat.rsplit_once(')').map_or("", |(_, fields)| fields).split_whitespace();
+    fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / TICKS
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let of = |k: usize, default: &str| arguments.get(k).map_or(default.to_owned(), Clone::clone);
@@ -147,22 +155,24 @@ fn run_together(model: &Model, known: &Known, factored: &Factored, cases: usize)
         .collect();
     let loads: Vec<Loads<'_>> =
         sets.iter().map(|q_known| Loads { q_known, ..Loads::default() }).collect();
-    let start = Instant::now();
+    let (start, busy) = (Instant::now(), busy_s());
     let together =
         factored.solve_several(model.stiffness(), &loads, &mut |_| {}).expect("their answers");
-    let together_s = start.elapsed().as_secs_f64();
-    let (mut alone_s, mut most, mut steps) = (0.0, 0.0f64, 0);
+    let (together_s, together_busy_s) = (start.elapsed().as_secs_f64(), busy_s() - busy);
+    let (mut alone_s, mut alone_busy_s, mut most, mut steps) = (0.0, 0.0, 0.0f64, 0);
     for (found, loads) in together.iter().zip(&loads) {
-        let start = Instant::now();
+        let (start, busy) = (Instant::now(), busy_s());
         let alone = factored.solve(model.stiffness(), *loads, &mut |_| {}).expect("its answer");
         alone_s += start.elapsed().as_secs_f64();
+        alone_busy_s += busy_s() - busy;
         most = most.max(off(&alone.displacement, &found.displacement));
         steps = steps.max(found.refinement_steps);
     }
     println!(
-        "{cases} cases together {together_s:.2} s, one by one {alone_s:.2} s, {:.2} times as fast, at most \
-         {steps} steps, off by {most:.1e}, peak {:.2} GiB",
-        alone_s / together_s,
+        "{cases} cases together {together_s:.2} s ({together_busy_s:.2} s of processors), one by one \
+         {alone_s:.2} s ({alone_busy_s:.2} s), {:.2} times the processor time, at most {steps} steps, off by \
+         {most:.1e}, peak {:.2} GiB",
+        alone_busy_s / together_busy_s,
         peak_gib()
     );
 }
