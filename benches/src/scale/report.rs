@@ -142,7 +142,8 @@ fn beside_each_other(rows: &[Row]) -> String {
             three_digits(memory)
         ));
     }
-    if let Some((nodes, m)) = of_multigrid().filter(|(nodes, _)| *nodes >= MILLION).last() {
+    let largest = of_multigrid().max_by_key(|(nodes, _)| *nodes);
+    if let Some((nodes, m)) = largest.filter(|(nodes, _)| *nodes >= MILLION) {
         let gib = m.peak_bytes / GIB;
         lines.push(format!(
             "- {nodes} nodes by `multigrid`: {} s and {} GiB; the bar is {MILLION_BAR_GIB} GiB ({}).",

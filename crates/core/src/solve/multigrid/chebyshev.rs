@@ -98,14 +98,17 @@ const ESTIMATE_STEPS: usize = 14;
 /// Degree of the polynomial.
 const DEGREE: usize = 2;
 
+/// The numbers of one row of W vectors, B unknowns at each node.
+type Row<const B: usize, const W: usize> = [[f32; W]; B];
+
 /// What a smoother works on: W vectors, the numbers of one row next to each other.
 pub(super) struct Vectors<const B: usize, const W: usize> {
     /// Correction that smoothing has made.
-    pub x: Vec<[[f32; W]; B]>,
+    pub x: Vec<Row<B, W>>,
     /// What is left of the right-hand sides.
-    pub r: Vec<[[f32; W]; B]>,
+    pub r: Vec<Row<B, W>>,
     /// The last step, and room for the next one.
-    d: [Vec<[[f32; W]; B]>; 2],
+    d: [Vec<Row<B, W>>; 2],
 }
 
 impl<const B: usize, const W: usize> Vectors<B, W> {
@@ -115,7 +118,7 @@ impl<const B: usize, const W: usize> Vectors<B, W> {
     }
 
     /// Makes a step by tasks of rows (`fill(first row, steps)`) and adds it to the correction.
-    pub fn take_correction(&mut self, fill: impl Fn(usize, &mut [[[f32; W]; B]]) + Sync) {
+    pub fn take_correction(&mut self, fill: impl Fn(usize, &mut [Row<B, W>]) + Sync) {
         let Self { x, d: [d, _], .. } = self;
         let tasks = d.par_chunks_mut(TASK_ROWS).zip(x.par_chunks_mut(TASK_ROWS));
         tasks.enumerate().for_each(|(task, (d, x))| {
@@ -125,14 +128,14 @@ impl<const B: usize, const W: usize> Vectors<B, W> {
     }
 
     /// The last step, and the residual that it leaves out of account.
-    pub fn step_and_residual(&mut self) -> (&[[[f32; W]; B]], &mut [[[f32; W]; B]]) {
+    pub fn step_and_residual(&mut self) -> (&[Row<B, W>], &mut [Row<B, W>]) {
         (&self.d[0], &mut self.r)
     }
 }
 
 /// `x + d` in the place of `x`.
 #[inline(always)]
-fn add<const B: usize, const W: usize>(x: &mut [[f32; W]; B], d: &[[f32; W]; B]) {
+fn add<const B: usize, const W: usize>(x: &mut Row<B, W>, d: &Row<B, W>) {
     for (x, d) in x.as_flattened_mut().iter_mut().zip(d.as_flattened()) {
         *x += d;
     }
@@ -140,7 +143,7 @@ fn add<const B: usize, const W: usize>(x: &mut [[f32; W]; B], d: &[[f32; W]; B])
 
 /// `x − d` in the place of `x`.
 #[inline(always)]
-fn subtract<const B: usize, const W: usize>(x: &mut [[f32; W]; B], d: &[[f32; W]; B]) {
+fn subtract<const B: usize, const W: usize>(x: &mut Row<B, W>, d: &Row<B, W>) {
     for (x, d) in x.as_flattened_mut().iter_mut().zip(d.as_flattened()) {
         *x -= d;
     }
@@ -256,8 +259,8 @@ impl<const B: usize> Chebyshev<B> {
     fn turn<const W: usize>(
         &self,
         a: &BlockRows<B, B>,
-        (d, next): (&[[[f32; W]; B]], &mut [[[f32; W]; B]]),
-        (x, r): (&mut [[[f32; W]; B]], &mut [[[f32; W]; B]]),
+        (d, next): (&[Row<B, W>], &mut [Row<B, W>]),
+        (x, r): (&mut [Row<B, W>], &mut [Row<B, W>]),
         (of_last, of_force): (f32, f32),
     ) {
         let out = next.par_chunks_mut(TASK_ROWS).zip(x.par_chunks_mut(TASK_ROWS));
