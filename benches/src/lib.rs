@@ -18,6 +18,7 @@
 //! ```
 
 pub mod axis;
+mod balance;
 mod ball;
 pub mod collision;
 pub mod command;
@@ -39,6 +40,7 @@ pub mod report;
 pub mod report_error;
 mod requests;
 pub mod sample;
+pub mod scale;
 pub mod scaling;
 pub mod scene;
 pub mod service;
@@ -60,6 +62,8 @@ pub enum ReportName {
     Frontier,
     /// The factor over fronts against what the machine can do at most.
     Limits,
+    /// Nodes against time and memory, 10⁴ to 10⁶, by factors, multigrid and a cluster's worker.
+    Scale,
     /// Figures 5.1, 5.2 and 6.13 to 6.16 of the thesis, measured again.
     Scaling,
     /// Force of one press on finer meshes by each contact model, and its frame time.
@@ -83,6 +87,7 @@ pub fn measure(name: ReportName, options: &Options) -> Result<Report, ReportErro
         ReportName::Latency => latency::measure(options),
         ReportName::Frontier => frontier::measure(options),
         ReportName::Limits => limits::measure(options),
+        ReportName::Scale => scale::measure(options),
         ReportName::Scaling => scaling::measure(options),
         ReportName::Contact => contact::measure(options),
         ReportName::Felt => felt::measure(options),

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 
 use softgrasp_bench::quick::Quick;
-use softgrasp_bench::{ReportName, measure};
+use softgrasp_bench::{ReportName, measure, scale};
 
 fn quick(name: ReportName) -> Quick {
     Quick::make(|options| measure(name, options))
@@ -86,6 +86,30 @@ fn scaling_is_timed_fitted_and_drawn_with_small_errors() {
     }
     let vertices = std::fs::read_to_string(report.folder().join("scaling-vertices.svg")).unwrap();
     assert!(vertices.contains("gauss-jordan") && vertices.contains("1998"));
+}
+
+/// Sizes that a test has time for; with and without a worker.
+#[test]
+fn scale_is_measured_in_processes_of_its_own() {
+    let report = Quick::make(|options| scale::measure_sizes(options, &[1000, 2197, 4096]));
+    let ways = report.column("scale.csv", "way");
+    let steps = report.column("scale.csv", "steps");
+    for (k, way) in ["front", "front-mixed", "multigrid"].into_iter().enumerate() {
+        assert_eq!(ways.iter().filter(|w| *w == way).count(), 3, "{ways:?}");
+        assert_eq!(steps[k].is_empty(), way != "multigrid");
+    }
+    assert!(report.column("scale.csv", "outcome").iter().all(|outcome| outcome == "answered"));
+    assert!(report.numbers("scale.csv", "residual_rel").iter().all(|&e| e <= 1e-8));
+    assert!(report.numbers("scale.csv", "peak_memory_gib").iter().all(|&gib| gib > 0.005));
+    let off = report.column("scale.csv", "off_front_rel");
+    assert_eq!(off.iter().filter(|off| off.is_empty()).count(), 3, "front has nothing beside it");
+    assert!(report.numbers("scale-laws.csv", "sizes").iter().all(|&sizes| sizes == 3.0));
+    let page = std::fs::read_to_string(report.folder().join("scale.md")).unwrap();
+    let has_worker = ways.iter().any(|way| way.starts_with("worker"));
+    assert_ne!(has_worker, page.contains("No worker was asked: "), "{page}");
+    assert_eq!(has_worker, report.has("scale-machines.csv"));
+    assert!(page.contains("4096 nodes, the largest size that `front` answered"), "{page}");
+    assert!(report.has("scale-time.svg") && report.has("scale-memory.svg"));
 }
 
 #[test]

@@ -9,16 +9,18 @@ use std::process::Command;
 use softgrasp_tests::quoting::items;
 
 /// Code that a report measures, by the beginning of its file's name.
-const MEASURED: [(&str, &[&str]); 7] = [
+const MEASURED: [(&str, &[&str]); 8] = [
     ("latency-frame", &["crates/core/src/solve/condensed", "crates/protocol/src", ANSWERS]),
     ("latency-hold", &["crates/core/src/solve/condensed", "crates/protocol/src", ANSWERS]),
     ("latency-onset", &["crates/core/src/solve/condensed", "crates/core/src/solve/front", ANSWERS]),
     ("peers", &["crates/core/src/solve/front", "crates/core/src/solve/ordering"]),
     ("service-session", &["crates/core/src/solve/front", "crates/core/src/solve/ordering"]),
     ("scaling", &["crates/core/src/solve/front", "crates/core/src/fem/assembly.rs"]),
+    ("scale", &["crates/core/src/solve/front", "crates/core/src/solve/multigrid", WORKER]),
     ("collision", &["crates/grasp/src/sphere_tree"]),
 ];
 const ANSWERS: &str = "crates/fea-server/src/answer";
+const WORKER: &str = "cluster/fea-worker/src";
 /// Heading of the section that lists the reports older than the code they measure.
 const OLDER: &str = "Older than the code they measure";
 

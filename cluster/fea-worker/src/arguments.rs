@@ -75,6 +75,7 @@ impl Arguments {
             threads: self.threads,
             max_nodes: self.max_nodes,
             max_elements: Limits::LARGEST.tet_count_max,
+            max_frame: Limits::LARGEST.payload_len_max,
             memory_limit: self.memory_per_rank.0,
             tokens: self.token_file.as_deref().map(Tokens::read).transpose()?,
             encryption,

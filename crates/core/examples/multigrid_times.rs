@@ -4,7 +4,9 @@
 //! `multigrid_times SHAPE NODES [POISSON] [ELEMENT] [METHOD]…`, SHAPE a built-in object; or
 //! `lattice`, a cube of boxes of six tetrahedra of any size; `flat:H`, the same of height H; `slivers:H`,
 //! the same with every eighth inner node pushed up to that share of its box below the next;
-//! `contrast:C`, the same of two materials in boxes of four nodes' breadth. METHOD those to run, `multigrid` alone by default. Peak memory is that of the process, so one method a run.
+//! `contrast:C`, the same of two materials in boxes of four nodes' breadth. METHOD those to run, `multigrid`
+//! alone by default; `multigrid:8` solves eight load cases together as well, and compares them with each
+//! alone. Peak memory is that of the process, so one method a run.
 #![allow(clippy::print_stdout, reason = "a table on standard output is what it is for")]
 
 use std::time::Instant;
@@ -13,7 +15,7 @@ use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::{Element, Material};
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate, signed_volume};
 use softgrasp_core::model::{Known, Model};
-use softgrasp_core::solve::{Loads, Method};
+use softgrasp_core::solve::{Factored, Loads, Method};
 
 /// A cube of `n`³ nodes, six tetrahedra a box.
 fn lattice(n: usize, place_of: impl Fn([usize; 3], Point3<f64>) -> Point3<f64>) -> TetMesh {
@@ -70,6 +72,14 @@ fn peak_gib() -> f64 {
     kib.unwrap_or(f64::NAN) / (1 << 20) as f64
 }
 
+/// Processor time that the process has used, s: what other programs on the machine do is not in it.
+fn busy_s() -> f64 {
+    const TICKS: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat.rsplit_once(')').map_or("", |(_, fields)| fields).split_whitespace();
+    fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / TICKS
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let of = |k: usize, default: &str| arguments.get(k).map_or(default.to_owned(), Clone::clone);
@@ -78,9 +88,9 @@ fn main() {
     let poisson: f64 = of(2, "0.3").parse().expect("Poisson's ratio");
     let name = of(3, "t4");
     let element = Element::ALL.into_iter().find(|e| e.name() == name).expect("an element");
-    let methods: Vec<Method> = match arguments.get(4..) {
-        None | Some([]) => vec![Method::Multigrid],
-        Some(names) => names.iter().map(|name| name.parse().expect("a method")).collect(),
+    let methods: Vec<(Method, usize)> = match arguments.get(4..) {
+        None | Some([]) => vec![(Method::Multigrid, 1)],
+        Some(names) => names.iter().map(|name| method_and_cases(name)).collect(),
     };
     let start = Instant::now();
     let (shape, hardness) = shape.split_once(':').unwrap_or((&shape, "1"));
@@ -119,10 +129,58 @@ fn main() {
     run(&model, &known, methods);
 }
 
+/// A method, and the number of load cases behind its colon.
+fn method_and_cases(text: &str) -> (Method, usize) {
+    let (name, cases) = text.split_once(':').unwrap_or((text, "1"));
+    (name.parse().expect("a method"), cases.parse().expect("a number of load cases"))
+}
+
+fn size(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// How far two answers are apart, over the size of the first.
+fn off(first: &[f64], second: &[f64]) -> f64 {
+    let off: Vec<f64> = first.iter().zip(second).map(|(a, b)| a - b).collect();
+    size(&off) / size(first)
+}
+
+/// Solves several load cases together and one by one.
+fn run_together(model: &Model, known: &Known, factored: &Factored, cases: usize) {
+    let sets: Vec<Vec<f64>> = (0..cases)
+        .map(|case| {
+            let value = |(k, q): (usize, &f64)| q * (1.0 + (1.7 * (k % 3 + case) as f64).sin());
+            known.q_known.iter().enumerate().map(value).collect()
+        })
+        .collect();
+    let loads: Vec<Loads<'_>> =
+        sets.iter().map(|q_known| Loads { q_known, ..Loads::default() }).collect();
+    let (start, busy) = (Instant::now(), busy_s());
+    let together =
+        factored.solve_several(model.stiffness(), &loads, &mut |_| {}).expect("their answers");
+    let (together_s, together_busy_s) = (start.elapsed().as_secs_f64(), busy_s() - busy);
+    let (mut alone_s, mut alone_busy_s, mut most, mut steps) = (0.0, 0.0, 0.0f64, 0);
+    for (found, loads) in together.iter().zip(&loads) {
+        let (start, busy) = (Instant::now(), busy_s());
+        let alone = factored.solve(model.stiffness(), *loads, &mut |_| {}).expect("its answer");
+        alone_s += start.elapsed().as_secs_f64();
+        alone_busy_s += busy_s() - busy;
+        most = most.max(off(&alone.displacement, &found.displacement));
+        steps = steps.max(found.refinement_steps);
+    }
+    println!(
+        "{cases} cases together {together_s:.2} s ({together_busy_s:.2} s of processors), one by one \
+         {alone_s:.2} s ({alone_busy_s:.2} s), {:.2} times the processor time, at most {steps} steps, off by \
+         {most:.1e}, peak {:.2} GiB",
+        alone_busy_s / together_busy_s,
+        peak_gib()
+    );
+}
+
 /// Runs the methods one after the other, and compares each with the first.
-fn run(model: &Model, known: &Known, methods: Vec<Method>) {
+fn run(model: &Model, known: &Known, methods: Vec<(Method, usize)>) {
     let mut first: Option<Vec<f64>> = None;
-    for method in methods {
+    for (method, cases) in methods {
         let start = Instant::now();
         let factored = model.factor(&known.dofs, method, &mut |_| {}).expect("a factor");
         let setup_s = start.elapsed().as_secs_f64();
@@ -136,12 +194,7 @@ fn run(model: &Model, known: &Known, methods: Vec<Method>) {
             }
         };
         let solve_s = start.elapsed().as_secs_f64();
-        let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let error = first.as_ref().map_or(f64::NAN, |first| {
-            let off: Vec<f64> =
-                first.iter().zip(&solution.displacement).map(|(a, b)| a - b).collect();
-            size(&off) / size(first)
-        });
+        let error = first.as_ref().map_or(f64::NAN, |first| off(first, &solution.displacement));
         println!(
             "{method}: set-up {setup_s:.2} s, solve {solve_s:.2} s, {} steps, residual {:.1e}, \
              estimate {:.1e}, off the first method by {error:.1e}, held {:.2} GiB, peak {:.2} GiB",
@@ -152,5 +205,8 @@ fn run(model: &Model, known: &Known, methods: Vec<Method>) {
             peak_gib()
         );
         first.get_or_insert(solution.displacement);
+        if cases > 1 {
+            run_together(model, known, &factored, cases);
+        }
     }
 }

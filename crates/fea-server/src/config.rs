@@ -214,8 +214,8 @@ mod tests {
     #[test]
     fn a_server_can_be_told_to_read_as_much_as_one_message_holds() {
         assert_eq!(ServerConfig::default().limits(), Limits::default());
-        let (max_nodes, max_elements) = (u32::MAX, u32::MAX);
-        let most = ServerConfig { max_nodes, max_elements, ..ServerConfig::default() };
+        let (max_nodes, max_elements, max_frame) = (u32::MAX, u32::MAX, u32::MAX);
+        let most = ServerConfig { max_nodes, max_elements, max_frame, ..ServerConfig::default() };
         assert_eq!(most.limits(), Limits::LARGEST);
         let Limits { node_count_max, tet_count_max, payload_len_max, .. } = Limits::LARGEST;
         let bytes = 24 * u64::from(node_count_max) + 16 * u64::from(tet_count_max);

@@ -215,7 +215,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
     async fn write(&mut self, request_id: u64, reply: &Reply) -> Result<(), SessionError> {
         self.out.clear();
         // Replies are limited by the protocol, not by what this server reads.
-        if let Err(error) = reply.encode_into(request_id, &Limits::default(), &mut self.out) {
+        if let Err(error) = reply.encode_into(request_id, &Limits::LARGEST, &mut self.out) {
             tracing::error!(%error, "a reply cannot be encoded");
             let rejected = Reply::Rejected(Refusal::Internal.to_message());
             if rejected.encode_into(request_id, &Limits::default(), &mut self.out).is_err() {

@@ -39,13 +39,14 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// The most that a server can be told to read, and that a client reads: two million nodes and six
-    /// elements for each come to 229 MiB, which one payload holds.
+    /// The most that a server can be told to read, and that a client reads: sixteen million nodes and six
+    /// elements for each come to 1.8 GiB, less than half of what the header can tell of a payload. The
+    /// leanest method needs 60 GiB for so many.
     pub const LARGEST: Self = Self {
-        payload_len_max: 256 * 1024 * 1024,
-        node_count_max: 2_000_000,
-        tet_count_max: 12_000_000,
-        dof_count_max: 6_000_000,
+        payload_len_max: 2 * 1024 * 1024 * 1024,
+        node_count_max: 16_000_000,
+        tet_count_max: 96_000_000,
+        dof_count_max: 48_000_000,
         material_count_max: 65_536,
         text_len_max: 16 * 1024,
     };

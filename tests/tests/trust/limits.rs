@@ -5,7 +5,7 @@ use std::time::Duration;
 use fea_server::{RunningServer, ServerConfig};
 use glove_client::ask::connection::{LinkError, ServerConnection};
 use softgrasp_core::mesh::TetMesh;
-use softgrasp_protocol::{HEADER_LEN, ModelHash, RejectCode, Reply, Request};
+use softgrasp_protocol::{HEADER_LEN, Limits, ModelHash, RejectCode, Reply, Request};
 use softgrasp_tests::questions::{cube, once, upload};
 use softgrasp_tests::raw_session::{RawSession, request_frame};
 use softgrasp_tests::watchdog::{until, within};
@@ -72,12 +72,47 @@ fn bytes_of_a_message() {
             }
             other => panic!("{max_frame}: {other:?}"),
         }
-        // A client that knows the limit from the welcome does not even send it.
+        // A client that knows the limit from the welcome does not even send it, and goes on.
         if !fits {
-            let told = client(&server).welcome().limits.payload_len_max;
-            assert_eq!(told, max_frame);
+            let mut client = client(&server);
+            assert_eq!(client.welcome().limits.payload_len_max, max_frame);
+            assert!(matches!(client.ask(&request), Err(LinkError::Encode(_))));
+            let pong = client.ask(&Request::Ping { nonce: 7 }).unwrap();
+            assert_eq!(pong, Reply::Pong { nonce: 7 });
         }
     }
+}
+
+/// A mesh of more than 256 MiB is read as one message by a server that was told to; by another its client
+/// does not send it.
+#[test]
+fn a_message_beyond_the_usual_limit_is_read_where_the_server_was_told_to() {
+    let mut large = upload(&cube(27));
+    large.mesh.regions.clear();
+    large.mesh.tets = vec![[0, 1, 2, 3]; 17_000_000];
+    // Which is refused as soon as it is looked at.
+    large.mesh.tets[0] = [0, 1, 2, 27];
+    let request = Request::UploadModel(large);
+    let limits = Limits::LARGEST;
+    let told = ServerConfig {
+        max_nodes: limits.node_count_max,
+        max_elements: limits.tet_count_max,
+        max_frame: limits.payload_len_max,
+        ..config(1)
+    };
+    within(5 * LIMIT, "a large message", move || {
+        let server = start(told.clone());
+        let (code, text) = refusal(&mut client(&server), &request);
+        assert!(code == RejectCode::BadRequest && text.contains("27"), "{code}: {text}");
+        let usual = start(config(1));
+        assert!(matches!(client(&usual).ask(&request), Err(LinkError::Encode(_))));
+        // What has no room is refused by its header; the session goes on.
+        let small = start(ServerConfig { memory_limit: 256 << 20, ..told.clone() });
+        let mut of_small = client(&small);
+        let (code, text) = refusal(&mut of_small, &request);
+        assert_eq!(code, RejectCode::MemoryLimit, "{text}");
+        assert_eq!(is_solved(&small, &cube(27)), Ok(()));
+    });
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! The largest object: one answer by the real program, checked against the equations.
 
-use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,6 +9,7 @@ use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{BuiltIn, Surface, generate};
 use softgrasp_core::model::{Element, Model};
 
+use crate::balance::imbalance;
 use crate::programs::Programs;
 use crate::report::{ReportError, check, progress};
 use crate::scene::presses;
@@ -121,25 +121,6 @@ fn answer(path: &Path) -> Result<Vec<f64>, ReportError> {
     Ok(displacement)
 }
 
-/// Largest force on a free degree of freedom, relative to the largest on a known one; infinite if the
-/// answer does not have the known displacements or the right length.
-fn imbalance(model: &Model, known: &[(u32, f64)], displacement: &[f64]) -> f64 {
-    let size = known.iter().fold(0.0f64, |m, (_, u)| m.max(u.abs()));
-    let is_kept = |&(dof, u): &(u32, f64)| {
-        displacement.get(dof as usize).is_some_and(|got| (got - u).abs() <= 1e-12 * size)
-    };
-    if displacement.len() != 3 * model.mesh().node_count() || !known.iter().all(is_kept) {
-        return f64::INFINITY;
-    }
-    let held: BTreeSet<usize> = known.iter().map(|&(dof, _)| dof as usize).collect();
-    let (mut free, mut needed) = (0.0f64, 0.0f64);
-    for (dof, force) in model.stiffness().mul(displacement).iter().enumerate() {
-        let largest = if held.contains(&dof) { &mut needed } else { &mut free };
-        *largest = if force.is_finite() { largest.max(force.abs()) } else { f64::INFINITY };
-    }
-    free / needed
-}
-
 fn write(path: &Path, text: String) -> Result<(), ReportError> {
     std::fs::write(path, text)
         .map_err(|source| ReportError::Write { path: path.to_owned(), source })
@@ -156,24 +137,3 @@ const COLUMNS: [&str; 9] = [
     "error_estimate_rel",
     "residual_rel",
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::Pressed;
-    use softgrasp_core::solve::Method;
-
-    #[test]
-    fn an_answer_that_is_moved_is_out_of_balance() {
-        let scene = Pressed::try_new(BuiltIn::Sphere, 100).unwrap();
-        let (model, _) = scene.model().unwrap();
-        let (_, solution) = scene.analyse(Method::SparseCholesky).unwrap();
-        let mut displacement = solution.displacement;
-        assert!(imbalance(&model, &scene.pairs, &displacement) < 1e-12);
-        let free = (0..displacement.len()).find(|&d| scene.pairs.iter().all(|p| p.0 as usize != d));
-        displacement[free.unwrap()] *= 1.0 + 1e-6;
-        assert!(imbalance(&model, &scene.pairs, &displacement) > 1e-12);
-        displacement.pop();
-        assert_eq!(imbalance(&model, &scene.pairs, &displacement), f64::INFINITY);
-    }
-}

@@ -108,6 +108,8 @@ impl Row<'_> {
                 24.. => self.some_columns::<24, SIZES>(from, forces, sizes),
                 16.. => self.some_columns::<16, SIZES>(from, forces, sizes),
                 8.. => self.some_columns::<8, SIZES>(from, forces, sizes),
+                4.. => self.some_columns::<4, SIZES>(from, forces, sizes),
+                2.. => self.some_columns::<2, SIZES>(from, forces, sizes),
                 _ => self.some_columns::<1, SIZES>(from, forces, sizes),
             };
         }

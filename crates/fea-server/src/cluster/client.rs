@@ -164,6 +164,6 @@ impl Requests {
 
 fn encoded(request: &Request, id: u64) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
-    request.encode_into(id, &Limits::default(), &mut bytes)?;
+    request.encode_into(id, &Limits::LARGEST, &mut bytes)?;
     Ok(bytes)
 }

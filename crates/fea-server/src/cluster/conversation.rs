@@ -74,7 +74,7 @@ impl Conversation {
                 Box::new(stream)
             }
         };
-        let connection = Connection::new(stream, Limits::default());
+        let connection = Connection::new(stream, Limits::LARGEST);
         let mut conversation = Self { connection };
         let hello = Hello {
             alive_every_ms: ALIVE_EVERY_MS,

@@ -164,8 +164,13 @@ impl Host {
             ServerChoice::Embedded => {
                 let stage = StageWatch::default();
                 let usual = ServerConfig::default();
+                let largest = Limits::LARGEST;
                 let config = ServerConfig {
                     listen: SocketAddr::from(([127, 0, 0, 1], 0)),
+                    // Nobody else asks it: memory alone is its limit.
+                    max_nodes: largest.node_count_max,
+                    max_elements: largest.tet_count_max,
+                    max_frame: largest.payload_len_max,
                     threads: threads.unwrap_or(usual.threads),
                     memory_limit: memory_limit.unwrap_or(usual.memory_limit),
                     stage: stage.clone(),
@@ -215,7 +220,7 @@ impl ServerConnection {
         let stream = ServerStream::new(open_socket(&endpoint.address)?, &endpoint)?;
         stream.set_read_timeout(Some(WELCOME_MAX)).map_err(|e| LinkError::Connection(e.into()))?;
         let mut this = Self {
-            connection: Connection::new(stream, Limits::default()),
+            connection: Connection::new(stream, Limits::LARGEST),
             limits: Limits::default(),
             welcome: Welcome::default(),
             request_id: 0,
@@ -225,7 +230,11 @@ impl ServerConnection {
         let client = concat!("glove-client ", env!("CARGO_PKG_VERSION"));
         let hello = Hello::new(client, endpoint.token);
         match this.ask(&Request::Hello(hello)) {
-            Ok(Reply::Welcome(welcome)) => this.welcome = welcome,
+            Ok(Reply::Welcome(welcome)) => {
+                // What the server would not read is refused here, with the numbers, before it is sent.
+                this.limits.payload_len_max = welcome.limits.payload_len_max;
+                this.welcome = welcome;
+            }
             Ok(other) => return Err(unexpected("Hello", &other)),
             Err(LinkError::Connection(ConnectionError::Frame(FrameError::Magic { found })))
                 if found.first() == Some(&TLS_ALERT) =>

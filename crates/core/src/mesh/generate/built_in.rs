@@ -58,7 +58,7 @@ pub enum GenerateError {
 pub const NODES_MIN: usize = 27;
 
 /// Most nodes an object is made with.
-pub const NODES_MAX: usize = 400_000;
+pub const NODES_MAX: usize = 2_000_000;
 
 impl BuiltIn {
     /// Every object, in the order of the names.

@@ -222,6 +222,9 @@ impl Factored {
         on_stage(Stage::Solve);
         let system = self.system(stiffness);
         loads.iter().try_for_each(|loads| system.check(*loads))?;
+        if let Kernel::Multigrid(hierarchy) = &self.kernel {
+            return one_load::solve_by_cycles(system, hierarchy, loads).into_iter().collect();
+        }
         let alone = |loads: &Loads<'_>| self.solve(stiffness, *loads, &mut |_| {});
         let is_together = self.with_kernel(Kernel::takes_rows)
             && !matches!(self.method(), Method::Pcg | Method::Condensed);

@@ -7,7 +7,7 @@ use super::refinement::{Judged, RESIDUAL_GOOD, refine};
 use super::solution::{Loads, Solution, System};
 use crate::solve::Method;
 use crate::solve::certainty::backward_error;
-use crate::solve::multigrid::{self, Goal, Hierarchy};
+use crate::solve::multigrid::{self, Goal, Hierarchy, Outcome, TOGETHER};
 use crate::solve::pcg::{self, PcgOutcome, PcgParams};
 use crate::solve::rates::ERROR_ITERATED;
 use crate::solve::vectors::{norm, subtract};
@@ -36,7 +36,8 @@ pub(super) fn solve(
     loads: Loads<'_>,
 ) -> Result<(Solution, bool), SolveError> {
     if let Kernel::Multigrid(hierarchy) = kernel {
-        return Ok((solve_by_cycles(system, hierarchy, loads)?, true));
+        let mut found = solve_by_cycles(system, hierarchy, &[loads]);
+        return found.pop().expect("as many answers as loads").map(|solution| (solution, true));
     }
     let is_single = kernel.is_single();
     let stops_early = is_single && system.method == Method::Pcg;
@@ -109,21 +110,44 @@ fn solve_by_pcg(
     (reached, is_near)
 }
 
-/// The answer by conjugate gradients that a hierarchy preconditions.
-fn solve_by_cycles(
+/// Answers by conjugate gradients that a hierarchy preconditions, in the order of the loads.
+///
+/// # Errors
+/// For each load [`SolveError::NotFinite`], [`SolveError::NotConverged`].
+pub(super) fn solve_by_cycles(
     system: System<'_>,
     hierarchy: &Hierarchy,
-    loads: Loads<'_>,
-) -> Result<Solution, SolveError> {
-    let System { stiffness, partition, method, .. } = system;
-    let mut b = vec![0.0; partition.dof_count()];
-    partition.scatter_unknown(&system.right_hand_side(loads), &mut b);
+    loads: &[Loads<'_>],
+) -> Vec<Result<Solution, SolveError>> {
+    let System { stiffness, partition, .. } = system;
+    let of_some = |some: &[Loads<'_>]| -> Vec<_> {
+        let posed = |loads: &Loads<'_>| {
+            let mut b = vec![0.0; partition.dof_count()];
+            partition.scatter_unknown(&system.right_hand_side(*loads), &mut b);
+            (b, goal_of(*loads))
+        };
+        let asked: Vec<(Vec<f64>, Goal)> = some.iter().map(posed).collect();
+        let found = multigrid::solve(stiffness, partition, hierarchy, &asked);
+        drop(asked);
+        found.into_iter().zip(some).map(|(found, loads)| answer(system, *loads, found)).collect()
+    };
+    // No more right-hand sides are there at once than are worked on.
+    loads.chunks(TOGETHER).flat_map(of_some).collect()
+}
+
+/// How far steps by a hierarchy go.
+fn goal_of(loads: Loads<'_>) -> Goal {
     let (residual_rel, error_rel) = match loads.residual_rel > 0.0 {
         true => (loads.residual_rel.max(RESIDUAL_ITERATED), loads.residual_rel.max(ERROR_ITERATED)),
         false => (RESIDUAL_ITERATED, ERROR_ITERATED),
     };
-    let goal = Goal { residual_rel, error_rel, steps_max: STEPS_MAX };
-    let found = multigrid::solve(stiffness, partition, hierarchy, &b, goal);
+    Goal { residual_rel, error_rel, steps_max: STEPS_MAX }
+}
+
+/// The answer that steps by a hierarchy found, if it is one.
+fn answer(system: System<'_>, loads: Loads<'_>, found: Outcome) -> Result<Solution, SolveError> {
+    let System { stiffness, partition, method, .. } = system;
+    let error_rel = goal_of(loads).error_rel;
     let mut q = found.x;
     system.prescribe(loads, &mut q);
     system.check_finite(&q)?;
@@ -159,13 +183,17 @@ pub(super) fn inverse_by_cycles(system: System<'_>, hierarchy: &Hierarchy, b: &[
     let System { stiffness, partition, .. } = system;
     let n = partition.unknown().len();
     let goal = Goal { residual_rel: 1.0, error_rel: ERROR_OF_CONDITION, steps_max: STEPS_MAX };
-    let of_column = |b: &[f64]| {
+    let posed = |b: &[f64]| {
         let mut all = vec![0.0; partition.dof_count()];
         partition.scatter_unknown(b, &mut all);
-        let found = multigrid::solve(stiffness, partition, hierarchy, &all, goal);
+        (all, goal)
+    };
+    let asked: Vec<(Vec<f64>, Goal)> = b.chunks(n.max(1)).map(posed).collect();
+    let found = multigrid::solve(stiffness, partition, hierarchy, &asked);
+    let of_column = |found: Outcome| {
         let is_digit = found.error_estimate_rel <= ERROR_OF_CONDITION;
         let x = partition.unknown().iter().map(|&dof| found.x[dof as usize]);
         x.map(|x| if is_digit { x } else { f64::NAN }).collect::<Vec<f64>>()
     };
-    b.chunks(n.max(1)).flat_map(of_column).collect()
+    found.into_iter().flat_map(of_column).collect()
 }

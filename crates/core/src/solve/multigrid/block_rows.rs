@@ -104,30 +104,46 @@ impl<const R: usize, const C: usize> BlockRows<R, C> {
 
     /// Calls `each(k, product of row first + k with x)` for some rows, in their order.
     ///
-    /// Shapes: `x` one place for each column.
-    pub fn products(
+    /// Shapes: `x` one place for each column, with W vectors next to each other.
+    pub fn products<const W: usize>(
         &self,
         (first, count): (usize, usize),
-        x: &[[f32; C]],
-        each: impl FnMut(usize, [f32; R]),
+        x: &[[[f32; W]; C]],
+        each: impl FnMut(usize, [[f32; W]; R]),
     ) {
         Arch::new().dispatch(Products { matrix: self, first, count, x, each });
     }
 
-    /// Product of one row. Terms of one entry of the block are added up first, then those of a line.
+    /// Product of one row. With one vector terms of one entry of the block are added up first, then those of
+    /// a line; several vectors fill the registers by themselves.
     #[inline(always)]
-    fn product(&self, row: usize, x: &[[f32; C]]) -> [f32; R] {
-        let mut sums = [[0.0f32; C]; R];
+    fn product<const W: usize>(&self, row: usize, x: &[[[f32; W]; C]]) -> [[f32; W]; R] {
         let range = self.range(row);
-        for (block, &column) in self.blocks[range.clone()].iter().zip(&self.columns[range]) {
+        let pairs = self.blocks[range.clone()].iter().zip(&self.columns[range]);
+        if W == 1 {
+            let mut sums = [[0.0f32; C]; R];
+            for (block, &column) in pairs {
+                let x = &x[column as usize];
+                for (sums, block) in sums.iter_mut().zip(block) {
+                    for c in 0..C {
+                        sums[c] += block[c] * x[c][0];
+                    }
+                }
+            }
+            return sums.map(|line| [line.iter().sum(); W]);
+        }
+        let mut sums = [[0.0f32; W]; R];
+        for (block, &column) in pairs {
             let x = &x[column as usize];
-            for (sums, block) in sums.iter_mut().zip(block) {
-                for c in 0..C {
-                    sums[c] += block[c] * x[c];
+            for (sum, line) in sums.iter_mut().zip(block) {
+                for (entry, x) in line.iter().zip(x) {
+                    for w in 0..W {
+                        sum[w] += entry * x[w];
+                    }
                 }
             }
         }
-        sums.map(|line| line.iter().sum())
+        sums
     }
 }
 
@@ -144,15 +160,17 @@ impl<const B: usize> NodeMatrix<B, B> for BlockRows<B, B> {
 }
 
 /// Some rows of a product.
-struct Products<'a, F, const R: usize, const C: usize> {
+struct Products<'a, F, const R: usize, const C: usize, const W: usize> {
     matrix: &'a BlockRows<R, C>,
     first: usize,
     count: usize,
-    x: &'a [[f32; C]],
+    x: &'a [[[f32; W]; C]],
     each: F,
 }
 
-impl<F: FnMut(usize, [f32; R]), const R: usize, const C: usize> WithSimd for Products<'_, F, R, C> {
+impl<F: FnMut(usize, [[f32; W]; R]), const R: usize, const C: usize, const W: usize> WithSimd
+    for Products<'_, F, R, C, W>
+{
     type Output = ();
 
     #[inline(always)]

@@ -98,37 +98,54 @@ const ESTIMATE_STEPS: usize = 14;
 /// Degree of the polynomial.
 const DEGREE: usize = 2;
 
-/// What a smoother works on.
-pub(super) struct Vectors<const B: usize> {
+/// The numbers of one row of W vectors, B unknowns at each node.
+type Row<const B: usize, const W: usize> = [[f32; W]; B];
+
+/// What a smoother works on: W vectors, the numbers of one row next to each other.
+pub(super) struct Vectors<const B: usize, const W: usize> {
     /// Correction that smoothing has made.
-    pub x: Vec<[f32; B]>,
-    /// What is left of the right-hand side.
-    pub r: Vec<[f32; B]>,
+    pub x: Vec<Row<B, W>>,
+    /// What is left of the right-hand sides.
+    pub r: Vec<Row<B, W>>,
     /// The last step, and room for the next one.
-    d: [Vec<[f32; B]>; 2],
+    d: [Vec<Row<B, W>>; 2],
 }
 
-impl<const B: usize> Vectors<B> {
+impl<const B: usize, const W: usize> Vectors<B, W> {
     pub fn new(rows: usize) -> Self {
-        let zeros = || vec![[0.0; B]; rows];
+        let zeros = || vec![[[0.0; W]; B]; rows];
         Self { x: zeros(), r: zeros(), d: [zeros(), zeros()] }
     }
 
     /// Makes a step by tasks of rows (`fill(first row, steps)`) and adds it to the correction.
-    pub fn take_correction(&mut self, fill: impl Fn(usize, &mut [[f32; B]]) + Sync) {
+    pub fn take_correction(&mut self, fill: impl Fn(usize, &mut [Row<B, W>]) + Sync) {
         let Self { x, d: [d, _], .. } = self;
         let tasks = d.par_chunks_mut(TASK_ROWS).zip(x.par_chunks_mut(TASK_ROWS));
         tasks.enumerate().for_each(|(task, (d, x))| {
             fill(task * TASK_ROWS, d);
-            for (x, d) in x.iter_mut().zip(d) {
-                (0..B).for_each(|k| x[k] += d[k]);
-            }
+            x.iter_mut().zip(d).for_each(|(x, d)| add(x, d));
         });
     }
 
     /// The last step, and the residual that it leaves out of account.
-    pub fn step_and_residual(&mut self) -> (&[[f32; B]], &mut [[f32; B]]) {
+    pub fn step_and_residual(&mut self) -> (&[Row<B, W>], &mut [Row<B, W>]) {
         (&self.d[0], &mut self.r)
+    }
+}
+
+/// `x + d` in the place of `x`.
+#[inline(always)]
+fn add<const B: usize, const W: usize>(x: &mut Row<B, W>, d: &Row<B, W>) {
+    for (x, d) in x.as_flattened_mut().iter_mut().zip(d.as_flattened()) {
+        *x += d;
+    }
+}
+
+/// `x − d` in the place of `x`.
+#[inline(always)]
+fn subtract<const B: usize, const W: usize>(x: &mut Row<B, W>, d: &Row<B, W>) {
+    for (x, d) in x.as_flattened_mut().iter_mut().zip(d.as_flattened()) {
+        *x -= d;
     }
 }
 
@@ -165,11 +182,11 @@ impl<const B: usize> Chebyshev<B> {
         let rows = a.row_count();
         // Without pattern, so that no mesh is orthogonal to it.
         let mixed = |i: usize| (7.3 * (i + 1) as f64).sin() as f32;
-        let mut r: Vec<[f32; B]> = (0..rows)
+        let mut r: Vec<[[f32; 1]; B]> = (0..rows)
             .into_par_iter()
-            .map(|row| std::array::from_fn(|k| mixed(B * row + k)))
+            .map(|row| std::array::from_fn(|k| [mixed(B * row + k)]))
             .collect();
-        let mut p = vec![[0.0; B]; rows];
+        let mut p = vec![[[0.0]; B]; rows];
         let (mut rho, mut beta) = (0.0, 0.0);
         let mut ritz = Ritz::default();
         let mut alpha = 0.0;
@@ -186,9 +203,9 @@ impl<const B: usize> Chebyshev<B> {
             rho = rho_next;
             let of_last = beta as f32;
             p.par_iter_mut().with_min_len(TASK_ROWS).zip(&z).for_each(|(p, z)| {
-                (0..B).for_each(|k| p[k] = z[k] + of_last * p[k]);
+                (0..B).for_each(|k| p[k] = [z[k][0] + of_last * p[k][0]]);
             });
-            let mut ap = vec![[0.0; B]; rows];
+            let mut ap = vec![[[0.0]; B]; rows];
             ap.par_chunks_mut(TASK_ROWS).enumerate().for_each(|(task, ap)| {
                 a.products((task * TASK_ROWS, ap.len()), &p, |k, product| ap[k] = product);
             });
@@ -199,19 +216,19 @@ impl<const B: usize> Chebyshev<B> {
             }
             let length = alpha as f32;
             r.par_iter_mut().with_min_len(TASK_ROWS).zip(&ap).for_each(|(r, ap)| {
-                (0..B).for_each(|k| r[k] -= length * ap[k]);
+                (0..B).for_each(|k| r[k][0] -= length * ap[k][0]);
             });
         }
         ritz.largest().filter(|largest| *largest > 0.0).unwrap_or(1.0)
     }
 
-    fn divide(&self, r: &[[f32; B]]) -> Vec<[f32; B]> {
+    fn divide(&self, r: &[[[f32; 1]; B]]) -> Vec<[[f32; 1]; B]> {
         let pairs = self.inverse_diagonal.par_iter().with_min_len(TASK_ROWS).zip(r);
         pairs.map(|(inverse, r)| times(inverse, r)).collect()
     }
 
     /// Improves `x`, whose residual is `r`, which follows only if `finish`.
-    pub fn smooth(&self, a: &BlockRows<B, B>, v: &mut Vectors<B>, finish: bool) {
+    pub fn smooth<const W: usize>(&self, a: &BlockRows<B, B>, v: &mut Vectors<B, W>, finish: bool) {
         let smallest = self.largest / SMOOTHED_DOWN_TO;
         let middle = 0.5 * (self.largest + smallest);
         let half = 0.5 * (self.largest - smallest);
@@ -222,8 +239,8 @@ impl<const B: usize> Chebyshev<B> {
         let steps = d.par_iter_mut().with_min_len(TASK_ROWS).zip(x.par_iter_mut());
         steps.zip(self.inverse_diagonal.par_iter().zip(r.par_iter())).for_each(
             |((d, x), (inverse, r))| {
-                *d = times(inverse, r).map(|step| by * step);
-                (0..B).for_each(|k| x[k] += d[k]);
+                *d = times(inverse, r).map(|step| step.map(|step| by * step));
+                add(x, d);
             },
         );
         for _ in 1..DEGREE {
@@ -239,38 +256,38 @@ impl<const B: usize> Chebyshev<B> {
     }
 
     /// One more step: `r − A d`, then `next = of_last d + of_force D⁻¹ r`, then `x + next`.
-    fn turn(
+    fn turn<const W: usize>(
         &self,
         a: &BlockRows<B, B>,
-        (d, next): (&[[f32; B]], &mut [[f32; B]]),
-        (x, r): (&mut [[f32; B]], &mut [[f32; B]]),
+        (d, next): (&[Row<B, W>], &mut [Row<B, W>]),
+        (x, r): (&mut [Row<B, W>], &mut [Row<B, W>]),
         (of_last, of_force): (f32, f32),
     ) {
         let out = next.par_chunks_mut(TASK_ROWS).zip(x.par_chunks_mut(TASK_ROWS));
         out.zip(r.par_chunks_mut(TASK_ROWS)).enumerate().for_each(|(task, ((next, x), r))| {
             let first = task * TASK_ROWS;
             a.products((first, next.len()), d, |row, product| {
-                (0..B).for_each(|k| r[row][k] -= product[k]);
+                subtract(&mut r[row], &product);
                 let force = times(&self.inverse_diagonal[first + row], &r[row]);
-                for k in 0..B {
-                    next[row][k] = of_last * d[first + row][k] + of_force * force[k];
-                    x[row][k] += next[row][k];
+                let ours = next[row].as_flattened_mut().iter_mut();
+                let theirs = d[first + row].as_flattened().iter().zip(force.as_flattened());
+                for (next, (d, force)) in ours.zip(theirs) {
+                    *next = of_last * d + of_force * force;
                 }
+                add(&mut x[row], &next[row]);
             });
         });
     }
 }
 
 /// `r − A d` in the place of `r`.
-pub(super) fn subtract_product<const R: usize, const C: usize>(
+pub(super) fn subtract_product<const R: usize, const C: usize, const W: usize>(
     a: &BlockRows<R, C>,
-    d: &[[f32; C]],
-    r: &mut [[f32; R]],
+    d: &[[[f32; W]; C]],
+    r: &mut [[[f32; W]; R]],
 ) {
     r.par_chunks_mut(TASK_ROWS).enumerate().for_each(|(task, r)| {
-        a.products((task * TASK_ROWS, r.len()), d, |row, product| {
-            (0..R).for_each(|k| r[row][k] -= product[k]);
-        });
+        a.products((task * TASK_ROWS, r.len()), d, |row, product| subtract(&mut r[row], &product));
     });
 }
 

@@ -46,18 +46,25 @@ impl Coarsest {
         }
     }
 
-    /// The answer, or something near it, in `v.x` for the right-hand side `v.r`.
-    pub fn solve(&self, v: &mut Vectors<MOTIONS>) {
+    /// The answers, or something near them, in `v.x` for the right-hand sides `v.r`.
+    pub fn solve<const W: usize>(&self, v: &mut Vectors<MOTIONS, W>) {
         match self {
             Self::Factor(tiles) => {
-                let mut b: Vec<f64> = v.r.iter().flatten().map(|x| f64::from(*x)).collect();
-                tiles.solve_in_place(&mut b);
-                for (x, b) in v.x.iter_mut().zip(b.as_chunks::<MOTIONS>().0) {
-                    *x = b.map(|b| b as f32);
+                let solved: Vec<Vec<f64>> = (0..W)
+                    .into_par_iter()
+                    .map(|w| {
+                        let of_column = v.r.as_flattened().iter().map(|x| f64::from(x[w]));
+                        let mut b: Vec<f64> = of_column.collect();
+                        tiles.solve_in_place(&mut b);
+                        b
+                    })
+                    .collect();
+                for (row, x) in v.x.as_flattened_mut().iter_mut().enumerate() {
+                    *x = std::array::from_fn(|w| solved[w][row] as f32);
                 }
             }
             Self::Smoothed(a, smoother) => {
-                v.x.fill([0.0; MOTIONS]);
+                v.x.fill([[0.0; W]; MOTIONS]);
                 smoother.smooth(a, v, true);
                 smoother.smooth(a, v, false);
             }
@@ -107,11 +114,11 @@ const COARSENED: f64 = 0.8;
 /// Most levels of a hierarchy.
 const LEVELS_MAX: usize = 20;
 
-/// What one descent and ascent works on.
-pub(crate) struct Workspace {
-    fine: Vectors<AXES>,
-    coarse: Vec<Vectors<MOTIONS>>,
-    coarsest: Vectors<MOTIONS>,
+/// What one descent and ascent works on, for W right-hand sides at once.
+pub(crate) struct Workspace<const W: usize> {
+    fine: Vectors<AXES, W>,
+    coarse: Vec<Vectors<MOTIONS, W>>,
+    coarsest: Vectors<MOTIONS, W>,
 }
 
 impl Hierarchy {
@@ -139,7 +146,7 @@ impl Hierarchy {
     }
 
     /// Memory for [`Hierarchy::apply`].
-    pub fn workspace(&self) -> Workspace {
+    pub fn workspace<const W: usize>(&self) -> Workspace<W> {
         Workspace {
             fine: Vectors::new(self.fine.row_count()),
             coarse: self.coarse.iter().map(|level| Vectors::new(level.row_count())).collect(),
@@ -162,29 +169,35 @@ impl Hierarchy {
             + std::mem::size_of_val(self.unknown.as_slice())
     }
 
-    /// Nearly `K11⁻¹ r`, symmetric positive definite up to single precision's rounding.
+    /// Nearly `K11⁻¹ r` for W right-hand sides, symmetric positive definite up to single precision's
+    /// rounding. Each is scaled by itself, so none spoils the digits of another.
     ///
-    /// Shapes: `r` and `z` 3N, known rows of `r` zero, those of `z` become zero. Units: N, m.
-    pub fn apply(&self, r: &[f64], z: &mut [f64], w: &mut Workspace) {
-        let size = largest(r);
-        let size = if size > 0.0 && size.is_finite() { size } else { 1.0 };
-        let by = 1.0 / size;
+    /// Shapes: `r` and `z` 3N × W, the numbers of one degree of freedom next to each other; known rows of
+    /// `r` zero, those of `z` become zero. Units: N, m.
+    pub fn apply<const W: usize>(&self, r: &[f64], z: &mut [f64], w: &mut Workspace<W>) {
+        let is_scale = |size: f64| size > 0.0 && size.is_finite();
+        let sizes = largest::<W>(r).map(|size| if is_scale(size) { size } else { 1.0 });
+        let by = sizes.map(|size| 1.0 / size);
         let nodes = self.nodes.par_iter().with_min_len(TASK_ROWS);
         w.fine.r.par_iter_mut().zip(nodes).for_each(|(place, &node)| {
-            let first = AXES * node as usize;
-            *place = std::array::from_fn(|axis| (by * r[first + axis]) as f32);
+            let r = &r[AXES * W * node as usize..];
+            for (place, r) in place.iter_mut().zip(r.as_chunks::<W>().0) {
+                *place = std::array::from_fn(|w| (by[w] * r[w]) as f32);
+            }
         });
         self.cycle(w);
-        let back = size * self.scale;
-        z.par_chunks_mut(TASK_ROWS * AXES).enumerate().for_each(|(task, z)| {
+        let back = sizes.map(|size| size * self.scale);
+        z.par_chunks_mut(TASK_ROWS * AXES * W).enumerate().for_each(|(task, z)| {
             z.fill(0.0);
             let first = (task * TASK_ROWS) as u32;
-            let last = first + (z.len() / AXES) as u32;
+            let last = first + (z.len() / (AXES * W)) as u32;
             let from = self.nodes.partition_point(|&node| node < first);
             let nodes = self.nodes[from..].iter().take_while(|node| **node < last);
             for (&node, x) in nodes.zip(&w.fine.x[from..]) {
-                let at = AXES * (node - first) as usize;
-                (0..AXES).for_each(|axis| z[at + axis] = back * f64::from(x[axis]));
+                let z = &mut z[AXES * W * (node - first) as usize..];
+                for (z, x) in z.as_chunks_mut::<W>().0.iter_mut().zip(x) {
+                    *z = std::array::from_fn(|w| back[w] * f64::from(x[w]));
+                }
             }
         });
     }
@@ -199,12 +212,12 @@ impl Hierarchy {
         for (&dof, r) in self.unknown.iter().zip(r) {
             all[dof as usize] = *r;
         }
-        self.apply(&all, &mut z, &mut self.workspace());
+        self.apply::<1>(&all, &mut z, &mut self.workspace());
         self.unknown.iter().map(|&dof| z[dof as usize]).collect()
     }
 
     /// Down and up again: `w.fine.x` for `w.fine.r`.
-    fn cycle(&self, w: &mut Workspace) {
+    fn cycle<const W: usize>(&self, w: &mut Workspace<W>) {
         let Workspace { fine, coarse, coarsest } = w;
         self.fine.descend(fine, coarse.first_mut().map_or(&mut coarsest.r, |v| &mut v.r));
         for (k, level) in self.coarse.iter().enumerate() {

@@ -96,23 +96,29 @@ impl<const B: usize> Level<B> {
 
     /// Smooths from nothing, and hands what is left to the coarser level: `Pᵀ r`.
     ///
-    /// Shapes: `v` this level's, `v.r` the right-hand side; `coarse` one place per aggregate.
-    pub fn descend(&self, v: &mut Vectors<B>, coarse: &mut [[f32; MOTIONS]]) {
-        v.x.par_chunks_mut(TASK_ROWS).for_each(|x| x.fill([0.0; B]));
+    /// Shapes: `v` this level's, `v.r` the right-hand sides; `coarse` one place per aggregate.
+    pub fn descend<const W: usize>(
+        &self,
+        v: &mut Vectors<B, W>,
+        coarse: &mut [[[f32; W]; MOTIONS]],
+    ) {
+        v.x.par_chunks_mut(TASK_ROWS).for_each(|x| x.fill([[0.0; W]; B]));
         self.smoother.smooth(&self.a, v, true);
         let r = &v.r;
         coarse.par_iter_mut().with_min_len(TASK_ROWS / 4).enumerate().for_each(|(column, sum)| {
-            *sum = [0.0; MOTIONS];
+            *sum = [[0.0; W]; MOTIONS];
             for &(row, at) in self.by_column.of(column) {
                 for (line, r) in self.p.block(at as usize).iter().zip(&r[row as usize]) {
-                    (0..MOTIONS).for_each(|k| sum[k] += line[k] * r);
+                    for (sum, entry) in sum.iter_mut().zip(line) {
+                        (0..W).for_each(|w| sum[w] += entry * r[w]);
+                    }
                 }
             }
         });
     }
 
     /// Takes the coarser level's correction, `x + P e`, and smooths what it leaves.
-    pub fn ascend(&self, v: &mut Vectors<B>, coarse: &[[f32; MOTIONS]]) {
+    pub fn ascend<const W: usize>(&self, v: &mut Vectors<B, W>, coarse: &[[[f32; W]; MOTIONS]]) {
         v.take_correction(|first, step| {
             self.p.products((first, step.len()), coarse, |row, product| step[row] = product);
         });

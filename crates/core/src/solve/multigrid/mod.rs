@@ -2,7 +2,8 @@
 //!
 //! Nodes are gathered into aggregates, whose rigid motions are the unknowns of a coarser system, and
 //! so on until the system is small. What the coarse systems cannot see is smoothed on the finer
-//! ones. The hierarchy is in single precision, residuals and conjugate directions are in double.
+//! ones. The hierarchy is in single precision, residuals and conjugate directions are in double. Several
+//! right-hand sides share every pass over matrix and hierarchy.
 //!
 //! Every parallel loop writes to places of its own and every sum has a fixed order, so any number of
 //! threads gives the same bits.
@@ -21,5 +22,5 @@ mod small;
 #[cfg(test)]
 mod tests;
 
-pub(super) use conjugate::{Goal, solve};
+pub(super) use conjugate::{Goal, Outcome, TOGETHER, solve};
 pub(super) use hierarchy::Hierarchy;

@@ -38,10 +38,19 @@ pub(super) fn add_transposed_product<const R: usize, const K: usize, const C: us
     }
 }
 
-/// Product `a x` of a block and a vector.
+/// Product `a x` of a block and W vectors.
 #[inline(always)]
-pub(super) fn times<const B: usize>(a: &[[f32; B]; B], x: &[f32; B]) -> [f32; B] {
-    a.map(|line| line.iter().zip(x).map(|(a, x)| a * x).sum())
+pub(super) fn times<const B: usize, const W: usize>(
+    a: &[[f32; B]; B],
+    x: &[[f32; W]; B],
+) -> [[f32; W]; B] {
+    let mut product = [[0.0; W]; B];
+    for (sum, line) in product.iter_mut().zip(a) {
+        for (a, x) in line.iter().zip(x) {
+            (0..W).for_each(|w| sum[w] += a * x[w]);
+        }
+    }
+    product
 }
 
 /// The block in double precision.
@@ -102,17 +111,23 @@ pub(super) fn square<const R: usize, const C: usize>(a: &[[f64; C]; R]) -> f64 {
 
 /// Numbers of a part.
 pub(super) const PART: usize = 4096;
-/// Sums that run beside each other.
+/// Sums that run beside each other. As many columns as divide it have sums of their own among them.
 const LANES: usize = 8;
 
-/// Scalar product `aᵀ b` of long vectors.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let parts: Vec<f64> =
+/// Scalar products `aᵀ b` of the W columns of long vectors.
+///
+/// Shapes: rows × W, the numbers of one row next to each other; W divides eight.
+pub(super) fn dots<const W: usize>(a: &[f64], b: &[f64]) -> [f64; W] {
+    let parts: Vec<[f64; W]> =
         a.par_chunks(PART).zip(b.par_chunks(PART)).map(|(a, b)| of_part(a, b)).collect();
-    parts.iter().sum()
+    let mut sums = [0.0; W];
+    for part in parts {
+        (0..W).for_each(|w| sums[w] += part[w]);
+    }
+    sums
 }
 
-fn of_part(a: &[f64], b: &[f64]) -> f64 {
+fn of_part<const W: usize>(a: &[f64], b: &[f64]) -> [f64; W] {
     let mut sums = [0.0; LANES];
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
     for (sum, (a, b)) in sums.iter_mut().zip(a_rest.iter().zip(b_rest)) {
@@ -123,30 +138,43 @@ fn of_part(a: &[f64], b: &[f64]) -> f64 {
             sums[k] += a[k] * b[k];
         }
     }
-    sums.iter().sum()
+    std::array::from_fn(|w| sums.iter().skip(w).step_by(W).sum())
 }
 
-/// Euclidean norm of a long vector.
-pub(super) fn norm(v: &[f64]) -> f64 {
-    match dot(v, v) {
+/// Euclidean norms of the W columns of a long vector.
+///
+/// Shapes: as [`dots`].
+pub(super) fn norms<const W: usize>(v: &[f64]) -> [f64; W] {
+    let squares = dots::<W>(v, v);
+    std::array::from_fn(|w| match squares[w] {
         square if SAFE_SQUARES.contains(&square) => square.sqrt(),
-        _ => vectors::norm(v),
-    }
+        _ => vectors::norm(&v.iter().skip(w).step_by(W).copied().collect::<Vec<f64>>()),
+    })
 }
 
-/// Largest absolute value; a NaN is passed over.
-pub(super) fn largest(v: &[f64]) -> f64 {
-    v.par_chunks(PART).map(vectors::largest).reduce(|| 0.0, f64::max)
+/// Largest absolute values of the W columns; a NaN is passed over.
+///
+/// Shapes: as [`dots`].
+pub(super) fn largest<const W: usize>(v: &[f64]) -> [f64; W] {
+    let of_part = |part: &[f64]| {
+        let mut most = [0.0f64; W];
+        for row in part.as_chunks::<W>().0 {
+            (0..W).for_each(|w| most[w] = most[w].max(row[w].abs()));
+        }
+        most
+    };
+    let larger = |a: [f64; W], b: [f64; W]| std::array::from_fn(|w| a[w].max(b[w]));
+    v.par_chunks(PART).map(of_part).reduce(|| [0.0; W], larger)
 }
 
 /// `aᵀ b` of vectors of blocks, in double precision.
-pub(super) fn dot_blocks<const B: usize>(a: &[[f32; B]], b: &[[f32; B]]) -> f64 {
+pub(super) fn dot_blocks<const B: usize>(a: &[[[f32; 1]; B]], b: &[[[f32; 1]; B]]) -> f64 {
     let parts: Vec<f64> = a
         .par_chunks(PART)
         .zip(b.par_chunks(PART))
         .map(|(a, b)| {
-            let products = a.iter().flatten().zip(b.iter().flatten());
-            products.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+            let products = a.as_flattened().iter().zip(b.as_flattened());
+            products.map(|([a], [b])| f64::from(*a) * f64::from(*b)).sum()
         })
         .collect();
     parts.iter().sum()
@@ -172,5 +200,22 @@ mod tests {
     fn block_that_is_not_definite_falls_back_to_its_diagonal() {
         let inverse = inverse(&[[1.0, 2.0], [2.0, 4.0]]);
         assert_eq!(inverse, [[1.0, 0.0], [0.0, 0.25]]);
+    }
+
+    #[test]
+    fn columns_have_the_sums_that_each_has_alone() {
+        let rows = 3 * PART + 5;
+        let of = |seed: f64| move |k: usize| (seed * (k + 1) as f64).sin();
+        let a: Vec<f64> = (0..4 * rows).map(of(0.37)).collect();
+        let b: Vec<f64> = (0..4 * rows).map(of(0.71)).collect();
+        let column = |v: &[f64], w: usize| v.iter().skip(w).step_by(4).copied().collect::<Vec<_>>();
+        let (together, most, sizes) = (dots::<4>(&a, &b), largest::<4>(&a), norms::<4>(&a));
+        for w in 0..4 {
+            let (a, b) = (column(&a, w), column(&b, w));
+            let [alone] = dots::<1>(&a, &b);
+            assert!((together[w] - alone).abs() < 1e-10, "{} is not {alone}", together[w]);
+            assert_eq!([most[w]], largest::<1>(&a));
+            assert!((sizes[w] - norms::<1>(&a)[0]).abs() < 1e-10);
+        }
     }
 }

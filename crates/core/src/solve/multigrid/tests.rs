@@ -55,7 +55,8 @@ fn check_against(model: &Model, pairs: &[(u32, f64)], method: Method) -> u32 {
     let found = answer(model, pairs, Method::Multigrid).unwrap();
     let error = off(&found.displacement, &dense.displacement);
     let estimate = found.error_estimate_rel.unwrap();
-    assert!(error <= estimate + 1e-13 && error <= 1e-9, "{error:e}, estimated {estimate:e}");
+    // Rounding of either answer is not in the estimate.
+    assert!(error <= estimate + 1e-12 && error <= 1e-9, "{error:e}, estimated {estimate:e}");
     let forces = off(&found.reaction, &dense.reaction);
     assert!(forces <= 1e-7, "reactions off by {forces:e}");
     found.refinement_steps
@@ -128,11 +129,98 @@ fn any_number_of_threads_gives_the_same_bits() {
     let model = model(BuiltIn::Strawberry, 3000, Element::Tet4, 0.3);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| answer(&model, &held_at_few(&model), Method::Multigrid).unwrap())
+        pool.install(|| {
+            let known = model.known(held_at_few(&model)).unwrap();
+            let factored = model.factor(&known.dofs, Method::Multigrid, &mut |_| {}).unwrap();
+            let other: Vec<f64> = known.q_known.iter().map(|q| (7.0 * q).cos()).collect();
+            let of = |q_known| Loads { q_known, ..Loads::default() };
+            let loads = [of(&known.q_known[..]), of(&other), of(&other)];
+            let together = factored.solve_several(model.stiffness(), &loads, &mut |_| {}).unwrap();
+            let alone = factored.solve(model.stiffness(), loads[0], &mut |_| {}).unwrap();
+            (together, alone)
+        })
     };
     let one = with(1);
     for threads in [2, 4, 7] {
         assert_eq!(with(threads), one, "{threads} threads");
+    }
+}
+
+/// Every load case together as alone: what is known, its forces, none at all, and goals of its own.
+#[test]
+fn several_loads_together_are_answered_as_each_alone() {
+    let model = model(BuiltIn::Strawberry, 1500, Element::Tet4, 0.3);
+    let known = model.known(held_at_few(&model)).unwrap();
+    let factored = model.factor(&known.dofs, Method::Multigrid, &mut |_| {}).unwrap();
+    let free = model.stiffness().node_count() as u32 / 2;
+    for count in [1usize, 2, 3, 5, 6, 8, 11] {
+        let q_known: Vec<Vec<f64>> = (0..count)
+            .map(|case| {
+                // The third is not loaded at all.
+                let value = |k: usize| {
+                    if case == 2 { 0.0 } else { (1.3 * (k + 3 * case + 1) as f64).sin() }
+                };
+                (0..known.dofs.len()).map(value).collect()
+            })
+            .collect();
+        let mut forces = vec![0.0; 3 * model.system_node_count()];
+        forces[3 * free as usize] = 2.0;
+        let loads: Vec<Loads<'_>> = q_known
+            .iter()
+            .enumerate()
+            .map(|(case, q_known)| Loads {
+                q_known,
+                forces: if case == 1 { &forces } else { &[] },
+                residual_rel: if case == 3 { 1e-3 } else { 0.0 },
+            })
+            .collect();
+        let together = factored.solve_several(model.stiffness(), &loads, &mut |_| {}).unwrap();
+        assert_eq!(together.len(), count);
+        for (case, (found, loads)) in together.iter().zip(&loads).enumerate() {
+            let alone = factored.solve(model.stiffness(), *loads, &mut |_| {}).unwrap();
+            let (steps, of_alone) = (found.refinement_steps, alone.refinement_steps);
+            assert!(steps.abs_diff(of_alone) <= 1, "{case} of {count}: {steps}, alone {of_alone}");
+            if case == 2 {
+                assert!(found.displacement.iter().all(|u| *u == 0.0) && steps == 0);
+                continue;
+            }
+            let error = off(&found.displacement, &alone.displacement);
+            let near = if case == 3 { 1e-3 } else { 1e-10 };
+            assert!(error <= near, "{case} of {count}: {error:e}");
+            assert!(off(&found.reaction, &alone.reaction) <= 10.0 * near);
+            if count == 1 {
+                assert_eq!(found, &alone, "one load goes the same way");
+            }
+        }
+    }
+}
+
+/// A load that is no number, or leads to none, spoils only its own answer.
+#[test]
+fn a_load_that_is_no_number_is_refused_and_spoils_no_other() {
+    let model = model(BuiltIn::Cube, 216, Element::Tet4, 0.3);
+    let known = model.known(held_at_few(&model)).unwrap();
+    let partition = model.held_partition(&known.dofs).unwrap();
+    let hierarchy = Hierarchy::new(model.stiffness(), &partition);
+    let goal = Goal { residual_rel: 1e-12, error_rel: 1e-10, steps_max: 100 };
+    let side = |seed: f64| {
+        let mut b = vec![0.0; partition.dof_count()];
+        partition.unknown().iter().for_each(|&dof| b[dof as usize] = (seed * f64::from(dof)).cos());
+        b
+    };
+    let mut broken = side(0.2);
+    broken[partition.unknown()[7] as usize] = f64::NAN;
+    let huge: Vec<f64> = side(0.4).iter().map(|b| 1e300 * b).collect();
+    let asked = [side(0.3), broken, side(0.5), huge].map(|b| (b, goal));
+    let found = solve(model.stiffness(), &partition, &hierarchy, &asked);
+    assert!(found[1].x.iter().all(|x| x.is_nan()), "what is no number has no answer");
+    for w in [0, 2, 3] {
+        let alone = solve(model.stiffness(), &partition, &hierarchy, &asked[w..=w]).pop().unwrap();
+        assert!(found[w].residual_rel <= 1e-12 && found[w].error_estimate_rel <= 1e-10);
+        let largest = alone.x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        let pairs = found[w].x.iter().zip(&alone.x);
+        let most = pairs.fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+        assert!(most <= 1e-9 * largest && largest > 0.0, "{w}: {most:e} of {largest:e}");
     }
 }
 
@@ -292,7 +380,8 @@ fn estimate_of_an_unfinished_answer_covers_its_error() {
     }
     let to = |residual_rel: f64, steps_max: u32| {
         let goal = Goal { residual_rel, error_rel: 1.0, steps_max };
-        solve(model.stiffness(), &partition, &hierarchy, &b, goal)
+        let asked = [(b.clone(), goal)];
+        solve(model.stiffness(), &partition, &hierarchy, &asked).pop().unwrap()
     };
     let truth = to(1e-12, 500);
     for steps_max in [6, 10, 15, 20] {
