@@ -17,6 +17,7 @@ mod field_arguments;
 pub mod fill;
 mod force_arguments;
 mod gestures;
+mod hand_arguments;
 mod hand_files;
 pub mod inspect;
 pub mod interruption;

@@ -29,3 +29,4 @@ mod regions;
 mod runs;
 mod serial_runs;
 mod start;
+mod two_hand_runs;
