@@ -1,8 +1,9 @@
-// A headset that is not there: navigator.xr with two eyes and one tracked hand, which plays the frames of
+// A headset that is not there: navigator.xr with two eyes and two tracked hands. The right one plays the frames of
 // `window.fakeHand` (25 places of a joint in tenths of a millimetre each, 15 frames a second) as often as a
-// display of 72 Hz asks; where pictures come more slowly than 30 a second, the hand moves more slowly. The eye is where the page puts the world's origin at the origin.
+// display of 72 Hz asks; where pictures come more slowly than 30 a second, the hand moves more slowly; the left one is its mirror image,
+// beside it (`ASIDE_M`). The eye is where the page puts the world's origin at the origin.
 (() => {
-  const RATE_HZ = 72, FRAMES_HZ = 15, STEP_MAX_S = 1 / 30, EYES_M = 0.032;
+  const RATE_HZ = 72, FRAMES_HZ = 15, STEP_MAX_S = 1 / 30, EYES_M = 0.032, ASIDE_M = 0.25;
   const identity = { x: 0, y: 0, z: 0, w: 1 };
   window.XRRigidTransform = class {
     constructor(position = { x: 0, y: 0, z: 0 }, orientation = identity) {
@@ -26,18 +27,19 @@
       return { x: view.eye === "left" ? 0 : width / 2, y: 0, width: width / 2, height };
     }
   };
-  const joints = Array.from({ length: 25 }, (_, joint) => ({ joint }));
+  const joints = (side) => Array.from({ length: 25 }, (_, joint) => [joint, { joint, side }]);
   // Where a joint is now, between two frames.
-  function place(joint, seconds) {
+  function place({ joint, side }, seconds) {
     const frames = window.fakeHand, at = Math.min(seconds * FRAMES_HZ, frames.length - 1), i = Math.floor(at), t = at - i;
     const a = frames[i][joint], b = frames[Math.min(i + 1, frames.length - 1)][joint];
-    return { x: 1e-4 * (a[0] + t * (b[0] - a[0])), y: 1e-4 * (a[1] + t * (b[1] - a[1])), z: 1e-4 * (a[2] + t * (b[2] - a[2])) };
+    const x = 1e-4 * (a[0] + t * (b[0] - a[0]));
+    return { x: side === "right" ? x : -x - ASIDE_M, y: 1e-4 * (a[1] + t * (b[1] - a[1])), z: 1e-4 * (a[2] + t * (b[2] - a[2])) };
   }
   class Session extends EventTarget {
     constructor() {
       super();
       this.renderState = {};
-      this.inputSources = [{ handedness: "right", hand: new Map(joints.map((j, i) => [i, j])) }];
+      this.inputSources = ["left", "right"].map((side) => ({ handedness: side, hand: new Map(joints(side)) }));
       this.seconds = 0;
       this.before = performance.now();
       window.fakeSession = this;
@@ -68,7 +70,7 @@
       return {
         session: this,
         getViewerPose: () => ({ transform: new XRRigidTransform(eye), views: [view("left", -EYES_M), view("right", EYES_M)] }),
-        getJointPose: ({ joint }) => ({ transform: new XRRigidTransform(place(joint, seconds)), radius: 0.01 }),
+        getJointPose: (joint) => ({ transform: new XRRigidTransform(place(joint, seconds)), radius: 0.01 }),
       };
     }
     async end() { this.ended = true; this.dispatchEvent(new Event("end")); }

@@ -184,7 +184,7 @@ def picture_of_scene(browser, path):
 
 
 def headset(client, program, folder, pictures):
-    """The tracked hand of a headset lifts the strawberry; the connection is lost and comes back."""
+    """Both hands of a headset are tracked and one lifts the strawberry; the connection is lost and comes back."""
     run = Run(client, folder, "--hand", "xr", "--grasp", "contact", "--shading", "plain")
     # The processor draws: with fewer pixels pictures come often enough for a hand that holds something.
     browser = Browser(program, folder, (960, 480), 0.5)
@@ -199,7 +199,9 @@ def headset(client, program, folder, pictures):
         browser.until("!document.getElementById('enter').hidden")
         browser.value("document.getElementById('enter').click()")
         browser.until("softgrasp.figures.stereo > 10")
-        browser.until("softgrasp.scene.picture.hand !== 0")
+        browser.until("softgrasp.scene.picture.hands.length === 2")
+        check(browser.value("softgrasp.scene.picture.hands.every((hand) => softgrasp.scene.hands.has(hand.version))"),
+              "a hand has no skin")
         picture_of_scene(browser, f"{pictures}/headset-before.png")
         for name, share in eyes(f"{pictures}/headset-before.png").items():
             say(f"{name} eye: {share} of it is as red as the strawberry")

@@ -1,7 +1,7 @@
 //! Turns the bytes of glove and tracker into the pose of the hand.
 
 use nalgebra::{Isometry3, Translation3};
-use softgrasp_grasp::hand::{HandDimensions, HandPose, JointAngles, pose};
+use softgrasp_grasp::hand::{HandDimensions, HandPose, Handedness, JointAngles, pose};
 
 use crate::devices::calibration::{Calibration, sensor_name};
 use crate::devices::cyberglove::{
@@ -15,6 +15,7 @@ use crate::devices::fastrak::{
 use crate::devices::{
     Detected, Freshness, HandSample, Heard, PoseGate, ReceiverMount, SampleHold, SensorGate,
 };
+use crate::joints::JointsRecord;
 use crate::joints_reader::{FitErrors, JointsReader};
 use crate::notice::Notice;
 use crate::sent::{Arrival, Device};
@@ -226,7 +227,7 @@ impl HandReader {
     ///
     /// Units: `now_s` s on the client's clock, the time of bytes that come with the tick.
     pub fn feed(&mut self, arrivals: &[Arrival], now_s: f64) {
-        for Arrival { device, at_s, is_datagram, bytes } in arrivals {
+        for Arrival { device, at_s, is_datagram, bytes, .. } in arrivals {
             let time_s = at_s.unwrap_or(now_s);
             self.first_s.get_or_insert(time_s);
             match device {
@@ -234,13 +235,42 @@ impl HandReader {
                 Device::Tracker => self.feed_tracker(bytes, time_s),
                 Device::Joints => {
                     let told = self.joints.feed(bytes, *is_datagram, time_s);
-                    if self.gates.is_some() {
-                        self.news.extend(told.map(Notice::done));
-                    }
-                    self.setup.dimensions = *self.joints.dimensions();
+                    self.meet_sender(told);
                 }
             }
         }
+    }
+
+    /// Takes records of this hand's joints that came in the stream of the other one, at a time, s.
+    pub(crate) fn take_joints(&mut self, records: &[JointsRecord], time_s: f64) {
+        for record in records {
+            let told = self.joints.take(record, time_s);
+            self.meet_sender(told);
+        }
+    }
+
+    /// Takes over the dimensions of the sender's hand, and what is told of it.
+    fn meet_sender(&mut self, told: Option<String>) {
+        if self.gates.is_some() {
+            self.news.extend(told.map(Notice::done));
+        }
+        if self.joints.side().is_some() {
+            self.setup.dimensions = *self.joints.dimensions();
+        }
+    }
+
+    /// Reader of the joints of another program.
+    pub(crate) fn joints_mut(&mut self) -> &mut JointsReader {
+        &mut self.joints
+    }
+
+    /// Side of the hand, once it is known: a sender of joints says it, glove and tracker have that of the
+    /// set-up.
+    pub fn side(&self) -> Option<Handedness> {
+        let sample = self.hold.sample(0.0);
+        let has_devices = sample.glove.is_some() || sample.tracker.is_some();
+        let of_setup = has_devices.then_some(self.setup.dimensions.handedness);
+        self.joints.side().or(of_setup)
     }
 
     fn feed_glove(&mut self, bytes: &[u8], time_s: f64) {

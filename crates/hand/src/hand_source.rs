@@ -87,6 +87,32 @@ impl HandSource {
         }
     }
 
+    /// Meets another object; a script begins anew, by this plan or by one that it makes.
+    pub fn meet_new_object(&mut self, plan: Option<GraspPlan>) {
+        match self {
+            Self::Scripted(hand) => hand.restart(plan),
+            Self::Mouse(hand) => hand.meet_new_object(),
+            Self::Foreign(hand) => hand.restart(),
+            Self::Live(_) | Self::Replay(_) => {}
+        }
+    }
+
+    /// The hand of live devices, where it is one.
+    pub fn as_live(&self) -> Option<&LiveHand> {
+        match self {
+            Self::Live(hand) => Some(hand),
+            Self::Scripted(_) | Self::Mouse(_) | Self::Replay(_) | Self::Foreign(_) => None,
+        }
+    }
+
+    /// The hand of a mouse, where it is one.
+    pub fn as_mouse(&mut self) -> Option<&mut MouseHand> {
+        match self {
+            Self::Mouse(hand) => Some(hand),
+            Self::Scripted(_) | Self::Live(_) | Self::Replay(_) | Self::Foreign(_) => None,
+        }
+    }
+
     /// Whether the hand is played by the program, so that it can be paused; a person cannot.
     pub fn is_played(&self) -> bool {
         matches!(self, Self::Scripted(_) | Self::Replay(_) | Self::Foreign(_))

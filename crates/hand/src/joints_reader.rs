@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 use serde::Serialize;
-use softgrasp_grasp::hand::{HandDimensions, JointAngles};
+use softgrasp_grasp::hand::{HandDimensions, Handedness, JointAngles};
 
 use crate::joints::{
     Doubts, FittedHand, HandFit, JointsEvent, JointsParser, JointsRecord, fitted_dimensions,
@@ -12,6 +12,12 @@ use crate::joints::{
 pub struct JointsReader {
     parser: JointsParser,
     fit: HandFit,
+    /// Side of the hand that is followed: that of the first record, `None` before it.
+    side: Option<Handedness>,
+    /// Side of the run's other hand, which is not followed here.
+    taken: Option<Handedness>,
+    /// Records of the other hand that have come and were not taken.
+    others: Vec<JointsRecord>,
     /// Records that the hand is measured by, until there are enough.
     measured: Vec<JointsRecord>,
     /// Where the sender's frame lies in the world; `None` until the first hand.
@@ -37,8 +43,29 @@ pub struct FitErrors {
     pub most_m: f64,
 }
 
+impl FitErrors {
+    /// Errors of the records of both.
+    #[must_use]
+    pub fn with(&self, other: &Self) -> Self {
+        let records = self.records + other.records;
+        if records == 0 {
+            return Self::default();
+        }
+        let squares = |errors: &Self| errors.rms_m.powi(2) * errors.records as f64;
+        let rms_m = match (self.records, other.records) {
+            // A mean of one kind keeps its bits.
+            (_, 0) => self.rms_m,
+            (0, _) => other.rms_m,
+            _ => ((squares(self) + squares(other)) / records as f64).sqrt(),
+        };
+        Self { records, rms_m, most_m: self.most_m.max(other.most_m) }
+    }
+}
+
 /// Number of records by which a hand is measured; before these it has the usual size.
 const MEASURED: usize = 30;
+/// Number of records of the other hand that wait at most.
+const OTHERS_MAX: usize = 64;
 /// Number of fitted records after which the sender is described to the person.
 const INTRODUCED_AFTER: u64 = 60;
 /// The first palm is placed here in the world, m: before the object, to the right of its middle.
@@ -53,6 +80,9 @@ impl JointsReader {
         Self {
             parser: JointsParser::new(),
             fit: HandFit::new(dimensions),
+            side: None,
+            taken: None,
+            others: Vec::new(),
             measured: Vec::new(),
             world_from_sender,
             newest: None,
@@ -64,7 +94,8 @@ impl JointsReader {
         }
     }
 
-    /// Takes bytes that came at a time, s; returns, once, a sentence that describes the sender.
+    /// Takes bytes that came at a time, s; returns, once, a sentence that describes the sender. Records of
+    /// the other hand wait for [`JointsReader::take_others`].
     pub fn feed(&mut self, bytes: &[u8], is_datagram: bool, time_s: f64) -> Option<String> {
         let mut records = Vec::new();
         let mut faults = Vec::new();
@@ -82,8 +113,48 @@ impl JointsReader {
         }
         self.faults += faults.len() as u64;
         faults.iter().for_each(|fault| self.doubts.fault(fault));
-        let told = records.iter().filter_map(|record| self.follow(record, time_s));
+        let told = records.iter().filter_map(|record| self.take(record, time_s));
         told.collect::<Vec<_>>().pop()
+    }
+
+    /// Takes a record that came at a time, s, as [`JointsReader::feed`] does.
+    pub fn take(&mut self, record: &JointsRecord, time_s: f64) -> Option<String> {
+        let is_ours = match self.side {
+            Some(side) => record.hand == side,
+            None => self.taken != Some(record.hand),
+        };
+        if !is_ours {
+            if self.others.len() < OTHERS_MAX {
+                self.others.push(*record);
+            }
+            return None;
+        }
+        self.follow(record, time_s)
+    }
+
+    /// Records of the other hand that have come since the last call.
+    pub fn take_others(&mut self) -> Vec<JointsRecord> {
+        std::mem::take(&mut self.others)
+    }
+
+    /// Side of the hand that is followed; `None` before the first record.
+    pub fn side(&self) -> Option<Handedness> {
+        self.side
+    }
+
+    /// Leaves the hand of this side to another reader.
+    pub fn leave(&mut self, side: Handedness) {
+        self.taken = Some(side);
+    }
+
+    /// Pose of the sender's frame in the world; `None` until it is known.
+    pub fn world_from_sender(&self) -> Option<Isometry3<f64>> {
+        self.world_from_sender
+    }
+
+    /// Places the sender's frame in the world, unless its place is known.
+    pub fn place_sender(&mut self, world_from_sender: Isometry3<f64>) {
+        self.world_from_sender.get_or_insert(world_from_sender);
     }
 
     /// Number of bad lines and of records that no hand fits.
@@ -142,6 +213,7 @@ impl JointsReader {
             self.faults += 1;
             return None;
         }
+        self.side = Some(record.hand);
         self.measure(record);
         match self.fit.fit(record) {
             Ok(fitted) => {
@@ -178,10 +250,7 @@ impl JointsReader {
             let dimensions = self.fit.dimensions().with_handedness(record.hand);
             self.fit = HandFit::new(dimensions);
         }
-        let same_hand = self.measured.first().is_none_or(|first| first.hand == record.hand);
-        if same_hand {
-            self.measured.push(*record);
-        }
+        self.measured.push(*record);
         if self.measured.len() == MEASURED
             && let Ok(dimensions) = fitted_dimensions(&self.measured)
         {
@@ -196,6 +265,28 @@ mod tests {
 
     use super::*;
     use crate::joints::record_of_hand;
+
+    #[test]
+    fn other_hand_of_a_stream_is_not_fitted_and_waits_for_its_own_reader() {
+        let record = |side| {
+            let hand = HandDimensions::default().with_handedness(side);
+            record_of_hand(&hand, &JointAngles::flat(), &Isometry3::translation(0.1, 0.2, 0.3))
+        };
+        let (left, right) = (record(Handedness::Left), record(Handedness::Right));
+        let mut reader = JointsReader::new(HandDimensions::default(), None);
+        assert_eq!(reader.side(), None);
+        for record in [&left, &right, &left] {
+            reader.take(record, 0.0);
+        }
+        assert_eq!((reader.side(), reader.fit_errors().records), (Some(Handedness::Left), 2));
+        assert_eq!(reader.take_others(), [right]);
+        let mut other = JointsReader::new(HandDimensions::default(), None);
+        other.leave(Handedness::Left);
+        other.take(&left, 0.0);
+        assert_eq!((other.side(), other.take_others()), (None, vec![left]));
+        other.take(&right, 0.0);
+        assert_eq!((other.side(), other.fit_errors().records), (Some(Handedness::Right), 1));
+    }
 
     #[test]
     fn who_speaks_is_told_once_with_hand_unit_rate_and_fit() {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::joints::{ArrivedBytes, JointsFeed, JointsListener};
 use crate::notice::Notice;
-use crate::sent::{Arrival, Device};
+use crate::sent::{Arrival, Device, WhichHand};
 use crate::serial::{DeviceState, SerialDevices};
 
 /// Devices that are open, and whose bytes come by themselves.
@@ -51,6 +51,7 @@ impl LiveHand {
             Source::Serial(devices) => {
                 let pieces = devices.take().into_iter();
                 let arrival = |piece: crate::serial::Arrived| Arrival {
+                    hand: WhichHand::First,
                     device: piece.device,
                     at_s: at(piece.arrived),
                     is_datagram: false,
@@ -72,8 +73,9 @@ impl LiveHand {
         }
     }
 
-    /// What is wrong with the devices, or what they wait for, a sentence each; none while all talk.
-    pub fn complaints(&self) -> Vec<Notice> {
+    /// What is wrong with the devices, or what they wait for, a sentence each; none while all talk. `hands`
+    /// is the number of hands that have been heard of: each may have a sender of its own.
+    pub fn complaints(&self, hands: usize) -> Vec<Notice> {
         match &self.source {
             Source::Serial(devices) => {
                 let states = devices.states().into_iter();
@@ -87,11 +89,13 @@ impl LiveHand {
                 let address = listener.local_addr();
                 vec![Notice::waits(format!("nobody sends joints to {address}"))]
             }
-            Source::Joints(listener) if listener.senders() > 1 => vec![Notice::refused(format!(
-                "{} senders send joints to {}: one hand is followed, end the others",
-                listener.senders(),
-                listener.local_addr()
-            ))],
+            Source::Joints(listener) if listener.senders() > hands.max(1) => {
+                let (senders, address) = (listener.senders(), listener.local_addr());
+                let followed = if hands > 1 { "two hands are" } else { "one hand is" };
+                vec![Notice::refused(format!(
+                    "{senders} senders send joints to {address}: {followed} followed, end the others"
+                ))]
+            }
             Source::Fed(feed) if feed.senders() == 0 => {
                 let text = "no headset sends a hand: open the page in its browser and enter";
                 vec![Notice::waits(text)]
@@ -104,6 +108,7 @@ impl LiveHand {
 /// Pieces of a stream of joints; `at` has the time of a moment on the client's clock, s.
 fn joints(pieces: Vec<ArrivedBytes>, at: impl Fn(Instant) -> Option<f64>) -> Vec<Arrival> {
     let arrival = |piece: ArrivedBytes| Arrival {
+        hand: WhichHand::First,
         device: Device::Joints,
         at_s: at(piece.arrived),
         is_datagram: piece.datagram,
@@ -135,7 +140,7 @@ mod tests {
         let listener = JointsListener::bind("127.0.0.1:0".parse().unwrap()).unwrap();
         let address = listener.local_addr();
         let mut hand = LiveHand::joints(listener, "joints".to_owned());
-        assert!(hand.complaints()[0].text.contains("nobody sends joints"));
+        assert!(hand.complaints(0)[0].text.contains("nobody sends joints"));
         let senders = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
         let told = (0..500).any(|_| {
             for sender in &senders {
@@ -143,8 +148,9 @@ mod tests {
             }
             std::thread::sleep(Duration::from_millis(10));
             hand.take(0.0);
-            hand.complaints().iter().any(|told| told.text.starts_with("2 senders send joints"))
+            hand.complaints(1).iter().any(|told| told.text.starts_with("2 senders send joints"))
         });
-        assert!(told, "{:?}", hand.complaints());
+        assert!(told, "{:?}", hand.complaints(1));
+        assert_eq!(hand.complaints(2), [], "a left and a right hand may have a sender each");
     }
 }

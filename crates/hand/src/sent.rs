@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use softgrasp_grasp::grasp::Command;
+use softgrasp_grasp::hand::Handedness;
 
 /// Input of one tick: device bytes and a menu command.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,6 +16,17 @@ pub struct Sent {
     /// What the tick did with the server's answers when it was recorded; `None` unless it is played
     /// again.
     pub recorded: Option<RecordedAnswers>,
+}
+
+impl Sent {
+    /// Adds what the devices of the second hand send in the same tick. The scripts are over when both are.
+    pub fn join_second(&mut self, second: Self) {
+        let of_second = second.arrivals.into_iter();
+        self.arrivals
+            .extend(of_second.map(|arrival| Arrival { hand: WhichHand::Second, ..arrival }));
+        self.command = self.command.or(second.command);
+        self.over &= second.over;
+    }
 }
 
 /// What a tick that is played again has to wait for, and what it must not take yet.
@@ -57,9 +69,52 @@ impl Device {
     }
 }
 
+/// One of the hands of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WhichHand {
+    /// The only hand, or the one that was named first.
+    #[default]
+    First,
+    /// The other hand.
+    Second,
+}
+
+impl WhichHand {
+    /// Both hands, in their order.
+    pub const ALL: [Self; 2] = [Self::First, Self::Second];
+
+    /// Position among both hands.
+    pub const fn index(self) -> usize {
+        match self {
+            Self::First => 0,
+            Self::Second => 1,
+        }
+    }
+}
+
+/// A device from which nothing good has come for too long.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SilentDevice {
+    /// The device.
+    pub device: Device,
+    /// Side of its hand; `None` in a run of one hand.
+    pub side: Option<Handedness>,
+}
+
+impl SilentDevice {
+    /// Name of the device in sentences, with its hand where there are two.
+    pub fn name(&self) -> String {
+        let name = self.device.name();
+        self.side.map_or(name.to_owned(), |side| format!("{} hand's {name}", side.name()))
+    }
+}
+
 /// Bytes of one device that came together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrival {
+    /// Hand whose devices sent the bytes. A stream that brings both hands is the first one's.
+    pub hand: WhichHand,
     /// Device that sent the bytes.
     pub device: Device,
     /// When their first byte came, s on the client's clock; `None` stands for the tick that takes
@@ -74,6 +129,6 @@ pub struct Arrival {
 impl Arrival {
     /// Bytes of a stream that come with the tick.
     pub fn with_tick(device: Device, bytes: Vec<u8>) -> Self {
-        Self { device, at_s: None, is_datagram: false, bytes }
+        Self { hand: WhichHand::First, device, at_s: None, is_datagram: false, bytes }
     }
 }

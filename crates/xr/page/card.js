@@ -20,7 +20,8 @@ export class Card {
     byId("read-dialog").onclose = (e) => { if (e.target.returnValue && byId("read-name").value) ask("read", { name: byId("read-name").value }); };
     byId("save-dialog").onclose = (e) => { if (e.target.returnValue) ask("save", { name: byId("save-name").value }); };
     byId("exit-dialog").onclose = (e) => { if (e.target.returnValue === "exit") ask("exit"); };
-    byId("tips").append(...["T", "I", "M", "R", "L"].map((letter) => Object.assign(document.createElement("span"), { textContent: letter })));
+    for (const id of ["tips", "second-tips"])
+      byId(id).append(...["T", "I", "M", "R", "L"].map((letter) => Object.assign(document.createElement("span"), { textContent: letter })));
     document.addEventListener("keydown", (event) => this.key(event));
     byId("hint").textContent = matchMedia("(pointer: coarse)").matches
       ? "" : "drag: turn · right drag: shift · wheel: nearer · K keep shape · C colours · F view";
@@ -71,7 +72,9 @@ export class Card {
     this.status = status;
     this.say("state", status.state);
     byId("state").className = ["squeezed", "held"].includes(status.state) ? status.state : "";
-    [...byId("tips").children].forEach((dot, i) => dot.classList.toggle("on", status.tips[i]));
+    byId("second-tips").hidden = !status.second_tips;
+    for (const [id, tips] of [["tips", status.tips], ["second-tips", status.second_tips ?? []]])
+      [...byId(id).children].forEach((dot, i) => dot.classList.toggle("on", tips[i] === true));
     this.say("force", status.grip_n === null ? "" : `grip force ${status.grip_n.toFixed(2)} N`);
     const answer = status.round_trip_ms === null ? "" : ` · answer in ${status.round_trip_ms.toFixed(1)} ms`;
     const server = status.preparing ? "the server prepares the object" : `server ${status.server}`;

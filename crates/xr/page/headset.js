@@ -14,7 +14,6 @@ export class Headset {
     this.after = after;
     this.session = null;
     this.takesHands = false;
-    this.side = null;
     this.number = 0;
     this.sentAt = new Float64Array(REMEMBERED).fill(NaN);
     this.sentNumber = new Uint32Array(REMEMBERED);
@@ -113,17 +112,17 @@ export class Headset {
     return hands;
   }
 
-  // One hand grasps, the first that is tracked; the right one where both are.
+  // Both hands grasp; where both are tracked from the beginning on, the right one is the first.
   send(hands, time) {
     if (!this.takesHands) return;
-    this.side ??= hands.right ? "right" : hands.left ? "left" : null;
-    const numbers = hands[this.side];
-    if (!numbers) return;
-    this.number = (this.number + 1) >>> 0;
-    const at = this.number % REMEMBERED;
-    this.sentAt[at] = performance.now();
-    this.sentNumber[at] = this.number;
-    this.stream.sendHand(this.side === "right", this.number, time, numbers);
+    for (const side of ["right", "left"]) {
+      if (!hands[side]) continue;
+      this.number = (this.number + 1) >>> 0;
+      const at = this.number % REMEMBERED;
+      this.sentAt[at] = performance.now();
+      this.sentNumber[at] = this.number;
+      this.stream.sendHand(side === "right", this.number, time, hands[side]);
+    }
   }
 
   // How long ago a hand was tracked, ms; NaN for one that is forgotten.
@@ -135,8 +134,8 @@ export class Headset {
   // The joints of both hands as balls: where the hand really is.
   skeletons(hands) {
     const extras = [];
-    for (const [side, numbers] of Object.entries(hands)) {
-      const grasps = side === this.side && this.takesHands;
+    const grasps = this.takesHands;
+    for (const numbers of Object.values(hands)) {
       for (let joint = 0; joint < JOINTS; joint++) {
         const [x, y, z] = numbers.subarray(7 * joint, 7 * joint + 3);
         if (Number.isNaN(x)) continue;

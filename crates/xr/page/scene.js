@@ -1,8 +1,8 @@
-// What is drawn: object, hand, ground and the joints of tracked hands, by WebGL 2 alone.
+// What is drawn: object, hands, ground and the joints of tracked hands, by WebGL 2 alone.
 
 import { FRAGMENT, HAND_VERTEX, OBJECT_VERTEX, PLAIN_VERTEX } from "./shaders.js";
 
-const GROUND_RADIUS_M = 3, MAX_CAPSULES = 12;
+const GROUND_RADIUS_M = 3, MAX_CAPSULES = 24;
 
 export class Scene {
   constructor(canvas) {
@@ -11,7 +11,7 @@ export class Scene {
     this.gl = gl;
     this.canvas = canvas;
     this.object = null;
-    this.hand = null;
+    this.hands = new Map();
     this.picture = null;
     this.light = null;
     this.programs = {
@@ -146,7 +146,7 @@ export class Scene {
     put(4, hand.bones, 4, gl.UNSIGNED_BYTE, true);
     this.buffer(gl.ELEMENT_ARRAY_BUFFER, hand.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
-    this.hand = { array, count: hand.triangles.length, version: hand.version, texture: hand.texture };
+    this.hands.set(hand.version, { array, count: hand.triangles.length, texture: hand.texture });
     this.fetchTexture(hand.texture, true);
   }
 
@@ -176,6 +176,12 @@ export class Scene {
       gl.bufferSubData(gl.ARRAY_BUFFER, 4 * low, object.normals, 2 * low, 2 * (high - low));
     }
     this.picture = picture;
+    // Hands of other sizes than these come no more.
+    const shown = picture.hands.map((hand) => hand.version);
+    for (const [version, { array }] of this.hands) if (shown.length && version < Math.min(...shown)) {
+      gl.deleteVertexArray(array);
+      this.hands.delete(version);
+    }
   }
 
   // Draws into the framebuffer that is bound; `view` as Eye.view gives it.
@@ -188,7 +194,10 @@ export class Scene {
     if (!picture) return;
     this.drawGround(view, picture);
     this.drawObject(view, picture);
-    if (picture.bones && this.hand && this.hand.version === picture.hand) this.drawHand(view, picture);
+    for (const { version, bones } of picture.hands) {
+      const hand = this.hands.get(version);
+      if (hand) this.drawHand(view, hand, bones);
+    }
     for (const extra of extras) this.drawExtra(view, extra);
     gl.bindVertexArray(null);
   }
@@ -230,9 +239,8 @@ export class Scene {
     this.material({ colour: this.light.ground, roughness: this.light.ground_roughness, isShaded: true });
     const capsules = new Float32Array(8 * MAX_CAPSULES);
     capsules.set(picture.capsules.subarray(0, capsules.length));
-    // Capsules that are not there shade nothing: they lie far below.
-    for (let i = picture.capsules.length / 8; i < MAX_CAPSULES; i++) capsules.set([0, -99, 0, 1e-6, 0, -99, 0, 0], 8 * i);
     gl.uniform4fv(this.at.get("uCapsules"), capsules);
+    gl.uniform1f(this.at.get("uCapsuleCount"), Math.min(picture.capsules.length / 8, MAX_CAPSULES));
     gl.uniformMatrix4fv(this.at.get("uWorldFromModel"), false, [r, 0, 0, 0, 0, 1, 0, 0, 0, 0, r, 0, 0, picture.ground, 0, 1]);
     this.elements(this.ground);
   }
@@ -255,12 +263,12 @@ export class Scene {
     gl.disable(gl.CULL_FACE);
   }
 
-  drawHand(view, picture) {
+  drawHand(view, hand, bones) {
     const gl = this.gl, [roughness, subsurface] = this.light.hand;
     this.begin(this.programs.hand, view);
-    gl.uniform4fv(this.at.get("uBones"), picture.bones);
-    this.material({ roughness, subsurface, texture: this.textures.get(this.hand.texture) });
-    this.elements(this.hand);
+    gl.uniform4fv(this.at.get("uBones"), bones);
+    this.material({ roughness, subsurface, texture: this.textures.get(hand.texture) });
+    this.elements(hand);
   }
 
   // A ball or a board of a headset: { mesh, matrix, ...material }.

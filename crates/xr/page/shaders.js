@@ -72,7 +72,8 @@ uniform vec2 uFog;                     // begin, one over its depth
 uniform vec3 uWall, uKeyTowards, uKey, uFillTowards, uFill;
 uniform sampler2D uTexture; uniform sampler2D uRelief;
 uniform vec4 uUse;                     // texture, relief, shade of the ground, only the texture
-uniform vec4 uCapsules[24];            // begin and radius, end
+uniform vec4 uCapsules[48];            // begin and radius, end
+uniform float uCapsuleCount;
 out vec4 colour;
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }
@@ -140,7 +141,8 @@ void main() {
   vec3 normal = normalize(vNormal) * (gl_FrontFacing ? 1.0 : -1.0);
   if (uUse.y > 0.5) normal = bumped(normal);
   vec2 shade = vec2(1.0);
-  if (uUse.z > 0.5) for (int i = 0; i < 12; i++) {
+  if (uUse.z > 0.5) for (int i = 0; i < 24; i++) {
+    if (float(i) >= uCapsuleCount) break;
     vec2 s = below(uCapsules[2 * i], uCapsules[2 * i + 1]);
     shade = vec2(min(shade.x, s.x), shade.y * s.y);
   }

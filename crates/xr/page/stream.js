@@ -1,9 +1,9 @@
 // The stream between page and run: messages as docs/xr.md has them, little-endian, and a connection
 // that is looked for again whenever it is lost.
 
-const FORMAT = 1;
+const FORMAT = 2;
 const OBJECT = 1, HAND = 2, PICTURE = 3;
-const WITH_HAND = 1, COLOURED = 2, WHOLE = 4;
+const WITH_HAND = 1, COLOURED = 2, WHOLE = 4, WITH_SECOND = 8;
 const NO_RECORD = 0xffffffff;
 const ACK_BYTES = 24, JOINTS = 25, JOINTS_BYTES = 16 + 28 * JOINTS;
 
@@ -49,8 +49,11 @@ export function decodePicture(buffer) {
   const flags = view.getUint8(1), capsuleCount = view.getUint16(2, true);
   const runCount = view.getUint32(88, true), changed = view.getUint32(92, true);
   const record = view.getUint32(32, true);
-  let at = 96, bones = null;
-  if (flags & WITH_HAND) { bones = array(Float32Array, buffer, at, 18 * 8); at += 18 * 32; }
+  let at = 96;
+  const hands = [];
+  const takeHand = (version) => { hands.push({ version, bones: array(Float32Array, buffer, at, 18 * 8) }); at += 18 * 32; };
+  if (flags & WITH_HAND) takeHand(view.getUint32(12, true));
+  if (flags & WITH_SECOND) { at += 4; takeHand(view.getUint32(at - 4, true)); }
   const capsules = array(Float32Array, buffer, at, 8 * capsuleCount);
   at += 32 * capsuleCount;
   const runs = array(Uint32Array, buffer, at, 2 * runCount);
@@ -61,12 +64,12 @@ export function decodePicture(buffer) {
   at += 4 * changed;
   const coloured = (flags & COLOURED) !== 0;
   return {
-    number: view.getUint32(4, true), object: view.getUint32(8, true), hand: view.getUint32(12, true),
+    number: view.getUint32(4, true), object: view.getUint32(8, true), hands,
     tick: Number(view.getBigUint64(16, true)), stamp: view.getFloat64(24, true),
     record: record === NO_RECORD ? null : record, ground: view.getFloat32(36, true),
     pose: array(Float32Array, buffer, 40, 7), origin: array(Float32Array, buffer, 68, 3),
     step: view.getFloat32(80, true), error: view.getFloat32(84, true),
-    whole: (flags & WHOLE) !== 0, coloured, bones, capsules, runs, places, normals, changed,
+    whole: (flags & WHOLE) !== 0, coloured, capsules, runs, places, normals, changed,
     shares: coloured ? array(Uint8Array, buffer, at, changed) : null, bytes: buffer.byteLength,
   };
 }

@@ -1,12 +1,11 @@
-//! The hand of a headset on its way from a page to the run, and how long it takes to come back.
+//! The hands of a headset on their way from a page to the run, and how long they take to come back.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use softgrasp_grasp::hand::Handedness;
 use softgrasp_hand::joints::{JointsFeed, JointsRecord};
 
-/// Tracked hand of a headset: that of the page which sent first, until this page falls silent.
+/// Tracked hands of a headset: those of the page which sent first, until this page falls silent.
 #[derive(Default)]
 pub struct Headset {
     feed: JointsFeed,
@@ -16,12 +15,10 @@ pub struct Headset {
 #[derive(Default)]
 struct State {
     driver: Option<Driver>,
-    /// Side (left or right) of the hand whose size the run has measured.
-    side: Option<Handedness>,
     latencies: Latencies,
 }
 
-/// Page whose hand is followed.
+/// Page whose hands are followed.
 struct Driver {
     viewer: u64,
     heard: Instant,
@@ -38,13 +35,13 @@ pub struct HandToPicture {
     pub p99_ms: u32,
 }
 
-/// Time of silence after which another page's hand is followed.
+/// Time of silence after which another page's hands are followed.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
 /// Upper end of the counted latencies, ms; longer ones count as this.
 const LATENCY_MAX_MS: usize = 2000;
 
 impl Headset {
-    /// Feed that carries the hand's joints to the run.
+    /// Feed that carries the joints of both hands to the run.
     pub fn feed(&self) -> JointsFeed {
         self.feed.clone()
     }
@@ -56,9 +53,6 @@ impl Headset {
             driver.viewer != viewer && now.saturating_duration_since(driver.heard) < SILENT_AFTER
         };
         if state.driver.as_ref().is_some_and(holds) {
-            return false;
-        }
-        if *state.side.get_or_insert(record.hand) != record.hand {
             return false;
         }
         state.driver = Some(Driver { viewer, heard: now });
@@ -124,24 +118,26 @@ impl Latencies {
 
 #[cfg(test)]
 mod tests {
+    use softgrasp_grasp::hand::Handedness;
+
     use super::*;
 
     #[test]
-    fn second_headset_and_other_hand_are_not_followed_until_the_first_is_silent() {
+    fn both_hands_of_a_headset_are_followed_and_a_second_headset_when_the_first_is_silent() {
         let headset = Headset::default();
         let right = JointsRecord::empty(Handedness::Right);
         let left = JointsRecord::empty(Handedness::Left);
         let now = Instant::now();
         assert!(headset.take(1, &right, now));
-        assert!(!headset.take(2, &right, now), "one hand is followed");
-        assert!(!headset.take(1, &left, now), "the hand was measured");
+        assert!(!headset.take(2, &right, now), "one headset is followed");
+        assert!(headset.take(1, &left, now), "with both its hands");
         assert_eq!(headset.feed().senders(), 1);
         assert!(headset.take(2, &right, now + 2 * SILENT_AFTER), "the first is silent");
         headset.gone(1);
         assert_eq!(headset.feed().senders(), 1, "another one sends");
         headset.gone(2);
         assert_eq!(headset.feed().senders(), 0);
-        assert_eq!(headset.feed().take().len(), 2);
+        assert_eq!(headset.feed().take().len(), 3);
     }
 
     #[test]

@@ -55,7 +55,7 @@ fn picture(tick: u64) -> Option<Arc<Picture>> {
     Some(Arc::new(Picture {
         tick,
         object: Arc::new(ObjectMesh { version: 1, message: vec![OBJECT, 0, 0, 0] }),
-        hand: None,
+        hands: [None, None],
         record: None,
         world_from_object: [0.0; 7],
         ground_y: 0.0,

@@ -12,7 +12,7 @@ use softgrasp_window::view::camera::ViewCamera;
 use softgrasp_window::view::colouring::Colouring;
 use softgrasp_window::view::control::Control;
 use softgrasp_window::view::directed_eye::DirectedEye;
-use softgrasp_window::view::frame::{NewsKind, ObjectView, ViewFrame};
+use softgrasp_window::view::frame::{HandView, NewsKind, ObjectView, ViewFrame};
 use softgrasp_window::view::ground_shade::capsules;
 use softgrasp_window::view::light::GROUND_M;
 use softgrasp_window::view::loading::LoadObject;
@@ -88,7 +88,7 @@ pub struct Painter {
     eye: DirectedEye,
     camera: Option<ViewCamera>,
     object: Option<ShownObject>,
-    hand: Option<ShownHand>,
+    hands: [Option<ShownHand>; 2],
     hand_texture: Option<u32>,
     version: u32,
     space: Option<QuantisedBox>,
@@ -115,7 +115,7 @@ impl Painter {
             eye: DirectedEye::new(false).lowered(UNDER_MENU),
             camera: None,
             object: None,
-            hand: None,
+            hands: [None, None],
             hand_texture: None,
             version: 0,
             space: None,
@@ -227,14 +227,14 @@ impl Painter {
         self.space = Some(space);
         let shares = object.shares(self.colouring.shares(), numbers.len());
         let mesh = Arc::clone(&object.mesh);
-        let hand = self.pose_hand(frame);
+        let hands = self.pose_hands(frame);
         let pose = &frame.object.world_from_object;
         let (t, q) = (&pose.translation, &pose.rotation);
         Some(Picture {
             tick: frame.tick,
             object: mesh,
-            hand,
-            record: frame.hand.as_ref().and_then(|hand| u32::try_from(hand.record?).ok()),
+            hands,
+            record: frame.hands().filter_map(|hand| u32::try_from(hand.record?).ok()).max(),
             world_from_object: [t.x, t.y, t.z, q.i, q.j, q.k, q.w].map(|x| x as f32),
             ground_y: frame.object.table_y.unwrap_or(GROUND_M) as f32,
             capsules: capsules(frame, &shape, true).iter().map(|c| c.scaled(1.0)).collect(),
@@ -258,16 +258,23 @@ impl Painter {
         self.space = None;
     }
 
-    fn pose_hand(&mut self, frame: &ViewFrame) -> Option<PosedHand> {
-        let hand = frame.hand.as_ref()?;
-        if self.hand.as_ref().is_none_or(|shown| !shown.fits(hand)) {
-            let textures = &self.easel.textures;
-            let texture = *self.hand_texture.get_or_insert_with(|| ShownHand::texture(textures));
-            self.version += 1;
-            self.hand = Some(ShownHand::new(self.version, hand, texture));
-        }
-        let shown = self.hand.as_ref()?;
-        Some((Arc::clone(&shown.mesh), shown.bones(hand)))
+    fn pose_hands(&mut self, frame: &ViewFrame) -> [Option<PosedHand>; 2] {
+        let Self { hands, hand_texture, version, easel, .. } = self;
+        let mut pose = |shown: &mut Option<ShownHand>, hand: &HandView| {
+            if shown.as_ref().is_none_or(|shown| !shown.fits(hand)) {
+                let texture =
+                    *hand_texture.get_or_insert_with(|| ShownHand::texture(&easel.textures));
+                *version += 1;
+                *shown = Some(ShownHand::new(*version, hand, texture));
+            }
+            let shown = shown.as_ref()?;
+            Some((Arc::clone(&shown.mesh), shown.bones(hand)))
+        };
+        let [first, second] = hands;
+        [
+            frame.hand.as_ref().and_then(|hand| pose(first, hand)),
+            frame.second_hand.as_ref().and_then(|hand| pose(second, hand)),
+        ]
     }
 
     fn status(&mut self, frame: &ViewFrame) -> Arc<str> {

@@ -14,9 +14,9 @@ pub struct Picture {
     pub tick: u64,
     /// Unmoving part of the object.
     pub object: Arc<ObjectMesh>,
-    /// Unmoving part of the hand, and the motion of its bones.
-    pub hand: Option<PosedHand>,
-    /// Number that the headset gave to the record of joints which the hand follows.
+    /// Unmoving part of each hand, and the motion of its bones.
+    pub hands: [Option<PosedHand>; 2],
+    /// Newest number that the headset gave to a record of joints which a hand follows.
     pub record: Option<u32>,
     /// Pose of the object in the world: translation in m, then quaternion x, y, z, w.
     pub world_from_object: [f32; 7],

@@ -102,6 +102,8 @@ struct Status<'a> {
     state: &'static str,
     deforming: bool,
     tips: [bool; 5],
+    /// Those of the second hand, where there is one.
+    second_tips: Option<[bool; 5]>,
     grip_n: Option<f64>,
     server: &'static str,
     preparing: bool,
@@ -147,6 +149,7 @@ pub fn status_text(
         state: state(frame),
         deforming: frame.grasp.state == Some(StateName::Deforming),
         tips: frame.grasp.tips,
+        second_tips: frame.second_hand.is_some().then_some(frame.grasp.second_tips),
         grip_n: frame.grip_newtons(),
         server: frame.server.link.name(),
         preparing: frame.server.is_preparing,

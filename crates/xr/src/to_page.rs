@@ -5,7 +5,7 @@ use softgrasp_window::view::hand_skin::BONE_COUNT;
 use crate::picture::Picture;
 
 /// Version of the messages; the page says so if it knows another.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 /// First byte of an object's message.
 pub const OBJECT: u8 = 1;
 /// First byte of a hand's message.
@@ -18,6 +18,8 @@ pub const WITH_HAND: u8 = 1;
 pub const COLOURED: u8 = 2;
 /// Flag of a picture: it has all vertices.
 pub const WHOLE: u8 = 4;
+/// Flag of a picture: it has a second hand.
+pub const WITH_SECOND_HAND: u8 = 8;
 /// Number that stands for no record of joints.
 pub const NO_RECORD: u32 = u32::MAX;
 
@@ -142,7 +144,9 @@ pub fn picture_message(
     let changed: usize = runs.iter().map(|(_, length)| length).sum();
     let mut flags = 0;
     let mut flag = |is: bool, flag: u8| flags |= if is { flag } else { 0 };
-    flag(picture.hand.is_some(), WITH_HAND);
+    let [first, second] = &picture.hands;
+    flag(first.is_some(), WITH_HAND);
+    flag(second.is_some(), WITH_SECOND_HAND);
     flag(!picture.shares.is_empty(), COLOURED);
     flag(before.is_none(), WHOLE);
     let capsules = u16::try_from(picture.capsules.len()).unwrap_or(0);
@@ -150,7 +154,7 @@ pub fn picture_message(
     bytes.0.extend_from_slice(&capsules.to_le_bytes());
     bytes.whole(number);
     bytes.whole(picture.object.version);
-    bytes.whole(picture.hand.as_ref().map_or(0, |(mesh, _)| mesh.version));
+    bytes.whole(first.as_ref().map_or(0, |(mesh, _)| mesh.version));
     bytes.0.extend_from_slice(&picture.tick.to_le_bytes());
     bytes.0.extend_from_slice(&stamp_ms.to_le_bytes());
     bytes.whole(picture.record.unwrap_or(NO_RECORD));
@@ -161,7 +165,11 @@ pub fn picture_message(
     bytes.floats(&[space.step, space.error]);
     bytes.count(runs.len());
     bytes.count(changed);
-    if let Some((_, bones)) = &picture.hand {
+    if let Some((_, bones)) = first {
+        bytes.floats(bones.as_flattened());
+    }
+    if let Some((mesh, bones)) = second {
+        bytes.whole(mesh.version);
         bytes.floats(bones.as_flattened());
     }
     bytes.floats(picture.capsules.as_flattened());

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::picture::ObjectMesh;
+use crate::picture::{HandMesh, ObjectMesh};
 use crate::quantised::QuantisedBox;
 
 /// Length of a picture's message before the parts of varying length, bytes.
@@ -13,7 +13,7 @@ fn picture(numbers: Vec<[u16; 3]>, shares: Vec<u8>) -> Picture {
     Picture {
         tick: 70_000,
         object: Arc::new(ObjectMesh { version: 5, message: Vec::new() }),
-        hand: None,
+        hands: [None, None],
         record: Some(9),
         world_from_object: [0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0],
         ground_y: -0.03,
@@ -54,6 +54,28 @@ fn first_picture_has_every_vertex_at_the_documented_places() {
     let normals = places + 12;
     assert_eq!(bytes[normals..normals + 4], [7, 0, 249, 255]);
     assert_eq!(bytes[normals + 8..], [0, 255], "shares end the message");
+}
+
+#[test]
+fn second_hand_comes_after_the_first_with_its_own_version_and_alone_where_the_first_is_lost() {
+    let hand = |version: u32, number: f32| {
+        let mesh = Arc::new(HandMesh { version, message: Vec::new() });
+        Some((mesh, [[number; 8]; BONE_COUNT]))
+    };
+    let bones = 4 * 8 * BONE_COUNT;
+    let mut both = picture(Vec::new(), vec![]);
+    both.hands = [hand(6, 0.25), hand(7, 0.75)];
+    let bytes = picture_message(&both, None, 3, 12.5);
+    assert_eq!(bytes[1] & (WITH_HAND | WITH_SECOND_HAND), WITH_HAND | WITH_SECOND_HAND);
+    assert_eq!((u32_at(&bytes, 12), f32_at(&bytes, PICTURE_HEAD)), (6, 0.25));
+    let second = PICTURE_HEAD + bones;
+    assert_eq!((u32_at(&bytes, second), f32_at(&bytes, second + 4)), (7, 0.75));
+    assert_eq!(f32_at(&bytes, second + bones), 0.75, "its last number");
+    assert_eq!(f32_at(&bytes, second + 4 + bones), 1.0, "then the capsules");
+    both.hands[0] = None;
+    let bytes = picture_message(&both, None, 3, 12.5);
+    assert_eq!(bytes[1] & (WITH_HAND | WITH_SECOND_HAND), WITH_SECOND_HAND);
+    assert_eq!((u32_at(&bytes, 12), u32_at(&bytes, PICTURE_HEAD)), (0, 7));
 }
 
 #[test]

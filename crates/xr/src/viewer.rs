@@ -31,7 +31,8 @@ struct Viewer {
     drawn: u32,
     stamp_ms: f64,
     status: Option<Arc<str>>,
-    hand_version: u32,
+    /// Versions of the hands that the page has.
+    hand_versions: [u32; 2],
     heard: Instant,
 }
 
@@ -72,7 +73,7 @@ pub async fn attend(socket: WebSocket, site: Arc<Site>, number: u64) {
         drawn: 0,
         stamp_ms: f64::NAN,
         status: None,
-        hand_version: 0,
+        hand_versions: [0; 2],
         heard: Instant::now(),
         site: Arc::clone(&site),
     };
@@ -141,11 +142,13 @@ impl Viewer {
         if before.as_ref().is_none_or(|before| before.object.version != picture.object.version) {
             self.send(Message::binary(picture.object.message.clone())).await?;
         }
-        if let Some((hand, _)) = &picture.hand
-            && hand.version != self.hand_version
-        {
-            self.hand_version = hand.version;
-            self.send(Message::binary(hand.message.clone())).await?;
+        for (which, hand) in picture.hands.iter().enumerate() {
+            if let Some((hand, _)) = hand
+                && hand.version != self.hand_versions[which]
+            {
+                self.hand_versions[which] = hand.version;
+                self.send(Message::binary(hand.message.clone())).await?;
+            }
         }
         if self.status.as_ref().is_none_or(|told| !Arc::ptr_eq(told, &picture.status)) {
             self.status = Some(Arc::clone(&picture.status));

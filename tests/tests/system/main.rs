@@ -37,5 +37,6 @@ mod settings;
 mod start;
 mod stopping;
 mod tracked_hands;
+mod two_hands;
 mod wire_rules;
 mod wishes;

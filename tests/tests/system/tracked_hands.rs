@@ -15,7 +15,7 @@ use softgrasp_grasp::object::{ContactModel, SoftObject};
 use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::joints::{JOINT_NAMES, WRIST};
 use softgrasp_hand::sent::Sent;
-use softgrasp_hand::sent::{Arrival, Device};
+use softgrasp_hand::sent::{Arrival, Device, WhichHand};
 use softgrasp_tests::shared::shared;
 
 use crate::settings::{linear_settings, sized};
@@ -67,6 +67,7 @@ fn pinch_of_a_recorded_hand_lifts_a_ball_that_is_put_where_the_hand_closes() {
         let line = serde_json::json!({"hand": "left", "joints": joints}).to_string();
         let sent = Sent {
             arrivals: vec![Arrival {
+                hand: WhichHand::First,
                 device: Device::Joints,
                 at_s: None,
                 is_datagram: true,

@@ -8,7 +8,7 @@ use softgrasp_hand::devices::HandSample;
 use softgrasp_hand::devices::cyberglove::RawSensors;
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::hand_setup::HandConfiguration;
-use softgrasp_hand::sent::Arrival;
+use softgrasp_hand::sent::{Arrival, WhichHand};
 use softgrasp_hand::serial::{SerialDevices, SerialSource, settings_of_hand};
 
 /// Returns the next reading of the glove; `None` if none came within a short time.
@@ -62,6 +62,7 @@ impl Live {
             .take()
             .into_iter()
             .map(|piece| Arrival {
+                hand: WhichHand::First,
                 device: piece.device,
                 at_s: Some(at(piece.arrived)),
                 is_datagram: false,

@@ -18,6 +18,7 @@ pub mod fill;
 mod force_arguments;
 mod gestures;
 mod gradient_arguments;
+mod hand_arguments;
 mod hand_files;
 pub mod inspect;
 pub mod interruption;

@@ -7,6 +7,7 @@ use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::recording::{RecordedRegion, RecordedSetup};
 use softgrasp_protocol::{ElementName, LawName, Material};
 
+use super::hand_arguments::SecondHand;
 use crate::ask::solve_settings::Elasticity;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
 use crate::object::region_choice::{Ellipsoid, RegionChoice};
@@ -74,17 +75,39 @@ fn recorded_element(name: &str) -> anyhow::Result<ElementName> {
 /// # Errors
 /// A text that this version cannot read.
 pub(super) fn recorded_hand(setup: &RecordedSetup) -> anyhow::Result<HandConfiguration> {
-    let read = HandConfiguration::read(&setup.hand_setup);
+    configuration(&setup.hand_setup, &setup.calibration)
+}
+
+/// Second hand of a recorded run, which the recording's bytes carry; `None` for a run of one hand.
+///
+/// # Errors
+/// A text that this version cannot read.
+pub(super) fn recorded_second_hand(setup: &RecordedSetup) -> anyhow::Result<Option<SecondHand>> {
+    let Some(recorded) = &setup.second_hand else { return Ok(None) };
+    Ok(Some(SecondHand {
+        request: None,
+        shares_stream: recorded.shares_stream,
+        configuration: configuration(&recorded.hand_setup, &recorded.calibration)?,
+        is_live: recorded.is_live,
+        world_from_sender: recorded.world_from_sender.map(pose_of),
+    }))
+}
+
+fn configuration(hand_setup: &str, calibration: &str) -> anyhow::Result<HandConfiguration> {
+    let read = HandConfiguration::read(hand_setup);
     let mut configuration = read.context("the recording's hand")?;
-    let calibration = read_toml(&setup.calibration);
+    let calibration = read_toml(calibration);
     configuration.setup.calibration = calibration.context("the recording's calibration")?;
     Ok(configuration)
 }
 
 /// Pose in the world of a sender of joints in a recorded run.
 pub(super) fn recorded_place(setup: &RecordedSetup) -> Option<Isometry3<f64>> {
-    let [x, y, z, qx, qy, qz, qw] = setup.world_from_sender?;
+    setup.world_from_sender.map(pose_of)
+}
+
+fn pose_of([x, y, z, qx, qy, qz, qw]: [f64; 7]) -> Isometry3<f64> {
     // The quaternion is one already: it comes back with its bits.
     let rotation = UnitQuaternion::new_unchecked(Quaternion::new(qw, qx, qy, qz));
-    Some(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+    Isometry3::from_parts(Translation3::new(x, y, z), rotation)
 }

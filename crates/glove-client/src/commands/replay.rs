@@ -8,6 +8,7 @@ use softgrasp_grasp::object::ObjectChoice;
 use softgrasp_hand::hand_request::HandRequest;
 
 use super::access_arguments::AccessArguments;
+use super::hand_arguments::HandArguments;
 use super::numbers::{count, speed};
 use super::run::RunCommand;
 use super::run_arguments::RunArguments;
@@ -50,7 +51,7 @@ impl ReplayCommand {
     /// One line: why the recording cannot be played, or what differs.
     pub fn run(&self) -> anyhow::Result<()> {
         let arguments = RunArguments {
-            hand: Some(HandRequest::Replay(self.recording.clone())),
+            hand: HandArguments::of(HandRequest::Replay(self.recording.clone())),
             speed: Some(self.speed),
             object: self.object.clone(),
             server: self.server.clone(),

@@ -117,7 +117,7 @@ impl RunCommand {
         plan: &RunPlan,
         mut page: Option<RunPage>,
     ) -> anyhow::Result<RunReport> {
-        if plan.hand == HandRequest::Mouse {
+        if plan.sources().any(|source| *source == HandRequest::Mouse) {
             bail!(
                 "--hand mouse needs the window: a run without one has nothing to be moved by; \
                    take --hand scripted"

@@ -7,12 +7,13 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use nalgebra::{Isometry3, Point3, Translation3};
+use nalgebra::Isometry3;
 use softgrasp_core::fem::Material as ElasticMaterial;
-use softgrasp_grasp::hand::HandDimensions;
 use softgrasp_grasp::object::ObjectChoice;
 use softgrasp_hand::foreign_recording::is_foreign;
 use softgrasp_hand::hand_reader::HandSetup;
+#[cfg(any(feature = "window", feature = "xr"))]
+use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::hand_request::HandRequest;
 use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::recording::{Recording, read_recording};
@@ -24,12 +25,13 @@ use super::contact_arguments::{ContactArguments, GraspRule};
 use super::display_arguments::DisplayArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::force_arguments::ForceArguments;
-use super::hand_files::read_configuration;
-use super::numbers::{count, place, poisson, positive, speed, ticks};
+use super::hand_arguments::{HandArguments, SecondHand};
+use super::numbers::{count, poisson, positive, speed, ticks};
 use super::page_arguments::PageArguments;
 use super::recorded_object::recorded_object;
 use super::recorded_settings::{
-    recorded_hand, recorded_place, recorded_regions, recorded_scene, recorded_settings,
+    recorded_hand, recorded_place, recorded_regions, recorded_scene, recorded_second_hand,
+    recorded_settings,
 };
 use super::region_arguments::RegionArguments;
 use crate::ask::connection::ServerChoice;
@@ -62,24 +64,9 @@ pub struct RunArguments {
     /// other built-ins].
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     pub(super) object_size: Option<f64>,
-    /// The hand: scripted[:lift|approach|attach|squeeze|release|regrasp], mouse (in a window),
-    /// serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, xr (with --xr), or
-    /// replay:F.mcap.
-    #[arg(long, value_name = "SOURCE")]
-    pub(super) hand: Option<HandRequest>,
-    /// Configuration of the hand, its glove and its tracker (hand.toml, made by `calibrate` and
-    /// `align`).
-    #[arg(long, value_name = "F.toml")]
-    pub(super) hand_setup: Option<PathBuf>,
-    /// Length of the hand, m: wrist crease to tip of the middle finger [default: 0.185].
-    #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
-    pub(super) hand_length: Option<f64>,
-    /// Breadth of the hand, m: across the knuckles, without the thumb [default: 0.084].
-    #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
-    pub(super) hand_breadth: Option<f64>,
-    /// Place of the object in the frame of a sender of joints, m [default: before its first hand].
-    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
-    pub(super) joints_origin: Option<Point3<f64>>,
+    /// The hands that act.
+    #[command(flatten)]
+    pub(super) hand: HandArguments,
     /// Where the object is put: home, or hand, between thumb and fingers of the first hand that is heard
     /// of [default: home].
     #[arg(long, value_name = "home|hand")]
@@ -203,8 +190,10 @@ pub(super) struct RunPlan {
     pub(super) server: ServerChoice,
     /// Endpoint of the server, with token and encryption; `None` for the embedded one.
     pub(super) endpoint: Option<Endpoint>,
-    /// Hand that is asked for.
+    /// Hand that is asked for; the first of two.
     pub(super) hand: HandRequest,
+    /// Second hand, or one that the stream of the first may carry.
+    pub(super) second: Option<SecondHand>,
     /// Whether ticks wait for answers.
     pub(super) pace: Pace,
     /// Time from tick to tick, in real time; `None` for as fast as possible.
@@ -257,20 +246,14 @@ impl RunArguments {
     /// # Errors
     /// A scene that cannot be read, or settings that do not go together.
     pub(super) fn plan(&self) -> anyhow::Result<RunPlan> {
-        if let Some(HandRequest::Replay(path)) = &self.hand
+        self.hand.check()?;
+        if let Some(HandRequest::Replay(path)) = self.hand.first()
             && !is_foreign(path)
         {
             return self.plan_of_recording(path);
         }
-        let scene = match &self.scene {
-            Some(path) => SceneFile::read(path)?,
-            None => SceneFile::default(),
-        };
-        let object = match (self.asked_object(), &scene.object) {
-            (Some(choice), _) => choice.clone(),
-            (None, Some(name)) => name.parse()?,
-            (None, None) => "strawberry".parse()?,
-        };
+        let scene = self.scene.as_deref().map(SceneFile::read).transpose()?.unwrap_or_default();
+        let object = self.chosen_object(&scene)?;
         let method = match (&self.method, &scene.method) {
             (Some(method), _) => method.clone(),
             (None, Some(name)) => name.parse().context("the scene's method")?,
@@ -293,8 +276,13 @@ impl RunArguments {
         let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
         let is_xr = self.takes_headset(&hand)?;
         let (force, contact_scene) = self.felt.of_run(rule.scene)?;
+        let hand_configuration = self.hand.configuration()?;
+        // The thesis's rules know one hand.
+        let of_two = rule.scene.map(|_| self.hand.second(&hand, &hand_configuration));
+        let second = of_two.transpose()?.flatten();
         // Devices have a time of their own.
-        let period = self.period(hand.is_live() || force.is_some());
+        let is_timed = hand.is_live() || second.as_ref().is_some_and(|second| second.is_live);
+        let period = self.period(is_timed || force.is_some());
         let object_size =
             self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
@@ -324,9 +312,19 @@ impl RunArguments {
             period,
             is_live: hand.is_live(),
             hand,
-            hand_configuration: self.hand_configuration()?,
-            world_from_sender: self.world_from_sender(is_xr),
+            second,
+            hand_configuration,
+            world_from_sender: self.hand.world_from_sender(is_xr),
             recording: None,
+        })
+    }
+
+    /// Object that flags or scene name; a strawberry where none does.
+    fn chosen_object(&self, scene: &SceneFile) -> anyhow::Result<ObjectChoice> {
+        Ok(match (self.asked_object(), &scene.object) {
+            (Some(choice), _) => choice.clone(),
+            (None, Some(name)) => name.parse()?,
+            (None, None) => "strawberry".parse()?,
         })
     }
 
@@ -353,9 +351,10 @@ impl RunArguments {
         Ok(regions)
     }
 
-    /// Whether the hand is that of a headset, which a page must send.
+    /// Whether the first hand is that of a headset, which a page must send.
     fn takes_headset(&self, hand: &HandRequest) -> anyhow::Result<bool> {
-        if *hand == HandRequest::Xr && self.page.xr.is_none() {
+        let mut all = self.hand.hands.iter().chain([hand]);
+        if all.any(|hand| *hand == HandRequest::Xr) && self.page.xr.is_none() {
             bail!(
                 "--hand xr takes the hand of a headset from the page: give it an address by --xr"
             );
@@ -363,49 +362,31 @@ impl RunArguments {
         Ok(*hand == HandRequest::Xr)
     }
 
-    /// Pose in the world of a sender of joints; a page sends the hand in the world frame.
-    fn world_from_sender(&self, is_xr: bool) -> Option<Isometry3<f64>> {
-        let chosen = self.joints_origin.map(|at| Translation3::from(-at.coords).into());
-        chosen.or(is_xr.then(Isometry3::identity))
-    }
-
     /// Rules of the grasp, equations, and configuration of the hand.
     fn grasping(&self, scene: &SceneFile, method: &MethodName) -> anyhow::Result<Grasping> {
         // A run of which nothing was said picks a strawberry from a table. Hands that are no script of the
         // thesis's grasp grasp as hands do.
-        let lifts = match &self.hand {
+        let lifts = match self.hand.first() {
+            _ if self.hand.are_two() => true,
             Some(HandRequest::Scripted(script)) => *script == ScriptName::Lift,
             Some(_) => true,
             None => self.asked_object().is_none() && self.scene.is_none(),
         };
         let needs_thesis = !lifts || *method != MethodName::auto();
         let rule = self.grasp.of_run(scene, &self.elasticity, needs_thesis)?;
+        if self.hand.are_two() && rule.scene.is_none() {
+            bail!("two hands need --grasp contact: the rules of the thesis know one hand");
+        }
         let elasticity = match rule.scene {
             Some(_) => self.elasticity.of_contact(scene)?,
             None => self.elasticity.of_run(scene, method)?,
         };
         let script = if rule.scene.is_some() { ScriptName::Lift } else { ScriptName::default() };
-        let hand = self.hand.clone().unwrap_or(HandRequest::Scripted(script));
+        let hand = self.hand.first().cloned().unwrap_or(HandRequest::Scripted(script));
         if rule.scene.is_none() && hand == HandRequest::Scripted(ScriptName::Lift) {
             bail!("the script lift needs --grasp contact");
         }
         Ok(Grasping { rule, elasticity, hand })
-    }
-
-    /// Configuration of the hand from its file, with the size of the command line.
-    fn hand_configuration(&self) -> anyhow::Result<HandConfiguration> {
-        let mut configuration = match &self.hand_setup {
-            Some(path) => read_configuration(path)?,
-            None => HandConfiguration::default(),
-        };
-        let old = configuration.setup.dimensions;
-        if self.hand_length.is_some() || self.hand_breadth.is_some() {
-            let length_m = self.hand_length.unwrap_or(old.hand_length);
-            let size =
-                HandDimensions::scaled(length_m, self.hand_breadth.unwrap_or(old.hand_breadth))?;
-            configuration.setup.dimensions = size.with_handedness(old.handedness);
-        }
-        Ok(configuration)
     }
 
     /// Settings of the run that is replayed: object, material and solves are the recorded ones, whatever
@@ -433,6 +414,7 @@ impl RunArguments {
             endpoint: self.access.to(&server)?,
             server,
             hand: HandRequest::Replay(path.to_owned()),
+            second: recorded_second_hand(setup)?,
             // Each tick waits for the answers that it took before.
             pace: Pace::Lockstep,
             period: period.map(Duration::from_secs_f64),
@@ -458,10 +440,29 @@ impl RunPlan {
         Self { pace, period, ..self.clone() }
     }
 
-    /// Whether the hand is that of a headset.
+    /// Sources of the hands, the second one's where it has its own.
+    pub(super) fn sources(&self) -> impl Iterator<Item = &HandRequest> {
+        let second = self.second.as_ref().and_then(|second| second.request.as_ref());
+        std::iter::once(&self.hand).chain(second)
+    }
+
+    /// Kind of the hand that window and page are made for: the mouse, where it moves one of two.
+    #[cfg(any(feature = "window", feature = "xr"))]
+    pub(super) fn choice(&self) -> HandChoice {
+        let mut choices = self.sources().map(HandRequest::choice);
+        let is_moved = choices.any(|choice| choice == HandChoice::Mouse);
+        if is_moved { HandChoice::Mouse } else { self.hand.choice() }
+    }
+
+    /// Name of the sources in reports and recordings.
+    pub(super) fn hand_name(&self) -> String {
+        self.sources().map(HandRequest::to_string).collect::<Vec<_>>().join(" + ")
+    }
+
+    /// Whether a hand is that of a headset.
     #[cfg(feature = "xr")]
     pub(super) fn takes_headset(&self) -> bool {
-        self.hand == HandRequest::Xr
+        self.sources().any(|source| *source == HandRequest::Xr)
     }
 
     /// Whether a script begins again after its end; not if the run is recorded or has a number of ticks.

@@ -83,7 +83,7 @@ impl RunPage {
         talk: PageTalk,
     ) -> anyhow::Result<()> {
         let PageTalk { controls, notices, has_window } = talk;
-        let hand = plan.hand.choice();
+        let hand = plan.choice();
         let request = plan.object_request(&HandSetup::default());
         let run = ShownRun {
             look: Look::of(&plan.object.to_string()),

@@ -3,13 +3,16 @@
 use std::path::Path;
 
 use anyhow::ensure;
+use nalgebra::Isometry3;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_hand::devices::calibration::toml_text;
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::recording::{
-    RecordedFriction, RecordedRegion, RecordedSetup, Recorder, VERSION,
+    RecordedFriction, RecordedHand, RecordedRegion, RecordedSetup, Recorder, VERSION,
+    VERSION_OF_ONE_HAND,
 };
 
+use super::hand_arguments::SecondHand;
 use super::run_arguments::RunPlan;
 use crate::ask::digest::Digest;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
@@ -24,12 +27,11 @@ pub(super) fn start_recorder(
     path: &Path,
     plan: &RunPlan,
     loaded: &LoadedObject,
-    hand: String,
 ) -> anyhow::Result<Recorder> {
     let SolveSettings { material, element, method, contact, subscription, elasticity, max_error } =
         &plan.settings;
     let setup = RecordedSetup {
-        version: VERSION,
+        version: if plan.second.is_some() { VERSION } else { VERSION_OF_ONE_HAND },
         program: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
         object: plan.object.to_string(),
         nodes: plan.nodes,
@@ -54,18 +56,32 @@ pub(super) fn start_recorder(
             viscosity_s: scene.viscosity,
             gravity: scene.gravity.into(),
         }),
-        hand,
+        hand: plan.hand_name(),
         period_s: plan.period.map(|period| period.as_secs_f64()),
         hand_setup: plan.hand_configuration.to_text(),
         calibration: toml_text(&plan.hand_configuration.setup.calibration)?,
         is_live: plan.is_live,
-        world_from_sender: plan.world_from_sender.as_ref().map(|pose| {
-            let ([x, y, z], [qx, qy, qz, qw]): ([f64; 3], [f64; 4]) =
-                (pose.translation.vector.into(), pose.rotation.coords.into());
-            [x, y, z, qx, qy, qz, qw]
-        }),
+        world_from_sender: plan.world_from_sender.as_ref().map(recorded_place),
+        second_hand: plan.second.as_ref().map(recorded_hand).transpose()?,
     };
     Ok(Recorder::start(path, setup)?)
+}
+
+fn recorded_hand(second: &SecondHand) -> anyhow::Result<RecordedHand> {
+    let SecondHand { configuration, is_live, shares_stream, world_from_sender, .. } = second;
+    Ok(RecordedHand {
+        hand_setup: configuration.to_text(),
+        calibration: toml_text(&configuration.setup.calibration)?,
+        is_live: *is_live,
+        shares_stream: *shares_stream,
+        world_from_sender: world_from_sender.as_ref().map(recorded_place),
+    })
+}
+
+fn recorded_place(pose: &Isometry3<f64>) -> [f64; 7] {
+    let ([x, y, z], [qx, qy, qz, qw]): ([f64; 3], [f64; 4]) =
+        (pose.translation.vector.into(), pose.rotation.coords.into());
+    [x, y, z, qx, qy, qz, qw]
 }
 
 fn recorded_region(region: &RegionChoice) -> RecordedRegion {

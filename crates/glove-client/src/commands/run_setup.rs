@@ -2,7 +2,6 @@
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
-#[cfg(any(feature = "window", feature = "xr"))]
 use std::sync::Arc;
 
 use anyhow::Context;
@@ -12,18 +11,21 @@ use softgrasp_grasp::grasp::Grasp;
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_hand::foreign_recording::{ForeignHand, is_foreign};
 use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::hand_readers::HandReaders;
 use softgrasp_hand::hand_request::HandRequest;
+use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::hand_source::HandSource;
 use softgrasp_hand::joints::{JointsFeed, JointsListener};
 use softgrasp_hand::live_hand::LiveHand;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 use softgrasp_hand::mouse::MouseHand;
 use softgrasp_hand::recording::ReplayHand;
-use softgrasp_hand::scripted::{GraspPlan, NoGrasp, Planner, ScriptedHand};
+use softgrasp_hand::scripted::{GraspPlan, NoGrasp, PlanRequest, Planner, ScriptedHand};
 use softgrasp_hand::serial::{SerialDevices, settings_of_hand};
 #[cfg(any(feature = "window", feature = "xr"))]
 use softgrasp_window::view::loading::LoadObject;
 
+use super::hand_arguments::SecondHand;
 use super::run_arguments::RunPlan;
 use super::run_recording::{check_object, start_recorder};
 use crate::ask::connection::Host;
@@ -37,7 +39,8 @@ use crate::pace::tick_budget::Priority;
 use crate::run::contact_grasp::ContactScene;
 use crate::run::grasp_loop::GraspLoop;
 use crate::run::run_report::RunReport;
-use crate::run::session::{Session, priority_for};
+use crate::run::session::Session;
+use crate::run::tick_priority::priority_for;
 
 /// Run that can be played.
 pub(super) struct ReadyRun {
@@ -93,12 +96,13 @@ pub(super) fn make_ready(
         check_object(&recording.setup, &loaded)?;
     }
     let recorder = setup.record.as_deref();
-    let hand_name = plan.hand.to_string();
-    let recorder =
-        recorder.map(|path| start_recorder(path, plan, &loaded, hand_name)).transpose()?;
+    let recorder = recorder.map(|path| start_recorder(path, plan, &loaded)).transpose()?;
     let LoadedObject { summary, mut object, plan: grip, .. } = loaded;
     seen(&object)?;
-    let hand = hand_of(plan, setup, grip)?;
+    let first = Acting { request: &plan.hand, configuration: &plan.hand_configuration };
+    let hand = hand_of(plan, setup, first, || grip)?;
+    let second = plan.second.as_ref().map(|hand| second_of(plan, setup, hand, &object));
+    let second = second.transpose()?.flatten();
     let priority = match plan.pace {
         Pace::Lockstep => Priority::Ordinary,
         Pace::Free => priority_for(&mut object)?,
@@ -117,9 +121,10 @@ pub(super) fn make_ready(
     if std::io::stderr().is_terminal() {
         summary.notes.iter().for_each(|note| eprintln!("glove-client: {note}"));
     }
+    let names = std::iter::once(&hand).chain(&second).map(HandSource::name);
     let mut report = RunReport::new(
         summary,
-        hand.name(),
+        names.collect::<Vec<_>>().join(" + "),
         plan.server.to_string(),
         plan.pace,
         plan.settings.contact,
@@ -128,12 +133,9 @@ pub(super) fn make_ready(
         report.played.keep_older(path);
     }
     let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M)?;
-    let reader = match plan.is_live {
-        true => HandReader::of_devices(hand_setup, plan.world_from_sender),
-        false => HandReader::new(hand_setup),
-    };
     let settings = plan.settings.clone();
-    let mut grasp_loop = GraspLoop::try_new(reader, object, grasp, link, settings, plan.pace)
+    let readers = readers_of(plan);
+    let mut grasp_loop = GraspLoop::try_new(readers, object, grasp, link, settings, plan.pace)
         .context("cannot start a thread beside the ticks")?;
     if let Some(scene) = plan.contact_scene {
         let table_y = Some(grasp_loop.object().rest_shape().bottom());
@@ -147,6 +149,9 @@ pub(super) fn make_ready(
         grasp_loop.tick_every(period);
     }
     let mut session = Session::new(grasp_loop, hand, report, priority, setup.ends_with_script);
+    if let Some(second) = second {
+        session.act_with(second);
+    }
     if let Some(recorder) = recorder {
         session.record_to(recorder);
     }
@@ -170,38 +175,78 @@ pub(super) fn load_beside(request: ObjectRequest) -> LoadObject {
     })
 }
 
-/// Hand of a run; `grip` is the plan by which the scripted one grasps the object.
+/// Readers of the hands of a run.
+fn readers_of(plan: &RunPlan) -> HandReaders {
+    let reader = |is_live, configuration: &HandConfiguration, place| match is_live {
+        true => HandReader::of_devices(configuration.setup.clone(), place),
+        false => HandReader::new(configuration.setup.clone()),
+    };
+    let first = reader(plan.is_live, &plan.hand_configuration, plan.world_from_sender);
+    match &plan.second {
+        None => first.into(),
+        Some(SecondHand { shares_stream, configuration, is_live, world_from_sender, .. }) => {
+            let second = reader(*is_live, configuration, *world_from_sender);
+            match shares_stream {
+                true => HandReaders::of_stream(first, second),
+                false => HandReaders::of_two(first, second),
+            }
+        }
+    }
+}
+
+/// A hand of a run: its source and its configuration.
+struct Acting<'a> {
+    request: &'a HandRequest,
+    configuration: &'a HandConfiguration,
+}
+
+/// Source of the second hand of a run; `None` where another source carries it.
+fn second_of(
+    plan: &RunPlan,
+    setup: &Setup,
+    hand: &SecondHand,
+    object: &SoftObject,
+) -> anyhow::Result<Option<HandSource>> {
+    let SecondHand { request: Some(request), configuration, .. } = hand else { return Ok(None) };
+    let grip = || {
+        let rest = Arc::clone(object.rest_shape());
+        PlanRequest::new(rest, configuration.setup.clone(), plan.settings.contact).grip()
+    };
+    hand_of(plan, setup, Acting { request, configuration }, grip).map(Some)
+}
+
+/// Source of a hand of a run; `grip` is the plan by which the scripted one grasps the object.
 fn hand_of(
     plan: &RunPlan,
     setup: &Setup,
-    grip: Result<GraspPlan, NoGrasp>,
+    Acting { request, configuration }: Acting<'_>,
+    grip: impl FnOnce() -> Result<GraspPlan, NoGrasp>,
 ) -> anyhow::Result<HandSource> {
-    let hand_setup = &plan.hand_configuration.setup;
+    let (hand_setup, name) = (&configuration.setup, request.to_string());
     let planner = || Planner::beside().context("cannot start the planner's thread");
     let contact = plan.settings.contact;
-    Ok(match (&plan.hand, plan.pace) {
+    Ok(match (request, plan.pace) {
         (HandRequest::Mouse, _) => {
             MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).holding(contact).into()
         }
-        (HandRequest::Scripted(script), Pace::Lockstep) => {
-            let hand = ScriptedHand::following(*script, hand_setup.clone(), grip?);
-            hand.squeezing_longer(setup.squeeze_times).holding(contact).into()
-        }
-        (HandRequest::Scripted(script), Pace::Free) => {
-            let hand = ScriptedHand::following(*script, hand_setup.clone(), grip?);
-            let hand = hand.squeezing_longer(setup.squeeze_times);
-            hand.holding(contact).with_planner(planner()?).into()
+        (HandRequest::Scripted(script), pace) => {
+            let hand = ScriptedHand::following(*script, hand_setup.clone(), grip()?);
+            let hand = hand.squeezing_longer(setup.squeeze_times).holding(contact);
+            match pace {
+                Pace::Lockstep => hand.into(),
+                Pace::Free => hand.with_planner(planner()?).into(),
+            }
         }
         (HandRequest::Serial(source), _) => {
-            let settings = settings_of_hand(source, &plan.hand_configuration);
-            LiveHand::serial(SerialDevices::open(settings)?, plan.hand.to_string()).into()
+            let settings = settings_of_hand(source, configuration);
+            LiveHand::serial(SerialDevices::open(settings)?, name).into()
         }
         (HandRequest::Joints(address), _) => {
-            LiveHand::joints(JointsListener::bind(*address)?, plan.hand.to_string()).into()
+            LiveHand::joints(JointsListener::bind(*address)?, name).into()
         }
         (HandRequest::Xr, _) => {
             let feed = setup.joints.clone().context("there is no page that sends a hand")?;
-            LiveHand::fed(feed, plan.hand.to_string()).into()
+            LiveHand::fed(feed, name).into()
         }
         (HandRequest::Replay(path), _) if is_foreign(path) => {
             ForeignHand::read(path, hand_setup, plan.tick_s())?.into()

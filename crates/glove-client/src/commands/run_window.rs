@@ -183,7 +183,7 @@ fn start(
             contact: words_of_contact(&plan.settings.contact.to_string()),
             is_lifted: plan.contact_scene.is_some(),
             material: plan.elastic_material()?,
-            hand: plan.hand.choice(),
+            hand: plan.choice(),
             method: plan.settings.method.to_string(),
             max_error: None,
             tick_s: plan.tick_s(),

@@ -1,5 +1,5 @@
-//! A grasp by contact with friction: the free object among the rigid bodies of the hand and above a
-//! table, in steps of time.
+//! A grasp by contact with friction: the free object among the rigid bodies of one hand or two and above
+//! a table, in steps of time.
 
 use std::time::Instant;
 
@@ -8,9 +8,10 @@ use softgrasp_core::dynamics::{Candidate, MovingBody};
 use softgrasp_core::rigid_body::RigidShape;
 use softgrasp_force::ForceReport;
 use softgrasp_grasp::grasp::StateName;
-use softgrasp_grasp::hand::{HAND_BODIES, HandBody};
+use softgrasp_grasp::hand::HAND_BODIES;
 use softgrasp_grasp::object::SoftObject;
 use softgrasp_grasp::sphere_tree::{SearchedSurface, triangles_near};
+use softgrasp_hand::sent::WhichHand;
 use softgrasp_protocol::{
     BodyLoad, BodyShape, ContactAsk, ContactFrame, ContactReport, Deformation, ModelHash,
     NodeChoice, ObjectState, PathChoice,
@@ -23,6 +24,7 @@ use crate::ask::link::ReachedStep;
 use crate::ask::solve_settings::Elasticity;
 use crate::run::contact_ledger::StepRecord;
 use crate::run::felt::FeltHand;
+use crate::run::grasping_hand::{BodyPoses, BothHands, GraspingHand};
 
 /// Constants of an object and of the hand that grasps it with friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,33 +64,26 @@ pub struct ContactGrasp {
     world_from_home: Isometry3<f64>,
     /// State of the object after the last answer.
     state: ObjectState,
-    /// Time and pose of the hand at the end of the last answered step.
-    hand: Option<HandMoment>,
+    /// Both hands; the second is not there in a run of one.
+    hands: [GraspingHand; 2],
+    /// End of the last answered step on the client's clock, s.
+    time_s: Option<f64>,
     /// Step that was asked for and not answered yet.
     asked: Option<Asked>,
-    /// Force and torque of each body on the object in the last answer: the table, then the hand.
-    loads: Vec<BodyLoad>,
+    /// Force and torque of the table on the object in the last answer.
+    table_load: Option<BodyLoad>,
     /// How well the last step meets the law of contact.
     report: ContactReport,
     /// Whether the server's last step is not the one that the state comes from.
     strayed: bool,
-    /// Whether the hand must leave the object before it can touch it.
-    is_apart: bool,
     /// Number of steps in a row in which nothing has moved.
     still_steps: u32,
     /// Number of steps in a row with motion too slow to be seen.
     slow_steps: u32,
     /// State that was reported last.
     told: Option<StateName>,
-    /// Force that the hand feels.
+    /// Force that the first hand feels.
     felt: Option<FeltHand>,
-}
-
-/// Poses of the bodies of a hand at a time, s.
-#[derive(Clone, Debug)]
-struct HandMoment {
-    time_s: f64,
-    world_from_bodies: [Isometry3<f64>; HAND_BODIES],
 }
 
 /// What became of the answer to a step.
@@ -115,20 +110,20 @@ pub struct StepWish {
 struct Asked {
     tick: u64,
     at: Instant,
-    hand: HandMoment,
+    /// End of the step, s.
+    time_s: f64,
+    /// Poses of both hands at the end of the step.
+    hands: [Option<BodyPoses>; 2],
     /// Extent of the object at rest, m ([`extent`]).
     extent: f64,
 }
 
-/// Number of bodies before those of the hand: the table.
+/// Number of bodies before those of the hands: the table.
 const TABLE: usize = 1;
 /// Longest step, s: a run with longer ticks plays in slow motion.
 const STEP_MAX_S: f64 = 1.0 / 60.0;
 /// Shortest step, s; a shorter one is left to the next tick.
 const STEP_MIN_S: f64 = 2e-4;
-/// Distance, m, by which a hand was not followed if it moves farther in one step: it must leave the
-/// object first.
-const LEAP_M: f64 = 0.15;
 /// Distance, m, at which a hand that was inside the object counts as outside.
 const CLEAR_M: f64 = 2e-3;
 /// Speed below which an object is at rest, m/s and (times its extent) rad/s.
@@ -159,12 +154,12 @@ impl ContactGrasp {
             scene,
             world_from_home,
             state: ObjectState::at_rest(pose_of(&world_from_home)),
-            hand: None,
+            hands: [GraspingHand::new(), GraspingHand::new()],
+            time_s: None,
             asked: None,
-            loads: Vec::new(),
+            table_load: None,
             report: ContactReport::default(),
             strayed: true,
-            is_apart: true,
             still_steps: 0,
             slow_steps: 0,
             told: None,
@@ -198,15 +193,16 @@ impl ContactGrasp {
     /// Puts the object, at rest and undeformed, at a pose.
     pub fn put(&mut self, world_from_object: Isometry3<f64>) {
         self.state = ObjectState::at_rest(pose_of(&world_from_object));
-        self.loads.clear();
+        self.table_load = None;
+        self.hands.iter_mut().for_each(|hand| hand.press(&[]));
         self.felt.iter_mut().for_each(FeltHand::let_go);
         self.let_go();
         (self.asked, self.still_steps, self.strayed) = (None, 0, true);
     }
 
-    /// Releases the object: the hand must leave it before it can touch it again.
+    /// Releases the object: each hand must leave it before it can touch it again.
     pub fn let_go(&mut self) {
-        self.is_apart = true;
+        self.hands.iter_mut().for_each(|hand| hand.is_apart = true);
         self.still_steps = 0;
     }
 
@@ -231,40 +227,36 @@ impl ContactGrasp {
         &mut self,
         tick: u64,
         now_s: f64,
-        hand: &[HandBody; HAND_BODIES],
+        hands: &BothHands,
         object: &SoftObject,
         wish: StepWish,
     ) -> Option<ContactFrame> {
-        let world_from_bodies = std::array::from_fn(|i| hand[i].world_from_body);
-        if let Some(felt) = &self.felt {
-            felt.hand(self.world_from_table(), &world_from_bodies);
+        let poses = [0, 1].map(|which| hands[which].as_ref().map(GraspingHand::poses));
+        if let (Some(felt), Some(_)) = (&self.felt, &poses[0]) {
+            felt.hand(self.body_poses(&poses));
         }
         if self.asked.is_some() {
             return None;
         }
-        let moment = HandMoment { time_s: now_s, world_from_bodies };
-        let before = self.hand.get_or_insert_with(|| moment.clone());
-        let seconds = match now_s - before.time_s {
+        let begun_s = *self.time_s.get_or_insert(now_s);
+        for (hand, now) in self.hands.iter_mut().zip(&poses) {
+            now.iter().for_each(|now| hand.meet(now));
+        }
+        let seconds = match now_s - begun_s {
             0.0 if tick == 0 => STEP_MAX_S,
             seconds if seconds < STEP_MIN_S => return None,
             seconds => seconds.min(STEP_MAX_S),
         };
-        let leap = (0..HAND_BODIES).map(|i| {
-            let (a, b) = (&before.world_from_bodies[i], &moment.world_from_bodies[i]);
-            (a.translation.vector - b.translation.vector).norm()
-        });
-        let leapt = leap.fold(0.0, f64::max) > LEAP_M;
-        if leapt {
-            before.world_from_bodies = moment.world_from_bodies;
-            self.is_apart = true;
+        for (hand, now) in self.hands.iter_mut().zip(&poses) {
+            now.iter().for_each(|now| hand.follow(now));
         }
-        let bodies = self.bodies(hand);
+        let bodies = self.bodies(hands);
         let ask = self.ask(seconds, &wish);
         let extent = extent(object.rest().vertices());
-        let near = self.candidates(&bodies, object, extent, &ask);
+        let near = self.candidates(hands, &bodies, object, extent, &ask);
         let is_touchable = near.iter().any(|candidate| usize::from(candidate.body) >= TABLE);
         if self.still_steps >= STILL_STEPS && !is_touchable {
-            self.hand = Some(moment);
+            self.end_at(now_s, poses);
             return None;
         }
         let step_object = StepObject {
@@ -275,11 +267,23 @@ impl ContactGrasp {
             displacement: object.displacement(),
             nodes: wish.nodes,
         };
-        self.asked = Some(Asked { tick, at: Instant::now(), hand: moment, extent });
+        self.asked = Some(Asked { tick, at: Instant::now(), time_s: now_s, hands: poses, extent });
         Some(step_object.frame_among(self.state.clone(), &bodies, ask, &near))
     }
 
-    /// Lets the hand feel the object from now on.
+    /// Ends a step at a time, s, with the hands at these poses.
+    fn end_at(&mut self, time_s: f64, hands: [Option<BodyPoses>; 2]) {
+        self.time_s = Some(time_s);
+        self.hands.iter_mut().zip(hands).for_each(|(hand, now)| hand.end(now));
+    }
+
+    /// Poses of all bodies of a step: the table, then those of the hands that are there.
+    fn body_poses(&self, hands: &[Option<BodyPoses>; 2]) -> Vec<Isometry3<f64>> {
+        let of_hands = hands.iter().flatten().flatten().copied();
+        std::iter::once(self.world_from_table()).chain(of_hands).collect()
+    }
+
+    /// Lets the first hand feel the object from now on.
     pub(crate) fn feel(&mut self, felt: FeltHand) {
         self.felt = Some(felt);
     }
@@ -319,8 +323,9 @@ impl ContactGrasp {
         }
     }
 
-    /// Bodies of a step, each with its motion since the last answer: the table, then the hand.
-    fn bodies(&self, hand: &[HandBody; HAND_BODIES]) -> Vec<StepBody> {
+    /// Bodies of a step, each with its motion since the last answer: the table, then the hands that are
+    /// there.
+    fn bodies(&self, hands: &BothHands) -> Vec<StepBody> {
         let friction = self.scene.friction;
         let up = Vector3::y_axis();
         let table = StepBody {
@@ -331,20 +336,13 @@ impl ContactGrasp {
             ),
             shape: BodyShape::Plane { normal: up.into_inner().into() },
         };
-        let of_hand = hand.iter().enumerate().map(|(i, body)| {
-            let start = self.hand.as_ref().map_or(body.world_from_body, |h| h.world_from_bodies[i]);
-            StepBody {
-                moving: MovingBody {
-                    shape: body.shape(),
-                    world_from_body_start: start,
-                    world_from_body_end: body.world_from_body,
-                    friction,
-                    compliance: self.scene.finger_compliance,
-                },
-                shape: BodyShape::Capsule { radius: body.radius, length: body.length },
-            }
-        });
-        std::iter::once(table).chain(of_hand).collect()
+        let mut bodies = vec![table];
+        for (hand, of_hand) in self.hands.iter().zip(hands) {
+            let compliance = self.scene.finger_compliance;
+            let of_hand = of_hand.iter();
+            bodies.extend(of_hand.flat_map(|of| hand.step_bodies(of, friction, compliance)));
+        }
+        bodies
     }
 
     /// Triangles that can touch a body; none for a hand that must leave the object first.
@@ -352,6 +350,7 @@ impl ContactGrasp {
     /// Units: `extent` of the object m.
     fn candidates(
         &mut self,
+        hands: &BothHands,
         bodies: &[StepBody],
         object: &SoftObject,
         extent: f64,
@@ -363,19 +362,35 @@ impl ContactGrasp {
             triangles: &object.surface().triangles,
             places: object.shape(),
         };
-        let moving: Vec<MovingBody> = bodies.iter().map(|body| body.moving.clone()).collect();
         let world_from_object = self.world_from_object();
-        if self.is_apart {
-            let hand = &moving[TABLE..];
-            self.is_apart = !triangles_near(&surface, &world_from_object, hand, CLEAR_M).is_empty();
+        let moving = |at: usize| bodies[at].moving.clone();
+        let mut places: Vec<usize> = (0..TABLE).collect();
+        let mut first = TABLE;
+        for (hand, _) in self.hands.iter_mut().zip(hands).filter(|(_, bodies)| bodies.is_some()) {
+            let of_hand = first..first + HAND_BODIES;
+            first = of_hand.end;
+            if hand.is_apart {
+                let bodies: Vec<MovingBody> = of_hand.clone().map(moving).collect();
+                let near = triangles_near(&surface, &world_from_object, &bodies, CLEAR_M);
+                hand.is_apart = !near.is_empty();
+            }
+            if !hand.is_apart {
+                places.extend(of_hand);
+            }
         }
-        let touching = if self.is_apart { &moving[..TABLE] } else { &moving[..] };
-        let margin = reach_of_step(extent, &self.state, touching, ask);
-        triangles_near(&surface, &world_from_object, touching, margin)
+        let touching: Vec<MovingBody> = places.iter().copied().map(moving).collect();
+        let margin = reach_of_step(extent, &self.state, &touching, ask);
+        let mut near = triangles_near(&surface, &world_from_object, &touching, margin);
+        // Bodies were counted among those that may touch.
+        for candidate in &mut near {
+            let place = places[usize::from(candidate.body)];
+            candidate.body = u16::try_from(place).unwrap_or(candidate.body);
+        }
+        near
     }
 
     /// Takes the answer to the step of a tick. A step that was not solved and would throw the object away
-    /// is not taken: the object stays where it was, undeformed, and the hand must leave it.
+    /// is not taken: the object stays where it was, undeformed, and the hands must leave it.
     pub fn take(&mut self, tick: u64, reached: ReachedStep) -> TakenStep {
         let Some(asked) = self.asked.take_if(|asked| asked.tick == tick) else {
             return TakenStep::NotAsked;
@@ -386,22 +401,37 @@ impl ContactGrasp {
         let is_far = contact.penetration_max > LOST_DEPTH * extent || moved > LOST_WAY * extent;
         if !contact.is_converged && is_far {
             self.put(self.world_from_object());
-            self.hand = Some(asked.hand);
+            self.end_at(asked.time_s, asked.hands);
             return TakenStep::Lost;
         }
         let norm = |v: &[f64; 3]| v[0].hypot(v[1]).hypot(v[2]);
-        let world_from_table = self.world_from_table();
-        if let Some(felt) = &mut self.felt {
-            felt.answer(&small_system, world_from_table, &asked.hand.world_from_bodies, asked.at);
+        let poses = self.body_poses(&asked.hands);
+        match (&mut self.felt, &asked.hands[0]) {
+            (Some(felt), Some(_)) => felt.answer(&small_system, &poses, asked.at),
+            // What the other hand presses with is not felt.
+            (Some(felt), None) => felt.let_go(),
+            (None, _) => {}
         }
         let speed = norm(&state.velocity).max(norm(&state.angular_velocity) * extent);
         let is_still = speed < STILL_SPEED;
         self.still_steps = if is_still { self.still_steps.saturating_add(1) } else { 0 };
         self.slow_steps = if speed < SLOW_SPEED { self.slow_steps.saturating_add(1) } else { 0 };
-        (self.state, self.loads, self.report) = (state, loads, contact);
+        self.press(&asked.hands, &loads);
+        (self.state, self.report) = (state, contact);
         self.strayed = false;
-        self.hand = Some(asked.hand);
+        self.end_at(asked.time_s, asked.hands);
         TakenStep::Taken
+    }
+
+    /// Hands the loads of an answer to the table and to the hands that were there.
+    fn press(&mut self, hands: &[Option<BodyPoses>; 2], loads: &[BodyLoad]) {
+        self.table_load = loads.first().copied();
+        let mut first = TABLE;
+        for (hand, was_there) in self.hands.iter_mut().zip(hands) {
+            let of_hand = first..first + if was_there.is_some() { HAND_BODIES } else { 0 };
+            first = of_hand.end;
+            hand.press(loads.get(of_hand).unwrap_or_default());
+        }
     }
 
     /// Gives up the step of a tick, so that the next tick asks again; returns whether it was awaited.
@@ -418,35 +448,21 @@ impl ContactGrasp {
         is_awaited
     }
 
-    /// Whether each finger presses on the object, thumb first.
-    pub fn touching(&self) -> [bool; 5] {
-        std::array::from_fn(|digit| self.loads_of(digit).iter().any(|load| load.contacts > 0))
-    }
-
-    /// Force of each finger on the object, N, in the world frame, thumb first; zero without contact.
-    pub fn finger_forces(&self) -> [Vector3<f64>; 5] {
-        std::array::from_fn(|digit| {
-            self.loads_of(digit).iter().map(|load| Vector3::from(load.force)).sum()
-        })
+    /// What one of the hands presses with.
+    pub fn hand(&self, which: WhichHand) -> &GraspingHand {
+        &self.hands[which.index()]
     }
 
     /// Force of the table on the object, N, in the world frame; zero without contact.
     pub fn table_force(&self) -> Vector3<f64> {
-        self.loads.first().map_or(Vector3::zeros(), |load| Vector3::from(load.force))
-    }
-
-    /// Loads of the segments of a finger; empty before the first answer.
-    fn loads_of(&self, digit: usize) -> &[BodyLoad] {
-        let first = TABLE + 3 * digit;
-        self.loads.get(first..first + 3).unwrap_or_default()
+        self.table_load.map_or(Vector3::zeros(), |load| Vector3::from(load.force))
     }
 
     /// Record of the last step: its forces, and how well it meets the law of contact.
     pub fn record(&self, tick: u64, round_trip_ms: f64) -> StepRecord {
-        let table = self.loads.get(..TABLE).unwrap_or_default();
-        let palm = self.loads.get(TABLE + 15..).unwrap_or_default();
-        let fingers = std::array::from_fn(|digit| self.loads_of(digit));
-        StepRecord::new(tick, round_trip_ms, &self.report, (table, fingers, palm))
+        let [first, second] = &self.hands;
+        let loads = (first.loads(), second.was_there().then(|| second.loads()));
+        StepRecord::new(tick, round_trip_ms, &self.report, self.table_load.as_slice(), loads)
     }
 
     /// Whether the state differs from the one at the last call.
@@ -464,28 +480,19 @@ impl ContactGrasp {
         self.slow_steps >= SLOW_STEPS
     }
 
-    /// State of the grasp: `Detached` while the hand must leave the object, `Deforming` from the first
-    /// touch on.
+    /// State of the grasp: `Detached` while the hands must leave the object, `Deforming` from the first
+    /// touch of one of them on.
     pub fn state_name(&self) -> StateName {
-        let of_hand = self.loads.get(TABLE..).unwrap_or_default();
-        match self.is_apart {
-            true => StateName::Detached,
-            false if of_hand.iter().any(|load| load.contacts > 0) => StateName::Deforming,
-            false => StateName::Free,
+        match &self.hands {
+            hands if hands.iter().any(GraspingHand::is_touching) => StateName::Deforming,
+            hands if hands.iter().all(|hand| hand.is_apart) => StateName::Detached,
+            _ => StateName::Free,
         }
     }
 
-    /// Displacement of the shown hand from the measured one, m, in the world frame: each segment of a
+    /// Displacement of a shown hand from the measured one, m, in the world frame: each segment of a
     /// finger gives way to the force on it.
-    pub fn pushed_back(&self) -> [[Vector3<f64>; 3]; 5] {
-        let compliance = self.scene.finger_compliance;
-        std::array::from_fn(|digit| {
-            let loads = self.loads_of(digit);
-            std::array::from_fn(|i| {
-                loads
-                    .get(i)
-                    .map_or(Vector3::zeros(), |load| -compliance * Vector3::from(load.force))
-            })
-        })
+    pub fn pushed_back(&self, which: WhichHand) -> [[Vector3<f64>; 3]; 5] {
+        self.hands[which.index()].pushed_back(self.scene.finger_compliance)
     }
 }

@@ -13,6 +13,9 @@ pub struct StepRecord {
     pub finger_force_n: [f64; 5],
     /// Force of the palm on the object, N.
     pub palm_force_n: f64,
+    /// Forces of the second hand; absent in a step without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_hand: Option<HandForces>,
     /// Force of the table on the object, N.
     pub table_force_n: f64,
     /// Number of points that press.
@@ -41,6 +44,42 @@ pub struct StepRecord {
     pub round_trip_ms: f64,
 }
 
+/// Forces of a hand on the object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct HandForces {
+    /// Force of each finger, N, thumb first.
+    pub finger_force_n: [f64; 5],
+    /// Force of the palm, N.
+    pub palm_force_n: f64,
+}
+
+/// Loads of a hand in one step.
+pub struct HandLoads<'a> {
+    fingers: [&'a [BodyLoad]; 5],
+    palm: &'a [BodyLoad],
+}
+
+impl<'a> HandLoads<'a> {
+    /// Loads of a hand, by finger, thumb first, and of its palm.
+    pub fn of(of_finger: impl Fn(usize) -> &'a [BodyLoad], palm: &'a [BodyLoad]) -> Self {
+        Self { fingers: std::array::from_fn(of_finger), palm }
+    }
+
+    fn forces(&self) -> HandForces {
+        HandForces { finger_force_n: self.fingers.map(force_n), palm_force_n: force_n(self.palm) }
+    }
+
+    fn contacts(&self) -> u32 {
+        let all = self.fingers.iter().copied().chain([self.palm]).flatten();
+        all.map(|load| load.contacts).sum()
+    }
+}
+
+/// Force of several bodies together, N.
+fn force_n(loads: &[BodyLoad]) -> f64 {
+    loads.iter().map(|load| Vector3::from(load.force)).sum::<Vector3<f64>>().norm()
+}
+
 /// Totals of all answered steps of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ContactTotals {
@@ -65,23 +104,24 @@ pub struct ContactTotals {
 }
 
 impl StepRecord {
-    /// Record of a step; `of_fingers` are the loads of each finger, `table` that of the table.
+    /// Record of a step, of the loads of the table and of both hands; `None` where there was no second one.
     pub fn new(
         tick: u64,
         round_trip_ms: f64,
         report: &ContactReport,
-        (table, of_fingers, of_palm): (&[BodyLoad], [&[BodyLoad]; 5], &[BodyLoad]),
+        table: &[BodyLoad],
+        (first, second): (HandLoads<'_>, Option<HandLoads<'_>>),
     ) -> Self {
-        let force = |loads: &[BodyLoad]| {
-            loads.iter().map(|load| Vector3::from(load.force)).sum::<Vector3<f64>>().norm()
-        };
-        let all = of_fingers.iter().copied().chain([table, of_palm]).flatten();
+        let HandForces { finger_force_n, palm_force_n } = first.forces();
+        let of_table: u32 = table.iter().map(|load| load.contacts).sum();
+        let of_second = second.as_ref().map_or(0, HandLoads::contacts);
         Self {
             tick,
-            finger_force_n: of_fingers.map(force),
-            palm_force_n: force(of_palm),
-            table_force_n: force(table),
-            contacts: all.map(|load| load.contacts).sum(),
+            finger_force_n,
+            palm_force_n,
+            second_hand: second.as_ref().map(HandLoads::forces),
+            table_force_n: force_n(table),
+            contacts: of_table + first.contacts() + of_second,
             penetration_max_m: report.penetration_max,
             slip_max_m: report.slip_max,
             residual_n: report.residual,
@@ -108,7 +148,8 @@ impl ContactTotals {
         self.residual_rel_max = self.residual_rel_max.max(step.residual_rel);
         self.residual_max_n = self.residual_max_n.max(step.residual_n);
         self.cone_violation_max_n = self.cone_violation_max_n.max(step.cone_violation_n);
-        let force = step.finger_force_n.into_iter().fold(0.0, f64::max);
+        let of_second = step.second_hand.map_or([0.0; 5], |hand| hand.finger_force_n);
+        let force = step.finger_force_n.into_iter().chain(of_second).fold(0.0, f64::max);
         self.finger_force_max_n = self.finger_force_max_n.max(force);
     }
 
@@ -158,9 +199,12 @@ mod tests {
                 is_converged: residual < 1e-4,
                 ..ContactReport::default()
             };
-            let loads = (&table[..], [&thumb[..], &[], &[], &[], &[]], &palm[..]);
-            let step = StepRecord::new(tick, 1.0, &report, loads);
+            let hand = || HandLoads::of(|digit| if digit == 0 { &thumb[..] } else { &[] }, &palm);
+            let step = StepRecord::new(tick, 1.0, &report, &table, (hand(), None));
             assert!((step.finger_force_n[0] - 0.7).abs() < 1e-12 && step.contacts == 8);
+            let both = StepRecord::new(tick, 1.0, &report, &table, (hand(), Some(hand())));
+            assert_eq!((both.contacts, both.finger_force_n), (14, step.finger_force_n));
+            assert_eq!(both.second_hand.map(|hand| hand.finger_force_n), Some(step.finger_force_n));
             totals.add(&step);
         }
         assert_eq!((totals.steps, totals.not_converged, totals.residual_max_n), (2, 1, 2e-3));

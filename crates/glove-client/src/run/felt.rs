@@ -17,7 +17,7 @@ pub(crate) struct FeltHand {
     unused: Option<SystemError>,
 }
 
-/// Number of bodies of a step: the table, then the hand.
+/// Number of bodies of a step before those of a second hand: the table, then the hand that feels.
 const BODIES: usize = 1 + HAND_BODIES;
 /// Segments of a finger.
 const SEGMENTS: usize = 3;
@@ -30,29 +30,21 @@ impl FeltHand {
         Self { renderer, presses: false, unused: None }
     }
 
-    /// Hands the hand over: poses of the table and of the bodies of the hand, world from body, now.
-    pub(crate) fn hand(
-        &self,
-        world_from_table: Isometry3<f64>,
-        world_from_bodies: &[Isometry3<f64>; HAND_BODIES],
-    ) {
-        let poses = std::iter::once(world_from_table).chain(world_from_bodies.iter().copied());
-        self.renderer.newest().hand(poses.collect(), Instant::now());
+    /// Hands the hand over: poses of all bodies now, world from body: the table, the hand that feels, and
+    /// the other hand where there is one.
+    pub(crate) fn hand(&self, world_from_bodies: Vec<Isometry3<f64>>) {
+        self.renderer.newest().hand(world_from_bodies, Instant::now());
     }
 
-    /// Hands the small system of an answer over. `world_from_bodies` are the poses of the hand that the
-    /// step ended with, and `asked_at` is when it was there.
+    /// Hands the small system of an answer over. `world_from_bodies` are the poses of all bodies that the
+    /// step ended with, and `asked_at` is when they were there.
     pub(crate) fn answer(
         &mut self,
         system: &SmallSystemMessage,
-        world_from_table: Isometry3<f64>,
-        world_from_bodies: &[Isometry3<f64>; HAND_BODIES],
+        world_from_bodies: &[Isometry3<f64>],
         asked_at: Instant,
     ) {
-        let pose = |body: usize| match body.checked_sub(1) {
-            None => Some(&world_from_table),
-            Some(of_hand) => world_from_bodies.get(of_hand),
-        };
+        let pose = |body: usize| world_from_bodies.get(body);
         match small_system(system, self.renderer.target(), pose) {
             Ok(system) => {
                 self.presses = !system.is_empty();
@@ -116,7 +108,7 @@ fn small_system<'p>(
 }
 
 /// Finger of a body of a step, thumb first, with the palm as the one after the little finger; `None` for
-/// the table.
+/// the table and for the other hand, which does not feel.
 fn finger_of(body: usize) -> Option<usize> {
     let of_hand = body.checked_sub(1).filter(|_| body < BODIES)?;
     Some((of_hand / SEGMENTS).min(FINGERS))
@@ -133,7 +125,7 @@ mod tests {
         assert_eq!(finger_of(0), None, "the table");
         assert_eq!([1, 3, 4, 15].map(finger_of), [Some(0), Some(0), Some(1), Some(4)]);
         assert_eq!(finger_of(16), Some(5), "the palm");
-        assert_eq!(finger_of(BODIES), None);
+        assert_eq!(finger_of(BODIES), None, "the other hand");
     }
 
     #[test]

@@ -1,10 +1,12 @@
-//! Ticks of a grasp by contact with friction: each asks for a step of the free object, and shows the hand
-//! where the object lets it be.
+//! Ticks of a grasp by contact with friction: each asks for a step of the free object, and shows the hands
+//! where the object lets them be.
 
 use nalgebra::Point3;
 use softgrasp_grasp::grasp::{Command, GraspEvent, HandSegments, StateName};
 use softgrasp_grasp::hand::{HandColliders, HandDimensions, HandPose, hand_bodies};
 use softgrasp_grasp::object::ObjectError;
+use softgrasp_hand::scripted::Seen;
+use softgrasp_hand::sent::WhichHand;
 use softgrasp_protocol::PathChoice;
 
 use crate::ask::digest::step_digest;
@@ -16,16 +18,22 @@ use crate::run::live_object::LiveObject;
 use crate::run::shown::Shown;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
-/// Tick of a grasp by friction: number, time on the client's clock (s), and hand.
-pub(crate) struct FrictionTick<'a> {
-    pub(crate) tick: u64,
-    pub(crate) now_s: f64,
-    pub(crate) hand: &'a HandPose,
-    pub(crate) dimensions: &'a HandDimensions,
+/// Hand of a tick, and its dimensions.
+#[derive(Clone, Copy)]
+pub(crate) struct TickHand {
+    pub(crate) pose: HandPose,
+    pub(crate) dimensions: HandDimensions,
 }
 
-impl FrictionTick<'_> {
-    /// Plays the tick; returns the segments of the hand as they are shown.
+/// Tick of a grasp by friction: number, time on the client's clock (s), and the hands that are there.
+pub(crate) struct FrictionTick {
+    pub(crate) tick: u64,
+    pub(crate) now_s: f64,
+    pub(crate) hands: [Option<TickHand>; 2],
+}
+
+impl FrictionTick {
+    /// Plays the tick; returns the segments of each hand as they are shown.
     ///
     /// # Errors
     /// [`ObjectError`] when the object cannot be shown any more.
@@ -35,12 +43,14 @@ impl FrictionTick<'_> {
         holding: &mut Holding,
         object: &mut LiveObject,
         outcome: &mut TickOutcome,
-    ) -> Result<HandSegments, ObjectError> {
+    ) -> Result<[Option<HandSegments>; 2], ObjectError> {
         obey(command, holding, object, outcome)?;
-        let object_from_world = object.shown.world_from_object().inverse();
-        let tips = HandColliders::new(self.dimensions, self.hand).fingers.map(|f| f.contact_point);
-        let tips = tips.map(|tip| object_from_world * tip);
-        object.prefetch(&tips, self.dimensions.tip_radii(), holding, outcome);
+        for TickHand { pose, dimensions } in self.hands.iter().flatten() {
+            let object_from_world = object.shown.world_from_object().inverse();
+            let tips = HandColliders::new(dimensions, pose).fingers.map(|f| f.contact_point);
+            let tips = tips.map(|tip| object_from_world * tip);
+            object.prefetch(&tips, dimensions.tip_radii(), holding, outcome);
+        }
         let is_asked = self.ask(holding, object, outcome);
         if is_asked.is_ok() {
             object.wait_in_lockstep(holding, outcome)?;
@@ -53,7 +63,7 @@ impl FrictionTick<'_> {
             object.questions.end_grip();
             object.stop_keeping(outcome);
         }
-        let segments = self.hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment));
+        let segments = self.segments();
         let Some(contact) = holding.friction_mut() else { return Ok(segments) };
         if contact.enters(state) {
             outcome.events.push(LoopEvent::Grasp(GraspEvent::Entered(state)));
@@ -61,9 +71,19 @@ impl FrictionTick<'_> {
         object.shown.place(contact.world_from_object());
         self.see(contact, &object.shown, state, outcome);
         outcome.seen.is_late |= !object.questions.link().is_connected();
-        let ends: [Point3<f64>; 5] = self.hand.fingers.map(|finger| finger.tip());
-        // The shown hand stays outside of the object.
-        Ok(given_way(&segments, &ends, &contact.pushed_back()))
+        // The shown hands stay outside of the object.
+        Ok(WhichHand::ALL.map(|which| {
+            let hand = self.hands[which.index()]?;
+            let ends: [Point3<f64>; 5] = hand.pose.fingers.map(|finger| finger.tip());
+            Some(given_way(&segments[which.index()]?, &ends, &contact.pushed_back(which)))
+        }))
+    }
+
+    /// Segments of each hand as they were measured.
+    fn segments(&self) -> [Option<HandSegments>; 2] {
+        let of =
+            |hand: TickHand| hand.pose.fingers.map(|f| f.segments.map(|s| s.world_from_segment));
+        self.hands.map(|hand| hand.map(of))
     }
 
     /// Asks for the step of the free object up to this tick, unless its shape is being kept.
@@ -88,7 +108,7 @@ impl FrictionTick<'_> {
         if is_given_up {
             outcome.gave_up_step |= contact.give_up_any();
         }
-        let bodies = hand_bodies(self.dimensions, self.hand);
+        let bodies = self.hands.map(|hand| hand.map(|h| hand_bodies(&h.dimensions, &h.pose)));
         let wish = StepWish {
             nodes: questions.nodes(shown.object(), changing.wants_whole()),
             elasticity: questions.settings().elasticity,
@@ -122,17 +142,24 @@ impl FrictionTick<'_> {
         state: StateName,
         outcome: &mut TickOutcome,
     ) {
-        outcome.tips = contact.touching();
+        let [first, second] = WhichHand::ALL.map(|which| contact.hand(which));
+        outcome.tips = first.touching();
+        outcome.second_tips = second.touching();
         outcome.state = Some(state);
         outcome.shown_tick = shown.tick();
         outcome.seen.inside = outcome.tips;
         outcome.seen.state = Some(state);
         outcome.seen.world_from_object = *shown.world_from_object();
         outcome.seen.is_still = contact.is_still();
-        outcome.seen.finger_forces_n = contact.finger_forces().map(|force| force.norm());
+        outcome.seen.finger_forces_n = first.finger_forces().map(|force| force.norm());
         outcome.seen.table_force_n = contact.table_force().norm();
         outcome.seen.friction = contact.scene().friction;
         outcome.seen.is_late = contact.is_late(self.tick);
+        outcome.seen_by_second = Seen {
+            inside: outcome.second_tips,
+            finger_forces_n: second.finger_forces().map(|force| force.norm()),
+            ..outcome.seen
+        };
     }
 }
 

@@ -11,12 +11,12 @@ use softgrasp_grasp::grasp::{
     Command, Contact, Grasp, GraspError, GraspEvent, HandSegments, StateName, StepInput,
     StepOutput, sense,
 };
-use softgrasp_grasp::hand::{HandColliders, HandPose, above_table};
+use softgrasp_grasp::hand::{HandColliders, HandPose};
 use softgrasp_grasp::object::{ObjectError, RestShape, SoftObject};
 use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::hand_readers::HandReaders;
 use softgrasp_hand::notice::Notice;
-use softgrasp_hand::sent::Device;
-use softgrasp_hand::sent::Sent;
+use softgrasp_hand::sent::{Sent, WhichHand};
 use softgrasp_protocol::{Material, MethodName};
 
 use crate::ask::link::Link;
@@ -27,17 +27,18 @@ use crate::pace::Pace;
 use crate::run::changing::{Changing, Replacement};
 use crate::run::contact_grasp::{ContactGrasp, ContactScene};
 use crate::run::felt::FeltHand;
-use crate::run::friction::FrictionTick;
+use crate::run::friction::{FrictionTick, TickHand};
 use crate::run::holding::Holding;
 use crate::run::live_object::LiveObject;
 use crate::run::placing::where_it_closes;
 use crate::run::questions::Questions;
 use crate::run::shown::Shown;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
+use crate::run::tracked_hands::TrackedHands;
 
 /// The client's loop between devices and server.
 pub struct GraspLoop {
-    reader: HandReader,
+    hands: TrackedHands,
     holding: Holding,
     object: LiveObject,
     /// Place where the object is put when the first hand comes.
@@ -45,20 +46,16 @@ pub struct GraspLoop {
     /// Whether the table stops the hand: one that was put below an object in the hand is not there for the
     /// hand.
     stops_hand: bool,
-    hand: Option<HandPose>,
-    shown_segments: HandSegments,
-    /// Devices that were silent in the last tick.
-    silent: Vec<Device>,
 }
 
 impl GraspLoop {
-    /// Loop around an object at the origin; sends its model to the server at once. To be made before the
-    /// calling thread asks for real-time priority.
+    /// Loop of one hand or two around an object at the origin; sends its model to the server at once. To be
+    /// made before the calling thread asks for real-time priority. Two hands need a grasp by friction.
     ///
     /// # Errors
     /// Error of the operating system if it starts no thread.
     pub fn try_new(
-        reader: HandReader,
+        readers: impl Into<HandReaders>,
         object: SoftObject,
         grasp: Grasp,
         link: Link,
@@ -68,14 +65,11 @@ impl GraspLoop {
         let questions = Questions::new(link, settings, pace, &object);
         let changing = Changing::start(pace)?;
         Ok(Self {
-            reader,
+            hands: TrackedHands::new(readers.into()),
             holding: Holding::new(grasp),
             object: LiveObject { shown: Shown::new(object), questions, changing },
             place: ObjectPlace::Home,
             stops_hand: true,
-            hand: None,
-            shown_segments: [[Isometry3::identity(); 3]; 5],
-            silent: Vec::new(),
         })
     }
 
@@ -132,15 +126,25 @@ impl GraspLoop {
         self.holding.state_name()
     }
 
-    /// Hand of the last tick, as measured, but never below the table of a grasp by friction.
+    /// First hand of the last tick, as measured, but never below the table of a grasp by friction.
     pub fn hand(&self) -> Option<&HandPose> {
-        self.hand.as_ref()
+        self.hands.pose(WhichHand::First)
     }
 
-    /// Segments of the hand as the last tick shows them, in the world: those that may not enter the
-    /// object stay at their last free pose.
+    /// Whether there was a hand in the last tick.
+    pub fn has_hand(&self) -> bool {
+        WhichHand::ALL.into_iter().any(|which| self.hands.pose(which).is_some())
+    }
+
+    /// Hand of the last tick, as [`GraspLoop::hand`], with its segments as the tick shows them, in the
+    /// world: those that may not enter the object stay at their last free pose.
+    pub fn shown_hand(&self, which: WhichHand) -> Option<(&HandPose, &HandSegments)> {
+        Some((self.hands.pose(which)?, self.hands.shown(which)))
+    }
+
+    /// Segments of the first hand as the last tick shows them.
     pub fn shown_segments(&self) -> &HandSegments {
-        &self.shown_segments
+        self.hands.shown(WhichHand::First)
     }
 
     /// Contact of each fingertip after the last tick, thumb first.
@@ -171,9 +175,14 @@ impl GraspLoop {
         self.object.questions.link().has_model() && !self.object.changing.replaces()
     }
 
-    /// Reader of the hand, for its faults.
+    /// Reader of the first hand.
     pub fn reader(&self) -> &HandReader {
-        &self.reader
+        self.hands.readers.first()
+    }
+
+    /// Readers of all hands, for their faults.
+    pub fn readers(&self) -> &HandReaders {
+        &self.hands.readers
     }
 
     /// Waits until all requests have ended, for at most `at_most`; returns whether they have.
@@ -204,38 +213,42 @@ impl GraspLoop {
     /// [`ObjectError`] if the answer does not fit the object.
     pub fn tick(&mut self, tick: u64, now_s: f64, sent: &Sent) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
-        self.reader.feed(&sent.arrivals, now_s);
+        self.hands.readers.feed(&sent.arrivals, now_s);
         self.object.questions.begin_tick(sent.recorded.as_ref());
         self.object.pick_up(&mut self.holding, &mut outcome)?;
         self.object.save_when_whole(&mut self.holding, &mut outcome);
-        self.look_at_devices(now_s, &mut outcome);
-        // Until both devices have spoken there is no hand to act with.
-        let Some(measured) = self.reader.hand(now_s) else { return Ok(outcome) };
-        self.meet_first_hand(&measured, now_s);
-        let hand = self.held_up(&measured);
+        self.hands.look_at_devices(now_s, &mut outcome);
+        // Until the devices of a hand have spoken there is none to act with.
+        if self.readers().heard(now_s) == 0 {
+            return Ok(outcome);
+        }
+        self.meet_first_hand(now_s);
+        let hands = self.hands.measured(now_s, self.table_for_hands());
         self.object.take_work(&mut self.holding, &mut outcome);
         let command = self.object.allowed(sent.command, &mut self.holding, &mut outcome);
         let keeping = self.is_keeping();
-        if self.holding.friction().is_some() {
-            let dimensions = &self.reader.setup().dimensions;
-            let friction = FrictionTick { tick, now_s, hand: &hand, dimensions };
-            self.shown_segments =
+        let shown = if self.holding.friction().is_some() {
+            let friction = FrictionTick { tick, now_s, hands };
+            let shown =
                 friction.play(command, &mut self.holding, &mut self.object, &mut outcome)?;
             outcome.seen.keeping = keeping;
+            outcome.seen_by_second.keeping = keeping;
+            shown
         } else {
-            self.tick_of_the_thesis(tick, &hand, command, &mut outcome)?;
+            // The thesis's rules know one hand.
+            let [Some(TickHand { pose, .. }), _] = hands else { return Ok(outcome) };
+            let shown = self.tick_of_the_thesis(tick, &pose, command, &mut outcome)?;
             outcome.seen.keeping = self.is_keeping();
-        }
-        self.hand = Some(hand);
+            [Some(shown), None]
+        };
+        self.hands.show(&hands, shown);
         Ok(outcome)
     }
 
-    /// The hand as the table lets it be: a table stops a hand as it stops an object.
-    fn held_up(&self, measured: &HandPose) -> HandPose {
+    /// Height of the table where it stops hands, m.
+    fn table_for_hands(&self) -> Option<f64> {
         let contact = self.holding.friction().filter(|_| self.stops_hand);
-        let table_y = contact.and_then(|contact| contact.scene().table_y);
-        let dimensions = &self.reader.setup().dimensions;
-        table_y.map_or(*measured, |table_y| above_table(dimensions, measured, table_y))
+        contact.and_then(|contact| contact.scene().table_y)
     }
 
     /// Whether the hand waits until a shape is kept. In lockstep this is done in the next tick, and the
@@ -244,38 +257,23 @@ impl GraspLoop {
         self.pace() == Pace::Free && self.object.changing.keep().is_wanted()
     }
 
-    /// Puts the object where the first hand closes, if that is wanted.
-    fn meet_first_hand(&mut self, hand: &HandPose, now_s: f64) {
-        let Some((angles, _)) = self.reader.measured(now_s) else { return };
+    /// Puts the object where the first hand closes that is heard of, if that is wanted.
+    fn meet_first_hand(&mut self, now_s: f64) {
+        let readers = self.readers();
+        let mut heard = WhichHand::ALL.into_iter().filter_map(|which| readers.of(which));
+        let heard = heard.find_map(|reader| {
+            let (angles, _) = reader.measured(now_s)?;
+            Some((angles, reader.hand(now_s)?, reader.setup().dimensions))
+        });
+        let Some((angles, hand, dimensions)) = heard else { return };
         if std::mem::take(&mut self.place) != ObjectPlace::Hand {
             return;
         }
         self.stops_hand = false;
-        let dimensions = self.reader.setup().dimensions;
-        let home = where_it_closes(&dimensions, &angles, hand, self.object());
+        let home = where_it_closes(&dimensions, &angles, &hand, self.object());
         if self.holding.set_home(home).is_ok() {
             self.object.shown.place(home);
         }
-    }
-
-    /// Reports devices that fall silent, and those that speak again. A hand without samples keeps its
-    /// pose, and so does the object that it holds.
-    fn look_at_devices(&mut self, now_s: f64, outcome: &mut TickOutcome) {
-        outcome.silent = self.reader.silent(now_s);
-        let silent = &outcome.silent;
-        let fallen = silent.iter().filter(|device| !self.silent.contains(device));
-        let what = match self.reader.measured(now_s) {
-            Some(_) => "the hand is held where it was",
-            None => "there is no hand yet",
-        };
-        let tell =
-            |device: &Device| Notice::refused(format!("the {} is silent: {what}", device.name()));
-        outcome.events.extend(fallen.map(tell).map(LoopEvent::Device));
-        let back = self.silent.iter().filter(|device| !silent.contains(device));
-        let tell = |device: &Device| Notice::done(format!("the {} speaks again", device.name()));
-        outcome.events.extend(back.map(tell).map(LoopEvent::Device));
-        self.silent.clone_from(&outcome.silent);
-        outcome.events.extend(self.reader.take_news().into_iter().map(LoopEvent::Device));
     }
 
     /// Plays the part of a tick by the thesis's rules that needs a hand.
@@ -285,18 +283,17 @@ impl GraspLoop {
         hand: &HandPose,
         command: Option<Command>,
         outcome: &mut TickOutcome,
-    ) -> Result<(), ObjectError> {
+    ) -> Result<HandSegments, ObjectError> {
         let step = self.step(hand, command, outcome);
         self.follow(tick, &step, outcome)?;
         self.object.shown.place(step.world_from_object);
-        self.shown_segments = step.world_from_segment;
         outcome.events.extend(step.events.iter().map(|&event| LoopEvent::Grasp(event)));
         outcome.state = Some(step.state);
         outcome.seen.state = Some(step.state);
         outcome.seen.world_from_object = step.world_from_object;
         outcome.recalled = step.recalled;
         outcome.shown_tick = self.object.shown.tick();
-        Ok(())
+        Ok(step.world_from_segment)
     }
 
     fn step(
@@ -305,7 +302,7 @@ impl GraspLoop {
         command: Option<Command>,
         outcome: &mut TickOutcome,
     ) -> StepOutput {
-        let colliders = HandColliders::new(&self.reader.setup().dimensions, hand);
+        let colliders = HandColliders::new(&self.reader().setup().dimensions, hand);
         let thesis = self.holding.thesis();
         let world_from_object = thesis.world_from_object(&hand.world_from_palm);
         let margin = thesis.release_margin();
@@ -314,7 +311,7 @@ impl GraspLoop {
         let tips = fingers.map(|finger| finger.tip_in_object);
         outcome.seen.inside = std::array::from_fn(|i| fingers[i].tip_hits[0].is_some());
         outcome.tips = outcome.seen.inside;
-        let tip_radii = self.reader.setup().dimensions.tip_radii();
+        let tip_radii = self.reader().setup().dimensions.tip_radii();
         self.object.prefetch(&tips, tip_radii, &mut self.holding, outcome);
         self.holding.step(&StepInput {
             world_from_palm: hand.world_from_palm,
@@ -331,7 +328,7 @@ impl GraspLoop {
         step: &StepOutput,
         outcome: &mut TickOutcome,
     ) -> Result<(), ObjectError> {
-        let tip_radii = self.reader.setup().dimensions.tip_radii();
+        let tip_radii = self.reader().setup().dimensions.tip_radii();
         let (holding, object) = (&mut self.holding, &mut self.object);
         if step.events.contains(&GraspEvent::ShapeKept) {
             object.keep_made();
@@ -479,7 +476,8 @@ impl GraspLoop {
         self.object.pick_up(&mut self.holding, &mut outcome)?;
         self.object.save_when_whole(&mut self.holding, &mut outcome);
         self.object.take_work(&mut self.holding, &mut outcome);
-        self.object.ask_for_inside(self.reader.setup().dimensions.tip_radii());
+        let tip_radii = self.reader().setup().dimensions.tip_radii();
+        self.object.ask_for_inside(tip_radii);
         Ok(outcome)
     }
 }

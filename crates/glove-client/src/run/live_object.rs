@@ -8,6 +8,7 @@ use softgrasp_core::fem::Material as ElasticMaterial;
 use softgrasp_grasp::grasp::Command;
 use softgrasp_grasp::object::{ObjectError, RestShape};
 use softgrasp_hand::notice::Notice;
+use softgrasp_hand::sent::WhichHand;
 use softgrasp_protocol::solve_report::SolveSummary;
 use softgrasp_protocol::{Material, NodeChoice};
 
@@ -148,7 +149,8 @@ impl LiveObject {
         outcome.steps.push(contact.record(tick, ms));
         shown.place(contact.world_from_object());
         let object_from_world = shown.world_from_object().rotation.inverse();
-        let forces = contact.finger_forces().map(|force| object_from_world * force);
+        let forces = contact.hand(WhichHand::First).finger_forces();
+        let forces = forces.map(|force| object_from_world * force);
         shown.name_answer(tick, Some(forces), false);
         shown.deform(&reached.nodes, reached.displacement)
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use softgrasp_grasp::grasp::StateName;
 use softgrasp_hand::hand_source::HandSource;
 use softgrasp_hand::scripted::GraspPlan;
+use softgrasp_hand::sent::WhichHand;
 use softgrasp_protocol::solve_report::SolveSummary;
 use softgrasp_window::view::frame::{
     GraspView, HandActs, HandView, LinkHealth, News, NewsKind, ObjectView, ServerView, TickTiming,
@@ -85,8 +86,7 @@ impl Observer {
         grasp_loop: &GraspLoop,
     ) -> ViewFrame {
         let object = grasp_loop.object();
-        let setup = grasp_loop.reader().setup();
-        let faults = grasp_loop.reader().faults();
+        let faults = grasp_loop.readers().faults();
         ViewFrame {
             tick: due.tick,
             at_s: now_s,
@@ -99,15 +99,12 @@ impl Observer {
                 world_from_object: *grasp_loop.world_from_object(),
                 table_y: grasp_loop.contact_grasp().and_then(|contact| contact.scene().table_y),
             },
-            hand: grasp_loop.hand().map(|hand| HandView {
-                dimensions: setup.dimensions,
-                world_from_palm: hand.world_from_palm,
-                world_from_segment: *grasp_loop.shown_segments(),
-                record: grasp_loop.reader().joints_number(),
-            }),
+            hand: hand_view(grasp_loop, WhichHand::First),
+            second_hand: hand_view(grasp_loop, WhichHand::Second),
             grasp: GraspView {
                 state: outcome.state,
                 tips: outcome.tips,
+                second_tips: outcome.second_tips,
                 contacts: grasp_loop.contacts(),
                 forces: grasp_loop.fingertip_forces(),
                 keeping: outcome.seen.keeping,
@@ -127,6 +124,17 @@ impl Observer {
             timings: std::mem::take(&mut self.timings),
         }
     }
+}
+
+fn hand_view(grasp_loop: &GraspLoop, which: WhichHand) -> Option<HandView> {
+    let (hand, shown) = grasp_loop.shown_hand(which)?;
+    let reader = grasp_loop.readers().of(which)?;
+    Some(HandView {
+        dimensions: reader.setup().dimensions,
+        world_from_palm: hand.world_from_palm,
+        world_from_segment: *shown,
+        record: reader.joints_number(),
+    })
 }
 
 fn health(grasp_loop: &GraspLoop, tick: u64, outcome: &TickOutcome) -> LinkHealth {

@@ -7,6 +7,7 @@ use softgrasp_hand::recording::{
     AnswerSeen, EventSeen, HandSeen, PoseSeen, SPRINGBACK_REFUSED, SceneSeen, StageDigests,
     SurfaceSeen, TickNews, TickSeen,
 };
+use softgrasp_hand::sent::WhichHand;
 
 use crate::ask::digest::Digest;
 use crate::pace::Due;
@@ -68,8 +69,8 @@ pub fn news(outcome: &TickOutcome) -> TickNews {
     }
 }
 
-/// Hand and object after a tick, with the object's surface if `with_surface`; `None` until both devices
-/// have sent samples.
+/// Hands and object after a tick, with the object's surface if `with_surface`; `None` until the devices of
+/// a hand have sent samples.
 ///
 /// Units: `now_s` s on the client's clock.
 pub fn scene(
@@ -78,18 +79,24 @@ pub fn scene(
     grasp_loop: &GraspLoop,
     with_surface: bool,
 ) -> Option<SceneSeen> {
-    let (angles, _) = grasp_loop.reader().measured(now_s)?;
-    let hand = grasp_loop.hand()?;
-    Some(SceneSeen {
-        pose: pose(tick, hand, grasp_loop),
-        hand: HandSeen {
-            world_from_palm: hand.world_from_palm,
-            world_from_segments: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
-            angles_rad: angles.to_array(),
-            dimensions: grasp_loop.reader().setup().dimensions,
-        },
+    let hands = WhichHand::ALL.map(|which| hand_seen(grasp_loop, which, now_s));
+    hands.iter().any(Option::is_some).then(|| SceneSeen {
+        pose: grasp_loop.hand().map(|hand| pose(tick, hand, grasp_loop)),
+        hands,
         world_from_object: *grasp_loop.world_from_object(),
         surface: with_surface.then(|| surface(grasp_loop.object())),
+    })
+}
+
+fn hand_seen(grasp_loop: &GraspLoop, which: WhichHand, now_s: f64) -> Option<HandSeen> {
+    let (hand, _) = grasp_loop.shown_hand(which)?;
+    let reader = grasp_loop.readers().of(which)?;
+    let (angles, _) = reader.measured(now_s)?;
+    Some(HandSeen {
+        world_from_palm: hand.world_from_palm,
+        world_from_segments: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
+        angles_rad: angles.to_array(),
+        dimensions: reader.setup().dimensions,
     })
 }
 
@@ -117,11 +124,16 @@ fn pose(tick: u64, hand: &HandPose, grasp_loop: &GraspLoop) -> PoseSeen {
 
 /// Digests of the stages of a tick that has just been played.
 pub fn stage_digests(grasp_loop: &GraspLoop, outcome: &TickOutcome) -> StageDigests {
-    let Some(hand) = grasp_loop.hand() else { return StageDigests::default() };
+    let hands = WhichHand::ALL.map(|which| grasp_loop.shown_hand(which));
+    if hands.iter().all(Option::is_none) {
+        return StageDigests::default();
+    }
     let mut pose = Digest::default();
-    pose.isometry(&hand.world_from_palm);
-    for segment in hand.fingers.iter().flat_map(|finger| &finger.segments) {
-        pose.isometry(&segment.world_from_segment);
+    for (hand, _) in hands.iter().flatten() {
+        pose.isometry(&hand.world_from_palm);
+        for segment in hand.fingers.iter().flat_map(|finger| &finger.segments) {
+            pose.isometry(&segment.world_from_segment);
+        }
     }
     let mut contacts = Digest::default();
     contacts.text(&outcome.state.map_or(String::new(), |state| state.to_string()));
@@ -129,7 +141,9 @@ pub fn stage_digests(grasp_loop: &GraspLoop, outcome: &TickOutcome) -> StageDige
         contacts.count(contact.map_or(u64::MAX, |contact| u64::from(contact.node)));
     }
     contacts.isometry(grasp_loop.world_from_object());
-    grasp_loop.shown_segments().iter().flatten().for_each(|s| contacts.isometry(s));
+    for (_, shown) in hands.iter().flatten() {
+        shown.iter().flatten().for_each(|segment| contacts.isometry(segment));
+    }
     let mut displacement = Digest::default();
     displacement.count(grasp_loop.object().rest_shapes());
     grasp_loop.object().displacement().iter().for_each(|u| displacement.numbers(u));

@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Quaternion, UnitQuaternion};
 use softgrasp_grasp::grasp::{Command, GraspEvent, StateName};
-use softgrasp_grasp::object::{ObjectError, SoftObject};
+use softgrasp_grasp::object::ObjectError;
 use softgrasp_hand::hand_source::HandSource;
 use softgrasp_hand::live_hand::LiveHand;
 use softgrasp_hand::loaded_object::LoadedObject;
+use softgrasp_hand::mouse::MouseHand;
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::recording::{Intervention, Recorder, Replayed};
 use softgrasp_hand::scripted::Seen;
@@ -19,7 +20,7 @@ use softgrasp_hand::sent::Sent;
 use softgrasp_window::view::control::Control;
 
 use crate::ask::solve_settings::Subscription;
-use crate::pace::tick_budget::{LIMIT, Priority, TickBudget};
+use crate::pace::tick_budget::{Priority, TickBudget};
 use crate::pace::{Due, Pace};
 use crate::run::grasp_loop::GraspLoop;
 use crate::run::latency::LatencyLedger;
@@ -31,7 +32,9 @@ use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 pub struct Session {
     grasp_loop: GraspLoop,
     hand: HandSource,
+    second: Option<HandSource>,
     seen: Seen,
+    seen_by_second: Seen,
     report: RunReport,
     budget: TickBudget,
     ends_with_script: bool,
@@ -68,7 +71,9 @@ impl Session {
         Self {
             grasp_loop,
             hand,
+            second: None,
             seen: Seen::default(),
+            seen_by_second: Seen::default(),
             report,
             budget: TickBudget::new(priority),
             ends_with_script,
@@ -80,6 +85,11 @@ impl Session {
             complaints: Vec::new(),
             awaits_model: false,
         }
+    }
+
+    /// Lets a second hand act beside the first. The run ends with the scripts when both are over.
+    pub fn act_with(&mut self, second: HandSource) {
+        self.second = Some(second);
     }
 
     /// Makes a script wait until the server has prepared the object: for a person who watches.
@@ -98,8 +108,11 @@ impl Session {
         self.budget.begin();
         let began = Instant::now();
         // Between the ticks the object may have been turned or replaced.
-        self.seen.world_from_object = *self.grasp_loop.world_from_object();
-        self.seen.object_awaited = self.awaits_model && !self.grasp_loop.is_object_ready();
+        let object_awaited = self.awaits_model && !self.grasp_loop.is_object_ready();
+        for seen in [&mut self.seen, &mut self.seen_by_second] {
+            seen.world_from_object = *self.grasp_loop.world_from_object();
+            seen.object_awaited = object_awaited;
+        }
         let (due, now_s, mut sent) = self.next(due, now_s);
         if sent.over && self.ends_with_script {
             self.report.add_skipped(due.skipped);
@@ -109,9 +122,9 @@ impl Session {
             sent.command = self.commands.pop_front();
         }
         let mut outcome = self.grasp_loop.tick(due.tick, now_s, &sent)?;
-        self.complain(due.tick, &mut outcome);
+        self.complain(due.tick, now_s, &mut outcome);
         self.record(due, now_s, &sent, &outcome);
-        self.seen = outcome.seen;
+        (self.seen, self.seen_by_second) = (outcome.seen, outcome.seen_by_second);
         self.hear(&outcome);
         self.report.add(due, now_s, &outcome);
         let computed = self.budget.end();
@@ -131,7 +144,11 @@ impl Session {
             return (Due { tick, skipped }, now_s, sent);
         }
         let object = self.grasp_loop.object();
-        let sent = self.hand.next_after(due.skipped + 1, now_s, &self.seen, object);
+        let ticks = due.skipped + 1;
+        let mut sent = self.hand.next_after(ticks, now_s, &self.seen, object);
+        if let Some(second) = &mut self.second {
+            sent.join_second(second.next_after(ticks, now_s, &self.seen_by_second, object));
+        }
         (due, now_s, sent)
     }
 
@@ -151,21 +168,26 @@ impl Session {
     }
 
     /// Tells the faults of devices that were open before, or never were.
-    fn complain(&mut self, tick: u64, outcome: &mut TickOutcome) {
-        let HandSource::Live(hand) = &self.hand else { return };
-        if tick % COMPLAIN_EVERY != COMPLAIN_EVERY - 1 {
+    fn complain(&mut self, tick: u64, now_s: f64, outcome: &mut TickOutcome) {
+        if tick % COMPLAIN_EVERY != COMPLAIN_EVERY - 1 || self.live_hands().next().is_none() {
             return;
         }
-        let complaints = self.complaints_of(hand);
+        let complaints = self.complaints(now_s);
         let new = complaints.iter().filter(|told| !self.complaints.contains(told));
         outcome.events.extend(new.cloned().map(LoopEvent::Device));
         self.complaints = complaints;
     }
 
+    fn live_hands(&self) -> impl Iterator<Item = &LiveHand> {
+        std::iter::once(&self.hand).chain(&self.second).filter_map(HandSource::as_live)
+    }
+
     /// Faults of devices, and of the records that they send.
-    fn complaints_of(&self, hand: &LiveHand) -> Vec<Notice> {
-        let of_reader = self.grasp_loop.reader().complaints().into_iter().map(Notice::refused);
-        hand.complaints().into_iter().chain(of_reader).collect()
+    fn complaints(&self, now_s: f64) -> Vec<Notice> {
+        let readers = self.grasp_loop.readers();
+        let heard = readers.heard(now_s);
+        let of_devices = self.live_hands().flat_map(|hand| hand.complaints(heard));
+        of_devices.chain(readers.complaints().into_iter().map(Notice::refused)).collect()
     }
 
     /// Records a tick, and compares it with a recording during a replay.
@@ -194,7 +216,7 @@ impl Session {
         for (asked, solve) in &outcome.answers {
             self.latency.shown(*asked, solve.round_trip_ms, end_s);
         }
-        let sample_s = self.grasp_loop.reader().sample_time_s(now_s);
+        let sample_s = self.grasp_loop.readers().sample_time_s(now_s);
         if let (Some(StateName::Deforming), Some(sample_s)) = (outcome.state, sample_s) {
             self.latency.asked(tick, sample_s, now_s, end_s);
         }
@@ -249,9 +271,7 @@ impl Session {
             Control::TurnObject(rotation) => self.turn_object(rotation),
             Control::Restart => self.restart(),
             Control::Mouse(input) => {
-                if let HandSource::Mouse(hand) = &mut self.hand {
-                    hand.take(input);
-                }
+                self.mouse_hands().for_each(|hand| hand.take(input));
                 Ok(())
             }
             Control::SetMethod(method) => {
@@ -296,9 +316,23 @@ impl Session {
         &self.grasp_loop
     }
 
-    /// Hand of the run.
+    /// First hand of the run.
     pub fn hand(&self) -> &HandSource {
         &self.hand
+    }
+
+    /// Whether all hands are played by the program, so that they can be paused.
+    pub fn is_played(&self) -> bool {
+        self.hand.is_played() && self.second.as_ref().is_none_or(HandSource::is_played)
+    }
+
+    /// Whether a hand can go on only with a window.
+    pub fn needs_window(&self) -> bool {
+        self.hand.needs_window() || self.second.as_ref().is_some_and(HandSource::needs_window)
+    }
+
+    fn mouse_hands(&mut self) -> impl Iterator<Item = &mut MouseHand> {
+        std::iter::once(&mut self.hand).chain(&mut self.second).filter_map(HandSource::as_mouse)
     }
 
     /// Whether commands wait for the next tick.
@@ -308,9 +342,8 @@ impl Session {
 
     /// Sentences for the person since the last call.
     pub fn take_notices(&mut self) -> Vec<Notice> {
-        if let HandSource::Mouse(hand) = &mut self.hand {
-            self.notices.extend(hand.take_notices());
-        }
+        let said: Vec<Notice> = self.mouse_hands().flat_map(MouseHand::take_notices).collect();
+        self.notices.extend(said);
         std::mem::take(&mut self.notices)
     }
 
@@ -331,17 +364,16 @@ impl Session {
     pub fn finish(mut self, interrupted: bool) -> Result<RunReport, ObjectError> {
         self.report.add_last(&self.grasp_loop.take_last()?);
         self.report.interrupted = interrupted;
-        self.report.finish(self.grasp_loop.reader().faults(), &self.budget);
+        self.report.finish(self.grasp_loop.readers().faults(), &self.budget);
         self.report.summary.latency = self.latency.summary();
         self.report.force = self.grasp_loop.end_force();
-        let fit = self.grasp_loop.reader().fit_errors();
+        let fit = self.grasp_loop.readers().fit_errors();
         self.report.summary.joint_fit = (fit.records > 0).then_some(fit);
-        if let HandSource::Live(hand) = &self.hand {
-            self.report.summary.pieces_dropped = hand.dropped();
-            if self.grasp_loop.hand().is_none() {
-                let why = self.complaints_of(hand).into_iter().map(|told| told.text);
-                self.report.no_hand = Some(why.collect());
-            }
+        self.report.summary.pieces_dropped = self.live_hands().map(LiveHand::dropped).sum();
+        let is_live = self.live_hands().next().is_some();
+        if is_live && !self.grasp_loop.has_hand() {
+            let why = self.complaints(0.0).into_iter().map(|told| told.text);
+            self.report.no_hand = Some(why.collect());
         }
         if let HandSource::Replay(hand) = self.hand {
             self.report.replay = Some(ReplaySummary::of(&hand));
@@ -357,10 +389,11 @@ impl Session {
         self.notices.extend(outcome.events.iter().filter_map(notice_of));
         self.notices.extend(outcome.notices.iter().cloned());
         if let Some(state) = outcome.state {
-            let &TickOutcome { tips, recalled, shown_tick, seen, .. } = outcome;
+            let &TickOutcome { tips, second_tips, recalled, shown_tick, seen, .. } = outcome;
             let state = Some(state);
-            self.last =
-                TickOutcome { state, tips, recalled, shown_tick, seen, ..TickOutcome::default() };
+            let showed =
+                TickOutcome { state, tips, second_tips, recalled, ..TickOutcome::default() };
+            self.last = TickOutcome { shown_tick, seen, ..showed };
         }
     }
 
@@ -385,12 +418,9 @@ impl Session {
         };
         self.grasp_loop.replace_object(Arc::clone(object.rest_shape()), &summary.name)?;
         self.grasp_loop.let_object_go();
-        match &mut self.hand {
-            HandSource::Scripted(hand) => hand.restart(plan.copied()),
-            HandSource::Mouse(hand) => hand.meet_new_object(),
-            HandSource::Foreign(hand) => hand.restart(),
-            HandSource::Live(_) | HandSource::Replay(_) => {}
-        }
+        self.hand.meet_new_object(plan.copied());
+        // The plan is the first hand's: another one makes its own.
+        self.second.iter_mut().for_each(|second| second.meet_new_object(None));
         self.intervened(Intervention::NotReplayed(format!("the object became {}", summary.name)));
         Ok(())
     }
@@ -417,12 +447,15 @@ impl Session {
         };
         self.grasp_loop.begin_anew()?;
         hand.restart(None);
+        if let Some(HandSource::Scripted(second)) = &mut self.second {
+            second.restart(None);
+        }
         self.intervened(Intervention::NotReplayed("the script began again".to_owned()));
         Ok(())
     }
 
     fn turn_object(&mut self, rotation: UnitQuaternion<f64>) -> Result<(), Notice> {
-        if self.hand.is_played() {
+        if self.hand.is_played() || self.second.as_ref().is_some_and(HandSource::is_played) {
             let text = "a script grasps the object as it stands; take the mouse hand to turn it";
             return Err(Notice::refused(text));
         }
@@ -459,25 +492,4 @@ fn notice_of(event: &LoopEvent) -> Option<Notice> {
         LoopEvent::Device(notice) => notice.clone(),
         LoopEvent::Grasp(_) | LoopEvent::Shape(_) | LoopEvent::Server(_) => return None,
     })
-}
-
-/// Real-time priority for the ticks if the object takes an answer within half of the time that such a
-/// thread may compute; the other half is for the rest of a tick.
-///
-/// # Errors
-/// [`ObjectError`] if the object cannot be shown.
-pub fn priority_for(object: &mut SoftObject) -> Result<Priority, ObjectError> {
-    let mut trial = TickBudget::new(Priority::Ordinary);
-    let still = vec![[0.0; 3]; object.surface().nodes.len()];
-    // The second time the memory is there.
-    for _ in 0..2 {
-        trial.begin();
-        object.apply_to_surface(&still)?;
-        let computed = trial.end();
-        object.relax()?;
-        if computed <= LIMIT / 2 {
-            return Ok(Priority::RealTime);
-        }
-    }
-    Ok(Priority::Ordinary)
 }

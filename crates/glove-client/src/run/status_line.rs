@@ -45,8 +45,13 @@ impl StatusLine {
         self.drawn = Some(Instant::now());
         let state = outcome.state.map_or("waiting for the hand".to_owned(), |s| s.to_string());
         // One letter a finger that touches, a dot for one that does not.
-        let tips: String =
-            "TIMRL".chars().zip(outcome.tips).map(|(c, on)| if on { c } else { '.' }).collect();
+        let letters = |tips: [bool; 5]| -> String {
+            "TIMRL".chars().zip(tips).map(|(c, on)| if on { c } else { '.' }).collect()
+        };
+        let mut tips = letters(outcome.tips);
+        if outcome.second_tips.contains(&true) {
+            tips = format!("{tips} {}", letters(outcome.second_tips));
+        }
         let solver = self.last_solve.as_ref().map_or("no solve yet".to_owned(), |s| {
             let report = &s.report;
             format!(

@@ -178,13 +178,13 @@ impl<'a> TickLoop<'a> {
 
     fn obey(&mut self, control: Control) {
         let pauses = matches!(control, Control::Pause | Control::Step);
-        if pauses && !self.session.hand().is_played() {
+        if pauses && !self.session.is_played() {
             let text = "a hand that a person moves cannot be paused";
             return self.say(Notice::refused(text));
         }
         match (control, self.mode) {
             (Control::Stop, _) | (_, Mode::Stopped) => self.mode = Mode::Stopped,
-            (Control::EndWithScript, _) if self.session.hand().needs_window() => {
+            (Control::EndWithScript, _) if self.session.needs_window() => {
                 self.mode = Mode::Stopped;
             }
             (Control::EndWithScript, mode) => {

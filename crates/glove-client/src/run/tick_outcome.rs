@@ -3,7 +3,7 @@
 use softgrasp_grasp::grasp::{GraspEvent, StateName};
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::scripted::Seen;
-use softgrasp_hand::sent::Device;
+use softgrasp_hand::sent::SilentDevice;
 use softgrasp_protocol::solve_report::SolveSummary;
 
 use crate::ask::unanswered::Unanswered;
@@ -49,6 +49,8 @@ pub struct TickOutcome {
     pub state: Option<StateName>,
     /// Whether each fingertip holds or touches, thumb first.
     pub tips: [bool; 5],
+    /// Whether each fingertip of the second hand touches, thumb first.
+    pub second_tips: [bool; 5],
     /// Number of segments shown at their last free pose, for each finger.
     pub recalled: [u8; 5],
     /// Answers that came, each with the tick that had asked.
@@ -60,7 +62,7 @@ pub struct TickOutcome {
     /// Tick whose answer the object shows now; `None` if it shows none of this grip.
     pub shown_tick: Option<u64>,
     /// Devices that are silent, so that the hand keeps its pose.
-    pub silent: Vec<Device>,
+    pub silent: Vec<SilentDevice>,
     /// Ticks among the answers whose path at large deformation began at rest.
     pub from_rest: Vec<u64>,
     /// Whether the tick took the answer about springing back, or its refusal.
@@ -75,6 +77,8 @@ pub struct TickOutcome {
     pub request_digest: Option<String>,
     /// Visible result of the tick for the person.
     pub seen: Seen,
+    /// The same for the person behind the second hand.
+    pub seen_by_second: Seen,
     /// Sentences for the person.
     pub notices: Vec<Notice>,
 }

@@ -31,3 +31,4 @@ mod regions;
 mod runs;
 mod serial_runs;
 mod start;
+mod two_hand_runs;

@@ -134,7 +134,7 @@ fn capsule(finger: Option<Finger>, start: Point3<f64>, end: Point3<f64>, radius:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::{HandColliders, JointAngles, pose};
+    use crate::hand::{HandColliders, Handedness, JointAngles, pose};
 
     #[test]
     fn bodies_lie_on_the_segments_and_the_fingertips_end_where_the_colliders_do() {
@@ -158,6 +158,28 @@ mod tests {
                 }
             }
             assert!(bodies[15..].iter().all(|body| body.finger.is_none()));
+        }
+    }
+
+    #[test]
+    fn bodies_of_a_left_hand_are_the_mirror_image_of_those_of_a_right_one() {
+        let right = HandDimensions::default();
+        let left = right.with_handedness(Handedness::Left);
+        for closed in [0.0, 0.6, 1.2] {
+            let angles = JointAngles::from_array(&[closed; 23]);
+            let (shift, turn) = (Vector3::new(0.1, 0.2, -0.3), Vector3::new(0.3, closed, -0.7));
+            // Of a turn, the mirror keeps the part about its own axis and turns the others round.
+            let over = |v: Vector3<f64>| Vector3::new(-v.x, v.y, v.z);
+            let turned_over = Vector3::new(turn.x, -turn.y, -turn.z);
+            let of_right = hand_bodies(&right, &pose(&right, &angles, Isometry3::new(shift, turn)));
+            let palm = Isometry3::new(over(shift), turned_over);
+            let of_left = hand_bodies(&left, &pose(&left, &angles, palm));
+            for (a, b) in of_right.iter().zip(&of_left) {
+                assert_eq!((a.finger, a.radius), (b.finger, b.radius));
+                for (end, other) in a.ends().iter().zip(&b.ends()) {
+                    assert!((over(end.coords) - other.coords).norm() < 1e-15, "{end} and {other}");
+                }
+            }
         }
     }
 

@@ -12,7 +12,7 @@ use super::reading::{
     TrackerText, UnitWord,
 };
 use crate::devices::ReceiverMount;
-use crate::devices::calibration::{Form, read_calibration};
+use crate::devices::calibration::{Calibration, Form, read_calibration};
 use crate::devices::cyberglove::SensorCount;
 use crate::devices::fastrak::{Encoding, LengthUnit, OutputList, Station};
 use crate::hand_reader::HandSetup;
@@ -120,6 +120,19 @@ impl HandConfiguration {
             Some(EncodingWord::Binary) => format.encoding = Encoding::Binary,
         }
         Ok(())
+    }
+
+    /// Configuration of the same person's other hand: of the same size, with the same records from a
+    /// transmitter at the same place. Calibration and mount are each hand's own: they are the default ones.
+    #[must_use]
+    pub fn of_other_hand(&self) -> Self {
+        let mut other = Self { calibration_file: None, ..self.clone() };
+        let hand = self.setup.dimensions.handedness.other();
+        other.setup.dimensions = self.setup.dimensions.with_handedness(hand);
+        other.setup.mount = ReceiverMount::default();
+        other.setup.calibration = Calibration::default();
+        other.setup.calibration.hand = hand;
+        other
     }
 
     /// Takes the text of the calibration's file over.

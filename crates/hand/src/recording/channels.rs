@@ -3,15 +3,15 @@
 use serde_json::{Value, json};
 
 use super::foxglove;
-use crate::sent::Device;
+use crate::sent::{Device, WhichHand};
 
 /// A channel of a recording: one topic in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// How the run was set up; one message, the first.
     Setup,
-    /// Raw bytes of a device.
-    Device(Device),
+    /// Raw bytes of a device of a hand.
+    Device(WhichHand, Device),
     /// Pose of the hand, for other programs; a replay does not need it.
     Pose,
     /// An event of the grasp, the shape, the server or a device.
@@ -33,12 +33,12 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// All channels.
-    pub const ALL: [Self; 13] = [
+    /// All channels; those of a second hand come last, and only a run of two hands has them.
+    pub const ALL: [Self; 16] = [
         Self::Setup,
-        Self::Device(Device::Glove),
-        Self::Device(Device::Tracker),
-        Self::Device(Device::Joints),
+        Self::Device(WhichHand::First, Device::Glove),
+        Self::Device(WhichHand::First, Device::Tracker),
+        Self::Device(WhichHand::First, Device::Joints),
         Self::Pose,
         Self::Event,
         Self::Request,
@@ -48,15 +48,26 @@ impl Channel {
         Self::Scene,
         Self::Log,
         Self::Tick,
+        Self::Device(WhichHand::Second, Device::Glove),
+        Self::Device(WhichHand::Second, Device::Tracker),
+        Self::Device(WhichHand::Second, Device::Joints),
     ];
+
+    /// Whether the channel is of a second hand.
+    pub const fn is_of_second(self) -> bool {
+        matches!(self, Self::Device(WhichHand::Second, _))
+    }
 
     /// Topic of the channel in the file.
     pub const fn topic(self) -> &'static str {
         match self {
             Self::Setup => "/setup",
-            Self::Device(Device::Glove) => "/glove",
-            Self::Device(Device::Tracker) => "/tracker",
-            Self::Device(Device::Joints) => "/joints",
+            Self::Device(WhichHand::First, Device::Glove) => "/glove",
+            Self::Device(WhichHand::Second, Device::Glove) => "/second/glove",
+            Self::Device(WhichHand::First, Device::Tracker) => "/tracker",
+            Self::Device(WhichHand::Second, Device::Tracker) => "/second/tracker",
+            Self::Device(WhichHand::First, Device::Joints) => "/joints",
+            Self::Device(WhichHand::Second, Device::Joints) => "/second/joints",
             Self::Pose => "/pose",
             Self::Event => "/event",
             Self::Request => "/request",
@@ -78,7 +89,7 @@ impl Channel {
     pub const fn schema_name(self) -> &'static str {
         match self {
             Self::Setup => "softgrasp.Setup",
-            Self::Device(_) => "softgrasp.DeviceBytes",
+            Self::Device(..) => "softgrasp.DeviceBytes",
             Self::Pose => "softgrasp.HandPose",
             Self::Event => "softgrasp.Event",
             Self::Request => "softgrasp.Request",
@@ -109,8 +120,9 @@ impl Channel {
                 "period_s": {"type": ["number", "null"]}, "hand_setup": text,
                 "calibration": text, "is_live": flag,
                 "world_from_sender": {"type": ["array", "null"], "items": number},
+                "second_hand": {"type": "object"},
             }),
-            Self::Device(_) => json!({
+            Self::Device(..) => json!({
                 "at_s": {"type": ["number", "null"]}, "datagram": flag, "hex": text,
             }),
             Self::Pose => json!({

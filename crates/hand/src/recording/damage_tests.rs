@@ -4,14 +4,14 @@ use std::path::Path;
 
 use super::recorder::{Recorder, TickNews};
 use super::tick::{RecordedSetup, TickSeen};
-use super::{ReadError, Recording, VERSION, read_recording};
+use super::{ReadError, Recording, VERSION_OF_ONE_HAND, read_recording};
 use crate::sent::Sent;
 use crate::sent::{Arrival, Device};
 
 /// Set-up of a recording; what it says matters to nobody here.
 pub(super) fn setup() -> RecordedSetup {
     RecordedSetup {
-        version: VERSION,
+        version: VERSION_OF_ONE_HAND,
         program: "test".to_owned(),
         object: "cube".to_owned(),
         nodes: 8,
@@ -36,6 +36,7 @@ pub(super) fn setup() -> RecordedSetup {
         calibration: String::new(),
         is_live: false,
         world_from_sender: None,
+        second_hand: None,
     }
 }
 

@@ -32,17 +32,18 @@ pub struct DeviceBytes {
 }
 
 impl RecordingFile {
-    /// Begins a file; an older one of this name is replaced.
+    /// Begins a file of a run of one hand or of two; an older one of this name is replaced.
     ///
     /// # Errors
     /// The error of the operating system or of the MCAP library.
-    pub fn create(path: &Path) -> McapResult<Self> {
+    pub fn create(path: &Path, has_second: bool) -> McapResult<Self> {
         let options = WriteOptions::new()
             .compression(None)
             .library(concat!("softgrasp glove-client ", env!("CARGO_PKG_VERSION")));
         let mut writer = options.create(BufWriter::new(File::create(path)?))?;
         let mut ids = Vec::with_capacity(Channel::ALL.len());
-        for channel in Channel::ALL {
+        let channels = Channel::ALL.into_iter();
+        for channel in channels.filter(|channel| has_second || !channel.is_of_second()) {
             let schema = channel.schema().to_string();
             let schema =
                 writer.add_schema(channel.schema_name(), "jsonschema", schema.as_bytes())?;

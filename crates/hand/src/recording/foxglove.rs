@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use softgrasp_grasp::hand::{Finger, HandDimensions};
 
 use super::tick::{HandSeen, SurfaceSeen};
+use crate::sent::WhichHand;
 
 /// Names of the three segments of a finger, from the palm outward.
 const SEGMENTS: [&str; 3] = ["proximal", "middle", "distal"];
@@ -19,17 +20,27 @@ const INFO: u8 = 2;
 /// Half the thickness of the palm that is drawn, over the breadth of the hand.
 const PALM_THICKNESS_SHARE: f64 = 0.26;
 
-/// Where palm, segments and object are: frames `palm`, `object` and `index/proximal` and so on in `world`.
+/// Where palms, segments and object are: frames `palm`, `object` and `index/proximal` and so on in `world`,
+/// those of a second hand with `second/` before them.
 ///
 /// Units: `at_s` s on the client's clock; m.
-pub fn frame_transforms(hand: &HandSeen, world_from_object: &Isometry3<f64>, at_s: f64) -> Value {
-    let of_fingers = Finger::ALL.into_iter().flat_map(|finger| {
-        let segments = &hand.world_from_segments[finger.index()];
-        (0..3).map(move |segment| (frame_of(finger, segment), segments[segment]))
+pub fn frame_transforms(
+    hands: &[Option<HandSeen>; 2],
+    world_from_object: &Isometry3<f64>,
+    at_s: f64,
+) -> Value {
+    let hands = WhichHand::ALL.into_iter().zip(hands);
+    let of_hands = hands.filter_map(|(which, hand)| Some((which, hand.as_ref()?)));
+    let of_hands = of_hands.flat_map(|(which, hand)| {
+        let palm = (palm_of(which), hand.world_from_palm);
+        let of_fingers = Finger::ALL.into_iter().flat_map(move |finger| {
+            let segments = &hand.world_from_segments[finger.index()];
+            (0..3).map(move |segment| (frame_of(which, finger, segment), segments[segment]))
+        });
+        std::iter::once(palm).chain(of_fingers)
     });
-    let frames =
-        [("palm".to_owned(), hand.world_from_palm), ("object".to_owned(), *world_from_object)];
-    let transforms = frames.into_iter().chain(of_fingers).map(|(child, world_from_child)| {
+    let frames = std::iter::once(("object".to_owned(), *world_from_object)).chain(of_hands);
+    let transforms = frames.map(|(child, world_from_child)| {
         json!({
             "timestamp": time(at_s),
             "parent_frame_id": "world",
@@ -43,7 +54,7 @@ pub fn frame_transforms(hand: &HandSeen, world_from_object: &Isometry3<f64>, at_
 
 /// The hand: a cylinder in the frame of each segment, and a box in that of the palm. Frames move them; they
 /// are written again only when the size of the hand changes.
-pub fn hand_scene(dimensions: &HandDimensions, at_s: f64) -> Value {
+pub fn hand_scene(which: WhichHand, dimensions: &HandDimensions, at_s: f64) -> Value {
     let (lengths, radii) = (dimensions.segment_lengths(), dimensions.segment_radii());
     let tip_radii = dimensions.tip_radii();
     let of_fingers = Finger::ALL.into_iter().flat_map(|finger| {
@@ -63,7 +74,7 @@ pub fn hand_scene(dimensions: &HandDimensions, at_s: f64) -> Value {
                 "top_scale": end_scale.clamp(0.0, 1.0),
                 "color": rgba(SKIN),
             });
-            let frame = frame_of(finger, segment);
+            let frame = frame_of(which, finger, segment);
             entity(&frame, at_s, "cylinders", vec![cylinder])
         })
     });
@@ -73,7 +84,7 @@ pub fn hand_scene(dimensions: &HandDimensions, at_s: f64) -> Value {
         "size": {"x": breadth, "y": length, "z": PALM_THICKNESS_SHARE * breadth},
         "color": rgba(SKIN),
     });
-    let palm = entity("palm", at_s, "cubes", vec![palm]);
+    let palm = entity(&palm_of(which), at_s, "cubes", vec![palm]);
     json!({"deletions": [], "entities": std::iter::once(palm).chain(of_fingers).collect::<Vec<_>>()})
 }
 
@@ -147,8 +158,20 @@ pub const SCENE: &str = "foxglove.SceneUpdate";
 /// Name of the schema of [`log_line`].
 pub const LOG: &str = "foxglove.Log";
 
-fn frame_of(finger: Finger, segment: usize) -> String {
-    format!("{finger}/{}", SEGMENTS[segment])
+/// Beginning of the names of a hand's frames.
+const fn prefix_of(which: WhichHand) -> &'static str {
+    match which {
+        WhichHand::First => "",
+        WhichHand::Second => "second/",
+    }
+}
+
+fn palm_of(which: WhichHand) -> String {
+    format!("{}palm", prefix_of(which))
+}
+
+fn frame_of(which: WhichHand, finger: Finger, segment: usize) -> String {
+    format!("{}{finger}/{}", prefix_of(which), SEGMENTS[segment])
 }
 
 /// An entity that moves with its frame, of primitives of one kind.
@@ -202,17 +225,23 @@ mod tests {
             angles_rad: [0.0; 23],
             dimensions,
         };
+        let object = Isometry3::identity();
         let surface = SurfaceSeen { points: vec![Point3::origin(); 3], triangles: vec![[0, 1, 2]] };
         let messages = [
-            (TRANSFORMS, frame_transforms(&hand, &Isometry3::identity(), 1.5)),
-            (SCENE, hand_scene(&dimensions, 1.5)),
+            (TRANSFORMS, frame_transforms(&[Some(hand.clone()), Some(hand)], &object, 1.5)),
+            (SCENE, hand_scene(WhichHand::Second, &dimensions, 1.5)),
             (SCENE, object_scene(&surface, 1.5)),
             (LOG, log_line("grasp", "released", 1.5)),
         ];
         for (name, message) in &messages {
             check(name, &schema(name), message);
         }
-        assert_eq!(messages[0].1["transforms"].as_array().unwrap().len(), 17);
+        let frames = messages[0].1["transforms"].as_array().unwrap().iter();
+        let names: Vec<&str> = frames.map(|f| f["child_frame_id"].as_str().unwrap()).collect();
+        assert_eq!(names.len(), 1 + 2 * 16);
+        for name in ["object", "palm", "second/palm", "index/distal", "second/thumb/proximal"] {
+            assert!(names.contains(&name), "{name} in {names:?}");
+        }
         assert_eq!(messages[1].1["entities"].as_array().unwrap().len(), 16);
         assert_eq!(messages[3].1["timestamp"], json!({"sec": 1, "nsec": 500_000_000}));
     }

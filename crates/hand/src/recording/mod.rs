@@ -12,12 +12,13 @@ mod replay_check;
 mod stages;
 mod tick;
 
-pub use read::{ReadError, Recording, VERSION, read_recording};
+pub use read::{ReadError, Recording, VERSION, VERSION_OF_ONE_HAND, read_recording};
 pub use recorder::{RecordError, Recorder, TickNews};
 pub use replay::{ReplayHand, Replayed};
 pub use replay_check::{Difference, ReplayCheck};
 pub use stages::{Stage, StageDigests};
 pub use tick::{
-    AnswerSeen, EventSeen, HandSeen, Intervention, PoseSeen, RecordedFriction, RecordedRegion,
-    RecordedSetup, RecordedTick, SPRINGBACK_REFUSED, SceneSeen, SurfaceSeen, TickSeen,
+    AnswerSeen, EventSeen, HandSeen, Intervention, PoseSeen, RecordedFriction, RecordedHand,
+    RecordedRegion, RecordedSetup, RecordedTick, SPRINGBACK_REFUSED, SceneSeen, SurfaceSeen,
+    TickSeen,
 };

@@ -51,7 +51,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// The file was written by a newer program.
-    #[error("{path} is of version {found}; this program reads {VERSION}")]
+    #[error("{path} is of version {found}; this program reads {VERSION_OF_ONE_HAND} to {VERSION}")]
     Version {
         /// Path of the file.
         path: PathBuf,
@@ -60,8 +60,11 @@ pub enum ReadError {
     },
 }
 
-/// Version of the messages; raised when an old reader would misread a new file.
-pub const VERSION: u32 = 1;
+/// Newest version of the messages; raised when an old reader would misread a new file. This is that of a run
+/// of two hands.
+pub const VERSION: u32 = 2;
+/// Version of the messages of a run of one hand.
+pub const VERSION_OF_ONE_HAND: u32 = 1;
 /// No message of ours is longer; a file that says so is not followed.
 const RECORD_MAX: usize = 64 << 20;
 
@@ -102,10 +105,10 @@ pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
                 setup = serde_json::from_slice(data).ok();
                 setup.is_some()
             }
-            Some(Channel::Device(device)) => {
+            Some(Channel::Device(hand, device)) => {
                 let arrival = serde_json::from_slice::<DeviceBytes>(data).ok().and_then(|read| {
                     let DeviceBytes { at_s, datagram: is_datagram, hex } = read;
-                    Some(Arrival { device, at_s, is_datagram, bytes: bytes_of(&hex)? })
+                    Some(Arrival { hand, device, at_s, is_datagram, bytes: bytes_of(&hex)? })
                 });
                 next.arrivals.extend(arrival.clone());
                 arrival.is_some()
@@ -135,7 +138,7 @@ pub fn read_recording(path: &Path) -> Result<Recording, ReadError> {
         }
     }
     let Some(setup) = setup else { return Err(ReadError::NoSetup { path }) };
-    if setup.version != VERSION {
+    if !(VERSION_OF_ONE_HAND..=VERSION).contains(&setup.version) {
         return Err(ReadError::Version { path, found: setup.version });
     }
     join_answers(&mut ticks, &answers);

@@ -13,8 +13,7 @@ use super::channels::Channel;
 use super::file::{DeviceBytes, RecordingFile, hex_of};
 use super::foxglove;
 use super::tick::{AnswerSeen, EventSeen, Intervention, RecordedSetup, SceneSeen, TickSeen};
-use crate::sent::Arrival;
-use crate::sent::Sent;
+use crate::sent::{Arrival, Sent, WhichHand};
 
 /// A recording that is being written.
 pub struct Recorder {
@@ -95,7 +94,7 @@ impl Recorder {
     /// [`RecordError`].
     pub fn start(path: &Path, setup: RecordedSetup) -> Result<Self, RecordError> {
         let path = path.to_owned();
-        let file = RecordingFile::create(&path);
+        let file = RecordingFile::create(&path, setup.second_hand.is_some());
         let file = file.map_err(|source| RecordError::Write { path: path.clone(), source })?;
         let (messages, to_write) = channel();
         // Nobody hears it yet.
@@ -181,7 +180,7 @@ impl Drop for Recorder {
 
 fn write_all(mut file: RecordingFile, messages: &Receiver<Message>) -> McapResult<()> {
     let mut flushed = Instant::now();
-    let mut drawn = None;
+    let mut drawn = [None; 2];
     loop {
         match messages.recv_timeout(FLUSH_EVERY) {
             Ok(Message::Setup(setup)) => {
@@ -199,17 +198,17 @@ fn write_all(mut file: RecordingFile, messages: &Receiver<Message>) -> McapResul
     }
 }
 
-/// Writes a tick; `drawn` is the size of the hand that was drawn last.
+/// Writes a tick; `drawn` are the sizes of the hands that were drawn last.
 fn write_tick(
     file: &mut RecordingFile,
     message: &TickMessage,
-    drawn: &mut Option<HandDimensions>,
+    drawn: &mut [Option<HandDimensions>; 2],
 ) -> McapResult<()> {
     let TickMessage { arrivals, scene, events, answers, seen } = message;
     let now_s = seen.now_s;
-    for Arrival { device, at_s, is_datagram, bytes } in arrivals {
+    for Arrival { hand, device, at_s, is_datagram, bytes } in arrivals {
         let data = DeviceBytes { at_s: *at_s, datagram: *is_datagram, hex: hex_of(bytes) };
-        file.write(Channel::Device(*device), at_s.unwrap_or(now_s), &data)?;
+        file.write(Channel::Device(*hand, *device), at_s.unwrap_or(now_s), &data)?;
     }
     if let Some(scene) = scene {
         write_scene(file, seen, scene, drawn)?;
@@ -233,17 +232,24 @@ fn write_scene(
     file: &mut RecordingFile,
     seen: &TickSeen,
     scene: &SceneSeen,
-    drawn: &mut Option<HandDimensions>,
+    drawn: &mut [Option<HandDimensions>; 2],
 ) -> McapResult<()> {
-    let (now_s, hand) = (seen.now_s, &scene.hand);
-    file.write(Channel::Pose, now_s, &scene.pose)?;
-    let angles = json!({"tick": seen.tick, "names": ANGLE_NAMES, "rad": hand.angles_rad});
-    file.write(Channel::Angles, now_s, &angles)?;
-    let transforms = foxglove::frame_transforms(hand, &scene.world_from_object, now_s);
+    let now_s = seen.now_s;
+    if let Some(pose) = &scene.pose {
+        file.write(Channel::Pose, now_s, pose)?;
+    }
+    if let Some(hand) = &scene.hands[0] {
+        let angles = json!({"tick": seen.tick, "names": ANGLE_NAMES, "rad": hand.angles_rad});
+        file.write(Channel::Angles, now_s, &angles)?;
+    }
+    let transforms = foxglove::frame_transforms(&scene.hands, &scene.world_from_object, now_s);
     file.write(Channel::Transforms, now_s, &transforms)?;
-    if *drawn != Some(hand.dimensions) {
-        *drawn = Some(hand.dimensions);
-        file.write(Channel::Scene, now_s, &foxglove::hand_scene(&hand.dimensions, now_s))?;
+    for ((which, hand), drawn) in WhichHand::ALL.into_iter().zip(&scene.hands).zip(drawn) {
+        let Some(dimensions) = hand.as_ref().map(|hand| hand.dimensions) else { continue };
+        if drawn.replace(dimensions) != Some(dimensions) {
+            let shapes = foxglove::hand_scene(which, &dimensions, now_s);
+            file.write(Channel::Scene, now_s, &shapes)?;
+        }
     }
     if let Some(surface) = &scene.surface {
         file.write(Channel::Scene, now_s, &foxglove::object_scene(surface, now_s))?;

@@ -68,6 +68,24 @@ pub struct RecordedSetup {
     /// Where a sender of joints was placed: m, then quaternion x y z w; `None` where its first hand
     /// was placed before the object.
     pub world_from_sender: Option<[f64; 7]>,
+    /// The second hand; `None` in a run of one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_hand: Option<RecordedHand>,
+}
+
+/// How the second hand of a recorded run was set up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordedHand {
+    /// Hand, glove, tracker and their places (TOML, `docs/devices.md`).
+    pub hand_setup: String,
+    /// Calibration of the glove (TOML).
+    pub calibration: String,
+    /// Whether devices sent what they would, so that the form of their records was found out.
+    pub is_live: bool,
+    /// Whether the hand came in the first one's stream of joints, which carries both.
+    pub shares_stream: bool,
+    /// Where a sender of its joints was placed, as [`RecordedSetup::world_from_sender`].
+    pub world_from_sender: Option<[f64; 7]>,
 }
 
 /// A region of the object's mesh with a material of its own.
@@ -195,13 +213,14 @@ pub struct PoseSeen {
     pub object_xyzw: [f64; 4],
 }
 
-/// Hand and object of a tick, for programs that draw them; a replay does not need it.
+/// Hands and object of a tick, for programs that draw them; a replay does not need it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneSeen {
-    /// Palm, fingertips and object, as numbers for other programs.
-    pub pose: PoseSeen,
-    /// Poses, angles and dimensions of the hand.
-    pub hand: HandSeen,
+    /// Palm and fingertips of the first hand, and the object, as numbers for other programs; `None` without
+    /// that hand.
+    pub pose: Option<PoseSeen>,
+    /// Poses, angles and dimensions of the hands that are there.
+    pub hands: [Option<HandSeen>; 2],
     /// Pose of the object in the world.
     pub world_from_object: Isometry3<f64>,
     /// Deformed surface of the object, in some of the ticks.

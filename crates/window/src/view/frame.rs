@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use softgrasp_grasp::grasp::{Contact, HandSegments, StateName};
 use softgrasp_grasp::hand::{HandColliders, HandDimensions, HandPose, pose_of_segments};
 use softgrasp_grasp::object::RestShape;
-use softgrasp_hand::sent::Device;
+use softgrasp_hand::sent::SilentDevice;
 use softgrasp_protocol::solve_report::SolveSummary;
 
 use super::camera::ViewCamera;
@@ -22,6 +22,8 @@ pub struct ViewFrame {
     pub object: ObjectView,
     /// The hand; `None` until both devices have spoken.
     pub hand: Option<HandView>,
+    /// The second hand; `None` in a run of one, and until its devices have spoken.
+    pub second_hand: Option<HandView>,
     /// State and contacts of the grasp.
     pub grasp: GraspView,
     /// State of the server and its newest answer.
@@ -96,6 +98,8 @@ pub struct GraspView {
     pub state: Option<StateName>,
     /// Whether each tip holds or touches, thumb first.
     pub tips: [bool; 5],
+    /// Whether each tip of the second hand touches, thumb first.
+    pub second_tips: [bool; 5],
     /// Contact that each tip holds, thumb first.
     pub contacts: [Option<Contact>; 5],
     /// Force of each tip on the object, N, object frame; `None` where none is known.
@@ -103,7 +107,7 @@ pub struct GraspView {
     /// Whether the shape is being made the next rest shape.
     pub keeping: bool,
     /// Devices that are silent: the hand is held where it was.
-    pub silent: Vec<Device>,
+    pub silent: Vec<SilentDevice>,
 }
 
 /// What the hand does by itself.
@@ -231,6 +235,11 @@ impl ViewFrame {
         (newtons >= GRIP_LEAST_N).then_some(newtons)
     }
 
+    /// The hands that are there.
+    pub fn hands(&self) -> impl Iterator<Item = &HandView> {
+        self.hand.iter().chain(&self.second_hand)
+    }
+
     /// Positions of all vertices as they are shown.
     ///
     /// Units: m. Frame: the object's.
@@ -251,7 +260,7 @@ impl ViewFrame {
 
     /// An eye that sees the hand and what it is about to grasp; `None` without a hand.
     pub fn eye_beside_hand(&self) -> Option<ViewCamera> {
-        let hand = self.hand.as_ref()?;
+        let hand = self.hands().next()?;
         let object = self.object.world_from_object * self.object.rest.centre();
         Some(ViewCamera::beside_hand(object, &hand.world_from_palm, hand.dimensions.handedness))
     }
@@ -316,6 +325,7 @@ pub(crate) mod samples {
                 table_y: None,
             },
             hand: None,
+            second_hand: None,
             grasp: GraspView::default(),
             server: ServerView::default(),
             acts: HandActs::default(),

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::frame::{HandView, ViewFrame};
 
-/// Most capsules that darken the ground.
-pub const MAX_CAPSULES: usize = 12;
+/// Most capsules that darken the ground: the object, and the palm and the fingers of two hands.
+pub const MAX_CAPSULES: usize = 24;
 /// Radius of the palm, m.
 const PALM_RADIUS_M: f64 = 0.026;
 
@@ -33,8 +33,8 @@ impl Capsule {
 /// Units: `shape` m, object frame. Frame of the capsules: world, m.
 pub fn capsules(frame: &ViewFrame, shape: &[Point3<f64>], hand_is_shown: bool) -> Vec<Capsule> {
     let mut all: Vec<_> = around(&frame.object.world_from_object, shape).into_iter().collect();
-    if let (true, Some(hand)) = (hand_is_shown, &frame.hand) {
-        all.extend(of_hand(hand));
+    if hand_is_shown {
+        all.extend(frame.hands().flat_map(of_hand));
     }
     all.truncate(MAX_CAPSULES);
     all

@@ -28,7 +28,8 @@ const PALM_MIDDLE: f64 = 0.24;
 ///
 /// Units: m. Frame: world; `direction` has length 1.
 pub fn pointed_at(frame: &ViewFrame, origin: &Point3<f64>, direction: &Vector3<f64>) -> PointedAt {
-    let hand = frame.hand.as_ref().and_then(|hand| hand_distance(hand, origin, direction));
+    let distances = frame.hands().filter_map(|hand| hand_distance(hand, origin, direction));
+    let hand = distances.min_by(f64::total_cmp);
     let object = object_distance(frame, origin, direction);
     match (hand, object) {
         (None, None) => PointedAt::Nothing,

@@ -13,7 +13,7 @@ use softgrasp_core::fem::Material;
 use softgrasp_grasp::grasp::StateName;
 use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::scripted::ScriptName;
-use softgrasp_hand::sent::Device;
+use softgrasp_hand::sent::{Device, SilentDevice};
 
 use super::changes::Change;
 use super::panels::{Panels, Seen};
@@ -46,7 +46,8 @@ pub(super) fn running_with(hand: HandChoice, change: impl FnOnce(&mut ViewFrame)
     let mut frame = frame(12_345);
     frame.grasp.state = Some(StateName::Deforming);
     frame.grasp.forces = Some([Vector3::new(1.0, 2.0, 3.0); 5]);
-    frame.grasp.silent = vec![Device::Glove, Device::Tracker];
+    let silent = |device| SilentDevice { device, side: None };
+    frame.grasp.silent = [Device::Glove, Device::Tracker].map(silent).to_vec();
     frame.server.shown_tick = Some(1);
     frame.server.said = Some("lost: the connection broke: reset by peer (os error 104)".to_owned());
     change(&mut frame);

@@ -19,7 +19,7 @@ struct Drawn {
     fill_towards: vec4<f32>,
     fill: vec4<f32>,
     // Capsules that stand above the ground: begin and radius, end.
-    capsules: array<vec4<f32>, 24>,
+    capsules: array<vec4<f32>, 48>,
 }
 
 @group(0) @binding(0) var<uniform> drawn: Drawn;
@@ -145,14 +145,24 @@ fn opaque(corner: Corner, @builtin(front_facing) is_front: bool) -> @location(0)
     return vec4<f32>(seen(corner, is_front, vec2<f32>(1.0)).rgb, 1.0);
 }
 
+// Twelve capsules, those of the object and one hand, or the ones after them.
+fn twelve(p: vec3<f32>, first: u32) -> vec2<f32> {
+    let c = &drawn.capsules;
+    let i = first;
+    let a = both(two(p, c[i], c[i + 1], c[i + 2], c[i + 3]), two(p, c[i + 4], c[i + 5], c[i + 6], c[i + 7]));
+    let b = both(two(p, c[i + 8], c[i + 9], c[i + 10], c[i + 11]), two(p, c[i + 12], c[i + 13], c[i + 14], c[i + 15]));
+    let e = both(two(p, c[i + 16], c[i + 17], c[i + 18], c[i + 19]), two(p, c[i + 20], c[i + 21], c[i + 22], c[i + 23]));
+    return both(both(a, b), e);
+}
+
 @fragment
 fn ground(corner: Corner, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-    let p = corner.place;
-    let c = &drawn.capsules;
-    let a = both(two(p, c[0], c[1], c[2], c[3]), two(p, c[4], c[5], c[6], c[7]));
-    let b = both(two(p, c[8], c[9], c[10], c[11]), two(p, c[12], c[13], c[14], c[15]));
-    let e = both(two(p, c[16], c[17], c[18], c[19]), two(p, c[20], c[21], c[22], c[23]));
-    return vec4<f32>(seen(corner, is_front, both(both(a, b), e)).rgb, 1.0);
+    var shade = twelve(corner.place, 0u);
+    // A radius: there is a second hand.
+    if drawn.capsules[24].w > 0.0 {
+        shade = both(shade, twelve(corner.place, 24u));
+    }
+    return vec4<f32>(seen(corner, is_front, shade).rgb, 1.0);
 }
 
 struct Blended {

@@ -22,7 +22,7 @@ pub struct Scene {
     root: SceneNode3d,
     stage: Stage,
     object: Option<DrawnObject>,
-    hand: Option<DrawnHand>,
+    hands: [Option<DrawnHand>; 2],
     marks: DrawnMarks,
     spheres: DrawnSpheres,
     look: Look,
@@ -34,7 +34,15 @@ impl Scene {
         let mut root = SceneNode3d::empty();
         let stage = Stage::new(window, &mut root);
         let (marks, spheres) = (DrawnMarks::new(&mut root), DrawnSpheres::new(&mut root));
-        Self { root, stage, object: None, hand: None, marks, spheres, look: Look::Imported }
+        Self {
+            root,
+            stage,
+            object: None,
+            hands: [None, None],
+            marks,
+            spheres,
+            look: Look::Imported,
+        }
     }
 
     /// Sets the look of the next object.
@@ -79,7 +87,7 @@ impl Scene {
                 drawn.draw_wireframe(window);
             }
         }
-        is_new |= self.follow_hand(frame, display);
+        is_new |= self.follow_hands(frame, display);
         let spheres = shown_spheres(frame, &shape, display.spheres);
         is_new |= self.spheres.show(&object.world_from_object, &spheres);
         if is_new {
@@ -91,17 +99,16 @@ impl Scene {
         self.marks.follow(frame, &shape, display.contacts, display.forces);
     }
 
-    /// Moves the hand to a tick; returns whether it is another hand than before.
-    fn follow_hand(&mut self, frame: &ViewFrame, display: &Display) -> bool {
-        let Some(hand) = &frame.hand else { return false };
-        let is_new = self.hand.as_ref().is_none_or(|drawn| !drawn.fits(hand));
-        if is_new {
-            if let Some(before) = self.hand.take() {
+    /// Moves the hands to a tick; returns whether one of them is another hand than before.
+    fn follow_hands(&mut self, frame: &ViewFrame, display: &Display) -> bool {
+        let mut is_new = false;
+        for (drawn, hand) in self.hands.iter_mut().zip([&frame.hand, &frame.second_hand]) {
+            let Some(hand) = hand else { continue };
+            if let Some(before) = drawn.take_if(|drawn| !drawn.fits(hand)) {
                 before.remove();
             }
-            self.hand = Some(DrawnHand::new(&mut self.root, hand));
-        }
-        if let Some(drawn) = &mut self.hand {
+            is_new |= drawn.is_none();
+            let drawn = drawn.get_or_insert_with(|| DrawnHand::new(&mut self.root, hand));
             drawn.follow(hand);
             drawn.show(display.skin, display.colliders);
         }

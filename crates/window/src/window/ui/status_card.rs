@@ -26,9 +26,14 @@ pub fn show(context: &Context, frame: &ViewFrame, told: &Told) {
             let (name, ground) = state(frame);
             theme::chip(ui, name, ground);
             fingertips(ui, frame.grasp.tips);
+            if frame.second_hand.is_some() {
+                ui.add_space(4.0);
+                fingertips(ui, frame.grasp.second_tips);
+            }
         });
         for device in &frame.grasp.silent {
-            let what = match frame.hand {
+            let mut hands = frame.hands().map(|hand| hand.dimensions.handedness);
+            let what = match hands.find(|side| device.side.is_none_or(|silent| silent == *side)) {
                 Some(_) => "the hand stays where it was",
                 None => "there is no hand yet",
             };
