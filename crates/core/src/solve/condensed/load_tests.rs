@@ -203,7 +203,7 @@ fn masks_with_loads_meet_their_equations() {
 
 #[test]
 fn why_there_is_no_bound_is_said() {
-    let shape = Shape::new(cube(64), 0.3, &touched(&[0, 1, 2, 3]));
+    let shape = Shape::new(cube(64), 0.3, &touched(&[0, 3, 12, 48]));
     let none = Touched::default();
     let columns = spread(&shape.mesh).iter().map(|forces| column(&shape, forces)).collect();
     let loaded = LoadedSet::new(&shape.base, Arc::new(set_of(&shape, &none)), columns);
@@ -220,6 +220,14 @@ fn why_there_is_no_bound_is_said() {
     // How large the answer is is not known where only nodes that stay are told of.
     assert!(why(&[1.0; 4], false).unwrap_err().contains("as large as"));
     assert!(why(&[1e200, 0.0, 0.0, 0.0], true).unwrap_err().contains("too large"));
+}
+
+/// The singular values of a matrix without rows were asked for, which panics.
+#[test]
+fn free_body_that_nothing_touches_is_refused_and_does_not_panic() {
+    let shape = Shape::new(cube(64), 0.3, &[]);
+    let set = ContactSet::try_new(&shape.base, &shape.columns, &Touched::default());
+    assert_eq!(set.err(), Some(CondensedError::NotHeld));
 }
 
 #[test]

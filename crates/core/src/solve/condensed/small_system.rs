@@ -51,9 +51,12 @@ const CONDITION_MAX: f64 = 1e14;
 ///
 /// Shapes: `moved` one row per displacement of a contact, one column per motion.
 fn refusal(moved: &DMatrix<f64>, condition: f64) -> CondensedError {
-    let sizes = moved.clone().singular_values();
-    let is_free = moved.nrows() < moved.ncols()
-        || !moved.is_empty() && sizes.min() <= FREE_BELOW * sizes.max();
+    // A matrix without rows has no singular values.
+    let is_nearly_free = |moved: &DMatrix<f64>| {
+        let sizes = moved.clone().singular_values();
+        sizes.min() <= FREE_BELOW * sizes.max()
+    };
+    let is_free = moved.nrows() < moved.ncols() || !moved.is_empty() && is_nearly_free(moved);
     match is_free {
         true => CondensedError::NotHeld,
         false => CondensedError::HeldTooWeakly { condition },
