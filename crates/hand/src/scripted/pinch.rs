@@ -260,8 +260,9 @@ impl Trial<'_> {
                 pose(&self.sought.setup.dimensions, &angles, plan.path.world_from_palm(centre));
             let bodies = hand_bodies(&self.sought.setup.dimensions, &hand);
             // Beyond its knuckle's segment a finger that holds may lie along the surface.
-            let holds =
-                |position: usize| position < 15 && position % 3 > 0 && meetings[position / 3].holds;
+            let holds = |position: usize| {
+                position < 15 && !position.is_multiple_of(3) && meetings[position / 3].holds
+            };
             let mut others = bodies.iter().enumerate().filter(|(at, _)| !holds(*at));
             others.all(|(_, body)| self.is_clear(body))
         })
