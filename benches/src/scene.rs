@@ -1,5 +1,6 @@
 //! Scene of every report: an object held and pressed by five fingertips.
 
+use glove_client::ask::model_upload::mesh_data;
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
@@ -126,11 +127,7 @@ impl Pressed {
     }
 
     fn on_the_wire(&self) -> (MeshData, Vec<softgrasp_protocol::Material>) {
-        let mesh = MeshData {
-            vertices: self.mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
-            tets: self.mesh.tets().to_vec(),
-            regions: Vec::new(),
-        };
+        let mesh = mesh_data(&self.mesh);
         let (young, poisson) = (self.material.young(), self.material.poisson());
         (mesh, vec![softgrasp_protocol::Material { young, poisson }])
     }

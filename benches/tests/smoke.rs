@@ -51,8 +51,11 @@ fn contacts_are_pressed_and_timed_with_small_errors() {
     }
     assert_eq!(report.column("contact-frames.csv", "unknown_forces")[2], "15");
     assert!(report.has("contact.svg"));
+    // Linear steps are timed with cold and warm columns, all others with warm ones.
     let phases = report.column("contact-steps.csv", "phase");
-    assert_eq!(phases, ["settle", "pinch", "lift", "hold"].repeat(4));
+    assert_eq!(phases, ["settle", "pinch", "lift", "hold"].repeat(5));
+    let columns = report.column("contact-steps.csv", "columns");
+    assert_eq!(columns.iter().filter(|columns| *columns == "cold").count(), 4);
 }
 
 /// Warm frames are timed beside their echo, with small errors.
@@ -217,6 +220,19 @@ fn beside(report: &Quick) {
     assert!(refused.iter().zip(&done).all(|(refused, done)| refused + done == 8.0));
 }
 
+/// Both clients get right answers, where Python is installed with what its client needs.
+fn python(report: &Quick) {
+    if !report.has("service-python.csv") {
+        eprintln!("skipped: the client in Python, for which something is not installed here");
+        return;
+    }
+    assert_eq!(report.column("service-python.csv", "client"), ["Rust", "Python"]);
+    let of = |name| report.numbers("service-python.csv", name);
+    assert!(of("frames").iter().all(|&frames| frames >= 25.0));
+    assert!(of("rate_hz").iter().chain(&of("rate_rel")).all(|&rate| rate > 0.0));
+    assert!(of("error_rel").iter().all(|&error| error < 1e-9));
+}
+
 /// Hostile connections and restarts cost no right answer.
 fn hostile(report: &Quick) {
     let (what, measured) = (
@@ -245,5 +261,6 @@ fn users_of_one_server_get_right_answers() {
     session(&report);
     beside(&report);
     clients(&report);
+    python(&report);
     hostile(&report);
 }

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # fea-worker under mpirun on 1, 2 and 4 ranks, alone and behind fea-server --cluster: the bits of the
 # matrix, the displacements against a factor of one machine, a rank that is killed in the middle, a client
-# that goes, the memory limit, and two network namespaces as two hosts. Ends with 0 when all of it holds,
-# and with 0 and one line where MPI or PETSc cannot be had.
+# that goes, the memory limit, two network namespaces as two hosts, and the GPL in what it is linked with.
+# Ends with 0 when all of it holds, and with 0 and one line where MPI or PETSc cannot be had.
 #
 #   tests/cluster/run.sh                            builds the programs and runs
 #   BIN_DIR=target/debug tests/cluster/run.sh       takes fea-server and glove-client from there
@@ -37,49 +37,8 @@ case "${CARGO_TARGET_DIR:-}" in /*) worker="$CARGO_TARGET_DIR/debug/fea-worker" 
 "$worker" --version >/dev/null || fail "fea-worker does not start"
 server_program="$bin_dir/fea-server" client="$bin_dir/glove-client"
 
-# Few cores: ranks that wait give way, and nothing else takes more than one.
-export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMP_NUM_THREADS=1
-mpi=(mpirun --oversubscribe --bind-to none --mca mpi_yield_when_idle 1)
-work="$(mktemp -d)"
-name="softgrasp-$$"
-declare -A pid=()
-
-cleanup() {
-    touch "$work/over"
-    [ "$1" = 0 ] || show_logs >&2
-    for process in "${!pid[@]}"; do
-        kill -TERM "${pid[$process]}" || true
-    done 2>/dev/null
-    wait 2>/dev/null
-    for host in a b; do ip netns del "$name-$host" 2>/dev/null || true; done
-    rm -rf "$work"
-}
-ends_by cleanup
-
-# start NAME COMMAND...: in the background; `address` is where it listens.
-start() {
-    local process=$1
-    shift
-    : >"$work/$process.out"
-    "$@" >"$work/$process.out" 2>>"$work/$process.log" &
-    pid[$process]=$!
-    wait_until 60 grep -q '^listening on ' "$work/$process.out" || fail "the $process does not start"
-    address="$(sed -n 's/^listening on //p' "$work/$process.out" | tail -n 1)"
-}
-
-# end NAME: asks a process to end, and waits for it.
-end() {
-    kill -TERM "${pid[$1]}" 2>/dev/null || true
-    wait "${pid[$1]}" 2>/dev/null || true
-    unset "pid[$1]"
-}
-
-# start_worker NAME RANKS [OPTION...]
-start_worker() {
-    local process=$1 ranks=$2
-    shift 2
-    start "$process" "${mpi[@]}" -n "$ranks" "$worker" --listen 127.0.0.1:0 --digest "$@"
-}
+# shellcheck source=tests/cluster/jobs.sh
+source tests/cluster/jobs.sh
 
 # start_supervised NAME RANKS PORT: starts the job again whenever it ends.
 start_supervised() {
@@ -96,39 +55,21 @@ start_supervised() {
     start "$process" supervised "$2" "$3"
 }
 
-# -- Questions
+# -- Licences: what cluster/no_gpl.sh says of Debian's PETSc
 
-# question SHAPE NODES: $work/SHAPE.msh and its known displacements $work/SHAPE.csv.
-question() {
-    "$client" mesh "$1" --nodes "$2" --out "$work/$1.msh" >/dev/null
-    python3 "$here/check.py" known "$work/$1.msh" >"$work/$1.csv"
+known_by_its_libraries() {
+    local library said
+    said="$(cluster/no_gpl.sh "$server_program" 2>&1)" || fail "fea-server is refused: $said"
+    if ! pkg-config --libs PETSc | grep -q petsc_real; then
+        say "the worker's libraries skipped: its PETSc is not Debian's"
+        return 0
+    fi
+    ! said="$(cluster/no_gpl.sh "$worker" 2>&1)" || fail "Debian's PETSc is let through: $said"
+    for library in fftw3 umfpack cholmod trilinos; do
+        grep -q "lib$library" <<<"$said" || fail "$library is not named: $said"
+    done
+    say "refused: $said"
 }
-
-# solve SHAPE ADDRESS OUT [OPTION...]: the answer in $work/OUT.csv, its report in $work/OUT.json.
-solve() {
-    local shape=$1 at=$2 out=$3
-    shift 3
-    timeout 240 "$client" solve --mesh "$work/$shape.msh" --known "$work/$shape.csv" --server "$at" \
-        --out "$work/$out.csv" --report "$work/$out.json" "$@" >"$work/$out.log" 2>&1
-}
-
-# agrees A B AT_MOST: the largest difference over the largest displacement.
-agrees() {
-    python3 "$here/check.py" agree "$work/$1.csv" "$work/$2.csv" "$3" || fail "$1 and $2 differ"
-}
-
-# report OUT CHECK...: what the report of an answer must say.
-report() {
-    local out=$1
-    shift
-    python3 "$here/check.py" report "$work/$out.json" "$@" || fail "the report of $out"
-}
-
-listens() { (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null; }
-
-free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
-
-digests() { sed -n 's/.*matrix \([0-9a-f]\{16\}\)$/\1/p' "$work/$1.log" | sort -u; }
 
 # -- Ranks: the same matrix to the last bit, and the same displacements
 
@@ -172,6 +113,10 @@ refused_for_memory() {
 }
 
 # -- Behind a server
+
+listens() { (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null; }
+
+free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
 
 through_a_server() {
     local port began
@@ -269,6 +214,7 @@ AGENT
     end hosts
 }
 
+known_by_its_libraries
 on_ranks
 refused_for_memory
 through_a_server

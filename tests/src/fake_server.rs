@@ -68,6 +68,7 @@ fn reply_to(request: &Request, displacements: &[[f64; 3]]) -> Option<Reply> {
                 mask_forces: Vec::new(),
                 fields: Vec::new(),
                 cases: Vec::new(),
+                gradient: None,
             })))
         }
         Request::Ping { nonce } => Some(Reply::Pong { nonce: *nonce }),

@@ -1,6 +1,7 @@
 //! Shared by the system tests: questions, clients, faulty connections, checks of files.
 
 pub mod conversation;
+pub mod curved;
 pub mod fake_server;
 pub mod faulty_pipe;
 pub mod faulty_proxy;

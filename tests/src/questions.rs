@@ -45,6 +45,7 @@ pub fn mesh_data(mesh: &TetMesh) -> MeshData {
         vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
         tets: mesh.tets().to_vec(),
         regions: mesh.regions().to_vec(),
+        mid_edge: mesh.mid_edge_nodes().to_vec(),
     }
 }
 

@@ -75,7 +75,7 @@ fn read(path: &str) -> String {
 fn packages(arguments: &[&str]) -> Option<Vec<Package>> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let output = Command::new(cargo)
-        .args(["metadata", "--format-version", "1", "--locked", "--offline", "--all-features"])
+        .args(["metadata", "--format-version", "1", "--locked", "--offline"])
         .args(arguments)
         .current_dir(root())
         .output()
@@ -90,12 +90,15 @@ fn packages(arguments: &[&str]) -> Option<Vec<Package>> {
     Some(packages.collect())
 }
 
-/// All packages, or those of this machine's platform if the others are missing; and whether it is all.
+/// All packages, or those of this machine's platform without further features if the others are missing; and
+/// whether it is all.
 fn packages_that_are_there() -> (Vec<Package>, bool) {
-    if let Some(packages) = packages(&[]) {
+    if let Some(packages) = packages(&["--all-features"]) {
         return (packages, true);
     }
-    println!("partly skipped: packages of other systems are not here (cargo fetch --locked)");
+    println!(
+        "partly skipped: packages of other systems and features are not here (cargo fetch --locked)"
+    );
     let host = Command::new("rustc").arg("-vV").output().expect("rustc").stdout;
     let host = String::from_utf8(host).expect("text");
     let host = host.lines().find_map(|line| line.strip_prefix("host: ")).expect("a platform");

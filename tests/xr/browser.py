@@ -18,6 +18,8 @@ class Browser:
         self._read, from_browser = os.pipe()
 
         def hand_over():
+            # Drawing by the processor takes all of it; the run that it shows comes first.
+            os.nice(10)
             # The browser reads commands from 3 and writes answers to 4.
             reads, writes = os.dup(to_browser), os.dup(from_browser)
             os.dup2(reads, 3)

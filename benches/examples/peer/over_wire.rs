@@ -21,7 +21,7 @@ pub fn run(problem: &Problem, method: &str, threads: usize) -> anyhow::Result<se
         mesh: MeshData {
             vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
             tets: mesh.tets().to_vec(),
-            regions: Vec::new(),
+            ..MeshData::default()
         },
         materials: vec![Material { young: YOUNG, poisson: POISSON }],
         element: ElementName::T4,

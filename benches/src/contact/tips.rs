@@ -1,5 +1,6 @@
 //! Fingertips that touch an object, and the question of each contact model about them.
 
+use glove_client::ask::model_upload::mesh_data;
 use nalgebra::Point3;
 use softgrasp_core::contact::SurfaceStars;
 use softgrasp_core::fem::Material;
@@ -7,7 +8,7 @@ use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_core::model::{Element, Model};
 use softgrasp_grasp::object::ContactModel;
 use softgrasp_protocol::{
-    DofValue, ElementName, FieldSet, Masks, MeshData, MethodName, NodeChoice, Precision, Question,
+    DofValue, ElementName, FieldSet, Masks, MethodName, NodeChoice, Precision, Question,
     UploadModel, Want,
 };
 
@@ -75,11 +76,7 @@ impl Tips {
 
     /// Model for a server to keep.
     pub fn upload(&self) -> UploadModel {
-        let mesh = MeshData {
-            vertices: self.mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
-            tets: self.mesh.tets().to_vec(),
-            regions: Vec::new(),
-        };
+        let mesh = mesh_data(&self.mesh);
         let (young, poisson) = (self.material.young(), self.material.poisson());
         let materials = vec![softgrasp_protocol::Material { young, poisson }];
         UploadModel { mesh, materials, element: ElementName::T4, fixed: self.fixed.clone() }

@@ -3,10 +3,11 @@
 use std::time::{Duration, Instant};
 
 use glove_client::ask::connection::{Host, ServerChoice, ServerConnection};
+use glove_client::ask::model_upload::mesh_data;
 use softgrasp_core::mesh::{BuiltIn, Surface};
 use softgrasp_protocol::{
-    Answer, Ask, ElementName, LargeAsk, LargeReport, Masks, Material, MeshData, ModelHash,
-    NodeChoice, Pace, PathChoice, Question, Request, UploadModel, Want,
+    Answer, Ask, ElementName, LargeAsk, LargeReport, Masks, Material, ModelHash, NodeChoice, Pace,
+    PathChoice, Question, Request, UploadModel, Want,
 };
 
 use super::squeeze::Squeeze;
@@ -87,11 +88,7 @@ pub(super) fn hold_rate(
 fn model_of(squeeze: &Squeeze) -> UploadModel {
     let mesh = squeeze.model.mesh();
     UploadModel {
-        mesh: MeshData {
-            vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
-            tets: mesh.tets().to_vec(),
-            regions: Vec::new(),
-        },
+        mesh: mesh_data(mesh),
         materials: vec![Material { young: 2.0e4, poisson: 0.4 }],
         element: ElementName::T4,
         fixed: Vec::new(),

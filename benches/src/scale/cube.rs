@@ -1,11 +1,12 @@
 //! The question that every way is asked: a cube that stands on its lowest face and is pressed from above.
 
+use glove_client::ask::model_upload::mesh_data;
 use nalgebra::Point3;
 use softgrasp_core::fem::Material;
 use softgrasp_core::mesh::{BuiltIn, TetMesh, generate};
 use softgrasp_core::model::{Element, Model};
 use softgrasp_protocol::{
-    Ask, Body, DofValue, ElementChoice, MeshData, MethodName, NodeChoice, Question, Want,
+    Ask, Body, DofValue, ElementChoice, MethodName, NodeChoice, Question, Want,
 };
 
 use crate::balance::imbalance;
@@ -44,11 +45,7 @@ impl Cube {
 
     /// The question in a method's name, for the displacements of all nodes.
     pub fn ask(&self, method: &str) -> Ask {
-        let mesh = MeshData {
-            vertices: self.mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
-            tets: self.mesh.tets().to_vec(),
-            regions: Vec::new(),
-        };
+        let mesh = mesh_data(&self.mesh);
         let (young, poisson) = (self.material.young(), self.material.poisson());
         let materials = vec![softgrasp_protocol::Material { young, poisson }];
         let known = self.known.iter().map(|&(dof, value)| DofValue { dof, value });

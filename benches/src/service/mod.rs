@@ -1,8 +1,9 @@
 //! Report `service`: what users of one server get: beside a running session, beside others' long work,
-//! among many clients, among hostile ones, over restarts and an hour.
+//! among many clients, from Python, among hostile ones, over restarts and an hour.
 
 mod beside_work;
 mod load;
+mod python;
 mod session;
 mod trust;
 
@@ -22,6 +23,8 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     beside_work::measure(options, &mut report)?;
     report.chapter("How many clients one server serves in time");
     load::measure(options, &mut report)?;
+    report.chapter("How many frames a second Python gets");
+    python::measure(options, &mut report)?;
     report.chapter("A server one can trust");
     trust::measure(options, &mut report)?;
     Ok(report)

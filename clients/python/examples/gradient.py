@@ -37,6 +37,23 @@ class Elastic:
         return found.known_displacements
 
 
+class Large(Elastic):
+    """The same at large deformation: the server works out the derivatives at the equilibrium."""
+
+    FROM_REST = softgrasp.LargeDeformation(path="from-rest")
+
+    def displacements(self, known: np.ndarray) -> np.ndarray:
+        self.case = self.case.with_displacements(known)
+        return self.kept.large_frame(self.case, self.FROM_REST).displacements
+
+    def gradient(self, by_displacements: np.ndarray) -> np.ndarray:
+        """At the displacements that were asked for last."""
+        quantity = softgrasp.Quantity(slopes=by_displacements)
+        found = self.kept.large_frame(self.case, self.FROM_REST, quantity=quantity).gradient
+        assert found is not None
+        return found.known_displacements
+
+
 def wanted_shape(mesh: softgrasp.Mesh) -> np.ndarray:
     """Displacements that the upper face should have: a gentle wave, m."""
     place = mesh.points[mesh.nodes_at(z=0.02)]
@@ -107,6 +124,20 @@ def misfit(
     return float((off**2).sum()), elastic.gradient(by_displacements)
 
 
+def off_by(
+    elastic: Elastic, at: np.ndarray, top: np.ndarray, wanted: np.ndarray, size: float
+) -> float:
+    """How far the gradient is from central differences, of its largest number."""
+    _, slope = misfit(elastic, at, top, wanted)
+    worst = 0.0
+    for k in range(0, len(at), 5):
+        step = np.zeros(len(at))
+        step[k] = size
+        up, down = (misfit(elastic, at + s * step, top, wanted)[0] for s in (1, -1))
+        worst = max(worst, abs((up - down) / (2 * size) - slope[k]) / np.abs(slope).max())
+    return worst
+
+
 def main() -> None:
     mesh = softgrasp.Mesh.block((0.06, 0.02, 0.02), (6, 2, 2))
     top = mesh.nodes_at(z=0.02)
@@ -118,17 +149,13 @@ def main() -> None:
     model = softgrasp.Model(mesh, softgrasp.Material(20e3, 0.4))
     wanted = wanted_shape(mesh)
     with softgrasp.Server.spawn() as server:
-        elastic = Elastic(server.keep(model, fixed=ends), case)
+        kept = server.keep(model, fixed=ends)
+        elastic = Elastic(kept, case)
         at = 1e-4 * np.random.default_rng(3).standard_normal(len(case.known_dofs))
-        _, slope = misfit(elastic, at, top, wanted)
-        worst = 0.0
-        for k in range(0, len(at), 5):
-            step = np.zeros(len(at))
-            step[k] = 1e-4
-            up, down = (misfit(elastic, at + s * step, top, wanted)[0] for s in (1, -1))
-            worst = max(worst, abs((up - down) / 2e-4 - slope[k]) / np.abs(slope).max())
-        print(f"gradient against central differences: off by {worst:.1e}")
-        assert worst < 1e-6
+        for name, function, size in (("linear", elastic, 1e-4), ("large", Large(kept, case), 1e-6)):
+            worst = off_by(function, at, top, wanted, size)
+            print(f"{name} gradient against central differences: off by {worst:.1e}")
+            assert worst < 1e-6
         known, losses = (by_numpy if torch is None else by_torch)(elastic, top, wanted)
     how = "numpy" if torch is None else f"torch {torch.__version__}"
     print(f"{how}: misfit {losses[0]:.2e} m², after {len(losses)} evaluations {losses[-1]:.2e} m²")

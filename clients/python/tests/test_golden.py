@@ -23,19 +23,20 @@ from softgrasp import (
     ObjectState,
     Plane,
     Pose,
+    Quantity,
     Question,
     RigidMotionFree,
     Sphere,
     WarningCode,
     calls,
 )
-from softgrasp.answer import read_answer, read_large_answer, read_several_answers
+from softgrasp.answer import Asked, read_answer, read_large_answer, read_several_answers
 from softgrasp.contact import read_contact_answer
 from softgrasp.conversation import Conversation
 from softgrasp.framing import HEADER_LEN, Kind, encode_frame
 
 REQUESTS = ["Hello", "Ask", "Ask-model", "Ask-large", "Ask-cases", "HaveModel", "UploadModel"]
-REQUESTS += ["Ask-fields", "Ask-loads", "Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
+REQUESTS += ["Ask-gradient", "UploadModel-mid-edge", "Ask-fields", "Ask-loads", "Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
 NAME = bytes(0xA0 ^ k for k in range(32))
 POINTS = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0, 0, 0]]
 MATERIAL = Material(20_000.0, 0.45)
@@ -51,6 +52,13 @@ def loaded() -> LoadCase:
 
 def labelled() -> Model:
     return Model(Mesh(POINTS, [[0, 1, 2, 3]], [7]), {7: MATERIAL}, "t4")
+
+
+def curved() -> Model:
+    points = [[node, 0.5 * node * node, -1.0] for node in range(14)]
+    mid_edge = [[5, 6, 7, 8, 9, 10], [6, 10, 9, 11, 12, 13]]
+    mesh = Mesh(points, [[0, 1, 2, 3], [1, 2, 3, 4]], [7, 2], mid_edge)
+    return Model(mesh, {7: MATERIAL, 2: MATERIAL}, "t10")
 
 
 def contact_frame() -> calls.Call:
@@ -95,6 +103,13 @@ def requests() -> dict[str, calls.Call]:
         max_error=0.01,
         fields=["elements.stress", "nodes.von_mises", "elements.energy"],
     )
+    slopes, curvatures = np.zeros((4, 3)), np.zeros((4, 3))
+    slopes[1, 1], slopes[3, 1], curvatures[3, 1] = 1.5, -2.0, 300.0
+    of_reactions, bent = [0.0, 0.25], [0.0, -1.0]
+    quantity = Quantity(slopes, curvatures, of_reactions, bent, points=True)
+    of_quantity = Question(
+        nodes=[0, 2, 3], precision="f32", max_error=0.01, quantity=quantity
+    )
     plain = Model(Mesh(POINTS, [[0, 1, 2, 3]]), MATERIAL, "t10")
     cases = [[0.0, -0.001], [0.0, -0.002], [-0.0, 0.001]]
     return {
@@ -104,9 +119,11 @@ def requests() -> dict[str, calls.Call]:
         "Ask-large": calls.large_frame(NAME, HELD, LARGE, frame),
         "Ask-fields": calls.frame(NAME, MASKED, with_fields),
         "Ask-loads": calls.frame(NAME, loaded(), frame),
+        "Ask-gradient": calls.frame(NAME, MASKED, of_quantity),
         "Ask-cases": calls.solve_several(labelled(), HELD, cases, False, once),
         "HaveModel": calls.have_model(NAME),
         "UploadModel": calls.upload_model(plain, plain.fixed_dofs([3])),
+        "UploadModel-mid-edge": calls.upload_model(curved(), np.array([15], np.uint32)),
         "Cancel": calls.cancel(2),
         "Prefetch": calls.prefetch(NAME, [1, 3], [Mask([3, 1], [1.0, 2.0])]),
         "Drop": calls.drop(NAME),
@@ -121,6 +138,19 @@ def test_requests_have_their_recorded_bytes(name: str, monkeypatch) -> None:
     monkeypatch.setattr(softgrasp.contact, "candidate_triangles", lambda *_: near)
     expected, call = golden(name), requests()[name]
     assert encode_frame(call.kind, header_of(expected).request_id, call.payload) == expected
+
+
+def test_derivatives_are_read_in_the_order_of_their_load_case() -> None:
+    case = LoadCase([9, 2], [0.0, -0.001])
+    gradient = read_answer(golden_reader("Answer-gradient"), Asked(case, (3, 7))).gradient
+    assert gradient is not None and gradient.value == 0.125
+    assert gradient.known_displacements.tolist() == [-0.5, 8.0]
+    assert gradient.forces[:, 0].tolist() == [0.5, 1.0, 1.5, 0.0]
+    assert gradient.forces[:, 2].tolist() == [0.0, -0.5, -0.5, -0.5]
+    assert gradient.young == {3: 1e-5, 7: -2e-6} and gradient.poisson == {3: 0.75, 7: 0.0}
+    assert gradient.acceleration is not None and gradient.acceleration.tolist() == [0, 0.25, -1]
+    assert gradient.pressures is not None and gradient.pressures.tolist() == [4e-4]
+    assert gradient.points is not None and gradient.points[3].tolist() == [-12.0, 0.0, 3.0]
 
 
 def test_answer_is_read() -> None:

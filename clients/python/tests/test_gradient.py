@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 
 import softgrasp
-from softgrasp import AsyncServer, LoadCase, Material, Mesh, Model, Pressure, Server
+from softgrasp import (
+    AsyncServer,
+    LargeDeformation,
+    LoadCase,
+    Material,
+    Mesh,
+    Model,
+    Pressure,
+    Quantity,
+    Server,
+    Uncertain,
+)
 
 RANDOM = np.random.default_rng(20261125)
 
@@ -206,3 +217,95 @@ def test_what_has_no_gradient_is_said(server: Server) -> None:
         kept.gradient(case.mask(top, (0.0, 0.0, -0.001)))
     with pytest.raises(ValueError, match="by_displacements"):
         kept.gradient(case, by_displacements=np.ones(3))
+
+
+def quantity_of(pressed: Pressed) -> Quantity:
+    """What `Pressed.quantity` works out, as the server is told it."""
+    curved = np.full(pressed.linear.shape, 1e3)
+    return Quantity(pressed.linear, curved, pressed.of_reactions, points=True)
+
+
+def test_gradient_of_the_server_is_that_of_this_package(server: Server) -> None:
+    pressed = Pressed()
+    expected = pressed.gradient(server)
+    once = server.solve(pressed.model(), pressed.case, quantity=quantity_of(pressed)).gradient
+    frame = server.keep(pressed.model()).frame(pressed.case, quantity=quantity_of(pressed))
+    for found in (once, frame.gradient):
+        assert found is not None and found.value is not None
+        quantity = pressed.quantity(server, pressed.model(), pressed.case)
+        assert found.value == pytest.approx(quantity, rel=1e-9)
+        for name in ("known_displacements", "forces", "points", "acceleration", "pressures"):
+            ours, own = getattr(expected, name), getattr(found, name)
+            assert np.abs(ours - own).max() < 1e-9 * np.abs(ours).max(), name
+        assert expected.young is not None and expected.poisson is not None
+        assert found.young == pytest.approx(expected.young, rel=1e-9)
+        assert found.poisson == pytest.approx(expected.poisson, rel=1e-9)
+    assert server.solve(pressed.model(), pressed.case).gradient is None
+
+
+@pytest.mark.parametrize("element", ["t4", "t4-anp", "t10"])
+def test_gradient_at_large_deformation_is_that_of_central_differences(
+    server: Server, element: str
+) -> None:
+    pressed = Pressed()
+    case, quantity = pressed.case, quantity_of(pressed)
+    large = LargeDeformation(law="neo-hookean-log", path="from-rest")
+
+    def solved(case: LoadCase, young: float = 6e4) -> softgrasp.Gradient:
+        materials = {0: Material(2e4, 0.3), 1: Material(young, 0.4)}
+        model = Model(pressed.mesh, materials, element)  # type: ignore[arg-type]
+        found = server.solve_large(model, case, large, quantity=quantity).gradient
+        assert found is not None
+        return found
+
+    def value(case: LoadCase, young: float = 6e4) -> float:
+        found = solved(case, young).value
+        assert found is not None
+        return found
+
+    found = solved(case)
+    for k in range(0, len(case.known_dofs), 11):
+        step = np.zeros(len(case.known_dofs))
+        step[k] = 1e-6
+        up, down = (
+            value(case.with_displacements(case.known_displacements + s)) for s in (step, -step)
+        )
+        assert differs(found.known_displacements[k], up, down, 1e-6) < 1e-6
+    node = pressed.side[0]
+    push = np.array([2e-4, 0.0, 0.0])
+    up, down = (value(case.force([node], s)) for s in (push, -push))
+    assert differs(found.forces[node, 0], up, down, 2e-4) < 1e-6
+    assert found.young is not None and found.points is not None
+    assert differs(found.young[1], value(case, 60010.0), value(case, 59990.0), 10.0) < 1e-6
+    assert np.abs(found.points.sum(axis=0)).max() < 1e-8 * np.abs(found.points).max()
+    # A path of a kept model that has come to rest has the same derivatives.
+    kept = server.keep(Model(pressed.mesh, pressed.materials, element))  # type: ignore[arg-type]
+    on_path = kept.large_frame(case, large, quantity=quantity).gradient
+    assert on_path is not None
+    assert np.abs(on_path.forces - found.forces).max() < 1e-6 * np.abs(found.forces).max()
+
+
+def test_what_has_no_derivatives_is_refused_by_name(server: Server) -> None:
+    pressed = Pressed()
+    model, quantity = pressed.model(), quantity_of(pressed)
+    with pytest.raises(ValueError, match="one case"):
+        rows = [pressed.case.known_displacements] * 2
+        server.solve_several(model, pressed.case, rows, quantity=quantity)
+    with pytest.raises(ValueError, match="neither"):
+        Quantity()
+    with pytest.raises(ValueError, match="slopes"):
+        Quantity(slopes=[1.0, 2.0])
+    with pytest.raises(ValueError, match="reactions"):
+        server.solve(model, pressed.case, quantity=Quantity(of_reactions=np.ones(999)))
+    with pytest.raises(softgrasp.BadRequest, match="factor"):
+        masked = pressed.case.mask(pressed.side, (0.0, 0.0, 0.0))
+        server.solve(model, masked, quantity=quantity)
+    with pytest.raises(softgrasp.BadRequest, match="node 9999"):
+        far = np.zeros((10001, 3))
+        far[9999] = 1.0
+        server.solve(model, pressed.case, quantity=Quantity(far))
+    with pytest.raises(softgrasp.BadRequest, match="yield stress"):
+        flowing = LargeDeformation(yield_stress=1e3)
+        server.solve_large(model, pressed.case, flowing, quantity=quantity)
+    with pytest.raises(Uncertain, match="not converged"):
+        server.solve_large(model, pressed.case, max_error=0.1, quantity=quantity)

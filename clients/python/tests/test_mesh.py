@@ -125,6 +125,55 @@ def test_files_of_the_repository_are_read(name: str) -> None:
     assert mesh.regions is None
 
 
+MSH_2_TEN = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+10
+1 0 0 0
+2 1 0 0
+3 0 1 0
+4 0 0 1
+5 0.5 -0.1 0
+6 0.5 0.5 0
+7 0 0.5 0
+8 0 0 0.5
+9 0 0.5 0.5
+10 0.5 0 0.5
+$EndNodes
+$Elements
+1
+1 11 2 0 1 1 2 3 4 5 6 7 8 9 10
+$EndElements
+"""
+
+
+def test_mid_edge_nodes_are_kept_where_every_tetrahedron_has_them(tmp_path: Path) -> None:
+    mesh = Mesh.read(written(tmp_path, MSH_2_TEN))
+    # Gmsh has the edge from 3 to 4 before that from 2 to 4.
+    assert mesh.tets.tolist() == [[0, 1, 2, 3]]
+    assert mesh.mid_edge is not None and mesh.mid_edge.tolist() == [[4, 5, 6, 7, 9, 8]]
+    mixed = MSH_2_TEN.replace("$Elements\n1\n", "$Elements\n2\n2 4 2 0 1 2 3 4 1\n")
+    mesh = Mesh.read(written(tmp_path, mixed))
+    assert mesh.mid_edge is None and len(mesh.tets) == 2
+    for wrong in ([[4, 5, 6, 7, 9]], [[4, 5, 6, 7, 9, 10]], np.zeros((2, 6), int)):
+        with pytest.raises(ValueError, match="mid-edge"):
+            Mesh(np.zeros((10, 3)), [[0, 1, 2, 3]], mid_edge=wrong)
+
+
+def test_mid_edge_nodes_are_read_by_meshio(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    mesh = Mesh.read(written(tmp_path, MSH_2_TEN))
+    assert mesh.mid_edge is not None
+    nodes = np.concatenate([mesh.tets, mesh.mid_edge], axis=1).astype(int)
+    file = meshio.Mesh(mesh.points, [("tetra10", nodes)])
+    for name in ("a.vtu", "a.vtk", "a.inp"):
+        meshio.write(tmp_path / name, file)
+        again = Mesh.read(tmp_path / name)
+        assert np.array_equal(again.tets, mesh.tets), name
+        assert again.mid_edge is not None and np.array_equal(again.mid_edge, mesh.mid_edge), name
+
+
 def test_other_formats_are_read_by_meshio(tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
     block = Mesh.block((1.0, 2.0, 3.0), (1, 2, 1))

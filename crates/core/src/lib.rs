@@ -30,6 +30,7 @@ pub mod contact;
 pub mod dynamics;
 pub mod fem;
 pub mod fill;
+pub mod gradient;
 pub mod mesh;
 pub mod mesh_io;
 pub mod model;
@@ -41,6 +42,7 @@ pub mod surface;
 
 pub use fem::hyperelastic::Law;
 pub use fem::{Element, Material};
+pub use gradient::{Gradient, Quantity, Term};
 pub use mesh::TetMesh;
 pub use soft_body::{
     Answer, Axis, Frames, Inexactness, LargeAnswer, LoadCase, SoftBody, SoftBodyError,

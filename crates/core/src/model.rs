@@ -18,8 +18,8 @@ use crate::fem::{
     summarise_strain_quadratic,
 };
 use crate::mesh::{Bodies, TetMesh};
-use crate::solve::condensed::Base;
-use crate::solve::equilibrium::{Hold, HoldOf};
+use crate::solve::condensed::{Base, BaseOf};
+use crate::solve::equilibrium::{Hold, HoldOf, TangentsBy};
 use crate::solve::memory::model_bytes;
 use crate::solve::{
     Analysed, Factored, KnownDisplacements, Partition, RigidBodies, Stage, Within, find_free_motion,
@@ -33,7 +33,7 @@ use crate::solve::{
 pub struct Model {
     mesh: TetMesh,
     element: Element,
-    /// Mesh with mid-edge nodes behind the corners, for ten-node elements.
+    /// Mesh of ten-node elements.
     quadratic: Option<QuadraticMesh>,
     materials: Vec<Material>,
     bodies: Bodies,
@@ -55,13 +55,15 @@ pub struct Known {
 }
 
 impl Model {
-    /// Assembles the stiffness of a mesh with one of the elements.
+    /// Assembles the stiffness of a mesh with one of the elements; linear ones leave mid-edge nodes of the
+    /// mesh unused.
     ///
     /// Shapes: `materials` one, or one per region; `fixed` degrees of freedom held at zero, in any
     /// order. Units: m, Pa.
     ///
     /// # Errors
-    /// [`ModelError`] for regions without material and for fixed nodes that are not there.
+    /// [`ModelError`] for regions without material, for fixed nodes that are not there, and for mid-edge
+    /// nodes that no ten-node elements can have.
     pub fn try_new(
         mesh: TetMesh,
         element: Element,
@@ -70,6 +72,10 @@ impl Model {
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Self, ModelError> {
         on_stage(Stage::Assemble);
+        let mesh = match element {
+            Element::Tet10 => mesh,
+            Element::Tet4 | Element::Tet4Anp => mesh.without_mid_edge_nodes(),
+        };
         fixed.sort_unstable();
         fixed.dedup();
         Partition::try_new(&mesh.used_nodes(), &fixed)?;
@@ -139,6 +145,27 @@ impl Model {
     /// Connected bodies and pieces.
     pub fn bodies(&self) -> &Bodies {
         &self.bodies
+    }
+
+    /// One material for the whole body, or one for each region.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// Derivatives by the places of the mesh's nodes, from those by the places of all nodes of the system:
+    /// mid-edge nodes that were made lie in the middle of their corners.
+    ///
+    /// Shapes: three for each node of the system; three for each node of the mesh.
+    pub fn by_nodes_of_mesh(&self, mut slopes: Vec<f64>) -> Vec<f64> {
+        let made = slopes.split_off((3 * self.mesh.node_count()).min(slopes.len()));
+        let edges = self.quadratic.iter().flat_map(|quadratic| quadratic.edges());
+        for (slope, edge) in made.as_chunks::<3>().0.iter().zip(edges) {
+            for &corner in edge {
+                let own = &mut slopes[3 * corner as usize..3 * corner as usize + 3];
+                own.iter_mut().zip(slope).for_each(|(sum, slope)| *sum += 0.5 * slope);
+            }
+        }
+        slopes
     }
 
     /// Degrees of freedom the scene holds at zero, ascending.
@@ -238,8 +265,8 @@ impl Model {
         Ok(Partition::try_new(&self.used, dofs)?)
     }
 
-    /// Base of the condensed engine for this shape; with a limit, its factor may take so much memory
-    /// only.
+    /// Base of the condensed engine for this shape; with a limit, its factor or hierarchy may take so much
+    /// memory only.
     ///
     /// Units: `limit` bytes.
     ///
@@ -250,11 +277,24 @@ impl Model {
         limit: Option<u64>,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Base, ModelError> {
-        let Self { mesh, bodies, rigid, stiffness, fixed, quadratic, .. } = self;
-        if quadratic.is_some() {
-            return Err(ModelError::QuadraticCondensed);
+        Ok(Base::try_new(self.base_of()?, &self.fixed, limit, on_stage)?)
+    }
+
+    /// Base of the condensed engine whose columns come from conjugate gradients with multigrid: a fraction of a
+    /// factor's memory, more time for each contact, and an estimate of the error instead of a bound.
+    ///
+    /// # Errors
+    /// [`ModelError::Condensed`], [`ModelError::QuadraticCondensed`].
+    pub fn condense_without_factor(&self) -> Result<Base, ModelError> {
+        Ok(Base::without_factor(self.base_of()?, &self.fixed)?)
+    }
+
+    fn base_of(&self) -> Result<BaseOf<'_>, ModelError> {
+        let Self { mesh, bodies, rigid, stiffness, quadratic, .. } = self;
+        match quadratic {
+            Some(_) => Err(ModelError::QuadraticCondensed),
+            None => Ok(BaseOf { mesh, bodies, rigid, stiffness }),
         }
-        Ok(Base::try_new(mesh, bodies, rigid, stiffness, fixed, limit, on_stage)?)
     }
 
     /// Orders and analyses `K11` for a set of known degrees of freedom, after making sure that it
@@ -319,24 +359,41 @@ impl Model {
         self.materials.iter().map(Material::poisson).fold(-1.0, f64::max)
     }
 
-    /// Known degrees of freedom and masks as a hold for equilibria; `before` lends its order if it
-    /// is by the same degrees of freedom.
+    /// Known degrees of freedom and masks as a hold for equilibria, whose tangents are factored; `before`
+    /// lends its order if it is by the same degrees of freedom.
     ///
     /// Shapes: `dofs` ascending, fixed ones among them; `masks` of this model.
     ///
     /// # Errors
-    /// [`ModelError::Partition`], [`ModelError::Free`], [`ModelError::Dependent`].
+    /// As [`Model::hold_by`].
     pub fn hold(
         &self,
         dofs: &[u32],
         masks: Vec<Mask>,
         before: Option<&Hold>,
     ) -> Result<Hold, ModelError> {
+        self.hold_by(dofs, masks, TangentsBy::Factors, before)
+    }
+
+    /// Known degrees of freedom and masks as a hold for equilibria; `before` lends its order if it
+    /// is by the same degrees of freedom and means.
+    ///
+    /// Shapes: `dofs` ascending, fixed ones among them; `masks` of this model.
+    ///
+    /// # Errors
+    /// [`ModelError::Partition`], [`ModelError::Free`], [`ModelError::Dependent`].
+    pub fn hold_by(
+        &self,
+        dofs: &[u32],
+        masks: Vec<Mask>,
+        by: TangentsBy,
+        before: Option<&Hold>,
+    ) -> Result<Hold, ModelError> {
         self.check_held(dofs, &masks)?;
         let partition = Partition::try_new(&self.used, dofs)?;
         let Self { mesh, bodies, rigid, stiffness, .. } = self;
         let body = HoldOf { mesh, bodies, rigid, stiffness };
-        Ok(Hold::try_new(body, partition, masks, before)?)
+        Ok(Hold::try_new(body, partition, masks, by, before)?)
     }
 
     /// Strain, stress and energy by linear elasticity, with the estimate of the error if `is_judged`,
@@ -417,75 +474,4 @@ fn system(mesh: &TetMesh, element: Element, materials: &[Material]) -> Result<Sy
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mesh::{BuiltIn, generate};
-    use crate::solve::Method;
-
-    fn cube() -> Model {
-        let mesh = generate(BuiltIn::Cube, 64).unwrap();
-        let material = Material::try_new(1.0e5, 0.3).unwrap();
-        Model::try_new(mesh, Element::Tet4, &[material], vec![5, 3, 4], &mut |_| {}).unwrap()
-    }
-
-    #[test]
-    fn fixed_dofs_join_the_known_ones_and_yield_to_them() {
-        let known = cube().known(vec![(4, 0.5), (0, 0.25)]).unwrap();
-        assert_eq!(known.dofs, [0, 3, 4, 5]);
-        assert_eq!(known.q_known, [0.25, 0.0, 0.5, 0.0]);
-    }
-
-    #[test]
-    fn masks_that_do_not_fit_the_mesh_are_named() {
-        let one = generate(BuiltIn::Cube, 27).unwrap();
-        let moved = one.vertices().iter().map(|p| p + nalgebra::Vector3::new(0.2, 0.0, 0.0));
-        let orphan = [nalgebra::Point3::new(9.0, 9.0, 9.0)];
-        let vertices = one.vertices().iter().copied().chain(moved).chain(orphan).collect();
-        let tets = one.tets().iter().copied().chain(one.tets().iter().map(|t| t.map(|n| n + 27)));
-        let two = TetMesh::try_new(vertices, tets.collect(), vec![]).unwrap();
-        let material = Material::try_new(1.0e5, 0.3).unwrap();
-        let model = Model::try_new(two, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
-        let error = |nodes: &[u32]| {
-            let good = vec![(0, 1.0), (1, 1.0)];
-            let bad: Vec<(u32, f64)> = nodes.iter().map(|&n| (n, 1.0)).collect();
-            match model.masks([good, bad]) {
-                Err(ModelError::Mask { mask: 1, reason }) => reason,
-                other => panic!("{other:?}"),
-            }
-        };
-        assert_eq!(error(&[3, 55]), MaskError::NoSuchNode { node: 55, node_count: 55 });
-        assert_eq!(error(&[u32::MAX]), MaskError::NoSuchNode { node: u32::MAX, node_count: 55 });
-        assert_eq!(error(&[54]), MaskError::Orphan { node: 54 });
-        assert_eq!(error(&[26, 27]), MaskError::SeveralBodies { first: 26, second: 27 });
-        assert_eq!(error(&[]), MaskError::Empty);
-    }
-
-    #[test]
-    fn ten_node_elements_answer_at_the_corners_and_are_softer() {
-        let material = Material::try_new(1.0e5, 0.3).unwrap();
-        let known = [0, 1, 2, 3, 15, 12].map(|n| 3 * n).into_iter().flat_map(|d| d..d + 3);
-        let known: Vec<(u32, f64)> = known.map(|d| (d, 0.0)).collect();
-        let pulled = |element: Element| {
-            let mesh = generate(BuiltIn::Cube, 64).unwrap();
-            let model = Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).unwrap();
-            let known = model.known(known.clone()).unwrap();
-            let factored = model.factor(&known.dofs, Method::Front, &mut |_| {}).unwrap();
-            let mut forces = vec![0.0; 3 * model.system_node_count()];
-            forces[3 * 63] = 1.0;
-            let loads =
-                crate::solve::Loads { q_known: &known.q_known, forces: &forces, residual_rel: 0.0 };
-            let solution = factored.solve(model.stiffness(), loads, &mut |_| {}).unwrap();
-            solution.displacement[3 * 63]
-        };
-        // More freedom, less energy stored for the same force: the loaded corner gives more.
-        assert!(pulled(Element::Tet10) > 1.05 * pulled(Element::Tet4));
-    }
-
-    #[test]
-    fn body_held_at_two_nodes_is_refused_before_factoring() {
-        let error = cube().factor(&[0, 1, 2, 3, 4, 5], Method::SparseCholesky, &mut |stage| {
-            panic!("{stage:?} was begun");
-        });
-        assert!(matches!(error, Err(ModelError::Free(_))));
-    }
-}
+mod tests;

@@ -151,6 +151,28 @@ fn what_cannot_be_asked_is_refused_with_the_node() {
 }
 
 #[test]
+fn frames_without_a_factor_give_what_frames_with_one_give_within_their_estimate() {
+    let ball = generate(BuiltIn::Sphere, 900).unwrap();
+    let body = SoftBody::try_new(ball, Material::try_new(2.0e4, 0.4).unwrap()).unwrap();
+    let (mut by_factor, mut without) =
+        (body.frames().unwrap(), body.frames_without_factor().unwrap());
+    for tick in 1..4 {
+        let mut squeeze = LoadCase::new();
+        squeeze.prescribe(11, Vector3::new(-1e-4 * f64::from(tick), 0.0, 0.0));
+        squeeze.prescribe(400, Vector3::new(0.0, 1e-4, 0.0));
+        squeeze.hold([880]);
+        let [exact, found] =
+            [by_factor.answer(&squeeze).unwrap(), without.answer(&squeeze).unwrap()];
+        let Inexactness::Estimated(estimate) = found.inexactness else { panic!("{found:?}") };
+        let square = |v: &[Vector3<f64>]| v.iter().map(Vector3::norm_squared).sum::<f64>();
+        let pairs = found.displacements.iter().zip(&exact.displacements);
+        let apart: Vec<Vector3<f64>> = pairs.map(|(a, b)| a - b).collect();
+        let off = (square(&apart) / square(&exact.displacements)).sqrt();
+        assert!(off <= estimate && estimate < 1e-6, "off by {off:e}, estimated {estimate:e}");
+    }
+}
+
+#[test]
 fn frames_with_forces_weight_and_pressure_are_those_of_one_request() {
     let mesh = cube(125);
     let (low, high) = mesh.bounds();

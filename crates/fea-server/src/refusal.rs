@@ -2,10 +2,11 @@
 
 use softgrasp_core::dynamics::StepError;
 use softgrasp_core::fem::MaterialError;
+use softgrasp_core::gradient::NoGradient;
 use softgrasp_core::mesh::MeshError;
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::condensed::CondensedError;
-use softgrasp_core::solve::equilibrium::NoEquilibrium;
+use softgrasp_core::solve::equilibrium::{NoAdjoint, NoEquilibrium};
 use softgrasp_core::solve::{Method, SolveError, UnknownMethod};
 use softgrasp_protocol::{DecodeError, Field, ModelHash, RejectCode, Rejected, VERSION};
 
@@ -107,9 +108,23 @@ pub(crate) enum Refusal {
     Uncertain { method: String, error_rel: f64, condition: f64 },
     #[error(transparent)]
     NoEquilibrium(#[from] NoEquilibrium),
+    #[error(transparent)]
+    Gradient(#[from] NoGradient),
     #[error(
-        "large deformation is solved by newton with a factor of front or front-mixed, or auto; \
-         {method} cannot"
+        "derivatives are solved for with a factor; the method condensed and masks have none: ask with auto \
+         or front, and prescribe displacements of nodes"
+    )]
+    GradientCondensed,
+    #[error("derivatives are those of one case; ask for one case at a time")]
+    SeveralGradients,
+    #[error(
+        "the tangent for derivatives takes {bytes} bytes, {free} are free (--memory-limit); ask without \
+         them"
+    )]
+    GradientMemory { bytes: u64, free: u64 },
+    #[error(
+        "large deformation is solved by newton with a factor of front or front-mixed, by multigrid in a \
+         request with a mesh of its own, or auto; {method} cannot"
     )]
     LargeMethod { method: Method },
     #[error("rigid body {body} (from 0): {reason}")]
@@ -178,13 +193,15 @@ impl Refusal {
     pub fn code(&self) -> RejectCode {
         match self {
             Self::UnknownModel(_) => RejectCode::UnknownModel,
-            Self::Model(error) => code_of_model(error),
+            Self::Model(error) | Self::Gradient(NoGradient::Model(error)) => code_of_model(error),
+            Self::Gradient(NoGradient::Adjoint(error)) => code_of_adjoint(error),
             Self::Plan(error) => code_of_plan(error),
             Self::Method(_) => RejectCode::UnknownMethod,
             Self::TooManyNodes { .. } => RejectCode::TooLarge,
-            Self::TooManyCases { .. } | Self::FieldsMemory { .. } | Self::NoRoom(_) => {
-                RejectCode::MemoryLimit
-            }
+            Self::TooManyCases { .. }
+            | Self::FieldsMemory { .. }
+            | Self::GradientMemory { .. }
+            | Self::NoRoom(_) => RejectCode::MemoryLimit,
             Self::FieldsTooLarge { .. } => RejectCode::TooLarge,
             Self::Uncertain { .. } | Self::NoEquilibrium(_) => RejectCode::Uncertain,
             Self::Token | Self::Barred { .. } => RejectCode::NotAuthorised,
@@ -213,6 +230,16 @@ impl Refusal {
             _ => 0,
         };
         Rejected { code: self.code(), text: self.to_string(), detail, retry_after_ms }
+    }
+}
+
+fn code_of_adjoint(error: &NoAdjoint) -> RejectCode {
+    match error {
+        NoAdjoint::Plastic | NoAdjoint::Masks => RejectCode::BadRequest,
+        NoAdjoint::OutOfMemory { .. } => RejectCode::MemoryLimit,
+        NoAdjoint::NotConverged { .. } | NoAdjoint::Snapped | NoAdjoint::NotStable => {
+            RejectCode::Uncertain
+        }
     }
 }
 

@@ -55,7 +55,7 @@ pub(crate) struct RequestHandler {
 }
 
 /// Names of this server's capabilities, for `Welcome`.
-const CAPABILITIES: [&str; 10] = [
+const CAPABILITIES: [&str; 12] = [
     "large",
     "cases",
     "contact",
@@ -66,6 +66,8 @@ const CAPABILITIES: [&str; 10] = [
     "contact-yield",
     "small-system",
     "loads",
+    "mid-edge",
+    "gradients",
 ];
 /// The capability of a server with an engine beside it.
 const CLUSTER: &str = "cluster";
@@ -193,6 +195,9 @@ impl RequestHandler {
         let Ask { subject, question, large, cases, without_estimate, .. } = ask;
         if large.is_some() && !cases.is_empty() {
             return Err(Refusal::SeveralLarge);
+        }
+        if !question.quantity.is_empty() && !cases.is_empty() {
+            return Err(Refusal::SeveralGradients);
         }
         if large.is_some() {
             self.check_is_here(match &subject {

@@ -118,7 +118,7 @@ impl Client {
 fn mesh() -> MeshData {
     let mesh = generate(BuiltIn::Cube, 1000).unwrap();
     let vertices = mesh.vertices().iter().map(|p| p.coords.into()).collect();
-    MeshData { vertices, tets: mesh.tets().to_vec(), regions: Vec::new() }
+    MeshData { vertices, tets: mesh.tets().to_vec(), ..MeshData::default() }
 }
 
 const MATERIALS: [Material; 1] = [Material { young: 1e4, poisson: 0.3 }];

@@ -173,7 +173,7 @@ fn pulled(shape: BuiltIn, nodes: usize, method: &str) -> Ask {
         mesh: MeshData {
             vertices: mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
             tets: mesh.tets().to_vec(),
-            regions: Vec::new(),
+            ..MeshData::default()
         },
         materials: vec![Material { young: 1.0e5, poisson: 0.3 }],
         element: ElementChoice::T4,

@@ -11,7 +11,7 @@
 //! use glove_client::object::scene::{SceneFile, load_object};
 //!
 //! let scene = SceneFile::of_text("object = \"cube\"\nnodes = 64")?;
-//! let choice = scene.object.as_deref().unwrap_or("strawberry").parse()?;
+//! let choice = scene.object().unwrap_or("strawberry").parse()?;
 //! let object = load_object(&choice, scene.nodes.unwrap_or(1000), scene.object_size_m)?;
 //! assert_eq!(object.mesh.node_count(), 64);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

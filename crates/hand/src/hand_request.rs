@@ -7,6 +7,7 @@ use std::str::FromStr;
 
 use crate::scripted::ScriptName;
 use crate::serial::SerialSource;
+use crate::xr_runtime::{RuntimeError, WantedHands};
 
 /// A hand, and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub enum HandRequest {
     Joints(SocketAddr),
     /// The hand that a headset tracks and the page for browsers sends.
     Xr,
+    /// The hands that an OpenXR runtime tracks.
+    OpenXr(WantedHands),
 }
 
 impl HandRequest {
@@ -32,7 +35,7 @@ impl HandRequest {
             Self::Scripted(script) => HandChoice::Scripted(*script),
             Self::Mouse => HandChoice::Mouse,
             Self::Replay(_) => HandChoice::Replay,
-            Self::Serial(_) | Self::Joints(_) | Self::Xr => HandChoice::Live,
+            Self::Serial(_) | Self::Joints(_) | Self::Xr | Self::OpenXr(_) => HandChoice::Live,
         }
     }
 }
@@ -40,7 +43,7 @@ impl HandRequest {
 impl HandRequest {
     /// Whether live devices or senders determine what comes and when.
     pub fn is_live(&self) -> bool {
-        matches!(self, Self::Serial(_) | Self::Joints(_) | Self::Xr)
+        self.choice() == HandChoice::Live
     }
 }
 
@@ -53,6 +56,8 @@ impl FromStr for HandRequest {
             ("scripted", name) => Ok(Self::Scripted(name.parse().map_err(|e| format!("{e}"))?)),
             ("mouse", "") => Ok(Self::Mouse),
             ("xr", "") => Ok(Self::Xr),
+            ("openxr", _) if !cfg!(feature = "openxr") => Err(RuntimeError::NotBuilt.to_string()),
+            ("openxr", name) => Ok(Self::OpenXr(name.parse().map_err(|e| format!("{e}"))?)),
             ("replay", "") => Err("replay needs the file of a recording: replay:F.mcap".into()),
             ("replay", path) => Ok(Self::Replay(path.into())),
             ("serial", source) => Ok(Self::Serial(source.parse().map_err(|e| format!("{e}"))?)),
@@ -61,7 +66,7 @@ impl FromStr for HandRequest {
                 Ok(Self::Joints(address.map_err(|_| "joints needs IP:PORT to listen on")?))
             }
             _ => Err("there are scripted[:NAME], mouse, replay:F.mcap, \
-                      serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT and xr"
+                      serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, xr and openxr[:left|:right]"
                 .into()),
         }
     }
@@ -76,6 +81,7 @@ impl fmt::Display for HandRequest {
             Self::Serial(source) => write!(f, "serial:{source}"),
             Self::Joints(address) => write!(f, "joints:{address}"),
             Self::Xr => f.write_str("xr"),
+            Self::OpenXr(wanted) => wanted.fmt(f),
         }
     }
 }
@@ -97,5 +103,43 @@ impl HandChoice {
     /// Whether the hand is played by the program, so that it can be paused; a person cannot.
     pub fn is_played(self) -> bool {
         matches!(self, Self::Scripted(_) | Self::Replay)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use softgrasp_grasp::hand::Handedness;
+
+    use super::*;
+
+    #[test]
+    fn every_word_of_a_hand_is_read_as_it_is_written() {
+        let words = ["mouse", "xr", "scripted:lift", "joints:127.0.0.1:7879", "replay:a.mcap"];
+        for word in words {
+            assert_eq!(word.parse::<HandRequest>().map(|hand| hand.to_string()), Ok(word.into()));
+        }
+        for (word, wanted) in [
+            ("openxr", WantedHands::Both),
+            ("openxr:left", WantedHands::One(Handedness::Left)),
+            ("openxr:right", WantedHands::One(Handedness::Right)),
+        ] {
+            assert_eq!(HandRequest::OpenXr(wanted).to_string(), word);
+            let sides = wanted.sides().len();
+            assert_eq!(sides, if wanted == WantedHands::Both { 2 } else { 1 });
+        }
+    }
+
+    #[test]
+    fn hands_of_a_runtime_are_refused_by_a_build_that_asks_none() {
+        let read = |word: &str| word.parse::<HandRequest>();
+        if cfg!(feature = "openxr") {
+            assert_eq!(read("openxr"), Ok(HandRequest::OpenXr(WantedHands::Both)));
+            let left = WantedHands::One(Handedness::Left);
+            assert_eq!(read("openxr:left"), Ok(HandRequest::OpenXr(left)));
+            assert!(read("openxr:middle").unwrap_err().contains("there is no \"middle\""));
+        } else {
+            let refused = read("openxr").unwrap_err();
+            assert!(refused.contains("with its feature `openxr`"), "{refused}");
+        }
     }
 }

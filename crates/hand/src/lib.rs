@@ -1,8 +1,8 @@
 //! Where the hand comes from: devices, joints, scripts, a mouse, recordings.
 //!
 //! Every source ([`hand_source`]) brings bytes with their times ([`arrival`], [`sent`]): [`serial`]
-//! reads a glove and a tracker ([`devices`]), [`joints`] a stream of tracked joints, [`scripted`] plays
-//! a person, [`mouse`] has one with a mouse, [`recording`] and [`foreign_recording`] repeat what was.
+//! reads a glove and a tracker ([`devices`]), [`joints`] a stream of tracked joints, [`xr_runtime`] asks
+//! an OpenXR runtime for them, [`scripted`] plays a person, [`mouse`] has one with a mouse, [`recording`] and [`foreign_recording`] repeat what was.
 //! [`hand_reader`] makes a pose of the hand of them, by the dimensions, calibration and mount of
 //! [`hand_setup`]; [`hand_readers`] does so for a left and a right hand at once.
 //!
@@ -36,3 +36,4 @@ pub mod recording;
 pub mod scripted;
 pub mod sent;
 pub mod serial;
+pub mod xr_runtime;

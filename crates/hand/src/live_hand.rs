@@ -1,4 +1,4 @@
-//! A person's own hand: glove and tracker on serial ports, or a stream of joints.
+//! A person's own hand: glove and tracker on serial ports, a stream of joints, or a runtime of OpenXR.
 
 use std::time::Instant;
 
@@ -6,6 +6,7 @@ use crate::joints::{ArrivedBytes, JointsFeed, JointsListener};
 use crate::notice::Notice;
 use crate::sent::{Arrival, Device, WhichHand};
 use crate::serial::{DeviceState, SerialDevices};
+use crate::xr_runtime::RuntimeHands;
 
 /// Devices that are open, and whose bytes come by themselves.
 pub struct LiveHand {
@@ -17,6 +18,7 @@ enum Source {
     Serial(Box<SerialDevices>),
     Joints(JointsListener),
     Fed(JointsFeed),
+    Runtime(RuntimeHands),
 }
 
 impl LiveHand {
@@ -33,6 +35,11 @@ impl LiveHand {
     /// The hand whose joints another part of the program hands on; `name` stands in reports.
     pub fn fed(feed: JointsFeed, name: String) -> Self {
         Self { source: Source::Fed(feed), name }
+    }
+
+    /// The hand that an OpenXR runtime tracks; `name` stands in reports.
+    pub fn runtime(hands: RuntimeHands, name: String) -> Self {
+        Self { source: Source::Runtime(hands), name }
     }
 
     /// Name of the hand in reports.
@@ -61,6 +68,7 @@ impl LiveHand {
             }
             Source::Joints(listener) => joints(listener.take(), at),
             Source::Fed(feed) => joints(feed.take(), at),
+            Source::Runtime(hands) => joints(hands.take(), at),
         }
     }
 
@@ -70,6 +78,7 @@ impl LiveHand {
             Source::Serial(devices) => devices.dropped(),
             Source::Joints(listener) => listener.dropped(),
             Source::Fed(feed) => feed.dropped(),
+            Source::Runtime(hands) => hands.dropped(),
         }
     }
 
@@ -100,6 +109,7 @@ impl LiveHand {
                 let text = "no headset sends a hand: open the page in its browser and enter";
                 vec![Notice::waits(text)]
             }
+            Source::Runtime(hands) => hands.complaint().into_iter().collect(),
             Source::Joints(_) | Source::Fed(_) => Vec::new(),
         }
     }

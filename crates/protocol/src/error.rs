@@ -78,6 +78,14 @@ pub enum DecodeError {
         /// The fields in question, one bit for each; see [`Field::bit`](crate::Field::bit).
         bits: u32,
     },
+    /// A mesh announces arrays that this version does not know.
+    #[error(
+        "a mesh announces the arrays {bits:#x}; there are region labels (1) and mid-edge nodes (2)"
+    )]
+    UnknownArrays {
+        /// The arrays, one bit for each.
+        bits: u8,
+    },
     /// The kind in the header is the number of no message.
     #[error("unknown message kind {kind:#06x}")]
     UnknownKind {

@@ -29,6 +29,9 @@ impl Flat for [u32; 3] {
 impl Flat for [u32; 4] {
     const SCALAR_LEN: usize = 4;
 }
+impl Flat for [u32; 6] {
+    const SCALAR_LEN: usize = 4;
+}
 
 impl Flat for [f32; 3] {
     const SCALAR_LEN: usize = 4;
@@ -172,14 +175,38 @@ impl<'a> PayloadReader<'a> {
     where
         T: for<'de> SchemaRead<'de, PartFormat, Dst = T>,
     {
+        let part = read_fields(self.part_bytes()?)?;
+        self.skip_padding()?;
+        Ok(part)
+    }
+
+    /// Reads the part, to be called first, and the fields behind it that came later and may be left out.
+    ///
+    /// # Errors
+    /// As [`PayloadReader::part`].
+    pub(crate) fn part_and_later<T, L>(&mut self) -> Result<(T, L), DecodeError>
+    where
+        T: for<'de> SchemaRead<'de, PartFormat, Dst = T>,
+        L: for<'de> SchemaRead<'de, PartFormat, Dst = L> + Default,
+    {
+        let fields = self.part_bytes()?;
+        let mut rest = fields;
+        let (part, later) = match T::get(&mut rest) {
+            Ok(part) if rest.is_empty() => (part, L::default()),
+            Ok(part) => (part, read_fields(rest)?),
+            Err(_) => (read_fields(fields)?, L::default()),
+        };
+        self.skip_padding()?;
+        Ok((part, later))
+    }
+
+    /// Bytes of the part, behind their length.
+    fn part_bytes(&mut self) -> Result<&'a [u8], DecodeError> {
         let length = self.take("the length of the part", LENGTH_LEN, 1)?;
         let length = length.iter().rev().fold(0, |sum: u64, byte| (sum << 8) | u64::from(*byte));
         let len = usize::try_from(length).ok().filter(|len| *len <= PART_LEN_MAX);
         let len = len.ok_or(DecodeError::PartTooLong { len: length })?;
-        let fields = self.take("the part", len, 1)?;
-        let part = read_fields(fields)?;
-        self.skip_padding()?;
-        Ok(part)
+        self.take("the part", len, 1)
     }
 
     /// Reads one raw array of `count` entries; memory is taken only if its bytes are there.

@@ -240,6 +240,7 @@ export class Scene {
     const capsules = new Float32Array(8 * MAX_CAPSULES);
     capsules.set(picture.capsules.subarray(0, capsules.length));
     gl.uniform4fv(this.at.get("uCapsules"), capsules);
+    gl.uniform4fv(this.at.get("uAll"), ballOf(capsules, Math.min(picture.capsules.length / 8, MAX_CAPSULES)));
     gl.uniform1f(this.at.get("uCapsuleCount"), Math.min(picture.capsules.length / 8, MAX_CAPSULES));
     gl.uniformMatrix4fv(this.at.get("uWorldFromModel"), false, [r, 0, 0, 0, 0, 1, 0, 0, 0, 0, r, 0, 0, picture.ground, 0, 1]);
     this.elements(this.ground);
@@ -297,6 +298,18 @@ function toned(c) {
 
 // A linear colour as the screen takes it.
 function shown(c) { return c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055; }
+
+// The middle of some capsules, and a radius that holds them all.
+function ballOf(capsules, count) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < count; i++) for (const end of [0, 4]) for (let axis = 0; axis < 3; axis++) {
+    const place = capsules[8 * i + end + axis], radius = capsules[8 * i + 3];
+    low[axis] = Math.min(low[axis], place - radius);
+    high[axis] = Math.max(high[axis], place + radius);
+  }
+  const middle = low.map((l, axis) => 0.5 * (l + high[axis])), half = low.map((l, axis) => 0.5 * (high[axis] - l));
+  return count > 0 ? [...middle, Math.hypot(...half)] : [0, 0, 0, 0];
+}
 
 // A ball of radius 1: places, normals, triangles.
 function ball(around, up) {

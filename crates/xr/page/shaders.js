@@ -74,6 +74,7 @@ uniform sampler2D uTexture; uniform sampler2D uRelief;
 uniform vec4 uUse;                     // texture, relief, shade of the ground, only the texture
 uniform vec4 uCapsules[48];            // begin and radius, end
 uniform float uCapsuleCount;
+uniform vec4 uAll;                     // middle and radius of a ball that holds all capsules
 out vec4 colour;
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }
@@ -118,6 +119,13 @@ vec2 below(vec4 begin, vec4 end) {
   float around = 1.0 - 0.9 * radius * radius * saturate(toNear.y * inversesqrt(away)) / away;
   return vec2(lamp, around);
 }
+// Whether a place of the ground may be seen to be shaded: the lamp's shade blurs by less than this much,
+// and light from around that is taken further away is less than a level of a screen.
+bool isNear() {
+  vec3 to = uAll.xyz - vPlace;
+  vec3 flatTo = to - uKeyTowards * dot(to, uKeyTowards);
+  return length(flatTo) < uAll.w + 0.1 || length(to) < uAll.w + 0.5;
+}
 // Source: the neutral tone mapper of the Khronos group for physically based rendering.
 vec3 toned(vec3 c) {
   float x = min(c.r, min(c.g, c.b));
@@ -141,7 +149,7 @@ void main() {
   vec3 normal = normalize(vNormal) * (gl_FrontFacing ? 1.0 : -1.0);
   if (uUse.y > 0.5) normal = bumped(normal);
   vec2 shade = vec2(1.0);
-  if (uUse.z > 0.5) for (int i = 0; i < 24; i++) {
+  if (uUse.z > 0.5 && isNear()) for (int i = 0; i < 24; i++) {
     if (float(i) >= uCapsuleCount) break;
     vec2 s = below(uCapsules[2 * i], uCapsules[2 * i + 1]);
     shade = vec2(min(shade.x, s.x), shade.y * s.y);

@@ -12,7 +12,7 @@ use softgrasp_window::view::camera::ViewCamera;
 use softgrasp_window::view::colouring::Colouring;
 use softgrasp_window::view::control::Control;
 use softgrasp_window::view::directed_eye::DirectedEye;
-use softgrasp_window::view::frame::{HandView, NewsKind, ObjectView, ViewFrame};
+use softgrasp_window::view::frame::{HandView, NewsKind, ViewFrame};
 use softgrasp_window::view::ground_shade::capsules;
 use softgrasp_window::view::light::GROUND_M;
 use softgrasp_window::view::loading::LoadObject;
@@ -25,7 +25,7 @@ use crate::from_page::Ask;
 use crate::picture::{Picture, PosedHand};
 use crate::quantised::{QuantisedBox, folded};
 use crate::shown_hand::ShownHand;
-use crate::shown_object::ShownObject;
+use crate::shown_object::ShownObjects;
 use crate::status::{Sentences, status_text};
 use crate::textures::Textures;
 use crate::wishes::{Granted, Wishes};
@@ -87,7 +87,7 @@ pub struct Painter {
     sentences: Sentences,
     eye: DirectedEye,
     camera: Option<ViewCamera>,
-    object: Option<ShownObject>,
+    objects: Option<ShownObjects>,
     hands: [Option<ShownHand>; 2],
     hand_texture: Option<u32>,
     version: u32,
@@ -114,7 +114,7 @@ impl Painter {
             sentences: Sentences::default(),
             eye: DirectedEye::new(false).lowered(UNDER_MENU),
             camera: None,
-            object: None,
+            objects: None,
             hands: [None, None],
             hand_texture: None,
             version: 0,
@@ -219,16 +219,15 @@ impl Painter {
     fn paint(&mut self, frame: &ViewFrame) -> Option<Picture> {
         let shading = self.shading(frame);
         self.colouring.follow(&frame.object, shading, frame.at_s);
-        let shape = frame.shape();
-        self.dress(&frame.object);
-        let object = self.object.as_mut()?;
-        object.follow(&shape, &mut self.places, &mut self.normals);
+        self.dress(frame);
+        let objects = self.objects.as_mut()?;
+        objects.follow(frame, &mut self.places, &mut self.normals);
         let (space, numbers) = counted(self.space, &self.places)?;
         self.space = Some(space);
-        let shares = object.shares(self.colouring.shares(), numbers.len());
-        let mesh = Arc::clone(&object.mesh);
+        let shares = objects.shares(self.colouring.shares(), numbers.len());
+        let mesh = Arc::clone(&objects.mesh);
+        let pose = objects.world_from_vertices(frame);
         let hands = self.pose_hands(frame);
-        let pose = &frame.object.world_from_object;
         let (t, q) = (&pose.translation, &pose.rotation);
         Some(Picture {
             tick: frame.tick,
@@ -237,7 +236,7 @@ impl Painter {
             record: frame.hands().filter_map(|hand| u32::try_from(hand.record?).ok()).max(),
             world_from_object: [t.x, t.y, t.z, q.i, q.j, q.k, q.w].map(|x| x as f32),
             ground_y: frame.object.table_y.unwrap_or(GROUND_M) as f32,
-            capsules: capsules(frame, &shape, true).iter().map(|c| c.scaled(1.0)).collect(),
+            capsules: capsules(frame, &frame.shape(), true).iter().map(|c| c.scaled(1.0)).collect(),
             space,
             numbers,
             normals: self.normals.iter().map(|normal| folded(*normal)).collect(),
@@ -246,15 +245,22 @@ impl Painter {
         })
     }
 
-    fn dress(&mut self, object: &ObjectView) {
-        if self.object.as_mut().is_some_and(|shown| shown.is(object)) {
+    fn dress(&mut self, frame: &ViewFrame) {
+        let touched = frame.object.number;
+        if let Some(shown) = self.objects.as_mut()
+            && shown.are(frame)
+        {
+            if !shown.begin_with(touched) {
+                self.version += 1;
+                shown.put_first(self.version, touched);
+            }
             return;
         }
         // Another object that did not come through a page has no name here.
-        let is_ours = self.object.is_none() || !self.run.has_window;
+        let is_ours = self.objects.is_none() || !self.run.has_window;
         let look = if is_ours { self.run.look } else { Look::Imported };
         self.version += 1;
-        self.object = Some(ShownObject::new(self.version, look, object, &self.easel.textures));
+        self.objects = Some(ShownObjects::new(self.version, look, frame, &self.easel.textures));
         self.space = None;
     }
 

@@ -18,8 +18,9 @@ struct Kept {
     packed: BTreeMap<u32, Arc<Vec<u8>>>,
 }
 
-/// Largest number of textures kept; the oldest are dropped. An object has three at most, a hand one.
-const KEPT_MAX: usize = 12;
+/// Largest number of textures kept; the oldest are dropped. An object has three at most, a hand one, and a
+/// table eight objects.
+const KEPT_MAX: usize = 40;
 
 impl Textures {
     /// Packs a texture and returns its number, from 1 on; 0, which is none, if it cannot be packed.

@@ -128,8 +128,10 @@ fn compare(ccx: &Ccx, folder: &Path, asked: &Asked, object: &Object, of: (Elemen
         ("energy density", printed.density.iter().enumerate().map(of_energy).collect()),
     ];
     for (name, pairs) in compared {
-        // Of hyperelastic materials CalculiX prints another energy than that of the law.
-        if question.is_large && name == "energy density" {
+        // Of hyperelastic materials CalculiX prints another energy than that of the law, and the points of
+        // a curved element stand for different volumes, which it does not print.
+        let is_curved = !object.mesh.mid_edge_nodes().is_empty();
+        if (question.is_large || is_curved) && name == "energy density" {
             continue;
         }
         let comparison = Comparison::of(&pairs);
@@ -157,6 +159,11 @@ fn stress_strain_and_energy_of_elements_agree_with_calculix() {
         for question in questions(object, &system).into_iter().filter(|q| q.is_short) {
             compare(&ccx, folder.path(), &asked, object, (*element, question));
         }
+    }
+    let round = object::round(folder.path(), 80);
+    let system = System::new(&round.mesh, Element::Tet10);
+    for question in questions(&round, &system).into_iter().filter(|q| q.is_short) {
+        compare(&ccx, folder.path(), &asked, &round, (Element::Tet10, question));
     }
     for (object, element) in objects.iter().zip([Element::Tet4, Element::Tet10]) {
         let question = large_questions(object).remove(0).halved();

@@ -1,7 +1,7 @@
 //! CalculiX as referee: the same mesh, the same known displacements, the same element.
 //!
 //! Without `ccx` on the PATH the comparisons skip themselves in one line. `SOFTGRASP_REFEREE=full`
-//! asks for larger objects, every file and every question; `tests/referee/run.sh` sets it.
+//! asks for larger objects, every file and every question; `tests/referee/run.sh full` sets it.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,8 +22,6 @@ mod table;
 
 use std::path::Path;
 
-use softgrasp_core::fem::Element;
-
 use crate::agreement::Agreement;
 use crate::ccx::{Ccx, Results};
 use crate::deck::System;
@@ -31,9 +29,6 @@ use crate::object::{Object, is_full};
 use crate::question::{Question, questions};
 use crate::solved::Asked;
 use crate::table::Table;
-
-/// Elements that CalculiX has too (C3D4 and C3D10).
-const ELEMENTS: [Element; 2] = [Element::Tet4, Element::Tet10];
 
 /// Number of nodes above which only the questions of the short form are asked: CalculiX takes half a
 /// minute and more for each.
@@ -43,7 +38,7 @@ const LARGE: usize = 8000;
 fn compare(ccx: &Ccx, folder: &Path, asked: &Asked, objects: &[Object]) {
     let mut table = Table::default();
     for object in objects {
-        for element in ELEMENTS {
+        for &element in object.elements() {
             let system = System::new(&object.mesh, element);
             let mut of_object = Agreement::default();
             for question in questions(object, &system) {
@@ -88,6 +83,14 @@ fn regions_of_two_materials_agree_to_the_digits_that_calculix_prints() {
 }
 
 #[test]
+fn curved_elements_agree_to_the_digits_that_calculix_prints() {
+    let Some(ccx) = Ccx::find() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let objects = [object::round(folder.path(), if is_full() { 500 } else { 80 })];
+    compare(&ccx, folder.path(), &Asked::new(), &objects);
+}
+
+#[test]
 fn files_of_others_agree_to_the_digits_that_calculix_prints() {
     let Some(ccx) = Ccx::find() else { return };
     let Some(objects) = object::files() else { return };
@@ -127,7 +130,7 @@ fn followed(
     (question, printed)
 }
 
-/// Both at large deformation: NLGEOM on one side, `--deformation large` on the other, five objects.
+/// Both at large deformation: NLGEOM on one side, `--deformation large` on the other, curved edges among them.
 #[test]
 fn large_deformation_agrees_with_calculix() {
     let Some(ccx) = Ccx::find() else { return };
@@ -138,9 +141,10 @@ fn large_deformation_agrees_with_calculix() {
     let small = |object: &Object| object.mesh.node_count() < 400;
     objects.extend(object::files().unwrap_or_default().into_iter().filter(small).take(3));
     objects.push(object::sphere_with_stone(folder.path(), nodes));
+    objects.push(object::round(folder.path(), nodes / 2));
     let mut table = Table::default();
     for object in &objects {
-        for element in ELEMENTS {
+        for &element in object.elements() {
             let system = System::new(&object.mesh, element);
             let mut of_object = Agreement::default();
             for question in question::large_questions(object) {
@@ -170,7 +174,7 @@ fn another_poissons_ratio_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let asked = Asked::new();
     let objects = object::built_in(folder.path(), 60);
-    for element in ELEMENTS {
+    for &element in objects[0].elements() {
         let system = System::new(&objects[0].mesh, element);
         for question in questions(&objects[0], &system) {
             let found = asked.answer(&objects[0], &system, &question, folder.path());

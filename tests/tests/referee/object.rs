@@ -6,8 +6,10 @@ use clap::Parser;
 use glove_client::commands::mesh::MeshCommand;
 use glove_client::object::mesh_file::{encode_mesh, read_mesh_file};
 use glove_client::object::region_choice::{Ellipsoid, MeshOfRegions, RegionChoice};
+use softgrasp_core::fem::Element;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh, generate};
 use softgrasp_protocol::Material;
+use softgrasp_tests::curved::round_sphere;
 use softgrasp_tests::shared::shared;
 
 /// Mesh, and the file that it was read from.
@@ -37,6 +39,15 @@ impl Object {
     fn read(name: &str, file: PathBuf) -> Self {
         let mesh = read_mesh_file(&file).unwrap().mesh;
         Self { name: name.to_owned(), file, mesh, has_stone: false }
+    }
+
+    /// Elements that it is compared with, which CalculiX has too (C3D4 and C3D10); one with mid-edge nodes
+    /// of its own with ten-node ones alone.
+    pub fn elements(&self) -> &'static [Element] {
+        match self.mesh.mid_edge_nodes().is_empty() {
+            true => &[Element::Tet4, Element::Tet10],
+            false => &[Element::Tet10],
+        }
     }
 
     /// Materials of a question in which the body is of Young's modulus `young` and Poisson's ratio `poisson`:
@@ -73,6 +84,17 @@ pub fn sphere_with_stone(folder: &Path, nodes: usize) -> Object {
     let bytes = encode_mesh(&file, &made.mesh, made.regions.names(), &surface, &[]).unwrap();
     std::fs::write(&file, bytes).unwrap();
     Object { has_stone: true, ..Object::read("sphere with a stone", file) }
+}
+
+/// A sphere whose boundary edges are arcs, written with its mid-edge nodes and read again.
+pub fn round(folder: &Path, corners: usize) -> Object {
+    let file = folder.join("round-sphere.msh");
+    let mesh = round_sphere(corners);
+    let surface = Surface::from_mesh(&mesh);
+    std::fs::write(&file, encode_mesh(&file, &mesh, &[], &surface, &[]).unwrap()).unwrap();
+    let object = Object::read("round sphere", file);
+    assert_eq!(object.mesh, mesh);
+    object
 }
 
 /// Files of `shared/meshes`, in the order of their names; in the short form those of few nodes.

@@ -7,7 +7,7 @@ use crate::deck::System;
 use crate::object::Object;
 use crate::solved::Way;
 
-/// Known displacements and forces of one question, by degree of freedom of the corners.
+/// Known displacements and forces of one question, by degree of freedom of the mesh's nodes.
 #[derive(Clone)]
 pub struct Question {
     pub name: &'static str,
@@ -110,7 +110,7 @@ impl Question {
     }
 }
 
-/// Corners of an object that elements use.
+/// Nodes of an object that elements use: corners, and mid-edge nodes that the mesh brings along.
 struct Corners<'a> {
     object: &'a Object,
     nodes: Vec<usize>,
@@ -122,8 +122,8 @@ impl<'a> Corners<'a> {
         let used = object.mesh.used_nodes();
         let nodes = (0..used.len()).filter(|&n| used[n]).collect();
         let material = Material::try_new(1.0, 0.3).unwrap();
-        let mesh = object.mesh.clone();
-        let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
+        let (mesh, element) = (object.mesh.clone(), object.elements()[0]);
+        let model = Model::try_new(mesh, element, &[material], vec![], &mut |_| {}).unwrap();
         Self { object, nodes, model }
     }
 

@@ -14,7 +14,7 @@ use crate::start::{client, refusal, server};
 const STILL: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 /// Object above a table, and a finger that comes down on it.
-struct Scene {
+pub struct Scene {
     mesh: TetMesh,
     surface: Surface,
     model: ModelHash,
@@ -24,16 +24,10 @@ struct Scene {
 
 impl Scene {
     fn new(connection: &mut ServerConnection) -> Self {
-        let mesh = object(BuiltIn::Strawberry, 300);
-        let surface = Surface::from_mesh(&mesh);
-        let model = match connection.ask(&Request::UploadModel(upload(&mesh))) {
-            Ok(Reply::ModelReady(ready)) => ready.model,
-            other => panic!("the upload got {other:?}"),
-        };
-        Self { mesh, surface, model, deformation: None, fields: FieldSet::NONE }
+        scene_of(connection, object(BuiltIn::Strawberry, 300), None)
     }
 
-    fn frame(&self, state: ObjectState, step: u32) -> ContactFrame {
+    pub fn frame(&self, state: ObjectState, step: u32) -> ContactFrame {
         let (low, high) = self.mesh.bounds();
         let size = self.mesh.size();
         let at = |y: f64| {
@@ -79,6 +73,20 @@ impl Scene {
     }
 }
 
+/// The scene with a mesh of this kind, in metres.
+pub fn scene_of(
+    connection: &mut ServerConnection,
+    mesh: TetMesh,
+    deformation: Option<Deformation>,
+) -> Scene {
+    let surface = Surface::from_mesh(&mesh);
+    let model = match connection.ask(&Request::UploadModel(upload(&mesh))) {
+        Ok(Reply::ModelReady(ready)) => ready.model,
+        other => panic!("the upload got {other:?}"),
+    };
+    Scene { mesh, surface, model, deformation, fields: FieldSet::NONE }
+}
+
 fn advance(connection: &mut ServerConnection, frame: ContactFrame) -> ContactAnswer {
     match connection.ask(&Request::ContactFrame(Box::new(frame))) {
         Ok(Reply::ContactAnswer(answer)) => *answer,
@@ -113,10 +121,26 @@ fn played_with(
 ) -> Vec<ContactAnswer> {
     let mut connection = client(server);
     let scene = Scene { deformation, fields, ..Scene::new(&mut connection) };
+    played_in(&mut connection, &scene, steps)
+}
+
+/// Steps of the scene with another mesh.
+pub fn played_of(server: &RunningServer, mesh: &TetMesh, steps: u32) -> Vec<ContactAnswer> {
+    let mut connection = client(server);
+    let scene = scene_of(&mut connection, mesh.clone(), None);
+    played_in(&mut connection, &scene, steps)
+}
+
+/// Steps of a scene from rest.
+pub fn played_in(
+    connection: &mut ServerConnection,
+    scene: &Scene,
+    steps: u32,
+) -> Vec<ContactAnswer> {
     let mut state = ObjectState::at_rest(STILL);
     let mut answers = Vec::new();
     for step in 0..steps {
-        let answer = advance(&mut connection, scene.frame(state, step));
+        let answer = advance(connection, scene.frame(state, step));
         state = answer.state.clone();
         answers.push(answer);
     }

@@ -11,6 +11,7 @@ use glove_client::run::contact_grasp::ContactScene;
 use glove_client::run::grasp_loop::GraspLoop;
 use glove_client::run::run_report::RunReport;
 use glove_client::run::session::Session;
+use glove_client::run::table_object::FurtherObject;
 use glove_client::run::tick_outcome::TickOutcome;
 use nalgebra::Isometry3;
 use softgrasp_core::mesh::TetMesh;
@@ -24,6 +25,7 @@ use softgrasp_hand::notice::{Notice, NoticeKind};
 use softgrasp_hand::scripted::{Planner, ScriptName, ScriptedHand};
 use softgrasp_protocol::Material;
 use softgrasp_window::view::control::Control;
+use softgrasp_window::view::object_skin::Look;
 
 use crate::settings::linear_settings;
 use crate::start::server;
@@ -71,8 +73,37 @@ impl Controlled {
             .holding(ContactModel::Friction);
         let table_y = Some(object.rest_shape().bottom());
         let settings = SolveSettings { contact: ContactModel::Friction, ..settings() };
-        Self::begin(object, mouse.into(), settings, |grasp_loop| {
+        Self::begin(object, mouse.into(), settings, |grasp_loop, _| {
             grasp_loop.grasp_with_friction(ContactScene { table_y, ..ContactScene::default() });
+        })
+    }
+
+    /// Run with a mouse hand before two objects on a table, the second so far to the right of the first.
+    ///
+    /// Units: m.
+    pub fn by_mouse_before_two(meshes: [TetMesh; 2], x: f64) -> Self {
+        let lying = |mesh: &TetMesh| SoftObject::try_new(lying(mesh).unwrap().0).unwrap();
+        let [object, second] = meshes.each_ref().map(lying);
+        let mouse = MouseHand::new(HandSetup::default(), Planner::waited(), 1.0 / 60.0)
+            .holding(ContactModel::Friction);
+        let table_y = object.rest_shape().bottom();
+        let scene = ContactScene { table_y: Some(table_y), ..ContactScene::default() };
+        let settings = SolveSettings { contact: ContactModel::Friction, ..settings() };
+        let home = Isometry3::translation(x, table_y - second.rest_shape().bottom(), 0.0);
+        Self::begin(object, mouse.into(), settings.clone(), |grasp_loop, server| {
+            grasp_loop.grasp_with_friction(scene);
+            let address = server.address().to_string();
+            grasp_loop
+                .lay_beside(FurtherObject {
+                    name: "strawberry".to_owned(),
+                    look: Look::Strawberry,
+                    object: second,
+                    grasp: Grasp::try_new(home, Grasp::RELEASE_MARGIN_M).unwrap(),
+                    link: Link::start(address, Priority::Ordinary).unwrap(),
+                    settings,
+                    scene,
+                })
+                .unwrap();
         })
     }
 
@@ -84,14 +115,14 @@ impl Controlled {
     }
 
     fn new(object: SoftObject, hand: HandSource) -> Self {
-        Self::begin(object, hand, settings(), |_| {})
+        Self::begin(object, hand, settings(), |_, _| {})
     }
 
     fn begin(
         object: SoftObject,
         hand: HandSource,
         settings: SolveSettings,
-        set_up: impl FnOnce(&mut GraspLoop),
+        set_up: impl FnOnce(&mut GraspLoop, &RunningServer),
     ) -> Self {
         let server = server(1);
         let report = RunReport::new(
@@ -106,7 +137,7 @@ impl Controlled {
         let reader = HandReader::new(HandSetup::default());
         let mut grasp_loop =
             GraspLoop::try_new(reader, object, grasp, link, settings, Pace::Lockstep).unwrap();
-        set_up(&mut grasp_loop);
+        set_up(&mut grasp_loop, &server);
         let session = Session::new(grasp_loop, hand, report, Priority::Ordinary, false);
         session.wait_idle(Duration::from_secs(60));
         Self { session, notices: Vec::new(), tick: 0, _server: server }

@@ -49,3 +49,13 @@ fn flat_and_thin_objects_that_slip_are_lifted_at_the_second_try() {
     let mesh = mesh_io::parse(name, &bytes, &mut |_| None).unwrap().mesh;
     check(name, laid(&mesh, |extent| Vector3::repeat(0.08 / extent.max())));
 }
+
+/// It stood on a facet of its back, fell over, and the hand went after it as it pushed it along.
+#[test]
+fn banana_that_fell_over_beside_the_hand_lies_and_is_lifted() {
+    let Some(folder) = shared("meshes") else { return };
+    let name = "banana.vtk";
+    let bytes = std::fs::read(folder.join(name)).unwrap();
+    let mesh = mesh_io::parse(name, &bytes, &mut |_| None).unwrap().mesh;
+    check(name, laid(&mesh, |extent| Vector3::repeat(0.16 / extent.max())));
+}

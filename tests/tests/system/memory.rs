@@ -17,7 +17,7 @@ use softgrasp_tests::questions::{
 use crate::start::{answer, client, config, refusal};
 
 /// Counted memory needs of the squeezed mesh by `front` and `front-mixed`.
-fn counted(mesh: &TetMesh, element: Element) -> [Need; 2] {
+pub fn counted(mesh: &TetMesh, element: Element) -> [Need; 2] {
     counted_for(mesh, element, squeeze(mesh, 1.0).iter().map(|known| known.dof).collect())
 }
 
@@ -79,7 +79,7 @@ fn hopeless_mesh_is_refused_from_its_size_before_it_is_looked_at() {
     let nodes = 160_000u32;
     let tets = (0..900_000).map(|t| [0, 1, 2, 3].map(|c| (t + c) % nodes)).collect();
     let vertices = (0..nodes).map(|n| [f64::from(n), 0.0, 0.0]).collect();
-    let mesh = MeshData { vertices, tets, regions: Vec::new() };
+    let mesh = MeshData { vertices, tets, ..MeshData::default() };
     let server = fea_server::start(within(1 << 29)).unwrap();
     let mut connection = client(&server);
     let mut request = once(&cube(27), "auto");

@@ -11,12 +11,12 @@ use softgrasp_window::view::control::Control;
 use crate::controlled::Controlled;
 use crate::settings::sized;
 
-fn wish(run: &mut Controlled, input: MouseInput) {
+pub fn wish(run: &mut Controlled, input: MouseInput) {
     run.ask(Control::Mouse(input));
 }
 
 /// Waits until the hand has finished its own motion.
-fn arrive(run: &mut Controlled) {
+pub fn arrive(run: &mut Controlled) {
     let on_its_way = |run: &Controlled| match run.session.hand() {
         HandSource::Mouse(hand) => hand.is_on_its_way(),
         HandSource::Scripted(_)

@@ -74,8 +74,8 @@ fn cancelled_request_gives_its_turn_to_the_next_one() {
     within(LIMIT, "a cancelled request", || {
         let server = server(1);
         let mut session = RawSession::open(server.address());
-        // Seconds of work; what waits behind it has room in what the server reads ahead.
-        session.send(&request_frame(1, &long(512)));
+        // Seconds of work on the fastest machine; what waits behind it has room in what the server reads ahead.
+        session.send(&request_frame(1, &long(1331)));
         session.send(&request_frame(2, &Request::Ping { nonce: 5 }));
         session.send(&request_frame(3, &long(512)));
         std::thread::sleep(Duration::from_millis(300));

@@ -46,7 +46,6 @@ from .errors import (
     UnsupportedVersion,
 )
 from .field_values import FieldName, FieldValues, PlacedFields, WantedFields, matrices
-from .gradient import Gradient
 from .large import LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask, Pressure
@@ -54,6 +53,7 @@ from .mesh import Mesh
 from .model import Element, Material, Model
 from .pose import Pose
 from .program import ServerProgram
+from .quantity import Gradient, Quantity
 from .question import Precision, Question, Report
 from .report import ContactReport, LargeReport, SolveReport, StageTimes
 from .server import KeptModel, Server
@@ -109,6 +109,7 @@ __all__ = [
     "Pose",
     "Precision",
     "Pressure",
+    "Quantity",
     "Question",
     "REFUSALS",
     "Reactions",

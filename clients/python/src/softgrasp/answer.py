@@ -13,7 +13,14 @@ from .arrays import F32, Floats, Numbers, numbers
 from .errors import BadStream
 from .field_values import FieldsPart, FieldValues, read_field_values, read_fields_part
 from .fields import Fields
+from .load_case import LoadCase
 from .payload import PayloadReader
+from .quantity import (
+    Gradient,
+    GradientArrays,
+    read_gradient,
+    read_gradient_part,
+)
 from .report import LargeReport, SolveReport, read_large_report, read_solve_report
 
 
@@ -65,6 +72,8 @@ class Answer:
     fields: FieldValues | None
     """Strain, stress and energy, where they were asked for; None too where the server does not know
     them, which is an older one then."""
+    gradient: Gradient | None
+    """Derivatives of the question's quantity; None where there was none."""
 
     @property
     def residual_rel(self) -> float:
@@ -137,20 +146,32 @@ class AnswerPart(NamedTuple):
     fields: FieldsPart | None
 
 
-def read_answer(reader: PayloadReader) -> Answer:
-    """Reads an answer to a linear question of one case."""
+@dataclass(frozen=True)
+class Asked:
+    """What derivatives of an answer are told by: its load case, and the labels of the materials."""
+
+    case: LoadCase
+    labels: tuple[int, ...]
+
+    def gradient(self, arrays: GradientArrays | None) -> Gradient | None:
+        """The derivatives in the order of the load case."""
+        return None if arrays is None else arrays.of_case(self.case, self.labels)
+
+
+def read_answer(reader: PayloadReader, asked: Asked | None = None) -> Answer:
+    """Reads an answer to a linear question of one case; `asked` where derivatives were wanted."""
     answer = read_whole_answer(reader, read_answer_part(reader.part))
-    reader.finish()
-    return answer
+    gradient = _read_last(reader, asked)
+    return answer if gradient is None else replace(answer, gradient=gradient)
 
 
-def read_large_answer(reader: PayloadReader) -> LargeAnswer:
+def read_large_answer(reader: PayloadReader, asked: Asked | None = None) -> LargeAnswer:
     """Reads an answer to a question about large deformation."""
     part = read_answer_part(reader.part)
     if part.large is None:
         raise BadStream("an answer to a question about large deformation does not speak of it")
     answer = read_whole_answer(reader, part)
-    reader.finish()
+    gradient = _read_last(reader, asked)
     return LargeAnswer(
         answer.nodes,
         answer.displacements,
@@ -158,8 +179,18 @@ def read_large_answer(reader: PayloadReader) -> LargeAnswer:
         answer.mask_forces,
         part.report,
         answer.fields,
+        gradient,
         part.large,
     )
+
+
+def _read_last(reader: PayloadReader, asked: Asked | None) -> Gradient | None:
+    """Reads the derivatives behind all else, if they were wanted."""
+    arrays = None
+    if asked is not None:
+        arrays = read_gradient(reader, read_gradient_part(reader.part.option_block()))
+    reader.finish()
+    return None if asked is None else asked.gradient(arrays)
 
 
 def read_several_answers(reader: PayloadReader) -> SeveralAnswers:
@@ -228,7 +259,9 @@ def read_answer_arrays(reader: PayloadReader, part: AnswerPart) -> Answer:
     dofs = reader.numbers(part.reaction_count, limits.dof_count_max, "reactions")
     forces = reader.floats(part.reaction_count, limits.dof_count_max, "reactions")
     mask_forces = reader.floats(part.mask_count, limits.dof_count_max, "forces of masks", 3)
-    return Answer(nodes, displacements, Reactions(dofs, forces), mask_forces, part.report, None)
+    return Answer(
+        nodes, displacements, Reactions(dofs, forces), mask_forces, part.report, None, None
+    )
 
 
 _COUNTS = struct.Struct("<BId4I")

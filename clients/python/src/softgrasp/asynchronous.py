@@ -19,12 +19,13 @@ from .calls import Call, ModelReady
 from .contact import ContactAnswer, ContactStep, ObjectState
 from .errors import UnknownModel
 from .field_values import WantedFields
-from .gradient import Gradient, GradientQuestion
+from .gradient import GradientQuestion
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
 from .model import Model
 from .program import ServerProgram
+from .quantity import Gradient
 from .question import FrameOptions, Options, Precision, Question
 from .session import NamedModel, Session
 
@@ -183,7 +184,7 @@ class AsyncKeptModel(NamedModel):
 
     async def frame(self, case: LoadCase, **options: Unpack[FrameOptions]) -> Answer:
         """As `KeptModel.frame`."""
-        return await self._ask(calls.frame(self.hash, case, Question(**options)))
+        return await self._ask(calls.frame(self.hash, case, Question(**options), self.model.labels))
 
     async def large_frame(
         self,
@@ -192,7 +193,9 @@ class AsyncKeptModel(NamedModel):
         **options: Unpack[FrameOptions],
     ) -> LargeAnswer:
         """As `KeptModel.large_frame`."""
-        return await self._ask(calls.large_frame(self.hash, case, large, Question(**options)))
+        return await self._ask(
+            calls.large_frame(self.hash, case, large, Question(**options), self.model.labels)
+        )
 
     async def solve_several(
         self, case: LoadCase, displacements: ArrayLike, **options: Unpack[FrameOptions]

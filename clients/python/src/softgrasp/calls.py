@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 from numpy.typing import ArrayLike, NDArray
 
 from .answer import (
     Answer,
+    Asked,
     LargeAnswer,
     SeveralAnswers,
     read_answer,
@@ -55,8 +57,8 @@ class Call(Generic[T]):
     """Kind of the reply; None for a request that has none."""
     read: Callable[[PayloadReader], T]
     """Reads the reply."""
-    needs: str | None = None
-    """Capability without which a server does not understand the request."""
+    needs: frozenset[str] = frozenset()
+    """Capabilities without which a server does not understand the request."""
 
 
 @dataclass(frozen=True)
@@ -135,14 +137,17 @@ def cancel(request_id: int) -> Call[None]:
 
 def solve(model: Model, case: LoadCase, question: Question) -> Call[Answer]:
     """One self-contained linear request."""
-    return _ask(model, case, question, read_answer)
+    asked = _asked(question, case, model.labels)
+    return _ask(model, case, question, partial(read_answer, asked=asked))
 
 
 def solve_large(
     model: Model, case: LoadCase, large: LargeDeformation, question: Question
 ) -> Call[LargeAnswer]:
     """One self-contained request at large deformation."""
-    return _ask(model, case, question, read_large_answer, large=large)
+    asked = _asked(question, case, model.labels)
+    read = partial(read_large_answer, asked=asked)
+    return _ask(model, case, question, read, large=large)
 
 
 def solve_several(
@@ -156,6 +161,8 @@ def solve_several(
 
     `subject` is a model that comes along, or the name of one that the server keeps.
     """
+    if question.quantity is not None:
+        raise ValueError("derivatives are those of one case; ask for one case at a time")
     sets = floats(displacements, "sets of displacements", len(case.known_dofs))
     if len(sets) == 0:
         raise ValueError("there is no set of displacements to solve for")
@@ -185,19 +192,27 @@ def upload_model(model: Model, fixed_dofs: Numbers) -> Call[ModelReady]:
         return ready
 
     payload = payload_of(part, *model.arrays(), fixed_dofs)
-    return Call(Kind.UPLOAD_MODEL, payload, Kind.MODEL_READY, read)
+    return Call(Kind.UPLOAD_MODEL, payload, Kind.MODEL_READY, read, model.needs)
 
 
-def frame(model: bytes, case: LoadCase, question: Question) -> Call[Answer]:
-    """A linear question about a kept model."""
-    return _ask(model, case, question, read_answer)
+def frame(
+    model: bytes, case: LoadCase, question: Question, labels: tuple[int, ...] = (0,)
+) -> Call[Answer]:
+    """A linear question about a kept model; `labels` are those of its materials."""
+    read = partial(read_answer, asked=_asked(question, case, labels))
+    return _ask(model, case, question, read)
 
 
 def large_frame(
-    model: bytes, case: LoadCase, large: LargeDeformation, question: Question
+    model: bytes,
+    case: LoadCase,
+    large: LargeDeformation,
+    question: Question,
+    labels: tuple[int, ...] = (0,),
 ) -> Call[LargeAnswer]:
     """A question about a kept model at large deformation, on this session's path."""
-    return _ask(model, case, question, read_large_answer, large=large)
+    read = partial(read_large_answer, asked=_asked(question, case, labels))
+    return _ask(model, case, question, read, large=large)
 
 
 def contact_frame(
@@ -262,8 +277,15 @@ def _ask(
     level = REPORTS.index(question.report)
     part.fields("I?I", len(further), not estimate, level)
     payload = payload_of(part, *mesh, *question.arrays(case), further)
-    needs = "loads" if case.has_spread_loads else None
+    needs = frozenset({"loads"} if case.has_spread_loads else ())
+    needs |= frozenset(() if question.quantity is None else {"gradients"})
+    if isinstance(subject, Model):
+        needs |= subject.needs
     return Call(Kind.ASK, payload, Kind.ANSWER, read, needs)
+
+
+def _asked(question: Question, case: LoadCase, labels: tuple[int, ...]) -> Asked | None:
+    return None if question.quantity is None else Asked(case, labels)
 
 
 def _read_welcome(reader: PayloadReader) -> Welcome:

@@ -252,6 +252,7 @@ def read_contact_answer(reader: PayloadReader, node_count: int) -> ContactAnswer
         answer.mask_forces,
         part.report,
         answer.fields,
+        None,
         contact,
         state,
         _points(point_names, of_points),

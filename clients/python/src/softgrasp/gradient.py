@@ -6,12 +6,11 @@ A quantity J of displacements u and reactions R, linear elasticity, K u = f. The
     ∂J/∂f = λ,    ∂J/∂(prescribed u) = ∂J/∂u − r,    ∂J/∂p = λᵀ (∂f/∂p) − λᵀ (∂K/∂p) u
 
 for a number p of a load, a material or the place of a node: of linear tetrahedra ∂K/∂p and ∂f/∂p are
-known in closed form.
+known in closed form. This needs nothing of the server but answers; with the capability `gradients` it
+answers derivatives itself, at large deformation too (`Quantity`).
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,27 +20,7 @@ from .arrays import F64, U32, Floats, Numbers
 from .load_case import LoadCase
 from .mesh import Mesh
 from .model import Material, Model
-
-
-@dataclass(frozen=True, eq=False)
-class Gradient:
-    """Derivatives of a quantity J by what it depends on."""
-
-    known_displacements: Floats
-    """By each known displacement of the load case, in its order: dJ per m."""
-    forces: Floats
-    """By a force on each node, dJ per N; shape (nodes, 3), 0 where a displacement is known."""
-    points: Floats | None
-    """By the place of each node at rest, dJ per m; shape (nodes, 3). None but for `t4`."""
-    young: dict[int, float] | None
-    """By Young's modulus of each region's label (0 where there is one): dJ per Pa. None but for `t4`."""
-    poisson: dict[int, float] | None
-    """By Poisson's ratio of each region's label. None but for `t4`."""
-    acceleration: Floats | None = None
-    """By the acceleration of weight, dJ per m/s²; None without weight, and for `t10`."""
-    pressures: Floats | None = None
-    """By each pressure of the load case, in its order, dJ per Pa; None without weight and pressure,
-    and for `t10`."""
+from .quantity import Gradient
 
 
 class GradientQuestion:
@@ -67,7 +46,7 @@ class GradientQuestion:
         self._slope = _shaped(by_displacements, (nodes, 3), "by_displacements").reshape(-1)
         of_reactions = _shaped(by_reactions, (len(dofs),), "by_reactions")
         self._held = np.union1d(dofs, fixed_dofs)
-        used = 3 * np.unique(model.mesh.tets)[:, None] + np.arange(3)
+        used = 3 * model.used_nodes[:, None] + np.arange(3)
         free = np.setdiff1d(used, self._held).astype(U32)
         self.adjoint = LoadCase(dofs, -of_reactions, free, self._slope[free])
         self.needs_answer = model.kept_element == "t4"

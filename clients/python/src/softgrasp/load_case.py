@@ -214,13 +214,10 @@ def mask_arrays(masks: Iterable[Mask]) -> tuple[Numbers, Numbers, Floats, Floats
 
 
 def spread_part(case: LoadCase) -> Part:
-    """The fields of weight and pressure on the wire; none where nothing acts."""
-    part = Part()
-    if case.has_spread_loads:
-        triangles = sum(len(pressure.triangles) for pressure in case.pressures)
-        counts = (len(case.densities), len(case.pressures), triangles)
-        part.fields("3d3I", *case.acceleration.tolist(), *counts)
-    return part
+    """The fields of weight and pressure on the wire, which are left out where nothing acts."""
+    triangles = sum(len(pressure.triangles) for pressure in case.pressures)
+    counts = (len(case.densities), len(case.pressures), triangles)
+    return Part().fields("3d3I", *case.acceleration.tolist(), *counts)
 
 
 def spread_arrays(case: LoadCase) -> tuple[Floats, Floats, Numbers, Numbers]:

@@ -20,7 +20,7 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A body of linear tetrahedra.
+    """A body of tetrahedra, which may have nodes in the middles of their edges.
 
     The corners of a tetrahedron may come in any order. Nodes that no tetrahedron uses are allowed;
     they do not move. Raises `ValueError` for other shapes, numbers that are not finite, and
@@ -33,16 +33,25 @@ class Mesh:
     """Nodes of the corners of each tetrahedron, from 0; shape (tetrahedra, 4)."""
     regions: Numbers | None = None
     """Label of each tetrahedron, which chooses its material; None where there is one region."""
+    mid_edge: Numbers | None = None
+    """Nodes in the middles of the edges 12, 23, 13, 14, 24, 34 of each tetrahedron, for elements
+    `t10`; shape (tetrahedra, 6). None: the server makes them, on straight edges."""
     _cache: dict[str, Numbers] = field(default_factory=dict, repr=False)
 
     def __init__(
-        self, points: ArrayLike, tets: ArrayLike, regions: ArrayLike | None = None
+        self,
+        points: ArrayLike,
+        tets: ArrayLike,
+        regions: ArrayLike | None = None,
+        mid_edge: ArrayLike | None = None,
     ) -> None:
         # Copies of its own: a kept model is named by what is in them.
         object.__setattr__(self, "points", _locked(floats(points, "points", 3)))
         object.__setattr__(self, "tets", _locked(numbers(tets, "tetrahedra", 4)))
         labels = None if regions is None else _locked(numbers(regions, "regions"))
         object.__setattr__(self, "regions", labels)
+        middles = None if mid_edge is None else _locked(numbers(mid_edge, "mid-edge nodes", 6))
+        object.__setattr__(self, "mid_edge", middles)
         object.__setattr__(self, "_cache", {})
         if len(self.tets) == 0:
             raise ValueError("a mesh has at least one tetrahedron")
@@ -51,19 +60,25 @@ class Mesh:
             raise ValueError(f"a tetrahedron names node {last}; there are {len(self.points)}")
         if labels is not None and len(labels) != len(self.tets):
             raise ValueError(f"{len(labels)} regions for {len(self.tets)} tetrahedra")
+        if middles is not None and len(middles) != len(self.tets):
+            raise ValueError(f"{len(middles)} rows of mid-edge nodes for {len(self.tets)} tetrahedra")
+        if middles is not None and int(middles.max()) >= len(self.points):
+            raise ValueError(
+                f"a mid-edge node is {int(middles.max())}; there are {len(self.points)} nodes"
+            )
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         """Reads a mesh file; its lengths times `scale` are metres.
 
         Gmsh MSH 1, 2 and 4 in text are read by this package itself, all else by meshio where that
-        is installed (`pip install softgrasp[meshio]`). Of quadratic tetrahedra the corners are
-        taken. Regions are the physical groups of the file, where it has several. Raises
+        is installed (`pip install softgrasp[meshio]`). Where every tetrahedron has ten nodes, the
+        mid-edge nodes are kept, for elements `t10`; else the corners are taken. Regions are the physical groups of the file, where it has several. Raises
         `MeshFileError`, and `OSError` where the file cannot be opened.
         """
-        points, tets, regions = read_mesh(Path(path), scale)
+        points, nodes, regions = read_mesh(Path(path), scale)
         try:
-            return cls(points, tets, regions)
+            return cls(points, nodes[:, :4], regions, nodes[:, 4:] if nodes.shape[1] == 10 else None)
         except ValueError as error:
             raise MeshFileError(f"{path}: {error}") from error
 

@@ -13,6 +13,9 @@ from .errors import MeshFileError
 
 _TETRAHEDRA = {4: 4, 11: 10, 29: 20, 30: 35}
 """Nodes of the element types of Gmsh that are tetrahedra; the first four are the corners."""
+_TEN_NODES = 11
+"""The type of Gmsh with a node in the middle of each edge; its last two are exchanged here."""
+_EXCHANGED = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 _LABEL_MAX = 0xFFFF_FFFF
 _BEGINNINGS = (
     (b"$MeshFormat", "gmsh"),
@@ -83,13 +86,15 @@ class _Raw:
         self.tets: list[np.ndarray[Any, Any]] = []
         self.regions: list[np.ndarray[Any, Any]] = []
 
-    def add(self, corners: np.ndarray[Any, Any], region: np.ndarray[Any, Any]) -> None:
-        self.tets.append(corners[:, :4])
+    def add(
+        self, kind: int, nodes: np.ndarray[Any, Any], region: np.ndarray[Any, Any]
+    ) -> None:
+        self.tets.append(nodes[:, _EXCHANGED] if kind == _TEN_NODES else nodes[:, :4])
         self.regions.append(region)
 
 
 MeshArrays = tuple[Floats, "np.ndarray[Any, Any]", "Numbers | None"]
-"""Places of nodes, corners of tetrahedra, and regions where there are several."""
+"""Places of nodes; four or ten nodes of each tetrahedron; and regions where there are several."""
 
 
 def read_mesh(path: Path, scale: float) -> MeshArrays:
@@ -146,8 +151,8 @@ def _read_1(
                 continue
             if len(row) < 5 + size:
                 raise lines.fault(f"an element of type {row[1]} has {size} nodes")
-            corners = np.array([row[5:9]], dtype=np.int64)
-            raw.add(corners, np.array([row[2] or row[3]], dtype=np.int64))
+            nodes = np.array([row[5 : 5 + size]], dtype=np.int64)
+            raw.add(row[1], nodes, np.array([row[2] or row[3]], dtype=np.int64))
 
 
 def _read_2(
@@ -169,13 +174,13 @@ def _read_2(
                 continue
             if row[2] < 0 or len(row) < 3 + row[2] + size:
                 raise lines.fault(f"an element of type {row[1]} has {size} nodes")
-            rows.setdefault((size, row[2]), []).append(row[: 3 + row[2] + size])
-        for (size, tags), same in rows.items():
+            rows.setdefault((row[1], row[2]), []).append(row[: 3 + row[2] + size])
+        for (kind, tags), same in rows.items():
             table = np.array(same, dtype=np.int64)
             region = table[:, 3] if tags else np.zeros(len(table), dtype=np.int64)
             if tags > 1:
                 region = np.where(region == 0, table[:, 4], region)
-            raw.add(table[:, 3 + tags : 3 + tags + size], region)
+            raw.add(kind, table[:, 3 + tags :], region)
 
 
 def _read_4(
@@ -218,14 +223,15 @@ def _read_4(
             if count and table.shape[1] < 1 + _TETRAHEDRA[kind]:
                 raise lines.fault(f"an element of type {kind} has {_TETRAHEDRA[kind]} nodes")
             tag = first if is_40 else second
-            raw.add(table[:, 1:].reshape(count, -1), np.full(count, physical.get(tag, tag)))
+            nodes = table[:, 1:].reshape(count, _TETRAHEDRA[kind])
+            raw.add(kind, nodes, np.full(count, physical.get(tag, tag)))
 
 
 def _mesh(path: Path, raw: _Raw, scale: float) -> MeshArrays:
     if not raw.points or not raw.tets:
         raise MeshFileError(f"{path}: there is no tetrahedron in it")
     labels, points = np.concatenate(raw.labels), np.concatenate(raw.points)
-    tets = np.concatenate(raw.tets)
+    tets = _joined(raw.tets)
     order = np.argsort(labels, kind="stable")
     ordered = labels[order]
     if (ordered[1:] == ordered[:-1]).any():
@@ -238,6 +244,12 @@ def _mesh(path: Path, raw: _Raw, scale: float) -> MeshArrays:
             f"{path}: an element names node {int(tets[missing][0])}, which is not there"
         )
     return _checked(path, points * scale, order[found], np.concatenate(raw.regions))
+
+
+def _joined(tets: list[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
+    """Tetrahedra of several tables: with ten nodes where all have them, else their corners."""
+    width = min(table.shape[1] for table in tets)
+    return np.concatenate([table[:, :width] for table in tets])
 
 
 def _checked(
@@ -270,11 +282,11 @@ def _read_by_meshio(path: Path, scale: float, form: str | None) -> MeshArrays:
     tets, labels = [], []
     for block, cells in enumerate(file.cells):
         if cells.type.startswith("tetra"):
-            corners = np.asarray(cells.data)[:, :4]
-            tets.append(corners)
+            nodes = np.asarray(cells.data)
+            tets.append(nodes if cells.type == "tetra10" else nodes[:, :4])
             given = None if physical is None else np.asarray(physical[block]).reshape(-1)
-            labels.append(np.zeros(len(corners), np.int64) if given is None else given)
+            labels.append(np.zeros(len(nodes), np.int64) if given is None else given)
     if not tets:
         raise MeshFileError(f"{path}: there is no tetrahedron in it")
     points = np.asarray(file.points, dtype=np.float64) * scale
-    return _checked(path, points, np.concatenate(tets), np.concatenate(labels))
+    return _checked(path, points, _joined(tets), np.concatenate(labels))

@@ -53,7 +53,8 @@ class Model:
     element: Element | None = None
     """Kind of element. None: `t4`, and from a Poisson's ratio of 0.45 on `t4-anp`, which does not
     lock. `auto`: the server's choice for one request, which may be `t10`; as None where it is kept.
-    Displacements are prescribed at corners: the middles of the edges of `t10` stay free."""
+    With `t10` the mid-edge nodes of the mesh are nodes like all others, and edges may be curved;
+    where it has none, the server makes them and leaves them free between prescribed corners."""
 
     def __post_init__(self) -> None:
         if self.element is not None and self.element not in get_args(Element):
@@ -76,6 +77,12 @@ class Model:
         ratio = max(material.poisson for material in self._materials())
         return "t4-anp" if ratio >= _LOCKS_FROM else "t4"
 
+    @property
+    def used_nodes(self) -> Numbers:
+        """Nodes of the elements, ascending: corners, and the mid-edge nodes that `t10` has."""
+        _, tets, _, _, mid_edge = self._arrays()
+        return np.unique(np.concatenate([tets.reshape(-1), mid_edge.reshape(-1)]))
+
     def fixed_dofs(self, fixed: ArrayLike) -> Numbers:
         """Degrees of freedom of the nodes `fixed`, ascending, each once."""
         nodes = numbers(fixed, "fixed nodes")
@@ -89,7 +96,7 @@ class Model:
         Source: "The name of a model" in the page of the wire.
         """
         digest = blake3.blake3()
-        points, tets, regions, materials = self._arrays()
+        points, tets, regions, materials, mid_edge = self._arrays()
         sections: list[tuple[bytes, int, bytes | NDArray[Any]]] = [
             (b"softgrasp model 1", 0, self.kept_element.encode()),
             (b"vertices", len(points), points),
@@ -98,31 +105,51 @@ class Model:
             (b"materials", len(materials), materials),
             (b"fixed", len(fixed_dofs), fixed_dofs),
         ]
+        if len(mid_edge):
+            sections.append((b"mid-edge", len(mid_edge), mid_edge))
         for name, count, content in sections:
             digest.update(name + struct.pack("<Q", count))
             digest.update(content if isinstance(content, bytes) else content.tobytes())
         return digest.digest()
 
+    @property
+    def needs(self) -> frozenset[str]:
+        """Capabilities without which a server does not understand the mesh."""
+        return frozenset({"mid-edge"} if self._has_mid_edge else ())
+
     def part(self) -> Part:
         """The fields that announce the mesh on the wire."""
-        points, tets, regions, materials = self._arrays()
-        has_regions = len(regions) > 0
-        return Part().fields("II?I", len(points), len(tets), has_regions, len(materials))
+        points, tets, regions, materials, mid_edge = self._arrays()
+        arrays = (1 if len(regions) else 0) | (2 if len(mid_edge) else 0)
+        return Part().fields("IIBI", len(points), len(tets), arrays, len(materials))
 
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """The arrays of the mesh on the wire."""
         return self._arrays()
 
-    def _arrays(self) -> tuple[Floats, Numbers, Numbers, Floats]:
+    @property
+    def _has_mid_edge(self) -> bool:
+        """Whether the elements have the mid-edge nodes of the mesh."""
+        return self.element == "t10" and self.mesh.mid_edge is not None
+
+    def _arrays(self) -> tuple[Floats, Numbers, Numbers, Floats, Numbers]:
         table = [[material.young, material.poisson] for material in self._materials()]
         regions = self.mesh.regions
         if regions is None or isinstance(self.material, Material):
             regions = np.zeros(0, dtype=U32)
-        return self.mesh.points, self.mesh.tets, regions, np.array(table, dtype=F64)
+        mid_edge = self.mesh.mid_edge
+        if mid_edge is None or not self._has_mid_edge:
+            mid_edge = np.zeros((0, 6), dtype=U32)
+        return self.mesh.points, self.mesh.tets, regions, np.array(table, dtype=F64), mid_edge
 
     def _labels(self) -> list[int]:
         regions = self.mesh.regions
         return [0] if regions is None else [int(label) for label in np.unique(regions)]
+
+    @property
+    def labels(self) -> tuple[int, ...]:
+        """Labels of the regions that have materials, ascending; 0 where there is one material."""
+        return (0,) if isinstance(self.material, Material) else tuple(map(int, self._labels()))
 
     def _materials(self) -> list[Material]:
         """One material, or one for each label that occurs, in ascending order."""

@@ -11,6 +11,7 @@ from .arrays import NO_NUMBERS, Numbers, numbers, positive
 from .field_values import WantedFields, field_bits
 from .fields import Part
 from .load_case import LoadCase, mask_arrays, spread_arrays, spread_part
+from .quantity import Quantity
 
 Precision = Literal["f64", "f32"]
 """How displacements travel: in double precision, or in half the bytes, to 2⁻²⁴ of the largest."""
@@ -31,6 +32,7 @@ class Options(TypedDict, total=False):
     deadline_ms: float | None
     report: Report
     fields: WantedFields
+    quantity: Quantity | None
 
 
 class FrameOptions(Options, total=False):
@@ -59,6 +61,8 @@ class Question:
     """How much the report of the answer tells; less of it has fewer bytes."""
     fields: WantedFields = ()
     """Fields of strain, stress and energy that are wanted too, by name, or "all"."""
+    quantity: Quantity | None = None
+    """A quantity whose derivatives are wanted too: `gradient` of the answer. One more solve."""
     newest_wins: bool = False
     """Of frames of one model: one that has not been begun when a newer one with `newest_wins` comes
     is refused as `Superseded`."""
@@ -90,6 +94,8 @@ class Question:
         mask_nodes = sum([len(mask.nodes) for mask in case.masks])
         counts = (len(case.known_dofs), len(case.force_dofs), len(case.masks), mask_nodes)
         part.fields("5I", *counts, field_bits(self.fields))
+        if self.quantity is not None:
+            return part.join(spread_part(case)).join(self.quantity.part(case))
         return part.join(spread_part(case)) if case.has_spread_loads else part
 
     def arrays(self, case: LoadCase) -> tuple[NDArray[Any], ...]:
@@ -102,6 +108,7 @@ class Question:
             self._wanted(),
             *mask_arrays(case.masks),
             *(spread_arrays(case) if case.has_spread_loads else ()),
+            *(() if self.quantity is None else self.quantity.arrays(case)),
         )
 
     def _wanted(self) -> Numbers:

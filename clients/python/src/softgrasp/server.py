@@ -18,12 +18,13 @@ from .connection import Connection
 from .contact import ContactAnswer, ContactStep, ObjectState
 from .errors import UnknownModel
 from .field_values import WantedFields
-from .gradient import Gradient, GradientQuestion
+from .gradient import GradientQuestion
 from .large import AT_LARGE, LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask
 from .model import Model
 from .program import ServerProgram
+from .quantity import Gradient
 from .question import FrameOptions, Options, Precision, Question
 from .session import NamedModel, Session
 
@@ -208,7 +209,7 @@ class KeptModel(NamedModel):
 
     def frame(self, case: LoadCase, **options: Unpack[FrameOptions]) -> Answer:
         """Solves a load case by linear elasticity; the fixed nodes stay at zero."""
-        return self._ask(calls.frame(self.hash, case, Question(**options)))
+        return self._ask(calls.frame(self.hash, case, Question(**options), self.model.labels))
 
     def large_frame(
         self,
@@ -217,7 +218,9 @@ class KeptModel(NamedModel):
         **options: Unpack[FrameOptions],
     ) -> LargeAnswer:
         """Finds an equilibrium at large deformation, from this session's last one on the model."""
-        return self._ask(calls.large_frame(self.hash, case, large, Question(**options)))
+        return self._ask(
+            calls.large_frame(self.hash, case, large, Question(**options), self.model.labels)
+        )
 
     def solve_several(
         self, case: LoadCase, displacements: ArrayLike, **options: Unpack[FrameOptions]
@@ -243,7 +246,8 @@ class KeptModel(NamedModel):
         J is told by its own derivatives there: `by_displacements` by each displacement (nodes, 3),
         `by_reactions` by the reaction at each known degree of freedom of the case, in its order. `answer`
         is that to the case, of all nodes; without it the case is asked once more. Linear elasticity;
-        by places of nodes and materials with `t4` only. `ValueError` for masks and other shapes.
+        by places of nodes and materials with `t4` only; all elements and large deformation have
+        derivatives by `quantity=` of the other methods. `ValueError` for masks and other shapes.
         """
         question = GradientQuestion(
             self.model, self.fixed_dofs, case, by_displacements, by_reactions

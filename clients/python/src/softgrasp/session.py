@@ -60,9 +60,9 @@ class Session:
 
     def _check(self, call: Call[Any]) -> None:
         """Raises `NotCapable` where the server does not know what a request needs."""
-        if call.needs is not None and call.needs not in self._welcome.capabilities:
+        if call.needs and (missing := call.needs - self._welcome.capabilities):
             welcome = self._welcome
-            raise NotCapable(f"{welcome.server} {welcome.version} does not know {call.needs!r}")
+            raise NotCapable(f"{welcome.server} {welcome.version} does not know {min(missing)!r}")
 
     def _hello(self) -> Call[Welcome]:
         return calls.hello(CLIENT, self._token, self._patience.alive_every)

@@ -57,9 +57,10 @@ pub fn assemble(
     Ok(Stiffness { pattern: Arc::clone(pattern), blocks })
 }
 
-/// [`assemble`] for ten-node tetrahedra, on the pattern of [`StiffnessPattern::quadratic`].
+/// [`assemble`] for ten-node tetrahedra, on the pattern of [`StiffnessPattern::quadratic`]; curved ones by
+/// four points.
 ///
-/// Shapes: 3 (N + E) × 3 (N + E) for N corners and E edges. Units: as there.
+/// Shapes: 3 for each node of `mesh`, square. Units: as there.
 ///
 /// # Errors
 /// [`AssemblyError::NoMaterial`] if a region label has no material.
@@ -71,6 +72,15 @@ pub fn assemble_quadratic(
     materials: &[Material],
 ) -> Result<Stiffness, AssemblyError> {
     let lame = LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
+    if mesh.is_curved() {
+        // The points of an element are worked out for each of its rows: kept, they would take more
+        // memory than the stiffness.
+        let blocks = assemble_rows(pattern, |tet, local| {
+            let (lambda, mu) = lame.of(tet);
+            mesh.points(tet).stiffness_row(local, lambda, mu)
+        });
+        return Ok(Stiffness { pattern: Arc::clone(pattern), blocks });
+    }
     let gradients = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
     let blocks = assemble_rows(pattern, |tet, local| {
         let (lambda, mu) = lame.of(tet);

@@ -1,19 +1,26 @@
-//! The ten-node mesh made from a linear one: a node in the middle of every edge.
+//! The ten-node mesh of a linear one: with the mid-edge nodes that it brings along, or else with a node
+//! that is made in the middle of every edge.
 
 use nalgebra::Point3;
 use rayon::prelude::*;
 
+use super::mid_edge::{MidEdgeFault, edges_and_middles, ten_node_tets};
+use super::tet4;
 use super::tet10::EDGES;
+use super::tet10_points::Points;
 use crate::mesh::TetMesh;
 
-/// Straight-sided mesh of ten-node tetrahedra.
+/// Mesh of ten-node tetrahedra.
 ///
-/// Shapes: N corner nodes numbered as in the linear mesh (node i < N is its node i, orphans too),
-/// then one node for each of the E edges, edges sorted by their lower and then their higher
-/// corner; `tets` M × 10: corners 1 … 4 as in the linear mesh, then the middles of edges
-/// 12, 23, 13, 14, 24, 34 ([`EDGES`]). Units and frame: those of the linear mesh.
-/// Invariant: every index is below N + E, 3 (N + E) degrees of freedom fit `u32`, every element
-/// has positive volume, every mid-edge node lies halfway between its corners.
+/// Shapes: `tets` M × 10: corners 1 … 4 as in the linear mesh, then the nodes of edges
+/// 12, 23, 13, 14, 24, 34 ([`EDGES`]). The E edges are sorted by their lower and then their higher
+/// corner. Units and frame: those of the linear mesh.
+///
+/// Where the linear mesh brings mid-edge nodes along, its N nodes are the nodes, under their own
+/// numbers, and edges may be curved. Else edges are straight, and after the N nodes of the linear mesh
+/// (orphans too) comes one for each edge, halfway between its corners.
+/// Invariant: every index is below the number of nodes, 3 degrees of freedom for each fit `u32`, elements
+/// that share an edge share its node, and every element has a positive Jacobian determinant at its points.
 ///
 /// The order of the six edges is that of VTK (`VTK_QUADRATIC_TETRA`) and Abaqus/CalculiX (C3D10);
 /// Gmsh (type 11) has the last two exchanged. All of them count the volume positive that the
@@ -23,8 +30,21 @@ pub struct QuadraticMesh {
     corner_count: usize,
     vertices: Vec<Point3<f64>>,
     edges: Vec<[u32; 2]>,
+    /// Node of each edge, where the mesh brought them along.
+    middles: Vec<u32>,
     tets: Vec<[u32; 10]>,
     regions: Vec<u32>,
+}
+
+/// A linear mesh that has no ten-node counterpart.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum QuadraticMeshError {
+    /// The nodes cannot be numbered.
+    #[error(transparent)]
+    TooManyNodes(#[from] TooManyNodes),
+    /// Its own mid-edge nodes do not fit together.
+    #[error(transparent)]
+    MidEdge(#[from] MidEdgeFault),
 }
 
 /// A linear mesh whose ten-node counterpart cannot be numbered.
@@ -45,13 +65,30 @@ pub struct TooManyNodes {
 const NODES_MAX: usize = (u32::MAX / 3) as usize;
 
 impl QuadraticMesh {
-    /// Adds the mid-edge nodes of a linear mesh.
+    /// Takes the mid-edge nodes of a linear mesh, or makes them where it has none.
     ///
     /// # Errors
-    /// [`TooManyNodes`] if the degrees of freedom would not fit `u32`.
+    /// [`TooManyNodes`] if the degrees of freedom would not fit `u32`, [`MidEdgeFault`] if its own
+    /// mid-edge nodes contradict each other or fold an element.
     ///
     /// Source: edges as in [`EDGES`]; corners as in thesis Table 3.1, list 2.
-    pub fn try_new(mesh: &TetMesh) -> Result<Self, TooManyNodes> {
+    pub fn try_new(mesh: &TetMesh) -> Result<Self, QuadraticMeshError> {
+        match mesh.mid_edge_nodes().is_empty() {
+            true => Ok(Self::straight(mesh)?),
+            false => Self::curved(mesh),
+        }
+    }
+
+    fn curved(mesh: &TetMesh) -> Result<Self, QuadraticMeshError> {
+        let (edges, middles) = edges_and_middles(mesh)?;
+        let corner_count = mesh.node_count();
+        check_node_count(corner_count, 0)?;
+        let tets = ten_node_tets(mesh)?;
+        let (vertices, regions) = (mesh.vertices().to_vec(), mesh.regions().to_vec());
+        Ok(Self { corner_count, vertices, edges, middles, tets, regions })
+    }
+
+    fn straight(mesh: &TetMesh) -> Result<Self, TooManyNodes> {
         let edges = edges_of(mesh);
         let corner_count = mesh.node_count();
         check_node_count(corner_count, edges.len())?;
@@ -78,27 +115,39 @@ impl QuadraticMesh {
                 nodes
             })
             .collect();
-        Ok(Self { corner_count, vertices, edges, tets, regions: mesh.regions().to_vec() })
+        let (middles, regions) = (Vec::new(), mesh.regions().to_vec());
+        Ok(Self { corner_count, vertices, edges, middles, tets, regions })
     }
 
-    /// Number N of corner nodes: the nodes of the linear mesh, its orphans included.
+    /// Number N of the nodes of the linear mesh, its orphans included; what was made comes after them.
     pub fn corner_count(&self) -> usize {
         self.corner_count
     }
 
-    /// Number N + E of all nodes.
+    /// Whether the mid-edge nodes are the mesh's own, so that edges may be curved.
+    pub fn is_curved(&self) -> bool {
+        !self.middles.is_empty()
+    }
+
+    /// Number of all nodes.
     pub fn node_count(&self) -> usize {
         self.vertices.len()
     }
 
-    /// Coordinates of the corner nodes, then of the mid-edge nodes.
+    /// Coordinates of the nodes of the linear mesh, then of the mid-edge nodes that were made.
     pub fn vertices(&self) -> &[Point3<f64>] {
         &self.vertices
     }
 
-    /// Corners of every edge, lower one first; the middle of edge e is node N + e.
+    /// Corners of every edge, lower one first.
     pub fn edges(&self) -> &[[u32; 2]] {
         &self.edges
+    }
+
+    /// The mid-edge node between two corners; `None` if no element has that edge.
+    pub fn middle(&self, a: u32, b: u32) -> Option<u32> {
+        let edge = self.edges.binary_search(&[a.min(b), a.max(b)]).ok()?;
+        Some(self.middles.get(edge).copied().unwrap_or((self.corner_count + edge) as u32))
     }
 
     /// Node indices, ten per element, in the order given at [`QuadraticMesh`].
@@ -115,6 +164,14 @@ impl QuadraticMesh {
     pub fn corners(&self, tet: usize) -> [Point3<f64>; 4] {
         let [a, b, c, d, ..] = self.tets[tet];
         [a, b, c, d].map(|n| self.vertices[n as usize])
+    }
+
+    /// One element at rest at its four points.
+    pub fn points(&self, tet: usize) -> Points {
+        match self.is_curved() {
+            true => Points::curved(&self.tets[tet].map(|n| self.vertices[n as usize])),
+            false => Points::straight(&tet4::gradients(&self.corners(tet))),
+        }
     }
 
     /// For each node, whether some element uses it; mid-edge nodes always are.
@@ -149,90 +206,4 @@ fn check_node_count(corners: usize, edges: usize) -> Result<(), TooManyNodes> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::collections::BTreeMap;
-
-    use super::*;
-    use crate::mesh::{BuiltIn, generate};
-
-    #[test]
-    fn corners_keep_their_numbers_and_orphans_get_no_edges() {
-        let vertices =
-            [[1.0, 0.0, 0.0], [9.0, 9.0, 9.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]]
-                .map(Point3::from);
-        let linear = TetMesh::try_new(vertices.to_vec(), vec![[0, 2, 3, 4]], vec![7]).unwrap();
-        let mesh = QuadraticMesh::try_new(&linear).unwrap();
-        assert_eq!((mesh.corner_count(), mesh.node_count()), (5, 11));
-        assert_eq!(mesh.vertices()[..5], vertices);
-        assert_eq!(mesh.edges(), [[0, 2], [0, 3], [0, 4], [2, 3], [2, 4], [3, 4]]);
-        // Edges 12, 23, 13, 14, 24, 34 of corners 0, 2, 3, 4.
-        assert_eq!(mesh.tets(), [[0, 2, 3, 4, 5, 8, 6, 7, 9, 10]]);
-        assert_eq!(mesh.regions(), [7]);
-        assert_eq!(mesh.used_nodes().iter().filter(|u| !**u).count(), 1);
-        assert!(!mesh.used_nodes()[1]);
-    }
-
-    /// Numbers the edges through a map from pairs of corners instead of a sorted list.
-    fn naive_tets(linear: &TetMesh) -> Vec<[u32; 10]> {
-        let mut numbers = BTreeMap::new();
-        for c in linear.tets() {
-            for [a, b] in EDGES {
-                numbers.insert((c[a].min(c[b]), c[a].max(c[b])), 0);
-            }
-        }
-        for (i, number) in numbers.values_mut().enumerate() {
-            *number = (linear.node_count() + i) as u32;
-        }
-        let number = |a: u32, b: u32| numbers[&(a.min(b), a.max(b))];
-        let tets = linear.tets().iter();
-        tets.map(|&[a, b, c, d]| {
-            let edges = [(a, b), (b, c), (a, c), (a, d), (b, d), (c, d)];
-            let [e1, e2, e3, e4, e5, e6] = edges.map(|(a, b)| number(a, b));
-            [a, b, c, d, e1, e2, e3, e4, e5, e6]
-        })
-        .collect()
-    }
-
-    #[test]
-    fn built_in_objects_get_one_node_per_edge_in_its_middle() {
-        for shape in [BuiltIn::Cube, BuiltIn::Sphere, BuiltIn::Strawberry, BuiltIn::Toothpaste] {
-            let linear = generate(shape, 300).unwrap();
-            let mesh = QuadraticMesh::try_new(&linear).unwrap();
-            assert_eq!(mesh.tets(), naive_tets(&linear));
-            assert!(mesh.edges().is_sorted_by(|a, b| a < b));
-            for tet in mesh.tets() {
-                for (node, [a, b]) in tet[4..].iter().zip(EDGES) {
-                    let at = |n: u32| mesh.vertices()[n as usize];
-                    let off = at(*node) - nalgebra::center(&at(tet[a]), &at(tet[b]));
-                    assert!(off.norm() <= 1e-16, "{shape:?}");
-                }
-            }
-            // Euler characteristic of a ball: nodes − edges + faces − elements = 1, where
-            // 2 faces = 4 elements + boundary faces.
-            let boundary = crate::mesh::Surface::from_mesh(&linear).triangles.len() as i64;
-            let [n, e, t] = [linear.node_count(), mesh.edges().len(), linear.tets().len()]
-                .map(|count| count as i64);
-            assert_eq!(n - e + (4 * t + boundary) / 2 - t, 1, "{shape:?}");
-        }
-    }
-
-    #[test]
-    fn middle_of_huge_coordinates_is_finite() {
-        let (small, y, y_far) = (1e-150, 1.6e308, 1.7e308);
-        let vertices = [[small, y, 0.0], [0.0, y_far, 0.0], [0.0, y, small], [0.0, y, 0.0]];
-        let vertices = vertices.map(Point3::from).to_vec();
-        let linear = TetMesh::try_new(vertices, vec![[0, 1, 2, 3]], vec![]).unwrap();
-        let mesh = QuadraticMesh::try_new(&linear).unwrap();
-        assert_eq!(mesh.vertices()[4], Point3::new(0.5 * small, 0.5 * y + 0.5 * y_far, 0.0));
-        assert!(mesh.vertices().iter().all(|p| p.coords.iter().all(|c| c.is_finite())));
-    }
-
-    #[test]
-    fn more_nodes_than_degrees_of_freedom_can_number_are_refused() {
-        assert_eq!(check_node_count(NODES_MAX - 6, 6), Ok(()));
-        let error = check_node_count(NODES_MAX - 5, 6).unwrap_err();
-        assert_eq!(error, TooManyNodes { corners: NODES_MAX - 5, edges: 6 });
-        assert!(error.to_string().contains("1431655765 nodes"), "{error}");
-        assert!(check_node_count(usize::MAX, 6).is_err());
-    }
-}
+mod tests;

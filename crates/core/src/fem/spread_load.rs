@@ -3,13 +3,14 @@
 use nalgebra::{Point3, Vector3};
 
 use super::QuadraticMesh;
+use super::six_node_face::pressure_forces;
+use super::tet10::{QUADRATURE, shape_functions};
 use crate::mesh::{Surface, TetMesh};
 
 /// A body that loads are spread over.
 ///
 /// The forces at the nodes do the same work as the load in every displacement that the elements can have
-/// (consistent forces). Shapes: forces three for each node of the system, mid-edge nodes behind the
-/// corners. Units: m, N, kg/m³, m/s², Pa. Frame: that of the mesh.
+/// (consistent forces). Shapes: forces three for each node of the system. Units: m, N, kg/m³, m/s², Pa. Frame: that of the mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct SpreadLoads<'a> {
     mesh: &'a TetMesh,
@@ -82,16 +83,17 @@ impl<'a> SpreadLoads<'a> {
         for tet in 0..self.mesh.tets().len() {
             let region = regions.get(tet).map_or(0, |region| *region as usize);
             let density = densities.get(region).copied().unwrap_or(densities[0]);
-            let weight = density * self.mesh.signed_volume(tet).abs() * acceleration;
             match self.quadratic {
                 None => {
-                    let quarter = 0.25 * weight;
+                    let volume = self.mesh.signed_volume(tet).abs();
+                    let quarter = 0.25 * (density * volume * acceleration);
                     self.mesh.tets()[tet].iter().for_each(|&node| add(&mut forces, node, quarter));
                 }
                 Some(quadratic) => {
-                    let (corners, middles) = quadratic.tets()[tet].split_at(4);
-                    corners.iter().for_each(|&n| add(&mut forces, n, CORNER_OF_TEN * weight));
-                    middles.iter().for_each(|&n| add(&mut forces, n, MIDDLE_OF_TEN * weight));
+                    let (volume, shares) = self.shares(quadratic, tet);
+                    let weight = density * volume * acceleration;
+                    let nodes = quadratic.tets()[tet].iter().zip(shares);
+                    nodes.for_each(|(&node, share)| add(&mut forces, node, share * weight));
                 }
             }
         }
@@ -111,24 +113,94 @@ impl<'a> SpreadLoads<'a> {
         pressure: f64,
     ) -> Result<Vec<f64>, SpreadLoadError> {
         self.check_pressure(pressure)?;
+        let mut forces = vec![0.0; 3 * self.node_count()];
+        for corners in self.outward(triangles)? {
+            let face = self.face(corners);
+            let (places, carriers) = (face.places(self), face.carriers());
+            for (&node, force) in carriers.iter().zip(face.forces(&places, pressure)) {
+                add(&mut forces, node, force);
+            }
+        }
+        Ok(forces)
+    }
+
+    /// Derivative by the places of nodes at rest of the work of an even pressure in a virtual displacement.
+    ///
+    /// Shapes: `v` and the result three for each node of the system. Units: Pa; N for `v` in m.
+    ///
+    /// # Errors
+    /// As [`SpreadLoads::pressure`].
+    pub fn pressure_by_places(
+        self,
+        triangles: &[[u32; 3]],
+        pressure: f64,
+        v: &[f64],
+    ) -> Result<Vec<f64>, SpreadLoadError> {
+        self.check_pressure(pressure)?;
+        let mut slopes = vec![0.0; 3 * self.node_count()];
+        for corners in self.outward(triangles)? {
+            let face = self.face(corners);
+            let places = face.places(self);
+            let work = |places: &[Point3<f64>]| -> f64 {
+                let of_nodes = face.carriers().iter().zip(face.forces(places, pressure));
+                of_nodes.map(|(&node, force)| force.dot(&vector(v, node))).sum()
+            };
+            // The work is quadratic in the places, so that a difference over any step is its slope.
+            let step = places.iter().map(|p| (p - places[0]).amax()).fold(0.0, f64::max);
+            for (i, &node) in face.nodes().iter().enumerate() {
+                let along = |axis: usize| {
+                    let [up, down] = [step, -step].map(|step| {
+                        let mut moved = places.clone();
+                        moved[i][axis] += step;
+                        work(&moved)
+                    });
+                    (up - down) / (2.0 * step)
+                };
+                add(&mut slopes, node, Vector3::from_fn(|axis, _| along(axis)));
+            }
+        }
+        Ok(slopes)
+    }
+
+    /// Triangles of the boundary with their corners counter-clockwise seen from outside.
+    fn outward(self, triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, SpreadLoadError> {
         let mut outward: Vec<([u32; 3], [u32; 3])> = Surface::from_mesh(self.mesh)
             .triangles
             .into_iter()
             .map(|triangle| (sorted(triangle), triangle))
             .collect();
         outward.sort_unstable();
-        let mut forces = vec![0.0; 3 * self.node_count()];
-        for &triangle in triangles {
-            let found = outward.binary_search_by_key(&sorted(triangle), |(sorted, _)| *sorted);
-            let corners = match found {
-                Ok(at) => outward[at].1,
-                Err(_) => return Err(SpreadLoadError::NotOnBoundary { triangle }),
-            };
-            let [a, b, c] = corners.map(|node| self.place(node));
-            let third = (b - a).cross(&(c - a)) * (-pressure / 6.0);
-            self.carriers(corners).into_iter().for_each(|node| add(&mut forces, node, third));
+        let found = |&triangle: &[u32; 3]| {
+            let at = outward.binary_search_by_key(&sorted(triangle), |(sorted, _)| *sorted);
+            at.map(|at| outward[at].1).map_err(|_| SpreadLoadError::NotOnBoundary { triangle })
+        };
+        triangles.iter().map(found).collect()
+    }
+
+    /// A face of the boundary, from its corners.
+    fn face(self, corners: [u32; 3]) -> Face {
+        let carriers = self.carriers(corners);
+        match self.quadratic.is_some_and(QuadraticMesh::is_curved) {
+            false => Face::Flat { corners, carriers },
+            true => {
+                let ([a, b, c], [d, e, f]) = (corners, carriers);
+                Face::Curved([a, b, c, d, e, f])
+            }
         }
-        Ok(forces)
+    }
+
+    /// Volume of a ten-node element, m³, and the shares of it that its nodes carry.
+    fn shares(self, quadratic: &QuadraticMesh, tet: usize) -> (f64, [f64; 10]) {
+        if !quadratic.is_curved() {
+            let share = |i| if i < 4 { CORNER_OF_TEN } else { MIDDLE_OF_TEN };
+            return (self.mesh.signed_volume(tet).abs(), std::array::from_fn(share));
+        }
+        let points = quadratic.points(tet);
+        let mut shares = [0.0; 10];
+        for (l, of_point) in QUADRATURE.into_iter().zip(points.shares) {
+            shares.iter_mut().zip(shape_functions(l)).for_each(|(sum, n)| *sum += of_point * n);
+        }
+        (points.volume, shares)
     }
 
     /// Nodes that carry a third each of an even pressure on a triangle: the integral of a corner's shape
@@ -137,14 +209,11 @@ impl<'a> SpreadLoads<'a> {
         match self.quadratic {
             None => [a, b, c],
             Some(quadratic) => [[a, b], [b, c], [c, a]].map(|[a, b]| {
-                let edge = quadratic.edges().partition_point(|e| *e < [a.min(b), a.max(b)]);
-                (quadratic.corner_count() + edge) as u32
+                quadratic
+                    .middle(a, b)
+                    .expect("a face of the boundary has its edges from an element")
             }),
         }
-    }
-
-    fn place(self, node: u32) -> Point3<f64> {
-        self.mesh.vertices()[node as usize]
     }
 
     fn node_count(self) -> usize {
@@ -184,6 +253,53 @@ impl<'a> SpreadLoads<'a> {
             false => Err(SpreadLoadError::NotFinite { what: "the pressure", value: pressure }),
         }
     }
+}
+
+/// A face of the boundary under pressure.
+enum Face {
+    /// Corners, and the nodes that carry a third each.
+    Flat { corners: [u32; 3], carriers: [u32; 3] },
+    /// Corners and middles of the edges 12, 23, 31.
+    Curved([u32; 6]),
+}
+
+impl Face {
+    /// Nodes whose places make it.
+    fn nodes(&self) -> &[u32] {
+        match self {
+            Self::Flat { corners, .. } => corners,
+            Self::Curved(nodes) => nodes,
+        }
+    }
+
+    /// Nodes that carry the pressure.
+    fn carriers(&self) -> &[u32] {
+        match self {
+            Self::Flat { carriers, .. } => carriers,
+            Self::Curved(nodes) => nodes,
+        }
+    }
+
+    fn places(&self, of: SpreadLoads<'_>) -> Vec<Point3<f64>> {
+        let vertices = of.quadratic.map_or(of.mesh.vertices(), QuadraticMesh::vertices);
+        self.nodes().iter().map(|&node| vertices[node as usize]).collect()
+    }
+
+    /// Forces of a pressure on the carriers, where its nodes are at some places.
+    fn forces(&self, places: &[Point3<f64>], pressure: f64) -> Vec<Vector3<f64>> {
+        match (self, places) {
+            (Self::Curved(_), &[a, b, c, d, e, f]) => {
+                pressure_forces(&[a, b, c, d, e, f], pressure).to_vec()
+            }
+            (_, &[a, b, c, ..]) => vec![(b - a).cross(&(c - a)) * (-pressure / 6.0); 3],
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// The vector of a node.
+fn vector(field: &[f64], node: u32) -> Vector3<f64> {
+    Vector3::from_column_slice(&field[3 * node as usize..3 * node as usize + 3])
 }
 
 fn add(forces: &mut [f64], node: u32, force: Vector3<f64>) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{QuadraticMesh, dof, tet4, tet10};
+use super::{QuadraticMesh, dof, tet4};
 use crate::mesh::TetMesh;
 
 /// Largest element rotation and principal strain of a displacement field.
@@ -54,20 +54,17 @@ fn gradient_of(mesh: &TetMesh, tet: usize, displacement: &[f64]) -> Matrix3<f64>
 /// between that of the element's middle, which a linear tetrahedron has everywhere, and the
 /// extrapolated one of its corners.
 ///
-/// Shapes: `displacement` 3 (N + E), mid-edge nodes included. Units: m.
+/// Shapes: `displacement` 3 per node of `mesh`. Units: m.
 ///
-/// Source: as there, with [`tet10::QUADRATURE`].
+/// Source: as there, with [`super::tet10::QUADRATURE`].
 pub fn summarise_strain_quadratic(
     mesh: &QuadraticMesh,
     displacement: &[f64],
     pause: &mut dyn FnMut(),
 ) -> StrainSummary {
     largest(mesh.tets().len(), pause, |tet, most| {
-        let g = tet4::gradients(&mesh.corners(tet));
         let u = displacements_of(&mesh.tets()[tet], displacement);
-        for l in tet10::QUADRATURE {
-            most.see(&tet10::displacement_gradient(&g, &u, l));
-        }
+        mesh.points(tet).displacement_gradients(&u).iter().for_each(|h| most.see(h));
     })
 }
 
@@ -155,6 +152,7 @@ pub(super) fn principal_max(e: &Matrix3<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::tet10;
     use crate::mesh::{BuiltIn, generate};
     use nalgebra::{Point3, Rotation3};
 

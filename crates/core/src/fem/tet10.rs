@@ -1,10 +1,11 @@
-//! The quadratic (ten-node) tetrahedron with straight edges.
+//! The quadratic (ten-node) tetrahedron with straight edges, and its shape functions.
 //!
 //! Barycentric coordinates `L = (L₁ … L₄)` are the shape functions (3.8) of the linear
 //! tetrahedron. As the edges are straight, the gradients of `L` are those of [`tet4`] and constant,
 //! and everything here is a polynomial in `L` whose integral is known. As in [`tet4`] the
 //! stiffness is written twice: [`element_stiffness`] as quadrature of `Bᵀ D B`,
-//! [`stiffness_row`] in closed form, which assembly uses. A test holds them together.
+//! [`stiffness_row`] in closed form, which assembly uses. A test holds them together. Curved
+//! edges are worked out at four points ([`super::tet10_points`]).
 
 use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
 
@@ -178,4 +179,4 @@ pub fn displacement_gradient(g: &Gradients, u: &[Vector3<f64>; 10], l: [f64; 4])
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

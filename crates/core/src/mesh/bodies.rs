@@ -29,9 +29,17 @@ pub struct Bodies {
 }
 
 impl Bodies {
-    /// Labels the parts of a mesh.
+    /// Labels the parts of a mesh; a mid-edge node belongs to the body of its element, and joins none.
     pub fn from_mesh(mesh: &TetMesh) -> Self {
-        Self::from_tets(mesh.node_count(), mesh.tets())
+        let mut bodies = Self::from_tets(mesh.node_count(), mesh.tets());
+        for (nodes, &body) in mesh.mid_edge_nodes().iter().zip(&bodies.of_tet) {
+            for &node in nodes {
+                if bodies.of_node[node as usize].replace(body).is_none() {
+                    bodies.node_counts[body as usize] += 1;
+                }
+            }
+        }
+        bodies
     }
 
     /// Connected bodies of tetrahedra that are no mesh yet, some of them perhaps flat or repeated.

@@ -16,4 +16,4 @@ pub use inversion::Inversion;
 pub use quality::{Quality, TetQuality, tet_quality};
 pub use surface::Surface;
 pub(crate) use tet_mesh::Incidence;
-pub use tet_mesh::{MeshError, TetMesh, signed_volume};
+pub use tet_mesh::{MeshError, TetMesh, mirrored, mirrored_middles, signed_volume};

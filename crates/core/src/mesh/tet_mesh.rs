@@ -2,9 +2,11 @@
 
 use nalgebra::Point3;
 
-/// Tetrahedral mesh: vertex coordinates, four corners per element, one region label per element.
+/// Tetrahedral mesh: vertex coordinates, four corners per element, one region label per element, and
+/// perhaps six mid-edge nodes per element.
 ///
-/// Shapes: `vertices` N points; `tets` M × 4 indices into `vertices`; `regions` empty or M labels.
+/// Shapes: `vertices` N points; `tets` M × 4 indices into `vertices`; `regions` empty or M labels;
+/// mid-edge nodes none or M × 6 indices into `vertices`, of the edges 12, 23, 13, 14, 24, 34.
 /// Units: the file's own, metres inside a running scene.
 /// Invariant: every index is below N, every tetrahedron has positive signed volume
 /// `det J / 6` (3.33), where row i of `J` is corner i − corner 4 (3.23).
@@ -28,6 +30,7 @@ pub struct TetMesh {
     vertices: Vec<Point3<f64>>,
     tets: Vec<[u32; 4]>,
     regions: Vec<u32>,
+    mid_edge: Vec<[u32; 6]>,
 }
 
 /// Why vertices and elements do not make a mesh that can be modelled.
@@ -65,6 +68,14 @@ pub enum MeshError {
         /// Elements that were given.
         tets: usize,
     },
+    /// The list of mid-edge nodes has another length than the element list.
+    #[error("mid-edge nodes of {elements} elements for {tets} tetrahedra")]
+    MidEdgeCount {
+        /// Elements whose mid-edge nodes were given.
+        elements: usize,
+        /// Elements of the mesh.
+        tets: usize,
+    },
     /// There are no elements.
     #[error("the mesh has no tetrahedra")]
     Empty,
@@ -91,7 +102,7 @@ impl TetMesh {
         if let Some(node) = vertices.iter().position(|p| !p.coords.iter().all(|c| c.is_finite())) {
             return Err(MeshError::NotFinite { node });
         }
-        let mesh = Self { vertices, tets, regions };
+        let mesh = Self { vertices, tets, regions, mid_edge: Vec::new() };
         for (tet, corners) in mesh.tets.iter().enumerate() {
             if let Some(&node) = corners.iter().find(|&&n| n as usize >= mesh.vertices.len()) {
                 let node_count = mesh.vertices.len();
@@ -103,6 +114,39 @@ impl TetMesh {
             }
         }
         Ok(mesh)
+    }
+
+    /// This mesh with mid-edge nodes of its own, which are vertices of it; only ten-node elements look
+    /// at them, and see there that they fit together.
+    ///
+    /// Shapes: `mid_edge` one entry per element, nodes of the edges 12, 23, 13, 14, 24, 34; or none.
+    ///
+    /// # Errors
+    /// [`MeshError::MidEdgeCount`], and [`MeshError::IndexOutOfRange`] for a node that is not there.
+    pub fn with_mid_edge_nodes(mut self, mid_edge: Vec<[u32; 6]>) -> Result<Self, MeshError> {
+        let (elements, tets) = (mid_edge.len(), self.tets.len());
+        if elements != 0 && elements != tets {
+            return Err(MeshError::MidEdgeCount { elements, tets });
+        }
+        let node_count = self.vertices.len();
+        for (tet, nodes) in mid_edge.iter().enumerate() {
+            if let Some(&node) = nodes.iter().find(|&&n| n as usize >= node_count) {
+                return Err(MeshError::IndexOutOfRange { tet, node, node_count });
+            }
+        }
+        self.mid_edge = mid_edge;
+        Ok(self)
+    }
+
+    /// This mesh by its corners alone; the mid-edge nodes stay as vertices that no element uses.
+    pub fn without_mid_edge_nodes(mut self) -> Self {
+        self.mid_edge = Vec::new();
+        self
+    }
+
+    /// Mid-edge nodes of its own, of the edges 12, 23, 13, 14, 24, 34; empty when the mesh has none.
+    pub fn mid_edge_nodes(&self) -> &[[u32; 6]] {
+        &self.mid_edge
     }
 
     /// Vertex coordinates, in the order of the file.
@@ -135,22 +179,32 @@ impl TetMesh {
         signed_volume(&self.corners(tet))
     }
 
-    /// For each vertex, whether some element uses it; orphans are `false`.
+    /// For each vertex, whether some element uses it, as a corner or a mid-edge node; orphans are
+    /// `false`.
     pub fn used_nodes(&self) -> Vec<bool> {
-        let mut used = vec![false; self.vertices.len()];
-        for &n in self.tets.iter().flatten() {
+        let mut used = self.is_corner();
+        for &n in self.mid_edge.iter().flatten() {
             used[n as usize] = true;
         }
         used
     }
 
-    /// Longest edge of the axis-aligned bounding box of the vertices that elements use.
+    /// For each vertex, whether it is a corner of some element.
+    pub fn is_corner(&self) -> Vec<bool> {
+        let mut is_corner = vec![false; self.vertices.len()];
+        for &n in self.tets.iter().flatten() {
+            is_corner[n as usize] = true;
+        }
+        is_corner
+    }
+
+    /// Longest edge of the axis-aligned bounding box of the corners of elements.
     pub fn size(&self) -> f64 {
         let (low, high) = self.bounds();
         (high - low).max()
     }
 
-    /// Corners of the axis-aligned bounding box of the vertices that elements use.
+    /// Corners of the axis-aligned bounding box of the corners of elements.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         let mut low = Point3::from([f64::INFINITY; 3]);
         let mut high = Point3::from([f64::NEG_INFINITY; 3]);
@@ -161,14 +215,15 @@ impl TetMesh {
         (low, high)
     }
 
-    /// This mesh over moved vertices (keep shape, section 6.1.2).
+    /// This mesh over moved vertices (keep shape, section 6.1.2), mid-edge nodes with it.
     ///
     /// Shapes: `vertices` as many points as before.
     ///
     /// # Errors
     /// [`MeshError`] if a moved element is inverted or a coordinate is not finite.
     pub fn with_vertices(&self, vertices: Vec<Point3<f64>>) -> Result<Self, MeshError> {
-        Self::try_new(vertices, self.tets.clone(), self.regions.clone())
+        let moved = Self::try_new(vertices, self.tets.clone(), self.regions.clone())?;
+        moved.with_mid_edge_nodes(self.mid_edge.clone())
     }
 }
 
@@ -177,6 +232,16 @@ impl TetMesh {
 /// Source: thesis (3.23), (3.33).
 pub fn signed_volume(c: &[Point3<f64>; 4]) -> f64 {
     (c[0] - c[3]).dot(&(c[1] - c[3]).cross(&(c[2] - c[3]))) / 6.0
+}
+
+/// Corners of a tetrahedron with its orientation turned round; twice turned they are as they were.
+pub fn mirrored([a, b, c, d]: [u32; 4]) -> [u32; 4] {
+    [a, b, d, c]
+}
+
+/// Mid-edge nodes of a [`mirrored`] tetrahedron: of its edges 12, 23, 13, 14, 24, 34.
+pub fn mirrored_middles([e12, e23, e13, e14, e24, e34]: [u32; 6]) -> [u32; 6] {
+    [e12, e24, e14, e13, e23, e34]
 }
 
 /// Elements around every node, as one list with borders.
@@ -236,6 +301,22 @@ mod tests {
     fn inverted_tetrahedron_is_refused_with_its_volume() {
         let error = TetMesh::try_new(unit_tet(), vec![[1, 0, 2, 3]], vec![]).unwrap_err();
         assert!(matches!(error, MeshError::NotPositive { tet: 0, volume } if volume < 0.0));
+    }
+
+    #[test]
+    fn mid_edge_nodes_are_used_and_must_be_there() {
+        let mut vertices = unit_tet();
+        vertices.extend([Point3::new(0.5, 0.5, 0.0), Point3::new(9.0, 9.0, 9.0)]);
+        let mesh = TetMesh::try_new(vertices.clone(), vec![[0, 1, 2, 3]], vec![]).unwrap();
+        let curved = mesh.clone().with_mid_edge_nodes(vec![[4; 6]]).unwrap();
+        assert_eq!(curved.used_nodes(), [true, true, true, true, true, false]);
+        assert_eq!(mesh.used_nodes(), curved.is_corner());
+        assert_eq!(curved.with_vertices(vertices).unwrap(), curved);
+        assert_eq!(curved.without_mid_edge_nodes(), mesh);
+        let error = mesh.clone().with_mid_edge_nodes(vec![[4, 4, 6, 4, 4, 4]]).unwrap_err();
+        assert_eq!(error, MeshError::IndexOutOfRange { tet: 0, node: 6, node_count: 6 });
+        let error = mesh.with_mid_edge_nodes(vec![[4; 6]; 2]).unwrap_err();
+        assert_eq!(error, MeshError::MidEdgeCount { elements: 2, tets: 1 });
     }
 
     #[test]

@@ -138,8 +138,10 @@ fn only_part(
         }
         let regions = part.regions().map_err(|what| cursor.unsupported(&what))?;
         add_regions(&mut raw, regions, 0, "");
-        raw.findings.higher_order += part.higher_order;
-        (raw.points, raw.node_labels, raw.tets) = (part.points, part.node_labels, part.tets);
+        (raw.points, raw.node_labels) = (part.points, part.node_labels);
+        for (corners, further) in part.tets.into_iter().zip(&part.further) {
+            raw.add_tet(corners, further.as_ref().map_or(&[], |middles| middles.as_slice()));
+        }
     }
     Ok(raw)
 }
@@ -168,7 +170,7 @@ impl Joined {
         let labels = NodeLabels::try_new(&part.node_labels).map_err(|fault| cursor.fault(fault))?;
         self.raw.findings.labels_mapped |= labels.mapped();
         let first = self.raw.points.len() as i64;
-        for corners in &part.tets {
+        for (corners, further) in part.tets.iter().zip(&part.further) {
             let mut indices = [0; 4];
             for (index, &label) in indices.iter_mut().zip(corners) {
                 let Some(at) = labels.index(label) else {
@@ -177,10 +179,12 @@ impl Joined {
                 };
                 *index = first + i64::from(at);
             }
-            self.raw.tets.push(indices);
+            // A mid-edge node that the part does not have is none of another part either.
+            let of_label = |label| labels.index(label).map_or(-1, |at| first + i64::from(at));
+            let middles = further.map(|middles| middles.map(of_label));
+            self.raw.add_tet(indices, middles.as_ref().map_or(&[], |nodes| nodes.as_slice()));
         }
         self.raw.points.extend(part.points.iter().map(|&point| instance.place(point)));
-        self.raw.findings.higher_order += part.higher_order;
         let mut regions = part.regions().map_err(|what| cursor.unsupported(&what))?;
         if regions.names.is_empty() {
             // The instance itself is the region.

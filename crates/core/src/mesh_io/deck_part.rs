@@ -42,13 +42,14 @@ pub(super) struct DeckPart {
     pub(super) node_labels: Vec<i64>,
     /// Corner labels.
     pub(super) tets: Vec<[i64; 4]>,
+    /// Labels of the nodes of each tetrahedron behind its corners.
+    pub(super) further: Vec<Option<[i64; 6]>>,
     element_labels: Vec<i64>,
     sets: Vec<ElementSet>,
     /// Place of each set by its name in capitals.
     set_places: BTreeMap<String, usize>,
     /// Name of the set in capitals, material.
     sections: Vec<(String, String)>,
-    pub(super) higher_order: usize,
     pub(super) other_cells: BTreeMap<CellKind, usize>,
     /// Elements of unknown kinds by plural name.
     pub(super) odd_cells: BTreeMap<String, usize>,
@@ -91,7 +92,7 @@ impl DeckPart {
         self.sections.push((set.to_uppercase(), material.to_owned()));
     }
 
-    /// Adds an element; only tetrahedra are kept, by their corners.
+    /// Adds an element; only tetrahedra are kept, by their corners and mid-edge nodes.
     pub(super) fn add_element(
         &mut self,
         kind: CellKind,
@@ -99,14 +100,14 @@ impl DeckPart {
         nodes: &[i64],
         set: Option<usize>,
     ) {
-        let (Shape::Tetrahedron, &[a, b, c, d, ..]) = (kind.shape, nodes) else {
+        let (Shape::Tetrahedron, &[a, b, c, d, ref further @ ..]) = (kind.shape, nodes) else {
             *self.other_cells.entry(kind).or_default() += 1;
             return;
         };
         let tet = self.tets.len();
         self.tets.push([a, b, c, d]);
         self.element_labels.push(label);
-        self.higher_order += usize::from(nodes.len() > 4);
+        self.further.push(further.try_into().ok());
         let Some(set) = set.and_then(|set| self.sets.get_mut(set)) else { return };
         match set.members.last_mut() {
             Some(Member::Tets(tets)) if tets.end == tet => tets.end += 1,

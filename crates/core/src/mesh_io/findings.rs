@@ -40,7 +40,8 @@ pub struct Findings {
     pub mending: Option<Mending>,
     /// Nodes that are no corner of a kept tetrahedron; they keep their number.
     pub orphans: usize,
-    /// Tetrahedra of second or higher order; their corners are used, mid nodes become orphans.
+    /// Tetrahedra of second or higher order. Where every tetrahedron has ten nodes, the mesh keeps its
+    /// mid-edge nodes; else corners are used alone.
     pub higher_order: usize,
     /// Cells that are not tetrahedra, by plural name ("triangles").
     pub other_cells: BTreeMap<String, usize>,

@@ -39,7 +39,7 @@ mod xdmf_item;
 mod xml;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use companion::Companion;
 pub use error::{Fault, MeshFileError, Place};

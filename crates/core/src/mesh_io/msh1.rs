@@ -108,7 +108,7 @@ pub(super) fn read_elements(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<()
             let array = format!("nodes of an element of type {number}");
             return Err(cursor.count_fault(&array, &expected, &found));
         }
-        raw.add_cell(kind, nodes, regions);
+        raw.add_gmsh_cell(kind, nodes, regions);
     }
     end_section(cursor, "$ENDELM")
 }

@@ -86,7 +86,7 @@ fn read_text_elements(
                 return Err(cursor.count_fault(&array, &expected, &rest.len().to_string()));
             }
         };
-        raw.add_cell(kind, nodes, region(tags));
+        raw.add_gmsh_cell(kind, nodes, region(tags));
     }
     if without_tags > 0 {
         raw.findings.note(format!("{without_tags} elements announce tags and have none"));
@@ -125,7 +125,7 @@ fn read_binary_elements(
                 fields.push(i64::from(order.i32(bytes)));
             }
             let (tags, nodes) = fields.get(1..).unwrap_or_default().split_at(tag_count);
-            raw.add_cell(kind, nodes, region(tags));
+            raw.add_gmsh_cell(kind, nodes, region(tags));
         }
         done += follow;
     }

@@ -213,7 +213,7 @@ fn read_block(
             nodes.push(values.size("a node of an element")?);
         }
         if is_tetrahedron {
-            raw.add_cell(kind, &nodes, region);
+            raw.add_gmsh_cell(kind, &nodes, region);
         }
     }
     if !is_tetrahedron {

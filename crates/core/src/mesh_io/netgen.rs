@@ -88,6 +88,10 @@ fn read_volume_elements(cursor: &mut Cursor, raw: &mut RawMesh) -> Result<(), Me
         if shape == Shape::Tetrahedron {
             nodes.swap(2, 3);
         }
+        // Netgen has the middles of edges 12, 13, 14, 23, 24, 34, of its own corners.
+        if let [a, b, c, d, e12, e14, e13, e24, e23, e34] = nodes[..] {
+            nodes = vec![a, b, c, d, e12, e23, e13, e14, e24, e34];
+        }
         raw.add_cell(CellKind::new(shape, node_count), &nodes, [domain, 0]);
     }
     Ok(())

@@ -8,7 +8,7 @@ use super::cell_kind::{CellKind, Shape};
 use super::error::{Fault, MeshFileError};
 use super::labels::NodeLabels;
 use super::mending::repeated;
-use crate::mesh::{MeshError, TetMesh};
+use crate::mesh::{MeshError, TetMesh, mirrored, mirrored_middles};
 use crate::mesh_io::{BadTet, Findings, Format, Mending, MeshFile, TetFault};
 
 /// A volume below this fraction of the cube of the longest edge is rounding, not volume.
@@ -18,6 +18,8 @@ const DEGENERATE: f64 = 1e-14;
 struct Sound {
     tets: Vec<[u32; 4]>,
     kept: Vec<usize>,
+    /// Whether each was turned.
+    turned: Vec<bool>,
     /// Tetrahedra that were put right or dropped, ascending by record number.
     bad: Vec<BadTet>,
     volume_in_file: f64,
@@ -34,6 +36,9 @@ pub(super) struct RawMesh {
     pub(super) first_label: i64,
     /// Corner labels of each tetrahedron in file order.
     pub(super) tets: Vec<[i64; 4]>,
+    /// Labels of the mid-edge nodes of each tetrahedron, of the edges 12, 23, 13, 14, 24, 34; shorter than
+    /// `tets` where some tetrahedra have none or further nodes.
+    pub(super) mid_edge: Vec<[i64; 6]>,
     /// Two candidates for the region of each tetrahedron; the second counts when the first is 0
     /// everywhere (Gmsh: physical group, then geometric entity).
     pub(super) regions: Vec<[i64; 2]>,
@@ -48,16 +53,37 @@ pub(super) struct RawMesh {
 }
 
 impl RawMesh {
-    /// Adds a cell: a tetrahedron of any order by its first four nodes, anything else as a count.
+    /// Adds a cell: a tetrahedron by its corners, with its mid-edge nodes if it has ten nodes in the order
+    /// of VTK and Abaqus (edges 12, 23, 13, 14, 24, 34); anything else as a count.
     pub(super) fn add_cell(&mut self, kind: CellKind, nodes: &[i64], region: [i64; 2]) {
         match (kind.shape, nodes) {
-            (Shape::Tetrahedron, &[a, b, c, d, ..]) => {
-                self.tets.push([a, b, c, d]);
+            (Shape::Tetrahedron, &[a, b, c, d, ref further @ ..]) => {
+                self.add_tet([a, b, c, d], further);
                 self.regions.push(region);
-                self.findings.higher_order += usize::from(nodes.len() > 4);
             }
             _ => self.count_cells(kind, 1),
         }
+    }
+
+    /// [`RawMesh::add_cell`] in the order of Gmsh, which has edges 34 and 24 last.
+    pub(super) fn add_gmsh_cell(&mut self, kind: CellKind, nodes: &[i64], region: [i64; 2]) {
+        match (kind.shape, nodes) {
+            (Shape::Tetrahedron, &[a, b, c, d, e12, e23, e13, e14, e34, e24]) => {
+                self.add_cell(kind, &[a, b, c, d, e12, e23, e13, e14, e24, e34], region);
+            }
+            _ => self.add_cell(kind, nodes, region),
+        }
+    }
+
+    /// Adds a tetrahedron without a region: corners, and the nodes behind them in the order of VTK.
+    pub(super) fn add_tet(&mut self, corners: [i64; 4], further: &[i64]) {
+        if let Ok(middles) = further.try_into()
+            && self.mid_edge.len() == self.tets.len()
+        {
+            self.mid_edge.push(middles);
+        }
+        self.tets.push(corners);
+        self.findings.higher_order += usize::from(!further.is_empty());
     }
 
     /// Adds cells that are not tetrahedra to the count of their kind.
@@ -100,15 +126,17 @@ impl RawMesh {
             file: self.tets_file.clone().unwrap_or_else(|| name.to_owned()),
             fault,
         })?;
-        let Sound { tets, kept, bad, volume_in_file } = self.sound_tets(&all, format);
+        let Sound { tets, kept, turned, bad, volume_in_file } = self.sound_tets(&all, format);
         if tets.is_empty() {
             return Err(refuse(self.nothing_to_model()));
         }
+        let mid_edge = self.mid_edge_nodes(&labels, &kept, &turned);
         let regions = self.dense_regions(&kept);
-        let mesh =
-            TetMesh::try_new(self.points, tets, regions).map_err(|e| refuse(Fault::Mesh(e)))?;
+        let mesh = TetMesh::try_new(self.points, tets, regions)
+            .and_then(|mesh| mesh.with_mid_edge_nodes(mid_edge))
+            .map_err(|error| refuse(Fault::Mesh(error)))?;
         self.findings.mending = Mending::new(bad, volume_in_file, &all, &kept, &mesh);
-        self.findings.orphans = mesh.used_nodes().iter().filter(|&&used| !used).count();
+        self.findings.orphans = mesh.is_corner().iter().filter(|&&is_corner| !is_corner).count();
         Ok(MeshFile { format, mesh, findings: self.findings })
     }
 
@@ -129,6 +157,37 @@ impl RawMesh {
         Ok(all)
     }
 
+    /// Mid-edge nodes of the kept tetrahedra, turned as these are; none unless each of the file has six.
+    fn mid_edge_nodes(
+        &mut self,
+        labels: &NodeLabels,
+        kept: &[usize],
+        turned: &[bool],
+    ) -> Vec<[u32; 6]> {
+        if self.mid_edge.len() != self.tets.len() {
+            return Vec::new();
+        }
+        let mut of_kept = Vec::with_capacity(kept.len());
+        for (&tet, &is_turned) in kept.iter().zip(turned) {
+            let mut nodes = [0_u32; 6];
+            for (node, &label) in nodes.iter_mut().zip(&self.mid_edge[tet]) {
+                match labels.index(label) {
+                    Some(index) => *node = index,
+                    None => {
+                        let nodes = labels.describe();
+                        self.findings.note(format!(
+                            "mid-edge nodes are left out: tetrahedron {tet} (from 0) names node {label}, \
+                             but {nodes}"
+                        ));
+                        return Vec::new();
+                    }
+                }
+            }
+            of_kept.push(if is_turned { mirrored_middles(nodes) } else { nodes });
+        }
+        of_kept
+    }
+
     /// The tetrahedra that have volume, each once, ordered as [`TetMesh`] wants them.
     fn sound_tets(&mut self, all: &[[u32; 4]], format: Format) -> Sound {
         // The mesh counts volume from corner 4 (thesis 3.23), every format but the thesis lists
@@ -147,7 +206,13 @@ impl RawMesh {
         // What has the four corners of an earlier one would count twice in the stiffness, and its
         // faces would hide the surface.
         let mut repeated = repeated(all, volumes.iter().map(|v| v.0)).into_iter().peekable();
-        let mut sound = Sound { tets: Vec::new(), kept: Vec::new(), bad, volume_in_file: 0.0 };
+        let mut sound = Sound {
+            tets: Vec::new(),
+            kept: Vec::new(),
+            turned: Vec::new(),
+            bad,
+            volume_in_file: 0.0,
+        };
         for &(tet, volume) in &volumes {
             let in_file = volume * format_sign;
             sound.volume_in_file += in_file;
@@ -161,6 +226,7 @@ impl RawMesh {
             }
             sound.tets.push(if volume > 0.0 { all[tet] } else { mirrored(all[tet]) });
             sound.kept.push(tet);
+            sound.turned.push(volume <= 0.0);
         }
         sound.bad.sort_unstable_by_key(|bad| bad.tet);
         let with = |name: &str| {
@@ -235,11 +301,6 @@ impl RawMesh {
         }
         Fault::NoTetrahedra { found: parts.join(", ") }
     }
-}
-
-/// A tetrahedron with its orientation turned round; twice turned it is as it was.
-pub(super) fn mirrored([a, b, c, d]: [u32; 4]) -> [u32; 4] {
-    [a, b, d, c]
 }
 
 #[cfg(test)]

@@ -142,6 +142,10 @@ fn read_tets(mut cursor: Cursor, raw: &mut RawMesh) -> Result<(), MeshFileError>
             return Err(cursor.expected_instead(what, line));
         }
         let region = region_label(region, raw);
+        // TetGen has the middles of edges 34, 14, 12, 23, 24, 13.
+        if let [a, b, c, d, e34, e14, e12, e23, e24, e13] = nodes[..] {
+            nodes = vec![a, b, c, d, e12, e23, e13, e14, e24, e34];
+        }
         raw.add_cell(kind, &nodes, [region, 0]);
     }
     expect_end(&mut cursor, "tetrahedra", count)

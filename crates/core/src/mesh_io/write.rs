@@ -4,8 +4,7 @@ use std::io::Write;
 
 use super::encoding;
 use super::labels::RegionNumbers;
-use super::raw_mesh::mirrored;
-use crate::mesh::TetMesh;
+use crate::mesh::{TetMesh, mirrored, mirrored_middles};
 
 /// Data for a file that does not fit the mesh.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -117,10 +116,19 @@ fn write_mesh(
     writeln!(out, "{blocks} {count} 1 {count}")?;
     for block in numbered.chunk_by(same_region) {
         let region = block.first().map_or(0, |&(tet, _)| region_of(tet));
-        writeln!(out, "3 {} 4 {}", tag(region), block.len())?;
+        // 4 is Gmsh's number for a tetrahedron of four nodes, 11 for one of ten.
+        let number = if mesh.mid_edge_nodes().is_empty() { 4 } else { 11 };
+        writeln!(out, "3 {} {number} {}", tag(region), block.len())?;
         for &(tet, corners) in block {
             let [a, b, c, d] = mirrored(corners).map(|node| u64::from(node) + 1);
-            writeln!(out, "{} {a} {b} {c} {d}", tet + 1)?;
+            write!(out, "{} {a} {b} {c} {d}", tet + 1)?;
+            if let Some(&middles) = mesh.mid_edge_nodes().get(tet) {
+                let [e12, e23, e13, e14, e24, e34] = mirrored_middles(middles);
+                for node in [e12, e23, e13, e14, e34, e24] {
+                    write!(out, " {}", u64::from(node) + 1)?;
+                }
+            }
+            writeln!(out)?;
         }
     }
     writeln!(out, "$EndElements")
@@ -241,12 +249,17 @@ fn write_document(
     let coordinates = mesh.vertices().iter().flat_map(|p| [p.x, p.y, p.z]);
     write_array(out, "Float64", "Points", 3, coordinates.map(f64::to_le_bytes))?;
     writeln!(out, "</Points>\n<Cells>")?;
-    let corners = mesh.tets().iter().flat_map(|&tet| mirrored(tet)).map(i64::from);
-    write_array(out, "Int64", "connectivity", 1, corners.map(i64::to_le_bytes))?;
-    let ends = (1..=cells as i64).map(|cell| 4 * cell);
+    let middles = |tet: usize| mesh.mid_edge_nodes().get(tet).copied().map(mirrored_middles);
+    let nodes = mesh.tets().iter().enumerate().flat_map(|(tet, &corners)| {
+        mirrored(corners).into_iter().chain(middles(tet).into_iter().flatten())
+    });
+    let nodes = nodes.map(|node| i64::from(node).to_le_bytes());
+    write_array(out, "Int64", "connectivity", 1, nodes)?;
+    // VTK's numbers for a linear and a quadratic tetrahedron.
+    let (per_cell, number) = if mesh.mid_edge_nodes().is_empty() { (4, 10) } else { (10, 24) };
+    let ends = (1..=cells as i64).map(|cell| per_cell * cell);
     write_array(out, "Int64", "offsets", 1, ends.map(i64::to_le_bytes))?;
-    // 10 is VTK's number for a linear tetrahedron.
-    write_array(out, "UInt8", "types", 1, (0..cells).map(|_| [10_u8]))?;
+    write_array(out, "UInt8", "types", 1, (0..cells).map(|_| [number]))?;
     writeln!(out, "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")
 }
 

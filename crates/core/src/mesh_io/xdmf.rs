@@ -233,7 +233,9 @@ impl Cells<'_, '_> {
     ) -> Result<(), MeshFileError> {
         let region = self.regions.get(self.cell).copied().unwrap_or(0);
         self.cell += 1;
-        let (Shape::Tetrahedron, Some(corners)) = (kind.shape, nodes.first_chunk::<4>()) else {
+        let (Shape::Tetrahedron, Some((corners, further))) =
+            (kind.shape, nodes.split_first_chunk::<4>())
+        else {
             raw.count_cells(kind, 1);
             return Ok(());
         };
@@ -249,9 +251,14 @@ impl Cells<'_, '_> {
                 nodes,
             }));
         }
-        raw.tets.push(corners.map(|label| label + self.first as i64));
+        // Beyond its own grid a mid-edge node is none, also where a further grid would have one there.
+        let in_file = |label: i64| match usize::try_from(label).is_ok_and(|index| index < count) {
+            true => label + self.first as i64,
+            false => -1,
+        };
+        let further: Vec<i64> = further.iter().map(|&label| in_file(label)).collect();
+        raw.add_tet(corners.map(in_file), &further);
         raw.regions.push([region, 0]);
-        raw.findings.higher_order += usize::from(kind.nodes > 4);
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use crate::contact::MaskError;
 use crate::fem::hyperelastic::YieldError;
-use crate::fem::{AssemblyError, SpreadLoadError, TooManyNodes};
+use crate::fem::{AssemblyError, QuadraticMeshError, SpreadLoadError};
 use crate::solve::condensed::CondensedError;
 use crate::solve::equilibrium::Dependent;
 use crate::solve::{FreeMotion, KnownError, PartitionError, SolveError};
@@ -25,10 +25,10 @@ pub enum ModelError {
     /// The method failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// The mesh has too many edges for mid-edge nodes.
+    /// The mesh has too many edges for mid-edge nodes, or its own do not fit together.
     #[error(transparent)]
-    MidNodes(#[from] TooManyNodes),
-    /// A mid-edge node was named.
+    MidNodes(#[from] QuadraticMeshError),
+    /// A node was named that the mesh does not have, as a mid-edge node that was made.
     #[error("node {node} is given a displacement, but the mesh has {node_count} nodes (0-based)")]
     NoSuchNode {
         /// Node, from 0.

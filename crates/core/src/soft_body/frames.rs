@@ -60,9 +60,18 @@ impl<'a> Frames<'a> {
     pub(super) fn try_new(model: &'a Model) -> Result<Self, SoftBodyError> {
         let base = model.condense(None, &mut |_| {})?;
         base.prove_eigenvalue_min();
+        Ok(Self::of_base(model, base))
+    }
+
+    /// Makes a multigrid hierarchy of the base instead of a factor.
+    pub(super) fn without_factor(model: &'a Model) -> Result<Self, SoftBodyError> {
+        Ok(Self::of_base(model, model.condense_without_factor()?))
+    }
+
+    fn of_base(model: &'a Model, base: Base) -> Self {
         let nodes = (0..).take(model.mesh().node_count()).collect();
         let (set, load, loaded) = (None, None, None);
-        Ok(Self { model, base, columns: Columns::new(COLUMNS_BYTES), set, load, loaded, nodes })
+        Self { model, base, columns: Columns::new(COLUMNS_BYTES), set, load, loaded, nodes }
     }
 
     /// Displacements under prescribed displacements and forces. A node that is touched for the first time
@@ -111,7 +120,7 @@ impl<'a> Frames<'a> {
         forces: Vec<f64>,
     ) -> Result<Answer, SoftBodyError> {
         if self.load.as_ref().is_none_or(|(kept, _)| *kept != forces) {
-            let column = Arc::new(LoadColumn::new(&self.base, &forces));
+            let column = Arc::new(LoadColumn::try_new(&self.base, &forces)?);
             self.load = Some((forces, column));
             self.loaded = None;
         }
@@ -138,9 +147,10 @@ fn answer(
         displacements: displacements.into_iter().map(Vector3::from).collect(),
         reactions: reactions(&known.dofs, forces),
         residual_rel: certificate.residual_rel,
-        inexactness: match certificate.error_bound_rel {
-            Ok(error) => Inexactness::Proven(error),
-            Err(reason) => Inexactness::Unknown(reason),
+        inexactness: match (certificate.error_bound_rel, certificate.error_estimate_rel) {
+            (Ok(error), _) => Inexactness::Proven(error),
+            (Err(_), Some(error)) => Inexactness::Estimated(error),
+            (Err(reason), None) => Inexactness::Unknown(reason),
         },
     }
 }

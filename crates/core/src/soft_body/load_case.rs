@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use crate::gradient::{GradientOf, NoGradient, Quantity};
 use crate::model::{Known, Model, ModelError};
 use crate::solve::condensed::CondensedError;
 use crate::solve::equilibrium::NoEquilibrium;
@@ -118,6 +119,17 @@ impl LoadCase {
     pub fn pressure(&mut self, triangles: &[[u32; 3]], pressure: f64) -> &mut Self {
         self.pressures.push((triangles.to_vec(), pressure));
         self
+    }
+
+    /// What the gradient of a quantity under this load case is asked of, places of nodes among it.
+    pub(super) fn gradient_of<'a>(&'a self, quantity: &'a Quantity) -> GradientOf<'a> {
+        let weight = self.weight.as_ref();
+        GradientOf {
+            quantity,
+            weight: weight.map(|(densities, acceleration)| (densities.as_slice(), *acceleration)),
+            pressures: self.pressures.iter().map(|(on, value)| (on.as_slice(), *value)).collect(),
+            with_places: true,
+        }
     }
 
     /// Known degrees of freedom with their values, and forces on all degrees of freedom of a model.
@@ -274,6 +286,9 @@ pub enum SoftBodyError {
     /// No equilibrium at large deformation.
     #[error(transparent)]
     Equilibrium(#[from] NoEquilibrium),
+    /// No derivatives.
+    #[error(transparent)]
+    Gradient(#[from] NoGradient),
     /// A force on a node that nothing holds on to.
     #[error("a force acts on node {node}, which no element uses (0-based)")]
     LooseForce {

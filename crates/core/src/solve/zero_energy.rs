@@ -82,8 +82,10 @@ impl RigidBody {
 /// where two share three nodes that are not in line.
 fn rigid_parts(mesh: &TetMesh, bodies: &Bodies) -> Vec<Vec<u32>> {
     let mut of_node: Vec<Vec<u32>> = vec![Vec::new(); mesh.node_count()];
-    for (tet, &piece) in mesh.tets().iter().zip(&bodies.piece_of_tet) {
-        for &n in tet {
+    let mid_edge = mesh.mid_edge_nodes().iter().map(<[u32; 6]>::as_slice);
+    let nodes = mesh.tets().iter().map(<[u32; 4]>::as_slice).zip(&bodies.piece_of_tet);
+    for (nodes, &piece) in nodes.chain(mid_edge.zip(&bodies.piece_of_tet)) {
+        for &n in nodes {
             let list = &mut of_node[n as usize];
             if let Err(at) = list.binary_search(&piece) {
                 list.insert(at, piece);

@@ -6,10 +6,10 @@ use std::time::Instant;
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::model::{Known, ModelError};
 use softgrasp_core::solve::condensed::{Base, Certificate, ContactSet, Delivery, Touched};
-use softgrasp_core::solve::{Method, Stage};
+use softgrasp_core::solve::{Certainty, Method, Stage};
 use softgrasp_protocol::{
-    Answer, Displacements, DofValue, NodeChoice, Precision, Question, SolveReport, Warning,
-    WarningCode,
+    Answer, Displacements, DofValue, FieldValues, NodeChoice, Precision, Question, SolveReport,
+    Warning, WarningCode,
 };
 
 use super::contact_solution::{PreparedSet, Solved};
@@ -194,7 +194,9 @@ impl Contacts {
             false => peak_rss_bytes(),
         };
         if let Some(certainty) = set.certainty(base) {
-            add_certainty(certainty, question, &mut report)?;
+            let of_columns = certificate.error_estimate_rel.unwrap_or(0.0);
+            let error_rel = certainty.error_rel.max(of_columns);
+            add_certainty(Certainty { error_rel, ..certainty }, question, &mut report)?;
         }
         add_unmet_wishes(question, &mut report);
         if let StrainOf::Beside(resources) = strain {
@@ -207,8 +209,8 @@ impl Contacts {
             }
         }
         let nodes = question.want.nodes.clone();
-        let (large, cases) = (None, Vec::new());
-        Ok(Answer { report, large, nodes, displacements, reactions, mask_forces, cases, fields })
+        let forces = (reactions, mask_forces);
+        Ok(gathered(report, (nodes, displacements), forces, fields))
     }
 
     fn report(
@@ -240,6 +242,7 @@ impl Contacts {
             max_strain: strain.map_or(f64::NAN, |strain| strain.strain_max),
             precision: "f64".to_owned(),
             condition_estimate: Some(set.condition()),
+            error_estimate_rel: certificate.error_estimate_rel,
             warnings,
             chosen_because: why.to_owned(),
             ..SolveReport::default()
@@ -277,6 +280,26 @@ impl Contacts {
             stored.keep_strain(asked, strain);
             drop(claimed);
         });
+    }
+}
+
+/// An answer of linear elasticity, of one case.
+fn gathered(
+    report: SolveReport,
+    (nodes, displacements): (NodeChoice, Displacements),
+    (reactions, mask_forces): (Vec<DofValue>, Vec<[f64; 3]>),
+    fields: Vec<FieldValues>,
+) -> Answer {
+    Answer {
+        report,
+        large: None,
+        nodes,
+        displacements,
+        reactions,
+        mask_forces,
+        cases: Vec::new(),
+        fields,
+        gradient: None,
     }
 }
 

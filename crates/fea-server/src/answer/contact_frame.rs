@@ -9,18 +9,23 @@ use softgrasp_core::dynamics::{
     BodyContact, BodyLoad, Candidate, ContactStep, MovingBody, ObjectState, PointContact,
     SmallSystem, StepSettings,
 };
+use softgrasp_core::fem::StrainSummary;
+use softgrasp_core::fem::hyperelastic::LargeSummary;
 use softgrasp_core::model::ModelError;
 use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::condensed::{Contact, Elasticity};
 use softgrasp_protocol::{
     Answer, BodyContact as ContactMessage, BodyLoad as LoadMessage, ContactAnswer, ContactAsk,
     ContactFrame, ContactPoint, ContactReport, Deformation, Displacements, FieldSet, FieldValues,
-    NodeChoice, PathChoice, Precision, SmallSystem as SmallSystemMessage, SolveReport,
+    NodeChoice, PathChoice, Precision, SmallSystem as SmallSystemMessage, SolveReport, Warning,
+    WarningCode, WarningLevel,
 };
 
 use super::contact_large::{LargeWish, Made, PressedSeat};
 use super::fields::{Shape, contact_field_values, reserve_contact_fields};
 use super::large::law_of;
+use super::large_once::promised_error;
+use super::warnings::strain_warnings;
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::last_peak_rss_bytes;
 use crate::plan::columns_ms;
@@ -124,8 +129,7 @@ impl PosedContact {
     /// Units: ms.
     pub fn predicted_ms(&self, resources: &Resources) -> f64 {
         let Ok(base) = self.stored.base() else { return 0.0 };
-        let entries = base.bytes() as f64 / size_of::<f64>() as f64;
-        columns_ms(entries, self.missing(), &resources.rates.known())
+        columns_ms(&base, self.missing(), &resources.rates.known())
     }
 
     /// Number of nodes near bodies whose columns are not cached.
@@ -206,13 +210,15 @@ impl PosedContact {
     }
 
     fn answered(self, made: Made, fields: Vec<FieldValues>, computed: u64) -> ContactAnswer {
-        let Made { outcome, is_large, factors, plastic_strain, summary } = made;
+        let Made { outcome, is_large, factors, plastic_strain, summary, is_beyond_linear } = made;
         let (method, factor_reused) = match is_large {
             false => ("condensed", computed == 0),
             true => ("newton", factors == 0),
         };
         let model = &self.stored.model;
         let known = 3 * outcome.contacts.len() as u64;
+        let LargeSummary { rotation_max, strain_max, .. } = summary;
+        let (warning_level, warnings) = beyond_linear(is_beyond_linear, rotation_max, strain_max);
         let report = SolveReport {
             method: method.to_owned(),
             element: name_of(model.element()).into(),
@@ -222,8 +228,10 @@ impl PosedContact {
             error_bound_why: Some(
                 "a contact frame has the residuals of both parts and no proven bound".to_owned(),
             ),
-            max_rotation_deg: summary.rotation_max.to_degrees(),
-            max_strain: summary.strain_max,
+            max_rotation_deg: rotation_max.to_degrees(),
+            max_strain: strain_max,
+            warning_level,
+            warnings,
             precision: "f64".to_owned(),
             peak_rss_bytes: last_peak_rss_bytes(),
             factor_reused,
@@ -259,6 +267,7 @@ impl PosedContact {
                 mask_forces: Vec::new(),
                 cases: Vec::new(),
                 fields,
+                gradient: None,
             },
             contact,
             state: state_message(&outcome.state),
@@ -267,6 +276,24 @@ impl PosedContact {
             small_system,
         }
     }
+}
+
+/// Warnings of a step by linear elasticity that large deformation was open to, where memory is too short for
+/// it; none where that is not so.
+///
+/// Units: rad, 1.
+fn beyond_linear(is_so: bool, rotation_max: f64, strain_max: f64) -> (WarningLevel, Vec<Warning>) {
+    if !is_so {
+        return (WarningLevel::default(), Vec::new());
+    }
+    let promised = promised_error(rotation_max, strain_max);
+    let text = format!(
+        "linear elasticity answers, which may be off by {promised:.1e} of the largest displacement: memory \
+         is too short for a factor, which contact at large deformation takes"
+    );
+    let own = Warning::new(WarningCode::CHOICE, text);
+    let of_strain = strain_warnings(StrainSummary { rotation_max, strain_max });
+    (WarningLevel::CAUTION, [own].into_iter().chain(of_strain).collect())
 }
 
 /// Equations of a step; `None` for linear elasticity, which has no yield stress.

@@ -53,13 +53,22 @@ pub(super) struct Made {
     pub plastic_strain: f64,
     /// Rotation and stretches of the elements, where they were computed.
     pub summary: LargeSummary,
+    /// Whether linear elasticity answers beyond what it is meant for, because large deformation cannot be.
+    pub is_beyond_linear: bool,
 }
 
 impl Made {
     /// Outcome of a step by linear elasticity.
     pub fn linear(outcome: StepOutcome) -> Self {
         let summary = LargeSummary::UNKNOWN;
-        Self { outcome, is_large: false, factors: 0, plastic_strain: 0.0, summary }
+        Self {
+            outcome,
+            is_large: false,
+            factors: 0,
+            plastic_strain: 0.0,
+            summary,
+            is_beyond_linear: false,
+        }
     }
 }
 
@@ -78,7 +87,12 @@ impl Pressed {
         // The tangent and its positive part stand beside the linear stiffness.
         let blocks = pattern.block_count();
         let held = (model.bytes() + 2 * blocks * size_of::<[f64; 9]>()) as u64;
-        let need = Need::counted(model.element(), Method::Front, held, blocks, base.analysis());
+        let element = model.element();
+        let need = match base.analysis() {
+            Some(analysis) => Need::counted(element, Method::Front, held, blocks, analysis),
+            // Steps stay linear, or are refused where large deformation is asked for.
+            None => Need::exact(element, Method::Multigrid, held, 0),
+        };
         let subject = Subject::about(model, 0, Some(wish.model));
         admit(&resources.models, &reservation, &[need], &subject).map_err(PlanError::Memory)?;
         let body = LargeBody::at_rest(elements, Arc::clone(pattern));
@@ -144,9 +158,14 @@ impl LargeWish {
         wanted: &[u32],
     ) -> Result<Made, Refusal> {
         let may_be_linear = self.deformation == Deformation::Auto;
+        // Without a factor linear elasticity is all there is: it answers, and warns.
+        let allowed = match step.elasticity.base.has_factor() {
+            true => LINEAR_ERROR_REL,
+            false => f64::INFINITY,
+        };
         if may_be_linear
-            && pressed.promised() <= LINEAR_ERROR_REL
-            && let Some(made) = linear_if_small(pressed, step, state, wanted)?
+            && pressed.promised() <= allowed
+            && let Some(made) = linear_if_small(pressed, step, state, wanted, allowed)?
         {
             return Ok(made);
         }
@@ -158,27 +177,31 @@ impl LargeWish {
             factors: pressed.body.factors() - before,
             plastic_strain: pressed.body.elements().plastic_strain_max(),
             summary: pressed.body.summary(),
+            is_beyond_linear: false,
         })
     }
 }
 
-/// Step by linear elasticity, if rotation and strain at its end promise an error within the allowed one.
+/// Step by linear elasticity, if rotation and strain at its end promise an error within the allowed one,
+/// relative.
 fn linear_if_small(
     pressed: &Pressed,
     step: &ContactStep<'_>,
     state: &ObjectState,
     wanted: &[u32],
+    allowed: f64,
 ) -> Result<Option<Made>, Refusal> {
     let all: Vec<u32> = (0..step.vertices.len() as u32).collect();
     let mut outcome = step.advance(state, &all)?;
     let summary = pressed.body.summary_of(outcome.displacements.as_flattened());
     let promised = promised_error(summary.rotation_max, summary.strain_max);
-    if promised > LINEAR_ERROR_REL || promised.is_nan() {
+    if promised > allowed || promised.is_nan() {
         return Ok(None);
     }
     outcome.displacements = wanted
         .iter()
         .filter_map(|&node| outcome.displacements.get(node as usize).copied())
         .collect();
-    Ok(Some(Made { summary, ..Made::linear(outcome) }))
+    let is_beyond_linear = promised > LINEAR_ERROR_REL;
+    Ok(Some(Made { summary, is_beyond_linear, ..Made::linear(outcome) }))
 }

@@ -11,6 +11,7 @@ use softgrasp_protocol::{
 };
 
 use super::fields::{Shape, field_values};
+use super::gradient;
 use super::warnings::{add_certainty, add_unmet_wishes, strain_warnings};
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::peak_rss_bytes;
@@ -50,8 +51,10 @@ pub(super) fn answer(
         Some(_) => factored.solve(stiffness, loads, on_stage).map(|solution| (solution, None)),
     }
     .map_err(|error| Refusal::Model(error.into()))?;
+    let gradient = gradient::of_solution(model, posed.question, (factored, &solution))?;
     let strain = Some(model.strain(&solution.displacement, &mut || {}));
-    gather(model, factored, &posed, &solution, (certainty, strain), clock)
+    let answer = gather(model, factored, &posed, &solution, (certainty, strain), clock)?;
+    Ok(Answer { gradient, ..answer })
 }
 
 /// Solves several load cases together; `estimate`: whether to compute condition, error and strain too.
@@ -166,6 +169,7 @@ fn gather(
         mask_forces: Vec::new(),
         cases: Vec::new(),
         fields,
+        gradient: None,
     })
 }
 

@@ -63,7 +63,8 @@ pub(crate) fn place_once(
     clock: StageClock,
 ) -> Result<Placed, Refusal> {
     let Some((engine, why)) = engine_for(resources, &body, &message, &reservation)? else {
-        let answer = match cases.is_empty() && estimate {
+        let has_gradient = !message.quantity.is_empty();
+        let answer = match cases.is_empty() && (estimate || has_gradient) {
             true => solve_once(resources, body, message, reservation, clock),
             false => {
                 solve_several(resources, (body, message), (cases, estimate), reservation, clock)
@@ -183,7 +184,8 @@ fn engine_for(
     // What is wrong with the question, the server's own way says.
     let is_open =
         matches!(question_of(message, None, 0.0), Ok(question) if question.method.is_none());
-    if !is_open || !message.masks.is_empty() || !message.want.fields.is_empty() {
+    let is_plain = message.want.fields.is_empty() && message.quantity.is_empty();
+    if !is_open || !message.masks.is_empty() || !is_plain {
         return Ok(None);
     }
     let element = element_given(body.element)

@@ -1,6 +1,6 @@
 //! Checks that all displacements, forces and errors of a reply are finite numbers.
 
-use softgrasp_protocol::{Answer, Displacements, Reply, SolveReport};
+use softgrasp_protocol::{Answer, Displacements, GradientValues, Reply, SolveReport};
 
 /// Whether every displacement, force and error of a reply is a finite number. Values that a report leaves
 /// open on purpose (rotation, strain) may be NaN.
@@ -24,7 +24,8 @@ pub(crate) fn is_finite(reply: &Reply) -> bool {
 
 /// Whether displacements, forces and errors of one answer, and of its cases, are finite.
 pub(super) fn answer_is_finite(answer: &Answer) -> bool {
-    let Answer { report, displacements, reactions, mask_forces, cases, fields, .. } = answer;
+    let Answer { report, displacements, reactions, mask_forces, cases, fields, gradient, .. } =
+        answer;
     let are_displacements = match displacements {
         Displacements::F64(values) => all(values.iter().flatten()),
         Displacements::F32Quantised { scale, values } => {
@@ -41,6 +42,7 @@ pub(super) fn answer_is_finite(answer: &Answer) -> bool {
         && fields.iter().all(|case| {
             case.energy.is_finite() && case.arrays.iter().all(|(_, values)| all(values))
         })
+        && gradient.iter().all(GradientValues::is_finite)
 }
 
 fn all<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
@@ -69,11 +71,17 @@ mod tests {
                 error_rel: f64::NAN,
                 arrays: vec![(Field::ElementEnergy, vec![0.25; 2])],
             }],
+            gradient: Some(GradientValues { by_pressures: vec![0.5], ..GradientValues::default() }),
         };
         let is_sound = |answer: &Answer| is_finite(&Reply::Answer(Box::new(answer.clone())));
         assert!(is_sound(&sound));
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            let damages: [fn(&mut Answer, f64); 11] = [
+            let damages: [fn(&mut Answer, f64); 12] = [
+                |answer, value| {
+                    let gradient =
+                        GradientValues { by_pressures: vec![value], ..Default::default() };
+                    answer.gradient = Some(gradient);
+                },
                 |answer, value| answer.fields[0].energy = value,
                 |answer, value| answer.fields[0].arrays[0].1[1] = value,
                 |answer, value| {

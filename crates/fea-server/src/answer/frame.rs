@@ -13,6 +13,7 @@ use super::contact_solution::PreparedSet;
 use super::direct::{self, Posed};
 use super::factor::{FactorRequest, because_of_memory};
 use super::finite::answer_is_finite;
+use super::gradient;
 use super::several::check_cases;
 use crate::clock::StageClock;
 use crate::plan::{Subject, columns_ms, factor_ms, plan_frame};
@@ -71,8 +72,8 @@ fn kept_frame(
 ) -> Option<KeptFrame> {
     let QuestionMessage { known, masks, want, .. } = message;
     let NodeChoice::Nodes(nodes) = &want.nodes else { return None };
-    // Fields need the displacements of all nodes.
-    if !want.fields.is_empty() {
+    // Fields need the displacements of all nodes, and derivatives a factor.
+    if !want.fields.is_empty() || !message.quantity.is_empty() {
         return None;
     }
     // What cannot be small is not even copied for a look, on the thread that all sockets share.
@@ -174,6 +175,8 @@ impl PosedFrame {
         let known = model.known(pairs(&message.known))?;
         check_frame(model, &known, &message)?;
         let plan = plan_frame(&question, &stored, &known, !message.masks.is_empty())?;
+        let plan = gradient::planned(&question, &message, plan)?;
+        gradient::check_quantity(model, &known.dofs, &message)?;
         Ok(Self { hash, stored, message, question, known, plan })
     }
 
@@ -200,9 +203,8 @@ impl PosedFrame {
             (Method::Condensed, Ok(base)) => {
                 let fixed = stored.model.fixed().len().min(known.dofs.len());
                 let nodes = (known.dofs.len() - fixed).div_ceil(3);
-                let entries = base.bytes() as f64 / size_of::<f64>() as f64;
                 let loads = message.forces.len().div_ceil(3) + message.spread.pressures.len();
-                columns_ms(entries, nodes + message.masks.len() + loads, &rates)
+                columns_ms(&base, nodes + message.masks.len() + loads, &rates)
             }
             (method, _) => factor_ms(&stored.model, method, &rates),
         }

@@ -8,11 +8,12 @@ use softgrasp_core::model::{Known, Model};
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::equilibrium::{Equilibrium, Goal, NoEquilibrium, Path, Wish};
 use softgrasp_protocol::{
-    Answer, Deformation, Displacements, DofValue, LargeAsk, LargeReport, LawName, NodeChoice,
-    Question as QuestionMessage, SolveReport, Warning, WarningCode, WarningLevel,
+    Answer, Deformation, Displacements, DofValue, GradientValues, LargeAsk, LargeReport, LawName,
+    NodeChoice, Question as QuestionMessage, SolveReport, Warning, WarningCode, WarningLevel,
 };
 
 use super::fields::{Shape, field_values};
+use super::gradient::{check_equilibrium, check_quantity};
 use super::warnings::add_late;
 use crate::clock::{StageClock, ms_since};
 use crate::machine_memory::last_peak_rss_bytes;
@@ -35,6 +36,8 @@ pub(super) struct LargeQuestion {
     pub mask_q: Vec<f64>,
     pub forces: Vec<f64>,
     pub is_single: bool,
+    /// Whether tangents are inverted by multigrid because the question asks for that.
+    pub by_multigrid: bool,
     pub max_error: Option<f64>,
     pub deadline_ms: Option<f64>,
 }
@@ -55,14 +58,17 @@ impl LargeQuestion {
         let is_single = match question.method {
             None => model.poisson_max() < POISSON_FOR_DOUBLE,
             Some(Method::FrontMixed) => true,
-            Some(Method::Front) => false,
+            Some(Method::Front | Method::Multigrid) => false,
             Some(method) => return Err(Refusal::LargeMethod { method }),
         };
+        let by_multigrid = question.method == Some(Method::Multigrid);
         let known = model.known(pairs(&message.known))?;
+        check_quantity(model, &known.dofs, message)?;
+        check_equilibrium(ask, message)?;
         let forces = checked_forces(model, &known, message)?;
         let (masks, mask_q) = checked_masks(model, message)?;
         let (max_error, deadline_ms) = (question.max_error, question.deadline_ms);
-        Ok(Self { known, masks, mask_q, forces, is_single, max_error, deadline_ms })
+        Ok(Self { known, masks, mask_q, forces, is_single, by_multigrid, max_error, deadline_ms })
     }
 
     /// Moves the path of a live grasp to the prescribed displacements, until the answer is accurate
@@ -132,17 +138,20 @@ pub(super) struct Found<'a> {
     pub is_single: bool,
     pub factor_reused: bool,
     pub chosen_because: String,
+    /// Derivatives of the question's quantity.
+    pub gradient: Option<GradientValues>,
 }
 
 impl Found<'_> {
     /// The answer with the wanted results of the equilibrium, and its report.
     pub fn answer(
-        &self,
+        mut self,
         question: &LargeQuestion,
         message: &QuestionMessage,
         clock: StageClock,
     ) -> Answer {
-        let Self { model, path, equilibrium, summary, .. } = self;
+        let gradient = self.gradient.take();
+        let Self { model, path, equilibrium, summary, .. } = &self;
         let mut stage_ms = clock.finish();
         let start = Instant::now();
         let displacement = path.displacement();
@@ -187,9 +196,17 @@ impl Found<'_> {
             ..SolveReport::default()
         };
         add_warnings(equilibrium, summary, question, &mut report);
-        let nodes = message.want.nodes.clone();
-        let (large, cases) = (Some(self.large_report()), Vec::new());
-        Answer { report, large, nodes, displacements, reactions, mask_forces, cases, fields }
+        Answer {
+            report,
+            large: Some(self.large_report()),
+            nodes: message.want.nodes.clone(),
+            displacements,
+            reactions,
+            mask_forces,
+            cases: Vec::new(),
+            fields,
+            gradient,
+        }
     }
 
     fn large_report(&self) -> LargeReport {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_core::fem::hyperelastic::LargeSummary;
-use softgrasp_core::solve::Stage;
 use softgrasp_core::solve::equilibrium::{Hold, Path};
+use softgrasp_core::solve::{Method, Stage};
 use softgrasp_protocol::{
     Answer, Deformation, Displacements, LargeAsk, ModelHash, NodeChoice, Pace, PathChoice,
     Question as QuestionMessage, Want, Warning, WarningCode, WarningLevel,
@@ -13,6 +13,7 @@ use softgrasp_protocol::{
 
 use super::fields::{Shape, field_values};
 use super::frame::answer_frame;
+use super::gradient::{of_equilibrium, reserve_tangent};
 use super::large::{Found, FramePace, LINEAR_ERROR_REL, LargeQuestion, law_of};
 use super::large_once::{admit_path, linear_answer, promised_error};
 use crate::awaited::Awaited;
@@ -48,6 +49,9 @@ pub(crate) fn answer_large_frame(
     let resources = Arc::clone(resources);
     let stored = resources.models.find(hash).ok_or(Refusal::UnknownModel(hash))?;
     let question = LargeQuestion::new(&stored.model, &ask, &message)?;
+    if question.by_multigrid {
+        return Err(Refusal::LargeMethod { method: Method::Multigrid });
+    }
     let frame = Arc::new(Frame { resources, hash, stored, ask, message, question });
     let (kept, coming) = match seat.with(Option::take) {
         None => (None, None),
@@ -245,6 +249,11 @@ impl Frame {
         let part_will_do = self.ask.pace == Pace::Timely && question.deadline_ms.is_some();
         let pace = FramePace { factor_ms: kept.factor_ms, part_will_do };
         let equilibrium = question.advance(&mut kept.path, &clock, pace)?;
+        let hold = kept.path.hold();
+        let of_tangent =
+            reserve_tangent(&self.resources, (&stored.model, hold), message, Some(self.hash))?;
+        let gradient = of_equilibrium(&stored.model, message, (&kept.path, &equilibrium))?;
+        drop(of_tangent);
         clock.end();
         self.begin_factor(kept);
         let summary = self.summary(kept, &clock);
@@ -262,6 +271,7 @@ impl Frame {
                     "large: linear elasticity promises no error within what is allowed".to_owned()
                 }
             },
+            gradient,
         };
         Ok(found.answer(question, message, clock))
     }

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use softgrasp_core::fem::Element;
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::choose::cheapest_element;
-use softgrasp_core::solve::equilibrium::{Hold, Path};
-use softgrasp_core::solve::memory::Need;
+use softgrasp_core::solve::equilibrium::{Hold, Path, TangentsBy};
+use softgrasp_core::solve::memory::{Need, hierarchy_bytes};
 use softgrasp_core::solve::{Method, Stage};
 use softgrasp_protocol::{Answer, Body, Deformation, LargeAsk, LargeReport, Question};
 
+use super::gradient::{of_equilibrium, reserve_tangent};
 use super::large::{Found, LINEAR_ERROR_REL, LargeQuestion, law_of};
 use super::once::solve_once;
 use super::warnings::locking_warning;
@@ -46,18 +47,26 @@ pub(crate) fn solve_large(
     let element = element_given(element).unwrap_or_else(|| cheapest(poisson_max(&materials)));
     check_node_count(&mesh, resources.config.max_nodes)?;
     let subject = Subject::once(&mesh, message.known.len());
-    let needs = subject.predict(element, &[Method::FrontMixed]);
-    admit(&resources.models, &reservation, &needs, &subject).map_err(PlanError::Memory)?;
+    let needs = subject.predict(element, methods_of(&message));
+    let need =
+        admit(&resources.models, &reservation, &needs, &subject).map_err(PlanError::Memory)?;
     let model = model_of(mesh, &materials, element, Vec::new(), &mut clock)?;
     let question = LargeQuestion::new(&model, &large, &message)?;
     let elements = Arc::new(model.yielding(law_of(large.law), large.yield_stress)?);
     clock.begin(Stage::Order);
-    let hold = Arc::new(model.hold(&question.known.dofs, question.masks.clone(), None)?);
-    admit_path(resources, &reservation, &model, (&hold, question.is_single), &subject)?;
+    let held = Held { resources, reservation: &reservation, model: &model, subject: &subject };
+    let hold = Arc::new(held.hold(&question, &message, need.method)?);
+    let why = match hold.analysis() {
+        None if !question.by_multigrid => format!("{why}; {WITHOUT_FACTOR}"),
+        _ => why,
+    };
+    let _of_tangent = reserve_tangent(resources, (&model, &hold), &message, None)?;
     clock.begin(Stage::Solve);
     let rest = vec![0.0; 3 * model.system_node_count()];
-    let mut path = Path::new(elements, model.stiffness(), hold, rest, question.is_single);
+    let is_single = question.is_single || hold.analysis().is_none();
+    let mut path = Path::new(elements, model.stiffness(), hold, rest, is_single);
     let equilibrium = question.find(&mut path, &clock)?;
+    let gradient = of_equilibrium(&model, &message, (&path, &equilibrium))?;
     clock.end();
     let summary = path.elements().summary(path.displacement());
     let found = Found {
@@ -65,14 +74,67 @@ pub(crate) fn solve_large(
         path: &path,
         equilibrium,
         summary,
-        is_single: question.is_single,
+        is_single,
         factor_reused: false,
         chosen_because: why,
+        gradient,
     };
     let mut answered = found.answer(&question, &message, clock);
     let locks = locking_warning(model.element(), model.poisson_max());
     answered.report.warnings.extend(locks);
     Ok(answered)
+}
+
+/// Why corrections come from multigrid where that was not asked for.
+const WITHOUT_FACTOR: &str = "corrections by conjugate gradients with multigrid, since memory is too \
+                              short for factors of the tangents";
+
+/// Methods by which tangents may be inverted: what the question names, else the first that fits.
+fn methods_of(message: &Question) -> &'static [Method] {
+    match message.method.as_str() {
+        "multigrid" => &[Method::Multigrid],
+        "front" => &[Method::Front],
+        "front-mixed" => &[Method::FrontMixed],
+        _ => &[Method::FrontMixed, Method::Multigrid],
+    }
+}
+
+/// A body that is to be held at large deformation, and the memory that this may take.
+struct Held<'a> {
+    resources: &'a Resources,
+    reservation: &'a Reservation,
+    model: &'a Model,
+    subject: &'a Subject,
+}
+
+impl Held<'_> {
+    /// The hold, with memory reserved for factors of its tangents, or for hierarchies where factors do not
+    /// fit and are not asked for.
+    fn hold(
+        &self,
+        question: &LargeQuestion,
+        message: &Question,
+        predicted: Method,
+    ) -> Result<Hold, Refusal> {
+        let Self { resources, reservation, model, subject } = *self;
+        let by = |by| {
+            let hold = model.hold_by(&question.known.dofs, question.masks.clone(), by, None)?;
+            admit_path(resources, reservation, model, (&hold, question.is_single), subject)?;
+            Ok(hold)
+        };
+        if predicted == Method::Multigrid {
+            return by(TangentsBy::Multigrid);
+        }
+        match by(TangentsBy::Factors) {
+            Err(Refusal::Plan(PlanError::Memory(shortage)))
+                if methods_of(message).contains(&Method::Multigrid) =>
+            {
+                // What is short for a hierarchy too is told by what a factor would take.
+                by(TangentsBy::Multigrid).map_err(|_| Refusal::Plan(PlanError::Memory(shortage)))
+            }
+            held => held,
+        }
+    }
 }
 
 /// Element at large strain, where ten-node elements do not follow as far: a linear one that does not
@@ -156,7 +218,13 @@ pub(super) fn admit_path(
     let blocks = model.stiffness().pattern().block_count();
     // The tangent stands beside the linear stiffness.
     let held = (model.bytes() + blocks * size_of::<[f64; 9]>()) as u64;
-    let need = Need::counted(model.element(), method, held, blocks, hold.analysis());
+    let need = match hold.analysis() {
+        Some(analysis) => Need::counted(model.element(), method, held, blocks, analysis),
+        None => {
+            let hierarchy = hierarchy_bytes(model.system_node_count(), blocks) as u64;
+            Need::exact(model.element(), Method::Multigrid, held, hierarchy)
+        }
+    };
     admit(&resources.models, reservation, &[need], subject).map_err(PlanError::Memory)?;
     Ok(())
 }

@@ -10,6 +10,7 @@ mod factor;
 mod fields;
 mod finite;
 mod frame;
+mod gradient;
 mod large;
 mod large_frame;
 mod large_once;

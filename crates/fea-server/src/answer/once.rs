@@ -10,6 +10,7 @@ use softgrasp_protocol::{Answer, Body, Question as QuestionMessage};
 use super::condensed::{Contacts, StrainOf};
 use super::direct::{self, Posed};
 use super::factor::{FactorRequest, because_of_memory};
+use super::gradient;
 use super::upload::{may_prove, stored};
 use super::warnings::add_plan_warnings;
 use crate::budget::Reservation;
@@ -53,8 +54,10 @@ pub(crate) fn solve_once(
     };
     let models = &resources.models;
     let plan = plan_once(&request, models, &reservation, &resources.rates, || clock.elapsed_ms())?;
+    let plan = gradient::planned(&request.question, &message, plan)?;
     let model = model_of(mesh, &materials, plan.element, Vec::new(), &mut clock)?;
     let known = model.known(pairs(&message.known))?;
+    gradient::check_quantity(&model, &known.dofs, &message)?;
     let forces = checked_forces(&model, &known, &message)?;
     let work = Work { resources, reservation, request, message };
     let (mut answer, plan) = match plan.method {

@@ -59,6 +59,10 @@ impl Equations {
             let (what, instead) = ("weight and pressure", "give their forces on nodes");
             return Err(Refusal::NotByCluster { what, instead });
         }
+        if !task.question.quantity.is_empty() {
+            let (what, instead) = ("derivatives", "ask a server with memory for the model");
+            return Err(Refusal::NotByCluster { what, instead });
+        }
         let forces = scatter_forces((node_count, node_count), &known, &task.question.forces)?;
         let used = mesh.used_nodes();
         let body_count = held_by(&mesh, &used, &known.dofs)?;

@@ -56,6 +56,7 @@ impl Outcome {
             nodes: want.nodes.clone(),
             mask_forces: Vec::new(),
             fields: Vec::new(),
+            gradient: None,
         }
     }
 }

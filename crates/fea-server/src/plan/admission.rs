@@ -32,7 +32,7 @@ impl Subject {
 
     /// Subject of a request about a model that is there.
     pub fn about(model: &Model, known_dofs: usize, kept: Option<ModelHash>) -> Self {
-        let nodes = model.mesh().used_nodes().iter().filter(|used| **used).count();
+        let nodes = model.mesh().is_corner().iter().filter(|is_corner| **is_corner).count();
         let size = MeshSize { nodes, tets: model.mesh().tets().len() };
         let unknown_dofs = model.modelled_dofs().saturating_sub(known_dofs);
         Self { problem: Problem { size, known_dofs }, unknown_dofs, kept }

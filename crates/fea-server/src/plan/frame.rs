@@ -11,6 +11,11 @@ use crate::store::StoredModel;
 /// Number of touched degrees of freedom above which the small system is too large.
 const TOUCHED_DOFS_MAX: usize = 600;
 
+/// Where the columns of frames come from.
+const BY_FACTOR: &str = "frames on a kept model: exact from cached columns";
+const BY_CYCLES: &str = "frames on a kept model: from cached columns, which come from conjugate gradients \
+                         with multigrid, since memory is too short for a factor";
+
 /// Plan of the answer to one frame question.
 ///
 /// # Errors
@@ -43,7 +48,8 @@ pub(crate) fn plan_frame(
             Ok(by_factor(format!("{touched} degrees of freedom are held at once")))
         }
         (None, None) => {
-            let why = "frames on a kept model: exact from cached columns";
+            let has_factor = stored.base().is_ok_and(|base| base.has_factor());
+            let why = if has_factor { BY_FACTOR } else { BY_CYCLES };
             Ok(question.plan(element, Method::Condensed, why))
         }
         (None, Some(obstacle)) => Ok(by_factor(obstacle.to_string())),

@@ -6,10 +6,12 @@ use softgrasp_core::fem::Element;
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::Method;
 use softgrasp_core::solve::choose::cheapest_element;
+use softgrasp_core::solve::condensed::Base;
 use softgrasp_core::solve::rates::Rates;
 use softgrasp_core::solve::work::{MeshSize, Work};
 use softgrasp_protocol::{Ask, Body, ElementChoice, MeshData, Request, Subject, UploadModel};
 
+use super::admission::Subject as Measured;
 use crate::request::{element_given, element_of, poisson_max};
 
 /// Number of tangents that a request at large deformation is assumed to factor.
@@ -19,6 +21,8 @@ const SOLVES_OF_A_FRAME: f64 = 5.0;
 /// Right-hand sides that are solved together in the time of about three single ones.
 const TOGETHER: f64 = 15.0;
 const SOLVES_TOGETHER: f64 = 3.0;
+/// Steps of conjugate gradients for the columns of a contact where there is no factor.
+const CYCLES_OF_A_COLUMN: f64 = 30.0;
 /// Number of solves for all right-hand sides that refinement takes for one case of several.
 const SOLVES_PER_CASE: f64 = 1.0;
 
@@ -69,17 +73,26 @@ pub(crate) fn large_frame_ms(model: &Model, goes_on: bool, rates: &Rates) -> f64
     1e3 * SOLVES_OF_A_FRAME * (solve_s + evaluation_s)
 }
 
-/// Predicted time to compute the columns of `contacts` contacts by a factor of `factor_entries` entries.
+/// Predicted time to compute the columns of `contacts` contacts.
 ///
 /// Units: ms.
-pub(crate) fn columns_ms(factor_entries: f64, contacts: usize, rates: &Rates) -> f64 {
+pub(crate) fn columns_ms(base: &Base, contacts: usize, rates: &Rates) -> f64 {
+    let entry_ms = 1e3 * rates.double.solve_entry_s;
+    if !base.has_factor() {
+        let entries = base.bytes() as f64 / size_of::<f32>() as f64;
+        return entry_ms * CYCLES_OF_A_COLUMN * contacts as f64 * entries;
+    }
+    let entries = base.bytes() as f64 / size_of::<f64>() as f64;
     let together = (3.0 * contacts as f64 / TOGETHER).ceil();
-    1e3 * together * SOLVES_TOGETHER * rates.double.solve_entry_s * factor_entries
+    entry_ms * together * SOLVES_TOGETHER * entries
 }
 
 fn work_of_model(model: &Model) -> Work {
     let mesh = model.mesh();
-    let size = MeshSize { nodes: mesh.node_count(), tets: mesh.tets().len() };
+    let size = match mesh.mid_edge_nodes().is_empty() {
+        true => MeshSize { nodes: mesh.node_count(), tets: mesh.tets().len() },
+        false => Measured::about(model, 0, None).problem.size,
+    };
     Work::estimate(size, model.element())
 }
 
@@ -88,7 +101,12 @@ fn made_ms(rates: &Rates, work: &Work, method: Method) -> f64 {
 }
 
 fn work_of(mesh: &MeshData, element: Element) -> Work {
-    Work::estimate(MeshSize { nodes: mesh.vertices.len(), tets: mesh.tets.len() }, element)
+    let size = match mesh.mid_edge.is_empty() {
+        true => MeshSize { nodes: mesh.vertices.len(), tets: mesh.tets.len() },
+        // The work is estimated from the corners.
+        false => Measured::once(mesh, 0).problem.size,
+    };
+    Work::estimate(size, element)
 }
 
 /// Method of this name; an unknown name is refused later.

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use softgrasp_core::fem::{Element, Material};
-use softgrasp_core::mesh::{TetMesh, signed_volume};
+use softgrasp_core::mesh::{TetMesh, mirrored, mirrored_middles, signed_volume};
 use softgrasp_core::model::Model;
 use softgrasp_protocol::{ElementChoice, ElementName, Material as MaterialMessage, MeshData};
 
@@ -41,8 +41,18 @@ pub(crate) fn mesh_of(
         .collect::<Result<_, _>>()?;
     let regions = ranks(&mesh.regions, materials.len())?;
     let vertices: Vec<_> = mesh.vertices.into_iter().map(Point3::from).collect();
-    let tets = mesh.tets.into_iter().map(|tet| turned(&vertices, tet)).collect();
-    Ok((TetMesh::try_new(vertices, tets, regions)?, materials))
+    let mut tets = mesh.tets;
+    let mut mid_edge = mesh.mid_edge;
+    for (at, tet) in tets.iter_mut().enumerate() {
+        if is_mirrored(&vertices, *tet) {
+            *tet = mirrored(*tet);
+            if let Some(nodes) = mid_edge.get_mut(at) {
+                *nodes = mirrored_middles(*nodes);
+            }
+        }
+    }
+    let mesh = TetMesh::try_new(vertices, tets, regions)?.with_mid_edge_nodes(mid_edge)?;
+    Ok((mesh, materials))
 }
 
 /// Refuses a mesh of more nodes than the server takes, before anything is allocated for it.
@@ -90,16 +100,14 @@ pub(crate) fn poisson_max(materials: &[MaterialMessage]) -> f64 {
     materials.iter().map(|material| material.poisson).fold(-1.0, f64::max)
 }
 
-/// Corners of an element in the order of (3.23). Gmsh and VTK use the other orientation; clients may send
-/// either, since the stiffness does not depend on it.
-fn turned(vertices: &[Point3<f64>], tet: [u32; 4]) -> [u32; 4] {
+/// Whether the corners of an element are in the other order than that of (3.23). Gmsh and VTK use the other
+/// orientation; clients may send either, since the stiffness does not depend on it.
+fn is_mirrored(vertices: &[Point3<f64>], tet: [u32; 4]) -> bool {
     let corner = |i: usize| vertices.get(tet[i] as usize).copied();
     match (corner(0), corner(1), corner(2), corner(3)) {
-        (Some(a), Some(b), Some(c), Some(d)) if signed_volume(&[a, b, c, d]) < 0.0 => {
-            [tet[0], tet[1], tet[3], tet[2]]
-        }
+        (Some(a), Some(b), Some(c), Some(d)) => signed_volume(&[a, b, c, d]) < 0.0,
         // Indices out of range are refused with the mesh.
-        _ => tet,
+        _ => false,
     }
 }
 

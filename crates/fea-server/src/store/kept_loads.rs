@@ -111,7 +111,7 @@ impl KeptLoads {
         if let Some(kept) = kept {
             return Ok(kept);
         }
-        let column = Arc::new(LoadColumn::new(base, &unit_forces(model, key)?));
+        let column = Arc::new(LoadColumn::try_new(base, &unit_forces(model, key)?)?);
         self.columns.with(|all| {
             // Two frames at once may have made the same column.
             all.retain(|kept| kept.key != *key);

@@ -33,11 +33,8 @@ fn every_line_of_a_session_bears_its_number_and_its_peer() {
         let mut client = server.client();
         assert_eq!(client.hello("a test", None), Ok(()));
         let method = MethodName::try_new("nosuch").unwrap();
-        let body = Body {
-            mesh: MeshData { vertices: Vec::new(), tets: Vec::new(), regions: Vec::new() },
-            materials: Vec::new(),
-            element: ElementChoice::T4,
-        };
+        let body =
+            Body { mesh: MeshData::default(), materials: Vec::new(), element: ElementChoice::T4 };
         let once = Ask::new(body, Question { method, ..Question::default() });
         assert!(client.ask(&Request::from(once)).is_some());
         client.send(b"this is no frame");

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use nalgebra::Point3;
-use softgrasp_core::fem::{Element, QuadraticMesh, TooManyNodes, tet10};
+use softgrasp_core::fem::{Element, QuadraticMesh, QuadraticMeshError, tet10};
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_protocol::{DofValue, LawName, Material};
 
@@ -41,9 +41,9 @@ pub enum DeckError {
         /// Law of the question.
         law: LawName,
     },
-    /// The mesh has too many nodes for mid-edge nodes.
+    /// The mesh has too many nodes for mid-edge nodes, or its own do not fit together.
     #[error(transparent)]
-    Mesh(#[from] TooManyNodes),
+    Mesh(#[from] QuadraticMeshError),
 }
 
 /// Nodes and elements as CalculiX counts them.
@@ -56,7 +56,8 @@ struct Cells {
 }
 
 impl CalculixDeck<'_> {
-    /// The deck: nodes count from 1 in the order of the mesh, mid-edge nodes follow and are free.
+    /// The deck: nodes count from 1 in the order of the mesh; mid-edge nodes that it does not bring along
+    /// follow and are free.
     ///
     /// A question of large deformation is answered in increments (NLGEOM) with C₁₀ = μ/2 and
     /// D₁ = 2/κ, which is the law `neo-hookean`.
@@ -138,7 +139,7 @@ impl Cells {
             Element::Tet4 => Ok(Self {
                 vertices: mesh.vertices().to_vec(),
                 tets: mesh.tets().iter().map(|&[a, b, c, d]| vec![a, b, d, c]).collect(),
-                used: mesh.used_nodes(),
+                used: mesh.is_corner(),
                 name: "C3D4",
             }),
             Element::Tet10 => {

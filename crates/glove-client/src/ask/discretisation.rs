@@ -1,7 +1,8 @@
 //! Estimates the error of the mesh's discretisation by solving once more with the other element.
 
 use softgrasp_protocol::{
-    Answer, Ask, Body, ElementChoice, ElementName, MethodName, NodeChoice, Question, Want,
+    Answer, Ask, Body, DofValue, ElementChoice, ElementName, MeshData, MethodName, NodeChoice,
+    Question, Want,
 };
 
 use crate::ask::connection::ServerConnection;
@@ -9,7 +10,7 @@ use crate::ask::connection::ServerConnection;
 /// Estimate of the error of the mesh's discretisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiscretisationEstimate {
-    /// `‖u_t4 − u_t10‖ / ‖u_t10‖` over the nodes of the mesh, for the same prescribed displacements and
+    /// `‖u_t4 − u_t10‖ / ‖u_t10‖` over the corners of the mesh, for the same prescribed displacements and
     /// forces; `None` where there is none.
     pub rel: Option<f64>,
     /// How the estimate was made, or why there is none.
@@ -37,6 +38,16 @@ impl DiscretisationEstimate {
         answer: &Answer,
         displacements: &[[f64; 3]],
     ) -> Self {
+        let is_corner = is_corner(&body.mesh);
+        let is_middle = |of: &&DofValue| {
+            let node = of.dof as usize / 3;
+            !body.mesh.mid_edge.is_empty() && is_corner.get(node) == Some(&false)
+        };
+        if let Some(of) = question.known.iter().chain(&question.forces).find(is_middle) {
+            let node = of.dof / 3;
+            let why = format!("node {node} is a mid-edge node, which linear elements do not have");
+            return Self { rel: None, why };
+        }
         let is_quadratic = answer.report.element == ElementName::T10;
         let element = if is_quadratic { ElementChoice::T4 } else { ElementChoice::T10 };
         let question = Question {
@@ -57,7 +68,11 @@ impl DiscretisationEstimate {
             false => (displacements, second.as_slice()),
             true => (second.as_slice(), displacements),
         };
-        match difference_rel(linear, quadratic) {
+        let at_corners = |all: &[[f64; 3]]| -> Vec<[f64; 3]> {
+            let both = all.iter().zip(&is_corner);
+            both.filter(|(_, is_corner)| **is_corner).map(|(u, _)| *u).collect()
+        };
+        match difference_rel(&at_corners(linear), &at_corners(quadratic)) {
             Some(rel) => Self {
                 rel: Some(rel),
                 why: "an estimate, not a bound: the difference between linear and ten-node \
@@ -67,6 +82,17 @@ impl DiscretisationEstimate {
             None => Self { rel: None, why: "nothing moves".to_owned() },
         }
     }
+}
+
+/// For each node, whether it is a corner of an element.
+fn is_corner(mesh: &MeshData) -> Vec<bool> {
+    let mut is_corner = vec![false; mesh.vertices.len()];
+    for &node in mesh.tets.iter().flatten() {
+        if let Some(is_corner) = is_corner.get_mut(node as usize) {
+            *is_corner = true;
+        }
+    }
+    is_corner
 }
 
 /// `‖a − b‖ / ‖b‖`; `None` if `b` is zero or one of them is too large.

@@ -9,6 +9,7 @@ use softgrasp_grasp::hand::HandDimensions;
 use softgrasp_hand::foreign_recording::is_foreign;
 use softgrasp_hand::hand_request::HandRequest;
 use softgrasp_hand::hand_setup::HandConfiguration;
+use softgrasp_hand::xr_runtime::WantedHands;
 
 use super::hand_files::read_configuration;
 use super::numbers::{place, positive};
@@ -17,8 +18,8 @@ use super::numbers::{place, positive};
 #[derive(Args, Clone, Default)]
 pub(super) struct HandArguments {
     /// The hand: scripted[:lift|approach|attach|squeeze|release|regrasp], mouse (in a window),
-    /// serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, xr (with --xr), or
-    /// replay:F.mcap. Given twice, a right and a left hand act at once (with --grasp contact).
+    /// serial:glove=PATH[@BAUD],tracker=PATH[@BAUD], joints:IP:PORT, xr (with --xr),
+    /// openxr[:left|:right] (a build with the feature openxr), or replay:F.mcap. Given twice, a right and a left hand act at once (with --grasp contact).
     #[arg(long = "hand", value_name = "SOURCE")]
     pub(super) hands: Vec<HandRequest>,
     /// Configuration of the hand, its glove and its tracker (hand.toml, made by `calibrate` and
@@ -91,6 +92,9 @@ impl HandArguments {
             (HandRequest::Xr, HandRequest::Xr) => {
                 bail!("--hand xr brings both hands of a headset: name it once")
             }
+            (HandRequest::OpenXr(_), HandRequest::OpenXr(_)) => {
+                bail!("--hand openxr brings both hands of a runtime: name it once")
+            }
             (HandRequest::Joints(a), HandRequest::Joints(b)) if a == b => {
                 bail!("--hand joints:{a} brings both hands of its senders: name it once")
             }
@@ -143,7 +147,11 @@ impl HandArguments {
         of_first: &HandConfiguration,
     ) -> anyhow::Result<Option<SecondHand>> {
         let request = self.hands.get(1).cloned();
-        let carries_both = matches!(first, HandRequest::Joints(_) | HandRequest::Xr);
+        let carries_both = match first {
+            HandRequest::Joints(_) | HandRequest::Xr => true,
+            HandRequest::OpenXr(wanted) => *wanted == WantedHands::Both,
+            _ => false,
+        };
         if request.is_none() && !carries_both {
             return Ok(None);
         }
@@ -176,5 +184,33 @@ impl HandArguments {
             configuration.setup.dimensions = size.with_handedness(old.handedness);
         }
         Ok(configuration)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use softgrasp_grasp::hand::Handedness;
+
+    use super::*;
+
+    #[test]
+    fn runtime_brings_both_hands_unless_one_is_named() {
+        let of_first = HandConfiguration::default();
+        let second = |wanted| {
+            let hands = HandArguments::of(HandRequest::OpenXr(wanted));
+            hands.check().unwrap();
+            hands.second(&hands.hands[0], &of_first).unwrap()
+        };
+        let both = second(WantedHands::Both).unwrap();
+        assert!(both.shares_stream && both.is_live && both.request.is_none());
+        assert_eq!(both.world_from_sender, None, "the first hand places the runtime's space");
+        assert!(second(WantedHands::One(Handedness::Left)).is_none());
+        let left = HandRequest::OpenXr(WantedHands::One(Handedness::Left));
+        let mut hands = HandArguments::of(left.clone());
+        hands.hands.push(HandRequest::Mouse);
+        hands.check().unwrap();
+        assert!(hands.second(&left, &of_first).unwrap().is_some_and(|hand| !hand.shares_stream));
+        hands.hands[1] = HandRequest::OpenXr(WantedHands::One(Handedness::Right));
+        assert!(hands.check().unwrap_err().to_string().contains("name it once"));
     }
 }

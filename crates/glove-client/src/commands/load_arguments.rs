@@ -189,17 +189,26 @@ fn triangles_of(bytes: &[u8]) -> anyhow::Result<Vec<[u32; 3]>> {
     Ok(triangles)
 }
 
-/// Refuses loads that a server does not know, before it is asked.
+/// Refuses loads and mid-edge nodes that a server does not know, before it is asked.
 ///
 /// # Errors
 /// One line that names the server.
-pub(super) fn check_server(spread: &SpreadLoads, server: &Welcome) -> anyhow::Result<()> {
-    if !spread.is_empty() && !server.capabilities.iter().any(|name| name == "loads") {
+pub(super) fn check_server(
+    (mesh, spread): (&TetMesh, &SpreadLoads),
+    server: &Welcome,
+) -> anyhow::Result<()> {
+    let knows = |what: &str| server.capabilities.iter().any(|name| name == what);
+    let older = format!("{} {} is an older server", server.server, server.version);
+    if !spread.is_empty() && !knows("loads") {
         bail!(
-            "{} {} is an older server and takes no weight and no pressure; leave out --gravity, \
-             --density and --pressure, or give them as --forces",
-            server.server,
-            server.version
+            "{older} and takes no weight and no pressure; leave out --gravity, --density and \
+             --pressure, or give them as --forces"
+        );
+    }
+    if !mesh.mid_edge_nodes().is_empty() && !knows("mid-edge") {
+        bail!(
+            "{older} and takes no mid-edge nodes; take --element t4, or a file of four-node \
+             tetrahedra, to which it adds straight edges for t10"
         );
     }
     Ok(())

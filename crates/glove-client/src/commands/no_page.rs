@@ -9,7 +9,8 @@ use softgrasp_window::view::control::Control;
 #[cfg(feature = "window")]
 use softgrasp_window::view::frame::ViewFrame;
 
-use super::run_arguments::{RunArguments, RunPlan};
+use super::run_arguments::RunArguments;
+use super::run_plan::RunPlan;
 use crate::pace::Due;
 use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;

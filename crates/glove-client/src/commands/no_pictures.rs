@@ -2,7 +2,8 @@
 
 use anyhow::bail;
 
-use super::run_arguments::{RunArguments, RunPlan};
+use super::run_arguments::RunArguments;
+use super::run_plan::RunPlan;
 use crate::pace::Due;
 use crate::run::session::Session;
 use crate::run::tick_outcome::TickOutcome;

@@ -174,7 +174,9 @@ impl PressCommand {
     /// told.
     fn read_object(&self) -> anyhow::Result<(TetMesh, Vec<String>)> {
         match read_object_file(&self.mesh, NODES_DEFAULT)? {
-            ObjectFile::Mesh(file) => Ok((file.mesh, file.findings.region_labels)),
+            ObjectFile::Mesh(file) => {
+                Ok((file.mesh.without_mid_edge_nodes(), file.findings.region_labels))
+            }
             ObjectFile::Surface(surface) => {
                 let doubt = surface.doubtful_unit().map(|doubt| {
                     format!("{doubt}: `glove-client fill {} --scale S` first", self.mesh.display())

@@ -53,7 +53,7 @@ impl ReplayCommand {
         let arguments = RunArguments {
             hand: HandArguments::of(HandRequest::Replay(self.recording.clone())),
             speed: Some(self.speed),
-            object: self.object.clone(),
+            object: self.object.iter().cloned().collect(),
             server: self.server.clone(),
             access: self.access.clone(),
             threads: self.threads,

@@ -8,9 +8,10 @@ use clap::Args;
 
 use super::device_sentences::DeviceSentences;
 use super::key_frames::KeyFrames;
-use super::run_arguments::{RunArguments, RunPlan};
+use super::run_arguments::RunArguments;
 use super::run_page::{PageTalk, RunPage};
 use super::run_pictures::RunPictures;
+use super::run_plan::RunPlan;
 use super::run_series::RunSeries;
 use super::run_setup::{ReadyRun, Setup, SetupStage, make_ready};
 #[cfg(feature = "window")]
@@ -184,7 +185,7 @@ impl RunCommand {
             threads: self.arguments.threads,
             // Whoever looks at the page sees the story again.
             ends_with_script: self.arguments.ticks.is_none()
-                && (page.is_none() || !plan.begins_anew(&self.arguments)),
+                && (page.is_none() || !self.arguments.begins_anew(plan)),
             squeeze_times: if shown_slowly { 3 } else { 1 },
             joints: page.map(RunPage::joints),
         }

@@ -7,26 +7,21 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use nalgebra::Isometry3;
-use softgrasp_core::fem::Material as ElasticMaterial;
 use softgrasp_grasp::object::ObjectChoice;
 use softgrasp_hand::foreign_recording::is_foreign;
-use softgrasp_hand::hand_reader::HandSetup;
-#[cfg(any(feature = "window", feature = "xr"))]
-use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::hand_request::HandRequest;
-use softgrasp_hand::hand_setup::HandConfiguration;
-use softgrasp_hand::recording::{Recording, read_recording};
+use softgrasp_hand::recording::read_recording;
 use softgrasp_hand::scripted::ScriptName;
-use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
+use softgrasp_protocol::{ElementChoice, MethodName};
 
 use super::access_arguments::AccessArguments;
 use super::contact_arguments::{ContactArguments, GraspRule};
 use super::display_arguments::DisplayArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::force_arguments::ForceArguments;
-use super::hand_arguments::{HandArguments, SecondHand};
+use super::hand_arguments::HandArguments;
 use super::numbers::{count, poisson, positive, speed, ticks};
+use super::object_plan::{Laying, ObjectFlags, ObjectPlan};
 use super::page_arguments::PageArguments;
 use super::recorded_object::recorded_object;
 use super::recorded_settings::{
@@ -34,16 +29,13 @@ use super::recorded_settings::{
     recorded_settings,
 };
 use super::region_arguments::RegionArguments;
+use super::run_plan::{RunPlan, WATCHED_RATE_HZ};
 use crate::ask::connection::ServerChoice;
-use crate::ask::endpoint::Endpoint;
-use crate::ask::solve_settings::Elasticity;
-use crate::ask::solve_settings::{SolveSettings, Subscription, element_for_frames};
-use crate::object::loading::ObjectRequest;
+use crate::ask::solve_settings::{Elasticity, Subscription};
 use crate::object::object_place::ObjectPlace;
-use crate::object::region_choice::RegionChoice;
-use crate::object::scene::{NODES_DEFAULT, SceneFile, size_to_hold};
+use crate::object::scene::SceneFile;
+use crate::object::scene_objects::SceneEntry;
 use crate::pace::Pace;
-use crate::run::contact_grasp::ContactScene;
 
 /// Grasp and squeeze an object (the main job; also what `glove-client` alone does).
 #[derive(Args, Clone, Default)]
@@ -54,9 +46,10 @@ pub struct RunArguments {
     /// cube, sphere, strawberry, toothpaste, or a mesh file [default: strawberry].
     #[arg(value_name = "FILE|SHAPE", conflicts_with = "object")]
     pub(super) named_object: Option<ObjectChoice>,
-    /// The same as an option.
+    /// The same as an option. Given several times, so many objects lie beside each other on the table
+    /// (with --grasp contact); each touches hand and table, not the others.
     #[arg(long, value_name = "FILE|SHAPE")]
-    pub(super) object: Option<ObjectChoice>,
+    pub(super) object: Vec<ObjectChoice>,
     /// Nodes of a built-in object [default: 1000].
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub(super) nodes: Option<usize>,
@@ -67,6 +60,10 @@ pub struct RunArguments {
     /// The hands that act.
     #[command(flatten)]
     pub(super) hand: HandArguments,
+    /// Of several objects, number of the one that a scripted hand lifts and that the mouse hand goes to
+    /// first [default: 1].
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    pub(super) lifts: Option<usize>,
     /// Where the object is put: home, or hand, between thumb and fingers of the first hand that is heard
     /// of [default: home].
     #[arg(long, value_name = "home|hand")]
@@ -154,60 +151,6 @@ impl PlaceChoice {
     }
 }
 
-/// Element for the ticks; it must be one that `condensed` can solve.
-fn chosen_element(choice: ElementChoice, poisson: f64) -> anyhow::Result<ElementName> {
-    match choice {
-        ElementChoice::T4 => Ok(ElementName::T4),
-        ElementChoice::T4Anp => Ok(ElementName::T4Anp),
-        ElementChoice::Auto => Ok(element_for_frames(poisson)),
-        ElementChoice::T10 => bail!(
-            "run has no ten-node elements: a frame would take as long as a whole solve; take t4, \
-             t4-anp or auto, or solve one request with `glove-client solve --element t10`"
-        ),
-    }
-}
-
-/// Settings of a run, from flags and scene file.
-#[derive(Clone)]
-pub(super) struct RunPlan {
-    /// Object that is grasped.
-    pub(super) object: ObjectChoice,
-    /// Number of nodes of a built-in object.
-    pub(super) nodes: usize,
-    /// Longest extent of the object, m; `None` where the hand may choose it.
-    pub(super) object_size: Option<f64>,
-    /// Regions of a material of their own.
-    pub(super) regions: Vec<RegionChoice>,
-    /// Material, and settings of the solves.
-    pub(super) settings: SolveSettings,
-    /// Constants of a grasp by friction; `None` for the thesis's rules.
-    pub(super) contact_scene: Option<ContactScene>,
-    /// Device that takes the forces.
-    pub(super) force: Option<softgrasp_force::Target>,
-    /// Place where the object is put.
-    pub(super) place: ObjectPlace,
-    /// Server that solves.
-    pub(super) server: ServerChoice,
-    /// Endpoint of the server, with token and encryption; `None` for the embedded one.
-    pub(super) endpoint: Option<Endpoint>,
-    /// Hand that is asked for; the first of two.
-    pub(super) hand: HandRequest,
-    /// Second hand, or one that the stream of the first may carry.
-    pub(super) second: Option<SecondHand>,
-    /// Whether ticks wait for answers.
-    pub(super) pace: Pace,
-    /// Time from tick to tick, in real time; `None` for as fast as possible.
-    pub(super) period: Option<Duration>,
-    /// Configuration of the hand, its glove and its tracker.
-    pub(super) hand_configuration: HandConfiguration,
-    /// Whether the samples come from live devices.
-    pub(super) is_live: bool,
-    /// Pose in the world of a sender of joints; `None` puts its first hand before the object.
-    pub(super) world_from_sender: Option<Isometry3<f64>>,
-    /// Recording that is replayed.
-    pub(super) recording: Option<Arc<Recording>>,
-}
-
 /// Rules of the grasp, equations, and configuration of the hand.
 struct Grasping {
     rule: GraspRule,
@@ -215,10 +158,11 @@ struct Grasping {
     hand: HandRequest,
 }
 
-/// Ticks per second if a person watches.
-const WATCHED_RATE_HZ: f64 = 60.0;
 /// Longest time from tick to tick, s.
 const PERIOD_MAX_S: f64 = 3600.0;
+
+/// Most objects on one table: so many are drawn, and each has a link to the server.
+const OBJECTS_MAX: usize = 8;
 
 impl RunArguments {
     /// Whether the run is played without a window, because pictures are drawn tick by tick.
@@ -238,7 +182,13 @@ impl RunArguments {
 
     /// Object that was named, with or without `--object`.
     pub(super) fn asked_object(&self) -> Option<&ObjectChoice> {
-        self.object.as_ref().or(self.named_object.as_ref())
+        self.object.first().or(self.named_object.as_ref())
+    }
+
+    /// Whether the script of a run begins again after its end; not if the run is recorded or has a number
+    /// of ticks.
+    pub(super) fn begins_anew(&self, plan: &RunPlan) -> bool {
+        self.record.is_none() && self.ticks.is_none() && plan.recording.is_none()
     }
 
     /// Settings of the run, from flags and scene file.
@@ -252,28 +202,12 @@ impl RunArguments {
         {
             return self.plan_of_recording(path);
         }
-        let scene = self.scene.as_deref().map(SceneFile::read).transpose()?.unwrap_or_default();
-        let object = self.chosen_object(&scene)?;
-        let method = match (&self.method, &scene.method) {
-            (Some(method), _) => method.clone(),
-            (None, Some(name)) => name.parse().context("the scene's method")?,
-            (None, None) => MethodName::auto(),
-        };
-        let element = match (self.element, &scene.element) {
-            (Some(element), _) => element,
-            (None, Some(name)) => name.parse().context("the scene's element")?,
-            (None, None) => ElementChoice::Auto,
-        };
-        let material = Material {
-            young: self.young.or(scene.young_pa).unwrap_or(2.0e4),
-            poisson: self.poisson.or(scene.poisson).unwrap_or(0.4),
-        };
-        // Flags have been checked; what is wrong here stands in the scene file.
-        ElasticMaterial::try_new(material.young, material.poisson)
-            .context("the scene's material")?;
-        let regions = self.chosen_regions(&scene)?;
-        let largest = regions.iter().map(|region| region.poisson).fold(material.poisson, f64::max);
-        let Grasping { rule, elasticity, hand } = self.grasping(&scene, &method)?;
+        let file = self.scene.as_deref().map(SceneFile::read).transpose()?.unwrap_or_default();
+        let objects = self.scenes_of_objects(&file)?;
+        let is_several = objects.len() > 1;
+        let (scene, first_laying) = &objects[0];
+        let method = self.chosen_method(scene)?;
+        let Grasping { rule, elasticity, hand } = self.grasping(scene, &method, is_several)?;
         let is_xr = self.takes_headset(&hand)?;
         let (force, contact_scene) = self.felt.of_run(rule.scene)?;
         let hand_configuration = self.hand.configuration()?;
@@ -283,27 +217,28 @@ impl RunArguments {
         // Devices have a time of their own.
         let is_timed = hand.is_live() || second.as_ref().is_some_and(|second| second.is_live);
         let period = self.period(is_timed || force.is_some());
-        let object_size =
-            self.object_size.or(scene.object_size_m).or_else(|| size_to_hold(&object));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
-        Ok(RunPlan {
-            object,
-            nodes: self.nodes.or(scene.nodes).unwrap_or(NODES_DEFAULT),
-            object_size,
-            regions,
-            settings: SolveSettings {
-                material,
-                element: chosen_element(element, largest)?,
-                method,
-                contact: rule.contact,
-                subscription: match self.needs_whole() {
-                    false => Subscription::Surface,
-                    true => Subscription::Whole,
-                },
-                elasticity,
-                max_error: self.max_error,
+        let flags = ObjectFlags {
+            object: self.asked_object().filter(|_| !is_several),
+            nodes: self.nodes,
+            size_m: self.object_size,
+            young: self.young,
+            poisson: self.poisson,
+            element: self.element,
+            regions: &self.regions.regions,
+            method,
+            subscription: match self.needs_whole() {
+                false => Subscription::Surface,
+                true => Subscription::Whole,
             },
-            contact_scene,
+            max_error: self.max_error,
+        };
+        let first = flags.plan(scene, GraspRule { scene: contact_scene, ..rule }, elasticity)?;
+        Ok(RunPlan {
+            further: self.further(&flags, &objects[1..])?,
+            first_laying: first_laying.clone(),
+            aim: self.aim(objects.len())?,
+            first,
             force,
             place: self.place.map_or(ObjectPlace::Home, PlaceChoice::place),
             endpoint: self.access.to(&server)?,
@@ -319,13 +254,94 @@ impl RunArguments {
         })
     }
 
-    /// Object that flags or scene name; a strawberry where none does.
-    fn chosen_object(&self, scene: &SceneFile) -> anyhow::Result<ObjectChoice> {
-        Ok(match (self.asked_object(), &scene.object) {
-            (Some(choice), _) => choice.clone(),
-            (None, Some(name)) => name.parse()?,
-            (None, None) => "strawberry".parse()?,
+    /// Method that flags or scene name.
+    fn chosen_method(&self, scene: &SceneFile) -> anyhow::Result<MethodName> {
+        Ok(match (&self.method, &scene.method) {
+            (Some(method), _) => method.clone(),
+            (None, Some(name)) => name.parse().context("the scene's method")?,
+            (None, None) => MethodName::auto(),
         })
+    }
+
+    /// Plans of the further objects, each of its own scene.
+    fn further(
+        &self,
+        flags: &ObjectFlags<'_>,
+        scenes: &[(SceneFile, Laying)],
+    ) -> anyhow::Result<Vec<(ObjectPlan, Laying)>> {
+        let plan = |scene: &SceneFile| {
+            let rule = self.grasp.of_run(scene, &self.elasticity, false)?;
+            flags.plan(scene, rule, self.elasticity.of_contact(scene)?)
+        };
+        let plans = scenes.iter().enumerate().map(|(at, (scene, laying))| {
+            let plan = plan(scene).with_context(|| format!("object {}", at + 2))?;
+            Ok((plan, laying.clone()))
+        });
+        plans.collect()
+    }
+
+    /// Scene of each object: those that flags name, or else those of the file, each with what it has of its
+    /// own. Several are grasped by contact, unless something else is asked for.
+    ///
+    /// # Errors
+    /// What does not go with several objects.
+    fn scenes_of_objects(&self, file: &SceneFile) -> anyhow::Result<Vec<(SceneFile, Laying)>> {
+        let named: Vec<SceneEntry> = match &self.object[..] {
+            [] if self.named_object.is_none() => file.entries().to_vec(),
+            [] | [_] => Vec::new(),
+            several => several.iter().map(SceneEntry::of).collect(),
+        };
+        if named.len() < 2 {
+            // A flag replaces a list, and a list of one is one object.
+            let alone = named.first().map(|entry| file.of_entry(entry));
+            let laying = named.first().map(Laying::of).transpose()?.unwrap_or_default();
+            return Ok(vec![(alone.unwrap_or_else(|| file.clone()), laying)]);
+        }
+        if named.len() > OBJECTS_MAX {
+            bail!(
+                "{} objects do not lie on one table: there is room for {OBJECTS_MAX}",
+                named.len()
+            );
+        }
+        self.check_several(file)?;
+        let of_entry = |entry: &SceneEntry| {
+            let mut scene = file.of_entry(entry);
+            scene.grasp.get_or_insert_with(|| "contact".to_owned());
+            Ok((scene, Laying::of(entry)?))
+        };
+        named.iter().map(of_entry).collect()
+    }
+
+    /// Checks that nothing was asked for that several objects do not go with.
+    fn check_several(&self, file: &SceneFile) -> anyhow::Result<()> {
+        let refused = [
+            (self.record.is_some(), "--record: a recording holds one object"),
+            (self.series.is_some(), "--series: its files hold one object"),
+            (self.out_dir.is_some(), "--out-dir: its files hold one object"),
+            (self.felt.force.is_some(), "--force: a hand feels one object"),
+            (
+                !self.regions.regions.is_empty(),
+                "--material-region: write the region under its object, as [[object.region]] of a scene",
+            ),
+            (
+                !file.region.is_empty(),
+                "[[region]]: write the region under its object, as [[object.region]]",
+            ),
+        ];
+        match refused.iter().find(|(is_asked, _)| *is_asked) {
+            Some((_, what)) => bail!("several objects do not go with {what}"),
+            None => Ok(()),
+        }
+    }
+
+    /// Number, from 0, of the object that a hand goes to by itself.
+    fn aim(&self, objects: usize) -> anyhow::Result<usize> {
+        match self.lifts.unwrap_or(1) {
+            lifts if lifts > objects => {
+                bail!("--lifts {lifts}: there are {objects} objects; the first is 1")
+            }
+            lifts => Ok(lifts.saturating_sub(1)),
+        }
     }
 
     /// Time from tick to tick, if a person watches or the hand `is_timed`.
@@ -333,22 +349,6 @@ impl RunArguments {
         let is_timed = is_timed || self.is_watched();
         let rate = self.rate.or(is_timed.then_some(WATCHED_RATE_HZ))?;
         Some(Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)))
-    }
-
-    /// Regions of flags and scene; a flag wins over the scene's region of its name, whose place it keeps.
-    fn chosen_regions(&self, scene: &SceneFile) -> anyhow::Result<Vec<RegionChoice>> {
-        let mut regions = scene.region.clone();
-        for region in &self.regions.regions {
-            match regions.iter_mut().find(|known| known.name == region.name) {
-                Some(known) => {
-                    (known.young_pa, known.poisson) = (region.young_pa, region.poisson);
-                }
-                None => regions.push(region.clone()),
-            }
-        }
-        // Flags have been checked; what is wrong here stands in the scene file.
-        regions.iter().try_for_each(|region| region.material().map(drop)).context("the scene")?;
-        Ok(regions)
     }
 
     /// Whether the first hand is that of a headset, which a page must send.
@@ -363,11 +363,16 @@ impl RunArguments {
     }
 
     /// Rules of the grasp, equations, and configuration of the hand.
-    fn grasping(&self, scene: &SceneFile, method: &MethodName) -> anyhow::Result<Grasping> {
+    fn grasping(
+        &self,
+        scene: &SceneFile,
+        method: &MethodName,
+        is_several: bool,
+    ) -> anyhow::Result<Grasping> {
         // A run of which nothing was said picks a strawberry from a table. Hands that are no script of the
         // thesis's grasp grasp as hands do.
         let lifts = match self.hand.first() {
-            _ if self.hand.are_two() => true,
+            _ if self.hand.are_two() || is_several => true,
             Some(HandRequest::Scripted(script)) => *script == ScriptName::Lift,
             Some(_) => true,
             None => self.asked_object().is_none() && self.scene.is_none(),
@@ -376,6 +381,9 @@ impl RunArguments {
         let rule = self.grasp.of_run(scene, &self.elasticity, needs_thesis)?;
         if self.hand.are_two() && rule.scene.is_none() {
             bail!("two hands need --grasp contact: the rules of the thesis know one hand");
+        }
+        if is_several && rule.scene.is_none() {
+            bail!("several objects need --grasp contact: the rules of the thesis know one object");
         }
         let elasticity = match rule.scene {
             Some(_) => self.elasticity.of_contact(scene)?,
@@ -392,6 +400,9 @@ impl RunArguments {
     /// Settings of the run that is replayed: object, material and solves are the recorded ones, whatever
     /// the scene file says.
     fn plan_of_recording(&self, path: &Path) -> anyhow::Result<RunPlan> {
+        if self.object.len() > 1 || self.lifts.is_some() {
+            bail!("a recording holds one object: leave out the second --object, and --lifts");
+        }
         let recording = read_recording(path)?;
         let setup = &recording.setup;
         let recorded_s = setup.period_s.unwrap_or(1.0 / WATCHED_RATE_HZ);
@@ -400,15 +411,20 @@ impl RunArguments {
         let period = (speed > 0.0).then(|| (recorded_s / speed).min(PERIOD_MAX_S));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
         Ok(RunPlan {
-            object: match self.asked_object() {
-                Some(named) => named.clone(),
-                None => recorded_object(path, &setup.object)?,
+            first: ObjectPlan {
+                object: match self.asked_object() {
+                    Some(named) => named.clone(),
+                    None => recorded_object(path, &setup.object)?,
+                },
+                nodes: setup.nodes,
+                size_m: setup.size_m,
+                regions: recorded_regions(setup),
+                settings: recorded_settings(setup)?,
+                contact_scene: recorded_scene(setup),
             },
-            nodes: setup.nodes,
-            object_size: setup.size_m,
-            regions: recorded_regions(setup),
-            settings: recorded_settings(setup)?,
-            contact_scene: recorded_scene(setup),
+            first_laying: Laying::default(),
+            further: Vec::new(),
+            aim: 0,
             force: None,
             place: if setup.placed_in_hand { ObjectPlace::Hand } else { ObjectPlace::Home },
             endpoint: self.access.to(&server)?,
@@ -423,73 +439,6 @@ impl RunArguments {
             world_from_sender: recorded_place(setup),
             recording: Some(Arc::new(recording)),
         })
-    }
-}
-
-impl RunPlan {
-    /// Time from tick to tick of a hand that a person moves or watches, s.
-    pub(super) fn tick_s(&self) -> f64 {
-        self.period.map_or(1.0 / WATCHED_RATE_HZ, |period| period.as_secs_f64())
-    }
-
-    /// The same settings for a person who watches: in real time.
-    #[cfg(feature = "window")]
-    pub(super) fn for_window(&self) -> Self {
-        let period = Some(Duration::from_secs_f64(self.tick_s()));
-        let pace = if self.recording.is_some() { self.pace } else { Pace::Free };
-        Self { pace, period, ..self.clone() }
-    }
-
-    /// Sources of the hands, the second one's where it has its own.
-    pub(super) fn sources(&self) -> impl Iterator<Item = &HandRequest> {
-        let second = self.second.as_ref().and_then(|second| second.request.as_ref());
-        std::iter::once(&self.hand).chain(second)
-    }
-
-    /// Kind of the hand that window and page are made for: the mouse, where it moves one of two.
-    #[cfg(any(feature = "window", feature = "xr"))]
-    pub(super) fn choice(&self) -> HandChoice {
-        let mut choices = self.sources().map(HandRequest::choice);
-        let is_moved = choices.any(|choice| choice == HandChoice::Mouse);
-        if is_moved { HandChoice::Mouse } else { self.hand.choice() }
-    }
-
-    /// Name of the sources in reports and recordings.
-    pub(super) fn hand_name(&self) -> String {
-        self.sources().map(HandRequest::to_string).collect::<Vec<_>>().join(" + ")
-    }
-
-    /// Whether a hand is that of a headset.
-    #[cfg(feature = "xr")]
-    pub(super) fn takes_headset(&self) -> bool {
-        self.sources().any(|source| *source == HandRequest::Xr)
-    }
-
-    /// Whether a script begins again after its end; not if the run is recorded or has a number of ticks.
-    pub(super) fn begins_anew(&self, arguments: &RunArguments) -> bool {
-        arguments.record.is_none() && arguments.ticks.is_none() && self.recording.is_none()
-    }
-
-    /// Material as the core takes it.
-    ///
-    /// # Errors
-    /// None in practice: the plan was made with a valid material.
-    #[cfg(any(feature = "window", feature = "xr"))]
-    pub(super) fn elastic_material(&self) -> anyhow::Result<ElasticMaterial> {
-        let Material { young, poisson } = self.settings.material;
-        Ok(ElasticMaterial::try_new(young, poisson)?)
-    }
-
-    /// Request for the object, with the hand that is to grasp it.
-    pub(super) fn object_request(&self, setup: &HandSetup) -> ObjectRequest {
-        ObjectRequest {
-            choice: self.object.clone(),
-            nodes: self.nodes,
-            size_m: self.object_size,
-            regions: self.regions.clone(),
-            setup: setup.clone(),
-            contact: self.settings.contact,
-        }
     }
 }
 

@@ -17,7 +17,8 @@ use softgrasp_window::view::outlet::Outlet;
 use softgrasp_xr::{Page, PageOptions, ShownRun};
 
 use super::page_arguments::PageArguments;
-use super::run_arguments::{RunArguments, RunPlan};
+use super::run_arguments::RunArguments;
+use super::run_plan::RunPlan;
 use super::run_setup::load_beside;
 use crate::pace::Due;
 use crate::run::observer::{Foresight, Observer};
@@ -84,13 +85,13 @@ impl RunPage {
     ) -> anyhow::Result<()> {
         let PageTalk { controls, notices, has_window } = talk;
         let hand = plan.choice();
-        let request = plan.object_request(&HandSetup::default());
+        let request = plan.first.request(&HandSetup::default());
         let run = ShownRun {
-            look: Look::of(&plan.object.to_string()),
+            look: Look::of(&plan.first.object.to_string()),
             material: plan.elastic_material()?,
             shading: arguments.shown.shading,
             is_directed: matches!(hand, HandChoice::Scripted(_) | HandChoice::Mouse),
-            begins_anew: !has_window && plan.begins_anew(arguments),
+            begins_anew: !has_window && arguments.begins_anew(plan),
             has_window,
             controls,
             notices,

@@ -14,7 +14,8 @@ use softgrasp_window::view::shading::Shading;
 use softgrasp_window::window::{Animation, Pictures, RgbImage, png};
 
 use super::display_arguments::DisplayArguments;
-use super::run_arguments::{RunArguments, RunPlan};
+use super::run_arguments::RunArguments;
+use super::run_plan::RunPlan;
 use crate::object::file_writing::write_file;
 use crate::pace::Due;
 use crate::run::observer::{Foresight, Observer};
@@ -63,7 +64,7 @@ impl RunPictures {
             return Ok(None);
         }
         let size = shown.size();
-        let look = Look::of(&plan.object.to_string());
+        let look = Look::of(&plan.first.object.to_string());
         let material = plan.elastic_material()?;
         let pictures = Pictures::try_new(size.width, size.height, look, material)
             .context("no pictures can be drawn")?;

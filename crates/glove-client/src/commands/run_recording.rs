@@ -13,7 +13,7 @@ use softgrasp_hand::recording::{
 };
 
 use super::hand_arguments::SecondHand;
-use super::run_arguments::RunPlan;
+use super::run_plan::RunPlan;
 use crate::ask::digest::Digest;
 use crate::ask::solve_settings::{SolveSettings, Subscription};
 use crate::object::object_place::ObjectPlace;
@@ -29,17 +29,17 @@ pub(super) fn start_recorder(
     loaded: &LoadedObject,
 ) -> anyhow::Result<Recorder> {
     let SolveSettings { material, element, method, contact, subscription, elasticity, max_error } =
-        &plan.settings;
+        &plan.first.settings;
     let setup = RecordedSetup {
         version: if plan.second.is_some() { VERSION } else { VERSION_OF_ONE_HAND },
         program: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
-        object: plan.object.to_string(),
-        nodes: plan.nodes,
+        object: plan.first.object.to_string(),
+        nodes: plan.first.nodes,
         size_m: loaded.brought_to_m,
         mesh: mesh_digest(loaded.object.rest()),
         young_pa: material.young,
         poisson: material.poisson,
-        regions: plan.regions.iter().map(recorded_region).collect(),
+        regions: plan.first.regions.iter().map(recorded_region).collect(),
         element: element.to_string(),
         method: method.to_string(),
         contact: contact.to_string(),
@@ -49,7 +49,7 @@ pub(super) fn start_recorder(
         yield_pa: elasticity.yield_stress,
         max_error: *max_error,
         placed_in_hand: plan.place == ObjectPlace::Hand,
-        friction: plan.contact_scene.map(|scene| RecordedFriction {
+        friction: plan.first.contact_scene.map(|scene| RecordedFriction {
             friction: scene.friction,
             finger_compliance_m_n: scene.finger_compliance,
             density_kg_m3: scene.density,

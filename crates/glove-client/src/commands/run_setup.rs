@@ -3,6 +3,7 @@
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::Context;
 use nalgebra::Isometry3;
@@ -21,12 +22,15 @@ use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 use softgrasp_hand::mouse::MouseHand;
 use softgrasp_hand::recording::ReplayHand;
 use softgrasp_hand::scripted::{GraspPlan, NoGrasp, PlanRequest, Planner, ScriptedHand};
+use softgrasp_hand::sent::WhichHand;
 use softgrasp_hand::serial::{SerialDevices, settings_of_hand};
+use softgrasp_hand::xr_runtime::RuntimeHands;
 #[cfg(any(feature = "window", feature = "xr"))]
 use softgrasp_window::view::loading::LoadObject;
 
+use super::further_setup::FurtherObjects;
 use super::hand_arguments::SecondHand;
-use super::run_arguments::RunPlan;
+use super::run_plan::RunPlan;
 use super::run_recording::{check_object, start_recorder};
 use crate::ask::connection::Host;
 use crate::ask::link::Link;
@@ -90,7 +94,7 @@ pub(super) fn make_ready(
         at(SetupStage::Object(stage));
         true
     };
-    let loaded = load(&plan.object_request(&hand_setup), goes_on)?;
+    let loaded = load(&plan.first.request(&hand_setup), goes_on)?;
     let loaded = loaded.context("the object was called off")?;
     if let Some(recording) = &plan.recording {
         check_object(&recording.setup, &loaded)?;
@@ -99,9 +103,13 @@ pub(super) fn make_ready(
     let recorder = recorder.map(|path| start_recorder(path, plan, &loaded)).transpose()?;
     let LoadedObject { summary, mut object, plan: grip, .. } = loaded;
     seen(&object)?;
+    let further = FurtherObjects::load(plan, &hand_setup, &object, goes_on)?;
+    let aim = further.get(plan.aim);
+    let grip = aim.map_or(grip, |aim| aim.plan.clone());
     let first = Acting { request: &plan.hand, configuration: &plan.hand_configuration };
     let hand = hand_of(plan, setup, first, || grip)?;
-    let second = plan.second.as_ref().map(|hand| second_of(plan, setup, hand, &object));
+    let aimed = aim.map_or(&object, |aim| &aim.object);
+    let second = plan.second.as_ref().map(|hand| second_of(plan, setup, hand, aimed));
     let second = second.transpose()?.flatten();
     let priority = match plan.pace {
         Pace::Lockstep => Priority::Ordinary,
@@ -119,7 +127,8 @@ pub(super) fn make_ready(
     let link =
         Link::start(host.endpoint(), priority).context("cannot start the link to the server")?;
     if std::io::stderr().is_terminal() {
-        summary.notes.iter().for_each(|note| eprintln!("glove-client: {note}"));
+        let notes = summary.notes.iter().chain(further.notes());
+        notes.for_each(|note| eprintln!("glove-client: {note}"));
     }
     let names = std::iter::once(&hand).chain(&second).map(HandSource::name);
     let mut report = RunReport::new(
@@ -127,23 +136,14 @@ pub(super) fn make_ready(
         names.collect::<Vec<_>>().join(" + "),
         plan.server.to_string(),
         plan.pace,
-        plan.settings.contact,
+        plan.first.settings.contact,
     );
     if let Some(path) = &setup.report {
         report.played.keep_older(path);
     }
-    let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M)?;
-    let settings = plan.settings.clone();
-    let readers = readers_of(plan);
-    let mut grasp_loop = GraspLoop::try_new(readers, object, grasp, link, settings, plan.pace)
-        .context("cannot start a thread beside the ticks")?;
-    if let Some(scene) = plan.contact_scene {
-        let table_y = Some(grasp_loop.object().rest_shape().bottom());
-        grasp_loop.grasp_with_friction(ContactScene { table_y, ..scene });
-        if let Some(target) = plan.force.clone() {
-            grasp_loop.feel(Renderer::start(target).context("the hand cannot feel")?);
-        }
-    }
+    let mut grasp_loop = grasp_loop_of(plan, object, link)?;
+    report.further_objects = further.lay(plan, &host, priority, &mut grasp_loop)?;
+    WhichHand::ALL.into_iter().for_each(|which| grasp_loop.aim(which, plan.aim));
     grasp_loop.put_object(plan.place);
     if let Some(period) = plan.period {
         grasp_loop.tick_every(period);
@@ -156,6 +156,23 @@ pub(super) fn make_ready(
         session.record_to(recorder);
     }
     Ok(ReadyRun { session, host })
+}
+
+/// Loop around the first object, at home and on its table where the plan has one.
+fn grasp_loop_of(plan: &RunPlan, object: SoftObject, link: Link) -> anyhow::Result<GraspLoop> {
+    let grasp = Grasp::try_new(Isometry3::identity(), Grasp::RELEASE_MARGIN_M)?;
+    let settings = plan.first.settings.clone();
+    let readers = readers_of(plan);
+    let mut grasp_loop = GraspLoop::try_new(readers, object, grasp, link, settings, plan.pace)
+        .context("cannot start a thread beside the ticks")?;
+    if let Some(scene) = plan.first.contact_scene {
+        let table_y = Some(grasp_loop.object().rest_shape().bottom());
+        grasp_loop.grasp_with_friction(ContactScene { table_y, ..scene });
+        if let Some(target) = plan.force.clone() {
+            grasp_loop.feel(Renderer::start(target).context("the hand cannot feel")?);
+        }
+    }
+    Ok(grasp_loop)
 }
 
 /// Loads other objects of the same size.
@@ -210,7 +227,7 @@ fn second_of(
     let SecondHand { request: Some(request), configuration, .. } = hand else { return Ok(None) };
     let grip = || {
         let rest = Arc::clone(object.rest_shape());
-        PlanRequest::new(rest, configuration.setup.clone(), plan.settings.contact).grip()
+        PlanRequest::new(rest, configuration.setup.clone(), plan.first.settings.contact).grip()
     };
     hand_of(plan, setup, Acting { request, configuration }, grip).map(Some)
 }
@@ -224,7 +241,7 @@ fn hand_of(
 ) -> anyhow::Result<HandSource> {
     let (hand_setup, name) = (&configuration.setup, request.to_string());
     let planner = || Planner::beside().context("cannot start the planner's thread");
-    let contact = plan.settings.contact;
+    let contact = plan.first.settings.contact;
     Ok(match (request, plan.pace) {
         (HandRequest::Mouse, _) => {
             MouseHand::new(hand_setup.clone(), planner()?, plan.tick_s()).holding(contact).into()
@@ -247,6 +264,10 @@ fn hand_of(
         (HandRequest::Xr, _) => {
             let feed = setup.joints.clone().context("there is no page that sends a hand")?;
             LiveHand::fed(feed, name).into()
+        }
+        (HandRequest::OpenXr(wanted), _) => {
+            let period = Duration::from_secs_f64(plan.tick_s());
+            LiveHand::runtime(RuntimeHands::open(*wanted, period)?, name).into()
         }
         (HandRequest::Replay(path), _) if is_foreign(path) => {
             ForeignHand::read(path, hand_setup, plan.tick_s())?.into()

@@ -17,8 +17,9 @@ use softgrasp_window::window::{
 };
 
 use super::device_sentences::DeviceSentences;
-use super::run_arguments::{RunArguments, RunPlan};
+use super::run_arguments::RunArguments;
 use super::run_page::{PageTalk, RunPage};
+use super::run_plan::RunPlan;
 use super::run_setup::{ReadyRun, Setup, SetupStage, load_beside, make_ready};
 use super::tell_report::tell;
 use crate::ask::connection::{Host, ServerChoice};
@@ -50,9 +51,9 @@ pub(super) fn show(
         eye_is_chosen: arguments.shown.eye.is_some(),
         shading_is_chosen: arguments.shown.shading.is_some(),
         level_is_chosen: arguments.shown.light.is_some(),
-        object: plan.object.clone(),
-        contact: plan.settings.contact,
-        load: load_beside(plan.object_request(&HandSetup::default())),
+        object: plan.first.object.clone(),
+        contact: plan.first.settings.contact,
+        load: load_beside(plan.first.request(&HandSetup::default())),
         material: plan.elastic_material()?,
     };
     let app = match App::open(opening) {
@@ -172,19 +173,19 @@ fn start(
         joints: page.as_ref().map(RunPage::joints),
     };
     let timing = Timing { period: plan.period, ticks_max: arguments.ticks };
-    let begins_anew = plan.begins_anew(arguments);
+    let begins_anew = arguments.begins_anew(&plan);
     Start::begin(move |at| {
         let ReadyRun { mut session, host } =
             make_ready(&plan, &setup, |stage| at(step(stage)), |_| Ok(()))?;
         session.await_model();
         let about = About {
-            object: plan.object.to_string(),
+            object: plan.first.object.to_string(),
             server: words_of_server(&plan.server.to_string()),
-            contact: words_of_contact(&plan.settings.contact.to_string()),
-            is_lifted: plan.contact_scene.is_some(),
+            contact: words_of_contact(&plan.first.settings.contact.to_string()),
+            is_lifted: plan.first.contact_scene.is_some(),
             material: plan.elastic_material()?,
             hand: plan.choice(),
-            method: plan.settings.method.to_string(),
+            method: plan.first.settings.method.to_string(),
             max_error: None,
             tick_s: plan.tick_s(),
             begins_anew,

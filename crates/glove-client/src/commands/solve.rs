@@ -13,7 +13,7 @@ use softgrasp_core::solve::memory::Bytes;
 use softgrasp_protocol::solve_report::{SCHEMA, SolveSummary};
 use softgrasp_protocol::{
     Answer, Ask, Body, Deformation, Displacements, DofValue, ElementChoice, FieldValues, Material,
-    MethodName, NodeChoice, Pace, PathChoice, Question, Want, Warning, WarningCode,
+    MethodName, NodeChoice, Pace, PathChoice, Quantity, Question, Want, Warning, WarningCode,
 };
 
 use super::access_arguments::AccessArguments;
@@ -129,6 +129,9 @@ struct Report {
     discretisation_estimate_rel: Option<f64>,
     /// How the estimate was made, or why there is none.
     discretisation_why: String,
+    /// The quantity whose derivatives were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quantity: Option<f64>,
     /// Stored energy of the body, J, if fields were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     strain_energy: Option<f64>,
@@ -177,7 +180,7 @@ impl SolveCommand {
     /// One line each: what happened, where, and what to do.
     pub fn run(&self) -> anyhow::Result<()> {
         let progress = Progress::start("reading the mesh");
-        let file = read_mesh_file(&self.mesh)?;
+        let file = self.mesh_file()?;
         let materials = self.materials(&file)?;
         let question = self.question(&file.mesh)?;
         let elasticity = self.elasticity.of_request()?;
@@ -192,7 +195,8 @@ impl SolveCommand {
         progress.now("starting");
         let host = self.open_host()?;
         let mut connection = host.connect()?;
-        check_server(&question.spread, connection.welcome())?;
+        check_server((&file.mesh, &question.spread), connection.welcome())?;
+        self.gradient.check_server(connection.welcome())?;
         let nodes = file.mesh.node_count();
         progress.now(&match &self.server {
             ServerChoice::Embedded => format!("{nodes} nodes:"),
@@ -200,9 +204,7 @@ impl SolveCommand {
         });
         progress.watch(host.stage());
         let body = Body { mesh: mesh_data(&file.mesh), materials, element: self.element };
-        // A further solve asks about the same body.
-        let is_again = self.estimate_discretisation || self.gradient.is_wanted();
-        let again = is_again.then(|| (body.clone(), question.clone()));
+        let again = self.again(&body, &question);
         let start = Instant::now();
         let ask = Ask {
             large: elasticity.ask(PathChoice::FromRest, Pace::Repeatable),
@@ -222,19 +224,18 @@ impl SolveCommand {
             std::mem::replace(&mut answer.displacements, Displacements::F64(vec![]));
         let displacements = displacements.into_f64();
         self.write_cases(&file, &displacements, &answer)?;
+        self.gradient.write(&file, &answer)?;
         let mut discretisation = DiscretisationEstimate::not_asked();
         if let Some((body, question)) = &again {
             progress.now("solving again");
             let again = (body, question);
-            self.gradient.write(&mut connection, &file.mesh, again)?;
-            if self.estimate_discretisation {
-                discretisation =
-                    DiscretisationEstimate::of(&mut connection, again, &answer, &displacements);
-            }
+            discretisation =
+                DiscretisationEstimate::of(&mut connection, again, &answer, &displacements);
         }
         if let Some(path) = &self.report {
             let mut report = self.report(&file, &host, summary.clone(), discretisation.clone());
             report.add_fields(answer.fields.first());
+            report.quantity = answer.gradient.as_ref().map(|gradient| gradient.value);
             write_json(path, &report)?;
         }
         drop(progress);
@@ -246,6 +247,22 @@ impl SolveCommand {
             told.push_str(&describe_discretisation(&discretisation));
         }
         print(&told)
+    }
+
+    /// What a further solve asks of the same body, for its displacements alone.
+    fn again(&self, body: &Body, question: &Question) -> Option<(Body, Question)> {
+        let question = || Question { quantity: Quantity::default(), ..question.clone() };
+        self.estimate_discretisation.then(|| (body.clone(), question()))
+    }
+
+    /// The mesh file, with its mid-edge nodes where the element may be one that has some.
+    fn mesh_file(&self) -> anyhow::Result<MeshFile> {
+        let mut file = read_mesh_file(&self.mesh)?;
+        if matches!(self.element, ElementChoice::T4 | ElementChoice::T4Anp) {
+            file.mesh = file.mesh.without_mid_edge_nodes();
+        }
+        file.findings.orphans = file.mesh.used_nodes().iter().filter(|used| !**used).count();
+        Ok(file)
     }
 
     /// Materials of the mesh's regions, as they travel.
@@ -323,6 +340,7 @@ impl SolveCommand {
             max_error: self.max_error,
             deadline_ms: self.deadline,
             spread: self.loads.of_mesh(mesh)?,
+            quantity: self.gradient.quantity(node_count)?,
             ..Question::default()
         })
     }
@@ -335,8 +353,7 @@ impl SolveCommand {
     /// Refuses options that do not go together.
     fn check_cases(&self, elasticity: &Elasticity) -> anyhow::Result<()> {
         self.cases().check()?;
-        let is_linear = elasticity.deformation == Deformation::Linear;
-        self.gradient.check(self.known.len(), is_linear)?;
+        self.gradient.check(self.known.len())?;
         if self.is_several() && elasticity.deformation != Deformation::Linear {
             bail!(
                 "several --known and --no-estimate are for linear answers; leave out --deformation"
@@ -412,6 +429,7 @@ impl SolveCommand {
             solve,
             discretisation_estimate_rel: discretisation.rel,
             discretisation_why: discretisation.why,
+            quantity: None,
             strain_energy: None,
             stress_error_rel: None,
             out: self.out.first().map(|out| out.display().to_string()).unwrap_or_default(),

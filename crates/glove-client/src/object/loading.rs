@@ -55,7 +55,9 @@ const TURN_WORTH_SAYING: f64 = 1e-3;
 /// Makes an object ready. `goes_on` is told each stage and returns whether to go on; if it does not, the
 /// result is `None`.
 ///
-/// An imported object whose size was not asked for is enlarged until the hand finds a grip.
+/// An imported object whose size was not asked for is enlarged until the hand finds a grip, one that holds it
+/// if fingertips press with friction; where no size has such a grip, the smallest that the hand reaches is
+/// taken.
 ///
 /// # Errors
 /// [`LoadError`] if there is no object.
@@ -63,64 +65,74 @@ pub fn load(
     request: &ObjectRequest,
     mut goes_on: impl FnMut(LoadStage) -> bool,
 ) -> Result<Option<LoadedObject>, LoadError> {
-    let ObjectRequest { choice, nodes, size_m, regions, setup, contact } = request;
-    let mut size = *size_m;
+    let may_grow = request.size_m.is_none() && matches!(request.choice, ObjectChoice::File(_));
+    let mut size = request.size_m;
+    let mut smallest: Option<LoadedObject> = None;
     loop {
-        if !goes_on(LoadStage::Mesh) {
-            return Ok(None);
-        }
-        let SceneObject { mesh, region_names, mut notes } = load_object(choice, *nodes, size)?;
-        let made = MeshOfRegions::try_new(mesh, &region_names, regions)?;
-        let (mut mesh, regions) = (made.mesh, made.regions);
-        notes.extend(made.notes);
-        if *contact == ContactModel::Friction {
-            let (lies, turn) = lying(&mesh).map_err(ObjectError::Shape)?;
-            mesh = lies;
-            if turn.angle() > TURN_WORTH_SAYING {
-                let degrees = turn.angle().to_degrees();
-                notes.push(format!("turned by {degrees:.0}° so that it lies on the table"));
-            }
-        }
-        let summary = ObjectSummary {
-            name: choice.to_string(),
-            nodes: mesh.node_count(),
-            tets: mesh.tets().len(),
-            size_m: mesh.size(),
-            notes,
+        let Some(loaded) = load_at(request, size, &mut goes_on)? else { return Ok(None) };
+        let extent_m = size.unwrap_or_else(|| loaded.object.rest().size());
+        let is_gripped = match &loaded.plan {
+            Ok(plan) => plan.holds_by_friction || request.contact != ContactModel::Friction,
+            Err(reason) => !matches!(reason, NoGrasp::OutOfReach { .. }),
         };
-        if !goes_on(LoadStage::Tree) {
-            return Ok(None);
+        if is_gripped || !may_grow || extent_m >= ENLARGED_MAX_M {
+            let found = if is_gripped { loaded } else { smallest.unwrap_or(loaded) };
+            return Ok(goes_on(LoadStage::Ready).then_some(found));
         }
-        let object = SoftObject::at_rest(RestShape::try_new(mesh)?.with_regions(regions), 1);
-        if !goes_on(LoadStage::Plan) {
-            return Ok(None);
+        if loaded.plan.is_ok() {
+            smallest.get_or_insert(loaded);
         }
-        let rest = Arc::clone(object.rest_shape());
-        let plan = PlanRequest::new(rest, setup.clone(), *contact).grip();
-        match plan {
-            Err(NoGrasp::OutOfReach { extent_m })
-                if size_m.is_none()
-                    && matches!(choice, ObjectChoice::File(_))
-                    && extent_m < ENLARGED_MAX_M =>
-            {
-                size = Some(ENLARGE * extent_m);
-            }
-            plan => {
-                let wanted = goes_on(LoadStage::Ready);
-                return Ok(wanted.then_some(LoadedObject {
-                    summary,
-                    brought_to_m: size,
-                    object,
-                    plan,
-                }));
-            }
+        size = Some((ENLARGE * extent_m).min(ENLARGED_MAX_M));
+    }
+}
+
+/// Makes an object of one size ready, as far as `goes_on` allows: mesh, sphere tree and plan.
+fn load_at(
+    request: &ObjectRequest,
+    size: Option<f64>,
+    goes_on: &mut impl FnMut(LoadStage) -> bool,
+) -> Result<Option<LoadedObject>, LoadError> {
+    let ObjectRequest { choice, nodes, regions, setup, contact, .. } = request;
+    if !goes_on(LoadStage::Mesh) {
+        return Ok(None);
+    }
+    let SceneObject { mesh, region_names, mut notes } = load_object(choice, *nodes, size)?;
+    let made = MeshOfRegions::try_new(mesh, &region_names, regions)?;
+    let (mut mesh, regions) = (made.mesh, made.regions);
+    notes.extend(made.notes);
+    if *contact == ContactModel::Friction {
+        let (lies, turn) = lying(&mesh).map_err(ObjectError::Shape)?;
+        mesh = lies;
+        if turn.angle() > TURN_WORTH_SAYING {
+            let degrees = turn.angle().to_degrees();
+            notes.push(format!("turned by {degrees:.0}° so that it lies on the table"));
         }
     }
+    let summary = ObjectSummary {
+        name: choice.to_string(),
+        nodes: mesh.node_count(),
+        tets: mesh.tets().len(),
+        size_m: mesh.size(),
+        notes,
+    };
+    if !goes_on(LoadStage::Tree) {
+        return Ok(None);
+    }
+    let object = SoftObject::at_rest(RestShape::try_new(mesh)?.with_regions(regions), 1);
+    if !goes_on(LoadStage::Plan) {
+        return Ok(None);
+    }
+    let rest = Arc::clone(object.rest_shape());
+    let plan = PlanRequest::new(rest, setup.clone(), *contact).grip();
+    Ok(Some(LoadedObject { summary, brought_to_m: size, object, plan }))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
+    use softgrasp_core::mesh::{BuiltIn, generate};
+    use softgrasp_core::mesh_io::write_msh41;
 
     fn request(object: &str) -> ObjectRequest {
         ObjectRequest {
@@ -151,6 +163,29 @@ mod tests {
         for last in LoadStage::ALL {
             assert!(load(&request("cube"), |stage| stage < last).unwrap().is_none());
         }
+    }
+
+    #[test]
+    fn file_of_a_thing_too_thin_for_a_thumb_is_enlarged_until_friction_can_hold_it() {
+        let cube = generate(BuiltIn::Cube, 64).unwrap();
+        let edge = cube.bounds().1.x - cube.bounds().0.x;
+        let rod = |p: &Point3<f64>| Point3::new(p.x, 0.16 * p.y, 0.2 * p.z) * (0.08 / edge);
+        let rod = cube.with_vertices(cube.vertices().iter().map(rod).collect()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rod.msh");
+        std::fs::write(&path, write_msh41(&rod)).unwrap();
+        let asked = request(path.to_str().unwrap());
+        let sizes = [ContactModel::Mask, ContactModel::Friction].map(|contact| {
+            let loaded = load(&ObjectRequest { contact, ..asked.clone() }, |_| true);
+            let loaded = loaded.unwrap().unwrap();
+            let plan = loaded.plan.unwrap();
+            assert_eq!(plan.holds_by_friction, contact == ContactModel::Friction);
+            loaded.summary.size_m
+        });
+        assert!(sizes[1] > 1.2 * sizes[0], "{sizes:?} m");
+        let given = ObjectRequest { contact: ContactModel::Friction, size_m: Some(0.08), ..asked };
+        let loaded = load(&given, |_| true).unwrap().unwrap();
+        assert!((loaded.summary.size_m - 0.08).abs() < 0.01, "a size that was asked for is kept");
     }
 
     #[test]

@@ -10,5 +10,7 @@ pub mod object_work;
 pub mod region_choice;
 pub mod saving;
 pub mod scene;
+pub mod scene_objects;
 pub mod series;
 pub mod shape_history;
+pub mod table_layout;

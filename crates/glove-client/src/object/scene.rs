@@ -11,14 +11,15 @@ use softgrasp_grasp::object::ObjectChoice;
 use crate::object::mesh_file::MeshFileReadError;
 use crate::object::object_file::{ObjectFile, read_object_file};
 use crate::object::region_choice::RegionChoice;
+use crate::object::scene_objects::{SceneEntry, SceneObjects};
 
 /// Content of a scene file; every field can also be set by a flag, which wins.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneFile {
     /// cube, sphere, strawberry, toothpaste, or a file of a mesh or a surface (relative to the scene
-    /// file).
-    pub object: Option<String>,
+    /// file); or a list of several objects.
+    pub object: Option<SceneObjects>,
     /// Number of nodes of a built-in object, or of a surface that is filled.
     pub nodes: Option<usize>,
     /// Longest extent of the object, m; a mesh file is scaled to it.
@@ -113,13 +114,59 @@ impl SceneFile {
         let text = std::fs::read_to_string(path).map_err(read_error)?;
         let mut scene = Self::of_text(&text)
             .map_err(|e| SceneError::Parse { path: path.to_owned(), source: Box::new(e) })?;
-        if let Some(object) = &mut scene.object
-            && let Ok(ObjectChoice::File(file)) = object.parse()
-        {
-            let beside = path.parent().unwrap_or(Path::new("")).join(file);
-            *object = beside.to_string_lossy().into_owned();
+        let beside = |object: &mut String| {
+            if let Ok(ObjectChoice::File(file)) = object.parse() {
+                let beside = path.parent().unwrap_or(Path::new("")).join(file);
+                *object = beside.to_string_lossy().into_owned();
+            }
+        };
+        match &mut scene.object {
+            Some(SceneObjects::One(object)) => beside(object),
+            Some(SceneObjects::Several(entries)) => {
+                entries.iter_mut().for_each(|entry| beside(&mut entry.shape));
+            }
+            None => {}
         }
         Ok(scene)
+    }
+
+    /// Name of the object, if the scene names one alone.
+    pub fn object(&self) -> Option<&str> {
+        match &self.object {
+            Some(SceneObjects::One(name)) => Some(name),
+            Some(SceneObjects::Several(_)) | None => None,
+        }
+    }
+
+    /// The several objects of the scene; none where it has one or names none.
+    pub fn entries(&self) -> &[SceneEntry] {
+        match &self.object {
+            Some(SceneObjects::Several(entries)) => entries,
+            Some(SceneObjects::One(_)) | None => &[],
+        }
+    }
+
+    /// Scene with one of several objects alone, which has from this one what it leaves out.
+    #[must_use]
+    pub fn of_entry(&self, entry: &SceneEntry) -> Self {
+        let name = |own: &Option<String>, usual: &Option<String>| own.clone().or(usual.clone());
+        Self {
+            object: Some(SceneObjects::One(entry.shape.clone())),
+            nodes: entry.nodes.or(self.nodes),
+            object_size_m: entry.size_m.or(self.object_size_m),
+            young_pa: entry.young_pa.or(self.young_pa),
+            poisson: entry.poisson.or(self.poisson),
+            element: name(&entry.element, &self.element),
+            friction: entry.friction.or(self.friction),
+            density_kg_m3: entry.density_kg_m3.or(self.density_kg_m3),
+            deformation: name(&entry.deformation, &self.deformation),
+            material: name(&entry.material, &self.material),
+            yield_pa: entry.yield_pa.or(self.yield_pa),
+            region: entry.region.clone(),
+            method: self.method.clone(),
+            contact: self.contact.clone(),
+            grasp: self.grasp.clone(),
+        }
     }
 }
 
@@ -201,6 +248,11 @@ fn read_mesh(path: &Path, file: &MeshFile, notes: &mut Vec<String>) -> TetMesh {
             "{dropped} tetrahedra without volume, or repeated, were dropped; `glove-client inspect` \
              lists them"
         ));
+    }
+    if !file.mesh.mid_edge_nodes().is_empty() {
+        notes.push(
+            "mid-edge nodes of the file are left out: the edges are straight here".to_owned(),
+        );
     }
     largest_piece(&file.mesh, notes)
 }

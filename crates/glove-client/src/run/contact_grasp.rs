@@ -23,39 +23,9 @@ use crate::ask::contact_frame::{
 use crate::ask::link::ReachedStep;
 use crate::ask::solve_settings::Elasticity;
 use crate::run::contact_ledger::StepRecord;
+pub use crate::run::contact_scene::ContactScene;
 use crate::run::felt::FeltHand;
 use crate::run::grasping_hand::{BodyPoses, BothHands, GraspingHand};
-
-/// Constants of an object and of the hand that grasps it with friction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactScene {
-    /// Coefficient of friction between hand and object, and between table and object.
-    pub friction: f64,
-    /// Displacement of a finger for each unit of force on it, m/N: the measured finger may close further
-    /// than the shown one, which presses by their distance over this.
-    pub finger_compliance: f64,
-    /// Density of the object, kg/m³.
-    pub density: f64,
-    /// Time constant with which the shape forgets a force (Kelvin and Voigt), s.
-    pub viscosity: f64,
-    /// Acceleration of free fall, m/s², in the world frame; −y is down.
-    pub gravity: Vector3<f64>,
-    /// Height of the table (y in the world frame), m; `None` without a table.
-    pub table_y: Option<f64>,
-}
-
-impl Default for ContactScene {
-    fn default() -> Self {
-        Self {
-            friction: 0.8,
-            finger_compliance: 1e-3,
-            density: 1000.0,
-            viscosity: 0.02,
-            gravity: Vector3::new(0.0, -9.81, 0.0),
-            table_y: None,
-        }
-    }
-}
 
 /// State of a grasp by contact with friction.
 pub struct ContactGrasp {
@@ -181,6 +151,12 @@ impl ContactGrasp {
     pub fn set_home(&mut self, world_from_home: Isometry3<f64>) {
         let raised = world_from_home.translation.y - self.world_from_home.translation.y;
         self.scene.table_y = self.scene.table_y.map(|table_y| table_y + raised);
+        self.world_from_home = world_from_home;
+        self.return_home();
+    }
+
+    /// Sets another home on the table as it stands, and puts the object there.
+    pub fn lie_at(&mut self, world_from_home: Isometry3<f64>) {
         self.world_from_home = world_from_home;
         self.return_home();
     }

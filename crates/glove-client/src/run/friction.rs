@@ -13,9 +13,9 @@ use crate::ask::digest::step_digest;
 use crate::ask::unanswered::Unanswered;
 use crate::run::contact_grasp::{ContactGrasp, StepWish};
 use crate::run::given_way::given_way;
-use crate::run::holding::Holding;
 use crate::run::live_object::LiveObject;
 use crate::run::shown::Shown;
+use crate::run::table_object::TableObject;
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
 
 /// Hand of a tick, and its dimensions.
@@ -33,50 +33,71 @@ pub(crate) struct FrictionTick {
 }
 
 impl FrictionTick {
-    /// Plays the tick; returns the segments of each hand as they are shown.
+    /// Begins the tick for an object: carries out a command and asks for its step. The result says
+    /// whether it was asked.
     ///
     /// # Errors
     /// [`ObjectError`] when the object cannot be shown any more.
-    pub(crate) fn play(
+    pub(crate) fn begin(
         &self,
         command: Option<Command>,
-        holding: &mut Holding,
-        object: &mut LiveObject,
+        object: &mut TableObject,
         outcome: &mut TickOutcome,
-    ) -> Result<[Option<HandSegments>; 2], ObjectError> {
-        obey(command, holding, object, outcome)?;
+    ) -> Result<Result<(), Unanswered>, ObjectError> {
+        obey(command, object, outcome)?;
         for TickHand { pose, dimensions } in self.hands.iter().flatten() {
-            let object_from_world = object.shown.world_from_object().inverse();
+            let object_from_world = object.world_from_object().inverse();
             let tips = HandColliders::new(dimensions, pose).fingers.map(|f| f.contact_point);
             let tips = tips.map(|tip| object_from_world * tip);
-            object.prefetch(&tips, dimensions.tip_radii(), holding, outcome);
+            object.prefetch(&tips, dimensions.tip_radii(), outcome);
         }
-        let is_asked = self.ask(holding, object, outcome);
+        Ok(self.ask(object, outcome))
+    }
+
+    /// Ends the tick for an object: takes the answer, if it is awaited, and writes what is seen.
+    ///
+    /// # Errors
+    /// [`ObjectError`] when the object cannot be shown any more.
+    pub(crate) fn end(
+        &self,
+        is_asked: Result<(), Unanswered>,
+        object: &mut TableObject,
+        outcome: &mut TickOutcome,
+    ) -> Result<(), ObjectError> {
         if is_asked.is_ok() {
-            object.wait_in_lockstep(holding, outcome)?;
+            object.wait_in_lockstep(outcome)?;
         }
+        let TableObject { live, holding, .. } = object;
         let state = holding.state_name();
         if state == StateName::Deforming {
-            object.questions.begin_grip(self.tick);
+            live.questions.begin_grip(self.tick);
             outcome.unanswered.extend(is_asked.err().map(|why| (self.tick, why)));
         } else {
-            object.questions.end_grip();
-            object.stop_keeping(outcome);
+            live.questions.end_grip();
+            live.stop_keeping(outcome);
         }
-        let segments = self.segments();
-        let Some(contact) = holding.friction_mut() else { return Ok(segments) };
+        let Some(contact) = holding.friction_mut() else { return Ok(()) };
         if contact.enters(state) {
             outcome.events.push(LoopEvent::Grasp(GraspEvent::Entered(state)));
         }
-        object.shown.place(contact.world_from_object());
-        self.see(contact, &object.shown, state, outcome);
-        outcome.seen.is_late |= !object.questions.link().is_connected();
-        // The shown hands stay outside of the object.
-        Ok(WhichHand::ALL.map(|which| {
+        live.shown.place(contact.world_from_object());
+        self.see(contact, &live.shown, state, outcome);
+        outcome.seen.is_late |= !live.questions.link().is_connected();
+        Ok(())
+    }
+
+    /// Segments of each hand as they are shown: outside of the objects, each of which pushes it back.
+    pub(crate) fn shown_hands(&self, objects: &[&ContactGrasp]) -> [Option<HandSegments>; 2] {
+        let segments = self.segments();
+        WhichHand::ALL.map(|which| {
             let hand = self.hands[which.index()]?;
             let ends: [Point3<f64>; 5] = hand.pose.fingers.map(|finger| finger.tip());
-            Some(given_way(&segments[which.index()]?, &ends, &contact.pushed_back(which)))
-        }))
+            let pushes = objects.iter().map(|object| object.pushed_back(which));
+            let pushed = pushes.reduce(|all, more| {
+                std::array::from_fn(|digit| std::array::from_fn(|i| all[digit][i] + more[digit][i]))
+            });
+            Some(given_way(&segments[which.index()]?, &ends, &pushed.unwrap_or_default()))
+        })
     }
 
     /// Segments of each hand as they were measured.
@@ -87,13 +108,9 @@ impl FrictionTick {
     }
 
     /// Asks for the step of the free object up to this tick, unless its shape is being kept.
-    fn ask(
-        &self,
-        holding: &mut Holding,
-        object: &LiveObject,
-        outcome: &mut TickOutcome,
-    ) -> Result<(), Unanswered> {
-        let LiveObject { shown, questions, changing } = object;
+    fn ask(&self, object: &mut TableObject, outcome: &mut TickOutcome) -> Result<(), Unanswered> {
+        let TableObject { live, holding, .. } = object;
+        let LiveObject { shown, questions, changing } = live;
         if changing.keep().freezes() {
             return Err(Unanswered::KeepingShape);
         }
@@ -166,10 +183,10 @@ impl FrictionTick {
 /// Carries out a command of the menu.
 fn obey(
     command: Option<Command>,
-    holding: &mut Holding,
-    object: &mut LiveObject,
+    object: &mut TableObject,
     outcome: &mut TickOutcome,
 ) -> Result<(), ObjectError> {
+    let TableObject { live, holding, .. } = object;
     let (Some(command), Some(contact)) = (command, holding.friction_mut()) else { return Ok(()) };
     let event = match command {
         Command::Release => {
@@ -178,11 +195,11 @@ fn obey(
         }
         Command::ReturnHome => {
             contact.return_home();
-            object.shown.place(contact.world_from_object());
-            object.shown.relax()?;
+            live.shown.place(contact.world_from_object());
+            live.shown.relax()?;
             GraspEvent::ReturnedHome
         }
-        Command::KeepShape if object.keep_made() => {
+        Command::KeepShape if live.keep_made() => {
             contact.meet_new_shape();
             GraspEvent::ShapeKept
         }

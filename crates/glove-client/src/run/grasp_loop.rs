@@ -3,45 +3,39 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use softgrasp_force::{ForceReport, Renderer};
-use softgrasp_grasp::grasp::{
-    Command, Contact, Grasp, GraspError, GraspEvent, HandSegments, StateName, StepInput,
-    StepOutput, sense,
-};
-use softgrasp_grasp::hand::{HandColliders, HandPose};
+use softgrasp_grasp::grasp::{Command, Contact, Grasp, GraspError, HandSegments, StateName};
+use softgrasp_grasp::hand::HandPose;
 use softgrasp_grasp::object::{ObjectError, RestShape, SoftObject};
 use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::hand_readers::HandReaders;
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::sent::{Sent, WhichHand};
 use softgrasp_protocol::{Material, MethodName};
+use softgrasp_window::view::object_skin::Look;
 
 use crate::ask::link::Link;
 use crate::ask::solve_settings::{AnswerWishes, SolveSettings, Subscription};
-use crate::ask::unanswered::Unanswered;
 use crate::object::object_place::ObjectPlace;
 use crate::pace::Pace;
-use crate::run::changing::{Changing, Replacement};
 use crate::run::contact_grasp::{ContactGrasp, ContactScene};
 use crate::run::felt::FeltHand;
-use crate::run::friction::{FrictionTick, TickHand};
-use crate::run::holding::Holding;
-use crate::run::live_object::LiveObject;
+use crate::run::friction::FrictionTick;
+use crate::run::objects::Objects;
 use crate::run::placing::where_it_closes;
-use crate::run::questions::Questions;
-use crate::run::shown::Shown;
-use crate::run::tick_outcome::{LoopEvent, TickOutcome};
+use crate::run::table_object::{FurtherObject, TableObject};
+use crate::run::thesis_tick::ThesisTick;
+use crate::run::tick_outcome::TickOutcome;
 use crate::run::tracked_hands::TrackedHands;
 
 /// The client's loop between devices and server.
 pub struct GraspLoop {
     hands: TrackedHands,
-    holding: Holding,
-    object: LiveObject,
-    /// Place where the object is put when the first hand comes.
+    objects: Objects,
+    /// Place where the first object is put when the first hand comes.
     place: ObjectPlace,
     /// Whether the table stops the hand: one that was put below an object in the hand is not there for the
     /// hand.
@@ -62,68 +56,125 @@ impl GraspLoop {
         settings: SolveSettings,
         pace: Pace,
     ) -> std::io::Result<Self> {
-        let questions = Questions::new(link, settings, pace, &object);
-        let changing = Changing::start(pace)?;
+        let first = TableObject::start(object, grasp, link, settings, pace)?;
         Ok(Self {
             hands: TrackedHands::new(readers.into()),
-            holding: Holding::new(grasp),
-            object: LiveObject { shown: Shown::new(object), questions, changing },
+            objects: Objects::new(first),
             place: ObjectPlace::Home,
             stops_hand: true,
         })
     }
 
+    /// Lays a further object on the table of a grasp by friction; sends its model to the server at once.
+    /// To be made before the calling thread asks for real-time priority. Objects do not touch each other.
+    ///
+    /// # Errors
+    /// Error of the operating system if it starts no thread.
+    pub fn lay_beside(&mut self, further: FurtherObject) -> std::io::Result<()> {
+        let further = TableObject::further(further, self.pace())?;
+        self.objects.add(further);
+        Ok(())
+    }
+
+    /// Gives the first object its name and look, which are shown where there are several.
+    pub fn name_first(&mut self, name: &str, look: Look) {
+        let first = self.objects.first_mut();
+        (first.name, first.look) = (name.to_owned(), look);
+    }
+
+    /// The objects of the run.
+    pub(crate) fn objects(&self) -> &Objects {
+        &self.objects
+    }
+
+    /// Number of objects on the table.
+    pub fn object_count(&self) -> usize {
+        self.objects.count()
+    }
+
+    /// Object of a number, from 0, and its pose in the world; the first for a number that none has.
+    pub fn object_at(&self, number: usize) -> (&SoftObject, &Isometry3<f64>) {
+        let object = self.objects.get(number);
+        (object.object(), object.world_from_object())
+    }
+
+    /// Lets a hand go by itself to the object of a number, from 0.
+    pub fn aim(&mut self, which: WhichHand, number: usize) {
+        self.objects.aim(which, number);
+    }
+
+    /// Lets a hand go by itself to the object that is nearest to a point, seen from above; returns whether
+    /// it is another one than before.
+    ///
+    /// Units: m. Frame: world.
+    pub fn aim_at_nearest(&mut self, which: WhichHand, point: &Point3<f64>) -> bool {
+        let (before, nearest) = (self.objects.aimed(which), self.objects.nearest_to(point));
+        self.objects.aim(which, nearest);
+        nearest != before
+    }
+
+    /// Whether a hand goes by itself to the object that was touched last.
+    pub fn aims_at_touched(&self, which: WhichHand) -> bool {
+        self.objects.aimed(which) == self.objects.touched()
+    }
+
+    /// Object that a hand goes to by itself, and its pose in the world.
+    pub fn aimed(&self, which: WhichHand) -> (&SoftObject, &Isometry3<f64>) {
+        self.object_at(self.objects.aimed(which))
+    }
+
     /// Makes the object free and heavy, so that the hand grasps it by contact with friction instead of by
     /// the thesis's rules.
     pub fn grasp_with_friction(&mut self, scene: ContactScene) {
-        self.holding.by_friction(scene, &mut self.object.shown);
+        let first = self.objects.first_mut();
+        first.holding.by_friction(scene, &mut first.live.shown);
     }
 
     /// Lets the hand feel what a grasp by friction presses it with.
     pub fn feel(&mut self, renderer: Renderer) {
-        if let Some(contact) = self.holding.friction_mut() {
+        if let Some(contact) = self.objects.first_mut().holding.friction_mut() {
             contact.feel(FeltHand::new(renderer));
         }
     }
 
     /// Ends the force and tells of it; `None` without any.
     pub fn end_force(&mut self) -> Option<ForceReport> {
-        self.holding.friction_mut()?.end_force()
+        self.objects.first_mut().holding.friction_mut()?.end_force()
     }
 
-    /// State of the grasp by friction, if there is one.
+    /// State of the grasp of the first object by friction, if there is one.
     pub fn contact_grasp(&self) -> Option<&ContactGrasp> {
-        self.holding.friction()
+        self.objects.first().holding.friction()
     }
 
     /// Sets the time from tick to tick: live questions ask for their answer within it.
     pub fn tick_every(&mut self, period: Duration) {
-        self.object.questions.tick_every(period);
+        self.objects.iter_mut().for_each(|object| object.live.questions.tick_every(period));
     }
 
     /// Whether ticks wait for answers.
     pub fn pace(&self) -> Pace {
-        self.object.questions.pace()
+        self.objects.first().live.questions.pace()
     }
 
     /// Adds the digest of the question to every later outcome.
     pub fn want_digests(&mut self) {
-        self.object.questions.want_digests();
+        self.objects.first_mut().live.questions.want_digests();
     }
 
-    /// Object with its present shape.
+    /// The first object with its present shape.
     pub fn object(&self) -> &SoftObject {
-        self.object.shown.object()
+        self.objects.first().object()
     }
 
-    /// Pose of the object in the world after the last tick.
+    /// Pose of the first object in the world after the last tick.
     pub fn world_from_object(&self) -> &Isometry3<f64> {
-        self.object.shown.world_from_object()
+        self.objects.first().world_from_object()
     }
 
-    /// State of the grasp after the last tick.
+    /// State of the grasp of the first object after the last tick.
     pub fn state(&self) -> StateName {
-        self.holding.state_name()
+        self.objects.first().holding.state_name()
     }
 
     /// First hand of the last tick, as measured, but never below the table of a grasp by friction.
@@ -149,30 +200,30 @@ impl GraspLoop {
 
     /// Contact of each fingertip after the last tick, thumb first.
     pub fn contacts(&self) -> [Option<Contact>; 5] {
-        self.holding.contacts()
+        self.objects.first().holding.contacts()
     }
 
-    /// Force of each fingertip on the object in its shown shape, thumb first. `None` if the fingers do
+    /// Force of each fingertip on the object that was touched last in its shown shape, thumb first. `None` if the fingers do
     /// not deform it, until the first answer, and unless [`AnswerWishes::forces`] asks for them.
     ///
     /// Units: N. Frame: the object's.
     pub fn fingertip_forces(&self) -> Option<[Vector3<f64>; 5]> {
-        self.object.shown.forces()
+        self.objects.get(self.objects.touched()).live.shown.forces()
     }
 
-    /// Whether the server is preparing the object's model.
+    /// Whether the server has prepared the objects' models.
     pub fn is_model_prepared(&self) -> bool {
-        !self.object.questions.link().is_giving_model()
+        self.objects.iter().all(|object| !object.live.questions.link().is_giving_model())
     }
 
     /// Whether the server is connected.
     pub fn is_connected(&self) -> bool {
-        self.object.questions.link().is_connected()
+        self.objects.iter().all(|object| object.live.questions.link().is_connected())
     }
 
-    /// Whether the object is the one asked for, and the server keeps its model.
+    /// Whether the objects are those asked for, and the server keeps their models.
     pub fn is_object_ready(&self) -> bool {
-        self.object.questions.link().has_model() && !self.object.changing.replaces()
+        self.objects.iter().all(TableObject::is_ready)
     }
 
     /// Reader of the first hand.
@@ -187,14 +238,17 @@ impl GraspLoop {
 
     /// Waits until all requests have ended, for at most `at_most`; returns whether they have.
     pub fn wait_idle(&self, at_most: Duration) -> bool {
-        self.object.questions.link().wait_idle(at_most)
+        // Each waits for what is left of the time that all have.
+        let until = Instant::now() + at_most;
+        let left = || until.saturating_duration_since(Instant::now());
+        self.objects.iter().all(|object| object.live.questions.link().wait_idle(left()))
     }
 
     /// Waits until all requests have ended, for at most `at_most`, and until background work is done:
     /// then what the next tick finds does not depend on time.
     pub fn settle(&mut self, at_most: Duration) {
-        self.object.changing.settle();
-        self.object.questions.link().wait_idle(at_most);
+        self.objects.iter_mut().for_each(|object| object.live.changing.settle());
+        self.wait_idle(at_most);
     }
 
     /// Takes what has come from the server since the last tick, if no tick follows.
@@ -203,7 +257,8 @@ impl GraspLoop {
     /// [`ObjectError`] if the answer does not fit the object.
     pub fn take_last(&mut self) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
-        self.object.pick_up(&mut self.holding, &mut outcome)?;
+        self.objects.pick_up(&mut outcome)?;
+        self.objects.gather_news(&mut outcome);
         Ok(outcome)
     }
 
@@ -214,47 +269,56 @@ impl GraspLoop {
     pub fn tick(&mut self, tick: u64, now_s: f64, sent: &Sent) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
         self.hands.readers.feed(&sent.arrivals, now_s);
-        self.object.questions.begin_tick(sent.recorded.as_ref());
-        self.object.pick_up(&mut self.holding, &mut outcome)?;
-        self.object.save_when_whole(&mut self.holding, &mut outcome);
+        self.objects.first_mut().live.questions.begin_tick(sent.recorded.as_ref());
+        self.objects.each(&mut outcome, |object, part| {
+            object.pick_up(part)?;
+            object.save_when_whole(part);
+            Ok(())
+        })?;
         self.hands.look_at_devices(now_s, &mut outcome);
+        let played = self.play(tick, now_s, sent.command, &mut outcome);
+        self.objects.gather_news(&mut outcome);
+        played.map(|()| outcome)
+    }
+
+    /// Plays the part of a tick that needs a hand.
+    fn play(
+        &mut self,
+        tick: u64,
+        now_s: f64,
+        command: Option<Command>,
+        outcome: &mut TickOutcome,
+    ) -> Result<(), ObjectError> {
         // Until the devices of a hand have spoken there is none to act with.
         if self.readers().heard(now_s) == 0 {
-            return Ok(outcome);
+            return Ok(());
         }
         self.meet_first_hand(now_s);
         let hands = self.hands.measured(now_s, self.table_for_hands());
-        self.object.take_work(&mut self.holding, &mut outcome);
-        let command = self.object.allowed(sent.command, &mut self.holding, &mut outcome);
-        let keeping = self.is_keeping();
-        let shown = if self.holding.friction().is_some() {
+        self.objects.each(outcome, |object, part| {
+            object.take_work(part);
+            Ok(())
+        })?;
+        let shown = if self.contact_grasp().is_some() {
             let friction = FrictionTick { tick, now_s, hands };
-            let shown =
-                friction.play(command, &mut self.holding, &mut self.object, &mut outcome)?;
-            outcome.seen.keeping = keeping;
-            outcome.seen_by_second.keeping = keeping;
-            shown
+            self.objects.play(&friction, command, outcome)?
         } else {
-            // The thesis's rules know one hand.
-            let [Some(TickHand { pose, .. }), _] = hands else { return Ok(outcome) };
-            let shown = self.tick_of_the_thesis(tick, &pose, command, &mut outcome)?;
-            outcome.seen.keeping = self.is_keeping();
+            // The thesis's rules know one object and one hand.
+            let object = self.objects.first_mut();
+            let command = object.allowed(command, outcome);
+            let [Some(hand), _] = hands else { return Ok(()) };
+            let shown = ThesisTick { tick, hand }.play(command, object, outcome)?;
+            outcome.seen.keeping = object.is_keeping();
             [Some(shown), None]
         };
         self.hands.show(&hands, shown);
-        Ok(outcome)
+        Ok(())
     }
 
     /// Height of the table where it stops hands, m.
     fn table_for_hands(&self) -> Option<f64> {
-        let contact = self.holding.friction().filter(|_| self.stops_hand);
+        let contact = self.contact_grasp().filter(|_| self.stops_hand);
         contact.and_then(|contact| contact.scene().table_y)
-    }
-
-    /// Whether the hand waits until a shape is kept. In lockstep this is done in the next tick, and the
-    /// hand goes on.
-    fn is_keeping(&self) -> bool {
-        self.pace() == Pace::Free && self.object.changing.keep().is_wanted()
     }
 
     /// Puts the object where the first hand closes that is heard of, if that is wanted.
@@ -271,92 +335,7 @@ impl GraspLoop {
         }
         self.stops_hand = false;
         let home = where_it_closes(&dimensions, &angles, &hand, self.object());
-        if self.holding.set_home(home).is_ok() {
-            self.object.shown.place(home);
-        }
-    }
-
-    /// Plays the part of a tick by the thesis's rules that needs a hand.
-    fn tick_of_the_thesis(
-        &mut self,
-        tick: u64,
-        hand: &HandPose,
-        command: Option<Command>,
-        outcome: &mut TickOutcome,
-    ) -> Result<HandSegments, ObjectError> {
-        let step = self.step(hand, command, outcome);
-        self.follow(tick, &step, outcome)?;
-        self.object.shown.place(step.world_from_object);
-        outcome.events.extend(step.events.iter().map(|&event| LoopEvent::Grasp(event)));
-        outcome.state = Some(step.state);
-        outcome.seen.state = Some(step.state);
-        outcome.seen.world_from_object = step.world_from_object;
-        outcome.recalled = step.recalled;
-        outcome.shown_tick = self.object.shown.tick();
-        Ok(step.world_from_segment)
-    }
-
-    fn step(
-        &mut self,
-        hand: &HandPose,
-        command: Option<Command>,
-        outcome: &mut TickOutcome,
-    ) -> StepOutput {
-        let colliders = HandColliders::new(&self.reader().setup().dimensions, hand);
-        let thesis = self.holding.thesis();
-        let world_from_object = thesis.world_from_object(&hand.world_from_palm);
-        let margin = thesis.release_margin();
-        let (tree, normals) = (self.object().tree(), self.object().normals());
-        let fingers = sense(tree, normals, &colliders, &world_from_object, margin);
-        let tips = fingers.map(|finger| finger.tip_in_object);
-        outcome.seen.inside = std::array::from_fn(|i| fingers[i].tip_hits[0].is_some());
-        outcome.tips = outcome.seen.inside;
-        let tip_radii = self.reader().setup().dimensions.tip_radii();
-        self.object.prefetch(&tips, tip_radii, &mut self.holding, outcome);
-        self.holding.step(&StepInput {
-            world_from_palm: hand.world_from_palm,
-            world_from_segment: hand.fingers.map(|f| f.segments.map(|s| s.world_from_segment)),
-            fingers,
-            command,
-        })
-    }
-
-    /// Applies the decisions of the thesis's rules to object and server.
-    fn follow(
-        &mut self,
-        tick: u64,
-        step: &StepOutput,
-        outcome: &mut TickOutcome,
-    ) -> Result<(), ObjectError> {
-        let tip_radii = self.reader().setup().dimensions.tip_radii();
-        let (holding, object) = (&mut self.holding, &mut self.object);
-        if step.events.contains(&GraspEvent::ShapeKept) {
-            object.keep_made();
-        }
-        match &step.known {
-            Some(known) => {
-                outcome.tips = [true; 5];
-                let grip = object.questions.begin_grip(tick);
-                if object.changing.keep().freezes() {
-                    outcome.unanswered.push((tick, Unanswered::KeepingShape));
-                    return Ok(());
-                }
-                let wants_whole = object.changing.wants_whole();
-                let shown = object.shown.object();
-                let questions = &mut object.questions;
-                let question =
-                    questions.question_of_tick(shown, tip_radii, wants_whole, known, outcome);
-                if questions.ask(tick, grip, question, outcome) {
-                    object.wait_in_lockstep(holding, outcome)?;
-                }
-            }
-            // A tick whose input was ignored keeps the shape as it is.
-            None if step.state == StateName::Deforming => {
-                outcome.unanswered.push((tick, Unanswered::InputIgnored));
-            }
-            None => object.let_go(holding, outcome)?,
-        }
-        Ok(())
+        self.objects.put_first_at(home);
     }
 
     /// Sets the place where the object is put when the first hand comes.
@@ -370,101 +349,90 @@ impl GraspLoop {
     /// # Errors
     /// Reason for a refusal, in a sentence.
     pub fn undo_keep_shape(&mut self) -> Result<(), Notice> {
-        self.object.changing.refuse_while_changing()?;
-        let Some(earlier) = self.object.changing.history().last().map(Arc::clone) else {
-            return Err(Notice::refused("no shape has been kept: there is nothing to undo"));
-        };
-        self.object.begin_to_replace(earlier, Replacement::EarlierShape);
-        Ok(())
+        self.objects.touched_mut().undo_keep_shape()
     }
 
-    /// Puts the object back to its home, with the rest shape that it began with. The result is told in a
+    /// Puts every object back to its home, with the rest shape that it began with. The result is told in a
     /// later tick.
     ///
     /// # Errors
     /// Reason for a refusal, in a sentence.
     pub fn begin_anew(&mut self) -> Result<(), Notice> {
-        self.object.changing.refuse_while_changing()?;
-        self.put_object_home();
-        if let Some(first) = self.object.changing.history().first().map(Arc::clone) {
-            self.object.begin_to_replace(first, Replacement::FirstShape);
-        }
-        Ok(())
+        self.objects.iter_mut().try_for_each(TableObject::begin_anew)
     }
 
-    /// Replaces the object; the new one is free at its home. The result is told in a later tick.
+    /// Replaces the object that was touched last; the new one is free at its home. The result is told in
+    /// a later tick.
     ///
     /// # Errors
     /// Reason for a refusal, in a sentence.
     pub fn replace_object(&mut self, rest: Arc<RestShape>, name: &str) -> Result<(), Notice> {
-        self.object.changing.refuse_while_changing()?;
-        self.object.begin_to_replace(rest, Replacement::Other(name.to_owned()));
-        Ok(())
+        let has_room = self.objects.check_room_for(&rest);
+        has_room.map_err(|why| Notice::refused(format!("{name} is not taken: {why}")))?;
+        self.objects.touched_mut().replace(rest, name)
     }
 
-    /// Changes the object's material; it stays held as it is. An element that was chosen as the cheapest
-    /// without locking follows Poisson's ratio. The result is told in a later tick.
+    /// Changes the material of the object that was touched last; it stays held as it is. An element that
+    /// was chosen as the cheapest without locking follows Poisson's ratio. The result is told in a later
+    /// tick.
     ///
     /// # Errors
     /// Reason for a refusal, in a sentence.
     pub fn set_material(&mut self, material: Material) -> Result<(), Notice> {
-        self.object.set_material(material)
+        self.objects.touched_mut().live.set_material(material)
     }
 
-    /// Rotates the object about its centre while nothing holds it (thesis 6.1.2).
+    /// Rotates the object that was touched last about its centre while nothing holds it (thesis 6.1.2).
     ///
     /// Frame: the rotation is in the world frame.
     ///
     /// # Errors
     /// [`GraspError`] while the hand holds it.
     pub fn turn_object(&mut self, rotation: UnitQuaternion<f64>) -> Result<(), GraspError> {
-        let centre = self.world_from_object() * self.object().rest_shape().centre();
-        let about = Translation3::from(centre.coords);
-        let mut turned: Isometry3<f64> =
-            about * rotation * about.inverse() * self.world_from_object();
-        turned.rotation.renormalize();
-        self.holding.place(turned)?;
-        self.object.shown.place(turned);
-        Ok(())
+        self.objects.touched_mut().turn(rotation)
     }
 
-    /// Releases the object at its pose, because the hand is replaced.
+    /// Releases the objects at their poses, because the hand is replaced.
     pub fn let_object_go(&mut self) {
-        self.holding.let_go();
+        self.objects.iter_mut().for_each(|object| object.holding.let_go());
     }
 
-    /// Releases the object and puts it back to its home.
+    /// Releases the objects and puts them back to their homes.
     pub fn put_object_home(&mut self) {
-        self.holding.put_home(&mut self.object.shown);
+        self.objects.iter_mut().for_each(TableObject::put_home);
     }
 
-    /// Saves the object in its present shape, with all nodes. If the inside is not known it is asked for
+    /// Saves the object that was touched last in its present shape, with all nodes. If the inside is not known it is asked for
     /// first. The result is told in a later tick.
     ///
     /// # Errors
     /// Reason for a refusal, in a sentence.
     pub fn save(&mut self, path: PathBuf) -> Result<Option<Notice>, Notice> {
-        self.object.changing.save(path, self.object.shown.object())
+        self.objects.touched_mut().save(path)
     }
 
     /// Sets the method, from the next question on.
     pub fn set_method(&mut self, method: MethodName) {
-        self.object.questions.set_method(method);
+        for object in self.objects.iter_mut() {
+            object.live.questions.set_method(method.clone());
+        }
     }
 
     /// Sets the nodes that are asked for, from the next question on.
     pub fn set_subscription(&mut self, subscription: Subscription) {
-        self.object.questions.settings_mut().subscription = subscription;
+        for object in self.objects.iter_mut() {
+            object.live.questions.settings_mut().subscription = subscription;
+        }
     }
 
-    /// Wishes for the answers, from the next question on.
+    /// Wishes for the answers of a grasp by the thesis's rules, from the next question on.
     pub fn wishes_mut(&mut self) -> &mut AnswerWishes {
-        self.object.questions.wishes_mut()
+        self.objects.first_mut().live.questions.wishes_mut()
     }
 
-    /// Number of kept shapes that can be undone.
+    /// Number of kept shapes of the first object that can be undone.
     pub fn undo_count(&self) -> usize {
-        self.object.changing.history().len()
+        self.objects.first().undo_count()
     }
 
     /// Continues what is under way while no tick is played.
@@ -473,11 +441,15 @@ impl GraspLoop {
     /// [`ObjectError`] if the answer does not fit the object.
     pub fn idle(&mut self) -> Result<TickOutcome, ObjectError> {
         let mut outcome = TickOutcome::default();
-        self.object.pick_up(&mut self.holding, &mut outcome)?;
-        self.object.save_when_whole(&mut self.holding, &mut outcome);
-        self.object.take_work(&mut self.holding, &mut outcome);
         let tip_radii = self.reader().setup().dimensions.tip_radii();
-        self.object.ask_for_inside(tip_radii);
+        self.objects.each(&mut outcome, |object, part| {
+            object.pick_up(part)?;
+            object.save_when_whole(part);
+            object.take_work(part);
+            object.live.ask_for_inside(tip_radii);
+            Ok(())
+        })?;
+        self.objects.gather_news(&mut outcome);
         Ok(outcome)
     }
 }

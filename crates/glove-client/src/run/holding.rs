@@ -11,12 +11,14 @@ pub(crate) struct Holding {
     thesis: Grasp,
     /// Grasp by friction; it replaces the thesis's rules, which then only know the object's home.
     friction: Option<Box<ContactGrasp>>,
+    /// Whether others lie on the table too, so that its height stays.
+    keeps_table: bool,
 }
 
 impl Holding {
     /// Grasp by the rules of the thesis.
     pub(crate) fn new(thesis: Grasp) -> Self {
-        Self { thesis, friction: None }
+        Self { thesis, friction: None, keeps_table: false }
     }
 
     /// Changes to a grasp by contact with friction.
@@ -24,6 +26,11 @@ impl Holding {
         let contact = ContactGrasp::new(scene, *self.thesis.home());
         shown.place(contact.world_from_object());
         self.friction = Some(Box::new(contact));
+    }
+
+    /// Keeps the table where it is from now on, because other objects lie on it too.
+    pub(crate) fn keep_table(&mut self) {
+        self.keeps_table = true;
     }
 
     /// Grasp by the thesis's rules, whether or not it holds the object.
@@ -93,9 +100,12 @@ impl Holding {
     }
 
     /// Releases the object and puts it back to its home. A table is as high as the lowest point of the
-    /// object there.
+    /// object there, or the object lies as high as the table that it shares.
     pub(crate) fn put_home(&mut self, shown: &mut Shown) {
         self.thesis.let_go();
+        if self.keeps_table {
+            return self.lie_on_table(shown);
+        }
         let home = *self.thesis.home();
         // Nothing holds it any more.
         if self.thesis.place(home).is_ok() {
@@ -106,6 +116,20 @@ impl Holding {
             let table_y = contact.scene().table_y.map(|_| lowest);
             contact.meet_new_object(table_y);
             shown.place(contact.world_from_object());
+        }
+    }
+
+    /// Puts the object back to its home, as high as the table is.
+    fn lie_on_table(&mut self, shown: &mut Shown) {
+        let Some(contact) = &mut self.friction else { return };
+        let mut home = *self.thesis.home();
+        if let Some(table_y) = contact.scene().table_y {
+            home.translation.y = table_y - shown.object().rest_shape().bottom();
+        }
+        contact.lie_at(home);
+        // Nothing holds it any more.
+        if self.thesis.set_home(home).is_ok() {
+            shown.place(home);
         }
     }
 }

@@ -31,10 +31,10 @@ impl Foresight {
             self.made_for = plan;
             self.squeezing = plan.map(|plan| {
                 let setup = grasp_loop.reader().setup();
-                let centre = grasp_loop.object().rest_shape().centre();
+                let (object, world_from_object) = grasp_loop.aimed(WhichHand::First);
+                let centre = object.rest_shape().centre();
                 let in_object = plan.squeezing(setup, centre);
                 let mut seen = HandView::of_pose(setup.dimensions, &in_object);
-                let world_from_object = grasp_loop.world_from_object();
                 seen.world_from_palm = world_from_object * seen.world_from_palm;
                 for segment in seen.world_from_segment.iter_mut().flatten() {
                     *segment = world_from_object * *segment;
@@ -46,6 +46,7 @@ impl Foresight {
             story_is_over: hand.is_over(),
             is_on_its_way: hand.is_on_its_way(),
             squeezing: self.squeezing.clone(),
+            aimed: grasp_loop.objects().aimed(WhichHand::First),
         }
     }
 }
@@ -71,7 +72,8 @@ impl Observer {
         });
         self.said = heard.or(self.said.take());
         self.news.extend(outcome.events.iter().map(|event| news(due.tick, event)));
-        for (tick, solve) in &outcome.answers {
+        // Of several objects the one that was touched last is told of.
+        for (tick, solve) in &outcome.part(outcome.touched).answers {
             self.timings.push(TickTiming::new(*tick, solve));
             self.solve = Some(solve.clone());
         }
@@ -85,36 +87,30 @@ impl Observer {
         outcome: &TickOutcome,
         grasp_loop: &GraspLoop,
     ) -> ViewFrame {
-        let object = grasp_loop.object();
-        let faults = grasp_loop.readers().faults();
+        let (touched, faults) = (outcome.touched, grasp_loop.readers().faults());
+        let others = (0..grasp_loop.object_count()).filter(|number| *number != touched);
+        let part = outcome.part(touched);
         ViewFrame {
             tick: due.tick,
             at_s: now_s,
-            object: ObjectView {
-                rest: Arc::clone(object.rest_shape()),
-                rest_shapes: object.rest_shapes(),
-                kept: grasp_loop.undo_count(),
-                displacement: object.displacement().to_vec(),
-                whole: object.is_whole(),
-                world_from_object: *grasp_loop.world_from_object(),
-                table_y: grasp_loop.contact_grasp().and_then(|contact| contact.scene().table_y),
-            },
+            object: object_view(grasp_loop, touched),
+            others: others.map(|number| object_view(grasp_loop, number)).collect(),
             hand: hand_view(grasp_loop, WhichHand::First),
             second_hand: hand_view(grasp_loop, WhichHand::Second),
             grasp: GraspView {
-                state: outcome.state,
-                tips: outcome.tips,
-                second_tips: outcome.second_tips,
+                state: part.state,
+                tips: part.tips,
+                second_tips: part.second_tips,
                 contacts: grasp_loop.contacts(),
                 forces: grasp_loop.fingertip_forces(),
-                keeping: outcome.seen.keeping,
+                keeping: part.seen.keeping,
                 silent: outcome.silent.clone(),
             },
             server: ServerView {
-                link: health(grasp_loop, due.tick, outcome),
+                link: health(grasp_loop, due.tick, part),
                 is_preparing: !grasp_loop.is_model_prepared(),
                 solve: self.solve.clone(),
-                shown_tick: outcome.shown_tick,
+                shown_tick: part.shown_tick,
                 ticks_skipped: self.ticks_skipped,
                 device_faults: faults.glove + faults.tracker,
                 said: self.said.clone(),
@@ -123,6 +119,24 @@ impl Observer {
             news: std::mem::take(&mut self.news),
             timings: std::mem::take(&mut self.timings),
         }
+    }
+}
+
+/// The object of a number, from 0.
+fn object_view(grasp_loop: &GraspLoop, number: usize) -> ObjectView {
+    let shown = grasp_loop.objects().get(number);
+    let object = shown.object();
+    let is_one_of_several = grasp_loop.object_count() > 1;
+    ObjectView {
+        number,
+        own: is_one_of_several.then(|| shown.own_look()).flatten(),
+        rest: Arc::clone(object.rest_shape()),
+        rest_shapes: object.rest_shapes(),
+        kept: shown.undo_count(),
+        displacement: object.displacement().to_vec(),
+        whole: object.is_whole(),
+        world_from_object: *shown.world_from_object(),
+        table_y: shown.holding.friction().and_then(|contact| contact.scene().table_y),
     }
 }
 
@@ -149,6 +163,10 @@ fn health(grasp_loop: &GraspLoop, tick: u64, outcome: &TickOutcome) -> LinkHealt
 
 fn news(tick: u64, event: &LoopEvent) -> News {
     let (text, kind) = match event {
+        LoopEvent::OfFurther { object, event } => {
+            let News { text, kind, .. } = news(tick, event);
+            (format!("{text} ({object})"), kind)
+        }
         LoopEvent::Grasp(event) => (event.to_string(), NewsKind::Grasp),
         LoopEvent::KeepRefused(text) => (text.clone(), NewsKind::Refusal),
         LoopEvent::Device(notice) => (notice.text.clone(), NewsKind::Information),

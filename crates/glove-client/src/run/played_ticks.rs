@@ -14,7 +14,7 @@ use softgrasp_protocol::solve_report::SolveSummary;
 use crate::run::contact_ledger::StepRecord;
 
 /// Record of one tick that was played.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct TickRecord {
     /// Number of the tick, from 0.
     pub tick: u64,
@@ -36,6 +36,9 @@ pub struct TickRecord {
     pub shown_tick: Option<u64>,
     /// Computing time of the tick, ms.
     pub compute_ms: f64,
+    /// The further objects, in their order; absent in a run of one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<FurtherRecord>,
 }
 
 impl TickRecord {
@@ -47,6 +50,35 @@ impl TickRecord {
     /// Whether the fingers deformed the object, and there is neither an answer nor a reason yet.
     pub(crate) fn is_open(&self) -> bool {
         self.deforms() && self.solve.is_none() && self.unanswered.is_none()
+    }
+}
+
+/// Record of a further object in one tick that was played.
+#[derive(Clone, Debug, Serialize)]
+pub struct FurtherRecord {
+    /// Number of the object, from 2.
+    pub object: usize,
+    /// State of its grasp after the tick.
+    pub state: String,
+    /// Whether each fingertip of the first hand touches it, thumb first.
+    pub tips: [bool; 5],
+    /// Step that the tick asked for; null if it was not answered.
+    pub contact: Option<StepRecord>,
+    /// Reason why a tick in which it was touched has no answer; null for all other ticks.
+    pub unanswered: Option<&'static str>,
+    /// Tick whose answer the object shows after this one; null if it shows none.
+    pub shown_tick: Option<u64>,
+}
+
+impl FurtherRecord {
+    /// Whether a hand touched the object in this tick.
+    pub(crate) fn deforms(&self) -> bool {
+        self.state == StateName::Deforming.to_string()
+    }
+
+    /// Whether a hand touched it, and there is neither an answer nor a reason yet.
+    pub(crate) fn is_open(&self) -> bool {
+        self.deforms() && self.contact.is_none() && self.unanswered.is_none()
     }
 }
 
@@ -130,6 +162,11 @@ impl PlayedTicks {
         self.newest.iter()
     }
 
+    /// Records in memory, oldest first, for changes.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut TickRecord> {
+        self.newest.iter_mut()
+    }
+
     /// The newest record.
     pub fn last(&self) -> Option<&TickRecord> {
         self.newest.back()
@@ -197,6 +234,7 @@ mod tests {
             unanswered: None,
             shown_tick: None,
             compute_ms: 0.25,
+            further: Vec::new(),
         }
     }
 

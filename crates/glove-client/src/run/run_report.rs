@@ -17,6 +17,7 @@ use crate::pace::tick_budget::TickBudget;
 use crate::pace::{Due, Pace};
 use crate::run::answer_tally::AnswerTally;
 use crate::run::contact_ledger::ContactTotals;
+use crate::run::further_report::FurtherReport;
 use crate::run::latency::LatencySummary;
 use crate::run::played_ticks::{PlayedTicks, TickRecord};
 use crate::run::tick_outcome::{LoopEvent, TickOutcome};
@@ -42,6 +43,9 @@ pub struct RunReport {
     pub interrupted: bool,
     /// States of the grasp, in the order in which they were first reached.
     pub states_reached: Vec<String>,
+    /// The further objects of the run, in their order; absent in a run of one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further_objects: Vec<FurtherReport>,
     /// Events of the run, in their order.
     pub events: Vec<EventRecord>,
     /// Number of events beyond the first 10 000, which are not listed.
@@ -230,6 +234,7 @@ impl RunReport {
             ticks: 0,
             interrupted: false,
             states_reached: Vec::new(),
+            further_objects: Vec::new(),
             events: Vec::new(),
             events_left_out: 0,
             played: PlayedTicks::default(),
@@ -260,6 +265,9 @@ impl RunReport {
             self.states_reached.push(state.clone());
         }
         let at_ms = 1e3 * now_s;
+        let parts = self.further_objects.iter_mut().zip(&outcome.further);
+        let further =
+            parts.map(|(object, part)| object.record(part, at_ms, &self.played)).collect();
         let older = self.played.push(TickRecord {
             tick: due.tick,
             at_ms,
@@ -271,10 +279,15 @@ impl RunReport {
             unanswered: None,
             shown_tick: outcome.shown_tick,
             compute_ms: 0.0,
+            further,
         });
         // Its answer is not awaited any more.
-        if older.is_some_and(|record| record.is_open()) {
-            self.summary.unanswered.add(Unanswered::AnswerLate, 1);
+        if let Some(older) = older {
+            if older.is_open() {
+                self.summary.unanswered.add(Unanswered::AnswerLate, 1);
+            }
+            let objects = self.further_objects.iter_mut().zip(&older.further);
+            objects.for_each(|(object, record)| object.forget(record));
         }
         if outcome.state == Some(StateName::Deforming) {
             self.summary.deforming_ticks += 1;
@@ -311,6 +324,9 @@ impl RunReport {
         for (tick, why) in &outcome.unanswered {
             self.add_unanswered(*tick, *why);
         }
+        for (object, part) in self.further_objects.iter_mut().zip(&outcome.further) {
+            object.add(part, &mut self.played);
+        }
     }
 
     /// Adds ticks that were not played; they are deforming ticks if the one before them was.
@@ -321,6 +337,9 @@ impl RunReport {
             self.summary.deforming_ticks += ticks;
             self.summary.unanswered.add(Unanswered::TickSkipped, ticks);
         }
+        let last = self.played.last().map_or(&[][..], |last| last.further.as_slice());
+        let objects = self.further_objects.iter_mut().zip(last);
+        objects.for_each(|(object, last)| object.add_skipped(last, ticks));
     }
 
     /// Adds the computing time of the last tick.
@@ -377,6 +396,9 @@ impl RunReport {
     pub fn finish(&mut self, faults: DeviceFaults, budget: &TickBudget) {
         for (tick, why) in self.open_ticks() {
             self.add_unanswered(tick, why);
+        }
+        for object in &mut self.further_objects {
+            object.finish(&mut self.played);
         }
         self.frames_missing = self.played.why_missing().map(str::to_owned);
         let (counted, answers) = (&self.summary, &self.answers);

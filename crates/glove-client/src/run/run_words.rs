@@ -16,7 +16,10 @@ pub fn failure(report: &RunReport) -> Option<String> {
         return Some(format!("there was never a hand: {why}"));
     }
     let s = &report.summary;
-    if s.solves > 0 || s.deforming_ticks == 0 || report.interrupted {
+    let further = || report.further_objects.iter();
+    let solves = s.solves + further().map(|object| object.solves).sum::<usize>();
+    let deforming = s.deforming_ticks + further().map(|object| object.deforming_ticks).sum::<u64>();
+    if solves > 0 || deforming == 0 || report.interrupted {
         return None;
     }
     let why = match &report.last_failure {
@@ -25,7 +28,7 @@ pub fn failure(report: &RunReport) -> Option<String> {
             s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
         }
     };
-    Some(format!("none of {} deforming ticks was answered: {why}", s.deforming_ticks))
+    Some(format!("none of {deforming} deforming ticks was answered: {why}"))
 }
 
 /// Summary of one screen, for a person who does not know the program.
@@ -76,6 +79,7 @@ pub fn describe(report: &RunReport) -> String {
     text.push_str(&words_of_large(report));
     text.push_str(&report.summary.contact.as_ref().map_or(String::new(), |c| c.words()));
     text.push_str(&words_of_devices(report));
+    report.further_objects.iter().for_each(|object| text.push_str(&object.words()));
     if report.interrupted {
         text.push_str("  ended by the user\n");
     }

@@ -7,16 +7,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Quaternion, UnitQuaternion};
-use softgrasp_grasp::grasp::{Command, GraspEvent, StateName};
+use softgrasp_grasp::grasp::{Command, StateName};
 use softgrasp_grasp::object::ObjectError;
 use softgrasp_hand::hand_source::HandSource;
 use softgrasp_hand::live_hand::LiveHand;
 use softgrasp_hand::loaded_object::LoadedObject;
-use softgrasp_hand::mouse::MouseHand;
+use softgrasp_hand::mouse::{MouseHand, MouseInput};
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::recording::{Intervention, Recorder, Replayed};
 use softgrasp_hand::scripted::Seen;
-use softgrasp_hand::sent::Sent;
+use softgrasp_hand::sent::{Sent, WhichHand};
 use softgrasp_window::view::control::Control;
 
 use crate::ask::solve_settings::Subscription;
@@ -109,8 +109,9 @@ impl Session {
         let began = Instant::now();
         // Between the ticks the object may have been turned or replaced.
         let object_awaited = self.awaits_model && !self.grasp_loop.is_object_ready();
-        for seen in [&mut self.seen, &mut self.seen_by_second] {
-            seen.world_from_object = *self.grasp_loop.world_from_object();
+        let seen = [&mut self.seen, &mut self.seen_by_second];
+        for (seen, which) in seen.into_iter().zip(WhichHand::ALL) {
+            seen.world_from_object = *self.grasp_loop.aimed(which).1;
             seen.object_awaited = object_awaited;
         }
         let (due, now_s, mut sent) = self.next(due, now_s);
@@ -143,11 +144,11 @@ impl Session {
             interventions.into_iter().for_each(|done| self.repeat(done));
             return (Due { tick, skipped }, now_s, sent);
         }
-        let object = self.grasp_loop.object();
+        let [object, of_second] = WhichHand::ALL.map(|which| self.grasp_loop.aimed(which).0);
         let ticks = due.skipped + 1;
         let mut sent = self.hand.next_after(ticks, now_s, &self.seen, object);
         if let Some(second) = &mut self.second {
-            sent.join_second(second.next_after(ticks, now_s, &self.seen_by_second, object));
+            sent.join_second(second.next_after(ticks, now_s, &self.seen_by_second, of_second));
         }
         (due, now_s, sent)
     }
@@ -271,7 +272,7 @@ impl Session {
             Control::TurnObject(rotation) => self.turn_object(rotation),
             Control::Restart => self.restart(),
             Control::Mouse(input) => {
-                self.mouse_hands().for_each(|hand| hand.take(input));
+                self.take_mouse(input);
                 Ok(())
             }
             Control::SetMethod(method) => {
@@ -335,6 +336,19 @@ impl Session {
         std::iter::once(&mut self.hand).chain(&mut self.second).filter_map(HandSource::as_mouse)
     }
 
+    /// Passes on a wish of the person with the mouse. A hand that is to go somewhere by itself goes to the
+    /// object that it is over.
+    fn take_mouse(&mut self, input: MouseInput) {
+        let Self { grasp_loop, hand, second, .. } = self;
+        let hands = std::iter::once(hand).chain(second).zip(WhichHand::ALL);
+        for (hand, which) in hands.filter_map(|(hand, which)| Some((hand.as_mouse()?, which))) {
+            if input.is_errand() && grasp_loop.aim_at_nearest(which, &hand.looks_at()) {
+                hand.turn_to_another_object();
+            }
+            hand.take(input);
+        }
+    }
+
     /// Whether commands wait for the next tick.
     pub fn has_commands(&self) -> bool {
         !self.commands.is_empty()
@@ -364,6 +378,10 @@ impl Session {
     pub fn finish(mut self, interrupted: bool) -> Result<RunReport, ObjectError> {
         self.report.add_last(&self.grasp_loop.take_last()?);
         self.report.interrupted = interrupted;
+        for object in &mut self.report.further_objects {
+            let (_, world_from_object) = self.grasp_loop.object_at(object.number - 1);
+            object.at_m = world_from_object.translation.vector.into();
+        }
         self.report.finish(self.grasp_loop.readers().faults(), &self.budget);
         self.report.summary.latency = self.latency.summary();
         self.report.force = self.grasp_loop.end_force();
@@ -386,14 +404,10 @@ impl Session {
 
     /// Takes the news of a tick that the person is told.
     fn hear(&mut self, outcome: &TickOutcome) {
-        self.notices.extend(outcome.events.iter().filter_map(notice_of));
+        self.notices.extend(outcome.events.iter().filter_map(LoopEvent::notice));
         self.notices.extend(outcome.notices.iter().cloned());
-        if let Some(state) = outcome.state {
-            let &TickOutcome { tips, second_tips, recalled, shown_tick, seen, .. } = outcome;
-            let state = Some(state);
-            let showed =
-                TickOutcome { state, tips, second_tips, recalled, ..TickOutcome::default() };
-            self.last = TickOutcome { shown_tick, seen, ..showed };
+        if outcome.state.is_some() {
+            self.last = outcome.without_news();
         }
     }
 
@@ -418,9 +432,13 @@ impl Session {
         };
         self.grasp_loop.replace_object(Arc::clone(object.rest_shape()), &summary.name)?;
         self.grasp_loop.let_object_go();
-        self.hand.meet_new_object(plan.copied());
+        if self.grasp_loop.aims_at_touched(WhichHand::First) {
+            self.hand.meet_new_object(plan.copied());
+        }
         // The plan is the first hand's: another one makes its own.
-        self.second.iter_mut().for_each(|second| second.meet_new_object(None));
+        if self.grasp_loop.aims_at_touched(WhichHand::Second) {
+            self.second.iter_mut().for_each(|second| second.meet_new_object(None));
+        }
         self.intervened(Intervention::NotReplayed(format!("the object became {}", summary.name)));
         Ok(())
     }
@@ -474,22 +492,4 @@ impl Session {
         self.grasp_loop.wishes_mut().max_error = max_error;
         Ok(())
     }
-}
-
-/// Sentence for the person about an event, if it is worth one.
-fn notice_of(event: &LoopEvent) -> Option<Notice> {
-    Some(match event {
-        LoopEvent::Grasp(GraspEvent::ShapeKept) => Notice::done("shape kept"),
-        LoopEvent::Grasp(GraspEvent::Released) => Notice::done("the object is let go"),
-        LoopEvent::Grasp(GraspEvent::ReturnedHome) => Notice::done("the object is back home"),
-        LoopEvent::Grasp(GraspEvent::Ignored(Command::KeepShape)) => {
-            Notice::refused("no shape to keep: close all five fingers on the object first")
-        }
-        LoopEvent::Grasp(GraspEvent::Ignored(command)) => {
-            Notice::refused(format!("{command}: the hand holds nothing"))
-        }
-        LoopEvent::KeepRefused(text) => Notice::refused(text.clone()),
-        LoopEvent::Device(notice) => notice.clone(),
-        LoopEvent::Grasp(_) | LoopEvent::Shape(_) | LoopEvent::Server(_) => return None,
-    })
 }

@@ -34,8 +34,9 @@ impl StatusLine {
         move |text| bar.suspend(|| eprintln!("glove-client: {text}"))
     }
 
-    /// Shows the state after a tick.
+    /// Shows the state after a tick; of several objects that of the one that was touched last.
     pub fn show(&mut self, tick: u64, outcome: &TickOutcome) {
+        let outcome = outcome.part(outcome.touched);
         if let Some((_, solve)) = outcome.answers.last() {
             self.last_solve = Some(solve.clone());
         }

@@ -1,6 +1,6 @@
 //! Outcome of one tick: events, state of the grasp, answers, and ticks without one.
 
-use softgrasp_grasp::grasp::{GraspEvent, StateName};
+use softgrasp_grasp::grasp::{Command, GraspEvent, StateName};
 use softgrasp_hand::notice::Notice;
 use softgrasp_hand::scripted::Seen;
 use softgrasp_hand::sent::SilentDevice;
@@ -22,6 +22,13 @@ pub enum LoopEvent {
     Server(String),
     /// News of a device: it fell silent, speaks again, or sends bad records.
     Device(Notice),
+    /// Event of a further object of the run.
+    OfFurther {
+        /// Number and name of the object.
+        object: String,
+        /// What happened.
+        event: Box<LoopEvent>,
+    },
 }
 
 impl LoopEvent {
@@ -36,7 +43,33 @@ impl LoopEvent {
             Self::Shape(text) => ("shape", text.clone()),
             Self::Server(text) => ("server", text.clone()),
             Self::Device(notice) => ("device", notice.text.clone()),
+            Self::OfFurther { object, event } => {
+                let (kind, what) = event.kind_and_words();
+                (kind, format!("{what} ({object})"))
+            }
         }
+    }
+
+    /// Sentence for the person about the event, if it is worth one.
+    pub(crate) fn notice(&self) -> Option<Notice> {
+        Some(match self {
+            Self::Grasp(GraspEvent::ShapeKept) => Notice::done("shape kept"),
+            Self::Grasp(GraspEvent::Released) => Notice::done("the object is let go"),
+            Self::Grasp(GraspEvent::ReturnedHome) => Notice::done("the object is back home"),
+            Self::Grasp(GraspEvent::Ignored(Command::KeepShape)) => {
+                Notice::refused("no shape to keep: close all five fingers on the object first")
+            }
+            Self::Grasp(GraspEvent::Ignored(command)) => {
+                Notice::refused(format!("{command}: the hand holds nothing"))
+            }
+            Self::KeepRefused(text) => Notice::refused(text.clone()),
+            Self::Device(notice) => notice.clone(),
+            Self::OfFurther { object, event } => {
+                let notice = event.notice()?;
+                Notice { text: format!("{} ({object})", notice.text), ..notice }
+            }
+            Self::Grasp(_) | Self::Shape(_) | Self::Server(_) => return None,
+        })
     }
 }
 
@@ -81,9 +114,34 @@ pub struct TickOutcome {
     pub seen_by_second: Seen,
     /// Sentences for the person.
     pub notices: Vec<Notice>,
+    /// Number of the object that a hand touched last, from 0.
+    pub touched: usize,
+    /// Outcomes of the further objects of the run, in their order; their news are among those above.
+    pub further: Vec<TickOutcome>,
 }
 
 impl TickOutcome {
+    /// Outcome of the object of a number, from 0; that of the first for a number that none has.
+    pub fn part(&self, number: usize) -> &Self {
+        number.checked_sub(1).and_then(|at| self.further.get(at)).unwrap_or(self)
+    }
+
+    /// What the tick showed, without its news.
+    pub(crate) fn without_news(&self) -> Self {
+        let &Self { state, tips, second_tips, recalled, shown_tick, seen, touched, .. } = self;
+        Self {
+            state,
+            tips,
+            second_tips,
+            recalled,
+            shown_tick,
+            seen,
+            touched,
+            further: self.further.iter().map(Self::without_news).collect(),
+            ..Self::default()
+        }
+    }
+
     /// Tells what was written to a file, or why nothing was.
     pub(crate) fn tell_saved(&mut self, saved: Result<String, String>) {
         let (notice, text) = match saved {

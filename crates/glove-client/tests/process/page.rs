@@ -229,6 +229,23 @@ fn viewer_sees_a_scripted_hand_squeeze_and_lift_and_ends_the_run_by_the_menu() {
 }
 
 #[test]
+fn objects_of_a_table_come_as_one_mesh_in_the_world_and_colours_are_of_the_touched_one() {
+    let mut alone = SeenRun::start(&["--hand", "scripted:lift"]);
+    alone.until("an object", |seen| seen.pictures > 2);
+    let one = alone.end().1.vertices;
+    // The second object is lifted, so that it comes first from its touch on.
+    let mut run = SeenRun::start(&["--object", "cube", "--lifts", "2"]);
+    run.until("the touched one first", |seen| seen.objects > 1);
+    run.until("moved", |seen| seen.moved > 10);
+    let (code, seen) = run.end();
+    assert_eq!(code, Some(0));
+    assert!(seen.vertices > one + 100, "{} vertices beside {one} of the first", seen.vertices);
+    assert!((1e-6..1e-5).contains(&seen.error), "{}", seen.error);
+    // Vertices are given in the world, whatever is lifted.
+    assert!(seen.heights.iter().all(|height| *height == 0.0));
+}
+
+#[test]
 fn hand_of_a_headset_lifts_the_object_and_pictures_name_the_hand_they_show() {
     let folder = Folder::new();
     let hand = lifting_hand(&folder);

@@ -10,6 +10,14 @@ const TOUCHES_OF_SIZE: f64 = 1e-7;
 const ABOVE_OF_SIZE: f64 = 1e-9;
 /// Most turns over one edge or point. A ball of ten thousand facets rolls over some hundreds.
 const TURNS_MAX: usize = 20_000;
+/// A body that a tilt by this angle topples does not stand, rad: what is soft yields by as much under its own
+/// weight.
+const UNSTEADY: f64 = 0.2;
+/// It lies better only where its centre of mass comes down by this much, over the object's size: a ball of
+/// facets rolls from one to the next and gains nothing.
+const LOWER_OF_SIZE: f64 = 0.02;
+/// Least part of this that is worth a turn.
+const LOWER_LEAST: f64 = 1e-3;
 
 /// A mesh turned so that it lies on a table, with the middle of its box where it was, and that rotation.
 ///
@@ -31,21 +39,59 @@ pub fn lying(mesh: &TetMesh) -> Result<(TetMesh, UnitQuaternion<f64>), MeshError
 }
 
 /// Rotation that a rigid body of these points makes when it is put on a table as it is and let go, slowly:
-/// about the nearest edge or corner of what it stands on, until the next point touches, and so on.
+/// about the nearest edge or corner of what it stands on, until the next point touches, and so on; and
+/// further where a small tilt topples it to where its centre of mass is lower.
 ///
 /// Units: m. Frame: the table's normal is +y. `centre` is the centre of mass.
 pub fn resting_turn(points: &[Point3<f64>], centre: &Point3<f64>) -> UnitQuaternion<f64> {
     let mut around: Vec<Vector3<f64>> = points.iter().map(|point| point - centre).collect();
     let size = around.iter().map(Vector3::norm).fold(0.0, f64::max);
+    let rests = settle(&mut around, size);
+    match toppled(&around, size) {
+        Some(topples) => topples * rests,
+        None => rests,
+    }
+}
+
+/// Lets points fall until their centre of mass, the origin, is above what they stand on.
+fn settle(around: &mut [Vector3<f64>], size: f64) -> UnitQuaternion<f64> {
     let mut turn = UnitQuaternion::identity();
     for _ in 0..TURNS_MAX {
-        let Some(fall) = Fall::of(&around, size) else { break };
-        let step = fall.turn(&around, size);
-        around.iter_mut().for_each(|point| *point = step * *point);
-        turn = step * turn;
+        let Some(fall) = Fall::of(around, size) else { break };
+        turn = fall.play(around, size) * turn;
         turn.renormalize();
     }
     turn
+}
+
+/// The turn by which a body that stands unsteadily comes to lie lower, over one edge after the other, each
+/// time over the one that leads lowest; `None` where it gains little.
+fn toppled(around: &[Vector3<f64>], size: f64) -> Option<UnitQuaternion<f64>> {
+    let height = |around: &[Vector3<f64>]| -lowest(around);
+    let begun = height(around);
+    let (mut now, mut turn) = (around.to_vec(), UnitQuaternion::identity());
+    loop {
+        let tries = Fall::of_unsteady(&now, size).into_iter().map(|fall| {
+            let mut next = now.clone();
+            let over = fall.play(&mut next, size);
+            let further = settle(&mut next, size);
+            (next, further * over)
+        });
+        let best = tries.min_by(|a, b| height(&a.0).total_cmp(&height(&b.0)));
+        let Some((next, step)) =
+            best.filter(|best| height(&best.0) < height(&now) - LOWER_LEAST * LOWER_OF_SIZE * size)
+        else {
+            break;
+        };
+        (now, turn) = (next, step * turn);
+        turn.renormalize();
+    }
+    (begun - height(&now) > LOWER_OF_SIZE * size).then_some(turn)
+}
+
+/// Height of the lowest point.
+fn lowest(around: &[Vector3<f64>]) -> f64 {
+    around.iter().map(|point| point.y).fold(f64::INFINITY, f64::min)
 }
 
 /// A body that is not above its support: it falls about a pivot.
@@ -58,11 +104,7 @@ struct Fall {
 impl Fall {
     /// `None` for a body that rests. `around` are its points, seen from the centre of mass.
     fn of(around: &[Vector3<f64>], size: f64) -> Option<Self> {
-        let lowest = around.iter().map(|point| point.y).fold(f64::INFINITY, f64::min);
-        let touches = |point: &&Vector3<f64>| point.y - lowest <= TOUCHES_OF_SIZE * size;
-        let support: Vec<Vector2<f64>> =
-            around.iter().filter(touches).map(|point| Vector2::new(point.x, point.z)).collect();
-        let hull = convex_hull(support);
+        let (hull, lowest) = (support(around, size), lowest(around));
         let nearest = nearest_of_hull(&hull)?;
         let distance = nearest.norm();
         let pivot = Vector3::new(nearest.x, lowest, nearest.y);
@@ -81,6 +123,27 @@ impl Fall {
         }
     }
 
+    /// Falls of a body at rest over the edges of its support that a small tilt takes it over.
+    fn of_unsteady(around: &[Vector3<f64>], size: f64) -> Vec<Self> {
+        let (hull, lowest) = (support(around, size), lowest(around));
+        let fall = |edge: [Vector2<f64>; 2]| {
+            let nearest = nearest_of_edge(edge);
+            let along = (edge[1] - edge[0]).try_normalize(0.0)?;
+            // The hull runs around its inside on the left.
+            let direction = Vector3::new(along.y, 0.0, -along.x);
+            let pivot = Vector3::new(nearest.x, lowest, nearest.y);
+            (nearest.norm() < UNSTEADY.tan() * -lowest).then_some(Self { pivot, direction })
+        };
+        edges(&hull).filter_map(fall).collect()
+    }
+
+    /// Turns the body until the next point touches the table.
+    fn play(&self, around: &mut [Vector3<f64>], size: f64) -> UnitQuaternion<f64> {
+        let turn = self.turn(around, size);
+        around.iter_mut().for_each(|point| *point = turn * *point);
+        turn
+    }
+
     /// The turn about the pivot until the next point touches the table.
     fn turn(&self, around: &[Vector3<f64>], size: f64) -> UnitQuaternion<f64> {
         let angle = around.iter().filter_map(|point| {
@@ -94,6 +157,13 @@ impl Fall {
         let axis = nalgebra::Unit::new_normalize(Vector3::y().cross(&self.direction));
         UnitQuaternion::from_axis_angle(&axis, angle)
     }
+}
+
+/// Corners of what points stand on, around it.
+fn support(around: &[Vector3<f64>], size: f64) -> Vec<Vector2<f64>> {
+    let lowest = lowest(around);
+    let touching = around.iter().filter(|point| point.y - lowest <= TOUCHES_OF_SIZE * size);
+    convex_hull(touching.map(|point| Vector2::new(point.x, point.z)).collect())
 }
 
 /// The corners of the convex hull, around it; one or two for points that are one point or on a line.
@@ -123,16 +193,23 @@ fn convex_hull(mut points: Vec<Vector2<f64>>) -> Vec<Vector2<f64>> {
 
 /// The point of a convex hull that is nearest to the origin; `None` where the origin is inside.
 fn nearest_of_hull(hull: &[Vector2<f64>]) -> Option<Vector2<f64>> {
-    let edges = || (0..hull.len()).map(|i| (hull[i], hull[(i + 1) % hull.len()]));
-    if hull.len() > 2 && edges().all(|(a, b)| (b - a).perp(&-a) > 0.0) {
+    if hull.len() > 2 && edges(hull).all(|[a, b]| (b - a).perp(&-a) > 0.0) {
         return None;
     }
-    let on_edge = |(a, b): (Vector2<f64>, Vector2<f64>)| {
-        let along = b - a;
-        let share = (-a.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        a + share * along
-    };
-    edges().map(on_edge).min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+    let nearest = edges(hull).map(nearest_of_edge);
+    nearest.min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+}
+
+/// Edges of a convex hull, around it.
+fn edges(hull: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
+    (0..hull.len()).map(|i| [hull[i], hull[(i + 1) % hull.len()]])
+}
+
+/// The point of an edge that is nearest to the origin.
+fn nearest_of_edge([a, b]: [Vector2<f64>; 2]) -> Vector2<f64> {
+    let along = b - a;
+    let share = (-a.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    a + share * along
 }
 
 fn centre_of_mass(mesh: &TetMesh) -> Point3<f64> {
@@ -190,6 +267,32 @@ mod tests {
             let on_a_face = [edges.x, edges.y, edges.z].iter().any(|e| (e + lowest).abs() < 1e-9);
             assert!(on_a_face, "turn {seed}: lowest point at {lowest}");
         }
+    }
+
+    /// A body that stood on three points of its back fell over as soon as it was soft, and the hand found it
+    /// elsewhere than where it had been planned for.
+    #[test]
+    fn bent_rod_that_stands_on_a_facet_of_its_back_lies_on_its_side() {
+        // A bow in the plane of x and y, open upwards, with a small flat at its lowest place.
+        let ring = |along: f64| {
+            let middle = Vector3::new(0.1 * along.sin(), -0.1 * along.cos(), 0.0);
+            let out = Vector3::new(along.sin(), -along.cos(), 0.0);
+            (0..24).map(move |k| {
+                let around = std::f64::consts::TAU * (f64::from(k) + 0.5) / 24.0;
+                Point3::from(middle + 0.015 * (around.cos() * out + around.sin() * Vector3::z()))
+            })
+        };
+        let rings = (-12..=12).map(|k| 1.1 * (f64::from(k) + 0.5) / 12.5);
+        let points: Vec<Point3<f64>> = rings.flat_map(ring).collect();
+        let sum: Vector3<f64> = points.iter().map(|point| point.coords).sum();
+        let centre = Point3::from(sum / points.len() as f64);
+        let turn = resting_turn(&points, &centre);
+        let turned: Vec<_> = points.iter().map(|point| turn * (point - centre)).collect();
+        let high = turned.iter().map(|point| point.y).fold(f64::NEG_INFINITY, f64::max);
+        let height = high - lowest(&turned);
+        assert!(height < 0.032, "it rises {height} m above the table, a rod of 0.03 m");
+        let mut again = turned.clone();
+        assert!(settle(&mut again, 0.1).angle() < 1e-6, "it lies");
     }
 
     #[test]

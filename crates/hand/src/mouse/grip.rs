@@ -104,6 +104,7 @@ mod tests {
             reach: [0.0; 5],
             touch: [0.3, 0.5, 0.6, 0.4, 0.7],
             press: [0.4, 0.55, 0.7, 0.5, 0.72],
+            holds_by_friction: true,
         }
     }
 

@@ -152,6 +152,16 @@ impl MouseHand {
         self.begin(Errand::Aim { elsewhere: false });
     }
 
+    /// The hand goes to another object of several: plans are void.
+    pub fn turn_to_another_object(&mut self) {
+        self.forget_plan();
+    }
+
+    /// Point before the palm, where an object would lie that is to be grasped, m, in the world frame.
+    pub fn looks_at(&self) -> Point3<f64> {
+        self.world_from_palm * Point3::from(BEFORE_THE_PALM)
+    }
+
     /// Moves on by the time of so many ticks and returns what the devices send then.
     pub fn next_after(&mut self, ticks: u64, seen: &Seen, object: &SoftObject) -> Sent {
         let seconds = (ticks as f64 * self.tick_s).min(STEP_MAX_S);

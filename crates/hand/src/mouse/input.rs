@@ -47,6 +47,11 @@ impl Digits {
 }
 
 impl MouseInput {
+    /// Whether the hand is asked to go somewhere by itself.
+    pub fn is_errand(&self) -> bool {
+        matches!(self, Self::Aim | Self::AimElsewhere | Self::Reach | Self::Retreat)
+    }
+
     /// Whether the numbers of the wish are finite.
     pub(super) fn is_finite(&self) -> bool {
         match self {

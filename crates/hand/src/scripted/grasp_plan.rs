@@ -23,6 +23,10 @@ pub struct GraspPlan {
     pub touch: [f64; 5],
     /// Closure at which each tip has moved on by the depth asked for.
     pub press: [f64; 5],
+    /// Whether friction can be expected to hold the object: the line between thumb and fingers lies within the
+    /// cones of friction of a dry skin, and the object is thicker than the tip of the thumb. Not looked at
+    /// where a grasp without friction was wished for.
+    pub holds_by_friction: bool,
 }
 
 impl GraspPlan {
@@ -43,36 +47,39 @@ impl GraspPlan {
         self
     }
 
-    /// Whether the hand that has come, and the hand that nearly touches, are outside of the object.
+    /// The palm, the closures and the posture of a hand that has come so far: 0 away from the object, 1 there.
+    fn coming(&self, progress: f64) -> (PalmPath, [f64; 5], Posture) {
+        let path = self.path.backed_off(BACK_OFF * (1.0 - progress));
+        (
+            path,
+            self.reach.map(|reach| progress * reach),
+            Posture::OPEN.toward(&self.posture, progress),
+        )
+    }
+
+    /// Whether the hand is outside of the object on the last part of its way, when it has come, and when it
+    /// nearly touches.
     pub(super) fn has_room(&self, setup: &HandSetup, object: &RestShape) -> bool {
-        [self.reach, self.touch.map(|touch| NEARLY * touch)].iter().all(|closure| {
-            let angles = setup.felt(&angles(closure, self.posture));
-            let palm = self.path.world_from_palm(object.centre());
+        let vertices = object.mesh().vertices();
+        let surface = || object.surface().nodes.iter().map(|&node| vertices[node as usize]);
+        let nearly = (self.path, self.touch.map(|touch| NEARLY * touch), self.posture);
+        let moments = COMING.iter().map(|&progress| self.coming(progress)).chain([nearly]);
+        moments.into_iter().all(|(path, closure, posture)| {
+            let angles = setup.felt(&angles(&closure, posture));
+            let palm = path.world_from_palm(object.centre());
             let hand = pose(&setup.dimensions, &angles, palm);
-            let bodies = hand_bodies(&setup.dimensions, &hand);
-            let vertices = object.mesh().vertices();
-            let surface = object.surface().nodes.iter().map(|&node| vertices[node as usize]);
-            clearance(&bodies, surface) > -ROOM
+            clearance(&hand_bodies(&setup.dimensions, &hand), surface()) > -ROOM
         })
     }
 
     /// Whether the hand stays above a table while it reaches, touches and presses.
     pub(super) fn is_above(&self, setup: &HandSetup, centre: Point3<f64>, table_y: f64) -> bool {
         let halfway = std::array::from_fn(|digit| 0.5 * (self.reach[digit] + self.touch[digit]));
-        let moments = [
-            (self.path.backed_off(BACK_OFF), [0.0; 5], Posture::OPEN),
-            (
-                self.path.backed_off(0.5 * BACK_OFF),
-                self.reach.map(|reach| 0.5 * reach),
-                Posture::OPEN.toward(&self.posture, 0.5),
-            ),
-            (self.path, self.reach, self.posture),
-            (self.path, halfway, self.posture),
-            (self.path, self.touch, self.posture),
-            (self.path, self.press, self.posture),
-        ];
-        moments.iter().all(|(path, closure, posture)| {
-            let angles = setup.felt(&angles(closure, *posture));
+        let closed = [halfway, self.touch, self.press];
+        let coming = [0.0, 0.5, 1.0].map(|progress| self.coming(progress));
+        let moments = coming.into_iter().chain(closed.map(|c| (self.path, c, self.posture)));
+        moments.into_iter().all(|(path, closure, posture)| {
+            let angles = setup.felt(&angles(&closure, posture));
             let hand = pose(&setup.dimensions, &angles, path.world_from_palm(centre));
             let bodies = hand_bodies(&setup.dimensions, &hand);
             is_over(&outline(&bodies), &Isometry3::identity(), table_y + TABLE_CLEARANCE)
@@ -82,6 +89,8 @@ impl GraspPlan {
 
 /// Room between the hand and the table, m.
 const TABLE_CLEARANCE: f64 = 1e-3;
+/// Parts of its way at which a hand that comes must be clear of the object.
+const COMING: [f64; 5] = [0.6, 0.75, 0.85, 0.93, 1.0];
 /// A hand that nearly touches has closed by this share.
 const NEARLY: f64 = 0.85;
 /// Depth in the object that is no collision of a hand that does not touch yet, m.

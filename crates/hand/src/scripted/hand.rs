@@ -9,36 +9,13 @@ use softgrasp_grasp::object::{ContactModel, SoftObject};
 
 use super::approach::{BACK_OFF, PalmPath, above_ground};
 use super::grasp_plan::GraspPlan;
+use super::lay::Lay;
 use super::planner::{NoGrasp, PlanRequest, Planner};
 use super::posture::{Posture, angles};
 use super::script::{ScriptName, Step};
+use super::seen::Seen;
 use crate::hand_reader::HandSetup;
 use crate::sent::Sent;
-
-/// What the person behind the hand sees before moving on.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Seen {
-    /// Whether each tip is inside the object, thumb first.
-    pub inside: [bool; 5],
-    /// Pose of the object in the world.
-    pub world_from_object: Isometry3<f64>,
-    /// State of the grasp, once there is one.
-    pub state: Option<StateName>,
-    /// Whether the shape is being kept beside the ticks; the hand holds still until it is.
-    pub keeping: bool,
-    /// Whether the object, which is free to move, lies still.
-    pub is_still: bool,
-    /// Whether the object has not answered what the hand did before: a hand that lifts waits for it.
-    pub is_late: bool,
-    /// Force of each finger on the object, N, thumb first; zero where none is known.
-    pub finger_forces_n: [f64; 5],
-    /// Force of the table on the object, N: its weight, while nothing else holds it.
-    pub table_force_n: f64,
-    /// Coefficient of friction between hand and object; 0 where nothing holds by friction.
-    pub friction: f64,
-    /// Whether the object is being prepared and the person waits for it: the hand does not reach before.
-    pub object_awaited: bool,
-}
 
 /// Fingers, posture and palm of the hand at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,14 +70,10 @@ pub struct ScriptedHand {
     closure: [f64; 5],
     closure_before: [f64; 5],
     lift: f64,
-    /// Centre of the object that the hand came for, world.
-    came_for: Option<Point3<f64>>,
-    /// Weight of the object, N, as the table felt it before the hand came.
-    weight_n: f64,
+    /// How the object lay that the hand came for.
+    lay: Lay,
     /// How the object lay that the plan was made for, where it had rolled.
     planned_for: Option<UnitQuaternion<f64>>,
-    /// Height of the object's origin, world, when the hand came for it, m.
-    lay_y: f64,
     /// Whether the object has slipped out of the hand once.
     has_slipped: bool,
 }
@@ -164,10 +137,8 @@ impl ScriptedHand {
             closure: [0.0; 5],
             closure_before: [0.0; 5],
             lift: 0.0,
-            came_for: None,
+            lay: Lay::default(),
             planned_for: None,
-            weight_n: 0.0,
-            lay_y: 0.0,
             has_slipped: false,
         }
     }
@@ -181,7 +152,7 @@ impl ScriptedHand {
         self.plan = plan.unwrap_or(self.plan);
         (self.at, self.step_tick, self.progress, self.rested) = (0, 0, 0.0, 0);
         (self.closure, self.closure_before, self.lift) = ([0.0; 5], [0.0; 5], 0.0);
-        (self.came_for, self.planned_for) = (None, None);
+        (self.lay.centre, self.planned_for) = (None, None);
         (self.steps, self.has_slipped) = (self.name.steps(), false);
     }
 
@@ -258,15 +229,10 @@ impl ScriptedHand {
         }
         let mut centre = object.rest_shape().centre();
         if self.name == ScriptName::Lift {
-            // Until the fingers close the hand goes to where the object is.
             if matches!(step, Some(Step::Look | Step::Reach)) {
-                self.came_for = Some(seen.world_from_object * centre);
-                self.lay_y = seen.world_from_object.translation.y;
-                if seen.finger_forces_n == [0.0; 5] {
-                    self.weight_n = seen.table_force_n;
-                }
+                self.lay.look(seen, &centre);
             }
-            centre = self.came_for.unwrap_or(centre);
+            centre = self.lay.centre.unwrap_or(centre);
         }
         let moment = Moment {
             closure: self.closure,
@@ -310,8 +276,7 @@ impl ScriptedHand {
 
     /// Whether the object, as far as it can move, has not come up with the hand that lifts it.
     fn has_lost(&self, seen: &Seen) -> bool {
-        let risen = seen.world_from_object.translation.y - self.lay_y;
-        seen.friction > 0.0 && risen < 0.5 * self.lift
+        seen.friction > 0.0 && self.lay.risen(seen) < 0.5 * self.lift
     }
 
     /// Lets the hand open, go back and lift in another way, as a person does from whose hand a thing slips.
@@ -419,7 +384,7 @@ impl ScriptedHand {
         }
         // Each side holds half of the weight.
         let margin = if self.has_slipped { GRIP_MARGIN_AGAIN } else { GRIP_MARGIN };
-        let needed = margin * 0.5 * self.weight_n / seen.friction;
+        let needed = margin * 0.5 * self.lay.weight_n / seen.friction;
         let [thumb, fingers @ ..] = seen.finger_forces_n;
         [thumb < needed, fingers.iter().sum::<f64>() < needed]
     }

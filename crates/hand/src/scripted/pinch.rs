@@ -238,7 +238,8 @@ impl Trial<'_> {
         };
         let touch = meetings.map(|m| m.closure);
         let reach = touch.map(|touch| REACH * touch);
-        let touching = GraspPlan { path, posture, reach, touch, press: touch };
+        let touching =
+            GraspPlan { path, posture, reach, touch, press: touch, holds_by_friction: true };
         if !touching.is_above(setup, centre, table_y) {
             return None;
         }
@@ -281,8 +282,7 @@ impl Trial<'_> {
     /// Where thumb and fingers meet the surface; ring and little finger close along where they do not.
     fn meetings(&self, opening: &Opening) -> Option<[Meeting; 5]> {
         let fingers = &self.hand.fingers;
-        let is_expected =
-            |m: &Meeting, closure: f64| m.holds && (m.closure - closure).abs() < EXPECTED;
+        let is_expected = |m: &Meeting, closure: f64| (m.closure - closure).abs() < EXPECTED;
         let middle = self.meeting(&fingers[1])?;
         let index = self.meeting(&fingers[0])?;
         let thumb = self.meeting(&self.hand.thumbs[opening.thumb].1)?;

@@ -63,7 +63,11 @@ pub fn plan_grasp(object: &RestShape, setup: &HandSetup, wish: &GraspWish) -> Op
     };
     let found = match wish.pinches_first {
         true => pinch().or_else(searched),
-        false => searched().or_else(|| wish.holds_well.then(pinch)?),
+        // A pinch avoids no side; who wants another one asks again without that wish.
+        false => searched().or_else(|| {
+            let may_pinch = wish.holds_well && wish.avoid_gaze.is_none();
+            may_pinch.then(pinch)?
+        }),
     };
     // An object that friction cannot hold in this hand is grasped as it can be.
     found.or_else(|| {
@@ -113,7 +117,15 @@ fn search(
                 let posture = Posture { gather, ..found.0 };
                 let touch = found.1.map(|t| t.closure);
                 let opened = [0.0; 5];
-                let touching = GraspPlan { path, posture, reach: opened, touch, press: touch };
+                let holds_by_friction = wish.holds_well;
+                let touching = GraspPlan {
+                    path,
+                    posture,
+                    reach: opened,
+                    touch,
+                    press: touch,
+                    holds_by_friction,
+                };
                 let is_possible =
                     |y| touching.is_above(setup, centre, y) && touching.has_room(setup, object);
                 if !wish.table_y.is_none_or(is_possible) {

@@ -83,7 +83,18 @@ impl PlanRequest {
         });
         // The middle of the turned box is not the turned middle of the box.
         let shift = self.object.centre() - object.centre();
-        planned.map(|plan| plan.about(shift))
+        let is_thick = self.rises_above_thumb(object);
+        planned.map(|plan| {
+            let holds_by_friction = plan.holds_by_friction && is_thick;
+            GraspPlan { holds_by_friction, ..plan }.about(shift)
+        })
+    }
+
+    /// Whether an object that lies on a table rises above a thumb that lies beside it: tips of fingers without
+    /// nails come under nothing that is flatter.
+    fn rises_above_thumb(&self, object: &RestShape) -> bool {
+        let (low, high) = object.mesh().bounds();
+        high.y - low.y > THICK * 2.0 * self.setup.dimensions.thumb.tip_radius
     }
 
     /// Plan of a grasp, or the reason why the object cannot be grasped.
@@ -191,6 +202,9 @@ const VERTEX_PRESS_SPACING_SHARE: f64 = 0.45;
 /// A pinch that is to lift closes by this share of the object's smallest extent beyond the first touch: part
 /// of it dents the object, part of it pushes the fingers back.
 const PINCH_SHARE: f64 = 0.12;
+
+/// What friction is to hold is thicker than the tip of the thumb by this factor.
+const THICK: f64 = 1.3;
 
 /// An object that is turned by less than this is taken as it was, rad.
 const TURN_MIN: f64 = 1e-3;

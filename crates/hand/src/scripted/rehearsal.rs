@@ -6,8 +6,9 @@ use softgrasp_grasp::hand::{Finger, JointAngles};
 use softgrasp_grasp::object::SoftObject;
 
 use super::grasp_plan::GraspPlan;
-use super::hand::{Moment, ScriptedHand, Seen};
+use super::hand::{Moment, ScriptedHand};
 use super::script::ScriptName;
+use super::seen::Seen;
 use crate::hand_reader::HandSetup;
 
 /// The motion of a script, one moment per tick.

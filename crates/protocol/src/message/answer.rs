@@ -4,6 +4,7 @@ use wincode::{SchemaRead, SchemaWrite};
 
 use super::dof_value::DofValue;
 use super::fields::{FieldValues, FieldsPart, write_fields};
+use super::gradient::{GradientPart, GradientValues};
 use super::large::LargeReport;
 use super::question::{NodeChoice, Precision};
 use super::report::SolveReport;
@@ -45,6 +46,8 @@ pub struct Answer {
     pub cases: Vec<CaseAnswer>,
     /// Fields of the first case and of each further one; empty if none were asked for.
     pub fields: Vec<FieldValues>,
+    /// Derivatives of the quantity of the question; `None` where there was none, and in a contact frame.
+    pub gradient: Option<GradientValues>,
 }
 
 /// Displacements and forces of one further case, always in double precision.
@@ -69,6 +72,19 @@ pub(super) struct AnswerPart {
     mask_force_count: u32,
     case_count: u32,
     fields: Option<Block>,
+}
+
+/// Fields of an [`Answer`] that came later; they are left out where there are no derivatives.
+#[derive(Clone, Debug, Default, SchemaRead, SchemaWrite)]
+struct LaterPart {
+    gradient: Option<Block>,
+}
+
+/// All fields of an [`Answer`].
+#[derive(Clone, Debug, SchemaRead, SchemaWrite)]
+struct WholePart {
+    answer: AnswerPart,
+    later: LaterPart,
 }
 
 impl Displacements {
@@ -207,12 +223,31 @@ impl Answer {
             Some(fields) => fields.read_arrays(reader, count, 1 + cases.len())?,
             None => Vec::new(),
         };
-        Ok(Self { report, large, nodes, displacements, reactions, mask_forces, cases, fields })
+        let gradient = None;
+        Ok(Self {
+            report,
+            large,
+            nodes,
+            displacements,
+            reactions,
+            mask_forces,
+            cases,
+            fields,
+            gradient,
+        })
     }
 
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
-        writer.part(&self.part()?)?;
+        let answer = self.part()?;
+        match &self.gradient {
+            None => writer.part(&answer)?,
+            Some(gradient) => {
+                let later = LaterPart { gradient: Some(gradient.block()?) };
+                writer.part(&WholePart { answer, later })?;
+            }
+        }
         self.write_arrays(writer);
+        self.gradient.iter().for_each(|gradient| gradient.write_arrays(writer));
         Ok(())
     }
 
@@ -220,9 +255,14 @@ impl Answer {
         reader: &mut PayloadReader<'_>,
         limits: &Limits,
     ) -> Result<Self, DecodeError> {
-        let part: AnswerPart = reader.part()?;
+        let (part, later): (AnswerPart, LaterPart) = reader.part_and_later()?;
         part.check(limits)?;
-        Self::read_arrays(reader, part, limits)
+        let announced: Option<GradientPart> =
+            later.gradient.map(|block| block.read()).transpose()?;
+        announced.iter().try_for_each(|gradient| gradient.check(limits))?;
+        let answer = Self::read_arrays(reader, part, limits)?;
+        let gradient = announced.map(|gradient| gradient.read_arrays(reader)).transpose()?;
+        Ok(Self { gradient, ..answer })
     }
 }
 

@@ -5,6 +5,7 @@ mod ask;
 mod contact;
 mod dof_value;
 mod fields;
+mod gradient;
 mod large;
 mod masks;
 mod mesh;
@@ -26,6 +27,7 @@ pub use ask::{Ask, Body, Subject};
 pub use contact::{BodyLoad, ContactAnswer, ContactAsk, ContactFrame, ContactPoint, ContactReport};
 pub use dof_value::DofValue;
 pub use fields::{Field, FieldPlace, FieldSet, FieldValues};
+pub use gradient::{GradientValues, Quantity, QuantityTerm};
 pub use large::{
     Deformation, DeformationError, LargeAsk, LargeReport, LawName, LawNameError, Pace, PathChoice,
 };

@@ -87,6 +87,12 @@ impl ModelHash {
         fixed.dedup();
         let bytes: Vec<u8> = fixed.iter().flat_map(|d| d.to_le_bytes()).collect();
         section("fixed", fixed.len(), &bytes);
+        // Left out where there are none, so that the names of other models stay what they were.
+        if !upload.mesh.mid_edge.is_empty() {
+            let nodes = upload.mesh.mid_edge.iter().flatten();
+            let bytes: Vec<u8> = nodes.flat_map(|n| n.to_le_bytes()).collect();
+            section("mid-edge", upload.mesh.mid_edge.len(), &bytes);
+        }
         Self(*hasher.finalize().as_bytes())
     }
 }
@@ -204,6 +210,19 @@ fn parse_hash(text: &str) -> Option<[u8; 32]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn mid_edge_nodes_are_part_of_the_name() {
+        let upload = |mid_edge: Vec<[u32; 6]>| UploadModel {
+            mesh: MeshData { tets: vec![[0, 1, 2, 3]], mid_edge, ..MeshData::default() },
+            materials: vec![],
+            element: ElementName::T10,
+            fixed: vec![],
+        };
+        let names = [vec![], vec![[4, 5, 6, 7, 8, 9]], vec![[4, 5, 6, 7, 9, 8]]]
+            .map(|mid_edge| ModelHash::of(&upload(mid_edge)));
+        assert!(names[0] != names[1] && names[1] != names[2] && names[0] != names[2]);
+    }
 
     #[test]
     fn hash_text_reads_back() {

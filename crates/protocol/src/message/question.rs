@@ -4,6 +4,7 @@ use wincode::{SchemaRead, SchemaWrite};
 
 use super::dof_value::DofValue;
 use super::fields::FieldSet;
+use super::gradient::{Quantity, QuantityPart};
 use super::masks::{Masks, MasksPart};
 use super::names::MethodName;
 use super::spread_loads::{SpreadLoads, SpreadLoadsPart};
@@ -71,6 +72,9 @@ pub struct Question {
     pub deadline_ms: Option<f64>,
     /// Weight and pressure. A server without the capability `loads` refuses them as `BadRequest`.
     pub spread: SpreadLoads,
+    /// Quantity whose derivatives are wanted; none where it has no term. A server without the capability
+    /// `gradients` refuses it as `BadRequest`.
+    pub quantity: Quantity,
 }
 
 /// Announces the arrays of a [`Question`].
@@ -88,10 +92,18 @@ struct QuestionPart {
     fields: FieldSet,
 }
 
-/// Announces the arrays of a [`Question`] and, in fields that came later, those of its loads.
+/// Announces the arrays of a [`Question`] and, in fields that came later, those of its loads and its
+/// quantity.
 pub(super) struct QuestionParts {
     question: QuestionPart,
+    later: LaterParts,
+}
+
+/// Fields that came later, in their order.
+#[derive(Clone, Copy, Debug, Default, SchemaRead, SchemaWrite)]
+struct LaterParts {
     spread: SpreadLoadsPart,
+    quantity: QuantityPart,
 }
 
 #[derive(Clone, Copy, Debug, SchemaRead, SchemaWrite)]
@@ -101,12 +113,16 @@ enum NodeChoicePart {
 }
 
 impl Question {
-    /// The block of the part's fields; loads that are none take no bytes.
+    /// The block of the part's fields; loads that are none, and a quantity that is none, take no bytes.
     pub(super) fn block(&self) -> Result<Block, EncodeError> {
         let block = Block::of(&self.part()?)?;
-        match self.spread.is_empty() {
+        let block = match self.spread.is_empty() && self.quantity.is_empty() {
+            true => return Ok(block),
+            false => block.and(&self.spread.part()?)?,
+        };
+        match self.quantity.is_empty() {
             true => Ok(block),
-            false => block.and(&self.spread.part()?),
+            false => block.and(&self.quantity.part()?),
         }
     }
 
@@ -137,7 +153,7 @@ impl Question {
     }
 
     /// Writes the arrays: known displacements, forces, wanted nodes if listed, masks and their
-    /// displacements, weight and pressure.
+    /// displacements, weight and pressure, terms of the quantity.
     pub(super) fn write_arrays(&self, writer: &mut PayloadWriter<'_>) {
         writer.dof_values(&self.known);
         writer.dof_values(&self.forces);
@@ -147,12 +163,13 @@ impl Question {
         self.masks.write_arrays(writer);
         writer.array(&self.mask_displacements);
         self.spread.write_arrays(writer);
+        self.quantity.write_arrays(writer);
     }
 
     /// Reads the arrays that [`write_arrays`](Self::write_arrays) wrote; the counts have been checked.
     pub(super) fn read_arrays(
         reader: &mut PayloadReader<'_>,
-        QuestionParts { question: part, spread }: QuestionParts,
+        QuestionParts { question: part, later: LaterParts { spread, quantity } }: QuestionParts,
     ) -> Result<Self, DecodeError> {
         let method = MethodName::try_new(part.method)?;
         let known = reader.dof_values("known displacements", part.known_count as usize)?;
@@ -168,6 +185,7 @@ impl Question {
         let masks = Masks::read_arrays(reader, part.masks)?;
         let mask_displacements = reader.array("displacements of masks", masks.len())?;
         let spread = SpreadLoads::read_arrays(reader, spread)?;
+        let quantity = Quantity::read_arrays(reader, quantity)?;
         let (max_error, deadline_ms) = (part.max_error, part.deadline_ms);
         Ok(Self {
             known,
@@ -179,6 +197,7 @@ impl Question {
             max_error,
             deadline_ms,
             spread,
+            quantity,
         })
     }
 }
@@ -187,13 +206,14 @@ impl QuestionParts {
     /// The parts that a block holds, checked against the limits.
     pub(super) fn read(block: &Block, limits: &Limits) -> Result<Self, DecodeError> {
         let (question, rest): (QuestionPart, &[u8]) = block.read_first()?;
-        let spread = match rest.is_empty() {
-            true => SpreadLoadsPart::default(),
+        let later = match rest.is_empty() {
+            true => LaterParts::default(),
             false => read_fields(rest)?,
         };
         question.check(limits)?;
-        spread.check(limits)?;
-        Ok(Self { question, spread })
+        later.spread.check(limits)?;
+        later.quantity.check(limits)?;
+        Ok(Self { question, later })
     }
 }
 

@@ -3,7 +3,7 @@
 use softgrasp_protocol::*;
 
 use crate::raw::{only_frame, part_of, raw_frame};
-use crate::samples::{Message, conversation, sample, variants};
+use crate::samples::{Message, conversation, curved_model, quantity, sample, variants};
 
 fn decode(kind: Kind, payload: &[u8]) -> Result<Message, DecodeError> {
     Message::decode(&only_frame(&raw_frame(kind.number(), 1, payload)), &Limits::default())
@@ -21,8 +21,14 @@ fn fields_that_a_later_version_adds_are_skipped_in_every_message() {
     let all = conversation().into_iter().chain(variants().into_iter().map(|(_, message)| message));
     for message in all {
         let payload = only_frame(&message.encode()).payload;
+        // What this version leaves out where there is none, a later one writes before its own.
+        let left_out: &[u8] = match &message {
+            Message::Reply(_, Reply::Answer(answer)) if answer.gradient.is_none() => &[0],
+            _ => &[],
+        };
         for more in [&[7][..], &[1; 8], &[0xff; 100]] {
-            let read = decode(message.kind(), &with_more_fields(&payload, more)).unwrap();
+            let longer = with_more_fields(&payload, &[left_out, more].concat());
+            let read = decode(message.kind(), &longer).unwrap();
             let (read, sent) = match (read, &message) {
                 (Message::Request(_, read), Message::Request(_, sent)) => {
                     (format!("{read:?}"), format!("{sent:?}"))
@@ -139,4 +145,60 @@ fn loads_cost_nothing_where_there_are_none_and_an_older_server_refuses_them() {
     assert!(decode(Kind::Ask, &plain).is_ok());
     let error = decode(Kind::Ask, &seen).unwrap_err();
     assert!(!matches!(error, DecodeError::TooMany { .. }), "{error}");
+}
+
+#[test]
+fn derivatives_cost_nothing_where_nobody_wants_them_and_an_older_server_refuses_them() {
+    let asked = |quantity: Quantity| {
+        let mut bytes = Vec::new();
+        let question = Question { quantity, ..Question::default() };
+        let ask = Request::from(Ask::new(ModelHash([7; 32]), question));
+        ask.encode_into(1, &Limits::default(), &mut bytes).unwrap();
+        only_frame(&bytes).payload
+    };
+    let (plain, wanted) = (asked(Quantity::default()), asked(quantity()));
+    // Three doubles and three counts of loads, two counts and a boolean; three terms of 20 bytes; padding.
+    let more = wanted.len() - plain.len();
+    assert!(more.abs_diff(36 + 9 + 60) <= 3 * 8, "{more}");
+    // Who skips the fields finds the bytes of the arrays behind the last one that it knows.
+    let seen = [&plain[..], &[0; 72]].concat();
+    assert!(decode(Kind::Ask, &plain).is_ok() && decode(Kind::Ask, &seen).is_err());
+    let Message::Reply(_, Reply::Answer(answer)) = sample(Kind::Answer) else { unreachable!() };
+    let answered = |gradient: Option<GradientValues>| {
+        let mut bytes = Vec::new();
+        let reply = Reply::Answer(Box::new(Answer { gradient, ..*answer.clone() }));
+        reply.encode_into(1, &Limits::default(), &mut bytes).unwrap();
+        bytes.len()
+    };
+    let empty = GradientValues { value: 1.0, ..GradientValues::default() };
+    // A byte for the option, the length of the block, a double, five counts and an option; padding.
+    let more = answered(Some(empty)) - answered(None);
+    assert!(more.abs_diff(1 + 8 + 8 + 20 + 1) < 8, "{more}");
+}
+
+#[test]
+fn mid_edge_nodes_cost_their_bytes_and_an_older_server_refuses_them() {
+    let payload = |mesh: MeshData| {
+        let mut bytes = Vec::new();
+        let upload = Request::UploadModel(UploadModel { mesh, ..curved_model() });
+        upload.encode_into(1, &Limits::default(), &mut bytes).unwrap();
+        only_frame(&bytes).payload
+    };
+    let curved = curved_model().mesh;
+    let plain = payload(MeshData { mid_edge: vec![], ..curved.clone() });
+    let curved = payload(curved);
+    assert_eq!(curved.len(), plain.len() + 2 * 6 * 4);
+    // Behind the length of the part and two counts: a byte that was the boolean of region labels.
+    assert_eq!((plain[16], curved[16]), (1, 3));
+    for bits in [4, 7, 255] {
+        let mut hostile = curved.to_vec();
+        hostile[16] = bits;
+        let error = decode(Kind::UploadModel, &hostile).unwrap_err();
+        assert!(matches!(error, DecodeError::UnknownArrays { bits: known } if known == bits));
+    }
+    let mut without = curved.to_vec();
+    without[16] = 1;
+    assert!(decode(Kind::UploadModel, &without).is_err(), "the arrays are left over");
+    let cut = &curved[..curved.len() - 24];
+    assert!(matches!(decode(Kind::UploadModel, cut), Err(DecodeError::ArrayCut { .. })));
 }

@@ -207,7 +207,7 @@ fn large_arrays_are_copied_once_each_way() {
     let tets = vec![[0, 1, 2, 3]; 400_000];
     let array_len = 24 * vertices.len() + 16 * tets.len();
     let upload = UploadModel {
-        mesh: MeshData { vertices, tets, regions: vec![] },
+        mesh: MeshData { vertices, tets, ..MeshData::default() },
         materials: vec![],
         element: ElementName::T4,
         fixed: vec![],

@@ -121,24 +121,51 @@ pub fn answer() -> impl Strategy<Value = Answer> {
     let displacements = prop_oneof![double, single];
     let forces = (dof_values(), vec(point(), 0..4));
     let reports = (report(), option::of(large_report()));
-    let parts = (reports, displacements, any::<[bool; 2]>(), forces, 0..4_usize);
-    parts.prop_map(|((report, large), displacements, [all, has_fields], forces, cases)| {
-        let (reactions, mask_forces) = forces;
-        let count = u32::try_from(displacements.node_count()).unwrap();
-        let nodes = if all {
-            NodeChoice::All
-        } else {
-            NodeChoice::Nodes((0..count).map(|node| node.wrapping_mul(0x9e37_79b9)).collect())
-        };
-        let case = |k: usize| CaseAnswer {
-            displacements: vec![[k as f64, -0.5, 0.0]; displacements.node_count()],
-            reactions: vec![0.25 * k as f64; reactions.len()],
-        };
-        let cases = if displacements.node_count() + reactions.len() == 0 { 0 } else { cases };
-        let cases: Vec<CaseAnswer> = (0..cases).map(case).collect();
-        let fields = fields(has_fields, displacements.node_count(), 1 + cases.len());
-        Answer { report, large, nodes, displacements, reactions, mask_forces, cases, fields }
-    })
+    let parts = (reports, displacements, any::<[bool; 3]>(), forces, 0..4_usize);
+    parts.prop_map(
+        |((report, large), displacements, [all, has_fields, has_gradient], forces, cases)| {
+            let (reactions, mask_forces) = forces;
+            let count = u32::try_from(displacements.node_count()).unwrap();
+            let nodes = if all {
+                NodeChoice::All
+            } else {
+                NodeChoice::Nodes((0..count).map(|node| node.wrapping_mul(0x9e37_79b9)).collect())
+            };
+            let case = |k: usize| CaseAnswer {
+                displacements: vec![[k as f64, -0.5, 0.0]; displacements.node_count()],
+                reactions: vec![0.25 * k as f64; reactions.len()],
+            };
+            let cases = if displacements.node_count() + reactions.len() == 0 { 0 } else { cases };
+            let cases: Vec<CaseAnswer> = (0..cases).map(case).collect();
+            let fields = fields(has_fields, displacements.node_count(), 1 + cases.len());
+            let gradient = has_gradient.then(|| gradient(displacements.node_count()));
+            Answer {
+                report,
+                large,
+                nodes,
+                displacements,
+                reactions,
+                mask_forces,
+                cases,
+                fields,
+                gradient,
+            }
+        },
+    )
+}
+
+/// Derivatives for `nodes` nodes, with and without some of them.
+fn gradient(nodes: usize) -> GradientValues {
+    let of_nodes = vec![[1.5, nodes as f64, -0.25]; nodes];
+    GradientValues {
+        value: nodes as f64,
+        by_known: vec![DofValue { dof: 7, value: -0.5 }; nodes / 2],
+        by_materials: vec![[0.5, 2.0]; nodes % 3],
+        by_acceleration: nodes.is_multiple_of(2).then_some([0.0, 1.0, -2.0]),
+        by_pressures: vec![0.125; nodes % 4],
+        by_places: if nodes.is_multiple_of(5) { vec![] } else { of_nodes.clone() },
+        by_forces: of_nodes,
+    }
 }
 
 /// Fields of `cases` cases, each with values for `nodes` nodes and one element more.
@@ -240,12 +267,13 @@ fn large_report() -> impl Strategy<Value = LargeReport> {
 }
 
 fn mesh() -> impl Strategy<Value = MeshData> {
-    (vec(point(), 0..9), vec(any::<[u32; 4]>(), 0..9), any::<bool>()).prop_map(
-        |(vertices, tets, labelled)| {
-            let regions = tets.iter().filter(|_| labelled).map(|corners| corners[0] % 5).collect();
-            MeshData { vertices, tets, regions }
-        },
-    )
+    let parts =
+        (vec(point(), 0..9), vec(any::<[u32; 4]>(), 0..9), any::<bool>(), any::<Option<u32>>());
+    parts.prop_map(|(vertices, tets, labelled, middle)| {
+        let regions = tets.iter().filter(|_| labelled).map(|corners| corners[0] % 5).collect();
+        let mid_edge = tets.iter().filter_map(|&[a, b, c, d]| Some([a, b, c, d, middle?, 7]));
+        MeshData { mid_edge: mid_edge.collect(), vertices, tets, regions }
+    })
 }
 
 fn question() -> impl Strategy<Value = Question> {
@@ -259,19 +287,37 @@ fn question() -> impl Strategy<Value = Question> {
     let method = prop::sample::select(vec!["auto", "gauss-jordan", "pcg", "a_b-9"])
         .prop_map(|name| name.parse().unwrap());
     let bounds = (option::of(number()), option::of(number()));
-    (dof_values(), dof_values(), masks(), method, want, bounds, spread()).prop_map(
-        |(known, forces, masks, method, want, (max_error, deadline_ms), spread)| Question {
-            known,
-            forces,
-            mask_displacements: (0..masks.len()).map(|i| [i as f64, -0.5, 1e-3]).collect(),
-            masks,
-            method,
-            want,
-            max_error,
-            deadline_ms,
-            spread,
+    (dof_values(), dof_values(), masks(), method, want, bounds, spread(), quantity()).prop_map(
+        |(known, forces, masks, method, want, (max_error, deadline_ms), spread, quantity)| {
+            Question {
+                known,
+                forces,
+                mask_displacements: (0..masks.len()).map(|i| [i as f64, -0.5, 1e-3]).collect(),
+                masks,
+                method,
+                want,
+                max_error,
+                deadline_ms,
+                spread,
+                quantity,
+            }
         },
     )
+}
+
+fn quantity() -> impl Strategy<Value = Quantity> {
+    let terms = || {
+        let term = (any::<u32>(), number(), number());
+        vec(term.prop_map(|(dof, slope, curvature)| QuantityTerm { dof, slope, curvature }), 0..4)
+    };
+    let some = (terms(), terms(), any::<bool>()).prop_map(
+        |(of_displacements, of_reactions, with_places)| {
+            // What has no term does not travel.
+            let is_there = !of_displacements.is_empty() || !of_reactions.is_empty();
+            Quantity { of_displacements, of_reactions, with_places: with_places && is_there }
+        },
+    );
+    prop_oneof![Just(Quantity::default()), some]
 }
 
 fn spread() -> impl Strategy<Value = SpreadLoads> {

@@ -5,7 +5,7 @@ use softgrasp_protocol::*;
 
 use crate::random_messages::any_message;
 use crate::raw::{only_frame, raw_frame};
-use crate::samples::{Message, conversation, sample, variants};
+use crate::samples::{Message, conversation, curved_model, sample, variants};
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
@@ -84,6 +84,10 @@ fn lists_that_do_not_fit_together_are_not_sent() {
     let mut out = vec![];
     let error = Request::UploadModel(upload).encode_into(1, &Limits::default(), &mut out);
     assert!(matches!(error, Err(EncodeError::CountMismatch { count: 1, expected: 0, .. })));
+    let mesh = MeshData { mid_edge: vec![[0; 6]], ..curved_model().mesh };
+    let upload = UploadModel { mesh, ..curved_model() };
+    let error = Request::UploadModel(upload).encode_into(1, &Limits::default(), &mut out);
+    assert!(matches!(error, Err(EncodeError::CountMismatch { count: 1, expected: 2, .. })));
     let answer = conversation().into_iter().find_map(|message| match message {
         Message::Reply(_, Reply::Answer(answer)) => Some(answer),
         _ => None,

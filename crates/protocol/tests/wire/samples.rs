@@ -66,6 +66,7 @@ pub fn variants() -> Vec<(&'static str, Message)> {
     let with_fields = Want { fields: asked_fields(), ..question().want };
     let of_fields = Ask::new(hash(), Question { want: with_fields, ..question() });
     let of_loads = Ask::new(hash(), Question { spread: spread(), ..question() });
+    let of_quantity = Ask::new(hash(), Question { quantity: quantity(), ..question() });
     let case = CaseAnswer { displacements: vec![[1.0, -2.0, 0.25]; 3], reactions: vec![4.5] };
     let of_several = Answer {
         displacements: Displacements::F64(vec![[0.5, 0.0, 0.0]; 3]),
@@ -75,6 +76,7 @@ pub fn variants() -> Vec<(&'static str, Message)> {
     };
     let with_fields =
         Answer { fields: vec![field_values(1.0), field_values(-2.0)], ..of_several.clone() };
+    let with_gradient = Answer { gradient: Some(gradient()), ..*answer.clone() };
     let untold = Answer { report: SolveReport::untold(), ..*answer };
     let request = |ask| Message::Request(1, Request::Ask(Box::new(ask)));
     let reply = |answer| Message::Reply(1, Reply::Answer(Box::new(answer)));
@@ -84,13 +86,32 @@ pub fn variants() -> Vec<(&'static str, Message)> {
         ("Ask-cases", request(of_cases)),
         ("Ask-fields", request(of_fields)),
         ("Ask-loads", request(of_loads)),
+        ("Ask-gradient", request(of_quantity)),
+        ("UploadModel-mid-edge", Message::Request(1, Request::UploadModel(curved_model()))),
         ("Answer-large", reply(large_answer())),
         ("Answer-cases", reply(of_several)),
         ("Answer-untold", reply(untold)),
         ("Answer-fields", reply(with_fields)),
+        ("Answer-gradient", reply(with_gradient)),
         ("ContactFrame-small", Message::Request(1, Request::ContactFrame(Box::new(felt_frame())))),
         ("ContactAnswer-small", Message::Reply(1, Reply::ContactAnswer(Box::new(felt_answer())))),
     ]
+}
+
+/// A model of two elements with mid-edge nodes and regions.
+pub fn curved_model() -> UploadModel {
+    let places = (0..14).map(|node| [f64::from(node), 0.5 * f64::from(node * node), -1.0]);
+    UploadModel {
+        mesh: MeshData {
+            vertices: places.collect(),
+            tets: vec![[0, 1, 2, 3], [1, 2, 3, 4]],
+            regions: vec![7, 2],
+            mid_edge: vec![[5, 6, 7, 8, 9, 10], [6, 10, 9, 11, 12, 13]],
+        },
+        materials: vec![Material { young: 20_000.0, poisson: 0.45 }; 2],
+        element: ElementName::T10,
+        fixed: vec![15],
+    }
 }
 
 /// Set of some fields, of elements and of nodes.
@@ -133,6 +154,33 @@ fn question() -> Question {
         max_error: Some(0.01),
         deadline_ms: None,
         spread: SpreadLoads::default(),
+        quantity: Quantity::default(),
+    }
+}
+
+/// A quantity of two displacements and a reaction.
+pub fn quantity() -> Quantity {
+    Quantity {
+        of_displacements: vec![
+            QuantityTerm { dof: 4, slope: 1.5, curvature: 0.0 },
+            QuantityTerm { dof: 10, slope: -2.0, curvature: 300.0 },
+        ],
+        of_reactions: vec![QuantityTerm { dof: 2, slope: 0.25, curvature: -1.0 }],
+        with_places: true,
+    }
+}
+
+/// Derivatives for four nodes, a known displacement, two materials and a pressure.
+pub fn gradient() -> GradientValues {
+    let of_nodes = |scale: f64| (1..=4).map(|n| [scale * f64::from(n), 0.0, -scale]).collect();
+    GradientValues {
+        value: 0.125,
+        by_forces: of_nodes(0.5),
+        by_known: vec![DofValue { dof: 2, value: 8.0 }, DofValue { dof: 9, value: -0.5 }],
+        by_materials: vec![[1e-5, 0.75], [-2e-6, 0.0]],
+        by_acceleration: Some([0.0, 0.25, -1.0]),
+        by_pressures: vec![4e-4],
+        by_places: of_nodes(-3.0),
     }
 }
 
@@ -153,6 +201,7 @@ fn requests() -> Vec<Message> {
         vertices: vec![[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01], [0.0; 3]],
         tets: vec![[0, 1, 2, 3]],
         regions: vec![7],
+        mid_edge: vec![],
     };
     let materials = vec![Material { young: 20_000.0, poisson: 0.45 }];
     let everything = Question {
@@ -229,6 +278,7 @@ fn replies() -> Vec<Message> {
         mask_forces: vec![[0.0, -0.75, 0.125], [0.5, 0.0, 0.0]],
         cases: vec![],
         fields: vec![],
+        gradient: None,
     };
     let ready =
         ModelReady { model: hash(), unknown_dofs: 9, fixed_dofs: 3, reused: false, stage_ms };
@@ -300,6 +350,7 @@ fn large_answer() -> Answer {
         mask_forces: vec![],
         cases: vec![],
         fields: vec![],
+        gradient: None,
     }
 }
 

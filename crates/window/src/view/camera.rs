@@ -119,6 +119,28 @@ impl ViewCamera {
         self.distance = fits.clamp(DISTANCE_RANGE.0, DISTANCE_RANGE.1);
     }
 
+    /// Moves the eye away from its target until balls are seen whole in a picture of usual form, at most
+    /// to three times the distance.
+    ///
+    /// Units: m. Frame: world.
+    pub fn step_back_for(&mut self, balls: &[(Point3<f64>, f64)]) {
+        const ASPECT: f64 = 4.0 / 3.0;
+        const SEEN: f64 = 0.92;
+        let farthest = 3.0 * self.distance;
+        let is_seen = |eye: &Self| {
+            let [right, up, _] = eye.axes();
+            balls.iter().all(|(centre, radius)| {
+                [right, -right, up, -up].iter().all(|way| {
+                    let edge = eye.project(&(centre + way * *radius), ASPECT);
+                    edge.is_some_and(|(at, _)| at.x.abs() < SEEN * ASPECT && at.y.abs() < SEEN)
+                })
+            })
+        };
+        while !is_seen(self) && self.distance < farthest {
+            self.distance *= 1.05;
+        }
+    }
+
     /// Place of a point of the world in the picture: x from −aspect to aspect, y from −1 (bottom) to
     /// 1, and how far it is from the eye; `None` behind the eye.
     pub fn project(&self, point: &Point3<f64>, aspect: f64) -> Option<(Point2<f64>, f64)> {
@@ -230,5 +252,20 @@ mod tests {
         camera.zoom(f64::MAX);
         camera.zoom(-1e9);
         assert!(camera.distance.is_finite());
+    }
+
+    #[test]
+    fn eye_steps_back_until_all_balls_are_seen_and_stays_where_they_are() {
+        let mut eye = ViewCamera::default();
+        let before = eye;
+        eye.step_back_for(&[(eye.target, 1e-3)]);
+        assert_eq!(eye, before, "it sees that one already");
+        let [right, ..] = eye.axes();
+        let aside = eye.target + 0.3 * right;
+        eye.step_back_for(&[(aside, 0.02)]);
+        assert!(eye.distance > before.distance && eye.distance <= 3.2 * before.distance);
+        let (seen, _) = eye.project(&aside, 4.0 / 3.0).unwrap();
+        assert!(seen.x.abs() < 4.0 / 3.0, "{seen}");
+        assert_eq!((eye.target, eye.yaw), (before.target, before.yaw));
     }
 }

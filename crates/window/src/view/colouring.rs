@@ -27,8 +27,8 @@ const COLOURED_SHARE: f64 = 0.9;
 const COLOURED_PART: f64 = 0.6;
 
 struct Shaded {
-    /// Rest shape that it is made for.
-    of: u64,
+    /// Object and rest shape that it is made for, and its material where it has its own.
+    of: (usize, u64, Option<Material>),
     object: ShadedObject,
 }
 
@@ -63,9 +63,11 @@ impl Colouring {
         if shading == Shading::Plain {
             return;
         }
-        let of = object.rest_shapes;
+        let own = object.own.as_ref().map(|own| own.material);
+        let of = (object.number, object.rest_shapes, own);
         if self.shaded.as_ref().is_none_or(|shaded| shaded.of != of) {
-            let made = ShadedObject::new(Arc::clone(&object.rest), self.material);
+            let material = own.unwrap_or(self.material);
+            let made = ShadedObject::new(Arc::clone(&object.rest), material);
             self.shaded = Some(Shaded { of, object: made });
         }
         let Some(Shaded { object: shaded, .. }) = &mut self.shaded else { return };
@@ -133,5 +135,26 @@ mod tests {
             assert!(most > 0.3 && most <= 1.0 / COLOURED_PART + 1e-9, "{shading}: {most}");
             assert_eq!(most > 1.0, colouring.remark().starts_with("highest: "), "{shading}");
         }
+    }
+
+    #[test]
+    fn stress_of_one_of_several_objects_is_that_of_its_own_material() {
+        use crate::view::frame::OwnLook;
+        use crate::view::object_skin::Look;
+
+        let soft = Material::try_new(2.0e4, 0.4).unwrap();
+        let mut object = frame(1).object;
+        let bend = |p: &nalgebra::Point3<f64>| [0.02 * p.y, 0.0, 0.0];
+        object.displacement = object.rest.mesh().vertices().iter().map(bend).collect();
+        let largest = |young: f64| {
+            let material = Material::try_new(young, 0.4).unwrap();
+            let own = OwnLook { name: "cube".into(), look: Look::Cube, material };
+            let object = ObjectView { number: 1, own: Some(own), ..object.clone() };
+            let mut colouring = Colouring::new(soft);
+            colouring.follow(&object, Shading::VonMises, 0.0);
+            colouring.legend().most()
+        };
+        let ratio = largest(2.0e5) / largest(2.0e4);
+        assert!((5.0..20.0).contains(&ratio), "ten times as stiff: {ratio} times the stress");
     }
 }

@@ -72,11 +72,11 @@ impl DirectedEye {
         if let Some(squeezing) = &frame.acts.squeezing
             && self.placed.as_ref().is_none_or(|eye| !Arc::ptr_eq(&eye.squeezing, squeezing))
         {
-            let placed = PlacedEye::on(&frame.object, squeezing, self.lowered);
+            let placed = PlacedEye::on(frame, squeezing, self.lowered);
             let is_first = self.placed.replace(placed).is_none();
             self.glide = (!is_first).then_some(Glide { from: now, since_s: now_s });
         }
-        let to = self.placed.as_ref()?.carried_with(&frame.object);
+        let to = self.placed.as_ref()?.carried_with(frame.aimed());
         let share = self.glide.as_ref().map_or(1.0, |glide| (now_s - glide.since_s) / GLIDE_S);
         let eye = match &self.glide {
             Some(Glide { from, .. }) if share < 1.0 => {
@@ -93,9 +93,14 @@ impl DirectedEye {
 }
 
 impl PlacedEye {
-    fn on(object: &ObjectView, squeezing: &Arc<HandView>, lowered: f64) -> Self {
+    fn on(frame: &ViewFrame, squeezing: &Arc<HandView>, lowered: f64) -> Self {
+        let object = frame.aimed();
         let in_object = object.rest.centre();
-        let mut eye = eye_on_squeeze(&object.rest, &object.world_from_object, squeezing);
+        let others = frame.objects().filter(|other| other.number != object.number);
+        let others: Vec<_> = others.map(ObjectView::ball).collect();
+        let pose = &object.world_from_object;
+        let mut eye = eye_on_squeeze(&object.rest, pose, squeezing, &others);
+        eye.step_back_for(&others);
         eye.pan(0.0, lowered);
         Self {
             squeezing: Arc::clone(squeezing),

@@ -29,7 +29,7 @@ const REST_M: f64 = 5e-4;
 impl EyePlace {
     /// Places the eye anew when the object of this tick has been replaced.
     pub fn after(frame: &ViewFrame) -> Self {
-        let rest_shapes = frame.object.rest_shapes;
+        let rest_shapes = frame.aimed().rest_shapes;
         Self::AtRest { rest_shapes, palm_before: None, has_moved: false }
     }
 
@@ -40,7 +40,7 @@ impl EyePlace {
             Self::Taken => return None,
             Self::AtOnce => {}
             Self::AtRest { rest_shapes, palm_before, has_moved } => {
-                if frame.object.rest_shapes == *rest_shapes {
+                if frame.aimed().rest_shapes == *rest_shapes {
                     return None;
                 }
                 let before = palm_before.replace(palm)?;

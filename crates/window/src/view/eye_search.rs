@@ -22,6 +22,9 @@ const PALM: (f64, f64, f64) = (0.0, 0.085, 0.034);
 /// Radius of the ball around object and hand that fills the picture, m.
 const SEEN_RADIUS_M: f64 = 0.068;
 
+/// Number of what hides as a finger does and is none.
+const NO_FINGER: usize = 5;
+
 /// Weights in the sum that the best eye maximises: what each thing that is seen is worth.
 const THUMB: f64 = 1.6;
 const FINGER: f64 = 1.0;
@@ -29,15 +32,18 @@ const OPPOSED: f64 = 1.5;
 const SURFACE: f64 = 1.4;
 const OFF_PITCH: f64 = 0.8;
 
-/// The eye that sees most of a hand which squeezes an object.
+/// The eye that sees most of a hand which squeezes an object, past other objects, each in a ball.
 ///
-/// Units: m. Frames: `squeezing` in the world.
+/// Units: m. Frames: `squeezing` and the balls in the world.
 pub fn eye_on_squeeze(
     rest: &RestShape,
     world_from_object: &Isometry3<f64>,
     squeezing: &HandView,
+    others: &[(Point3<f64>, f64)],
 ) -> ViewCamera {
-    let scene = Scene::new(rest, world_from_object, squeezing);
+    let mut scene = Scene::new(rest, world_from_object, squeezing);
+    let balls = others.iter().map(|(centre, radius)| (*centre, *centre, *radius, NO_FINGER));
+    scene.bones.extend(balls);
     let mut best = (f64::NEG_INFINITY, ViewCamera::default());
     for step in 0..AROUND {
         for pitch in PITCHES {
@@ -61,7 +67,8 @@ struct Scene {
     tips: [Point3<f64>; 5],
     /// Positions on the object's surface, m, and their normals.
     places: Vec<(Point3<f64>, Vector3<f64>)>,
-    /// Segments of fingers and the palm: both ends and radius, m, and the digit's number (5 is the palm).
+    /// Segments of fingers, the palm and balls around other objects: both ends and radius, m, and the
+    /// digit's number.
     bones: Vec<(Point3<f64>, Point3<f64>, f64, usize)>,
 }
 
@@ -141,7 +148,7 @@ fn bones(
 ) -> Vec<(Point3<f64>, Point3<f64>, f64, usize)> {
     let (wrist, knuckles, radius) = PALM;
     let palm = |y: f64| world_from_palm * Point3::new(0.0, y, 0.0);
-    let mut all = vec![(palm(wrist), palm(knuckles), radius, 5)];
+    let mut all = vec![(palm(wrist), palm(knuckles), radius, NO_FINGER)];
     for (finger, of_finger) in colliders.fingers.iter().enumerate() {
         all.extend(of_finger.cylinders.iter().map(|bone| {
             (bone.base, bone.base + bone.axis.into_inner() * bone.length, bone.radius, finger)
@@ -187,7 +194,7 @@ mod tests {
             let request = PlanRequest::new(object, setup.clone(), contact);
             let pose = request.grip().unwrap().squeezing(&setup, rest.centre());
             let hand = HandView::of_pose(setup.dimensions, &pose);
-            let eye = eye_on_squeeze(&rest, &Isometry3::identity(), &hand);
+            let eye = eye_on_squeeze(&rest, &Isometry3::identity(), &hand, &[]);
             let scene = Scene::new(&rest, &Isometry3::identity(), &hand);
             let seen = (0..5).filter(|&finger| {
                 let tip = &scene.tips[finger];

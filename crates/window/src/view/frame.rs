@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use softgrasp_core::fem::Material;
 use softgrasp_grasp::grasp::{Contact, HandSegments, StateName};
 use softgrasp_grasp::hand::{HandColliders, HandDimensions, HandPose, pose_of_segments};
 use softgrasp_grasp::object::RestShape;
@@ -10,6 +11,7 @@ use softgrasp_hand::sent::SilentDevice;
 use softgrasp_protocol::solve_report::SolveSummary;
 
 use super::camera::ViewCamera;
+use super::object_skin::Look;
 
 /// One tick as the window sees it; a copy, so that the ticks go on while it is drawn.
 #[derive(Clone)]
@@ -18,8 +20,10 @@ pub struct ViewFrame {
     pub tick: u64,
     /// Time of the tick on the client's clock, s.
     pub at_s: f64,
-    /// The object in this tick.
+    /// The object in this tick; of several that which a hand touched last.
     pub object: ObjectView,
+    /// The other objects on the table; none in a run of one.
+    pub others: Vec<ObjectView>,
     /// The hand; `None` until both devices have spoken.
     pub hand: Option<HandView>,
     /// The second hand; `None` in a run of one, and until its devices have spoken.
@@ -41,6 +45,11 @@ pub struct ViewFrame {
 /// Units: m. Frame: the object's own.
 #[derive(Clone)]
 pub struct ObjectView {
+    /// Number of the object among those on the table, from 0.
+    pub number: usize,
+    /// Name, look and material of one of several objects; `None` where the run has one, whose look is that
+    /// of the run.
+    pub own: Option<OwnLook>,
     /// Rest shape, to which the object returns when nothing holds it.
     pub rest: Arc<RestShape>,
     /// Number of rest shapes so far; another number is another shape.
@@ -55,6 +64,33 @@ pub struct ObjectView {
     pub world_from_object: Isometry3<f64>,
     /// Height of the table that it can lie on, y of the world; `None` where it has no weight.
     pub table_y: Option<f64>,
+}
+
+/// Name, look and material of one of several objects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnLook {
+    /// Name of a built-in object, or its file.
+    pub name: Arc<str>,
+    /// Look of its skin.
+    pub look: Look,
+    /// Material, from which stresses for the colours are computed.
+    pub material: Material,
+}
+
+impl ObjectView {
+    /// Positions of all vertices as they are shown.
+    ///
+    /// Units: m. Frame: the object's.
+    pub fn shape(&self) -> Vec<Point3<f64>> {
+        let rest = self.rest.mesh().vertices().iter();
+        rest.zip(&self.displacement).map(|(p, u)| p + Vector3::from(*u)).collect()
+    }
+
+    /// Centre and radius of a ball around the rest shape, m, in the world frame.
+    pub fn ball(&self) -> (Point3<f64>, f64) {
+        let sphere = self.rest.tree().bounding_sphere();
+        (self.world_from_object * sphere.centre, sphere.radius)
+    }
 }
 
 /// The hand as it is shown: segments that may not enter the object stay outside it.
@@ -119,6 +155,8 @@ pub struct HandActs {
     pub is_on_its_way: bool,
     /// The hand as it will squeeze the object, where it has a plan; another one when it has another.
     pub squeezing: Option<Arc<HandView>>,
+    /// Number of the object that the hand goes to by itself.
+    pub aimed: usize,
 }
 
 /// State of the link to the server, and of what came over it.
@@ -244,8 +282,17 @@ impl ViewFrame {
     ///
     /// Units: m. Frame: the object's.
     pub fn shape(&self) -> Vec<Point3<f64>> {
-        let rest = self.object.rest.mesh().vertices().iter();
-        rest.zip(&self.object.displacement).map(|(p, u)| p + Vector3::from(*u)).collect()
+        self.object.shape()
+    }
+
+    /// All objects on the table, that which was touched last first.
+    pub fn objects(&self) -> impl Iterator<Item = &ObjectView> {
+        std::iter::once(&self.object).chain(&self.others)
+    }
+
+    /// The object that the hand goes to by itself, which the eye looks at.
+    pub fn aimed(&self) -> &ObjectView {
+        self.objects().find(|object| object.number == self.acts.aimed).unwrap_or(&self.object)
     }
 
     /// Whether there is a deformed shape that can be kept.
@@ -261,7 +308,8 @@ impl ViewFrame {
     /// An eye that sees the hand and what it is about to grasp; `None` without a hand.
     pub fn eye_beside_hand(&self) -> Option<ViewCamera> {
         let hand = self.hands().next()?;
-        let object = self.object.world_from_object * self.object.rest.centre();
+        let aimed = self.aimed();
+        let object = aimed.world_from_object * aimed.rest.centre();
         Some(ViewCamera::beside_hand(object, &hand.world_from_palm, hand.dimensions.handedness))
     }
 
@@ -316,6 +364,8 @@ pub(crate) mod samples {
             tick,
             at_s: tick as f64 / 60.0,
             object: ObjectView {
+                number: 0,
+                own: None,
                 rest: Arc::new(rest),
                 rest_shapes: 1,
                 kept: 0,
@@ -324,6 +374,7 @@ pub(crate) mod samples {
                 world_from_object: Isometry3::identity(),
                 table_y: None,
             },
+            others: Vec::new(),
             hand: None,
             second_hand: None,
             grasp: GraspView::default(),

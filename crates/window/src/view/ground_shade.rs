@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::frame::{HandView, ViewFrame};
 
-/// Most capsules that darken the ground: the object, and the palm and the fingers of two hands.
+/// Most capsules that darken the ground: the objects, and the palms and the fingers of the hands.
 pub const MAX_CAPSULES: usize = 24;
 /// Radius of the palm, m.
 const PALM_RADIUS_M: f64 = 0.026;
@@ -28,11 +28,14 @@ impl Capsule {
     }
 }
 
-/// Capsules around everything solid that is seen of a tick, at most [`MAX_CAPSULES`].
+/// Capsules around everything solid that is seen of a tick, at most [`MAX_CAPSULES`]; objects come first.
 ///
 /// Units: `shape` m, object frame. Frame of the capsules: world, m.
 pub fn capsules(frame: &ViewFrame, shape: &[Point3<f64>], hand_is_shown: bool) -> Vec<Capsule> {
     let mut all: Vec<_> = around(&frame.object.world_from_object, shape).into_iter().collect();
+    for other in &frame.others {
+        all.extend(around(&other.world_from_object, &other.shape()));
+    }
     if hand_is_shown {
         all.extend(frame.hands().flat_map(of_hand));
     }

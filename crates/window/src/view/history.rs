@@ -72,7 +72,8 @@ impl History {
 }
 
 fn bytes_of(frame: &ViewFrame) -> usize {
-    size_of::<ViewFrame>() + size_of_val(frame.object.displacement.as_slice())
+    let shapes = frame.objects().map(|object| size_of_val(object.displacement.as_slice()));
+    size_of::<ViewFrame>() + shapes.sum::<usize>()
 }
 
 #[cfg(test)]

@@ -83,13 +83,16 @@ fn object_distance(
     origin: &Point3<f64>,
     direction: &Vector3<f64>,
 ) -> Option<f64> {
-    let object_from_world = frame.object.world_from_object.inverse();
-    let (origin, direction) = (object_from_world * origin, object_from_world * direction);
-    let shape = frame.shape();
-    let triangles = frame.object.rest.surface().triangles.iter();
-    let hits = triangles.filter_map(|corners| {
-        let corners = corners.map(|node| shape[node as usize]);
-        ray_hit(&corners, &origin, &direction).map(|(distance, _)| distance)
+    let hits = frame.objects().filter_map(|object| {
+        let object_from_world = object.world_from_object.inverse();
+        let (origin, direction) = (object_from_world * origin, object_from_world * direction);
+        let shape = object.shape();
+        let triangles = object.rest.surface().triangles.iter();
+        let hits = triangles.filter_map(|corners| {
+            let corners = corners.map(|node| shape[node as usize]);
+            ray_hit(&corners, &origin, &direction).map(|(distance, _)| distance)
+        });
+        hits.min_by(f64::total_cmp)
     });
     hits.min_by(f64::total_cmp)
 }
@@ -119,6 +122,22 @@ mod tests {
         assert_eq!(with_palm_at(-0.2), PointedAt::Object);
         let aside = Vector3::new(1.0, 0.0, -0.5).normalize();
         assert_eq!(pointed_at(&frame, &from, &aside), PointedAt::Nothing);
+    }
+
+    #[test]
+    fn object_beside_the_first_is_pointed_at_too() {
+        use crate::view::frame::ObjectView;
+        use crate::view::frame::samples::frame;
+
+        let mut frame = frame(0);
+        let (from, down) = (Point3::new(0.2, 0.0, 1.0), -Vector3::z());
+        assert_eq!(pointed_at(&frame, &from, &down), PointedAt::Nothing);
+        frame.others = vec![ObjectView {
+            number: 1,
+            world_from_object: nalgebra::Isometry3::translation(0.2, 0.0, 0.0),
+            ..frame.object.clone()
+        }];
+        assert_eq!(pointed_at(&frame, &from, &down), PointedAt::Object);
     }
 
     #[test]

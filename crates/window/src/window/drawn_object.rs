@@ -8,7 +8,8 @@ use softgrasp_grasp::object::RestShape;
 
 use super::drawn_mesh::{DrawnMesh, remove_texture, set_relief, set_texture};
 use super::units::{UNITS_PER_M, drawn_pose};
-use crate::view::colour_map::{ColourMap, texture_u};
+use crate::view::colour_map::texture_u;
+use crate::view::colouring::Colouring;
 use crate::view::frame::ObjectView;
 use crate::view::object_skin::{Look, ObjectSkin, Part, SurfaceMaterial};
 
@@ -38,7 +39,10 @@ impl DrawnObject {
     /// The object at rest, below a node.
     pub fn new(scene: &mut SceneNode3d, look: Look, object: &ObjectView) -> Self {
         let skin = ObjectSkin::new(look, &object.rest);
-        let name = format!("object {}", object.rest_shapes);
+        let name = match object.number {
+            0 => format!("object {}", object.rest_shapes),
+            number => format!("object {number}, shape {}", object.rest_shapes),
+        };
         let mut group = scene.add_group();
         let parts = skin.parts().iter().map(|part| drawn_part(&mut group, &name, part)).collect();
         let ghost = ghost(&mut group, &skin);
@@ -87,10 +91,11 @@ impl DrawnObject {
 
     /// Colours the body by shares of a range at the nodes, or gives it its own look back if there
     /// are none.
-    pub fn colour_by(&mut self, shares: &[f64], map: &ColourMap) {
+    pub fn colour_by(&mut self, colouring: Option<&Colouring>) {
+        let shares = colouring.map_or(&[][..], Colouring::shares);
         let Some(body) = self.skin.parts().first() else { return };
         let Some(drawn) = self.parts.first_mut() else { return };
-        if !shares.is_empty() {
+        if let Some(map) = colouring.map(Colouring::map).filter(|_| !shares.is_empty()) {
             let mut of_body = Vec::new();
             self.skin.body_values(shares, &mut of_body);
             let uv = |share: &f32| [texture_u(f64::from(*share)), 0.5];

@@ -302,7 +302,7 @@ impl Panels {
         };
         let since = self.prepares_since.get_or_insert_with(Instant::now).elapsed();
         (since > waiting_cards::BRIEF).then(|| Preparing {
-            object: &running.about.object,
+            object: running.object_name(),
             nodes: frame.object.rest.mesh().node_count(),
             stage: (running.about.server_stage)(),
             since,
@@ -331,7 +331,7 @@ fn menu_facts<'a>(seen: &Seen<'a>, running: &'a Running) -> MenuFacts<'a> {
     MenuFacts {
         display: seen.display,
         hand: about.hand,
-        object: &about.object,
+        object: running.object_name(),
         method: &about.method,
         solved_by: newest
             .and_then(|frame| Some(frame.server.solve.as_ref()?.report.method.as_str())),
@@ -343,13 +343,14 @@ fn menu_facts<'a>(seen: &Seen<'a>, running: &'a Running) -> MenuFacts<'a> {
 }
 
 fn softness_of(running: &Running, frame: &ViewFrame) -> Is {
-    let (material, mesh) = (&running.about.material, frame.object.rest.mesh());
+    let own = frame.object.own.as_ref().map(|own| own.material);
+    let (material, mesh) = (own.unwrap_or(running.about.material), frame.object.rest.mesh());
     Is {
         young: material.young(),
         poisson: material.poisson(),
         size_m: mesh.size(),
         nodes: mesh.node_count(),
-        can_be_refined: matches!(running.about.object.parse(), Ok(ObjectChoice::BuiltIn(_))),
+        can_be_refined: matches!(running.object_name().parse(), Ok(ObjectChoice::BuiltIn(_))),
         grip_newtons: frame.grip_newtons(),
     }
 }
@@ -357,7 +358,7 @@ fn softness_of(running: &Running, frame: &ViewFrame) -> Is {
 fn run_facts(running: &Running, graphics: &str) -> RunFacts {
     let about = &running.about;
     RunFacts {
-        object: about.object.clone(),
+        object: running.object_name().to_owned(),
         material: (about.material.young(), about.material.poisson()),
         contact: about.contact.clone(),
         server: about.server.clone(),

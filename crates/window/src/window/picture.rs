@@ -88,6 +88,7 @@ mod tests {
     use super::*;
     use crate::view::display::Level;
     use crate::view::frame::samples::frame;
+    use crate::view::frame::{ObjectView, OwnLook};
     use crate::view::shading::Shading;
 
     /// `None`, and a line that says so, where nothing can draw.
@@ -146,5 +147,35 @@ mod tests {
             let share = share_that_differs(&seen(false), &seen(true));
             assert!(share > 0.03, "{level}: the ghost changes {share} of the picture");
         }
+    }
+
+    #[test]
+    fn object_that_lies_beside_the_first_is_seen_and_has_its_own_look() {
+        let Some(mut pictures) = pictures() else { return };
+        let (alone, mut two) = (frame(3), frame(3));
+        let own = |look| OwnLook {
+            name: "another".into(),
+            look,
+            material: Material::try_new(2.0e4, 0.4).unwrap(),
+        };
+        let beside = |look| ObjectView {
+            number: 1,
+            own: Some(own(look)),
+            world_from_object: nalgebra::Isometry3::translation(0.05, 0.0, 0.0),
+            ..alone.object.clone()
+        };
+        let mut camera = ViewCamera::default();
+        camera.frame(alone.object.rest.centre(), alone.object.rest.mesh().size());
+        let display = Display::default();
+        let before = pictures.draw(&alone, &display, &camera);
+        two.others = vec![beside(Look::Sphere)];
+        let ball = pictures.draw(&two, &display, &camera);
+        let share = share_that_differs(&before, &ball);
+        assert!(share > 0.03, "the other object changes {share} of the picture");
+        let Some(mut others) = self::pictures() else { return };
+        two.others = vec![beside(Look::Imported)];
+        let clay = others.draw(&two, &display, &camera);
+        let share = share_that_differs(&ball, &clay);
+        assert!(share > 0.01, "its look changes {share} of the picture");
     }
 }

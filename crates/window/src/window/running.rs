@@ -178,6 +178,12 @@ impl Running {
         let _ = self.ticks.controls.send(control);
     }
 
+    /// Name of the object; of several that which was touched last.
+    pub fn object_name(&self) -> &str {
+        let own = self.newest.as_ref().and_then(|frame| frame.object.own.as_ref());
+        own.map_or(&self.about.object, |own| &own.name)
+    }
+
     /// Notes that another object is there: its script is played from the beginning.
     pub fn object_is(&mut self, object: String) {
         self.about.object = object;

@@ -1,5 +1,7 @@
 //! The scene: everything that is seen of a tick, and how it follows the next one.
 
+use std::collections::BTreeMap;
+
 use kiss3d::prelude::{SceneNode3d, Window};
 use nalgebra::Point3;
 use softgrasp_grasp::hand::Finger;
@@ -12,7 +14,7 @@ use super::drawn_spheres::{DrawnSpheres, Visit};
 use super::stage::Stage;
 use crate::view::colouring::Colouring;
 use crate::view::display::{Display, Level, Spheres};
-use crate::view::frame::ViewFrame;
+use crate::view::frame::{ObjectView, ViewFrame};
 use crate::view::ground_shade::capsules;
 use crate::view::light::GROUND_M;
 use crate::view::object_skin::Look;
@@ -21,7 +23,8 @@ use crate::view::object_skin::Look;
 pub struct Scene {
     root: SceneNode3d,
     stage: Stage,
-    object: Option<DrawnObject>,
+    /// The objects by their number.
+    objects: BTreeMap<usize, DrawnObject>,
     hands: [Option<DrawnHand>; 2],
     marks: DrawnMarks,
     spheres: DrawnSpheres,
@@ -37,7 +40,7 @@ impl Scene {
         Self {
             root,
             stage,
-            object: None,
+            objects: BTreeMap::new(),
             hands: [None, None],
             marks,
             spheres,
@@ -72,20 +75,9 @@ impl Scene {
         let shape = frame.shape();
         let object = &frame.object;
         self.stage.set_ground(object.table_y.unwrap_or(GROUND_M));
-        if self.object.as_mut().is_none_or(|drawn| !drawn.is(object)) {
-            if let Some(before) = self.object.take() {
-                before.remove();
-            }
-            self.object = Some(DrawnObject::new(&mut self.root, self.look, object));
-            is_new = true;
-        }
-        if let Some(drawn) = &mut self.object {
-            drawn.follow(object, &shape);
-            drawn.show_ghost(display.ghost);
-            drawn.colour_by(colouring.shares(), colouring.map());
-            if display.wireframe {
-                drawn.draw_wireframe(window);
-            }
+        is_new |= self.follow_object(window, object, &shape, display, Some(colouring));
+        for other in &frame.others {
+            is_new |= self.follow_object(window, other, &other.shape(), display, None);
         }
         is_new |= self.follow_hands(frame, display);
         let spheres = shown_spheres(frame, &shape, display.spheres);
@@ -97,6 +89,37 @@ impl Scene {
             self.stage.shade_ground(capsules(frame, &shape, display.skin));
         }
         self.marks.follow(frame, &shape, display.contacts, display.forces);
+    }
+
+    /// Moves an object to a tick, with its colours if it is the one that has them; returns whether it is
+    /// another object than before.
+    fn follow_object(
+        &mut self,
+        window: &mut Window,
+        object: &ObjectView,
+        shape: &[Point3<f64>],
+        display: &Display,
+        colouring: Option<&Colouring>,
+    ) -> bool {
+        let drawn = self.objects.get_mut(&object.number);
+        let is_new = drawn.is_none_or(|drawn| !drawn.is(object));
+        if is_new {
+            if let Some(before) = self.objects.remove(&object.number) {
+                before.remove();
+            }
+            let look = object.own.as_ref().map_or(self.look, |own| own.look);
+            let made = DrawnObject::new(&mut self.root, look, object);
+            self.objects.insert(object.number, made);
+        }
+        if let Some(drawn) = self.objects.get_mut(&object.number) {
+            drawn.follow(object, shape);
+            drawn.show_ghost(display.ghost);
+            drawn.colour_by(colouring);
+            if display.wireframe {
+                drawn.draw_wireframe(window);
+            }
+        }
+        is_new
     }
 
     /// Moves the hands to a tick; returns whether one of them is another hand than before.

@@ -12,7 +12,7 @@ use crate::view::camera::ViewCamera;
 use crate::view::colouring::Colouring;
 use crate::view::display::Display;
 use crate::view::eye_place::EyePlace;
-use crate::view::frame::ViewFrame;
+use crate::view::frame::{ObjectView, ViewFrame};
 use crate::view::shading::Shading;
 
 /// What the pictures show: scene, light, colours and eye.
@@ -77,10 +77,17 @@ impl ShownView {
 
     /// Places the eye so that it sees all of the object of a tick.
     pub(super) fn frame_all(&mut self, frame: &ViewFrame) {
-        let sphere = frame.object.rest.tree().bounding_sphere();
-        let centre = frame.object.world_from_object * sphere.centre;
+        let spheres: Vec<_> = frame.objects().map(ObjectView::ball).collect();
+        // The middle of the outermost, and as far as the farthest reaches.
+        let (mut low, mut high) = (spheres[0].0, spheres[0].0);
+        for (centre, _) in &spheres {
+            (low, high) = (low.inf(centre), high.sup(centre));
+        }
+        let middle = nalgebra::center(&low, &high);
+        let reach = spheres.iter().map(|(centre, radius)| (centre - middle).norm() + radius);
+        let radius = reach.fold(0.0, f64::max);
         self.director.eye_is_chosen();
-        self.camera.frame(centre, 1.7 * sphere.radius);
+        self.camera.frame(middle, 1.7 * radius);
     }
 
     /// Prepares for another object: the eye goes to where it will be, unless the person has it.

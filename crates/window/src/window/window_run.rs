@@ -250,7 +250,7 @@ impl WindowRun {
         match asked.softness {
             Some(SoftnessWish::Material { young, poisson }) => self.set_material(young, poisson),
             Some(SoftnessWish::Object { nodes, size_m }) => self.open_object(ObjectWish {
-                choice: self.object.clone(),
+                choice: self.changed_object(),
                 nodes,
                 size_m: Some(size_m),
             }),
@@ -284,7 +284,7 @@ impl WindowRun {
             Action::Exit => self.ends = true,
             Action::ReadFile => self.panels.dialog = Dialog::read(),
             Action::SaveAs => {
-                let name = self.running.as_ref().map_or("object", |r| r.about.object.as_str());
+                let name = self.running.as_ref().map_or("object", |r| r.object_name());
                 self.panels.dialog = Dialog::save(name);
             }
             Action::Snapshot => {
@@ -306,6 +306,12 @@ impl WindowRun {
             Action::Open(choice) => self.open_object(choice),
             other => self.act_on_run(other),
         }
+    }
+
+    /// The object that is shown and can be made of another size; of several that which was touched last.
+    fn changed_object(&self) -> ObjectChoice {
+        let named = self.running.as_ref().and_then(|running| running.object_name().parse().ok());
+        named.unwrap_or_else(|| self.object.clone())
     }
 
     /// Makes the object of another material.

@@ -84,6 +84,7 @@ fn on_the_wire(question: &Question) -> (MeshData, Vec<Material>) {
         vertices: question.mesh.vertices().iter().map(|p| [p.x, p.y, p.z]).collect(),
         tets: question.mesh.tets().to_vec(),
         regions: question.mesh.regions().to_vec(),
+        ..MeshData::default()
     };
     let materials = question.materials.iter();
     let of =

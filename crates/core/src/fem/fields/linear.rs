@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::state::{ElementState, at_corners, steepest_of};
 use super::tensor::{Tensor, square, tensor_of, with_pressure};
 use crate::fem::tet4::Gradients;
-use crate::fem::{Material, QuadraticMesh, dof, tet4, tet10};
+use crate::fem::{Material, QuadraticMesh, dof, tet4};
 use crate::mesh::{Incidence, TetMesh};
 
 /// Materials by region.
@@ -115,7 +115,7 @@ fn averaged_changes(mesh: &TetMesh, u: &[f64]) -> Vec<Vec<(u32, f64)>> {
 
 /// Ten-node tetrahedra: strain linear in each, exact at the four points of quadrature.
 ///
-/// Shapes: `u` 3 (N + E), mid-edge nodes included. Units: m.
+/// Shapes: `u` 3 per node of `mesh`. Units: m.
 ///
 /// Source: thesis (3.28) with ten shape functions for four.
 pub(crate) fn states_of_tet10(
@@ -124,20 +124,19 @@ pub(crate) fn states_of_tet10(
     u: &[f64],
 ) -> Vec<ElementState<4>> {
     let state = |tet: usize| {
-        let g = tet4::gradients(&mesh.corners(tet));
-        let moduli = materials.moduli_of(tet);
+        let (points, moduli) = (mesh.points(tet), materials.moduli_of(tet));
         let own = from_corner(&mesh.tets()[tet], u);
-        let strain =
-            tet10::QUADRATURE.map(|l| tensor_of(&tet10::displacement_gradient(&g, &own, l)));
-        let energy = strain.iter().map(|strain| density(strain, moduli)).sum::<f64>();
+        let strain = points.displacement_gradients(&own).map(|h| tensor_of(&h));
+        let densities = strain.iter().zip(points.shares);
+        let energy = densities.map(|(strain, share)| share * density(strain, moduli)).sum::<f64>();
         let strain = at_corners(strain);
         ElementState {
             strain,
             stress: strain.map(|strain| stress_of(&strain, moduli)),
-            energy: 0.25 * g.volume * energy,
-            volume: g.volume,
+            energy: points.volume * energy,
+            volume: points.volume,
             moduli,
-            steepest: steepest_of(&g),
+            steepest: steepest_of(&tet4::gradients(&mesh.corners(tet))),
         }
     };
     (0..mesh.tets().len()).into_par_iter().with_min_len(256).map(state).collect()

@@ -1,7 +1,8 @@
 //! Fields of elements and of nodes from the states of the elements, and what the two tell of the
 //! error.
 //!
-//! A node has the mean of what the elements around it have at that corner, by their volumes at rest.
+//! A node has the mean of what the elements around it have at that corner, by their volumes at rest; a
+//! mid-edge node of the mesh what they have in the middle of the edge.
 //! Between the nodes this *recovered* stress is linear, smooth, and nearer to the truth than that of
 //! the elements, so the distance between the two estimates how far the elements are off. At the border
 //! of two regions the true stress jumps: there each region recovers its own for the estimate, and the
@@ -14,6 +15,7 @@ use rayon::prelude::*;
 use super::state::ElementState;
 use super::tensor::{Tensor, plus, square, twice_energy};
 use super::values::{ElementFields, Fields, NodeFields};
+use crate::fem::tet10::EDGES;
 use crate::mesh::{Incidence, TetMesh};
 
 /// Recovered values of one node.
@@ -43,7 +45,7 @@ impl<const C: usize> Recovery<'_, C> {
     /// Fields of elements and nodes; with `is_judged` the estimate of the error too.
     pub fn fields(&self, is_judged: bool) -> Fields {
         let Self { mesh, states, .. } = self;
-        let around = Incidence::new(mesh.node_count(), mesh.tets());
+        let around = self.incidence();
         let of_node = |node: usize| around.tets(node as u32);
         let recovered: Vec<Recovered> = (0..mesh.node_count())
             .into_par_iter()
@@ -72,13 +74,40 @@ impl<const C: usize> Recovery<'_, C> {
         fields
     }
 
-    /// Mean of what some elements have at a corner, by their volumes.
+    /// Elements around every node, around mid-edge nodes of the mesh too.
+    fn incidence(&self) -> Incidence {
+        let (mesh, node_count) = (self.mesh, self.mesh.node_count());
+        if mesh.mid_edge_nodes().is_empty() {
+            return Incidence::new(node_count, mesh.tets());
+        }
+        let both = mesh.tets().iter().zip(mesh.mid_edge_nodes());
+        let nodes: Vec<[u32; 10]> = both
+            .map(|(corners, middles)| {
+                std::array::from_fn(|i| if i < 4 { corners[i] } else { middles[i - 4] })
+            })
+            .collect();
+        Incidence::new(node_count, &nodes)
+    }
+
+    /// Mean of what some elements have at a node, by their volumes.
     fn recovered(&self, node: usize, tets: impl Iterator<Item = u32>) -> Recovered {
         let (mut sum, mut volume) = (NOTHING, 0.0);
         for tet in tets.map(|tet| tet as usize) {
-            let (state, corner) = (&self.states[tet], self.corner(tet, node));
-            sum.strain = plus(sum.strain, state.volume, state.strain_at(corner));
-            sum.stress = plus(sum.stress, state.volume, state.stress_at(corner));
+            let state = &self.states[tet];
+            match self.ends(tet, node) {
+                [a, b] if a == b => {
+                    sum.strain = plus(sum.strain, state.volume, state.strain_at(a));
+                    sum.stress = plus(sum.stress, state.volume, state.stress_at(a));
+                }
+                // In the middle of an edge a linear field is the mean of its ends.
+                ends => {
+                    for corner in ends {
+                        let half = 0.5 * state.volume;
+                        sum.strain = plus(sum.strain, half, state.strain_at(corner));
+                        sum.stress = plus(sum.stress, half, state.stress_at(corner));
+                    }
+                }
+            }
             sum.density += state.energy;
             volume += state.volume;
         }
@@ -92,9 +121,15 @@ impl<const C: usize> Recovery<'_, C> {
         }
     }
 
-    fn corner(&self, tet: usize, node: usize) -> usize {
-        let corners = &self.mesh.tets()[tet];
-        corners.iter().position(|&n| n as usize == node).unwrap_or(0)
+    /// The corner of an element that a node is, twice, or the ends of the edge that it is in the middle of.
+    fn ends(&self, tet: usize, node: usize) -> [usize; 2] {
+        let is_it = |&n: &u32| n as usize == node;
+        if let Some(corner) = self.mesh.tets()[tet].iter().position(is_it) {
+            return [corner; 2];
+        }
+        let middles = self.mesh.mid_edge_nodes().get(tet);
+        let edge = middles.and_then(|middles| middles.iter().position(is_it));
+        edge.map_or([0; 2], |edge| EDGES[edge])
     }
 
     /// Estimates how far the stress of every element is off.

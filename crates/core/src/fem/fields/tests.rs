@@ -5,6 +5,7 @@ use nalgebra::{DVector, Matrix3, Point3, Rotation3, Vector3};
 use super::tensor::square;
 use super::{Tensor, tensor_of, von_mises};
 use crate::fem::hyperelastic::{Deformed, Elements, Law};
+use crate::fem::tet10::tests::curved_fixtures::bent;
 use crate::fem::{Element, Material, tet4};
 use crate::mesh::{BuiltIn, TetMesh, generate};
 use crate::model::Model;
@@ -278,6 +279,27 @@ fn a_uniform_stretch_has_the_cauchy_stress_of_the_law() {
         let strain = 0.5 * (stretch * stretch - 1.0);
         assert!(fields.nodes.strain.iter().all(|own| (own[2] - strain).abs() < 1e-12));
     }
+}
+
+#[test]
+fn a_linear_field_of_curved_elements_has_its_stress_at_mid_edge_nodes_too() {
+    let curved = bent(&generate(BuiltIn::Cube, 64).unwrap(), 0.05);
+    let h = Matrix3::new(0.02, -0.01, 0.03, 0.005, -0.03, 0.01, -0.02, 0.015, 0.01) * 1e-3;
+    let model = model(curved, Element::Tet10, &[material(0.3)]);
+    let u = field(&model, |p| h * p.coords);
+    let fields = model.fields(&u, true);
+    let strain = tensor_of(&h);
+    let stress: Vec<Tensor> = model.fields(&u, false).elements.stress;
+    assert_near(&fields.nodes.strain, &vec![strain; model.mesh().node_count()], 1e-12);
+    assert_near(&fields.nodes.stress, &vec![stress[0]; model.mesh().node_count()], 1e-11);
+    assert!(fields.error_rel.unwrap() < 1e-12, "{:?}", fields.error_rel);
+    let u = random_field(&model, 1, 1e-4);
+    let force = model.stiffness().mul(&u);
+    let half = 0.5 * DVector::from_vec(u.clone()).dot(&DVector::from_vec(force));
+    assert!((model.fields(&u, false).energy / half - 1.0).abs() < 1e-11);
+    let elements = model.hyperelastic(Law::NeoHookean).unwrap();
+    let large = model.large_fields(&elements, &u, false);
+    assert!((large.energy / elements.evaluate(&u).energy - 1.0).abs() < 1e-11);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::tensor::Tensor;
 
 /// Fields of a displacement field.
 ///
-/// Shapes: M elements, N nodes of the mesh (mid-edge nodes have none). Units: strain 1, stress Pa,
+/// Shapes: M elements, N nodes of the mesh (mid-edge nodes that were made have none). Units: strain 1, stress Pa,
 /// energy J. Frame: that of the mesh.
 ///
 /// By linear elasticity strain is the small strain `½ (H + Hᵀ)`. At large deformation strain is Green's,

@@ -11,7 +11,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::body::{Body, Evaluated, gradient_of, gradients_at};
+use super::body::{Body, Evaluated, gradient_of};
 use super::connectivity::{Averaging, Locals};
 use super::deformed::cofactor;
 use super::principal::Curvature;
@@ -42,10 +42,10 @@ impl<'a> AveragedVolume<'a> {
         (locals, averaging): (&'a Locals<4>, &'a Averaging),
         u: &'a [f64],
     ) -> Self {
-        let tets = locals.tets.par_iter().zip(&body.rest).with_min_len(256);
+        let tets = locals.tets.par_iter().enumerate().with_min_len(256);
         let of_tets: Vec<f64> = tets
-            .map(|(nodes, rest)| {
-                let h = gradient_of(nodes, &gradients_at::<4>(rest, 0), u);
+            .map(|(tet, nodes)| {
+                let h = gradient_of(nodes, &body.gradients_at::<4>(tet, 0), u);
                 Deformed::new(&h).j_minus_one
             })
             .collect();
@@ -78,10 +78,9 @@ impl<'a> AveragedVolume<'a> {
     /// `∂v_e/∂u` of the four corners of an element: `V_e cof(F) ∇N_a`, m².
     #[inline]
     fn slopes(&self, tet: usize) -> [Vector3<f64>; 4] {
-        let rest = &self.body.rest[tet];
-        let gradients = gradients_at::<4>(rest, 0);
+        let gradients = self.body.gradients_at::<4>(tet, 0);
         let f = gradient_of(&self.locals.tets[tet], &gradients, self.u) + Matrix3::identity();
-        let cofactor = cofactor(&f) * rest.volume;
+        let cofactor = cofactor(&f) * self.body.rest[tet].volume;
         gradients.map(|gradient| cofactor * gradient)
     }
 

@@ -7,17 +7,20 @@ use super::connectivity::{Averaging, ELEMENTS_TOGETHER, Locals};
 use super::law::ModuliPart;
 use super::{Deformed, Law, Moduli};
 use crate::fem::tet4::{self, Gradients};
+use crate::fem::tet10_points::Points;
 use crate::fem::{AssemblyError, Element, LameByRegion, Material, QuadraticMesh, dof, tet10};
 use crate::mesh::TetMesh;
 
 /// Elements of a body at rest, with their moduli.
 ///
-/// Shapes: M elements, N nodes of the system (mid-edge nodes behind the corners). Units: m, Pa.
+/// Shapes: M elements, N nodes of the system (mid-edge nodes that were made behind the corners). Units: m, Pa.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     pub shape: Shape,
     /// Gradients of the linear shape functions at rest, and the volume of each element.
     pub rest: Vec<Gradients>,
+    /// Elements at rest at their points, where edges may be curved; else empty.
+    curved: Vec<Points>,
     pub moduli: ModuliOf,
     pub node_count: usize,
 }
@@ -45,6 +48,24 @@ impl ModuliOf {
     /// Largest Poisson's ratio.
     pub fn poisson_max(&self) -> f64 {
         self.by_region.iter().map(Moduli::poisson).fold(-1.0, f64::max)
+    }
+
+    /// Number of materials.
+    pub fn len(&self) -> usize {
+        self.by_region.len()
+    }
+
+    /// The law of all of them.
+    pub fn law(&self) -> Law {
+        self.by_region.first().map_or_else(Law::default, |moduli| moduli.law)
+    }
+
+    /// Number of the material of one element.
+    pub fn region_of(&self, tet: usize) -> usize {
+        match self.is_one() {
+            true => 0,
+            false => self.regions.get(tet).map_or(0, |&region| region as usize),
+        }
     }
 
     /// Whether all elements have the same.
@@ -117,20 +138,9 @@ pub(super) struct At {
     pub weight: f64,
 }
 
-/// Quadrature points of an element of K nodes; each stands for the same share of its volume.
+/// Quadrature points of an element of K nodes.
 pub(super) const fn points_of<const K: usize>() -> usize {
     if K == 4 { 1 } else { 4 }
-}
-
-/// Gradients of the K shape functions at one of the points.
-#[inline]
-pub(super) fn gradients_at<const K: usize>(rest: &Gradients, point: usize) -> [Vector3<f64>; K] {
-    if K == 4 {
-        std::array::from_fn(|i| rest.of_shape[i])
-    } else {
-        let all = tet10::shape_gradients(rest, tet10::QUADRATURE[point]);
-        std::array::from_fn(|i| all[i])
-    }
 }
 
 /// Displacement gradient `H = Σ u_a ∇N_aᵀ` of an element.
@@ -161,7 +171,12 @@ impl Body {
         LameByRegion::try_new(mesh.regions(), mesh.tets().len(), materials)?;
         let by_region: Vec<Moduli> = materials.iter().map(|m| Moduli::new(law, m)).collect();
         let moduli = ModuliOf { by_region, regions: mesh.regions().to_vec() };
-        let rest = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
+        let mut rest = tet4::gradients_of(mesh.tets().len(), |t| mesh.corners(t));
+        let curved: Vec<Points> = match quadratic.filter(|own| own.is_curved()) {
+            None => Vec::new(),
+            Some(own) => (0..own.tets().len()).into_par_iter().map(|t| own.points(t)).collect(),
+        };
+        rest.iter_mut().zip(&curved).for_each(|(rest, points)| rest.volume = points.volume);
         let corners = || Locals::new(mesh.node_count(), mesh.tets());
         let (shape, node_count) = match (element, quadratic) {
             (Element::Tet10, Some(quadratic)) => {
@@ -174,15 +189,39 @@ impl Body {
             }
             _ => (Shape::Linear(corners()), mesh.node_count()),
         };
-        Ok(Self { shape, rest, moduli, node_count })
+        Ok(Self { shape, rest, curved, moduli, node_count })
     }
+
+    /// Gradients of the K shape functions of an element at one of its points.
+    #[inline]
+    pub fn gradients_at<const K: usize>(&self, tet: usize, point: usize) -> [Vector3<f64>; K] {
+        let rest = &self.rest[tet];
+        if K == 4 {
+            return std::array::from_fn(|i| rest.of_shape[i]);
+        }
+        let all = match self.curved.get(tet) {
+            None => tet10::shape_gradients(rest, tet10::QUADRATURE[point]),
+            Some(points) => points.gradients[point],
+        };
+        std::array::from_fn(|i| all[i])
+    }
+
+    /// Share of the volume of an element of K nodes that one of its points stands for.
+    #[inline]
+    pub fn share_of<const K: usize>(&self, tet: usize, point: usize) -> f64 {
+        let of_curved = self.curved.get(tet).map(|points| points.shares[point]);
+        of_curved.unwrap_or(1.0 / points_of::<K>() as f64)
+    }
+
+    /// Bytes that it holds in memory, roughly.
     pub fn bytes(&self) -> usize {
         let per_tet = match self.shape {
             Shape::Linear(_) => 32,
             Shape::Averaged(..) => 96,
             Shape::Quadratic(_) => 80,
         };
-        self.rest.len() * (size_of::<Gradients>() + per_tet) + 4 * self.node_count
+        let curved = size_of_val(self.curved.as_slice());
+        self.rest.len() * (size_of::<Gradients>() + per_tet) + curved + 4 * self.node_count
     }
 
     /// Energy and forces of an elastic body, element by element and point by point.
@@ -213,11 +252,10 @@ impl Body {
         let mut forces = Vec::new();
         let points = points_of::<K>();
         let sums = locals.for_each(&mut forces, |tet, forces, sum| {
-            let rest = &self.rest[tet];
-            let weight = rest.volume / points as f64;
             let mut so_far = [Vector3::zeros(); K];
             for point in 0..points {
-                let gradients = gradients_at::<K>(rest, point);
+                let weight = self.rest[tet].volume * self.share_of::<K>(tet, point);
+                let gradients = self.gradients_at::<K>(tet, point);
                 let deformed = Deformed::new(&gradient_of(&locals.tets[tet], &gradients, u));
                 let at = At { tet, point: points * tet + point, weight };
                 let stress = stress(at, &gradients, &deformed, sum) * weight;
@@ -257,7 +295,7 @@ impl Body {
             for (i, nodes) in tets.iter().enumerate() {
                 let tet = piece * ELEMENTS_TOGETHER + i;
                 for point in 0..points_of::<K>() {
-                    let gradients = gradients_at::<K>(&self.rest[tet], point);
+                    let gradients = self.gradients_at::<K>(tet, point);
                     let h = gradient_of(nodes, &gradients, u);
                     see(tet, points_of::<K>() * tet + point, &h, &mut so_far);
                 }

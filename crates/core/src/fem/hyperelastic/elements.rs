@@ -6,6 +6,8 @@ use super::averaged_volume::AveragedVolume;
 use super::body::{Body, Evaluated, Shape};
 use super::groups::Groups;
 use super::law::ModuliPart;
+use super::material_work::{self, ForcesOf, ModuliWork};
+use super::place_work::PlaceWork;
 use super::principal::Curvature;
 use super::states::States;
 use super::summary::{LargeSummary, gradient_change_max};
@@ -17,7 +19,7 @@ use crate::mesh::TetMesh;
 
 /// Elements of a body: shape at rest, law, moduli, and the plastic state where they yield.
 ///
-/// Shapes: M elements, N nodes of the system (mid-edge nodes behind the corners). Units: m, Pa.
+/// Shapes: M elements, N nodes of the system (mid-edge nodes that were made behind the corners). Units: m, Pa.
 #[derive(Clone, Debug)]
 pub struct Elements {
     /// What no step changes, shared by copies.
@@ -186,6 +188,37 @@ impl Elements {
             Some(plastic) => self.yielding(plastic).tangent_times(u, v),
             None => tangent::times(&self.body, u, v),
         }
+    }
+
+    /// The law of the elements; where they yield it is not that of their stress.
+    pub fn law(&self) -> Law {
+        self.body.moduli.law()
+    }
+
+    /// Work `vᵀ f(u)` of the forces of every region for each unit of its moduli, in parallel, the same bits
+    /// for any number of threads: the forces are linear in the moduli. Plastic flow is not in it.
+    ///
+    /// Shapes: `u`, `v` 3N; result one for each material. Units: m.
+    ///
+    /// # Panics
+    /// If the vectors do not hold 3N numbers.
+    pub fn material_work(&self, u: &[f64], v: &[f64], forces: ForcesOf) -> Vec<ModuliWork> {
+        self.check(u);
+        self.check(v);
+        material_work::of_regions(&self.body, (u, v), forces)
+    }
+
+    /// Derivative of the work `vᵀ (f(u) − weight)` by the place of every node of the system at rest, in
+    /// parallel, the same bits for any number of threads. Plastic flow is not in it.
+    ///
+    /// Shapes: result 3N. Units: N for a virtual displacement in m.
+    ///
+    /// # Panics
+    /// If the vectors do not hold 3N numbers.
+    pub fn place_work(&self, work: PlaceWork<'_>) -> Vec<f64> {
+        self.check(work.u);
+        self.check(work.v);
+        work.of(&self.body)
     }
 
     /// Largest share, at most 1, of a step that leaves every element its volume: 0.9 of the smallest

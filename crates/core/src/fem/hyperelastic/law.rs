@@ -119,6 +119,12 @@ impl Moduli {
         Self { law, mu: material.shear_modulus(), volumetric }
     }
 
+    /// A material of 1 Pa of shear modulus alone, and one of 1 Pa of volumetric modulus alone: energy, stress
+    /// and tangent are sums of theirs.
+    pub(super) fn units(law: Law) -> [Self; 2] {
+        [Self { law, mu: 1.0, volumetric: 0.0 }, Self { law, mu: 0.0, volumetric: 1.0 }]
+    }
+
     /// Bulk modulus κ at small strains, Pa.
     pub(super) fn bulk(&self) -> f64 {
         match self.law {

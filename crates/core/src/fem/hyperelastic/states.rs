@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 use super::averaged_volume::AveragedVolume;
-use super::body::{Body, Shape, gradient_of, gradients_at, points_of};
+use super::body::{Body, Shape, gradient_of, points_of};
 use super::connectivity::Locals;
 use super::yielding::{Plastic, Yielding};
 use super::{Deformed, Moduli};
@@ -60,7 +60,7 @@ impl States<'_> {
 
     fn state_of_one_point(&self, locals: &Locals<4>, tet: usize, u: &[f64]) -> ElementState<1> {
         let rest = &self.body.rest[tet];
-        let h = gradient_of(&locals.tets[tet], &gradients_at::<4>(rest, 0), u);
+        let h = gradient_of(&locals.tets[tet], &self.body.gradients_at::<4>(tet, 0), u);
         let point = self.point_state(tet, points_of::<4>() * tet, &h);
         ElementState {
             strain: [point.strain],
@@ -75,14 +75,15 @@ impl States<'_> {
     fn state_of_four_points(&self, locals: &Locals<10>, tet: usize, u: &[f64]) -> ElementState<4> {
         let rest = &self.body.rest[tet];
         let points: [PointState; 4] = std::array::from_fn(|point| {
-            let h = gradient_of(&locals.tets[tet], &gradients_at::<10>(rest, point), u);
+            let h = gradient_of(&locals.tets[tet], &self.body.gradients_at::<10>(tet, point), u);
             self.point_state(tet, points_of::<10>() * tet + point, &h)
         });
-        let density = points.iter().map(|point| point.density).sum::<f64>();
+        let density = |point: usize| self.body.share_of::<10>(tet, point) * points[point].density;
+        let density = (0..points.len()).map(density).sum::<f64>();
         ElementState {
             strain: at_corners(std::array::from_fn(|i| points[i].strain)),
             stress: at_corners(std::array::from_fn(|i| points[i].stress)),
-            energy: 0.25 * rest.volume * density,
+            energy: rest.volume * density,
             volume: rest.volume,
             moduli: self.body.moduli.of(tet).at_small_strain(),
             steepest: steepest_of(rest),
@@ -98,7 +99,7 @@ impl States<'_> {
         u: &[f64],
     ) -> ElementState<4> {
         let (rest, moduli) = (&self.body.rest[tet], self.body.moduli.of(tet));
-        let h = gradient_of(&locals.tets[tet], &gradients_at::<4>(rest, 0), u);
+        let h = gradient_of(&locals.tets[tet], &self.body.gradients_at::<4>(tet, 0), u);
         let own = elastic_state(&moduli.without_volume(), &Deformed::new(&h));
         let changes = volumes.changes_at_corners(tet);
         let of_volume = changes.iter().map(|&change| 0.25 * moduli.energy_of_volume(change));

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
-use super::body::{Body, gradient_of, gradients_at, points_of};
+use super::body::{Body, gradient_of, points_of};
 use super::connectivity::{ELEMENTS_TOGETHER, Locals};
 use super::deformed::cofactor;
 
@@ -22,9 +22,9 @@ pub(super) fn one_by_one<const K: usize>(
         .map(|(piece, tets)| {
             let mut least = 1.0f64;
             for (i, nodes) in tets.iter().enumerate() {
-                let rest = &body.rest[piece * ELEMENTS_TOGETHER + i];
+                let tet = piece * ELEMENTS_TOGETHER + i;
                 for point in 0..points_of::<K>() {
-                    let gradients = gradients_at::<K>(rest, point);
+                    let gradients = body.gradients_at::<K>(tet, point);
                     let f = gradient_of(nodes, &gradients, u) + Matrix3::identity();
                     let df = gradient_of(nodes, &gradients, step);
                     least = least.min(limit_of(volume_cubic(&f, &df)));

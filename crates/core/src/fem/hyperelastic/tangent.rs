@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::averaged_volume::AveragedVolume;
-use super::body::{At, Body, Shape, gradient_of, gradients_at, points_of};
+use super::body::{At, Body, Shape, gradient_of, points_of};
 use super::connectivity::Locals;
 use super::principal::{Curvature, PAIRS, PrincipalTangent, Tangent9};
 use super::yielding::Yielding;
@@ -118,11 +118,10 @@ fn rows<const K: usize>(
         });
     let tangents = tangents.concat();
     assemble_rows(pattern, |tet, local| {
-        let rest = &body.rest[tet];
         let mut row = [[0.0; 9]; K];
         for point in 0..points {
-            let gradients = gradients_at::<K>(rest, point);
-            let weight = rest.volume / points as f64;
+            let gradients = body.gradients_at::<K>(tet, point);
+            let weight = body.rest[tet].volume * body.share_of::<K>(tet, point);
             tangents[points * tet + point].add_row(&gradients, local, weight, &mut row);
         }
         row

@@ -8,7 +8,7 @@ use crate::mesh_io::{
 };
 
 /// The shared folder with real data, if this machine has it; says so when it has not.
-fn shared_meshes() -> Option<PathBuf> {
+pub(crate) fn shared_meshes() -> Option<PathBuf> {
     let named = std::env::var_os("SOFTGRASP_SHARED").map(PathBuf::from);
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|dir| dir.join("shared"));
     let found =

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::error::CondensedError;
+use super::held_inverse::{Held, HeldInverse};
 use super::rounding::{Ball, SLACK, UNIT, asymmetry, gamma, rounding_of_product, settled};
 use crate::fem::Stiffness;
 use crate::mesh::{Bodies, Surface, TetMesh};
@@ -96,14 +97,14 @@ impl Rigid {
     }
 }
 
-/// Base factor of one shape.
+/// The held body of one shape, with the inverse of its stiffness.
 ///
 /// Shapes: 3N degrees of freedom; `modes` z columns of 3N numbers.
 /// Units: stiffness N/m, modes 1.
 pub struct Base {
     pub(super) stiffness: Arc<Stiffness>,
     pub(super) partition: Partition,
-    pub(super) factor: FrontFactor<f64>,
+    pub(super) inverse: HeldInverse,
     /// Degrees of freedom the scene fixes, ascending.
     pub(super) fixed: Vec<u32>,
     /// Degrees of freedom held in addition so that `K_B` is definite; as many as modes.
@@ -123,44 +124,66 @@ pub struct Base {
     eigenvalue_min: WorkedOut<Option<f64>>,
 }
 
+/// The body that a base is made for.
+#[derive(Clone, Copy)]
+pub struct BaseOf<'a> {
+    /// Mesh of the body.
+    pub mesh: &'a TetMesh,
+    /// Its connected bodies.
+    pub bodies: &'a Bodies,
+    /// Their rigid parts.
+    pub rigid: &'a RigidBodies,
+    /// The stiffness `kᵍ`.
+    pub stiffness: &'a Arc<Stiffness>,
+}
+
 /// Share of the estimated smallest eigenvalue that the shifted factor must prove.
 const SHIFT_SHARE: f64 = 0.7;
 /// Steps of inverse iteration: the estimate only has to be good to a few per cent.
 const INVERSE_STEPS: usize = 12;
 
 impl Base {
-    /// Chooses the base of a shape and factors it on the current rayon pool; with a limit, the factor
-    /// may take so much memory only, which is looked at before it is allocated.
+    /// Chooses the base of a shape and factors it on the current rayon pool. With a limit the factor may
+    /// take so much memory only, which is looked at before it is allocated; where not even a factor in single
+    /// precision would fit, columns come from conjugate gradients with a multigrid hierarchy.
     ///
-    /// Shapes: `rigid` that of `mesh` and `bodies`; `fixed` ascending degrees of freedom held at
-    /// zero by the scene. Units: `limit` bytes.
+    /// Shapes: `fixed` ascending degrees of freedom held at zero by the scene. Units: `limit` bytes.
     ///
     /// # Errors
     /// [`CondensedError`]; [`CondensedError::OverLimit`] with needed bytes and limit.
     pub fn try_new(
-        mesh: &TetMesh,
-        bodies: &Bodies,
-        rigid: &RigidBodies,
-        stiffness: &Arc<Stiffness>,
+        body: BaseOf<'_>,
         fixed: &[u32],
         limit: Option<u64>,
         on_stage: &mut dyn FnMut(Stage),
     ) -> Result<Self, CondensedError> {
+        Self::made(body, fixed, |held| HeldInverse::within(body.mesh, held, limit, on_stage))
+    }
+
+    /// The base of a shape whose columns come from conjugate gradients with a multigrid hierarchy, however
+    /// much memory there is.
+    ///
+    /// Shapes: as in [`Base::try_new`].
+    ///
+    /// # Errors
+    /// [`CondensedError`].
+    pub fn without_factor(body: BaseOf<'_>, fixed: &[u32]) -> Result<Self, CondensedError> {
+        Self::made(body, fixed, |held| Ok(HeldInverse::cycles(held)))
+    }
+
+    fn made(
+        body: BaseOf<'_>,
+        fixed: &[u32],
+        inverse_of: impl FnOnce(Held<'_>) -> Result<HeldInverse, CondensedError>,
+    ) -> Result<Self, CondensedError> {
+        let BaseOf { mesh, bodies, rigid, stiffness } = body;
         let fields =
             motions(mesh, bodies, rigid, fixed).map_err(|body| CondensedError::Hinges { body })?;
         let held = hold(&fields, fixed);
         let mut known = [fixed, held.as_slice()].concat();
         known.sort_unstable();
         let partition = Partition::try_new(&mesh.used_nodes(), &known)?;
-        on_stage(Stage::Order);
-        let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
-        let needed = analysis.peak_bytes::<f64>() as u64;
-        if let Some(limit) = limit.filter(|limit| needed > *limit) {
-            return Err(CondensedError::OverLimit { needed, limit });
-        }
-        on_stage(Stage::Factor);
-        let factor = FrontFactor::try_new(&analysis, stiffness)
-            .map_err(|error| CondensedError::of_factor(error, &partition))?;
+        let inverse = inverse_of((stiffness, &partition))?;
         let modes: Vec<Mode> =
             fields.into_iter().map(|field| Mode::new(stiffness, field)).collect();
         let stiffest = stiffness.row_sum_max();
@@ -168,7 +191,7 @@ impl Base {
         Ok(Self {
             stiffness: Arc::clone(stiffness),
             partition,
-            factor,
+            inverse,
             fixed: fixed.to_vec(),
             surface: SurfaceNodes::from_mesh(mesh),
             rigid: Rigid::new(&modes, &held, asymmetry),
@@ -191,9 +214,20 @@ impl Base {
         &self.fixed
     }
 
-    /// Order and analysis of the factor, and of that of any matrix on its pattern.
-    pub fn analysis(&self) -> &FrontAnalysis {
-        self.factor.analysis()
+    /// Order and analysis of the factor, and of that of any matrix on its pattern; `None` where memory was
+    /// too short for a factor.
+    pub fn analysis(&self) -> Option<&FrontAnalysis> {
+        self.inverse.factor().map(|factor| &**factor.analysis())
+    }
+
+    /// Whether columns come from a factor; else from conjugate gradients with a multigrid hierarchy.
+    pub fn has_factor(&self) -> bool {
+        self.inverse.factor().is_some()
+    }
+
+    /// The stiffness, and the partition that holds the body.
+    pub(super) fn held_system(&self) -> Held<'_> {
+        (&self.stiffness, &self.partition)
     }
 
     /// Nodal forces `K u` (3.36) of a displacement field.
@@ -208,14 +242,15 @@ impl Base {
         self.held.is_empty()
     }
 
-    /// Bytes that the proof of the smallest eigenvalue takes for the moment: a second factor.
+    /// Bytes that the proof of the smallest eigenvalue takes for the moment: a second factor. None where
+    /// there is no first one, and so no proof.
     pub fn proof_bytes(&self) -> u64 {
-        self.factor.analysis().peak_bytes::<f64>() as u64
+        self.analysis().map_or(0, |analysis| analysis.peak_bytes::<f64>() as u64)
     }
 
-    /// Bytes of the factor and the modes.
+    /// Bytes of the factor or hierarchy, and of the modes.
     pub fn bytes(&self) -> usize {
-        self.factor.bytes() + self.modes.len() * 8 * self.dof_count() + self.surface.bytes()
+        self.inverse.bytes() + self.modes.len() * 8 * self.dof_count() + self.surface.bytes()
     }
 
     /// Skeel's condition number of the held shape, if it was estimated earlier.
@@ -227,23 +262,21 @@ impl Base {
     pub fn estimate_condition(&self) -> f64 {
         self.condition.get_or(|| {
             let weights = row_sums(&self.stiffness, &self.partition);
-            inverse_norm(&weights, &|mut b, columns| {
-                self.factor.solve_in_place(&mut b, columns);
-                b
-            })
+            inverse_norm(&weights, &|b, _| self.inverse.to_a_digit(self.held_system(), b))
         })
     }
 
     /// Proves a lower bound of the smallest eigenvalue of the symmetric part of `K_B`, once; costs a
     /// second factor for the moment.
     ///
-    /// Returns N/m, or `None` where double precision cannot prove one.
+    /// Returns N/m, or `None` where double precision cannot prove one, or there is no factor.
     pub fn prove_eigenvalue_min(&self) -> Option<f64> {
         self.eigenvalue_min.get_or(|| {
+            let analysis = self.inverse.factor()?.analysis();
             let estimate = self.estimate_eigenvalue_min()?;
             let shift = SHIFT_SHARE * estimate;
             let shifted = self.stiffness.shifted(-shift);
-            FrontFactor::<f64>::try_new(self.factor.analysis(), &shifted).ok()?;
+            FrontFactor::<f64>::try_new(analysis, &shifted).ok()?;
             // Rump 2006 for any order of summation; twice, for divisions by way of reciprocals.
             let n = self.partition.unknown().len();
             let margin = 2.0 * gamma(n + 3) * self.stiffness.trace() * SLACK;
@@ -270,8 +303,7 @@ impl Base {
                 return None;
             }
             x.iter_mut().for_each(|v| *v /= size);
-            let mut y = x.clone();
-            self.factor.solve_in_place(&mut y, 1);
+            let y = self.inverse.to_a_digit(self.held_system(), x.clone());
             let along: f64 = x.iter().zip(&y).map(|(a, b)| a * b).sum();
             quotient = (along > 0.0).then(|| 1.0 / along);
             x = y;

@@ -19,7 +19,9 @@ fn scaled(mesh: &TetMesh, length: f64, young: f64, poisson: f64, fixed: &[u32]) 
     let stiffness = Arc::new(assemble(&pattern, &mesh, &[material]).unwrap());
     let bodies = Bodies::from_mesh(&mesh);
     let rigid = RigidBodies::new(&mesh, &bodies);
-    let base = Base::try_new(&mesh, &bodies, &rigid, &stiffness, fixed, None, &mut |_| {}).unwrap();
+    let (mesh_of, bodies, rigid) = (&mesh, &bodies, &rigid);
+    let body = BaseOf { mesh: mesh_of, bodies, rigid, stiffness: &stiffness };
+    let base = Base::try_new(body, fixed, None, &mut |_| {}).unwrap();
     Shape { mesh, stiffness, base, columns: Columns::new(1 << 30) }
 }
 

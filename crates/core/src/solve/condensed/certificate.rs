@@ -18,6 +18,8 @@ pub struct Certificate {
     pub residual_rel: f64,
     /// Proven bound on `‖e‖ / ‖u‖` over all nodes, or why there is none.
     pub error_bound_rel: Result<f64, &'static str>,
+    /// Estimate of `‖e‖ / ‖u‖`, where columns come from conjugate gradients.
+    pub error_estimate_rel: Option<f64>,
 }
 
 /// How displacements are rounded before they are handed over.
@@ -36,6 +38,8 @@ const SINGLE: f64 = 5.960_464_477_539_063e-8 * (1.0 + 1e-6);
 
 const NOTHING_MOVES: &str = "nothing moves";
 const NOT_PROVEN: &str = "no lower bound of the smallest eigenvalue has been proven for this shape";
+const NO_FACTOR: &str = "the columns come from conjugate gradients, since memory is too short for a \
+                         factor: the error is estimated, and no bound is proven";
 const OUT_OF_RANGE: &str = "the numbers are too large or too small for a bound in double precision";
 const WEAKLY_HELD: &str =
     "the contacts hold the body so weakly that double precision proves no bound";
@@ -52,6 +56,8 @@ pub(super) struct LoadTerms<'a> {
     /// Residual of these displacements as computed, as a norm, and a bound of it.
     pub residual: f64,
     pub residual_bound: f64,
+    /// Estimated error of these displacements, as a norm.
+    pub error: f64,
     /// Right side of the small system, m, and a bound on the norm of what it is off.
     pub right: &'a DVector<f64>,
     pub right_off: f64,
@@ -83,6 +89,7 @@ impl Judge<'_> {
         Certificate {
             residual_rel: self.residual_rel(q, answer),
             error_bound_rel: self.bound(q, answer, delivered, delivery),
+            error_estimate_rel: self.estimate(norm(q), answer, 0.0, delivered),
         }
     }
 
@@ -100,6 +107,7 @@ impl Judge<'_> {
         let b = loads.load_size;
         Certificate {
             residual_rel: if b > 0.0 { residual / b } else { residual },
+            error_estimate_rel: self.estimate(norm(q), answer, loads.error, delivered),
             error_bound_rel: self.loaded_bound(norm(q), answer, &loads, (delivered, delivery)),
         }
     }
@@ -112,7 +120,7 @@ impl Judge<'_> {
         (delivered, delivery): (f64, Delivery),
     ) -> Result<f64, &'static str> {
         let Self { base, verified, .. } = self;
-        let eigenvalue = base.eigenvalue_min().ok_or(NOT_PROVEN)?;
+        let eigenvalue = proven_eigenvalue(base)?;
         if asked == 0.0 && loads.size == 0.0 {
             return Err(NOTHING_MOVES);
         }
@@ -127,6 +135,30 @@ impl Judge<'_> {
         let error = self.plain(&x, missed, factors, Some(loads)).ok_or(WEAKLY_HELD)?;
         let size = (asked / self.overlap.stretch).max(delivered / SLACK - error) / SLACK;
         relative(error, size, delivered, delivery)
+    }
+
+    /// Estimate of the relative error that conjugate gradients leave; `None` where a factor was used.
+    ///
+    /// The errors of the columns add up in proportion to the forces. Where the contacts are held, the small
+    /// system takes out again what moves them, which is a part of the same size.
+    ///
+    /// Units: `asked` and `delivered` norms, m; `of_loads` norm of the error of what loads move, m.
+    fn estimate(
+        self,
+        asked: f64,
+        answer: &ContactAnswer,
+        of_loads: f64,
+        delivered: f64,
+    ) -> Option<f64> {
+        if self.base.inverse.factor().is_some() {
+            return None;
+        }
+        let columns = &self.small.columns;
+        let places = self.small.places.iter().map(|&(at, axis)| columns[at].errors[axis]);
+        let of_columns: f64 = places.zip(&answer.lambda).map(|(e, force)| e * force.abs()).sum();
+        let size = delivered.max(asked / self.overlap.stretch);
+        let error = ESTIMATE_SAFETY * (of_columns + of_loads);
+        Some(if size > 0.0 { error / size } else { error })
     }
 
     /// Bound of the residual's norm by the residuals of columns and motions as computed.
@@ -162,7 +194,7 @@ impl Judge<'_> {
         delivery: Delivery,
     ) -> Result<f64, &'static str> {
         let Self { base, verified, .. } = self;
-        let eigenvalue = base.eigenvalue_min().ok_or(NOT_PROVEN)?;
+        let eigenvalue = proven_eigenvalue(base)?;
         let asked = norm(q);
         if asked == 0.0 {
             return Err(NOTHING_MOVES);
@@ -237,6 +269,17 @@ impl Judge<'_> {
         let known = c.moved * missed + gamma(v.norms.len() + 8) * c.sizes.at_most(&x.abs());
         Some((said + known) * SLACK)
     }
+}
+
+/// What the contacts take out of the errors of columns has about the size of these errors.
+const ESTIMATE_SAFETY: f64 = 2.0;
+
+/// Proven smallest eigenvalue of the held stiffness, N/m, or why there is none.
+fn proven_eigenvalue(base: &Base) -> Result<f64, &'static str> {
+    base.eigenvalue_min().ok_or(match base.inverse.factor() {
+        Some(_) => NOT_PROVEN,
+        None => NO_FACTOR,
+    })
 }
 
 /// Bound of the error, rounded as it is delivered, over a lower bound of the answer's size.

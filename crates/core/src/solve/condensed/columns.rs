@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::base::{Base, Block, SurfaceNodes};
 use super::error::CondensedError;
+use super::held_inverse::{CONTACTS_TOGETHER, HeldAnswer, Load};
 use super::rounding::{rounding_of_product, settled};
 use super::touched::Contact;
 use crate::solve::vectors::norm;
@@ -27,6 +28,8 @@ pub struct ContactColumns {
     pub(super) residuals: [f64; 3],
     /// Bounds on the same norms, rounding of the computation included.
     pub(super) residual_bounds: [f64; 3],
+    /// Estimated norms of the errors that conjugate gradients left; zero by a factor.
+    pub(super) errors: [f64; 3],
 }
 
 impl ContactColumns {
@@ -40,6 +43,7 @@ impl ContactColumns {
             norms,
             residuals: [f64::NAN; 3],
             residual_bounds: [f64::NAN; 3],
+            errors: [f64::NAN; 3],
         }
     }
 
@@ -122,7 +126,7 @@ impl Columns {
             contacts.iter().filter(|c| !kept.columns.contains_key(c)).cloned().collect()
         };
         // Computed without the lock: others may answer from the cache meanwhile.
-        let made = compute(base, &missing);
+        let made = compute(base, &missing)?;
         let mut kept = self.lock();
         kept.computed += missing.len() as u64;
         for columns in made {
@@ -141,7 +145,7 @@ impl Columns {
         drop(kept);
         // Another thread may have trimmed what this one counted on; then it is computed again.
         if found.len() < contacts.len() {
-            return Ok(compute(base, contacts).into_iter().map(Arc::new).collect());
+            return Ok(compute(base, contacts)?.into_iter().map(Arc::new).collect());
         }
         Ok(found)
     }
@@ -174,58 +178,43 @@ fn trim(kept: &mut Kept, base: &Base, bound: usize) {
     }
 }
 
-/// Contacts solved together: the fingers of a hand.
-///
-/// A solve always has this many contacts, some of them empty where fewer are asked for. The kernels
-/// sum in another order for another number of columns, so a column would depend in its last bits on
-/// which others happened to be missing with it, and that depends on timing.
-pub const CONTACTS_TOGETHER: usize = 5;
-
-fn compute(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
-    contacts.chunks(CONTACTS_TOGETHER).flat_map(|some| compute_together(base, some)).collect()
+fn compute(base: &Base, contacts: &[Contact]) -> Result<Vec<ContactColumns>, CondensedError> {
+    let mut made = Vec::with_capacity(contacts.len());
+    for some in contacts.chunks(CONTACTS_TOGETHER) {
+        made.extend(compute_together(base, some)?);
+    }
+    Ok(made)
 }
 
-fn compute_together(base: &Base, contacts: &[Contact]) -> Vec<ContactColumns> {
-    let unknown = base.partition.unknown();
-    let n = unknown.len();
-    let rows_wanted: Vec<usize> = (0..n).collect();
-    let mut loads: Vec<Load> = contacts.iter().flat_map(|c| unit_loads(base, c)).collect();
-    let asked = loads.len();
-    loads.resize_with(3 * CONTACTS_TOGETHER, Vec::new);
-    let solved = base.factor.solve_partial(&loads, &rows_wanted);
+fn compute_together(
+    base: &Base,
+    contacts: &[Contact],
+) -> Result<Vec<ContactColumns>, CondensedError> {
+    let loads: Vec<Load> = contacts.iter().flat_map(|c| unit_loads(base, c)).collect();
+    let solved = base.inverse.solve_contacts(base.held_system(), loads.clone())?;
     // Not refined: as they come, all columns are those of one matrix very near to K_B, so their
     // errors cancel in an answer; refined one by one they would be errors of their own, up to a
     // hundred times as large (docs/decisions.md).
-    let fields: Vec<Field> = loads[..asked]
+    let fields: Vec<Field> = loads
         .par_iter()
-        .enumerate()
-        .map(|(column, load)| {
-            let mut field = vec![0.0; base.dof_count()];
-            for (row, &dof) in unknown.iter().enumerate() {
-                field[dof as usize] = solved[(row, column)];
-            }
-            Field::check(base, load, field)
-        })
+        .zip(solved)
+        .map(|(load, answer)| Field::check(base, load, answer))
         .collect();
     let mut fields = fields.into_iter();
-    contacts
-        .iter()
-        .filter_map(|contact| {
-            let [x, y, z] = [fields.next()?, fields.next()?, fields.next()?];
-            Some(ContactColumns {
-                contact: contact.clone(),
-                surface: WorkedOut::default(),
-                norms: [x.norm, y.norm, z.norm],
-                residuals: [x.residual, y.residual, z.residual],
-                residual_bounds: [x.residual_bound, y.residual_bound, z.residual_bound],
-                fields: [x.field, y.field, z.field],
-            })
+    let of_contact = |contact: &Contact| {
+        let [x, y, z] = [fields.next()?, fields.next()?, fields.next()?];
+        Some(ContactColumns {
+            contact: contact.clone(),
+            surface: WorkedOut::default(),
+            norms: [x.norm, y.norm, z.norm],
+            residuals: [x.residual, y.residual, z.residual],
+            residual_bounds: [x.residual_bound, y.residual_bound, z.residual_bound],
+            errors: [x.error, y.error, z.error],
+            fields: [x.field, y.field, z.field],
         })
-        .collect()
+    };
+    Ok(contacts.iter().filter_map(of_contact).collect())
 }
-
-/// A load by rows of `K_B`.
-type Load = Vec<(usize, f64)>;
 
 /// Unit forces at a contact along x, y and z. What acts on a degree of freedom of the base itself
 /// moves nothing: it has no row.
@@ -246,11 +235,14 @@ pub(super) struct Field {
     pub residual: f64,
     /// Bound on the same norm, rounding of the computation included.
     pub residual_bound: f64,
+    /// Estimated norm of the error that conjugate gradients left; zero by a factor.
+    pub error: f64,
 }
 
 impl Field {
-    /// Shapes: `load` rows of `K_B` and forces, each row once; `field` 3N.
-    pub fn check(base: &Base, load: &[(usize, f64)], field: Vec<f64>) -> Self {
+    /// Shapes: `load` rows of `K_B` and forces, each row once; `answer` to it 3N.
+    pub fn check(base: &Base, load: &[(usize, f64)], answer: HeldAnswer) -> Self {
+        let HeldAnswer { field, error } = answer;
         let f = base.stiffness.mul(&field);
         let unknown = base.partition.unknown();
         let mut residual: Vec<f64> = unknown.iter().map(|&d| -f[d as usize]).collect();
@@ -259,6 +251,6 @@ impl Field {
         }
         let residual = norm(&residual);
         let residual_bound = settled(residual, rounding_of_product(&base.stiffness, &field));
-        Self { norm: norm(&field), field, residual, residual_bound }
+        Self { norm: norm(&field), field, residual, residual_bound, error }
     }
 }

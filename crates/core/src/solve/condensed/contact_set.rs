@@ -14,7 +14,6 @@ use super::small_system::{ContactAnswer, SmallSystem, WantedRows};
 use super::touched::Touched;
 use super::verified::Verified;
 use crate::solve::Certainty;
-use crate::solve::vectors::norm;
 use crate::solve::worked_out::WorkedOut;
 
 /// A set of contacts, ready to answer any displacements of them.
@@ -122,9 +121,11 @@ impl ContactSet {
     /// Solves once more for every column of the set, on the current rayon pool: from then on bounds
     /// ([`ContactSet::certify`]) are hundreds of times sharper. Does nothing where that was done.
     pub fn refine(&self, base: &Base) {
+        // Without a factor no eigenvalue is proven, and so no bound is there to be sharpened.
+        let Some(factor) = base.inverse.factor() else { return };
         if self.correction.get_ref().is_none() && !self.small.matrix.is_empty() {
             let fields: Vec<&Vec<f64>> = self.small.fields(base).collect();
-            let made = Correction::new(base, &self.touched, &self.verified, &fields);
+            let made = Correction::new((base, factor), &self.touched, &self.verified, &fields);
             // Somebody else may have been first; theirs has the same bits.
             self.correction.keep(made);
         }
@@ -165,10 +166,7 @@ impl ContactSet {
         delivered: &[[f64; 3]],
         delivery: Delivery,
     ) -> Certificate {
-        let delivered = match &self.rows {
-            Some(rows) => rows.size_of(delivered),
-            None => norm(delivered.as_flattened()),
-        };
+        let delivered = WantedRows::delivered_size(self.rows.as_ref(), delivered);
         self.judge(base).certificate(q, answer, delivered, delivery)
     }
 

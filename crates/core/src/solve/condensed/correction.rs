@@ -10,6 +10,7 @@ use super::rounding::{
 };
 use super::touched::Touched;
 use super::verified::Verified;
+use crate::solve::front::FrontFactor;
 use crate::solve::vectors::norm;
 
 /// What a second solve found out about the columns of `M = [s G  R]`.
@@ -100,10 +101,15 @@ struct Part {
 }
 
 impl Correction {
-    /// Solves once more for every column, on the current rayon pool.
+    /// Solves once more for every column, on the current rayon pool; `factor` is that of the base.
     ///
     /// Shapes: `fields` those of G and R, each 3N.
-    pub fn new(base: &Base, touched: &Touched, verified: &Verified, fields: &[&Vec<f64>]) -> Self {
+    pub fn new(
+        (base, factor): (&Base, &FrontFactor<f64>),
+        touched: &Touched,
+        verified: &Verified,
+        fields: &[&Vec<f64>],
+    ) -> Self {
         let (c, k) = (touched.force_count(), fields.len());
         let loads = touched.columns();
         let load = |j: usize| loads.get(j).map_or([].as_slice(), Vec::as_slice);
@@ -118,7 +124,7 @@ impl Correction {
         let modes = base.modes.iter();
         let forces: Vec<Accurate> =
             modes.map(|mode| residual(&base.stiffness, &mode.field, &[], true)).collect();
-        let corrections = solve(base, wrong.iter().map(|w| &w.value));
+        let corrections = solve(base, factor, wrong.iter().map(|w| &w.value));
         let scale = |j: usize| if j < c { verified.scale } else { 1.0 };
         let residuals = corrections.iter().zip(&wrong).enumerate();
         let residuals =
@@ -134,7 +140,7 @@ impl Correction {
         let (error, off) = found.first_order(verified, columns, &lengths);
         let disturbed: Vec<Vec<f64>> =
             columns.iter().map(|column| disturbance(&base.stiffness, column)).collect();
-        let simulated = solve(base, disturbed.iter());
+        let simulated = solve(base, factor, disturbed.iter());
         let expected = Part::new(touched, verified, columns, simulated, disturbed[c..].iter());
         let (expected, _) = expected.first_order(verified, columns, &lengths);
         let size = Form::new(columns);
@@ -246,12 +252,16 @@ fn moments(base: &Base, forces: &[Accurate]) -> f64 {
 }
 
 /// `K_B⁻¹` of some loads, 3N each; rows that are held count nothing.
-fn solve<'a>(base: &Base, loads: impl Iterator<Item = &'a Vec<f64>>) -> Vec<Vec<f64>> {
+fn solve<'a>(
+    base: &Base,
+    factor: &FrontFactor<f64>,
+    loads: impl Iterator<Item = &'a Vec<f64>>,
+) -> Vec<Vec<f64>> {
     let unknown = base.partition.unknown();
     let mut right: Vec<f64> =
         loads.flat_map(|load| unknown.iter().map(|&dof| load[dof as usize])).collect();
     let count = right.len() / unknown.len().max(1);
-    base.factor.solve_in_place(&mut right, count);
+    factor.solve_in_place(&mut right, count);
     let field = |solved: &[f64]| {
         let mut field = vec![0.0; base.dof_count()];
         unknown.iter().zip(solved).for_each(|(&dof, x)| field[dof as usize] = *x);

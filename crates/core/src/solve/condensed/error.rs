@@ -102,6 +102,26 @@ pub enum CondensedError {
         /// Motions without energy.
         motions: usize,
     },
+    /// Conjugate gradients, in the place of a factor of the base, did not come near the answer.
+    #[error(
+        "condensed: conjugate gradients end after {steps} steps with a residual of \
+         {residual_rel:.0e} and an estimated error of {error_estimate_rel:.0e}; allow the memory of a \
+         factor"
+    )]
+    NotConverged {
+        /// Steps taken.
+        steps: u32,
+        /// Residual relative to the load.
+        residual_rel: f64,
+        /// Estimated error relative to the displacements.
+        error_estimate_rel: f64,
+    },
+    /// Something that takes a factor of the base, which memory was too short for.
+    #[error(
+        "condensed: contact at large deformation takes a factor of the base, which does not fit the \
+         memory; allow more, or ask for linear elasticity"
+    )]
+    NoFactor,
     /// The answer is not finite.
     #[error("condensed: the answer is not finite; the known displacements are too large")]
     NotFinite,

@@ -43,11 +43,11 @@ pub struct FreeBody {
 }
 
 impl FreeBody {
-    /// Six solves with the factor of the base.
+    /// Six solves of the held body.
     ///
     /// # Errors
     /// [`CondensedError::NotFree`] where the scene holds the body, or it has several parts that move
-    /// on their own.
+    /// on their own; [`CondensedError::NotConverged`] where the base has no factor.
     pub fn try_new(mesh: &TetMesh, base: &Base) -> Result<Self, CondensedError> {
         let motions = base.modes.len();
         if motions != 6 || !base.fixed.is_empty() {
@@ -85,12 +85,12 @@ impl FreeBody {
             own: Matrix6::zeros(),
             residuals: [0.0; 6],
         };
-        body.respond(base);
+        body.respond(base)?;
         Ok(body)
     }
 
     /// Solves for the loads `M R`.
-    fn respond(&mut self, base: &Base) {
+    fn respond(&mut self, base: &Base) -> Result<(), CondensedError> {
         let (n, unknown) = (self.vertices.len(), base.partition.unknown());
         let mut loads = vec![0.0; 6 * unknown.len()];
         for (motion, load) in loads.chunks_exact_mut(unknown.len()).enumerate() {
@@ -99,23 +99,18 @@ impl FreeBody {
                 *load = self.volumes[node] * self.motions(node)[(axis, motion)];
             }
         }
-        let asked = loads.clone();
-        base.factor.solve_in_place(&mut loads, 6);
-        for (motion, residual) in self.residuals.iter_mut().enumerate() {
-            let of_motion = motion * unknown.len()..(motion + 1) * unknown.len();
-            let mut field = vec![0.0; base.dof_count()];
-            for (value, &dof) in loads[of_motion.clone()].iter().zip(unknown) {
-                field[dof as usize] = *value;
-            }
-            let forces = base.stiffness.mul(&field);
-            let left = unknown.iter().zip(&asked[of_motion]);
+        let answers = base.inverse.solve(base.held_system(), loads.clone())?;
+        let asked = loads.chunks_exact(unknown.len());
+        for ((residual, answer), asked) in self.residuals.iter_mut().zip(&answers).zip(asked) {
+            let forces = base.stiffness.mul(&answer.field);
+            let left = unknown.iter().zip(asked);
             *residual =
                 left.map(|(&dof, load)| (load - forces[dof as usize]).powi(2)).sum::<f64>().sqrt();
         }
         let mut response = vec![Matrix3x6::zeros(); n];
-        for (motion, solved) in loads.chunks_exact(unknown.len()).enumerate() {
-            for (value, &dof) in solved.iter().zip(unknown) {
-                response[dof as usize / 3][(dof as usize % 3, motion)] = *value;
+        for (motion, answer) in answers.iter().enumerate() {
+            for (response, u) in response.iter_mut().zip(answer.field.as_chunks::<3>().0) {
+                (0..3).for_each(|axis| response[(axis, motion)] = u[axis]);
             }
         }
         self.own = Matrix6::zeros();
@@ -123,6 +118,7 @@ impl FreeBody {
             self.own += self.volumes[node] * self.motions(node).transpose() * response;
         }
         self.response = response;
+        Ok(())
     }
 
     /// Volume at rest, m³.

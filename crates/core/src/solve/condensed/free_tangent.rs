@@ -19,9 +19,10 @@ use nalgebra::{DVector, Dyn, LU};
 use rayon::prelude::*;
 
 use super::base::Base;
-use super::columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
+use super::columns::{Columns, ContactColumns};
 use super::error::CondensedError;
 use super::free_body::FreeBody;
+use super::held_inverse::CONTACTS_TOGETHER;
 use super::touched::Contact;
 use crate::fem::Stiffness;
 use crate::solve::front::FrontFactor;
@@ -47,14 +48,16 @@ impl FreeTangent {
     /// Factors a tangent on the pattern of the base; columns take no more than `bound` bytes.
     ///
     /// # Errors
-    /// [`CondensedError::NotPositiveDefinite`] where it has no factor, [`CondensedError::OutOfMemory`].
+    /// [`CondensedError::NotPositiveDefinite`] where it has no factor, [`CondensedError::OutOfMemory`],
+    /// [`CondensedError::NoFactor`] where memory was too short for that of the base.
     pub fn try_new(
         base: &Base,
         body: &FreeBody,
         tangent: &Stiffness,
         bound: usize,
     ) -> Result<Self, CondensedError> {
-        let factor = FrontFactor::try_new(base.factor.analysis(), tangent)
+        let of_base = base.inverse.factor().ok_or(CondensedError::NoFactor)?;
+        let factor = FrontFactor::try_new(of_base.analysis(), tangent)
             .map_err(|error| CondensedError::of_factor(error, &base.partition))?;
         let loads = body.mean_loads();
         let pulls: Vec<Vec<f64>> = base.held.iter().map(|&dof| column(tangent, dof)).collect();

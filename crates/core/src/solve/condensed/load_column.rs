@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use super::base::Base;
 use super::columns::{ContactColumns, Field};
+use super::error::CondensedError;
+use super::held_inverse::HeldAnswer;
 
 /// The displacement of the held shape under some forces, `g = K_B⁻¹ f`, and how well it solves its equations.
 ///
@@ -29,23 +31,26 @@ pub enum UnitLoad {
 }
 
 impl LoadColumn {
-    /// Solves once with the factor of the base, on the current rayon pool.
+    /// Solves once, on the current rayon pool.
     ///
     /// Shapes: `forces` 3N. Units: N.
-    pub fn new(base: &Base, forces: &[f64]) -> Self {
+    ///
+    /// # Errors
+    /// [`CondensedError::NotConverged`] where the base has no factor.
+    pub fn try_new(base: &Base, forces: &[f64]) -> Result<Self, CondensedError> {
         let unknown = base.partition.unknown();
         // Always one by one: the kernels sum in another order for another number of columns.
-        let mut solved: Vec<f64> = unknown.iter().map(|&dof| forces[dof as usize]).collect();
+        let asked: Vec<f64> = unknown.iter().map(|&dof| forces[dof as usize]).collect();
         let load: Vec<(usize, f64)> =
-            solved.iter().copied().enumerate().filter(|(_, force)| *force != 0.0).collect();
-        base.factor.solve_in_place(&mut solved, 1);
-        let mut field = vec![0.0; base.dof_count()];
-        unknown.iter().zip(&solved).for_each(|(&dof, x)| field[dof as usize] = *x);
+            asked.iter().copied().enumerate().filter(|(_, force)| *force != 0.0).collect();
+        let mut answers = base.inverse.solve(base.held_system(), asked)?;
+        let nothing = || HeldAnswer { field: vec![0.0; base.dof_count()], error: 0.0 };
+        let answer = answers.pop().unwrap_or_else(nothing);
         let acting = (0u32..).zip(forces).filter(|(_, force)| **force != 0.0);
-        Self {
+        Ok(Self {
             forces: acting.map(|(dof, force)| (dof, *force)).collect(),
-            field: Field::check(base, &load, field),
-        }
+            field: Field::check(base, &load, answer),
+        })
     }
 
     /// Bytes that it takes.
@@ -78,6 +83,14 @@ impl UnitLoad {
                 (columns.residuals[*axis], columns.residual_bounds[*axis])
             }
             Self::Forces(column) => (column.field.residual, column.field.residual_bound),
+        }
+    }
+
+    /// Estimated norm of the error that conjugate gradients left.
+    pub(super) fn error(&self) -> f64 {
+        match self {
+            Self::Node { columns, axis } => columns.errors[*axis],
+            Self::Forces(column) => column.field.error,
         }
     }
 

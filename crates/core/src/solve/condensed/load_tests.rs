@@ -1,22 +1,22 @@
 //! Tests of loads beside contacts: against a direct factor, the equations themselves, and the bound.
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-use super::tests::{Shape, cube, pushes, relative_difference, touched};
+use super::tests::{Shape, cube, held, pushes, relative_difference, touched};
 use super::*;
 use crate::contact::Mask;
 use crate::fem::SpreadLoads;
-use crate::mesh::{Bodies, Surface, TetMesh};
+use crate::mesh::{Surface, TetMesh};
 use crate::mesh_io::parse;
+use crate::mesh_io::tests::real_files::shared_meshes;
 use crate::solve::vectors::norm;
-use crate::solve::{Factored, Loads, Method, Partition, RigidBodies, find_free_motion};
+use crate::solve::{Factored, Loads, Method, Partition};
 
 fn column(shape: &Shape, forces: &[f64]) -> UnitLoad {
-    UnitLoad::Forces(Arc::new(LoadColumn::new(&shape.base, forces)))
+    UnitLoad::Forces(Arc::new(LoadColumn::try_new(&shape.base, forces).unwrap()))
 }
 
 /// One newton along each axis of a node, by its columns.
@@ -252,18 +252,6 @@ fn same_bits_for_one_two_four_and_seven_threads() {
     assert!(answers.iter().all(|a| a == &answers[0]));
 }
 
-/// The shared folder with real data, if this machine has it; says so when it has not.
-fn shared_meshes() -> Option<PathBuf> {
-    let named = std::env::var_os("SOFTGRASP_SHARED").map(PathBuf::from);
-    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|dir| dir.join("shared"));
-    let found =
-        named.into_iter().chain(above).map(|dir| dir.join("meshes")).find(|dir| dir.is_dir());
-    if found.is_none() {
-        println!("skipped: no folder shared/meshes with real mesh files here");
-    }
-    found
-}
-
 /// Nodes that elements use, by their height.
 fn by_height(mesh: &TetMesh) -> Vec<u32> {
     let used = mesh.used_nodes();
@@ -305,15 +293,9 @@ proptest! {
         forces in prop::collection::vec((0u32..216, -1.0..1.0f64), 0..4),
         size in -3i32..4,
     ) {
-        let fixed: Vec<u32> =
-            fixed.into_iter().filter(|d| !nodes.contains(&(d / 3))).collect();
-        let shape = Shape::new(cube(216), 0.3, &fixed);
-        let dofs = touched(&nodes.into_iter().collect::<Vec<_>>());
-        let mut known = [fixed.as_slice(), dofs.as_slice()].concat();
-        known.sort_unstable();
-        let bodies = Bodies::from_mesh(&shape.mesh);
-        let rigid = RigidBodies::new(&shape.mesh, &bodies);
-        prop_assume!(find_free_motion(&shape.mesh, &bodies, &rigid, &known, &[]).is_none());
+        let held = held(&nodes, &fixed);
+        prop_assume!(held.is_some());
+        let (shape, dofs) = held.unwrap();
         let q = &q[..dofs.len()];
         let loads = spread(&shape.mesh);
         let mut columns: Vec<UnitLoad> = loads.iter().map(|f| column(&shape, f)).collect();

@@ -22,7 +22,6 @@ use super::load_column::UnitLoad;
 use super::overlap::LoadProducts;
 use super::rounding::{SLACK, accurate_dot, gamma};
 use super::small_system::{ContactAnswer, WantedRows};
-use crate::solve::vectors::norm;
 
 /// A contact set and the loads that act beside it, whose amounts may be others in every answer.
 ///
@@ -165,10 +164,7 @@ impl LoadedSet {
         delivered: &[[f64; 3]],
         delivery: Delivery,
     ) -> Certificate {
-        let delivered = match &self.rows {
-            Some(rows) => rows.size_of(delivered),
-            None => norm(delivered.as_flattened()),
-        };
+        let delivered = WantedRows::delivered_size(self.rows.as_ref(), delivered);
         let judge = self.set.judge(base);
         let sum = |of: &dyn Fn(&UnitLoad) -> f64| {
             let terms = self.loads.iter().zip(&answer.amounts);
@@ -179,6 +175,7 @@ impl LoadedSet {
             size: sum(&|load| load.norm()),
             residual: sum(&|load| load.residual().0),
             residual_bound: sum(&|load| load.residual().1),
+            error: sum(&UnitLoad::error),
             right: &answer.right,
             right_off: answer.right_off,
             load_size: self.products.size(judge.load.size(q), q, &answer.amounts),

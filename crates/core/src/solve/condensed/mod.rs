@@ -24,10 +24,13 @@ mod certificate;
 mod columns;
 mod contact_set;
 mod correction;
+#[cfg(test)]
+mod cycles_tests;
 mod error;
 mod free_body;
 mod free_response;
 mod free_tangent;
+mod held_inverse;
 mod load_column;
 #[cfg(test)]
 mod load_tests;
@@ -42,14 +45,15 @@ mod tests;
 mod touched;
 mod verified;
 
-pub use base::Base;
+pub use base::{Base, BaseOf};
 pub use certificate::{Certificate, Delivery};
-pub use columns::{CONTACTS_TOGETHER, Columns, ContactColumns};
+pub use columns::{Columns, ContactColumns};
 pub use contact_set::ContactSet;
 pub use error::CondensedError;
 pub use free_body::{FreeBody, Relief};
 pub use free_response::{Elasticity, HeldCompliance, NodeForce, Response, ShapeResponse};
 pub use free_tangent::FreeTangent;
+pub use held_inverse::CONTACTS_TOGETHER;
 pub use load_column::{LoadColumn, UnitLoad};
 pub use loaded_set::{LoadedAnswer, LoadedSet};
 pub use small_system::ContactAnswer;

@@ -219,8 +219,13 @@ impl WantedRows {
         u
     }
 
+    /// Norm of delivered displacements: of the rows that were wanted, or of all nodes where none were named.
+    pub fn delivered_size(rows: Option<&Self>, delivered: &[[f64; 3]]) -> f64 {
+        rows.map_or_else(|| norm(delivered.as_flattened()), |rows| rows.size_of(delivered))
+    }
+
     /// Norm of delivered displacements, every node once; zero where it is not known whose they are.
-    pub fn size_of(&self, delivered: &[[f64; 3]]) -> f64 {
+    fn size_of(&self, delivered: &[[f64; 3]]) -> f64 {
         if delivered.len() != self.nodes.len() {
             return 0.0;
         }

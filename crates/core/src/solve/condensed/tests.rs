@@ -1,5 +1,6 @@
 //! Tests of condensed answers: the direct factor, bounds and true errors, the cache.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use proptest::prelude::*;
@@ -19,18 +20,27 @@ pub(super) struct Shape {
 
 impl Shape {
     pub fn new(mesh: TetMesh, poisson: f64, fixed: &[u32]) -> Self {
+        Self::with(mesh, poisson, |body| Base::try_new(body, fixed, None, &mut |_| {})).unwrap()
+    }
+
+    /// A shape with the base that is made for it.
+    pub fn with(
+        mesh: TetMesh,
+        poisson: f64,
+        base_of: impl FnOnce(BaseOf<'_>) -> Result<Base, CondensedError>,
+    ) -> Result<Self, CondensedError> {
         let pattern = Arc::new(StiffnessPattern::new(&mesh));
         let material = Material::try_new(1.0e5, poisson).unwrap();
         let stiffness = Arc::new(assemble(&pattern, &mesh, &[material]).unwrap());
         let bodies = Bodies::from_mesh(&mesh);
         let rigid = RigidBodies::new(&mesh, &bodies);
         let base =
-            Base::try_new(&mesh, &bodies, &rigid, &stiffness, fixed, None, &mut |_| {}).unwrap();
-        Self { mesh, stiffness, base, columns: Columns::new(1 << 30) }
+            base_of(BaseOf { mesh: &mesh, bodies: &bodies, rigid: &rigid, stiffness: &stiffness })?;
+        Ok(Self { mesh, stiffness, base, columns: Columns::new(1 << 30) })
     }
 
     /// Displacements, reactions and certificate of the condensed answer.
-    fn answer(&self, dofs: &[u32], q: &[f64]) -> (Vec<f64>, Vec<f64>, Certificate) {
+    pub fn answer(&self, dofs: &[u32], q: &[f64]) -> (Vec<f64>, Vec<f64>, Certificate) {
         let set = ContactSet::try_new(&self.base, &self.columns, &Touched::of_dofs(dofs)).unwrap();
         let answer = set.solve(q).unwrap();
         let certificate = set.certify(&self.base, q, &answer, &[], Delivery::Double);
@@ -38,7 +48,7 @@ impl Shape {
     }
 
     /// Displacements and forces by a direct factor of K11, the oracle.
-    fn direct(&self, dofs: &[u32], q: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    pub fn direct(&self, dofs: &[u32], q: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let fixed = self.base.fixed().iter().map(|&d| (d, 0.0));
         let mut known: Vec<(u32, f64)> =
             dofs.iter().copied().zip(q.iter().copied()).chain(fixed).collect();
@@ -315,6 +325,20 @@ fn proven_bound_is_above_the_true_error_on_ten_thousand_random_frames() {
     }
 }
 
+/// A cube of 216 nodes that is touched at some and fixed in other degrees of freedom; `None` where these
+/// leave a motion free.
+pub(super) fn held(nodes: &BTreeSet<u32>, fixed: &BTreeSet<u32>) -> Option<(Shape, Vec<u32>)> {
+    let fixed: Vec<u32> = fixed.iter().copied().filter(|d| !nodes.contains(&(d / 3))).collect();
+    let shape = Shape::new(cube(216), 0.3, &fixed);
+    let dofs = touched(&nodes.iter().copied().collect::<Vec<_>>());
+    let mut known = [fixed.as_slice(), dofs.as_slice()].concat();
+    known.sort_unstable();
+    let bodies = Bodies::from_mesh(&shape.mesh);
+    let rigid = RigidBodies::new(&shape.mesh, &bodies);
+    let free = find_free_motion(&shape.mesh, &bodies, &rigid, &known, &[]);
+    free.is_none().then_some((shape, dofs))
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
     #[test]
@@ -323,15 +347,9 @@ proptest! {
         fixed in prop::collection::btree_set(0u32..648, 0..9),
         q in prop::collection::vec(-1e-2..1e-2f64, 18),
     ) {
-        let fixed: Vec<u32> =
-            fixed.into_iter().filter(|d| !nodes.contains(&(d / 3))).collect();
-        let shape = Shape::new(cube(216), 0.3, &fixed);
-        let dofs = touched(&nodes.into_iter().collect::<Vec<_>>());
-        let mut known = [fixed.as_slice(), dofs.as_slice()].concat();
-        known.sort_unstable();
-        let bodies = Bodies::from_mesh(&shape.mesh);
-        let rigid = RigidBodies::new(&shape.mesh, &bodies);
-        prop_assume!(find_free_motion(&shape.mesh, &bodies, &rigid, &known, &[]).is_none());
+        let held = held(&nodes, &fixed);
+        prop_assume!(held.is_some());
+        let (shape, dofs) = held.unwrap();
         let q = &q[..dofs.len()];
         let (u, _, _) = shape.answer(&dofs, q);
         let (expected, _) = shape.direct(&dofs, q);

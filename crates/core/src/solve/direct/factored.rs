@@ -11,6 +11,7 @@ use super::solution::{Fallback, Loads, Solution, System};
 use crate::fem::Stiffness;
 use crate::solve::certainty::{Certainty, inverse_norm, row_sums};
 use crate::solve::front::FrontFactor;
+use crate::solve::multigrid::inverse_to_a_digit;
 use crate::solve::worked_out::WorkedOut;
 use crate::solve::{Method, Partition, Stage, Within};
 
@@ -309,7 +310,9 @@ impl Factored {
         let n = weights.len();
         self.with_kernel(|kernel| {
             if let Kernel::Multigrid(hierarchy) = kernel {
-                let solve = |b: Vec<f64>, _| one_load::inverse_by_cycles(system, hierarchy, &b);
+                let partition = self.partition();
+                let solve =
+                    |b: Vec<f64>, _| inverse_to_a_digit(stiffness, partition, hierarchy, &b);
                 return inverse_norm(&weights, &solve);
             }
             inverse_norm(&weights, &|b, columns| {

@@ -23,8 +23,6 @@ const STEPS_MAX: u32 = 1000;
 /// Where rounding ends the steps, an answer with an estimated error this far above the goal is given,
 /// and says so.
 const SHORT_OF_ITERATED_GOAL: f64 = 100.0;
-/// Error to which a condition number's solves go.
-const ERROR_OF_CONDITION: f64 = 0.1;
 
 /// The answer by a factor, an inverse or a hierarchy, and whether refinement came to its goal.
 ///
@@ -175,25 +173,4 @@ fn answer(system: System<'_>, loads: Loads<'_>, found: Outcome) -> Result<Soluti
         refinement_steps: found.steps,
         fallback: system.fallback,
     })
-}
-
-/// `K11⁻¹ B` to a digit at least, for columns of n, one behind the other; no number where a digit
-/// is not reached.
-pub(super) fn inverse_by_cycles(system: System<'_>, hierarchy: &Hierarchy, b: &[f64]) -> Vec<f64> {
-    let System { stiffness, partition, .. } = system;
-    let n = partition.unknown().len();
-    let goal = Goal { residual_rel: 1.0, error_rel: ERROR_OF_CONDITION, steps_max: STEPS_MAX };
-    let posed = |b: &[f64]| {
-        let mut all = vec![0.0; partition.dof_count()];
-        partition.scatter_unknown(b, &mut all);
-        (all, goal)
-    };
-    let asked: Vec<(Vec<f64>, Goal)> = b.chunks(n.max(1)).map(posed).collect();
-    let found = multigrid::solve(stiffness, partition, hierarchy, &asked);
-    let of_column = |found: Outcome| {
-        let is_digit = found.error_estimate_rel <= ERROR_OF_CONDITION;
-        let x = partition.unknown().iter().map(|&dof| found.x[dof as usize]);
-        x.map(|x| if is_digit { x } else { f64::NAN }).collect::<Vec<f64>>()
-    };
-    found.into_iter().flat_map(of_column).collect()
 }

@@ -1,6 +1,8 @@
 //! Goes to an equilibrium by minimising the energy at place after place of a motion, with factors of
 //! the very shape: slower than following, and not lost where a branch bends or ends.
 
+use std::sync::Arc;
+
 use super::cause::Lost;
 use super::follow::{JUMP_OVER_STEP, PIECE_MIN, STRAYED_MIN};
 use super::followed::Followed;
@@ -45,7 +47,7 @@ pub(super) struct Descent<'a> {
 
 /// The tangent at a shape, with its factor in the path.
 struct Tangent {
-    stiffness: Stiffness,
+    stiffness: Arc<Stiffness>,
     /// Whether it is that of the energy, and not its positive part.
     is_exact: bool,
 }

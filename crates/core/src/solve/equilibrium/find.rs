@@ -40,7 +40,7 @@ pub(super) fn find(
 ) -> Result<Equilibrium, NoEquilibrium> {
     let before = at.snapshot();
     let nodes = at.shape.pattern.node_count() as f64;
-    let operations = at.shape.hold.analysis.flops() + OPERATIONS_OF_A_NODE * nodes;
+    let operations = at.shape.operations_of_inverse() + OPERATIONS_OF_A_NODE * nodes;
     let factors = (OPERATIONS_MAX / operations).clamp(FACTORS[0], FACTORS[1]) as u32;
     Search { at, goal, wish, factors }.run(&before)
 }

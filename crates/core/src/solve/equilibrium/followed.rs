@@ -57,7 +57,7 @@ impl Followed {
 
     /// Holds the body in another way from the same shape on.
     pub fn hold_by(&mut self, hold: Arc<Hold>) {
-        let is_same_order = Arc::ptr_eq(&self.shape.hold.analysis, &hold.analysis);
+        let is_same_order = self.shape.hold.has_order_of(&hold);
         self.q_before.clone_from(&self.shape.q);
         self.corrections.hold_by(&hold, is_same_order);
         self.shape.hold = hold;

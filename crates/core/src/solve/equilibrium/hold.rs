@@ -13,12 +13,13 @@ use crate::solve::partition::AXIS_NAMES;
 use crate::solve::zero_energy::held_for_definiteness;
 use crate::solve::{Partition, RigidBodies};
 
-/// What holds a body, ordered and analysed for factors of any tangent.
+/// What holds a body, ordered and analysed for factors of any tangent, or for corrections without a factor.
 ///
 /// Shapes: n unknown degrees of freedom, c = 3 × masks constraints.
 pub struct Hold {
     pub(super) partition: Arc<Partition>,
-    pub(super) analysis: Arc<FrontAnalysis>,
+    /// `None` where tangents are not factored.
+    pub(super) analysis: Option<Arc<FrontAnalysis>>,
     masks: Vec<Mask>,
     /// Row of `C` for each axis of each mask: places among the unknown, weights.
     pub(super) rows: Vec<Vec<(u32, f64)>>,
@@ -44,6 +45,16 @@ pub struct Dependent {
     pub axis: char,
 }
 
+/// How tangents are inverted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TangentsBy {
+    /// Cholesky factors over fronts.
+    Factors,
+    /// Conjugate gradients, preconditioned by a multigrid hierarchy of each tangent: a fraction of a
+    /// factor's memory, and more time for each correction.
+    Multigrid,
+}
+
 /// The body that is held.
 #[derive(Clone, Copy)]
 pub struct HoldOf<'a> {
@@ -63,7 +74,7 @@ const OWN_SHARE_MIN: f64 = 1e-10;
 impl Hold {
     /// A hold by known degrees of freedom (fixed ones among them) and masks, which together must
     /// hold every body; `before` lends its order and analysis if it is by the same degrees of
-    /// freedom.
+    /// freedom. Tangents are inverted by factors, or by conjugate gradients with multigrid.
     ///
     /// # Errors
     /// [`Dependent`] naming a mask.
@@ -71,19 +82,26 @@ impl Hold {
         body: HoldOf<'_>,
         partition: Partition,
         masks: Vec<Mask>,
+        by: TangentsBy,
         before: Option<&Self>,
     ) -> Result<Self, Dependent> {
         let lends = |before: &&Self| {
             before.partition.known() == partition.known()
                 && before.masks.is_empty() == masks.is_empty()
+                && before.analysis.is_some() == (by == TangentsBy::Factors)
         };
         let (partition, analysis, sprung) = match before.filter(lends) {
             Some(Self { partition, analysis, sprung, .. }) => {
-                (Arc::clone(partition), Arc::clone(analysis), sprung.clone())
+                (Arc::clone(partition), analysis.clone(), sprung.clone())
             }
             None => {
                 let HoldOf { mesh, bodies, rigid, stiffness } = body;
-                let analysis = Arc::new(FrontAnalysis::new(stiffness, &partition));
+                let analysis = match by {
+                    TangentsBy::Factors => {
+                        Some(Arc::new(FrontAnalysis::new(stiffness, &partition)))
+                    }
+                    TangentsBy::Multigrid => None,
+                };
                 let sprung = match masks.is_empty() {
                     true => Vec::new(),
                     false => held_for_definiteness(mesh, bodies, rigid, partition.known()),
@@ -130,9 +148,14 @@ impl Hold {
         self.partition.known()
     }
 
-    /// Order and analysis of factors.
-    pub fn analysis(&self) -> &Arc<FrontAnalysis> {
-        &self.analysis
+    /// Order and analysis of factors; `None` where tangents are not factored.
+    pub fn analysis(&self) -> Option<&FrontAnalysis> {
+        self.analysis.as_deref()
+    }
+
+    /// Whether an inverse for another hold serves this one too, once its masks are fitted.
+    pub(super) fn has_order_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.partition, &other.partition)
     }
 
     /// Constraints: three for each mask.

@@ -7,13 +7,67 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use super::hold::Hold;
 use crate::fem::hyperelastic::{Curvature, Elements};
 use crate::fem::{Stiffness, StiffnessPattern};
+use crate::solve::Partition;
 use crate::solve::front::{FrontError, FrontFactor};
+use crate::solve::multigrid::{self, Goal, Hierarchy};
 use crate::solve::vectors::norm;
 
-/// A factor of a tangent, in one of the precisions.
+/// A factor of a tangent in one of the precisions, or what stands for one.
 pub(super) enum Factor {
     Double(FrontFactor<f64>),
     Single(FrontFactor<f32>),
+    Cycles(Cycles),
+}
+
+/// Conjugate gradients with a multigrid hierarchy of a tangent.
+pub(super) struct Cycles {
+    hierarchy: Box<Hierarchy>,
+    stiffness: Arc<Stiffness>,
+    partition: Arc<Partition>,
+}
+
+/// Where conjugate gradients for a correction end: it is one of several, as with an older factor.
+const OF_CORRECTION: Goal = Goal { residual_rel: 1e-6, error_rel: 1e-5, steps_max: 400 };
+/// Estimated error with which a tangent counts as inverted. Along a direction without positive stiffness
+/// conjugate gradients end long before.
+const ERROR_OF_INVERSE: f64 = 1e-2;
+
+impl Cycles {
+    /// Makes the hierarchy, and looks whether conjugate gradients come to an end with it.
+    fn try_new(hold: &Hold, stiffness: &Arc<Stiffness>) -> Result<Self, FactorError> {
+        let partition = Arc::clone(&hold.partition);
+        let hierarchy = Box::new(Hierarchy::new(stiffness, &partition));
+        let cycles = Self { hierarchy, stiffness: Arc::clone(stiffness), partition };
+        // Without pattern, so that no direction is orthogonal to it.
+        let n = hold.partition.unknown().len();
+        let b: Vec<f64> = (0..n).map(|i| (7.3 * (i + 1) as f64).sin()).collect();
+        match cycles.solve(&b) {
+            Some(_) => Ok(cycles),
+            None => Err(FactorError::NotPositive),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.hierarchy.bytes() + self.stiffness.pattern().block_count() * size_of::<[f64; 9]>()
+    }
+
+    /// Answers for columns of n; `None` where conjugate gradients did not reach one.
+    fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
+        let Self { stiffness, partition, hierarchy } = self;
+        let found = multigrid::solve_columns(stiffness, partition, hierarchy, b, OF_CORRECTION);
+        let mut answers = Vec::with_capacity(b.len());
+        for outcome in found {
+            // A NaN is no answer either; nothing asked is nothing moved.
+            let is_answer =
+                outcome.error_estimate_rel <= ERROR_OF_INVERSE || outcome.residual_rel == 0.0;
+            if !is_answer {
+                return None;
+            }
+            let unknown = partition.unknown().iter();
+            answers.extend(unknown.map(|&dof| outcome.x[dof as usize]));
+        }
+        Some(answers)
+    }
 }
 
 /// Why a tangent has no factor.
@@ -43,12 +97,13 @@ impl Factor {
     /// A factor of a tangent (with its springs).
     pub fn try_new(
         hold: &Hold,
-        stiffness: &Stiffness,
+        stiffness: &Arc<Stiffness>,
         is_single: bool,
     ) -> Result<Self, FactorError> {
-        Ok(match is_single {
-            true => Self::Single(FrontFactor::try_new(&hold.analysis, stiffness)?),
-            false => Self::Double(FrontFactor::try_new(&hold.analysis, stiffness)?),
+        Ok(match &hold.analysis {
+            None => Self::Cycles(Cycles::try_new(hold, stiffness)?),
+            Some(analysis) if is_single => Self::Single(FrontFactor::try_new(analysis, stiffness)?),
+            Some(analysis) => Self::Double(FrontFactor::try_new(analysis, stiffness)?),
         })
     }
 
@@ -56,6 +111,7 @@ impl Factor {
         match self {
             Self::Double(factor) => factor.bytes(),
             Self::Single(factor) => factor.bytes(),
+            Self::Cycles(cycles) => cycles.bytes(),
         }
     }
 
@@ -67,6 +123,11 @@ impl Factor {
         }
         let columns = b.len() / n;
         match self {
+            // Where rounding leaves no answer the correction is none, and the line search says so.
+            Self::Cycles(cycles) => match cycles.solve(b) {
+                Some(x) => b.copy_from_slice(&x),
+                None => b.fill(0.0),
+            },
             Self::Double(factor) => factor.solve_in_place(b, columns),
             Self::Single(factor) => {
                 let scales: Vec<f64> = b.chunks(n).map(usable_norm).collect();
@@ -205,7 +266,7 @@ impl Renewal {
 pub(super) struct Factored {
     pub inverse: Inverse,
     /// The tangent, with the springs of the hold.
-    pub stiffness: Stiffness,
+    pub stiffness: Arc<Stiffness>,
     /// Share of the way to its positive part that was gone for a factor.
     pub share: f64,
 }
@@ -229,6 +290,7 @@ impl Factored {
                 stiffness.blend(positive.get_or_insert_with(part), share);
             }
             let springs = hold.add_springs(&mut stiffness);
+            let stiffness = Arc::new(stiffness);
             match Factor::try_new(hold, &stiffness, is_single) {
                 Ok(factor) => {
                     let inverse = Inverse::new(hold, factor, springs);

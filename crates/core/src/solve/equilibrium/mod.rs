@@ -1,6 +1,9 @@
 //! Equilibrium at large deformation: found by corrections with an older factor, followed from frame
 //! to frame, and judged by its own residual.
 
+mod adjoint;
+#[cfg(test)]
+mod adjoint_tests;
 mod cause;
 mod corrections;
 mod descent;
@@ -14,6 +17,8 @@ mod hold;
 mod inverse;
 #[cfg(test)]
 mod live_tests;
+#[cfg(test)]
+mod multigrid_tests;
 mod outcome;
 mod path;
 #[cfg(test)]
@@ -24,8 +29,9 @@ mod shape;
 #[cfg(test)]
 mod tests;
 
+pub use adjoint::{Adjoint, AdjointLoad, NoAdjoint};
 pub use goal::{Goal, Wish};
-pub use hold::{Dependent, Hold, HoldOf};
+pub use hold::{Dependent, Hold, HoldOf, TangentsBy};
 pub use inverse::{FactorError, Renewal, Renewed};
 pub use outcome::{Equilibrium, NoEquilibrium};
 pub use path::Path;

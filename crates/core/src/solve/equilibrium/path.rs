@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::adjoint::{Adjoint, AdjointLoad, NoAdjoint};
 use super::find::find;
 use super::follow::{Patience, follow};
 use super::followed::Followed;
@@ -137,6 +138,21 @@ impl Path {
         }
     }
 
+    /// The adjoint of the equilibrium that was found last, by the tangent there.
+    ///
+    /// # Errors
+    /// [`NoAdjoint`] with the reason.
+    ///
+    /// # Panics
+    /// If the load does not fit the body and its hold.
+    pub fn adjoint(
+        &self,
+        equilibrium: &Equilibrium,
+        load: &AdjointLoad<'_>,
+    ) -> Result<Adjoint, NoAdjoint> {
+        load.solve(&self.followed.shape, equilibrium)
+    }
+
     /// A factor to be made beside the frames, if the one there is has become old.
     pub fn renewal(&mut self) -> Option<Renewal> {
         if self.renewal_under_way || !self.followed.corrections.take_wish_for_a_factor() {
@@ -152,7 +168,7 @@ impl Path {
         self.renewal_under_way = false;
         let Ok(Renewed { hold, mut inverse }) = renewed else { return };
         let now = &self.followed.shape.hold;
-        if Arc::ptr_eq(&hold.analysis, &now.analysis) {
+        if hold.has_order_of(now) {
             if !Arc::ptr_eq(&hold, now) {
                 inverse.fit(now);
             }

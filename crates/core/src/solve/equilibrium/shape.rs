@@ -52,6 +52,9 @@ const ROUNDING: f64 = 4e-16;
 const REACH_SHARE: f64 = 1e-3;
 /// Change of an element's deformation gradient below which a step needs no limit.
 pub(super) const GRADIENT_CHANGE_SMALL: f64 = 0.05;
+/// Operations of a solve by conjugate gradients with multigrid for each block of the stiffness: thirty steps,
+/// each about six products with it.
+const OPERATIONS_OF_CYCLES: f64 = 30.0 * 6.0 * 18.0;
 /// How often a line search may cut a step.
 const CUTS_MAX: u32 = 25;
 
@@ -78,6 +81,14 @@ impl Shape {
     /// a thousandth of the path's largest at least, so that a hand may go back to where it began.
     pub fn size(&self) -> f64 {
         node_max(&self.q).max(self.reference)
+    }
+
+    /// Operations of a factor of the tangent, or of a solve by conjugate gradients with multigrid.
+    pub fn operations_of_inverse(&self) -> f64 {
+        match self.hold.analysis() {
+            Some(analysis) => analysis.flops(),
+            None => OPERATIONS_OF_CYCLES * self.pattern.block_count() as f64,
+        }
     }
 
     /// Energy and forces of the shape.

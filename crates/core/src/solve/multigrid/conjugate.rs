@@ -116,6 +116,46 @@ pub(crate) fn solve(
     found
 }
 
+/// Solves `K11 x = b` for columns of n, one behind the other, all to one goal; each answer as in [`solve`].
+///
+/// Shapes: `b` n for each column, in the order of the unknown degrees of freedom.
+pub(crate) fn solve_columns(
+    stiffness: &Stiffness,
+    partition: &Partition,
+    hierarchy: &Hierarchy,
+    b: &[f64],
+    goal: Goal,
+) -> Vec<Outcome> {
+    let posed = |b: &[f64]| {
+        let mut all = vec![0.0; partition.dof_count()];
+        partition.scatter_unknown(b, &mut all);
+        (all, goal)
+    };
+    let columns = b.chunks(partition.unknown().len().max(1));
+    let asked: Vec<(Vec<f64>, Goal)> = columns.map(posed).collect();
+    solve(stiffness, partition, hierarchy, &asked)
+}
+
+/// Error to which a digit is known, and the steps that are taken for it at most.
+const DIGIT: Goal = Goal { residual_rel: 1.0, error_rel: 0.1, steps_max: 1000 };
+
+/// `K11⁻¹ B` to a digit at least, for columns of n, one behind the other; no number where a digit is not
+/// reached.
+pub(crate) fn inverse_to_a_digit(
+    stiffness: &Stiffness,
+    partition: &Partition,
+    hierarchy: &Hierarchy,
+    b: &[f64],
+) -> Vec<f64> {
+    let found = solve_columns(stiffness, partition, hierarchy, b, DIGIT);
+    let of_column = |found: Outcome| {
+        let is_digit = found.error_estimate_rel <= DIGIT.error_rel;
+        let x = partition.unknown().iter().map(|&dof| found.x[dof as usize]);
+        x.map(|x| if is_digit { x } else { f64::NAN }).collect::<Vec<f64>>()
+    };
+    found.into_iter().flat_map(of_column).collect()
+}
+
 /// How many of so many right-hand sides are worked on next: at most one place stays empty.
 fn width(count: usize) -> usize {
     match count {

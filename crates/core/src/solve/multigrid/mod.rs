@@ -22,5 +22,5 @@ mod small;
 #[cfg(test)]
 mod tests;
 
-pub(super) use conjugate::{Goal, Outcome, TOGETHER, solve};
+pub(super) use conjugate::{Goal, Outcome, TOGETHER, inverse_to_a_digit, solve, solve_columns};
 pub(super) use hierarchy::Hierarchy;

@@ -414,7 +414,7 @@ mod tests {
             TickRequest { tick, grip: 0, asked }
         };
         let upload = UploadModel {
-            mesh: softgrasp_protocol::MeshData { vertices: vec![], tets: vec![], regions: vec![] },
+            mesh: softgrasp_protocol::MeshData::default(),
             materials: vec![],
             element: softgrasp_protocol::ElementName::T4,
             fixed: vec![],

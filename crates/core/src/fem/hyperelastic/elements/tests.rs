@@ -8,6 +8,7 @@ use proptest::prelude::*;
 use super::super::Curvature;
 use super::*;
 use crate::fem::StiffnessPattern;
+use crate::fem::tet10::tests::curved_fixtures::bent;
 use crate::fem::{NodalPatches, Stiffness};
 use crate::mesh::{BuiltIn, generate};
 use crate::model::Model;
@@ -20,7 +21,10 @@ struct Body {
 }
 
 fn body(element: Element, law: Law, poisson: f64) -> Body {
-    let mesh = generate(BuiltIn::Sphere, 60).unwrap();
+    body_of(generate(BuiltIn::Sphere, 60).unwrap(), element, law, poisson)
+}
+
+fn body_of(mesh: TetMesh, element: Element, law: Law, poisson: f64) -> Body {
     let material = Material::try_new(1.0e4, poisson).unwrap();
     let model = Model::try_new(mesh.clone(), element, &[material], vec![], &mut |_| {}).unwrap();
     let quadratic = QuadraticMesh::try_new(&mesh).unwrap();
@@ -223,5 +227,41 @@ proptest! {
         prop_assert!((summary.strain_max - (stretch - 1.0).abs()).abs() < 1e-9);
         prop_assert!((summary.stretch_max - stretch.max(1.0)).abs() < 1e-9);
         prop_assert!((summary.jacobian_min - stretch).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn curved_elements_have_the_slopes_of_their_energy_and_none_in_a_turn() {
+    let sphere = generate(BuiltIn::Sphere, 60).unwrap();
+    for law in [Law::NeoHookean, Law::NeoHookeanLog] {
+        let body = body_of(bent(&sphere, 0.04), Element::Tet10, law, 0.4);
+        assert_eq!(body.places.len(), 3 * body.model.mesh().node_count());
+        let (u, v) = (body.field(1, 0.005), body.field(2, 0.005));
+        let moved = |t: f64| -> Vec<f64> { u.iter().zip(&v).map(|(u, v)| u + t * v).collect() };
+        let step = 1e-5;
+        let [before, after] = [-step, step].map(|t| body.elements.evaluate(&moved(t)));
+        let slope = (after.energy - before.energy) / (2.0 * step);
+        let here = body.elements.evaluate(&u);
+        assert!(here.jacobian_min > 0.1, "{law}: {}", here.jacobian_min);
+        let work: f64 = here.forces.iter().zip(&v).map(|(f, v)| f * v).sum();
+        assert!((slope - work).abs() < 1e-7 * work.abs(), "{law}: {slope} {work}");
+        let product = body.elements.tangent_times(&u, &v);
+        let assembled = body.tangent(&u, Curvature::AsItIs).mul(&v);
+        for (i, (a, b)) in after.forces.iter().zip(&before.forces).enumerate() {
+            assert!(((a - b) / (2.0 * step) - product[i]).abs() < 1e-6 * amax(&product), "{law}");
+            assert!((assembled[i] - product[i]).abs() < 1e-11 * amax(&product), "{law}");
+        }
+        let rest = vec![0.0; u.len()];
+        let linear = body.model.stiffness().mul(&v);
+        let tangent = body.tangent(&rest, Curvature::AsItIs).mul(&v);
+        let off = linear.iter().zip(&tangent).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-11 * amax(&linear), "{law}: {off}");
+        let turn = Rotation3::from_euler_angles(1.0, -2.0, 0.5);
+        let places = body.places.as_chunks::<3>().0.iter().map(|p| Vector3::from(*p));
+        let turned: Vec<f64> = places.flat_map(|p| <[f64; 3]>::from(turn * p - p)).collect();
+        let turned = body.elements.evaluate(&turned);
+        let (force, energy) = (amax(&turned.forces), turned.energy);
+        assert!(force < 1e-9 * amax(&here.forces), "{law}: {force:e}");
+        assert!(energy.abs() < 1e-11 * here.energy, "{law}: {energy:e} of {:e}", here.energy);
     }
 }
