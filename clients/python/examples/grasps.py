@@ -98,7 +98,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="lines of JSON, added to")
     parser.add_argument("--server", action="append", default=[], help="HOST:PORT; may be repeated")
     parser.add_argument("--sessions", type=int, default=4, help="requests at the same time")
-    parser.add_argument("--shard", type=shard, default=(0, 1), help="K/N: every Nth grasp from K on")
+    parser.add_argument(
+        "--shard", type=shard, default=(0, 1), help="K/N: every Nth grasp from K on"
+    )
     given = parser.parse_args()
     done = set()
     if given.out.exists():

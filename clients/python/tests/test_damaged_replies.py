@@ -58,7 +58,9 @@ def judged(call: calls.Call, header: Header, payload: bytes) -> bool:
     """Whether a reply is taken. Errors other than those of this package go through."""
     conversation = Conversation(Limits())
     try:
-        conversation.reply(call, *replayed(header, payload))
+        answer = conversation.reply(call, *replayed(header, payload))
+        # It is read when it is looked at.
+        getattr(answer, "report", None)
     except SoftgraspError:
         return False
     return True

@@ -36,7 +36,17 @@ from softgrasp.conversation import Conversation
 from softgrasp.framing import HEADER_LEN, Kind, encode_frame
 
 REQUESTS = ["Hello", "Ask", "Ask-model", "Ask-large", "Ask-cases", "HaveModel", "UploadModel"]
-REQUESTS += ["Ask-gradient", "UploadModel-mid-edge", "Ask-fields", "Ask-loads", "Cancel", "Prefetch", "Drop", "Ping", "ContactFrame"]
+REQUESTS += [
+    "Ask-gradient",
+    "UploadModel-mid-edge",
+    "Ask-fields",
+    "Ask-loads",
+    "Cancel",
+    "Prefetch",
+    "Drop",
+    "Ping",
+    "ContactFrame",
+]
 NAME = bytes(0xA0 ^ k for k in range(32))
 POINTS = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0, 0, 0]]
 MATERIAL = Material(20_000.0, 0.45)
@@ -107,9 +117,7 @@ def requests() -> dict[str, calls.Call]:
     slopes[1, 1], slopes[3, 1], curvatures[3, 1] = 1.5, -2.0, 300.0
     of_reactions, bent = [0.0, 0.25], [0.0, -1.0]
     quantity = Quantity(slopes, curvatures, of_reactions, bent, points=True)
-    of_quantity = Question(
-        nodes=[0, 2, 3], precision="f32", max_error=0.01, quantity=quantity
-    )
+    of_quantity = Question(nodes=[0, 2, 3], precision="f32", max_error=0.01, quantity=quantity)
     plain = Model(Mesh(POINTS, [[0, 1, 2, 3]]), MATERIAL, "t10")
     cases = [[0.0, -0.001], [0.0, -0.002], [-0.0, 0.001]]
     return {

@@ -108,9 +108,7 @@ def test_gradient_by_places_of_nodes_is_that_of_central_differences(server: Serv
             assert abs(found.points[node, axis] - (up - down) / 2e-7) < 1e-6 * scale
 
 
-def _quantity_moved(
-    pressed: Pressed, server: Server, node: int, axis: int, by: float
-) -> float:
+def _quantity_moved(pressed: Pressed, server: Server, node: int, axis: int, by: float) -> float:
     points = np.array(pressed.mesh.points)
     points[node, axis] += by
     mesh = Mesh(points, pressed.mesh.tets, pressed.mesh.regions)
@@ -174,9 +172,7 @@ def test_awaited_gradient_is_the_same(server: Server) -> None:
         async with await AsyncServer.connect(server.address, timeout=60.0) as other:
             awaited = await other.keep(pressed.model())
             answer = await awaited.frame(pressed.case)
-            again = await awaited.gradient(
-                pressed.case, by_displacements=slope, answer=answer
-            )
+            again = await awaited.gradient(pressed.case, by_displacements=slope, answer=answer)
             found = await awaited.gradient(pressed.case, by_displacements=slope)
             assert np.array_equal(again.forces, found.forces)
             return found

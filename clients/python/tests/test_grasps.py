@@ -94,7 +94,9 @@ def test_sweep_that_was_cut_goes_on_where_it_was_and_shards_are_the_whole(
     cut.write_text("".join(lines[:60]) + lines[60][:30])
     goes_on = sweep(cut, "--server", address)
     assert goes_on.wait(timeout=120) == 0
-    assert goes_on.stdout is not None and "90 grasps answered, 60 were there" in goes_on.stdout.read()
+    assert (
+        goes_on.stdout is not None and "90 grasps answered, 60 were there" in goes_on.stdout.read()
+    )
     kept = [json.loads(line) for line in cut.read_text().splitlines() if line.endswith("}")]
     assert {result["grasp"]: result for result in kept} == expected
     parts = {}

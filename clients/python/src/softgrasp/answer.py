@@ -21,7 +21,7 @@ from .quantity import (
     read_gradient,
     read_gradient_part,
 )
-from .report import LargeReport, SolveReport, read_large_report, read_solve_report
+from .report import LargeReport, SolveReport, late_report, read_large_report, reads_report_late
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,7 @@ class Reactions:
         return np.where(self.dofs[place] == wanted, self.forces[place], 0.0)
 
 
+@reads_report_late
 @dataclass(frozen=True, eq=False)
 class Answer:
     """Displacements and what is known of their error.
@@ -68,7 +69,7 @@ class Answer:
     mask_forces: Floats
     """Force of each mask on the body, N; shape (masks, 3)."""
     report: SolveReport
-    """How the answer was found and how wrong it can be."""
+    """How the answer was found and how wrong it can be; read when it is first looked at."""
     fields: FieldValues | None
     """Strain, stress and energy, where they were asked for; None too where the server does not know
     them, which is an older one then."""
@@ -119,6 +120,7 @@ class CaseAnswer:
     """Strain, stress and energy, where they were asked for."""
 
 
+@reads_report_late
 @dataclass(frozen=True, eq=False)
 class SeveralAnswers:
     """Answers for several sets of displacements of the same degrees of freedom."""
@@ -217,7 +219,7 @@ def read_several_answers(reader: PayloadReader) -> SeveralAnswers:
 
 def read_answer_part(fields: Fields) -> AnswerPart:
     """Reads the fields of an answer."""
-    report = read_solve_report(fields.block())
+    report = late_report(fields)
     large = fields.option_block()
     listed, precision, scale, *counts = fields.fields(_COUNTS)
     nodes, reactions, masks, cases = counts

@@ -5,6 +5,7 @@ The blocking and the asynchronous server share these; neither knows a byte of th
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -271,16 +272,17 @@ def _ask(
         element = (*ELEMENTS, "auto").index(subject.asked_element)
         part = Part().fields("I", _OF_MESH).join(subject.part()).fields("I", element)
     else:
-        part = Part().fields("I", _OF_MODEL).raw(subject)
-    part.fields("?", question.newest_wins).block(question.part(case))
+        part = Part().raw(_OF_MODEL_BYTES).raw(subject)
+    part.raw(b"\1" if question.newest_wins else b"\0").block(question.part(case))
     part.option_block(None if large is None else large.part())
     level = REPORTS.index(question.report)
-    part.fields("I?I", len(further), not estimate, level)
+    part.raw(_FURTHER.pack(len(further), not estimate, level))
     payload = payload_of(part, *mesh, *question.arrays(case), further)
-    needs = frozenset({"loads"} if case.has_spread_loads else ())
-    needs |= frozenset(() if question.quantity is None else {"gradients"})
-    if isinstance(subject, Model):
-        needs |= subject.needs
+    needs = subject.needs if isinstance(subject, Model) else _NOTHING_NEEDED
+    if case.has_spread_loads:
+        needs |= {"loads"}
+    if question.quantity is not None:
+        needs |= {"gradients"}
     return Call(Kind.ASK, payload, Kind.ANSWER, read, needs)
 
 
@@ -309,3 +311,6 @@ def _nothing(_reader: PayloadReader) -> None:
 
 _OF_MESH, _OF_MODEL = 0, 1
 """What a request is about, on the wire."""
+_OF_MODEL_BYTES = struct.pack("<I", _OF_MODEL)
+_FURTHER = struct.Struct("<I?I")
+_NOTHING_NEEDED: frozenset[str] = frozenset()

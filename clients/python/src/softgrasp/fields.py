@@ -168,7 +168,11 @@ class Fields:
 
     def block(self) -> Fields:
         """A structure that may grow; without fields where an older writer does not know it."""
-        return Fields(self._take(self.u64(), "a structure"), self.limits)
+        return Fields(self.block_bytes(), self.limits)
+
+    def block_bytes(self) -> bytes:
+        """The bytes of such a structure, to be read later."""
+        return self._take(self.u64(), "a structure")
 
     def option_block(self) -> Fields | None:
         """Such a structure, which may be absent."""

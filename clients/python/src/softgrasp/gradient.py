@@ -103,9 +103,7 @@ def _powers(mesh: Mesh) -> NDArray[np.int64]:
     return np.array([mesh.node_count**2, mesh.node_count, 1], dtype=np.int64)
 
 
-def _amounts(
-    model: Model, case: LoadCase, adjoint: Floats
-) -> tuple[Floats | None, Floats | None]:
+def _amounts(model: Model, case: LoadCase, adjoint: Floats) -> tuple[Floats | None, Floats | None]:
     """λᵀ ∂f/∂p for the acceleration and for each pressure; None where none is, and for `t10`."""
     mesh = model.mesh
     if model.kept_element not in ("t4", "t4-anp") or not case.has_spread_loads:
@@ -179,7 +177,9 @@ def _by_elements(
         trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
         return grad, strain, lame * trace * np.eye(3) + 2.0 * mu * strain
 
-    (grad_u, strain_u, stress_u), (grad_a, strain_a, stress_a) = map(field, (displacements, adjoint))
+    (grad_u, strain_u, stress_u), (grad_a, strain_a, stress_a) = map(
+        field, (displacements, adjoint)
+    )
     work = np.einsum("mij,mij->m", stress_u, grad_a)
     # A node that moves changes the volume and the gradients of all fields in its elements.
     turned = np.einsum("mik,mij->mkj", grad_a, stress_u) + np.einsum(

@@ -61,7 +61,9 @@ class Mesh:
         if labels is not None and len(labels) != len(self.tets):
             raise ValueError(f"{len(labels)} regions for {len(self.tets)} tetrahedra")
         if middles is not None and len(middles) != len(self.tets):
-            raise ValueError(f"{len(middles)} rows of mid-edge nodes for {len(self.tets)} tetrahedra")
+            raise ValueError(
+                f"{len(middles)} rows of mid-edge nodes for {len(self.tets)} tetrahedra"
+            )
         if middles is not None and int(middles.max()) >= len(self.points):
             raise ValueError(
                 f"a mid-edge node is {int(middles.max())}; there are {len(self.points)} nodes"
@@ -78,7 +80,9 @@ class Mesh:
         """
         points, nodes, regions = read_mesh(Path(path), scale)
         try:
-            return cls(points, nodes[:, :4], regions, nodes[:, 4:] if nodes.shape[1] == 10 else None)
+            return cls(
+                points, nodes[:, :4], regions, nodes[:, 4:] if nodes.shape[1] == 10 else None
+            )
         except ValueError as error:
             raise MeshFileError(f"{path}: {error}") from error
 

@@ -86,9 +86,7 @@ class _Raw:
         self.tets: list[np.ndarray[Any, Any]] = []
         self.regions: list[np.ndarray[Any, Any]] = []
 
-    def add(
-        self, kind: int, nodes: np.ndarray[Any, Any], region: np.ndarray[Any, Any]
-    ) -> None:
+    def add(self, kind: int, nodes: np.ndarray[Any, Any], region: np.ndarray[Any, Any]) -> None:
         self.tets.append(nodes[:, _EXCHANGED] if kind == _TEN_NODES else nodes[:, :4])
         self.regions.append(region)
 

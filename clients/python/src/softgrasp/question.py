@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
 from typing import Any, Literal, TypedDict, cast, get_args
 
@@ -72,9 +73,10 @@ class Question:
             raise ValueError(f"precision is one of {PRECISIONS}, not {self.precision!r}")
         if self.report not in REPORTS:
             raise ValueError(f"report is one of {REPORTS}, not {self.report!r}")
-        wanted = (self.fields,) if isinstance(self.fields, str) else tuple(self.fields)
-        object.__setattr__(self, "fields", wanted)
-        field_bits(wanted)
+        if self.fields:
+            wanted = (self.fields,) if isinstance(self.fields, str) else tuple(self.fields)
+            field_bits(wanted)
+            object.__setattr__(self, "fields", wanted)
         if self.nodes is not None:
             object.__setattr__(self, "nodes", numbers(self.nodes, "wanted nodes"))
         for name in ("max_error", "deadline_ms"):
@@ -87,13 +89,13 @@ class Question:
         part = Part().text(self.method)
         precision = PRECISIONS.index(self.precision)
         if self.nodes is None:
-            part.fields("I?I", 0, self.reactions, precision)
+            part.raw(_ALL_NODES.pack(0, self.reactions, precision))
         else:
-            part.fields("II?I", 1, len(self._wanted()), self.reactions, precision)
+            part.raw(_NODES.pack(1, len(self._wanted()), self.reactions, precision))
         part.option(self.max_error).option(self.deadline_ms)
-        mask_nodes = sum([len(mask.nodes) for mask in case.masks])
+        mask_nodes = sum([len(mask.nodes) for mask in case.masks]) if case.masks else 0
         counts = (len(case.known_dofs), len(case.force_dofs), len(case.masks), mask_nodes)
-        part.fields("5I", *counts, field_bits(self.fields))
+        part.raw(_COUNTS.pack(*counts, field_bits(self.fields) if self.fields else 0))
         if self.quantity is not None:
             return part.join(spread_part(case)).join(self.quantity.part(case))
         return part.join(spread_part(case)) if case.has_spread_loads else part
@@ -114,3 +116,8 @@ class Question:
     def _wanted(self) -> Numbers:
         """The wanted nodes, which were checked; none where all are wanted."""
         return NO_NUMBERS if self.nodes is None else cast(Numbers, self.nodes)
+
+
+_ALL_NODES = struct.Struct("<I?I")
+_NODES = struct.Struct("<II?I")
+_COUNTS = struct.Struct("<5I")

@@ -23,6 +23,8 @@ class Stream:
     def __init__(self, plain: socket.socket, has_deadlines: bool) -> None:
         """Without deadlines nothing looks at the clock; those of the methods are None then."""
         self._socket = plain
+        # Who has no deadline sleeps once for all that is to come, and not once for each packet.
+        self._flags = 0 if has_deadlines else _UNTIL_FULL
         plain.settimeout(LOOK_EVERY if has_deadlines else None)
 
     def send(self, data: bytes, deadline: float | None) -> None:
@@ -36,7 +38,7 @@ class Stream:
         """Receives what is there, at least a byte; 0 where the other side has closed."""
         while True:
             try:
-                return self._socket.recv_into(target)
+                return self._socket.recv_into(target, 0, self._flags)
             except TimeoutError:
                 look_at_clock(deadline)
 
@@ -116,3 +118,4 @@ def look_at_clock(deadline: float | None) -> None:
 
 _Selector = getattr(selectors, "PollSelector", selectors.SelectSelector)
 """Knows sockets of any number where the system has one that does."""
+_UNTIL_FULL = getattr(socket, "MSG_WAITALL", 0)
