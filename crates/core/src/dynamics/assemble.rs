@@ -5,9 +5,11 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use super::configuration::{Configuration, Scene};
 use super::features::{Gap, MaterialPoint};
 use super::rigid_motion::Wrench;
+use super::rolling::Rolling;
 use crate::contact::coulomb::{
-    ContactProblem, Delassus, FrictionCone, PointForce, PointPlace, ProblemError,
+    ContactProblem, Delassus, FrictionCone, PointForce, PointLaw, PointPlace, ProblemError, Slide,
 };
+use crate::rigid_body::Barycentric;
 use crate::solve::condensed::{FreeBody, HeldCompliance, Relief, Response};
 
 /// A point in the problem.
@@ -78,9 +80,10 @@ fn tangent_of(normal: &Vector3<f64>) -> Vector3<f64> {
     normal.cross(&axis).normalize()
 }
 
-/// `W` and `b` of some points about a configuration.
+/// `W` and `b` of some points about a configuration, and of the springs by which their forces move.
 ///
-/// Shapes: `unpressed` the displacement of the response's rows if nothing pressed, m.
+/// Shapes: `unpressed` the displacement of the response's rows if nothing pressed, m. The springs are
+/// points of the problem behind the others, with their normal alone.
 ///
 /// # Errors
 /// [`ProblemError`] where a number is not finite.
@@ -88,13 +91,19 @@ pub(super) fn problem(
     scene: &Scene<'_>,
     response: &Response<'_>,
     (about, unpressed): (&Configuration, &[Vector3<f64>]),
-    points: &[ProblemPoint],
+    (points, rollings): (&[ProblemPoint], &[Rolling]),
 ) -> Result<ContactProblem, ProblemError> {
     let all: Vec<&ProblemPoint> = points.iter().collect();
-    let w = operator(scene, response, about, &all)?;
-    let b = free_motion(scene, response, (about, unpressed), points);
-    let cones = points.iter().map(|point| point.cone(scene)).collect();
-    ContactProblem::between_corners(w, b, cones)
+    let w = operator(scene, response, about, (&all, rollings))?;
+    let change = FreeChange::new(scene, response, (about, unpressed));
+    let mut b = Vec::with_capacity(3 * (points.len() + rollings.len()));
+    b.extend(
+        points.iter().flat_map(|point| change.of_point(point, point.slip(scene, response, about))),
+    );
+    b.extend(rollings.iter().flat_map(|r| [change.of_rolling(&points[r.position], r), 0.0, 0.0]));
+    let cones = points.iter().map(|point| PointLaw::Contact(point.cone(scene)));
+    let springs = rollings.iter().map(|r| PointLaw::Spring { stiffness: r.stiffness });
+    ContactProblem::between_corners(w, b, cones.chain(springs).collect())
 }
 
 /// A corner of the surface as one body presses on it.
@@ -104,7 +113,8 @@ struct Corner {
     node: u32,
 }
 
-/// `W`: place of every point per force at every point, by the compliance between the corners around them.
+/// `W`: place of every point per force at every point, by the compliance between the corners around them;
+/// behind them the same of the springs.
 ///
 /// # Errors
 /// [`ProblemError::NotFinite`].
@@ -112,7 +122,7 @@ pub(super) fn operator(
     scene: &Scene<'_>,
     response: &Response<'_>,
     about: &Configuration,
-    points: &[&ProblemPoint],
+    (points, rollings): (&[&ProblemPoint], &[Rolling]),
 ) -> Result<Delassus, ProblemError> {
     let of = |p: &&ProblemPoint| {
         let body = p.point.body;
@@ -121,12 +131,19 @@ pub(super) fn operator(
     let mut corners: Vec<Corner> = points.iter().flat_map(of).collect();
     corners.sort_unstable();
     corners.dedup();
-    let place = |p: &&ProblemPoint| {
-        let MaterialPoint { body, nodes, weights } = p.point;
+    let place = |p: &ProblemPoint, weights: Barycentric, slide: Option<Slide>| {
+        let MaterialPoint { body, nodes, .. } = p.point;
         let corner = |node: u32| corners.binary_search(&Corner { body, node }).unwrap_or(0) as u32;
-        PointPlace { corners: nodes.map(corner), weights, frame: p.frame }
+        PointPlace { corners: nodes.map(corner), weights, frame: p.frame, slide }
     };
-    let places = points.iter().map(place).collect();
+    let of_points = points.iter().map(|p| place(p, p.point.weights, None));
+    let of_rollings = rollings.iter().map(|r| {
+        let point = points[r.position];
+        let falls = point.local(&r.falls);
+        let slide = Slide { weights: point.point.weights, share: [falls.y, falls.z] };
+        place(point, r.weights, Some(slide))
+    });
+    let places = of_points.chain(of_rollings).collect();
     Delassus::try_new(compliance(scene, response, about, &corners), places)
 }
 
@@ -214,30 +231,57 @@ pub(super) fn residual(
     residuals.fold(0.0, |most, r| if r.is_nan() { f64::INFINITY } else { r.max(most) })
 }
 
-/// `b`: gap and slip of every point if no contact pressed, to first order about the configuration.
-fn free_motion(
-    scene: &Scene<'_>,
-    response: &Response<'_>,
-    (about, unpressed): (&Configuration, &[Vector3<f64>]),
-    points: &[ProblemPoint],
-) -> Vec<f64> {
-    let at = about.configured();
-    let turn = at.world_from_object.rotation;
-    let free = scene.rigid.motion(&Wrench::default(), &turn);
-    let h = scene.rigid.seconds;
-    let shift = turn.inverse() * (h * (free.velocity - about.motion.velocity));
-    let angle = turn.inverse() * (h * (free.angular_velocity - about.motion.angular_velocity));
-    let mut b = Vec::with_capacity(3 * points.len());
-    for p in points {
-        let point = &p.point;
-        let elastic = scene.place(response, unpressed, &point.nodes, &point.weights)
-            - scene.place(response, &about.displacement, &point.nodes, &point.weights);
-        let body = usize::from(point.body);
-        let pushed = scene.bodies[body].compliance * about.body_forces[body];
-        let change = shift + angle.cross(&p.arm) + elastic - pushed;
-        let normal = p.frame.column(0);
-        let moved = p.frame.transpose() * (p.slip(scene, response, about) + change);
-        b.extend([p.gap.distance + normal.dot(&change), moved.y, moved.z]);
+/// What changes about a configuration if no contact pressed, to first order: `b` of a problem.
+struct FreeChange<'a> {
+    scene: &'a Scene<'a>,
+    response: &'a Response<'a>,
+    about: &'a Configuration,
+    unpressed: &'a [Vector3<f64>],
+    /// Of the object's place, m, and of its turn, rad, in its own frame.
+    shift: Vector3<f64>,
+    angle: Vector3<f64>,
+}
+
+impl<'a> FreeChange<'a> {
+    fn new(
+        scene: &'a Scene<'a>,
+        response: &'a Response<'a>,
+        (about, unpressed): (&'a Configuration, &'a [Vector3<f64>]),
+    ) -> Self {
+        let turn = about.configured().world_from_object.rotation;
+        let free = scene.rigid.motion(&Wrench::default(), &turn);
+        let h = scene.rigid.seconds;
+        let shift = turn.inverse() * (h * (free.velocity - about.motion.velocity));
+        let angle = turn.inverse() * (h * (free.angular_velocity - about.motion.angular_velocity));
+        Self { scene, response, about, unpressed, shift, angle }
     }
-    b
+
+    /// Elastic change of a sum of nodes, m.
+    fn elastic(&self, nodes: &[u32; 3], weights: &Barycentric) -> Vector3<f64> {
+        let Self { scene, response, about, unpressed, .. } = self;
+        scene.place(response, unpressed, nodes, weights)
+            - scene.place(response, &about.displacement, nodes, weights)
+    }
+
+    /// How far a point goes from its body, m, in the object's frame.
+    fn way(&self, point: &ProblemPoint) -> Vector3<f64> {
+        let body = usize::from(point.point.body);
+        let elastic = self.elastic(&point.point.nodes, &point.point.weights);
+        let pushed = self.scene.bodies[body].compliance * self.about.body_forces[body];
+        self.shift + self.angle.cross(&point.arm) + elastic - pushed
+    }
+
+    /// Gap and slip of a point, m.
+    fn of_point(&self, point: &ProblemPoint, slip: Vector3<f64>) -> [f64; 3] {
+        let change = self.way(point);
+        let moved = point.frame.transpose() * (slip + change);
+        [point.gap.distance + point.frame.column(0).dot(&change), moved.y, moved.z]
+    }
+
+    /// Rise of the triangle over the way of a rolling point, m.
+    fn of_rolling(&self, point: &ProblemPoint, rolling: &Rolling) -> f64 {
+        let elastic = self.elastic(&point.point.nodes, &rolling.weights);
+        let along = rolling.along + self.angle.cross(&rolling.along) + elastic;
+        point.frame.column(0).dot(&along) + rolling.falls.dot(&self.way(point))
+    }
 }

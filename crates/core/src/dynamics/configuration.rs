@@ -95,7 +95,8 @@ impl Scene<'_> {
         mix(&self.corners(response, displacement, nodes), weights)
     }
 
-    fn corners(
+    /// Where the nodes of a triangle are in the object's frame.
+    pub fn corners(
         &self,
         response: &Response<'_>,
         displacement: &[Vector3<f64>],

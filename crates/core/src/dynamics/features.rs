@@ -138,6 +138,21 @@ impl Pool {
         self.corners.iter().chain(&self.inside)
     }
 
+    /// Moves a point to where its force has gone; where another one is already, it goes.
+    pub fn roll(&mut self, from: &MaterialPoint, to: MaterialPoint) {
+        let Some(place) = self.inside.iter().position(|point| point == from) else { return };
+        let others = (0..self.inside.len()).filter(|&other| other != place);
+        let mut others = others.map(|other| &self.inside[other]).chain(&self.corners);
+        if others.any(|other| other.is_same(&to)) {
+            self.inside.remove(place);
+        } else if to.nodes[0] == to.nodes[1] {
+            self.inside.remove(place);
+            self.corners.push(to);
+        } else {
+            self.inside[place] = to;
+        }
+    }
+
     /// Adds a point that is not there yet. A point of the same triangle that is near moves instead: to the
     /// new place, or with a force half of the way there. A force tilts the triangle, so that the deepest
     /// point is on its other side next; all of the way it would go to and fro between two places for ever,

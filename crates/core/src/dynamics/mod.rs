@@ -28,6 +28,7 @@ mod large_tests;
 mod law_tests;
 mod resultants;
 mod rigid_motion;
+mod rolling;
 mod rounds;
 mod settings;
 mod small_system;

@@ -41,7 +41,7 @@ pub(super) fn small_system(
     if contacts.is_empty() {
         return Some(SmallSystem { contacts, compliance: DMatrix::zeros(0, 0) });
     }
-    let w = operator(scene, response, &found.end, &points).ok()?.to_matrix();
+    let w = operator(scene, response, &found.end, (&points, &[])).ok()?.to_matrix();
     let rows = w.nrows();
     let entry = |r: usize, c: usize| w[(r, c)] * if r == c { 1.0 + ADDED } else { 1.0 };
     let factor = Llt::new(Mat::from_fn(rows, rows, entry).as_ref(), Side::Lower).ok()?;

@@ -2,14 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 use super::assemble::{ProblemPoint, problem, residual};
 use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint, Pool, force_at};
+use super::rolling::{Rolling, freedoms, rolled, rollings};
 use super::settings::{StepError, StepSettings};
-use super::state::HeldContact;
-use crate::contact::coulomb::{Solution, SolveBudget};
+use super::state::{HeldContact, mix};
+use crate::contact::coulomb::{PointForce, Solution, SolveBudget};
 use crate::solve::condensed::Response;
 
 /// Points nearer to a body than this share of the object's size are in the problem from the start.
@@ -51,6 +52,8 @@ struct Round {
     points: Vec<ProblemPoint>,
     /// Forces of the configuration it is about.
     lambda: Vec<f64>,
+    /// Directions in which the forces move through their triangles.
+    rollings: Vec<Rolling>,
     residual: f64,
     penetration: f64,
     /// Whether a force acts elsewhere than in the configuration that the problem is about.
@@ -108,12 +111,13 @@ impl Rounds<'_, '_> {
                 attempts_max: ATTEMPTS,
             };
             let about_now = (&about, self.unpressed);
-            let problem = problem(self.scene, self.response, about_now, &round.points)?;
-            let solution = Solution::of(&problem, &round.lambda, budget);
+            let what = (round.points.as_slice(), round.rollings.as_slice());
+            let problem = problem(self.scene, self.response, about_now, what)?;
+            let solution = Solution::of(&problem, &round.warm(), budget);
             rounds += 1;
             sweeps += solution.sweeps;
             newton_steps += solution.newton_steps;
-            let contacts = pressing(&round.points, &solution.lambda);
+            let contacts = round.pressing(&solution, &mut pool);
             let next = self.configuration(contacts, &about.configured());
             let about_now = std::mem::replace(&mut about, next);
             if best.as_ref().is_none_or(|(best_far, ..)| far < *best_far) {
@@ -150,7 +154,7 @@ impl Rounds<'_, '_> {
         let deepest = scene.deepest_points(self.response, &about.configured(), &bodies);
         for (point, distance) in deepest {
             penetration = penetration.max(-distance);
-            if distance < -0.5 * allowed {
+            if distance < -0.5 * allowed && !self.rolls_there(about, (&*pool, &bodies), &point) {
                 has_moved |= pool.add(point, &mut about.contacts);
             }
         }
@@ -179,7 +183,59 @@ impl Rounds<'_, '_> {
             points.push(point);
         }
         let residual = residual(scene, self.response, about, (&points, &lambda));
-        Ok(Round { points, lambda, residual, penetration, has_moved })
+        let rollings = self.rollings(about, &bodies, (&points, &lambda));
+        Ok(Round { points, lambda, rollings, residual, penetration, has_moved })
+    }
+
+    /// Directions in which a force at a point moves; none where its body is not round.
+    fn rollings_of(
+        &self,
+        (about, bodies): (&Configuration, &[Isometry3<f64>]),
+        point: &MaterialPoint,
+        (position, force): (usize, PointForce),
+    ) -> Vec<Rolling> {
+        let (scene, body) = (self.scene, usize::from(point.body));
+        let corners = scene.corners(self.response, &about.displacement, &point.nodes);
+        let in_body = bodies[body].inverse_transform_point(&mix(&corners, &point.weights));
+        let Some(curvature) = scene.bodies[body].shape.curvature(&in_body) else {
+            return Vec::new();
+        };
+        let turn = bodies[body].rotation.to_rotation_matrix();
+        let curvature = turn.matrix() * curvature * turn.matrix().transpose();
+        rollings((point, &corners), &curvature, (position, force))
+    }
+
+    /// Directions in which the points with a force move.
+    fn rollings(
+        &self,
+        about: &Configuration,
+        bodies: &[Isometry3<f64>],
+        (points, lambda): (&[ProblemPoint], &[f64]),
+    ) -> Vec<Rolling> {
+        let mut found = Vec::new();
+        for (position, point) in points.iter().enumerate() {
+            let force = PointForce::from_column_slice(&lambda[3 * position..3 * position + 3]);
+            if force.x > 0.0 && freedoms(&point.point) > 0 {
+                found.extend(self.rollings_of((about, bodies), &point.point, (position, force)));
+            }
+        }
+        found
+    }
+
+    /// Whether a force of the same edge or triangle moves to a deepest point by itself.
+    fn rolls_there(
+        &self,
+        about: &Configuration,
+        (pool, bodies): (&Pool, &[Isometry3<f64>]),
+        deepest: &MaterialPoint,
+    ) -> bool {
+        let is_beside = |p: &&MaterialPoint| p.body == deepest.body && p.nodes == deepest.nodes;
+        let freedoms = freedoms(deepest);
+        let rolls = |point: &MaterialPoint| {
+            self.rollings_of((about, bodies), point, (0, PointForce::x())).len() == freedoms
+        };
+        let mut beside = pool.inside.iter().filter(is_beside);
+        freedoms > 0 && beside.any(|p| force_at(&about.contacts, p).is_some() && rolls(p))
     }
 }
 
@@ -193,6 +249,46 @@ impl Round {
         })
     }
 
+    /// Forces to begin with: those of the configuration, and those of the springs there.
+    fn warm(&self) -> Vec<f64> {
+        let of_spring = |r: &Rolling| {
+            let rise = self.points[r.position].frame.column(0).dot(&r.along);
+            <[f64; 3]>::from(-rise * r.stiffness)
+        };
+        let springs = self.rollings.iter().flat_map(of_spring);
+        self.lambda.iter().copied().chain(springs).collect()
+    }
+
+    /// Contacts with a force along the normal, where the forces have moved to; the pool's points move with
+    /// them.
+    fn pressing(&self, solution: &Solution, pool: &mut Pool) -> Vec<HeldContact> {
+        let mut contacts: Vec<HeldContact> = Vec::with_capacity(self.points.len());
+        let mut rollings = (self.points.len()..).zip(&self.rollings).peekable();
+        for (position, point) in self.points.iter().enumerate() {
+            let mut moved = Vec::new();
+            while let Some((spring, rolling)) = rollings.next_if(|(_, r)| r.position == position) {
+                moved.push((rolling, solution.motion[3 * spring]));
+            }
+            let local = solution.force(position);
+            if local.x <= 0.0 {
+                continue;
+            }
+            let to = rolled(&point.point, moved.into_iter());
+            pool.roll(&point.point, to);
+            let force = point.frame * local;
+            match contacts.iter_mut().find(|held| to.is_same(&(&**held).into())) {
+                Some(held) => held.force += force,
+                None => contacts.push(HeldContact {
+                    body: to.body,
+                    nodes: to.nodes,
+                    weights: to.weights,
+                    force,
+                }),
+            }
+        }
+        contacts
+    }
+
     /// The points that press, and their forces in the object's frame.
     fn into_pressing(self) -> Vec<(ProblemPoint, Vector3<f64>)> {
         let forces = self.lambda.chunks_exact(3).map(Vector3::from_column_slice);
@@ -204,20 +300,4 @@ impl Round {
             })
             .collect()
     }
-}
-
-/// Contacts with a force along the normal.
-fn pressing(points: &[ProblemPoint], lambda: &[f64]) -> Vec<HeldContact> {
-    let forces = lambda.chunks_exact(3).map(Vector3::from_column_slice);
-    points
-        .iter()
-        .zip(forces)
-        .filter(|(_, local)| local.x > 0.0)
-        .map(|(point, local)| HeldContact {
-            body: point.point.body,
-            nodes: point.point.nodes,
-            weights: point.point.weights,
-            force: point.frame * local,
-        })
-        .collect()
 }

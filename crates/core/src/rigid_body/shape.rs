@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use super::closest::{
     Barycentric, Deepest, SignedDistance, area_normal, of_triangle_and_segment, on_triangle,
@@ -116,6 +116,25 @@ impl RigidShape {
             Self::Cuboid { half } => of_cuboid(point, half),
             Self::Mesh(mesh) => mesh.distance(point),
         }
+    }
+
+    /// Curvature of a round body's surface, seen from a point: the Hessian of the distance. `None` where it
+    /// is flat or has edges.
+    ///
+    /// Units: 1/m. Frame: the body's.
+    pub fn curvature(&self, point: &Point3<f64>) -> Option<Matrix3<f64>> {
+        let (from_axis, straight) = match self {
+            Self::Sphere { .. } => (point.coords, Matrix3::zeros()),
+            Self::Capsule { length, .. } => {
+                let along = point.z.clamp(-0.5 * length, 0.5 * length);
+                let axis = Vector3::z() * f64::from(along == point.z);
+                (point.coords - along * Vector3::z(), axis * axis.transpose())
+            }
+            Self::Plane { .. } | Self::Cuboid { .. } | Self::Mesh(_) => return None,
+        };
+        let radius = from_axis.norm();
+        let normal = from_axis.try_normalize(f64::MIN_POSITIVE)?;
+        Some((Matrix3::identity() - normal * normal.transpose() - straight) / radius)
     }
 
     /// Whether every triangle has one deepest point in it that moves smoothly with the triangle: a

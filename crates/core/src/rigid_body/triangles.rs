@@ -87,6 +87,8 @@ const NEAR_ENOUGH: f64 = 1e-3;
 /// Halvings of the step of the last search around the deepest point found, and ways tried with each.
 const HALVINGS: u32 = 34;
 const WAYS: u32 = 9;
+/// How often steps of one size are tried again where they have led deeper.
+const AGAIN: usize = 4;
 /// Samples along an edge, and thirds that are taken away around the best of them.
 const EDGE_SAMPLES: u32 = 8;
 const EDGE_THIRDS: usize = 40;
@@ -203,21 +205,38 @@ impl RigidMesh {
         best
     }
 
+    /// Steps in all ways, and on in the way that has led deeper (Hooke and Jeeves), ever smaller.
     fn descend(&self, mut best: Deepest, at: impl Fn(Barycentric) -> Deepest) -> Deepest {
-        let mut step = 0.125;
-        for halving in 0..HALVINGS {
-            for way in 0..WAYS {
-                // Turned with every halving, so that no crease stays between two ways for ever.
-                let angle = TURN * f64::from(halving) + FULL * f64::from(way) / f64::from(WAYS);
-                let (a, b) = (step * angle.cos(), step * angle.sin());
-                let moved = [best.weights[0] + a, best.weights[1] + b, best.weights[2] - a - b];
-                // A step out of the triangle ends at its border.
-                let within = moved.map(|weight: f64| weight.max(0.0));
-                let sum: f64 = within.iter().sum();
-                let found = at(within.map(|weight| weight / sum));
-                if found.distance.distance < best.distance.distance {
-                    best = found;
+        let consider = |moved: Barycentric, best: &mut Deepest| {
+            // A step out of the triangle ends at its border.
+            let within = moved.map(|weight: f64| weight.max(0.0));
+            let sum: f64 = within.iter().sum();
+            let found = at(within.map(|weight| weight / sum));
+            let is_deeper = found.distance.distance < best.distance.distance;
+            if is_deeper {
+                *best = found;
+            }
+            is_deeper
+        };
+        let (mut step, mut turns) = (0.125, 0);
+        for _ in 0..HALVINGS {
+            // Steps of one size follow a crease down for as long as they lead deeper.
+            for _ in 0..AGAIN {
+                let from = best.weights;
+                for way in 0..WAYS {
+                    // Turned each time, so that no crease stays between two ways for ever.
+                    let angle = TURN * f64::from(turns) + FULL * f64::from(way) / f64::from(WAYS);
+                    let (a, b) = (step * angle.cos(), step * angle.sin());
+                    let [x, y, z] = best.weights;
+                    consider([x + a, y + b, z - a - b], &mut best);
                 }
+                turns += 1;
+                if best.weights == from {
+                    break;
+                }
+                let way: [f64; 3] = std::array::from_fn(|k| best.weights[k] - from[k]);
+                let on = std::array::from_fn(|k| best.weights[k] + way[k]);
+                consider(on, &mut best);
             }
             step *= 0.5;
         }

@@ -6,7 +6,7 @@
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
 use super::cone::{PointForce, at};
 
@@ -19,12 +19,25 @@ pub struct PointPlace {
     pub weights: [f64; 3],
     /// Normal and two tangents as columns, in the frame of the compliance.
     pub frame: Matrix3<f64>,
+    /// What its motion along the normal has besides.
+    pub slide: Option<Slide>,
+}
+
+/// A part of the motion along the normal that its force does not work on: that of another mean of the same
+/// corners along the tangents.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slide {
+    /// Weights of the corners.
+    pub weights: [f64; 3],
+    /// Share of their motion along either tangent.
+    pub share: [f64; 2],
 }
 
 /// `W = Bᵀ K B`.
 ///
 /// Shapes: m corners; `compliance` K 3m × 3m, symmetric, positive semidefinite; n points. B has a block
-/// of weight times frame for each corner and point. Units: m/N.
+/// of weight times frame for each corner and point. Units: m/N. Where a point slides, its row of Bᵀ has that
+/// besides, and W is not symmetric.
 ///
 /// Source: Delassus (1917); Jourdan, Alart and Jean (1998).
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +81,20 @@ pub enum ProblemError {
 impl PointPlace {
     /// The point at a corner, in the frame of the compliance.
     pub fn corner(corner: u32) -> Self {
-        Self { corners: [corner; 3], weights: [1.0, 0.0, 0.0], frame: Matrix3::identity() }
+        Self {
+            corners: [corner; 3],
+            weights: [1.0, 0.0, 0.0],
+            frame: Matrix3::identity(),
+            slide: None,
+        }
+    }
+
+    /// Corners that its force or its motion has to do with.
+    fn touched(&self) -> impl Iterator<Item = usize> + use<> {
+        let slide = self.slide.map_or([0.0; 3], |slide| slide.weights);
+        let weights = self.weights.into_iter().zip(slide);
+        let corners = self.corners.into_iter().zip(weights);
+        corners.filter(|(_, (w, s))| *w != 0.0 || *s != 0.0).map(|(corner, _)| corner as usize)
     }
 
     /// Corners with a weight.
@@ -89,7 +115,7 @@ impl Delassus {
         points: Vec<PointPlace>,
     ) -> Result<Self, ProblemError> {
         let rows = compliance.nrows();
-        let last = points.iter().flat_map(PointPlace::weighted).map(|(corner, _)| corner).max();
+        let last = points.iter().flat_map(PointPlace::touched).max();
         let corners = last.map_or(0, |last| last + 1);
         if compliance.ncols() != rows || !rows.is_multiple_of(3) || rows < 3 * corners {
             let (points, expected, motion) = (points.len(), 3 * corners, compliance.ncols());
@@ -153,7 +179,14 @@ impl Delassus {
         for (corner, weight) in place.weighted() {
             moved += weight * at(v, corner);
         }
-        place.frame.tr_mul(&moved)
+        let mut moved = place.frame.tr_mul(&moved);
+        if let Some(slide) = place.slide {
+            let corners = place.corners.iter().zip(slide.weights).filter(|(_, w)| *w != 0.0);
+            let of_corner = |(&corner, weight): (&u32, f64)| weight * at(v, corner as usize);
+            let slid = place.frame.tr_mul(&corners.map(of_corner).sum::<Vector3<f64>>());
+            moved.x += slide.share[0] * slid.y + slide.share[1] * slid.z;
+        }
+        moved
     }
 
     /// Motions of the corners under forces at the points: `K B λ`.
@@ -203,6 +236,16 @@ impl Delassus {
                     s.add(row, column, of_row * of_column * turned);
                 }
             }
+            if let Some(slide) = place.slide {
+                // Answers to the motion along the normal only.
+                let tangents = place.frame.fixed_columns::<2>(1) * Vector2::from(slide.share);
+                let turned = place.frame * answer.column(0) * tangents.transpose();
+                for (row, of_row) in place.weighted() {
+                    for (&column, of_column) in place.corners.iter().zip(slide.weights) {
+                        s.add(row, column as usize, of_row * of_column * turned);
+                    }
+                }
+            }
         }
         let arch = pulp::Arch::new();
         let k = self.compliance.as_slice();
@@ -217,7 +260,7 @@ impl Delassus {
 
     /// The operator of some points alone, between their own corners.
     pub(super) fn of_points(&self, points: &[usize]) -> Self {
-        let of = |&point: &usize| self.points[point].weighted().map(|(corner, _)| corner);
+        let of = |&point: &usize| self.points[point].touched();
         let mut corners: Vec<usize> = points.iter().flat_map(of).collect();
         corners.sort_unstable();
         corners.dedup();
@@ -225,9 +268,10 @@ impl Delassus {
         corners.iter().enumerate().for_each(|(at, &corner)| position[corner] = at as u32);
         let renamed = |&point: &usize| {
             let mut place = self.points[point];
-            place.corners = std::array::from_fn(|k| match place.weights[k] == 0.0 {
-                true => 0,
-                false => position[place.corners[k] as usize],
+            let slides = |k: usize| place.slide.is_some_and(|slide| slide.weights[k] != 0.0);
+            place.corners = std::array::from_fn(|k| match place.weights[k] != 0.0 || slides(k) {
+                true => position[place.corners[k] as usize],
+                false => 0,
             });
             place
         };

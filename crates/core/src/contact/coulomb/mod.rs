@@ -2,6 +2,7 @@
 
 mod cone;
 mod delassus;
+mod law;
 mod newton;
 mod problem;
 mod solution;
@@ -10,7 +11,8 @@ mod splitting;
 mod sweeps;
 
 pub use cone::{FrictionCone, PointForce};
-pub use delassus::{Delassus, PointPlace, ProblemError};
+pub use delassus::{Delassus, PointPlace, ProblemError, Slide};
+pub use law::PointLaw;
 pub use problem::ContactProblem;
 pub use solution::{PointState, Solution, SolveBudget, state_of};
 

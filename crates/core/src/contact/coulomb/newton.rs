@@ -15,6 +15,7 @@ use faer::{MatMut, Par, Spec};
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2};
 
 use super::cone::{PointForce, at};
+use super::law::PointLaw;
 use super::problem::ContactProblem;
 
 /// A problem with a little compliance at every point, counted from given forces.
@@ -40,9 +41,11 @@ const STRAYING: usize = 4;
 const RUNAWAY: f64 = 30.0;
 
 impl<'a> Proximal<'a> {
-    /// `share` of every point's own compliance is added to it.
+    /// `share` of every point's own compliance is added to it; a spring has its own.
     pub fn new(problem: &'a ContactProblem, from: &'a [f64], share: f64) -> Self {
-        let added = problem.rho.iter().map(|rho| share / rho).collect();
+        let of_point =
+            |(rho, law): (&f64, &PointLaw)| if law.is_spring() { 0.0 } else { share / rho };
+        let added = problem.rho.iter().zip(&problem.laws).map(of_point).collect();
         Self { problem, added, from }
     }
 
@@ -91,7 +94,10 @@ impl<'a> Proximal<'a> {
         let problem = self.problem;
         let motion = self.motion(lambda);
         let pressed: Vec<usize> = (0..problem.point_count())
-            .filter(|&i| lambda[3 * i] - problem.rho[i] * motion[3 * i] > 0.0)
+            .filter(|&i| {
+                let presses = lambda[3 * i] - problem.rho[i] * motion[3 * i] > 0.0;
+                presses || problem.laws[i].is_spring()
+            })
             .collect();
         let mut next = vec![0.0; lambda.len()];
         if pressed.is_empty() {
@@ -106,8 +112,13 @@ impl<'a> Proximal<'a> {
         let answer = |&point: &usize| {
             let (rho, added) = (problem.rho[point], self.added[point]);
             let force = at(lambda, point);
-            let slip = Slip::new(problem.cones[point].friction, rho, &force, &at(&motion, point));
-            match slip {
+            let cone = match problem.laws[point] {
+                PointLaw::Contact(cone) => cone,
+                PointLaw::Spring { stiffness } => {
+                    return Answer::spring(&stiffness, force, at(&free, point).x);
+                }
+            };
+            match Slip::new(cone.friction, rho, &force, &at(&motion, point)) {
                 Some(slip) => slip.answer(added, at(&free, point).x),
                 None => Answer::sticking(added, at(&free, point)),
             }
@@ -158,6 +169,15 @@ impl Answer {
     /// A point that sticks: `added δ + W δ = −free`.
     fn sticking(added: f64, free: PointForce) -> Self {
         Self { given: -free / added, per_motion: Matrix3::identity() / added }
+    }
+
+    /// A spring: `δ = −(λ + k free) − k (W δ)_n`.
+    ///
+    /// Units: `stiffness` N/m, `force` N, `free` m.
+    fn spring(stiffness: &PointForce, force: PointForce, free: f64) -> Self {
+        let mut per_motion = Matrix3::zeros();
+        per_motion.set_column(0, stiffness);
+        Self { given: -force - stiffness * free, per_motion }
     }
 }
 

@@ -4,8 +4,9 @@ use nalgebra::DMatrix;
 
 use super::cone::{FrictionCone, at};
 use super::delassus::{Delassus, PointPlace, ProblemError};
+use super::law::PointLaw;
 
-/// Points in contact, or nearly so: `u = W λ + b`, and a cone for each.
+/// Points in contact, or nearly so: `u = W λ + b`, and a law for each.
 ///
 /// Shapes: n points; the Delassus operator W 3n × 3n, symmetric, positive semidefinite; `b` 3n; each
 /// point has three rows: normal, and two tangents.
@@ -16,7 +17,7 @@ use super::delassus::{Delassus, PointPlace, ProblemError};
 pub struct ContactProblem {
     pub(super) w: Delassus,
     pub(super) b: Vec<f64>,
-    pub(super) cones: Vec<FrictionCone>,
+    pub(super) laws: Vec<PointLaw>,
     /// A stiffness for each point, N/m: it turns metres into newtons in the residual.
     pub(super) rho: Vec<f64>,
 }
@@ -34,7 +35,8 @@ impl ContactProblem {
         cones: Vec<FrictionCone>,
     ) -> Result<Self, ProblemError> {
         let points = (0..cones.len() as u32).map(PointPlace::corner).collect();
-        Self::between_corners(Delassus::try_new(w, points)?, b, cones)
+        let laws = cones.into_iter().map(PointLaw::from).collect();
+        Self::between_corners(Delassus::try_new(w, points)?, b, laws)
     }
 
     /// Points that lie between the corners of a surface.
@@ -46,9 +48,9 @@ impl ContactProblem {
     pub fn between_corners(
         w: Delassus,
         b: Vec<f64>,
-        cones: Vec<FrictionCone>,
+        laws: Vec<PointLaw>,
     ) -> Result<Self, ProblemError> {
-        let points = cones.len();
+        let points = laws.len();
         let expected = 3 * points;
         let rows = 3 * w.point_count();
         if rows != expected || b.len() != expected {
@@ -67,12 +69,12 @@ impl ContactProblem {
             }
             rho.push(1.0 / compliance);
         }
-        Ok(Self { w, b, cones, rho })
+        Ok(Self { w, b, laws, rho })
     }
 
     /// Number of points.
     pub fn point_count(&self) -> usize {
-        self.cones.len()
+        self.laws.len()
     }
 
     /// Gap and slip `W λ + b` of every point, m.
@@ -90,15 +92,15 @@ impl ContactProblem {
         let points = 0..self.point_count();
         let residuals = points.map(|i| {
             let (force, motion) = (at(lambda, i), at(motion, i));
-            self.cones[i].residual(force, motion, self.rho[i])
+            self.laws[i].residual(force, motion, self.rho[i])
         });
         residuals.fold(0.0, f64::max)
     }
 
-    /// Every force moved into its cone.
+    /// Every force moved to the nearest one that its law allows.
     pub(super) fn projected(&self, lambda: &[f64]) -> Vec<f64> {
-        let points = self.cones.iter().enumerate();
-        points.flat_map(|(point, cone)| <[f64; 3]>::from(cone.project(at(lambda, point)))).collect()
+        let points = self.laws.iter().enumerate();
+        points.flat_map(|(point, law)| <[f64; 3]>::from(law.project(at(lambda, point)))).collect()
     }
 
     /// Contact problem of some points alone.
@@ -108,7 +110,7 @@ impl ContactProblem {
         Self {
             w: self.w.of_points(points),
             b: (0..rows).map(|k| self.b[row(k)]).collect(),
-            cones: points.iter().map(|&i| self.cones[i]).collect(),
+            laws: points.iter().map(|&i| self.laws[i]).collect(),
             rho: points.iter().map(|&i| self.rho[i]).collect(),
         }
     }

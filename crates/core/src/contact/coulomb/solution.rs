@@ -163,7 +163,9 @@ impl Solution {
         let mut is_in = vec![false; n];
         let (mut sweeps, mut newton_steps) = (0, 0);
         for _ in 0..ADDITIONS_MAX {
-            let joins = |&i: &usize| lambda[3 * i] > 0.0 || motion[3 * i] < 0.0;
+            let joins = |&i: &usize| {
+                lambda[3 * i] > 0.0 || motion[3 * i] < 0.0 || problem.laws[i].is_spring()
+            };
             let new: Vec<usize> = (0..n).filter(|&i| !is_in[i]).filter(joins).collect();
             if new.is_empty() {
                 break;

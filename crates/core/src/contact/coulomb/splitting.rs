@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, Matrix3};
 
 use super::cone::{PointForce, at};
+use super::law::PointLaw;
 use super::newton::solve_in_place;
 use super::problem::ContactProblem;
 
@@ -54,7 +55,7 @@ impl<'a> Splitting<'a> {
     /// Goes on with another share of every point's own compliance; as it is where that has no inverse.
     pub fn change_share(&mut self, share: f64) {
         let Some((added, compliance)) = added_and_compliance(self.problem, share) else { return };
-        let inside = self.problem.projected(&self.pushed);
+        let inside = self.inside();
         for (k, (pushed, inside)) in self.pushed.iter_mut().zip(&inside).enumerate() {
             *pushed = inside + (*pushed - inside) * self.added[k / 3] / added[k / 3];
         }
@@ -65,7 +66,7 @@ impl<'a> Splitting<'a> {
     pub fn advance(&mut self, sweeps: usize) -> Vec<f64> {
         let mut wanted = vec![0.0; self.pushed.len()];
         for _ in 0..sweeps {
-            let inside = self.problem.projected(&self.pushed);
+            let inside = self.inside();
             for (point, &added) in self.added.iter().enumerate() {
                 let force = at(&inside, point);
                 // What a force was pushed by is the motion, corrected already.
@@ -80,7 +81,16 @@ impl<'a> Splitting<'a> {
                 *pushed += RELAXATION * (agreed - inside);
             }
         }
-        self.problem.projected(&self.pushed)
+        self.inside()
+    }
+
+    /// The forces that obey their laws one by one, 3n, N.
+    fn inside(&self) -> Vec<f64> {
+        let points = self.problem.laws.iter().zip(&self.added).enumerate();
+        let of_point = |(point, (law, &added)): (usize, (&PointLaw, &f64))| {
+            <[f64; 3]>::from(law.yielding(at(&self.pushed, point), added))
+        };
+        points.flat_map(of_point).collect()
     }
 
     /// Of forces the added compliances alone would have, those that W with the added compliances has:
@@ -96,7 +106,7 @@ impl<'a> Splitting<'a> {
 
     /// De Saxcé's correction of a gap, m: with it a slip is complementary to the force that opposes it.
     fn correction(&self, point: usize, motion: &PointForce) -> f64 {
-        self.problem.cones[point].friction * motion.yz().norm()
+        self.problem.laws[point].friction() * motion.yz().norm()
     }
 }
 

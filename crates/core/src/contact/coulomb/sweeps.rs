@@ -132,7 +132,7 @@ impl Sweeps {
         let points = (0..problem.point_count())
             .map(|i| {
                 let own = w.fixed_view::<3, 3>(3 * i, 3 * i).into_owned();
-                PointProblem::new(own, problem.cones[i].friction)
+                PointProblem::new(own, problem.laws[i].friction())
             })
             .collect();
         Self { w, points }

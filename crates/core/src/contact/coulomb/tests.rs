@@ -204,7 +204,12 @@ fn between(corners: usize, seed: &[f64]) -> Vec<PointPlace> {
         };
         let axis = nalgebra::Vector3::new(*a, *b, 0.3);
         let frame = nalgebra::Rotation3::from_scaled_axis(*turn * axis).into_inner();
-        PointPlace { corners: [first, others[0], others[1]].map(|c| c as u32), weights, frame }
+        PointPlace {
+            corners: [first, others[0], others[1]].map(|c| c as u32),
+            weights,
+            frame,
+            slide: None,
+        }
     };
     (0..seed.len() / 4).map(place).collect()
 }
@@ -271,13 +276,59 @@ proptest! {
         let cones = vec![FrictionCone { friction }; points.len()];
         let w = Delassus::try_new(compliance(corners, &seed), points).unwrap();
         let dense = ContactProblem::try_new(w.to_matrix(), pushed.clone(), cones.clone()).unwrap();
-        let problem = ContactProblem::between_corners(w, pushed, cones).unwrap();
+        let problem = {
+            let laws = cones.into_iter().map(PointLaw::from).collect();
+            ContactProblem::between_corners(w, pushed, laws).unwrap()
+        };
         let budget = SolveBudget { residual_rel: 1e-8, residual: 0.0, attempts_max: 40 };
         let (ours, theirs) = (Solution::of(&problem, &[], budget), Solution::of(&dense, &[], budget));
         prop_assert!(ours.is_converged, "residual {:e} of {:e} N", ours.residual, ours.force_max());
         prop_assume!(theirs.is_converged);
         // Forces that shear every point can have more than one answer; without friction motions have one.
         let off = ours.motion.iter().zip(&theirs.motion).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        prop_assert!(friction > 0.3 || off < 1e-4, "{off:e}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// The oracle: the spring's compliance taken out of W beforehand.
+    #[test]
+    fn spring_among_the_points_is_that_of_the_problem_without_it_on_a_stiffer_body(
+        corners in 3usize..9,
+        seed in prop::collection::vec(-1.0..1.0f64, 27),
+        pushed in prop::collection::vec(-1.0..0.5f64, 27),
+        rise in -0.5..0.5f64,
+        logarithm in -2.0..2.0f64,
+        friction in 0.0..0.6f64,
+    ) {
+        let (k, stiffness) = (compliance(corners, &seed), 10.0f64.powf(logarithm));
+        let mut points: Vec<PointPlace> = (0..corners as u32).map(PointPlace::corner).collect();
+        points.push(PointPlace { weights: [-1.0, 0.4, 0.6], ..PointPlace::corner(0) });
+        points[corners].corners = [0, 1, 2];
+        let w = Delassus::try_new(k.clone(), points).unwrap();
+        let (whole, n) = (w.to_matrix(), 3 * corners);
+        let mut b = pushed[..n].to_vec();
+        let per_motion = stiffness / (1.0 + stiffness * whole[(n, n)]);
+        let stiffer = DMatrix::from_fn(n, n, |r, c| whole[(r, c)] - whole[(r, n)] * per_motion * whole[(n, c)]);
+        let pushed: Vec<f64> = (0..n).map(|r| b[r] - whole[(r, n)] * per_motion * rise).collect();
+        b.extend([rise, 0.0, 0.0]);
+        let contact = FrictionCone { friction };
+        let mut laws = vec![PointLaw::Contact(contact); corners];
+        laws.push(PointLaw::Spring { stiffness: Vector3::new(stiffness, 0.0, 0.0) });
+        let problem = ContactProblem::between_corners(w, b, laws).unwrap();
+        let oracle = ContactProblem::try_new(stiffer, pushed, vec![contact; corners]).unwrap();
+        let budget = SolveBudget { residual_rel: 1e-9, ..SolveBudget::default() };
+        let (ours, theirs) = (Solution::of(&problem, &[], budget), Solution::of(&oracle, &[], budget));
+        prop_assert!(ours.is_converged, "residual {:e} of {:e} N", ours.residual, ours.force_max());
+        prop_assume!(theirs.is_converged);
+        let spring = at(&ours.lambda, corners);
+        let off = (spring.x + stiffness * ours.motion[n]).abs();
+        prop_assert!(off < 1e-6 * (1.0 + spring.x.abs()), "{off:e}");
+        prop_assert_eq!(spring.yz().norm(), 0.0);
+        let pairs = ours.motion[..n].iter().zip(&theirs.motion);
+        let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         prop_assert!(friction > 0.3 || off < 1e-4, "{off:e}");
     }
 }
