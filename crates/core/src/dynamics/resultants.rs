@@ -3,7 +3,8 @@
 //! A body that presses holds its points: where it goes by δx, each point that it presses on goes by δx,
 //! so that `W δλ = S δx` with S from the bodies to their points, and the resultants change by
 //! `δF = Sᵀ δλ = K δx` with `K = Sᵀ W⁻¹ S`. The compliance is `C = K⁻¹`. W is the operator of the step,
-//! with viscosity, the object's mass and the compliances of the bodies in it. K says how the forces of this
+//! with viscosity, the object's mass and the compliances of the bodies in it, and with the springs by which
+//! forces move through triangles that tilt. K says how the forces of this
 //! step follow the places at which its bodies end if all points that press stick to their bodies; how far
 //! steps are from that is in the tests.
 
@@ -13,6 +14,7 @@ use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 
 use super::assemble::{ProblemPoint, operator};
 use super::configuration::Scene;
+use super::rolling::Rolling;
 use super::rounds::Found;
 use super::small_system::{BodyContact, SmallSystem};
 use crate::solve::condensed::Response;
@@ -41,7 +43,7 @@ pub(super) fn small_system(
     if contacts.is_empty() {
         return Some(SmallSystem { contacts, compliance: DMatrix::zeros(0, 0) });
     }
-    let w = operator(scene, response, &found.end, (&points, &[])).ok()?.to_matrix();
+    let w = compliance_of_points(scene, response, found, &points)?;
     let rows = w.nrows();
     let entry = |r: usize, c: usize| w[(r, c)] * if r == c { 1.0 + ADDED } else { 1.0 };
     let factor = Llt::new(Mat::from_fn(rows, rows, entry).as_ref(), Side::Lower).ok()?;
@@ -64,6 +66,31 @@ pub(super) fn small_system(
     let compliance = 0.5 * (&compliance + compliance.transpose());
     let is_finite = compliance.iter().all(|c| c.is_finite());
     is_finite.then_some(SmallSystem { contacts, compliance })
+}
+
+/// Place of every point per force at every point, if the forces move through their triangles as these tilt.
+///
+/// Shapes: 3n × 3n, m/N, symmetric: of a force that moves, its part along the normal is counted.
+fn compliance_of_points(
+    scene: &Scene<'_>,
+    response: &Response<'_>,
+    found: &Found,
+    points: &[&ProblemPoint],
+) -> Option<DMatrix<f64>> {
+    // A point that sticks to its body does not slide along it: the triangle's own rise is left.
+    let stuck = |rolling: &Rolling| Rolling { falls: Vector3::zeros(), ..rolling.clone() };
+    let rollings: Vec<Rolling> = found.rollings.iter().map(stuck).collect();
+    let w = operator(scene, response, &found.end, (points, &rollings)).ok()?.to_matrix();
+    let (n, springs) = (3 * points.len(), rollings.len());
+    let spring = |k: usize| n + 3 * k;
+    let stiffness = |k: usize| rollings[k].stiffness.x;
+    let between = DMatrix::from_fn(n, springs, |r, k| w[(r, spring(k))]);
+    let own = DMatrix::from_fn(springs, springs, |j, k| {
+        let yields = if j == k { 1.0 / stiffness(k) } else { 0.0 };
+        yields + w[(spring(j), spring(k))]
+    });
+    let relieved = own.cholesky()?.solve(&between.transpose());
+    Some(w.view((0, 0), (n, n)) - &between * relieved)
 }
 
 /// Bodies with a point that presses, ascending.

@@ -16,6 +16,7 @@ use crate::contact::coulomb::PointForce;
 use crate::rigid_body::Barycentric;
 
 /// A direction in which the place of a point's force moves.
+#[derive(Clone)]
 pub(super) struct Rolling {
     /// Position of the point in the problem.
     pub position: usize,
@@ -27,7 +28,7 @@ pub(super) struct Rolling {
     /// along the body: the body falls away.
     pub falls: Vector3<f64>,
     /// Change for a unit rise, 1/m.
-    per_motion: f64,
+    pub per_motion: f64,
     /// Force of the point over that motion, N/m.
     pub stiffness: PointForce,
 }

@@ -25,7 +25,10 @@ const ATTEMPTS: usize = 8;
 /// Where the rounds have ended.
 pub(super) struct Found {
     pub end: Configuration,
+    /// Points that press, and their forces in the object's frame.
     pub pressing: Vec<(ProblemPoint, Vector3<f64>)>,
+    /// Directions in which these forces move through their triangles.
+    pub rollings: Vec<Rolling>,
     pub penetration: f64,
     pub residual: f64,
     /// Whether a force acts elsewhere than where the problem was made.
@@ -91,10 +94,11 @@ impl Rounds<'_, '_> {
                 };
                 let (penetration, residual) = (round.penetration, round.residual);
                 let has_moved = round.has_moved;
-                let pressing = round.into_pressing();
+                let (pressing, rollings) = round.into_pressing();
                 return Ok(Found {
                     end,
                     pressing,
+                    rollings,
                     penetration,
                     residual,
                     has_moved,
@@ -289,15 +293,22 @@ impl Round {
         contacts
     }
 
-    /// The points that press, and their forces in the object's frame.
-    fn into_pressing(self) -> Vec<(ProblemPoint, Vector3<f64>)> {
-        let forces = self.lambda.chunks_exact(3).map(Vector3::from_column_slice);
-        let pressing = self.points.into_iter().zip(forces).filter(|(_, local)| local.x > 0.0);
-        pressing
-            .map(|(point, local)| {
+    /// The points that press with their forces in the object's frame, and the directions in which these move.
+    fn into_pressing(self) -> (Vec<(ProblemPoint, Vector3<f64>)>, Vec<Rolling>) {
+        let mut rollings = self.rollings.into_iter().peekable();
+        let (mut pressing, mut rolling) = (Vec::new(), Vec::new());
+        for (position, (point, local)) in
+            self.points.into_iter().zip(self.lambda.chunks_exact(3)).enumerate()
+        {
+            let local = Vector3::from_column_slice(local);
+            while let Some(of_point) = rollings.next_if(|rolling| rolling.position == position) {
+                rolling.push(Rolling { position: pressing.len(), ..of_point });
+            }
+            if local.x > 0.0 {
                 let force = point.frame * local;
-                (point, force)
-            })
-            .collect()
+                pressing.push((point, force));
+            }
+        }
+        (pressing, rolling)
     }
 }

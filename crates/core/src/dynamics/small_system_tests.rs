@@ -79,9 +79,9 @@ fn forces_of_a_step_that_ends_a_little_elsewhere_follow_the_small_system() {
     let state = ObjectState::at_rest(at(0.0, 0.0, 0.015));
     let (state, _) = settled(&object, state, 10);
     let mut step = |bodies: &[MovingBody]| object.advance(&state, bodies, settings());
-    // The difference does not shrink with the way; its cause is not known.
+    // What is left does not shrink with the way: the sides of a moving force, and normals that turn.
     let found = errors(&mut step, 4.0, &PINCH, [1e-5, 2.5e-6]);
-    assert!(found.iter().all(|error| *error < 0.15), "{found:?}");
+    assert!(found.iter().all(|error| *error < 0.06), "{found:?}");
 }
 
 #[test]
