@@ -345,3 +345,43 @@ fn closed_cycle_of_a_finger_takes_energy_and_never_gives_it() {
     assert!(pressed > 0.05, "never pressed: {pressed} N");
     assert!(work > 0.0, "the finger got {work} J back");
 }
+
+/// Five tips of 8 mm close on a ball of 7 cm, until they are 8 mm deep in it.
+fn closing(step: u32) -> Vec<MovingBody> {
+    let place = |step: u32, around: f64| {
+        let depth = 8e-3 * (f64::from(step) / 20.0).min(1.0);
+        let radius = 0.035 + 0.008 - depth;
+        at(radius * around.cos(), radius * around.sin(), 0.0)
+    };
+    let tip = |around: f64| MovingBody {
+        shape: RigidShape::sphere(0.008).unwrap(),
+        world_from_body_start: place(step, around),
+        world_from_body_end: place(step + 1, around),
+        friction: 0.8,
+        compliance: 1e-3,
+    };
+    [std::f64::consts::PI, -0.6, -0.2, 0.2, 0.6].map(tip).into()
+}
+
+#[test]
+fn forces_of_round_tips_do_not_go_to_and_fro_in_triangles_that_tilt() {
+    let ball = Object::sized(BuiltIn::Sphere, 1000, 0.07, 5e4, 0.4);
+    let mut state = ObjectState::at_rest(Isometry3::identity());
+    let settings = StepSettings {
+        seconds: 1.0 / 60.0,
+        viscosity: 0.02,
+        penetration_rel: 1e-9,
+        residual_rel: 1e-8,
+        rounds_max: 12,
+        ..StepSettings::default()
+    };
+    let mut rounds = 0;
+    for step in 0..25 {
+        let found = ball.advance(&state, &closing(step), settings);
+        let (penetration, residual) = (found.penetration_max, found.contact_residual_rel);
+        assert!(found.is_converged, "step {step}: {penetration:e} m, {residual:e}");
+        rounds += found.rounds;
+        state = found.state;
+    }
+    assert!(rounds < 200, "{rounds} rounds");
+}
