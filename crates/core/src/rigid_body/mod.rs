@@ -1,6 +1,7 @@
 //! Rigid bodies that press on a soft object: shapes, signed distance, deepest point of a triangle.
 
 mod closest;
+mod deepest;
 mod shape;
 mod triangles;
 

@@ -6,6 +6,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::closest::{Barycentric, area_normal, on_triangle, point_at};
 use super::closest::{Deepest, SignedDistance};
+use super::deepest::deepest_of;
 
 /// The inside of a closed surface of triangles.
 ///
@@ -80,22 +81,6 @@ pub enum RigidMeshError {
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;
-/// Pieces into which a triangle is cut at most while its deepest point is looked for.
-const PIECES_MAX: usize = 64;
-/// A piece is given up where it can be deeper by this share of its size only.
-const NEAR_ENOUGH: f64 = 1e-3;
-/// Halvings of the step of the last search around the deepest point found, and ways tried with each.
-const HALVINGS: u32 = 34;
-const WAYS: u32 = 9;
-/// How often steps of one size are tried again where they have led deeper.
-const AGAIN: usize = 4;
-/// Samples along an edge, and thirds that are taken away around the best of them.
-const EDGE_SAMPLES: u32 = 8;
-const EDGE_THIRDS: usize = 40;
-/// The whole turn, and the turn from one halving to the next: no part of the whole.
-const FULL: f64 = std::f64::consts::TAU;
-const TURN: f64 = 2.399_963;
-
 impl RigidMesh {
     /// Triangles with their corners counter-clockwise seen from outside; vertices in the same place
     /// count as one.
@@ -159,88 +144,9 @@ impl RigidMesh {
         SignedDistance { distance: sign * size, normal }
     }
 
-    /// The deepest point of a triangle: pieces whose middle cannot be near enough are left out, then a
-    /// search with ever smaller steps ends at a point from which no step leads deeper.
+    /// The deepest point of a triangle, by a search.
     pub(super) fn deepest(&self, corners: &[Point3<f64>; 3]) -> Deepest {
-        let at = |weights: Barycentric| Deepest {
-            weights,
-            distance: self.distance(&point_at(corners, &weights)),
-        };
-        let size = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
-        let whole = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let mut best = at(whole[0]);
-        let consider = |weights: Barycentric, best: &mut Deepest| {
-            let found = at(weights);
-            if found.distance.distance < best.distance.distance {
-                *best = found;
-            }
-            found.distance.distance
-        };
-        consider(whole[1], &mut best);
-        consider(whole[2], &mut best);
-        // Each piece with the smallest distance that can be in it; the most promising comes next.
-        let mut pieces = vec![(f64::NEG_INFINITY, whole, size)];
-        for _ in 0..PIECES_MAX {
-            let next = (0..pieces.len()).min_by(|&a, &b| pieces[a].0.total_cmp(&pieces[b].0));
-            let Some((least, piece, size)) = next.map(|at| pieces.swap_remove(at)) else { break };
-            if least >= best.distance.distance - NEAR_ENOUGH * size {
-                break;
-            }
-            for quarter in quarters(&piece) {
-                let middle =
-                    [0, 1, 2].map(|k| (quarter[0][k] + quarter[1][k] + quarter[2][k]) / 3.0);
-                // The distance changes by no more than the way gone: two thirds of the longest
-                // median, which is below the longest edge.
-                let reach = 0.5 * size;
-                pieces.push((consider(middle, &mut best) - 0.6 * reach, quarter, reach));
-            }
-        }
-        let mut best = self.descend(best, at);
-        for (first, second) in [(0, 1), (1, 2), (2, 0)] {
-            let on_edge = deepest_on_edge(first, second, at);
-            if on_edge.distance.distance < best.distance.distance {
-                best = on_edge;
-            }
-        }
-        best
-    }
-
-    /// Steps in all ways, and on in the way that has led deeper (Hooke and Jeeves), ever smaller.
-    fn descend(&self, mut best: Deepest, at: impl Fn(Barycentric) -> Deepest) -> Deepest {
-        let consider = |moved: Barycentric, best: &mut Deepest| {
-            // A step out of the triangle ends at its border.
-            let within = moved.map(|weight: f64| weight.max(0.0));
-            let sum: f64 = within.iter().sum();
-            let found = at(within.map(|weight| weight / sum));
-            let is_deeper = found.distance.distance < best.distance.distance;
-            if is_deeper {
-                *best = found;
-            }
-            is_deeper
-        };
-        let (mut step, mut turns) = (0.125, 0);
-        for _ in 0..HALVINGS {
-            // Steps of one size follow a crease down for as long as they lead deeper.
-            for _ in 0..AGAIN {
-                let from = best.weights;
-                for way in 0..WAYS {
-                    // Turned each time, so that no crease stays between two ways for ever.
-                    let angle = TURN * f64::from(turns) + FULL * f64::from(way) / f64::from(WAYS);
-                    let (a, b) = (step * angle.cos(), step * angle.sin());
-                    let [x, y, z] = best.weights;
-                    consider([x + a, y + b, z - a - b], &mut best);
-                }
-                turns += 1;
-                if best.weights == from {
-                    break;
-                }
-                let way: [f64; 3] = std::array::from_fn(|k| best.weights[k] - from[k]);
-                let on = std::array::from_fn(|k| best.weights[k] + way[k]);
-                consider(on, &mut best);
-            }
-            step *= 0.5;
-        }
-        best
+        deepest_of(corners, |point| self.distance(point))
     }
 
     fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
@@ -323,35 +229,6 @@ impl Sorted<'_> {
         }
         place
     }
-}
-
-/// The deepest point of an edge: the best of some samples, then a search by thirds around it.
-fn deepest_on_edge(first: usize, second: usize, at: impl Fn(Barycentric) -> Deepest) -> Deepest {
-    let on = |t: f64| {
-        let mut weights = [0.0; 3];
-        (weights[first], weights[second]) = (1.0 - t, t);
-        at(weights)
-    };
-    let sample = |k: u32| f64::from(k) / f64::from(EDGE_SAMPLES);
-    let depth = |t: f64| on(t).distance.distance;
-    let best = (0..=EDGE_SAMPLES).min_by(|&a, &b| depth(sample(a)).total_cmp(&depth(sample(b))));
-    let middle = sample(best.unwrap_or(0));
-    let (mut low, mut high) = ((middle - sample(1)).max(0.0), (middle + sample(1)).min(1.0));
-    for _ in 0..EDGE_THIRDS {
-        let third = (high - low) / 3.0;
-        match depth(low + third) <= depth(high - third) {
-            true => high -= third,
-            false => low += third,
-        }
-    }
-    on(0.5 * (low + high))
-}
-
-/// A quarter each of a triangle.
-fn quarters(piece: &[Barycentric; 3]) -> [[Barycentric; 3]; 4] {
-    let middle = |a: usize, b: usize| [0, 1, 2].map(|k| 0.5 * (piece[a][k] + piece[b][k]));
-    let (ab, bc, ca) = (middle(0, 1), middle(1, 2), middle(2, 0));
-    [[piece[0], ab, ca], [ab, piece[1], bc], [ca, bc, piece[2]], [ab, bc, ca]]
 }
 
 /// Vertices and triangles.
@@ -486,7 +363,7 @@ mod tests {
             // As near as bodies that touch are; deep in the box the way out has creases.
             prop_assume!((-0.05..0.05).contains(&theirs.distance.distance));
             let off = ours.distance.distance - theirs.distance.distance;
-            prop_assert!(off.abs() < 2e-3, "{off:e}: {ours:?} {theirs:?}");
+            prop_assert!(off.abs() < 5e-4, "{off:e}: {ours:?} {theirs:?}");
         }
     }
 
