@@ -188,7 +188,7 @@ mod tests {
             RigidShape::sphere(0.008).unwrap().curvature(&mix(&corners, &point.weights)).unwrap();
         let found = rollings((&point, &corners), &curvature, (0, PointForce::x()));
         let to = rolled(&point, found.iter().map(|r| (r, 1.0)));
-        assert!(to.weights.iter().any(|w| *w == 0.0), "{to:?}");
+        assert!(to.weights.contains(&0.0), "{to:?}");
         assert!((to.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 }
