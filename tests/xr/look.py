@@ -178,7 +178,10 @@ def picture_of_scene(browser, path):
     """A picture of what is drawn alone: the page's sentences would lie over it, with red bars of their own."""
     browser.value(
         "document.head.append(Object.assign(document.createElement('style'), {id: 'scene-alone', textContent:"
-        " 'body * { visibility: hidden !important } canvas { visibility: visible !important }'})); 0")
+        " 'body * { visibility: hidden !important } canvas { visibility: visible !important }'}));"
+        "window.isAlone = false; requestAnimationFrame(() => requestAnimationFrame(() => { window.isAlone = true })); 0")
+    # The picture is the one that was drawn last: on a busy machine that is one with the sentences still.
+    browser.until("window.isAlone")
     browser.picture(path)
     browser.value("document.getElementById('scene-alone').remove()")
 
