@@ -70,8 +70,8 @@ pub(super) fn deepest_of(
     best
 }
 
-/// Steps in all ways, ever smaller; where none leads deeper, down the crease that the directions of the
-/// distance around a point tell of.
+/// Steps in all ways, ever smaller, and after those of each size down the crease that the slopes around the
+/// point tell of.
 ///
 /// Source: gradient sampling, Burke, Lewis and Overton (2005).
 fn descend(
