@@ -4,7 +4,9 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use softgrasp_core::dynamics::{LargeBody, LargeStep, MovingBody, ObjectState, StepOutcome};
+use softgrasp_core::dynamics::{
+    Carried, LargeBody, LargeStep, MovingBody, ObjectState, StepOutcome,
+};
 use softgrasp_core::fem::hyperelastic::Law;
 use softgrasp_core::rigid_body::RigidShape;
 
@@ -74,14 +76,14 @@ impl Pinched {
         &self,
         state: &ObjectState,
         bodies: &[MovingBody],
-        (way, large): (Way, &mut LargeBody),
+        (way, large, carried): (Way, &mut LargeBody, &mut Carried),
     ) -> Result<(f64, StepOutcome), ReportError> {
         let settings = as_a_run(1.0 / RATE_HZ, way.residual_rel);
         let wanted = &self.0.surface.nodes;
         let (ms, found) = self.0.with_step(state, bodies, settings, |step| {
             timed_ms(|| match way.is_large {
                 true => LargeStep { step, body: large }.advance(state, wanted),
-                false => step.advance(state, wanted),
+                false => step.advance_from(state, wanted, carried),
             })
         });
         Ok((ms, found?))
@@ -194,6 +196,7 @@ fn play(ball: &Pinched, (way, columns): (Way, &str), table: &mut Table) -> Resul
     let (nodes, weight) = (ball.0.node_count(), ball.0.weight());
     let mut large = ball.large()?;
     let mut state = ObjectState::at_rest(Isometry3::identity());
+    let mut carried = Carried::default();
     let mut step = 0;
     for (name, lasts) in [("settle", SETTLE), ("pinch", PINCH), ("lift", RAISE), ("hold", HOLD)] {
         let mut phase = Phase::default();
@@ -201,7 +204,8 @@ fn play(ball: &Pinched, (way, columns): (Way, &str), table: &mut Table) -> Resul
         let mut balance = 0.0f64;
         let factors = large.factors();
         for _ in 0..lasts {
-            let (ms, found) = ball.step(&state, &Pinched::bodies(step), (way, &mut large))?;
+            let (ms, found) =
+                ball.step(&state, &Pinched::bodies(step), (way, &mut large, &mut carried))?;
             step += 1;
             phase.add(ms, &found);
             let sum: Vector3<f64> = found.loads.iter().map(|load| load.force).sum();

@@ -11,9 +11,9 @@ use softgrasp_protocol::{
 use tokio::task::JoinHandle;
 
 use crate::answer::{
-    KeptQuestion, Placed, PosedContact, PosedFrame, PressedSeat, Readiness, answer_cases,
-    answer_large_frame, is_finite, kept_elsewhere, place_kept, place_once, place_upload, prefetch,
-    prove, readiness, reserve_fields, solve_large,
+    CarriedSeat, KeptQuestion, Placed, PosedContact, PosedFrame, PressedSeat, Readiness,
+    answer_cases, answer_large_frame, is_finite, kept_elsewhere, place_kept, place_once,
+    place_upload, prefetch, prove, readiness, reserve_fields, solve_large,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;
@@ -46,6 +46,8 @@ pub(crate) struct RequestHandler {
     paths: Paths,
     /// The object that this session presses at large deformation.
     pressed: PressedSeat,
+    /// What a step of each object of this session leaves for the next.
+    carried: CarriedSeat,
     /// Task that makes a path in the background of this session.
     making: Option<JoinHandle<()>>,
     /// Counts this session among those that ask frame questions, from its first one on.
@@ -94,6 +96,7 @@ impl RequestHandler {
             held: HeldModels::new(Arc::clone(resources)),
             paths: Paths::default(),
             pressed: PressedSeat::default(),
+            carried: CarriedSeat::default(),
             making: None,
             grasping: None,
             alive_every: None,
@@ -155,6 +158,7 @@ impl RequestHandler {
             Request::Drop(hash) => {
                 self.paths.leave(hash);
                 self.pressed.with(|pressed| *pressed = None);
+                self.carried.with(|carried| carried.remove(&hash));
                 self.held.drop_model(hash);
                 return Ok(None);
             }
@@ -409,8 +413,8 @@ impl RequestHandler {
         let workers = &self.server.resources.workers;
         self.grasping.get_or_insert_with(|| self.server.grasping());
         let shared = Arc::clone(&resources);
-        let seat = Arc::clone(&self.pressed);
-        let among_frames = move || match PosedContact::new(&shared, frame, seat) {
+        let seats = (Arc::clone(&self.pressed), Arc::clone(&self.carried));
+        let among_frames = move || match PosedContact::new(&shared, frame, seats) {
             Err(refusal) => Ok(Err(refusal)),
             Ok(frame) if frame.is_prepared() => Ok(frame.answer(&shared, clock())),
             Ok(frame) => Err((Box::new(frame), clock)),

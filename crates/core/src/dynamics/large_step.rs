@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::checks::mass_of;
 use super::configuration::{Configured, Scene};
 use super::large_body::{LargeBody, Shape};
 use super::rigid_motion::MassProperties;
-use super::rounds::{Found, Rounds};
+use super::rounds::{Effort, Found, Rounds};
 use super::settings::{StepError, StepSettings};
 use super::state::{HeldContact, ObjectState, StepOutcome, at_nodes};
-use super::step::{ContactStep, mass_of};
+use super::step::ContactStep;
 use crate::solve::condensed::{Elasticity, FreeTangent, Response, ShapeResponse};
 
 /// Shapes that a step is solved about, one after the other.
@@ -307,29 +308,6 @@ struct Progress {
     /// Whether the factor is to be made anew.
     is_stale: bool,
     effort: Effort,
-}
-
-/// What a step has taken so far.
-#[derive(Clone, Copy, Default)]
-struct Effort {
-    shapes: usize,
-    rounds: usize,
-    sweeps: usize,
-    newton_steps: usize,
-}
-
-impl Effort {
-    fn see(&mut self, found: &Found) {
-        self.shapes += 1;
-        self.rounds += found.rounds;
-        self.sweeps += found.sweeps;
-        self.newton_steps += found.newton_steps;
-    }
-
-    fn told(self, outcome: StepOutcome) -> StepOutcome {
-        let Self { shapes, rounds, sweeps, newton_steps } = self;
-        StepOutcome { shapes, rounds, sweeps, newton_steps, ..outcome }
-    }
 }
 
 /// Displacement of some nodes.

@@ -18,6 +18,10 @@
 
 mod assemble;
 mod bodies;
+mod carried;
+#[cfg(test)]
+mod carried_tests;
+mod checks;
 mod configuration;
 mod features;
 mod large_body;
@@ -26,6 +30,7 @@ mod large_step;
 mod large_tests;
 #[cfg(test)]
 mod law_tests;
+mod near;
 mod resultants;
 mod rigid_motion;
 mod rolling;
@@ -42,6 +47,7 @@ mod tests;
 mod yield_tests;
 
 pub use bodies::{MovingBody, near_triangles, reach_of_step};
+pub use carried::Carried;
 pub use features::Candidate;
 pub use large_body::LargeBody;
 pub use large_step::LargeStep;

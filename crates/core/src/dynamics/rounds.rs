@@ -9,7 +9,7 @@ use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint, Pool, force_at};
 use super::rolling::{Rolling, freedoms, rolled, rollings};
 use super::settings::{StepError, StepSettings};
-use super::state::{HeldContact, mix};
+use super::state::{HeldContact, StepOutcome, mix};
 use crate::contact::coulomb::{PointForce, Solution, SolveBudget};
 use crate::solve::condensed::Response;
 
@@ -37,6 +37,29 @@ pub(super) struct Found {
     pub rounds: usize,
     pub sweeps: usize,
     pub newton_steps: usize,
+}
+
+/// What a step has taken so far.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Effort {
+    pub shapes: usize,
+    rounds: usize,
+    sweeps: usize,
+    newton_steps: usize,
+}
+
+impl Effort {
+    pub fn see(&mut self, found: &Found) {
+        self.shapes += 1;
+        self.rounds += found.rounds;
+        self.sweeps += found.sweeps;
+        self.newton_steps += found.newton_steps;
+    }
+
+    pub fn told(self, outcome: StepOutcome) -> StepOutcome {
+        let Self { shapes, rounds, sweeps, newton_steps } = self;
+        StepOutcome { shapes, rounds, sweeps, newton_steps, ..outcome }
+    }
 }
 
 /// The contact problem, made anew about where it ended.

@@ -6,15 +6,18 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
-use super::configuration::{Configured, Scene, sums_by_body};
+use super::carried::{Carried, Pressed};
+use super::checks::{check, check_names, check_nodes, mass_of};
+use super::configuration::{Configuration, Configured, Scene, sums_by_body};
 use super::features::{Candidate, merged};
+use super::near::{NearCandidates, NodeField};
 use super::resultants::small_system;
 use super::rigid_motion::{MassProperties, RigidStep};
-use super::rounds::{Found, Rounds};
+use super::rounds::{Effort, Found, Rounds};
 use super::settings::{StepError, StepSettings};
 use super::state::{BodyLoad, HeldContact, ObjectState, PointContact, StepOutcome, at_nodes};
 use crate::contact::coulomb::{FrictionCone, state_of};
-use crate::solve::condensed::{Elasticity, FreeBody, Response};
+use crate::solve::condensed::{Elasticity, Response};
 
 /// An object, the bodies around it, and how long the step is.
 #[derive(Clone, Copy)]
@@ -41,6 +44,26 @@ pub(super) type MakePart<'m> =
 const WAY_OF_THICKNESS: f64 = 0.5;
 /// Most parts of a step.
 const PARTS_MAX: f64 = 32.0;
+/// Triangles nearer to a body than this share of the object's size are in the rounds from the start.
+const NEAR: f64 = 8e-3;
+/// Times that the rounds are played with more candidates before all of them are taken.
+const PLAYS_MAX: usize = 3;
+
+/// What the rounds of a step begin with.
+struct Start {
+    held: Vec<HeldContact>,
+    world_from_object: Isometry3<f64>,
+    /// Displacement of the nodes; that of the step's beginning where there is none.
+    shape: Option<NodeField>,
+}
+
+impl Start {
+    /// Where other rounds have ended.
+    fn at(end: Configuration, shape: NodeField) -> Self {
+        let world_from_object = end.motion.world_from_object;
+        Self { held: end.contacts, world_from_object, shape: Some(shape) }
+    }
+}
 
 impl ContactStep<'_> {
     /// Makes the step, in parts where a body moves so far that it could pass through the surface.
@@ -50,10 +73,24 @@ impl ContactStep<'_> {
     /// # Errors
     /// [`StepError`]; a step that does not meet the law of contact is no error, it says so.
     pub fn advance(&self, state: &ObjectState, wanted: &[u32]) -> Result<StepOutcome, StepError> {
+        self.advance_from(state, wanted, &mut Carried::default())
+    }
+
+    /// Makes the step as [`ContactStep::advance`] does, quicker where it goes on from the state that
+    /// another step has ended with: the same to rounding. Carries what the next step begins with.
+    ///
+    /// # Errors
+    /// [`StepError`]; nothing is carried then.
+    pub fn advance_from(
+        &self,
+        state: &ObjectState,
+        wanted: &[u32],
+        carried: &mut Carried,
+    ) -> Result<StepOutcome, StepError> {
         let mass = self.checked(state)?;
         let parts = self.parts(state, &mass);
         self.in_parts(parts, state, wanted, &mut |part, begun, wanted| {
-            part.advance_whole(begun, mass, wanted)
+            part.advance_whole((begun, mass), wanted, carried)
         })
     }
 
@@ -114,30 +151,76 @@ impl ContactStep<'_> {
     /// Makes the whole step at once.
     fn advance_whole(
         &self,
-        state: &ObjectState,
-        mass: MassProperties,
+        (state, mass): (&ObjectState, MassProperties),
         wanted: &[u32],
+        carried: &mut Carried,
     ) -> Result<StepOutcome, StepError> {
-        let mut response = self.response(state);
-        response.need(state.forces.iter().map(|(node, _)| *node))?;
-        response.need(at_nodes(&state.contacts).iter().map(|(node, _)| *node))?;
-        let scene = self.scene(state, mass, response.displacement(&state.forces));
-        let size = self.size();
-        let settings = &self.settings;
+        let mut columns = Response::new(self.elasticity, Vec::new());
+        let (held, size) = (self.held(state), self.size());
+        let forces = at_nodes(&held);
+        columns.need(state.forces.iter().chain(&forces).map(|(node, _)| *node))?;
+        let nodes = self.with_rows(state, wanted);
+        let (begun, mut pressed) = carried.begin((self, &columns), (state, forces), &nodes);
+        let drifted = drifted(state, &mass, self.settings.seconds);
+        let mut near = NearCandidates::choose(self, (state, &drifted), &begun, NEAR * size);
+        let mut start = Start { held, world_from_object: state.world_from_object, shape: None };
+        let mut effort = Effort::default();
+        loop {
+            let candidates = near.chosen();
+            let step = ContactStep { candidates: &candidates, ..*self };
+            let mut response = columns.of_rows(step.rows(state));
+            let scene = step.scene(state, mass, begun.of(response.rows()));
+            let found = step.play((&scene, size), &mut response, start)?;
+            effort.see(&found);
+            // Contacts that the step began with often end it.
+            let ended_with = &found.end.pressing;
+            let pressed = pressed.take().filter(|pressed| pressed.forces == *ended_with);
+            let pressed = pressed.unwrap_or_else(|| Pressed::of(&response, &nodes, ended_with));
+            let ended = begun.after(&pressed.displacement, scene.answered());
+            let bodies = scene.object_from_bodies(&found.end.configured());
+            let allowed = 0.5 * self.settings.penetration_rel * size;
+            if !near.add_missed(&bodies, &ended, allowed) {
+                let displacements = ended.values[..wanted.len()].to_vec();
+                let outcome = self.outcome(&scene, &response, &found, displacements);
+                carried.end((&outcome.state, pressed), nodes, ended.values);
+                return Ok(StepOutcome { shapes: 1, ..effort.told(outcome) });
+            }
+            if effort.shapes >= PLAYS_MAX {
+                near.add_all();
+            }
+            start = Start::at(found.end, ended);
+        }
+    }
+
+    /// Some nodes, and behind them the nodes that the step can meet besides.
+    fn with_rows(&self, state: &ObjectState, wanted: &[u32]) -> Vec<u32> {
+        let mut is_named = vec![false; self.vertices.len()];
+        let mut nodes = wanted.to_vec();
+        wanted.iter().for_each(|&node| is_named[node as usize] = true);
+        let is_new = |node: &u32| !std::mem::replace(&mut is_named[*node as usize], true);
+        nodes.extend(self.met(state).filter(is_new));
+        nodes
+    }
+
+    /// Plays the rounds from where they start.
+    fn play<'s>(
+        &'s self,
+        (scene, size): (&'s Scene<'s>, f64),
+        response: &mut Response<'s>,
+        start: Start,
+    ) -> Result<Found, StepError> {
         // What is left of the shape that the step began with: the response is linear.
         let left = 1.0 - scene.answered();
         let unpressed: Vec<Vector3<f64>> = scene.begun.iter().map(|u| left * u).collect();
-        let unpressed = &unpressed;
-        let mut rounds =
-            Rounds { settings, size, scene: &scene, response: &mut response, unpressed };
-        let start = Configured {
-            world_from_object: state.world_from_object,
-            displacement: &scene.begun,
+        let displacement = start.shape.map_or(scene.begun.clone(), |u| u.of(response.rows()));
+        let configured = Configured {
+            world_from_object: start.world_from_object,
+            displacement: &displacement,
             body_forces: &[],
         };
-        let found = rounds.play(self.held(state), &start)?;
-        let displacements = response.displacement_of(wanted, &found.end.forces);
-        Ok(self.outcome(&scene, &response, &found, displacements))
+        let settings = &self.settings;
+        let mut rounds = Rounds { settings, size, scene, response, unpressed: &unpressed };
+        rounds.play(start.held, &configured)
     }
 
     /// Contacts of a state with bodies that are still there.
@@ -186,17 +269,17 @@ impl ContactStep<'_> {
         (high - low).norm()
     }
 
-    /// The response of all nodes that the step can meet.
-    fn response(&self, state: &ObjectState) -> Response<'_> {
-        Response::new(self.elasticity, self.rows(state))
+    /// Nodes that the step can meet, in any order and more than once.
+    fn met<'s>(&'s self, state: &'s ObjectState) -> impl Iterator<Item = u32> + use<'s> {
+        let near = self.candidates.iter().flat_map(|c| self.triangles[c.triangle as usize]);
+        let forced = state.forces.iter().map(|(node, _)| *node);
+        let held = state.contacts.iter().flat_map(|contact| contact.nodes);
+        near.chain(forced).chain(held)
     }
 
     /// All nodes that the step can meet, ascending.
     pub(super) fn rows(&self, state: &ObjectState) -> Vec<u32> {
-        let near = self.candidates.iter().flat_map(|c| self.triangles[c.triangle as usize]);
-        let forced = state.forces.iter().map(|(node, _)| *node);
-        let held = state.contacts.iter().flat_map(|contact| contact.nodes);
-        let mut rows: Vec<u32> = near.chain(forced).chain(held).collect();
+        let mut rows: Vec<u32> = self.met(state).collect();
         rows.sort_unstable();
         rows.dedup();
         rows
@@ -296,84 +379,4 @@ fn drifted(state: &ObjectState, mass: &MassProperties, seconds: f64) -> Isometry
     let turn = UnitQuaternion::from_scaled_axis(seconds * state.angular_velocity);
     let shift = Translation3::from(centre.coords + seconds * state.velocity);
     shift * turn * Translation3::from(-centre.coords) * state.world_from_object
-}
-
-/// Looks at the numbers of settings, bodies and state.
-///
-/// # Errors
-/// [`StepError::Setting`] naming the number, [`StepError::NotFinite`].
-pub(super) fn check(
-    settings: &StepSettings,
-    bodies: &[MovingBody],
-    state: &ObjectState,
-) -> Result<(), StepError> {
-    let setting = |what, value, expected| Err(StepError::Setting { what, value, expected });
-    if !(settings.seconds > 0.0 && settings.seconds.is_finite()) {
-        return setting("the length of the step", settings.seconds, "a positive number of seconds");
-    }
-    if !(settings.viscosity >= 0.0 && settings.viscosity.is_finite()) {
-        return setting("the viscosity", settings.viscosity, "a number of seconds, at least 0");
-    }
-    for body in bodies {
-        if !(body.friction >= 0.0 && body.friction.is_finite()) {
-            return setting("the friction of a body", body.friction, "a number, at least 0");
-        }
-        if !(body.compliance >= 0.0 && body.compliance.is_finite()) {
-            return setting("the compliance of a body", body.compliance, "m/N, at least 0");
-        }
-    }
-    let poses = bodies.iter().flat_map(|b| [b.world_from_body_start, b.world_from_body_end]);
-    let poses_are_finite = poses.into_iter().all(|pose| {
-        pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
-    });
-    let is_weight_finite = settings.gravity.iter().all(|x| x.is_finite());
-    match state.is_finite() && poses_are_finite && is_weight_finite {
-        true => Ok(()),
-        false => Err(StepError::NotFinite),
-    }
-}
-
-/// Looks whether the candidates name triangles and bodies that are there.
-///
-/// # Errors
-/// [`StepError::Candidate`].
-pub(super) fn check_names(
-    candidates: &[Candidate],
-    (triangles, bodies): (usize, usize),
-) -> Result<(), StepError> {
-    let is_there =
-        |c: &Candidate| (c.triangle as usize) < triangles && usize::from(c.body) < bodies;
-    match candidates.iter().position(|named| !is_there(named)) {
-        None => Ok(()),
-        Some(candidate) => {
-            let Candidate { triangle, body } = candidates[candidate];
-            Err(StepError::Candidate { candidate, triangle, triangles, body, bodies })
-        }
-    }
-}
-
-/// Looks whether the state names nodes that are there.
-///
-/// # Errors
-/// [`StepError::Node`].
-pub(super) fn check_nodes(state: &ObjectState, node_count: usize) -> Result<(), StepError> {
-    let held = state.contacts.iter().flat_map(|contact| contact.nodes);
-    let mut named = state.forces.iter().map(|(node, _)| *node).chain(held);
-    match named.find(|node| *node as usize >= node_count) {
-        Some(node) => Err(StepError::Node { node, node_count }),
-        None => Ok(()),
-    }
-}
-
-/// Mass and inertia of the object.
-///
-/// # Errors
-/// [`StepError::Setting`] for a density that gives none.
-pub(super) fn mass_of(
-    body: &FreeBody,
-    settings: &StepSettings,
-) -> Result<MassProperties, StepError> {
-    let (what, value) = ("the density", settings.density);
-    let expected = "a positive number of kg/m³";
-    MassProperties::of(body, value).ok_or(StepError::Setting { what, value, expected })
 }

@@ -76,7 +76,7 @@ impl Object {
         })
     }
 
-    fn with_step<T>(
+    pub(super) fn with_step<T>(
         &self,
         state: &ObjectState,
         bodies: &[MovingBody],

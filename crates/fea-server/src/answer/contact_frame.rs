@@ -1,13 +1,14 @@
 //! Answers one step of a free object among rigid bodies: linear from cached columns of the compliance, or
 //! at large deformation.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
 use softgrasp_core::contact::coulomb::PointState;
 use softgrasp_core::dynamics::{
-    BodyContact, BodyLoad, Candidate, ContactStep, MovingBody, ObjectState, PointContact,
-    SmallSystem, StepSettings,
+    BodyContact, BodyLoad, Candidate, Carried, ContactStep, MovingBody, ObjectState, PointContact,
+    SmallSystem, StepError, StepOutcome, StepSettings,
 };
 use softgrasp_core::fem::StrainSummary;
 use softgrasp_core::fem::hyperelastic::LargeSummary;
@@ -17,8 +18,8 @@ use softgrasp_core::solve::condensed::{Contact, Elasticity};
 use softgrasp_protocol::{
     Answer, BodyContact as ContactMessage, BodyLoad as LoadMessage, ContactAnswer, ContactAsk,
     ContactFrame, ContactPoint, ContactReport, Deformation, Displacements, FieldSet, FieldValues,
-    NodeChoice, PathChoice, Precision, SmallSystem as SmallSystemMessage, SolveReport, Warning,
-    WarningCode, WarningLevel,
+    ModelHash, NodeChoice, PathChoice, Precision, SmallSystem as SmallSystemMessage, SolveReport,
+    Warning, WarningCode, WarningLevel,
 };
 
 use super::contact_large::{LargeWish, Made, PressedSeat};
@@ -27,6 +28,7 @@ use super::large::law_of;
 use super::large_once::promised_error;
 use super::warnings::strain_warnings;
 use crate::clock::{StageClock, ms_since};
+use crate::lock::Lock;
 use crate::machine_memory::last_peak_rss_bytes;
 use crate::plan::columns_ms;
 use crate::refusal::Refusal;
@@ -34,9 +36,17 @@ use crate::request::{bodies_of, name_of, settings_of, state_message, state_of};
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
+/// What a session carries from one step of each of its objects to the next.
+pub(crate) type CarriedSeat = Arc<Lock<BTreeMap<ModelHash, Carried>>>;
+
+/// Objects for which a session carries something: those of a hand, and no more.
+const CARRIED_MAX: usize = 16;
+
 /// A contact frame that has been checked, with all data for its answer.
 pub(crate) struct PosedContact {
+    model: ModelHash,
     stored: Arc<StoredModel>,
+    carried: CarriedSeat,
     state: ObjectState,
     bodies: Vec<MovingBody>,
     triangles: Vec<[u32; 3]>,
@@ -57,7 +67,7 @@ impl PosedContact {
     pub fn new(
         resources: &Resources,
         frame: ContactFrame,
-        seat: PressedSeat,
+        (seat, carried): (PressedSeat, CarriedSeat),
     ) -> Result<Self, Refusal> {
         let ContactFrame {
             model,
@@ -95,7 +105,9 @@ impl PosedContact {
         let law = law_of(ask.law);
         let candidates = (0u32..).zip(&triangle_bodies).map(candidate).collect();
         Ok(Self {
+            model,
             stored,
+            carried,
             state,
             bodies: bodies_of(bodies)?,
             triangles,
@@ -174,7 +186,7 @@ impl PosedContact {
         };
         let mut made = match &self.large {
             Some(wish) => wish.advance(resources, &self.stored, &step, &self.state, &wanted)?,
-            None => Made::linear(step.advance(&self.state, &wanted)?),
+            None => Made::linear(self.advance_linear(&step, &wanted)?),
         };
         let computed = columns.computed().saturating_sub(computed);
         resources.models.trim();
@@ -185,6 +197,24 @@ impl PosedContact {
         stage_ms.encode = ms_since(start);
         answer.answer.report.stage_ms = stage_ms;
         Ok(answer)
+    }
+
+    /// Makes the step by linear elasticity, from what the session has carried if it goes on from there.
+    fn advance_linear(
+        &self,
+        step: &ContactStep<'_>,
+        wanted: &[u32],
+    ) -> Result<StepOutcome, StepError> {
+        let taken = self.carried.with(|carried| carried.remove(&self.model));
+        let mut carried = taken.unwrap_or_default();
+        let made = step.advance_from(&self.state, wanted, &mut carried)?;
+        self.carried.with(|all| {
+            if all.len() >= CARRIED_MAX {
+                all.clear();
+            }
+            all.insert(self.model, carried);
+        });
+        Ok(made)
     }
 
     /// Fields that are wanted for a step. `made` then has the displacements of all nodes, which are

@@ -19,7 +19,7 @@ mod several;
 mod upload;
 mod warnings;
 
-pub(crate) use contact_frame::PosedContact;
+pub(crate) use contact_frame::{CarriedSeat, PosedContact};
 pub(crate) use contact_large::PressedSeat;
 pub(crate) use elsewhere::{
     KeptQuestion, Placed, kept_elsewhere, place_kept, place_once, place_upload,

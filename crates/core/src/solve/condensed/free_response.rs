@@ -1,7 +1,7 @@
 //! Displacements of a few nodes of a free body under forces at a few nodes: what contact asks for.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -62,10 +62,22 @@ impl<'a> Source<'a> {
 pub struct Response<'a> {
     source: Source<'a>,
     rows: Vec<u32>,
-    /// Position of each row among the nodes of the surface; `None` for a node inside.
-    places: Vec<Option<usize>>,
     /// Columns of the held compliance, by node of the force.
-    kept: BTreeMap<u32, Arc<ContactColumns>>,
+    kept: BTreeMap<u32, Kept>,
+}
+
+/// Columns of the forces at one node.
+struct Kept {
+    columns: Arc<ContactColumns>,
+    /// Their blocks of the rows, side by side, once they are asked for: rows are asked for again and again,
+    /// and lie far apart in the columns.
+    of_rows: OnceLock<Vec<Block>>,
+}
+
+impl Kept {
+    fn new(columns: Arc<ContactColumns>) -> Self {
+        Self { columns, of_rows: OnceLock::new() }
+    }
 }
 
 /// Nodes whose displacement one task sums.
@@ -85,9 +97,17 @@ impl<'a> Response<'a> {
     }
 
     fn from(source: Source<'a>, rows: Vec<u32>) -> Self {
-        let surface = &source.base().surface;
-        let places = rows.iter().map(|&node| surface.place_of(node)).collect();
-        Self { source, rows, places, kept: BTreeMap::new() }
+        Self { source, rows, kept: BTreeMap::new() }
+    }
+
+    /// The response of other nodes, with the columns that are there.
+    ///
+    /// Shapes: `rows` ascending nodes.
+    pub fn of_rows(&self, rows: Vec<u32>) -> Self {
+        let mut other = Self::from(self.source, rows);
+        let kept = |(&node, kept): (&u32, &Kept)| (node, Kept::new(Arc::clone(&kept.columns)));
+        other.kept = self.kept.iter().map(kept).collect();
+        other
     }
 
     /// The nodes whose displacement can be asked for, ascending.
@@ -122,7 +142,7 @@ impl<'a> Response<'a> {
                 tangent.columns(base, body, &missing)?
             }
         };
-        self.kept.extend(missing.into_iter().zip(found));
+        self.kept.extend(missing.into_iter().zip(found.into_iter().map(Kept::new)));
         Ok(())
     }
 
@@ -131,13 +151,7 @@ impl<'a> Response<'a> {
     /// # Panics
     /// If the node was not named to [`Response::need`].
     pub fn held(&self, node: u32) -> HeldCompliance<'_> {
-        let columns = &self.kept[&node];
-        let nodes = &self.source.base().surface;
-        HeldCompliance {
-            nodes,
-            surface: columns.surface(nodes),
-            fields: columns.fields.each_ref().map(Vec::as_slice),
-        }
+        HeldCompliance::new(&self.source.base().surface, &self.kept[&node].columns)
     }
 
     /// What inertia takes from the compliance between points whose columns are asked for; nothing where
@@ -183,43 +197,65 @@ impl<'a> Response<'a> {
     }
 
     fn moved_rows(&self, forces: &[NodeForce]) -> Vec<[f64; 3]> {
-        self.moved_nodes(&self.rows, &self.places, forces)
+        let mut u = vec![[0.0; 3]; self.rows.len()];
+        for ((_, force), blocks) in forces.iter().zip(self.blocks_of_rows(forces)) {
+            u.iter_mut().zip(blocks).for_each(|(u, block)| add_moved(u, force, block));
+        }
+        self.relieve(forces, &self.rows, &mut u);
+        u
+    }
+
+    /// The blocks of the rows under forces at some nodes.
+    fn blocks_of_rows(&self, forces: &[NodeForce]) -> Vec<&[Block]> {
+        let of_node = |(node, _): &NodeForce| {
+            let held = self.held(*node);
+            let blocks = || self.rows.iter().map(|&row| held.block(row)).collect();
+            self.kept[node].of_rows.get_or_init(blocks).as_slice()
+        };
+        forces.par_iter().map(of_node).collect()
     }
 
     /// Displacement of any nodes under forces at needed nodes, on the current rayon pool.
     ///
     /// Units: N, m. Frame: the object's.
     pub fn displacement_of(&self, nodes: &[u32], forces: &[NodeForce]) -> Vec<[f64; 3]> {
-        let surface = &self.source.base().surface;
-        let places: Vec<Option<usize>> = nodes.iter().map(|&node| surface.place_of(node)).collect();
-        let mut u = self.moved_nodes(nodes, &places, forces);
+        let [mut u] = self.moved_of(nodes, [forces]);
         self.add_offset(nodes, &mut u);
         u
     }
 
-    /// The part of the displacement of some nodes that is in proportion to forces, in balance with inertia.
+    /// The part of the displacement of any nodes that is in proportion to forces at needed nodes, under
+    /// each of some sets of forces, on the current rayon pool.
     ///
-    /// Shapes: `places` of the nodes among those of the surface, in one order with them.
-    fn moved_nodes(
+    /// Units: N, m. Frame: the object's.
+    pub fn moved_of<const SETS: usize>(
         &self,
         nodes: &[u32],
-        places: &[Option<usize>],
-        forces: &[NodeForce],
-    ) -> Vec<[f64; 3]> {
-        let columns: Vec<(HeldCompliance<'_>, &Vector3<f64>)> =
-            forces.iter().map(|(node, force)| (self.held(*node), force)).collect();
-        let mut u = vec![[0.0; 3]; nodes.len()];
-        // Every node is summed by one task, in the order of the forces.
+        sets: [&[NodeForce]; SETS],
+    ) -> [Vec<[f64; 3]>; SETS] {
+        let surface = &self.source.base().surface;
+        let places: Vec<Option<usize>> = nodes.iter().map(|&node| surface.place_of(node)).collect();
+        let mut columns: BTreeMap<u32, (HeldCompliance<'_>, [Vector3<f64>; SETS])> =
+            BTreeMap::new();
+        for (set, forces) in sets.iter().enumerate() {
+            for (node, force) in *forces {
+                let none = || (self.held(*node), [Vector3::zeros(); SETS]);
+                columns.entry(*node).or_insert_with(none).1[set] += force;
+            }
+        }
+        let columns: Vec<_> = columns.into_values().collect();
+        let mut u = vec![[[0.0; 3]; SETS]; nodes.len()];
+        // Every node is summed by one task, in the order of the nodes with a force; its block of a column
+        // is read once for all sets.
         let tasks = u
             .par_chunks_mut(TASK_NODES)
             .zip(nodes.par_chunks(TASK_NODES).zip(places.par_chunks(TASK_NODES)));
-        tasks.for_each(|(u, (nodes, places))| {
-            for (columns, force) in &columns {
-                columns.add(force, (nodes, places), u);
-            }
-        });
-        self.relieve(forces, nodes, &mut u);
-        u
+        tasks.for_each(|(u, at)| columns.iter().for_each(|(held, forces)| held.add(forces, at, u)));
+        std::array::from_fn(|set| {
+            let mut of_set: Vec<[f64; 3]> = u.iter().map(|of_node| of_node[set]).collect();
+            self.relieve(sets[set], nodes, &mut of_set);
+            of_set
+        })
     }
 
     /// `‖K u − P f‖ / ‖f‖` at most, by the residuals of the columns as computed; of a linear body.
@@ -227,7 +263,7 @@ impl<'a> Response<'a> {
         let Source::Linear(elasticity) = self.source else { return f64::NAN };
         let (mut residual, mut square) = (0.0, 0.0);
         for (node, force) in forces {
-            let columns = &self.kept[node];
+            let columns = &self.kept[node].columns;
             residual += (0..3).map(|c| force[c].abs() * columns.residuals[c]).sum::<f64>();
             square += force.norm_squared();
         }
@@ -246,7 +282,12 @@ pub struct HeldCompliance<'a> {
     fields: [&'a [f64]; 3],
 }
 
-impl HeldCompliance<'_> {
+impl<'a> HeldCompliance<'a> {
+    fn new(nodes: &'a SurfaceNodes, columns: &'a ContactColumns) -> Self {
+        let fields = columns.fields.each_ref().map(Vec::as_slice);
+        Self { nodes, surface: columns.surface(nodes), fields }
+    }
+
     /// Displacement of a node, rows, by axis of the force, columns.
     pub fn at(&self, node: u32) -> Matrix3<f64> {
         Matrix3::from_column_slice(&self.block(node))
@@ -263,17 +304,20 @@ impl HeldCompliance<'_> {
         }
     }
 
-    /// Adds what a force does to some nodes, whose places among those of the surface are known.
-    fn add(
+    /// Adds what some forces do to some nodes, whose places among those of the surface are known.
+    fn add<const SETS: usize>(
         &self,
-        force: &Vector3<f64>,
+        forces: &[Vector3<f64>; SETS],
         (nodes, places): (&[u32], &[Option<usize>]),
-        displacement: &mut [[f64; 3]],
+        displacement: &mut [[[f64; 3]; SETS]],
     ) {
+        let add = |u: &mut [[f64; 3]; SETS], block: &Block| {
+            u.iter_mut().zip(forces).for_each(|(u, force)| add_moved(u, force, block));
+        };
         for ((u, &node), place) in displacement.iter_mut().zip(nodes).zip(places) {
             match place {
-                Some(place) => add_moved(u, force, &self.surface[*place]),
-                None => add_moved(u, force, &self.block(node)),
+                Some(place) => add(u, &self.surface[*place]),
+                None => add(u, &self.block(node)),
             }
         }
     }

@@ -1,0 +1,162 @@
+//! Candidates that are near their body where a step begins; the others are looked at once, where it ends.
+//!
+//! A run names every triangle that a body can reach in the worst case, ten times those that it touches. The
+//! rounds look at each candidate again and again, so they are played with the near ones. Where another one
+//! is inside its body at the end, it joins them and the rounds go on from there.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::bodies::MovingBody;
+use super::features::{Candidate, deepest};
+use super::state::ObjectState;
+use super::step::ContactStep;
+
+/// Displacements of some nodes, found by node.
+pub(super) struct NodeField {
+    /// Position of every node of the mesh among the values; [`NodeField::ABSENT`] for a node without one.
+    place: Vec<u32>,
+    pub values: Vec<[f64; 3]>,
+}
+
+impl NodeField {
+    const ABSENT: u32 = u32::MAX;
+
+    /// Shapes: one value for each of `nodes`. Units: m. Frame: the object's.
+    pub fn new(nodes: &[u32], values: Vec<[f64; 3]>, node_count: usize) -> Self {
+        let mut place = vec![Self::ABSENT; node_count];
+        for (at, &node) in (0u32..).zip(nodes) {
+            place[node as usize] = at;
+        }
+        Self { place, values }
+    }
+
+    /// Displacement of a node; zero for one without a value.
+    pub fn at(&self, node: u32) -> Vector3<f64> {
+        self.values.get(self.place[node as usize] as usize).copied().unwrap_or_default().into()
+    }
+
+    /// The field at the end of a step that it begins, in which the contact forces alone would give the same
+    /// nodes other displacements: of these a share is answered, and the rest is left of what was.
+    pub fn after(&self, pressed: &[[f64; 3]], answered: f64) -> Self {
+        let left = 1.0 - answered;
+        let mix = |(pressed, begun): (&[f64; 3], &[f64; 3])| {
+            std::array::from_fn(|axis| left * begun[axis] + answered * pressed[axis])
+        };
+        let values = pressed.iter().zip(&self.values).map(mix).collect();
+        Self { place: self.place.clone(), values }
+    }
+
+    /// Displacements of some nodes, in their order.
+    pub fn of(&self, nodes: &[u32]) -> Vec<Vector3<f64>> {
+        nodes.iter().map(|&node| self.at(node)).collect()
+    }
+}
+
+/// The candidates of a step, and which of them the rounds look at.
+pub(super) struct NearCandidates<'a> {
+    step: &'a ContactStep<'a>,
+    is_near: Vec<bool>,
+}
+
+impl<'a> NearCandidates<'a> {
+    /// The candidates within a distance of their body: of where it is at the beginning or where it would end
+    /// if no force pushed it back, seen from an object that is placed as it is then or there.
+    ///
+    /// Units: `distance` m.
+    pub fn choose(
+        step: &'a ContactStep<'a>,
+        (state, drifted): (&ObjectState, &Isometry3<f64>),
+        begun: &NodeField,
+        distance: f64,
+    ) -> Self {
+        let (from_start, from_end) = (state.world_from_object.inverse(), drifted.inverse());
+        let poses = |body: &MovingBody| {
+            [from_start * body.world_from_body_start, from_end * body.world_from_body_end]
+        };
+        let poses: Vec<[Isometry3<f64>; 2]> = step.bodies.iter().map(poses).collect();
+        let is_near = |candidate: &Candidate| {
+            let body = usize::from(candidate.body);
+            let triangle = Triangle::of(step, candidate, begun);
+            poses[body].iter().any(|pose| triangle.is_within(&step.bodies[body], pose, distance))
+        };
+        Self { step, is_near: step.candidates.iter().map(is_near).collect() }
+    }
+
+    /// Makes all of them near.
+    pub fn add_all(&mut self) {
+        self.is_near.fill(true);
+    }
+
+    /// The near ones, in the order of all.
+    pub fn chosen(&self) -> Vec<Candidate> {
+        let both = self.step.candidates.iter().zip(&self.is_near);
+        both.filter(|(_, is_near)| **is_near).map(|(candidate, _)| *candidate).collect()
+    }
+
+    /// Makes those near that reach deeper into their body than allowed; says whether there were any.
+    ///
+    /// Shapes: `object_from_bodies` one pose for each body. Units: m.
+    pub fn add_missed(
+        &mut self,
+        object_from_bodies: &[Isometry3<f64>],
+        ended: &NodeField,
+        allowed: f64,
+    ) -> bool {
+        let mut has_missed = false;
+        for (candidate, is_near) in self.step.candidates.iter().zip(&mut self.is_near) {
+            let body = usize::from(candidate.body);
+            if !*is_near {
+                let triangle = Triangle::of(self.step, candidate, ended);
+                *is_near =
+                    triangle.depth(&self.step.bodies[body], &object_from_bodies[body]) > allowed;
+                has_missed |= *is_near;
+            }
+        }
+        has_missed
+    }
+}
+
+/// A triangle of the surface in the object's frame.
+struct Triangle {
+    corners: [Vector3<f64>; 3],
+    middle: Point3<f64>,
+    /// Distance of the farthest corner from the middle, m.
+    reach: f64,
+}
+
+impl Triangle {
+    fn of(step: &ContactStep<'_>, candidate: &Candidate, displacement: &NodeField) -> Self {
+        let nodes = step.triangles[candidate.triangle as usize];
+        let corners = nodes.map(|node| step.vertices[node as usize].coords + displacement.at(node));
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let square = corners.iter().map(|c| (c - middle).norm_squared()).fold(0.0, f64::max);
+        Self { corners, middle: middle.into(), reach: square.sqrt() }
+    }
+
+    /// Whether a point of it can be within a distance of a body, m.
+    fn is_within(
+        &self,
+        body: &MovingBody,
+        object_from_body: &Isometry3<f64>,
+        distance: f64,
+    ) -> bool {
+        // No point is nearer than the middle by more than its distance from there.
+        let middle = object_from_body.inverse_transform_point(&self.middle);
+        let far = body.shape.distance(&middle).distance > distance + self.reach;
+        !far
+    }
+
+    /// How deep it reaches into a body, m; at most 0 where it does not.
+    fn depth(&self, body: &MovingBody, object_from_body: &Isometry3<f64>) -> f64 {
+        if !self.is_within(body, object_from_body, 0.0) {
+            return 0.0;
+        }
+        let of_corner = |corner: &Vector3<f64>| {
+            let in_body = object_from_body.inverse_transform_point(&Point3::from(*corner));
+            -body.shape.distance(&in_body).distance
+        };
+        let inside = deepest(&self.corners, &body.shape, object_from_body);
+        let inside = inside.map(|found| -found.distance.distance);
+        self.corners.iter().map(of_corner).chain(inside).fold(0.0, f64::max)
+    }
+}
