@@ -109,6 +109,38 @@ fn a_small_system_is_made_where_it_is_asked_for_only() {
     assert!(alone.contacts.is_empty() && alone.compliance.is_empty());
 }
 
+/// The bodies in a world that is turned.
+fn turned_bodies(bodies: &[MovingBody], turn: &Isometry3<f64>) -> Vec<MovingBody> {
+    let turned = |body: &MovingBody| MovingBody {
+        world_from_body_start: turn * body.world_from_body_start,
+        world_from_body_end: turn * body.world_from_body_end,
+        ..body.clone()
+    };
+    bodies.iter().map(turned).collect()
+}
+
+/// Friction of 4, and fingers a millimetre deep in an object that nothing has touched before.
+#[test]
+fn a_grip_that_begins_deep_is_solved_whichever_way_the_world_is_turned() {
+    let object = Object::sized(BuiltIn::Sphere, 200, 0.03, 20e3, 0.45);
+    let bodies = pinched(&[Vector3::zeros(); 2], 4.0);
+    let weightless = StepSettings { gravity: Vector3::zeros(), ..settings() };
+    let loads = |angle: f64| {
+        let turn = Isometry3::rotation(angle * Vector3::new(0.4, -0.2, 0.9));
+        let state = ObjectState::at_rest(turn * at(0.0, 0.0, 0.0145));
+        let found = object.advance(&state, &turned_bodies(&bodies, &turn), weightless);
+        assert!(found.is_converged, "turned by {angle}");
+        found.loads.iter().map(|load| load.normal_force).collect::<Vec<f64>>()
+    };
+    let straight = loads(0.0);
+    assert!(straight.iter().all(|force| *force > 0.1), "{straight:?}");
+    for angle in 1..24 {
+        for (force, expected) in loads(0.125 * f64::from(angle)).iter().zip(&straight) {
+            assert!((force - expected).abs() < 1e-9 * expected, "turned by {angle} / 8: {force}");
+        }
+    }
+}
+
 #[test]
 fn a_turned_world_turns_the_small_system() {
     let object = Object::sized(BuiltIn::Sphere, 200, 0.03, 20e3, 0.45);
@@ -116,17 +148,12 @@ fn a_turned_world_turns_the_small_system() {
     let state = ObjectState::at_rest(at(0.0, 0.0, 0.0145));
     let turned_state = ObjectState::at_rest(turn * at(0.0, 0.0, 0.0145));
     let bodies = pinched(&[Vector3::zeros(); 2], 4.0);
-    let turned_bodies: Vec<MovingBody> = bodies
-        .iter()
-        .map(|body| MovingBody {
-            world_from_body_start: turn * body.world_from_body_start,
-            world_from_body_end: turn * body.world_from_body_end,
-            ..body.clone()
-        })
-        .collect();
     let weightless = StepSettings { gravity: Vector3::zeros(), ..settings() };
     let one = object.advance(&state, &bodies, weightless).small_system.unwrap();
-    let other = object.advance(&turned_state, &turned_bodies, weightless).small_system.unwrap();
+    let other = object
+        .advance(&turned_state, &turned_bodies(&bodies, &turn), weightless)
+        .small_system
+        .unwrap();
     assert_eq!(one.contacts.len(), other.contacts.len());
     let rotation = turn.rotation.to_rotation_matrix();
     for i in 0..one.contacts.len() {

@@ -169,6 +169,7 @@ impl ContactStep<'_> {
             let candidates = near.chosen();
             let step = ContactStep { candidates: &candidates, ..*self };
             let mut response = columns.of_rows(step.rows(state));
+            response.need(at_nodes(&start.held).iter().map(|(node, _)| *node))?;
             let scene = step.scene(state, mass, begun.of(response.rows()));
             let found = step.play((&scene, size), &mut response, start)?;
             effort.see(&found);

@@ -103,6 +103,17 @@ impl ContactProblem {
         points.flat_map(|(point, law)| <[f64; 3]>::from(law.project(at(lambda, point)))).collect()
     }
 
+    /// The problem with a share of every point's friction.
+    pub(super) fn with_friction(&self, share: f64) -> Self {
+        let laws = self.laws.iter().map(|law| match *law {
+            PointLaw::Contact(FrictionCone { friction }) => {
+                PointLaw::Contact(FrictionCone { friction: share * friction })
+            }
+            spring => spring,
+        });
+        Self { laws: laws.collect(), ..self.clone() }
+    }
+
     /// Contact problem of some points alone.
     pub(super) fn of_points(&self, points: &[usize]) -> Self {
         let row = |k: usize| 3 * points[k / 3] + k % 3;

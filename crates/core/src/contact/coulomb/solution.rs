@@ -75,6 +75,9 @@ const SPLITTING_SHARES: [f64; 3] = [1.0, 0.1, 0.005];
 const NEAR: f64 = 0.1;
 /// The splitting begins anew at what Newton's method found where that left no more than this.
 const LEFT_TO_BEGIN_ANEW: f64 = 0.2;
+/// Shares of friction that are solved for one after the other where forces were not found: without friction
+/// they are those of a convex problem.
+const FRICTION_SHARES: [f64; 3] = [0.0, 0.3, 1.0];
 /// Over the largest force, or a newton, a residual that is no approximation of anything.
 const RUNAWAY: f64 = 10.0;
 
@@ -193,10 +196,31 @@ impl Solution {
         Self { sweeps, newton_steps, ..whole }
     }
 
-    /// The forces of all points at once, from some to begin with, each in its cone.
+    /// The forces of all points at once, from some to begin with, each in its cone; where they are not found
+    /// from there, from those of less friction.
     ///
     /// Shapes: `lambda` 3n, N.
     fn of_whole(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget) -> Self {
+        let mut best = Self::from_forces(problem, lambda, budget);
+        let (mut sweeps, mut newton_steps) = (best.sweeps, best.newton_steps);
+        let mut lambda = best.lambda.clone();
+        for share in if best.is_converged { &[][..] } else { &FRICTION_SHARES } {
+            let eased = problem.with_friction(*share);
+            let found = Self::from_forces(&eased, eased.projected(&lambda), budget);
+            sweeps += found.sweeps;
+            newton_steps += found.newton_steps;
+            lambda.clone_from(&found.lambda);
+            if *share == 1.0 && found.residual < best.residual {
+                best = found;
+            }
+        }
+        Self { sweeps, newton_steps, ..best }
+    }
+
+    /// The forces of all points at once, from some to begin with, each in its cone.
+    ///
+    /// Shapes: `lambda` 3n, N.
+    fn from_forces(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget) -> Self {
         let mut now = Forces::new(problem, lambda);
         let mut best = now.clone();
         let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
