@@ -27,8 +27,6 @@ pub(super) struct Scene<'a> {
 pub(super) struct Configuration {
     pub contacts: Vec<HeldContact>,
     pub motion: RigidMotion,
-    /// Forces of the contacts at their nodes.
-    pub pressing: Vec<NodeForce>,
     /// Forces whose elastic response is the shape.
     pub forces: Vec<NodeForce>,
     /// Displacement of the response's rows.
@@ -83,7 +81,7 @@ impl Scene<'_> {
         let mut displacement = response.moved(&new);
         displacement.iter_mut().zip(unpressed).for_each(|(u, unpressed)| *u += unpressed);
         let forces = self.elastic_forces(&pressing);
-        Configuration { contacts, motion, pressing, forces, displacement, body_forces }
+        Configuration { contacts, motion, forces, displacement, body_forces }
     }
 
     /// Where a point of the surface is in the object's frame.

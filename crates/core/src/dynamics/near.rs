@@ -35,17 +35,6 @@ impl NodeField {
         self.values.get(self.place[node as usize] as usize).copied().unwrap_or_default().into()
     }
 
-    /// The field at the end of a step that it begins, in which the contact forces alone would give the same
-    /// nodes other displacements: of these a share is answered, and the rest is left of what was.
-    pub fn after(&self, pressed: &[[f64; 3]], answered: f64) -> Self {
-        let left = 1.0 - answered;
-        let mix = |(pressed, begun): (&[f64; 3], &[f64; 3])| {
-            std::array::from_fn(|axis| left * begun[axis] + answered * pressed[axis])
-        };
-        let values = pressed.iter().zip(&self.values).map(mix).collect();
-        Self { place: self.place.clone(), values }
-    }
-
     /// Displacements of some nodes, in their order.
     pub fn of(&self, nodes: &[u32]) -> Vec<Vector3<f64>> {
         nodes.iter().map(|&node| self.at(node)).collect()

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::assemble::ProblemPoint;
 use super::bodies::MovingBody;
-use super::carried::{Carried, Pressed};
+use super::carried::Carried;
 use super::checks::{check, check_names, check_nodes, mass_of};
 use super::configuration::{Configuration, Configured, Scene, sums_by_body};
 use super::features::{Candidate, merged};
@@ -76,8 +76,8 @@ impl ContactStep<'_> {
         self.advance_from(state, wanted, &mut Carried::default())
     }
 
-    /// Makes the step as [`ContactStep::advance`] does, quicker where it goes on from the state that
-    /// another step has ended with: the same to rounding. Carries what the next step begins with.
+    /// Makes the step as [`ContactStep::advance`] does, to the bit, and quicker where it goes on from the
+    /// state that another step has ended with. Carries what the next step begins with.
     ///
     /// # Errors
     /// [`StepError`]; nothing is carried then.
@@ -157,10 +157,10 @@ impl ContactStep<'_> {
     ) -> Result<StepOutcome, StepError> {
         let mut columns = Response::new(self.elasticity, Vec::new());
         let (held, size) = (self.held(state), self.size());
-        let forces = at_nodes(&held);
-        columns.need(state.forces.iter().chain(&forces).map(|(node, _)| *node))?;
-        let nodes = self.with_rows(state, wanted);
-        let (begun, mut pressed) = carried.begin((self, &columns), (state, forces), &nodes);
+        columns.need(state.forces.iter().map(|(node, _)| *node))?;
+        let (nodes, node_count) = (self.with_rows(state, wanted), self.vertices.len());
+        let begun = carried.begin(&columns, state, &nodes);
+        let begun = NodeField::new(&nodes, begun, node_count);
         let drifted = drifted(state, &mass, self.settings.seconds);
         let mut near = NearCandidates::choose(self, (state, &drifted), &begun, NEAR * size);
         let mut start = Start { held, world_from_object: state.world_from_object, shape: None };
@@ -173,17 +173,14 @@ impl ContactStep<'_> {
             let scene = step.scene(state, mass, begun.of(response.rows()));
             let found = step.play((&scene, size), &mut response, start)?;
             effort.see(&found);
-            // Contacts that the step began with often end it.
-            let ended_with = &found.end.pressing;
-            let pressed = pressed.take().filter(|pressed| pressed.forces == *ended_with);
-            let pressed = pressed.unwrap_or_else(|| Pressed::of(&response, &nodes, ended_with));
-            let ended = begun.after(&pressed.displacement, scene.answered());
+            let ended = response.displacement_of(&nodes, &found.end.forces);
+            let ended = NodeField::new(&nodes, ended, node_count);
             let bodies = scene.object_from_bodies(&found.end.configured());
             let allowed = 0.5 * self.settings.penetration_rel * size;
             if !near.add_missed(&bodies, &ended, allowed) {
                 let displacements = ended.values[..wanted.len()].to_vec();
                 let outcome = self.outcome(&scene, &response, &found, displacements);
-                carried.end((&outcome.state, pressed), nodes, ended.values);
+                carried.end(&outcome.state, nodes, ended.values);
                 return Ok(StepOutcome { shapes: 1, ..effort.told(outcome) });
             }
             if effort.shapes >= PLAYS_MAX {

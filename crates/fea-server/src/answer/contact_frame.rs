@@ -47,8 +47,6 @@ pub(crate) struct PosedContact {
     model: ModelHash,
     stored: Arc<StoredModel>,
     carried: CarriedSeat,
-    /// Whether the client does not go on from the session's last step.
-    from_rest: bool,
     state: ObjectState,
     bodies: Vec<MovingBody>,
     triangles: Vec<[u32; 3]>,
@@ -110,7 +108,6 @@ impl PosedContact {
             model,
             stored,
             carried,
-            from_rest: ask.path == PathChoice::FromRest,
             state,
             bodies: bodies_of(bodies)?,
             triangles,
@@ -202,15 +199,15 @@ impl PosedContact {
         Ok(answer)
     }
 
-    /// Makes the step by linear elasticity, from what the session has carried if it goes on from there. A
-    /// client that has given up a step says so: a replay, which never asks for that step, gets the same bits.
+    /// Makes the step by linear elasticity, from what the session has carried if it goes on from there: the
+    /// same answer, to the bit.
     fn advance_linear(
         &self,
         step: &ContactStep<'_>,
         wanted: &[u32],
     ) -> Result<StepOutcome, StepError> {
         let taken = self.carried.with(|carried| carried.remove(&self.model));
-        let mut carried = taken.filter(|_| !self.from_rest).unwrap_or_default();
+        let mut carried = taken.unwrap_or_default();
         let made = step.advance_from(&self.state, wanted, &mut carried)?;
         self.carried.with(|all| {
             if all.len() >= CARRIED_MAX {

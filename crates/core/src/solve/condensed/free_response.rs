@@ -219,43 +219,19 @@ impl<'a> Response<'a> {
     ///
     /// Units: N, m. Frame: the object's.
     pub fn displacement_of(&self, nodes: &[u32], forces: &[NodeForce]) -> Vec<[f64; 3]> {
-        let [mut u] = self.moved_of(nodes, [forces]);
-        self.add_offset(nodes, &mut u);
-        u
-    }
-
-    /// The part of the displacement of any nodes that is in proportion to forces at needed nodes, under
-    /// each of some sets of forces, on the current rayon pool.
-    ///
-    /// Units: N, m. Frame: the object's.
-    pub fn moved_of<const SETS: usize>(
-        &self,
-        nodes: &[u32],
-        sets: [&[NodeForce]; SETS],
-    ) -> [Vec<[f64; 3]>; SETS] {
         let surface = &self.source.base().surface;
         let places: Vec<Option<usize>> = nodes.iter().map(|&node| surface.place_of(node)).collect();
-        let mut columns: BTreeMap<u32, (HeldCompliance<'_>, [Vector3<f64>; SETS])> =
-            BTreeMap::new();
-        for (set, forces) in sets.iter().enumerate() {
-            for (node, force) in *forces {
-                let none = || (self.held(*node), [Vector3::zeros(); SETS]);
-                columns.entry(*node).or_insert_with(none).1[set] += force;
-            }
-        }
-        let columns: Vec<_> = columns.into_values().collect();
-        let mut u = vec![[[0.0; 3]; SETS]; nodes.len()];
-        // Every node is summed by one task, in the order of the nodes with a force; its block of a column
-        // is read once for all sets.
+        let columns: Vec<(HeldCompliance<'_>, &Vector3<f64>)> =
+            forces.iter().map(|(node, force)| (self.held(*node), force)).collect();
+        let mut u = vec![[0.0; 3]; nodes.len()];
+        // Every node is summed by one task, in the order of the forces.
         let tasks = u
             .par_chunks_mut(TASK_NODES)
             .zip(nodes.par_chunks(TASK_NODES).zip(places.par_chunks(TASK_NODES)));
-        tasks.for_each(|(u, at)| columns.iter().for_each(|(held, forces)| held.add(forces, at, u)));
-        std::array::from_fn(|set| {
-            let mut of_set: Vec<[f64; 3]> = u.iter().map(|of_node| of_node[set]).collect();
-            self.relieve(sets[set], nodes, &mut of_set);
-            of_set
-        })
+        tasks.for_each(|(u, at)| columns.iter().for_each(|(held, force)| held.add(force, at, u)));
+        self.relieve(forces, nodes, &mut u);
+        self.add_offset(nodes, &mut u);
+        u
     }
 
     /// `‖K u − P f‖ / ‖f‖` at most, by the residuals of the columns as computed; of a linear body.
@@ -304,20 +280,17 @@ impl<'a> HeldCompliance<'a> {
         }
     }
 
-    /// Adds what some forces do to some nodes, whose places among those of the surface are known.
-    fn add<const SETS: usize>(
+    /// Adds what a force does to some nodes, whose places among those of the surface are known.
+    fn add(
         &self,
-        forces: &[Vector3<f64>; SETS],
+        force: &Vector3<f64>,
         (nodes, places): (&[u32], &[Option<usize>]),
-        displacement: &mut [[[f64; 3]; SETS]],
+        displacement: &mut [[f64; 3]],
     ) {
-        let add = |u: &mut [[f64; 3]; SETS], block: &Block| {
-            u.iter_mut().zip(forces).for_each(|(u, force)| add_moved(u, force, block));
-        };
         for ((u, &node), place) in displacement.iter_mut().zip(nodes).zip(places) {
             match place {
-                Some(place) => add(u, &self.surface[*place]),
-                None => add(u, &self.block(node)),
+                Some(place) => add_moved(u, force, &self.surface[*place]),
+                None => add_moved(u, force, &self.block(node)),
             }
         }
     }
