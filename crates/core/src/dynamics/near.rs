@@ -9,7 +9,6 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::bodies::MovingBody;
 use super::features::{Candidate, deepest};
 use super::state::ObjectState;
-use super::step::ContactStep;
 
 /// Displacements of some nodes, found by node.
 pub(super) struct NodeField {
@@ -41,9 +40,20 @@ impl NodeField {
     }
 }
 
+/// What can touch in a step.
+#[derive(Clone, Copy)]
+pub(super) struct Around<'a> {
+    /// Places of all nodes at rest, in the object's frame.
+    pub vertices: &'a [Point3<f64>],
+    /// Triangles of the boundary surface.
+    pub triangles: &'a [[u32; 3]],
+    pub bodies: &'a [MovingBody],
+    pub candidates: &'a [Candidate],
+}
+
 /// The candidates of a step, and which of them the rounds look at.
 pub(super) struct NearCandidates<'a> {
-    step: &'a ContactStep<'a>,
+    around: Around<'a>,
     is_near: Vec<bool>,
 }
 
@@ -53,7 +63,7 @@ impl<'a> NearCandidates<'a> {
     ///
     /// Units: `distance` m.
     pub fn choose(
-        step: &'a ContactStep<'a>,
+        around: Around<'a>,
         (state, drifted): (&ObjectState, &Isometry3<f64>),
         begun: &NodeField,
         distance: f64,
@@ -62,13 +72,13 @@ impl<'a> NearCandidates<'a> {
         let poses = |body: &MovingBody| {
             [from_start * body.world_from_body_start, from_end * body.world_from_body_end]
         };
-        let poses: Vec<[Isometry3<f64>; 2]> = step.bodies.iter().map(poses).collect();
+        let poses: Vec<[Isometry3<f64>; 2]> = around.bodies.iter().map(poses).collect();
         let is_near = |candidate: &Candidate| {
             let body = usize::from(candidate.body);
-            let triangle = Triangle::of(step, candidate, begun);
-            poses[body].iter().any(|pose| triangle.is_within(&step.bodies[body], pose, distance))
+            let triangle = Triangle::of(&around, candidate, begun);
+            poses[body].iter().any(|pose| triangle.is_within(&around.bodies[body], pose, distance))
         };
-        Self { step, is_near: step.candidates.iter().map(is_near).collect() }
+        Self { around, is_near: around.candidates.iter().map(is_near).collect() }
     }
 
     /// Makes all of them near.
@@ -78,7 +88,7 @@ impl<'a> NearCandidates<'a> {
 
     /// The near ones, in the order of all.
     pub fn chosen(&self) -> Vec<Candidate> {
-        let both = self.step.candidates.iter().zip(&self.is_near);
+        let both = self.around.candidates.iter().zip(&self.is_near);
         both.filter(|(_, is_near)| **is_near).map(|(candidate, _)| *candidate).collect()
     }
 
@@ -92,12 +102,12 @@ impl<'a> NearCandidates<'a> {
         allowed: f64,
     ) -> bool {
         let mut has_missed = false;
-        for (candidate, is_near) in self.step.candidates.iter().zip(&mut self.is_near) {
+        for (candidate, is_near) in self.around.candidates.iter().zip(&mut self.is_near) {
             let body = usize::from(candidate.body);
             if !*is_near {
-                let triangle = Triangle::of(self.step, candidate, ended);
+                let triangle = Triangle::of(&self.around, candidate, ended);
                 *is_near =
-                    triangle.depth(&self.step.bodies[body], &object_from_bodies[body]) > allowed;
+                    triangle.depth(&self.around.bodies[body], &object_from_bodies[body]) > allowed;
                 has_missed |= *is_near;
             }
         }
@@ -114,9 +124,10 @@ struct Triangle {
 }
 
 impl Triangle {
-    fn of(step: &ContactStep<'_>, candidate: &Candidate, displacement: &NodeField) -> Self {
-        let nodes = step.triangles[candidate.triangle as usize];
-        let corners = nodes.map(|node| step.vertices[node as usize].coords + displacement.at(node));
+    fn of(around: &Around<'_>, candidate: &Candidate, displacement: &NodeField) -> Self {
+        let nodes = around.triangles[candidate.triangle as usize];
+        let corners =
+            nodes.map(|node| around.vertices[node as usize].coords + displacement.at(node));
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         let square = corners.iter().map(|c| (c - middle).norm_squared()).fold(0.0, f64::max);
         Self { corners, middle: middle.into(), reach: square.sqrt() }

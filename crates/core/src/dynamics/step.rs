@@ -10,7 +10,7 @@ use super::carried::Carried;
 use super::checks::{check, check_names, check_nodes, mass_of};
 use super::configuration::{Configuration, Configured, Scene, sums_by_body};
 use super::features::{Candidate, merged};
-use super::near::{NearCandidates, NodeField};
+use super::near::{Around, NearCandidates, NodeField};
 use super::resultants::small_system;
 use super::rigid_motion::{MassProperties, RigidStep};
 use super::rounds::{Effort, Found, Rounds};
@@ -162,7 +162,8 @@ impl ContactStep<'_> {
         let begun = carried.begin(&columns, state, &nodes);
         let begun = NodeField::new(&nodes, begun, node_count);
         let drifted = drifted(state, &mass, self.settings.seconds);
-        let mut near = NearCandidates::choose(self, (state, &drifted), &begun, NEAR * size);
+        let mut near =
+            NearCandidates::choose(self.around(), (state, &drifted), &begun, NEAR * size);
         let mut start = Start { held, world_from_object: state.world_from_object, shape: None };
         let mut effort = Effort::default();
         loop {
@@ -188,6 +189,12 @@ impl ContactStep<'_> {
             }
             start = Start::at(found.end, ended);
         }
+    }
+
+    /// What can touch in the step.
+    fn around(&self) -> Around<'_> {
+        let Self { vertices, triangles, bodies, candidates, .. } = *self;
+        Around { vertices, triangles, bodies, candidates }
     }
 
     /// Some nodes, and behind them the nodes that the step can meet besides.

@@ -1,7 +1,7 @@
 //! Displacements of a few nodes of a free body under forces at a few nodes: what contact asks for.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -69,15 +69,9 @@ pub struct Response<'a> {
 /// Columns of the forces at one node.
 struct Kept {
     columns: Arc<ContactColumns>,
-    /// Their blocks of the rows, side by side, once they are asked for: rows are asked for again and again,
-    /// and lie far apart in the columns.
-    of_rows: OnceLock<Vec<Block>>,
-}
-
-impl Kept {
-    fn new(columns: Arc<ContactColumns>) -> Self {
-        Self { columns, of_rows: OnceLock::new() }
-    }
+    /// Their blocks of the rows, side by side: rows are asked for again and again, and lie far apart in the
+    /// columns.
+    of_rows: Vec<Block>,
 }
 
 /// Nodes whose displacement one task sums.
@@ -105,8 +99,8 @@ impl<'a> Response<'a> {
     /// Shapes: `rows` ascending nodes.
     pub fn of_rows(&self, rows: Vec<u32>) -> Self {
         let mut other = Self::from(self.source, rows);
-        let kept = |(&node, kept): (&u32, &Kept)| (node, Kept::new(Arc::clone(&kept.columns)));
-        other.kept = self.kept.iter().map(kept).collect();
+        let kept = |(&node, kept): (&u32, &Kept)| (node, Arc::clone(&kept.columns));
+        other.keep(self.kept.iter().map(kept).collect());
         other
     }
 
@@ -142,8 +136,20 @@ impl<'a> Response<'a> {
                 tangent.columns(base, body, &missing)?
             }
         };
-        self.kept.extend(missing.into_iter().zip(found.into_iter().map(Kept::new)));
+        self.keep(missing.into_iter().zip(found).collect());
         Ok(())
+    }
+
+    /// Keeps columns of some nodes, with their blocks of the rows.
+    fn keep(&mut self, found: Vec<(u32, Arc<ContactColumns>)>) {
+        let (nodes, rows) = (&self.source.base().surface, &self.rows);
+        let kept = |(node, columns): (u32, Arc<ContactColumns>)| {
+            let held = HeldCompliance::new(nodes, &columns);
+            let of_rows = rows.iter().map(|&row| held.block(row)).collect();
+            (node, Kept { columns, of_rows })
+        };
+        let kept: Vec<(u32, Kept)> = found.into_par_iter().map(kept).collect();
+        self.kept.extend(kept);
     }
 
     /// Held compliance of all nodes under forces at one.
@@ -198,21 +204,11 @@ impl<'a> Response<'a> {
 
     fn moved_rows(&self, forces: &[NodeForce]) -> Vec<[f64; 3]> {
         let mut u = vec![[0.0; 3]; self.rows.len()];
-        for ((_, force), blocks) in forces.iter().zip(self.blocks_of_rows(forces)) {
-            u.iter_mut().zip(blocks).for_each(|(u, block)| add_moved(u, force, block));
+        for (node, force) in forces {
+            u.iter_mut().zip(&self.kept[node].of_rows).for_each(|(u, b)| add_moved(u, force, b));
         }
         self.relieve(forces, &self.rows, &mut u);
         u
-    }
-
-    /// The blocks of the rows under forces at some nodes.
-    fn blocks_of_rows(&self, forces: &[NodeForce]) -> Vec<&[Block]> {
-        let of_node = |(node, _): &NodeForce| {
-            let held = self.held(*node);
-            let blocks = || self.rows.iter().map(|&row| held.block(row)).collect();
-            self.kept[node].of_rows.get_or_init(blocks).as_slice()
-        };
-        forces.par_iter().map(of_node).collect()
     }
 
     /// Displacement of any nodes under forces at needed nodes, on the current rayon pool.
