@@ -158,7 +158,7 @@ impl RequestHandler {
             Request::Drop(hash) => {
                 self.paths.leave(hash);
                 self.pressed.with(|pressed| *pressed = None);
-                self.carried.with(|carried| carried.remove(&hash));
+                self.carried.with(|carried| carried.retain(|(model, _)| *model != hash));
                 self.held.drop_model(hash);
                 return Ok(None);
             }

@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::features::Candidate;
+use super::features::{Candidate, Triangle};
 use crate::rigid_body::RigidShape;
 
 /// A rigid body, where it is when the step begins and when it ends.
@@ -111,17 +111,14 @@ pub fn near_triangles(
     bodies: &[MovingBody],
     margin: f64,
 ) -> Vec<Candidate> {
+    let object_from_world = world_from_object.inverse();
+    let poses: Vec<Isometry3<f64>> =
+        bodies.iter().map(|body| object_from_world * body.world_from_body_end).collect();
     let mut near = Vec::new();
     for (triangle, nodes) in (0u32..).zip(triangles) {
-        let corners = nodes.map(|node| places[node as usize]);
-        let middle =
-            Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
-        let reach = corners.iter().map(|c| (c - middle).norm()).fold(0.0, f64::max);
-        for (position, body) in (0u16..).zip(bodies) {
-            let in_body =
-                body.world_from_body_end.inverse_transform_point(&(world_from_object * middle));
-            // A distance changes by no more than the way gone.
-            if body.shape.distance(&in_body).distance < margin + reach {
+        let of_surface = Triangle::new(nodes.map(|node| places[node as usize]));
+        for ((position, body), pose) in (0u16..).zip(bodies).zip(&poses) {
+            if of_surface.is_within(&body.shape, pose, margin) {
                 near.push(Candidate { triangle, body: position });
             }
         }

@@ -12,7 +12,7 @@ use crate::solve::condensed::{NodeForce, Response};
 pub struct Carried(Option<Ended>);
 
 /// Nodes above which nothing is carried, as it would take more memory than a session should: 28 bytes each.
-const NODES_MAX: usize = 1 << 16;
+const NODES_MAX: usize = 1 << 15;
 
 #[derive(Debug)]
 struct Ended {

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::bodies::MovingBody;
-use super::features::{Candidate, Gap, MaterialPoint, deepest};
+use super::features::{Candidate, Gap, MaterialPoint, Triangle};
 use super::rigid_motion::{RigidMotion, RigidStep, Wrench};
 use super::state::{HeldContact, at_nodes, mix, summed};
 use crate::solve::condensed::{NodeForce, Response};
@@ -152,7 +152,8 @@ impl Scene<'_> {
             let nodes = self.triangles[candidate.triangle as usize];
             let body = usize::from(candidate.body);
             let corners = self.corners(response, at.displacement, &nodes);
-            let found = deepest(&corners, &self.bodies[body].shape, &object_from_bodies[body])?;
+            let triangle = Triangle::new(corners.map(Point3::from));
+            let found = triangle.deepest(&self.bodies[body].shape, &object_from_bodies[body])?;
             let point = MaterialPoint::new(candidate.body, nodes, found.weights);
             Some((point, found.distance.distance))
         };

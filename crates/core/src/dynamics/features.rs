@@ -93,30 +93,54 @@ impl From<&HeldContact> for MaterialPoint {
     }
 }
 
-/// The deepest point of a triangle in a body, where the triangle reaches into it and the body is on the
-/// triangle's outer side; a half space is met by corners alone.
+/// A triangle of the surface, deformed.
 ///
-/// Shapes: `corners` in the object's frame.
-pub(super) fn deepest(
-    corners: &[Vector3<f64>; 3],
-    shape: &RigidShape,
-    object_from_body: &Isometry3<f64>,
-) -> Option<Deepest> {
-    if matches!(shape, RigidShape::Plane { .. }) {
-        return None;
+/// Shapes: corners in order. Units: m. Frame: that of the poses that it is asked about.
+pub(super) struct Triangle {
+    corners: [Point3<f64>; 3],
+    middle: Point3<f64>,
+    /// Distance of the farthest corner from the middle.
+    reach: f64,
+}
+
+impl Triangle {
+    pub fn new(corners: [Point3<f64>; 3]) -> Self {
+        let [a, b, c] = corners.map(|corner| corner.coords);
+        let middle = Point3::from((a + b + c) / 3.0);
+        let square = corners.iter().map(|c| (c - middle).norm_squared()).fold(0.0, f64::max);
+        Self { corners, middle, reach: square.sqrt() }
     }
-    let in_body = corners.map(|c| object_from_body.inverse_transform_point(&Point3::from(c)));
-    // No point of the triangle is nearer to the body than its middle by more than its distance from there.
-    let middle = Point3::from((in_body[0].coords + in_body[1].coords + in_body[2].coords) / 3.0);
-    let reach = in_body.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max);
-    if shape.distance(&middle).distance > reach {
-        return None;
+
+    /// Whether a point of it can be within a distance of a body.
+    pub fn is_within(&self, shape: &RigidShape, pose: &Isometry3<f64>, distance: f64) -> bool {
+        // No point is nearer than the middle by more than its distance from there.
+        let far = shape.distance(&pose.inverse_transform_point(&self.middle)).distance;
+        far.is_nan() || far <= distance + self.reach
     }
-    let deepest = shape.deepest(&in_body);
-    let out_of_body = object_from_body.rotation * deepest.distance.normal;
-    let [a, b, c] = corners;
-    let outward = (b - a).cross(&(c - a));
-    (out_of_body.dot(&outward) < FACING * outward.norm()).then_some(deepest)
+
+    /// The deepest point in a body, where the triangle reaches into it and the body is on the triangle's
+    /// outer side; a half space is met by corners alone.
+    pub fn deepest(&self, shape: &RigidShape, pose: &Isometry3<f64>) -> Option<Deepest> {
+        if matches!(shape, RigidShape::Plane { .. }) || !self.is_within(shape, pose, 0.0) {
+            return None;
+        }
+        let deepest = shape.deepest(&self.corners.map(|c| pose.inverse_transform_point(&c)));
+        let out_of_body = pose.rotation * deepest.distance.normal;
+        let [a, b, c] = self.corners;
+        let outward = (b - a).cross(&(c - a));
+        (out_of_body.dot(&outward) < FACING * outward.norm()).then_some(deepest)
+    }
+
+    /// How deep it reaches into a body; zero where it does not.
+    pub fn depth(&self, shape: &RigidShape, pose: &Isometry3<f64>) -> f64 {
+        if !self.is_within(shape, pose, 0.0) {
+            return 0.0;
+        }
+        let of_corner =
+            |corner: &Point3<f64>| -shape.distance(&pose.inverse_transform_point(corner)).distance;
+        let inside = self.deepest(shape, pose).map(|found| -found.distance.distance);
+        self.corners.iter().map(of_corner).chain(inside).fold(0.0, f64::max)
+    }
 }
 
 /// Points of contact.
@@ -227,13 +251,13 @@ pub(super) fn merged(contacts: &[HeldContact]) -> Vec<HeldContact> {
 mod tests {
     use super::*;
 
-    fn triangle() -> [Vector3<f64>; 3] {
-        [Vector3::zeros(), Vector3::new(0.01, 0.0, 0.0), Vector3::new(0.0, 0.01, 0.0)]
+    fn triangle() -> Triangle {
+        Triangle::new([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]].map(Point3::from))
     }
 
     fn found(shape: &RigidShape, place: Vector3<f64>) -> Option<Deepest> {
         let pose = Isometry3::from_parts(place.into(), Default::default());
-        deepest(&triangle(), shape, &pose)
+        triangle().deepest(shape, &pose)
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::bodies::MovingBody;
-use super::features::{Candidate, deepest};
+use super::features::{Candidate, Triangle};
 use super::state::ObjectState;
 
 /// Displacements of some nodes, found by node.
@@ -51,6 +51,14 @@ pub(super) struct Around<'a> {
     pub candidates: &'a [Candidate],
 }
 
+impl Around<'_> {
+    /// The triangle of a candidate, in the object's frame.
+    fn triangle(&self, candidate: &Candidate, displacement: &NodeField) -> Triangle {
+        let nodes = self.triangles[candidate.triangle as usize];
+        Triangle::new(nodes.map(|node| self.vertices[node as usize] + displacement.at(node)))
+    }
+}
+
 /// The candidates of a step, and which of them the rounds look at.
 pub(super) struct NearCandidates<'a> {
     around: Around<'a>,
@@ -75,8 +83,8 @@ impl<'a> NearCandidates<'a> {
         let poses: Vec<[Isometry3<f64>; 2]> = around.bodies.iter().map(poses).collect();
         let is_near = |candidate: &Candidate| {
             let body = usize::from(candidate.body);
-            let triangle = Triangle::of(&around, candidate, begun);
-            poses[body].iter().any(|pose| triangle.is_within(&around.bodies[body], pose, distance))
+            let (triangle, shape) = (around.triangle(candidate, begun), &around.bodies[body].shape);
+            poses[body].iter().any(|pose| triangle.is_within(shape, pose, distance))
         };
         Self { around, is_near: around.candidates.iter().map(is_near).collect() }
     }
@@ -105,58 +113,12 @@ impl<'a> NearCandidates<'a> {
         for (candidate, is_near) in self.around.candidates.iter().zip(&mut self.is_near) {
             let body = usize::from(candidate.body);
             if !*is_near {
-                let triangle = Triangle::of(&self.around, candidate, ended);
-                *is_near =
-                    triangle.depth(&self.around.bodies[body], &object_from_bodies[body]) > allowed;
+                let triangle = self.around.triangle(candidate, ended);
+                let shape = &self.around.bodies[body].shape;
+                *is_near = triangle.depth(shape, &object_from_bodies[body]) > allowed;
                 has_missed |= *is_near;
             }
         }
         has_missed
-    }
-}
-
-/// A triangle of the surface in the object's frame.
-struct Triangle {
-    corners: [Vector3<f64>; 3],
-    middle: Point3<f64>,
-    /// Distance of the farthest corner from the middle, m.
-    reach: f64,
-}
-
-impl Triangle {
-    fn of(around: &Around<'_>, candidate: &Candidate, displacement: &NodeField) -> Self {
-        let nodes = around.triangles[candidate.triangle as usize];
-        let corners =
-            nodes.map(|node| around.vertices[node as usize].coords + displacement.at(node));
-        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let square = corners.iter().map(|c| (c - middle).norm_squared()).fold(0.0, f64::max);
-        Self { corners, middle: middle.into(), reach: square.sqrt() }
-    }
-
-    /// Whether a point of it can be within a distance of a body, m.
-    fn is_within(
-        &self,
-        body: &MovingBody,
-        object_from_body: &Isometry3<f64>,
-        distance: f64,
-    ) -> bool {
-        // No point is nearer than the middle by more than its distance from there.
-        let middle = object_from_body.inverse_transform_point(&self.middle);
-        let far = body.shape.distance(&middle).distance > distance + self.reach;
-        !far
-    }
-
-    /// How deep it reaches into a body, m; at most 0 where it does not.
-    fn depth(&self, body: &MovingBody, object_from_body: &Isometry3<f64>) -> f64 {
-        if !self.is_within(body, object_from_body, 0.0) {
-            return 0.0;
-        }
-        let of_corner = |corner: &Vector3<f64>| {
-            let in_body = object_from_body.inverse_transform_point(&Point3::from(*corner));
-            -body.shape.distance(&in_body).distance
-        };
-        let inside = deepest(&self.corners, &body.shape, object_from_body);
-        let inside = inside.map(|found| -found.distance.distance);
-        self.corners.iter().map(of_corner).chain(inside).fold(0.0, f64::max)
     }
 }

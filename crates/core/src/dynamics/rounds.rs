@@ -9,7 +9,7 @@ use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint, Pool, force_at};
 use super::rolling::{Rolling, freedoms, rolled, rollings};
 use super::settings::{StepError, StepSettings};
-use super::state::{HeldContact, StepOutcome, mix};
+use super::state::{HeldContact, StepOutcome, at_nodes, mix};
 use crate::contact::coulomb::{PointForce, Solution, SolveBudget};
 use crate::solve::condensed::Response;
 
@@ -153,8 +153,9 @@ impl Rounds<'_, '_> {
         }
     }
 
-    /// The configuration that contact forces lead to.
-    fn configuration(&self, contacts: Vec<HeldContact>, at: &Configured<'_>) -> Configuration {
+    /// The configuration that contact forces lead to. Their columns have been asked for.
+    fn configuration(&mut self, contacts: Vec<HeldContact>, at: &Configured<'_>) -> Configuration {
+        self.response.gather(at_nodes(&contacts).iter().map(|(node, _)| *node));
         self.scene.configuration((&*self.response, self.unpressed), contacts, at)
     }
 

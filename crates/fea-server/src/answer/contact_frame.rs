@@ -1,7 +1,6 @@
 //! Answers one step of a free object among rigid bodies: linear from cached columns of the compliance, or
 //! at large deformation.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -36,11 +35,11 @@ use crate::request::{bodies_of, name_of, settings_of, state_message, state_of};
 use crate::resources::Resources;
 use crate::store::StoredModel;
 
-/// What a session carries from one step of each of its objects to the next.
-pub(crate) type CarriedSeat = Arc<Lock<BTreeMap<ModelHash, Carried>>>;
+/// What a session carries from one step of each of its objects to the next, the newest step last.
+pub(crate) type CarriedSeat = Arc<Lock<Vec<(ModelHash, Carried)>>>;
 
-/// Objects for which a session carries something: those of a hand, and no more.
-const CARRIED_MAX: usize = 16;
+/// Objects for which a session carries something, those of the newest steps: a megabyte each at most.
+const CARRIED_MAX: usize = 8;
 
 /// A contact frame that has been checked, with all data for its answer.
 pub(crate) struct PosedContact {
@@ -206,14 +205,17 @@ impl PosedContact {
         step: &ContactStep<'_>,
         wanted: &[u32],
     ) -> Result<StepOutcome, StepError> {
-        let taken = self.carried.with(|carried| carried.remove(&self.model));
+        let taken = self.carried.with(|all| {
+            let place = all.iter().position(|(model, _)| *model == self.model)?;
+            Some(all.remove(place).1)
+        });
         let mut carried = taken.unwrap_or_default();
         let made = step.advance_from(&self.state, wanted, &mut carried)?;
         self.carried.with(|all| {
             if all.len() >= CARRIED_MAX {
-                all.clear();
+                all.remove(0);
             }
-            all.insert(self.model, carried);
+            all.push((self.model, carried));
         });
         Ok(made)
     }

@@ -202,15 +202,18 @@ impl Solution {
     /// Shapes: `lambda` 3n, N.
     fn of_whole(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget) -> Self {
         let mut best = Self::from_forces(problem, lambda, budget);
+        if best.is_converged {
+            return best;
+        }
         let (mut sweeps, mut newton_steps) = (best.sweeps, best.newton_steps);
         let mut lambda = best.lambda.clone();
-        for share in if best.is_converged { &[][..] } else { &FRICTION_SHARES } {
-            let eased = problem.with_friction(*share);
+        for share in FRICTION_SHARES {
+            let eased = problem.with_friction(share);
             let found = Self::from_forces(&eased, eased.projected(&lambda), budget);
             sweeps += found.sweeps;
             newton_steps += found.newton_steps;
             lambda.clone_from(&found.lambda);
-            if *share == 1.0 && found.residual < best.residual {
+            if share == 1.0 && found.residual < best.residual {
                 best = found;
             }
         }
