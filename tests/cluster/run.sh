@@ -130,7 +130,7 @@ through_a_server() {
     report too-large method=cluster-cg because 'no method fits'
     solve cube embedded front-cube --method front || fail "front on the cube"
     agrees front-cube too-large 1e-8
-    "$client" run --headless --server "$head_address" --object cube --nodes 216 --frames 240 \
+    "$client" run --headless --grasp thesis --server "$head_address" --object cube --nodes 216 --frames 240 \
         --report "$work/run.json" >"$work/run.log" 2>&1 || fail "a run through the server"
 
     # A rank is killed while all of them work: sooner where a quick machine had answered by then.

@@ -96,7 +96,7 @@ can_connect() { (exec 3<>"/dev/tcp/${1%:*}/${1##*:}") 2>/dev/null; }
 start_client() {
     local name=$1
     shift
-    "$client_program" run --headless --object cube --nodes 216 --deformation linear \
+    "$client_program" run --headless --grasp thesis --object cube --nodes 216 --deformation linear \
         --record "$work/$name.mcap" --report "$work/$name.json" "$@" >"$work/$name.log" 2>&1 &
     pid[$name]=$!
 }

@@ -184,7 +184,7 @@ for size in ${SIZES:-800x600 1280x800 1920x1080}; do
     [ "$size" != 800x600 ] && [ -z "${EVERY_SIZE:-}" ] || is_whole=1
     [ -n "$is_whole" ] && states="each of its states" || states="its squeeze"
     step "$size: the story, and every key in $states"
-    begin "story-$size" run --object strawberry
+    begin "story-$size" run --grasp thesis --object strawberry
     xdotool windowsize "$window" "${size%x*}" "${size#*x}"
     settle
     seen approach

@@ -73,6 +73,8 @@ pub(super) fn play(
             let mut arguments: Vec<&OsStr> = [
                 "run",
                 "--headless",
+                "--grasp",
+                "thesis",
                 "--deformation",
                 object.deformation,
                 "--rate",

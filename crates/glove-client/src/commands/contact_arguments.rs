@@ -23,8 +23,8 @@ pub(super) enum GraspChoice {
 pub(super) struct ContactArguments {
     /// contact (fingers press with friction, the object has weight and lies on a table; linear
     /// elasticity unless --deformation says otherwise) or thesis (three fingertips hold it, five
-    /// deform it) [default: contact for mouse, devices, joints, recordings of others, the script lift,
-    /// and a run without --object, --hand and --scene; else thesis].
+    /// deform it) [default: contact; thesis with --contact, --method, --deformation large|auto, --yield and
+    /// the scripts of the thesis's grasp].
     #[arg(long, value_name = "contact|thesis")]
     pub(super) grasp: Option<GraspChoice>,
     /// With --grasp thesis, what a fingertip holds: vertex (the node it touched, as in the thesis),

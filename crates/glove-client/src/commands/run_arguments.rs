@@ -369,14 +369,11 @@ impl RunArguments {
         method: &MethodName,
         is_several: bool,
     ) -> anyhow::Result<Grasping> {
-        // A run of which nothing was said picks a strawberry from a table. Hands that are no script of the
-        // thesis's grasp grasp as hands do.
-        let lifts = match self.hand.first() {
-            _ if self.hand.are_two() || is_several => true,
-            Some(HandRequest::Scripted(script)) => *script == ScriptName::Lift,
-            Some(_) => true,
-            None => self.asked_object().is_none() && self.scene.is_none(),
-        };
+        // A run picks its object from a table; only scripts of the thesis's grasp need the thesis's rules.
+        let first = self.hand.first();
+        let plays_thesis =
+            matches!(first, Some(HandRequest::Scripted(s)) if *s != ScriptName::Lift);
+        let lifts = self.hand.are_two() || is_several || !plays_thesis;
         let needs_thesis = !lifts || *method != MethodName::auto();
         let rule = self.grasp.of_run(scene, &self.elasticity, needs_thesis)?;
         if self.hand.are_two() && rule.scene.is_none() {

@@ -73,7 +73,7 @@ pub fn load(
         let extent_m = size.unwrap_or_else(|| loaded.object.rest().size());
         let is_gripped = match &loaded.plan {
             Ok(plan) => plan.holds_by_friction || request.contact != ContactModel::Friction,
-            Err(reason) => !matches!(reason, NoGrasp::OutOfReach { .. }),
+            Err(reason) => matches!(reason, NoGrasp::TooFewNodes { .. }),
         };
         if is_gripped || !may_grow || extent_m >= ENLARGED_MAX_M {
             let found = if is_gripped { loaded } else { smallest.unwrap_or(loaded) };

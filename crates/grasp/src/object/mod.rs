@@ -11,5 +11,5 @@ pub use choice::ObjectChoice;
 pub use contact_model::{ContactModel, UnknownContact};
 pub use regions::Regions;
 pub use rest_shape::{ObjectError, RestShape};
-pub use resting::{lying, resting_turn};
+pub use resting::{centre_of_mass, lying, resting_turn};
 pub use soft_object::SoftObject;

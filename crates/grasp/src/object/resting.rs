@@ -212,7 +212,10 @@ fn nearest_of_edge([a, b]: [Vector2<f64>; 2]) -> Vector2<f64> {
     a + share * along
 }
 
-fn centre_of_mass(mesh: &TetMesh) -> Point3<f64> {
+/// Centre of mass of a body of one density.
+///
+/// Units: m. Frame: that of the mesh.
+pub fn centre_of_mass(mesh: &TetMesh) -> Point3<f64> {
     let (mut sum, mut volume) = (Vector3::zeros(), 0.0);
     for (tet, nodes) in mesh.tets().iter().enumerate() {
         let part = mesh.signed_volume(tet);

@@ -70,6 +70,10 @@ pub struct ScriptedHand {
     closure: [f64; 5],
     closure_before: [f64; 5],
     lift: f64,
+    /// How far the hand was lifted when the step began.
+    lift_before: f64,
+    /// How far it had come up when it held the object that it then raised.
+    lift_of_grip: f64,
     /// How the object lay that the hand came for.
     lay: Lay,
     /// How the object lay that the plan was made for, where it had rolled.
@@ -93,6 +97,13 @@ const CLOSE_FAST: f64 = 0.03;
 const CLOSE_SLOW: f64 = 0.008;
 /// Closure per tick while a grip is tightened.
 const CLOSE_TIGHT: f64 = 0.003;
+/// Way of the hand in a tick, and at most, while it presses the object onto the table, m; and how many times
+/// its weight the table must carry for that.
+const COME_UP: f64 = 2e-4;
+const COME_UP_MAX: f64 = 0.01;
+const PRESSED_DOWN: f64 = 1.05;
+/// Share of its weight that a lifted object leaves on the table where one end still lies there.
+const DRAGS: f64 = 0.03;
 /// A grip presses so many times as hard as friction needs to hold the weight.
 const GRIP_MARGIN: f64 = 2.5;
 /// … and so many times as hard once the object has slipped.
@@ -137,6 +148,8 @@ impl ScriptedHand {
             closure: [0.0; 5],
             closure_before: [0.0; 5],
             lift: 0.0,
+            lift_before: 0.0,
+            lift_of_grip: 0.0,
             lay: Lay::default(),
             planned_for: None,
             has_slipped: false,
@@ -253,7 +266,7 @@ impl ScriptedHand {
     /// Plays one tick of a step; returns whether the shape is to be kept.
     fn advance(&mut self, step: Step, seen: &Seen) -> bool {
         if self.step_tick == 0 {
-            self.closure_before = self.closure;
+            (self.closure_before, self.lift_before) = (self.closure, self.lift);
         }
         self.step_tick += 1;
         let ticks_max = match step {
@@ -274,9 +287,11 @@ impl ScriptedHand {
         step == Step::Keep
     }
 
-    /// Whether the object, as far as it can move, has not come up with the hand that lifts it.
+    /// Whether the object, as far as it can move, has not come up with the hand that lifts it: all of it, or
+    /// one end of what is held beside its centre of mass.
     fn has_lost(&self, seen: &Seen) -> bool {
-        seen.friction > 0.0 && self.lay.risen(seen) < 0.5 * self.lift
+        let drags = seen.table_force_n > DRAGS * self.lay.weight_n;
+        seen.friction > 0.0 && (drags || self.lay.risen(seen) < 0.5 * self.lift)
     }
 
     /// Lets the hand open, go back and lift in another way, as a person does from whose hand a thing slips.
@@ -345,8 +360,13 @@ impl ScriptedHand {
                 };
                 self.close_to(&std::array::from_fn(deeper), progress);
             }
-            Step::Raise => self.lift = RAISE * progress,
-            Step::Lower => self.lift = RAISE * (1.0 - progress),
+            Step::Raise => {
+                self.lift_of_grip = self.lift_before;
+                self.lift = self.lift_before + RAISE * progress;
+            }
+            Step::Lower => {
+                self.lift = self.lift_before + (self.lift_of_grip - self.lift_before) * progress;
+            }
             Step::Reach | Step::Open => self.close_to(&plan.reach, progress),
             Step::TurnToOtherSide => self.lift = self.lift.min(LIFT * (1.0 - progress)),
             Step::Retreat => self.close_to(&[0.0; 5], progress),
@@ -362,8 +382,12 @@ impl ScriptedHand {
         }
     }
 
-    /// Closes the thumb, and the fingers, by a little where they press less than it takes to lift.
+    /// Closes the thumb, and the fingers, by a little where they press less than it takes to lift. A hand that
+    /// presses the object onto the table comes up meanwhile: such a force holds nothing once it is lifted.
     fn tighten(&mut self, seen: &Seen) {
+        if self.presses_down(seen) {
+            self.lift = (self.lift + COME_UP).min(COME_UP_MAX);
+        }
         let lacks = self.lacks_grip(seen);
         for digit in 0..5 {
             let (lacks, holds) = match digit {
@@ -389,6 +413,12 @@ impl ScriptedHand {
         [thumb < needed, fingers.iter().sum::<f64>() < needed]
     }
 
+    /// Whether the table carries more than the object's weight, and the hand can still come up.
+    fn presses_down(&self, seen: &Seen) -> bool {
+        let is_pressed = seen.table_force_n > PRESSED_DOWN * self.lay.weight_n;
+        seen.friction > 0.0 && is_pressed && self.lift < COME_UP_MAX
+    }
+
     /// Whether the person sees and feels that the step has done what it was for.
     fn is_done(&self, step: Step, seen: &Seen) -> bool {
         match step {
@@ -397,7 +427,7 @@ impl ScriptedHand {
             }
             Step::CloseOthers => seen.state == Some(StateName::Deforming),
             Step::Look => seen.is_still,
-            Step::Tighten => self.lacks_grip(seen) == [false; 2],
+            Step::Tighten => self.lacks_grip(seen) == [false; 2] && !self.presses_down(seen),
             _ => false,
         }
     }

@@ -1,9 +1,8 @@
 //! Opposed places of an object's surface: where thumb and fingers can hold it between them by friction.
 
 use nalgebra::{Point3, Vector3};
-use softgrasp_core::mesh::TetMesh;
 use softgrasp_core::surface::{SurfaceError, SurfaceTree, TriangleSurface};
-use softgrasp_grasp::object::RestShape;
+use softgrasp_grasp::object::{RestShape, centre_of_mass};
 
 /// Most places of the surface from which a line is drawn through the object.
 const STARTS_MAX: usize = 600;
@@ -139,16 +138,4 @@ impl PinchedSurface {
         let score = self.hold(&middle, &across, straight);
         holds.then_some(OpposedPair { thumb, across, width: out.at, score })
     }
-}
-
-/// Centre of mass of a body of one density, m.
-fn centre_of_mass(mesh: &TetMesh) -> Point3<f64> {
-    let (mut volume, mut moment) = (0.0, Vector3::zeros());
-    for (number, tet) in mesh.tets().iter().enumerate() {
-        let of_tet = mesh.signed_volume(number);
-        let sum: Vector3<f64> = tet.iter().map(|&n| mesh.vertices()[n as usize].coords).sum();
-        volume += of_tet;
-        moment += of_tet * 0.25 * sum;
-    }
-    Point3::from(moment / volume)
 }

@@ -40,6 +40,15 @@ pub enum NoGrasp {
         /// Longest extent of the object, m.
         extent_m: f64,
     },
+    /// No palm pose above the table that was tried lets the fingertips grasp the object that lies there.
+    #[error(
+        "the scripted hand found no palm pose above the table from which its fingertips reach this object \
+         ({extent_m:.3} m long); try another --object-size, or --grasp thesis, which has no table"
+    )]
+    OutOfReachAboveTable {
+        /// Longest extent of the object, m.
+        extent_m: f64,
+    },
     /// Five tips need five nodes.
     #[error("the object has {nodes} surface nodes; five fingertips need five different ones")]
     TooFewNodes {
@@ -102,9 +111,11 @@ impl PlanRequest {
     /// # Errors
     /// [`NoGrasp`].
     pub fn grip(&self) -> Result<GraspPlan, NoGrasp> {
-        self.plan().ok_or_else(|| match self.object.surface().nodes.len() {
-            nodes @ ..5 => NoGrasp::TooFewNodes { nodes },
-            _ => NoGrasp::OutOfReach { extent_m: self.object.mesh().size() },
+        let extent_m = self.object.mesh().size();
+        self.plan().ok_or_else(|| match (self.object.surface().nodes.len(), self.contact) {
+            (nodes @ ..5, _) => NoGrasp::TooFewNodes { nodes },
+            (_, ContactModel::Friction) => NoGrasp::OutOfReachAboveTable { extent_m },
+            _ => NoGrasp::OutOfReach { extent_m },
         })
     }
 }

@@ -56,8 +56,8 @@ impl ScriptName {
         match self {
             Self::Approach => vec![Reach, Hold, Retreat],
             Self::Lift => vec![
-                Look, Reach, Pinch, Grip, Tighten, Raise, Hold, Squeeze, Hold, Keep, Hold, Lower,
-                Open, Retreat,
+                Look, Reach, Pinch, Grip, Tighten, Raise, Hold, Squeeze, Hold, Keep, Tighten, Hold,
+                Lower, Open, Retreat,
             ],
             Self::Attach => vec![Reach, CloseThree, Hold, Open, Retreat],
             Self::Squeeze => squeeze.to_vec(),
@@ -101,7 +101,8 @@ pub(super) enum Step {
     Pinch,
     /// The fingers press as deep as was planned.
     Grip,
-    /// Thumb and fingers close on until they hold the object's weight by friction.
+    /// Thumb and fingers close on until they hold the object's weight by friction: before it is lifted, and
+    /// once its shape is kept, which then presses back less.
     Tighten,
     /// The hand lifts what it holds.
     Raise,
