@@ -49,6 +49,10 @@ pub enum LoadError {
 const ENLARGE: f64 = 1.25;
 const ENLARGED_MAX_M: f64 = 0.2;
 
+/// Note for an object that this hand has no grip for within the cones of friction.
+const MAY_SLIDE: &str = "no grip was found that friction holds for sure, so the object may slide out of the \
+                         hand: try another --object-size, or --grasp thesis";
+
 /// Rotation below which an object counts as not rotated, rad.
 const TURN_WORTH_SAYING: f64 = 1e-3;
 
@@ -108,7 +112,7 @@ fn load_at(
             notes.push(format!("turned by {degrees:.0}° so that it lies on the table"));
         }
     }
-    let summary = ObjectSummary {
+    let mut summary = ObjectSummary {
         name: choice.to_string(),
         nodes: mesh.node_count(),
         tets: mesh.tets().len(),
@@ -124,6 +128,10 @@ fn load_at(
     }
     let rest = Arc::clone(object.rest_shape());
     let plan = PlanRequest::new(rest, setup.clone(), *contact).grip();
+    let by_friction = *contact == ContactModel::Friction;
+    if by_friction && plan.as_ref().is_ok_and(|plan| !plan.holds_by_friction) {
+        summary.notes.push(MAY_SLIDE.to_owned());
+    }
     Ok(Some(LoadedObject { summary, brought_to_m: size, object, plan }))
 }
 
@@ -186,6 +194,10 @@ mod tests {
         let given = ObjectRequest { contact: ContactModel::Friction, size_m: Some(0.08), ..asked };
         let loaded = load(&given, |_| true).unwrap().unwrap();
         assert!((loaded.summary.size_m - 0.08).abs() < 0.01, "a size that was asked for is kept");
+        assert!(
+            loaded.summary.notes.iter().any(|note| note == MAY_SLIDE),
+            "and what that means told"
+        );
     }
 
     #[test]
