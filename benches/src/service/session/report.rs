@@ -82,11 +82,16 @@ pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError
     Ok(())
 }
 
-/// A built-in object, and files of other authors; a line for each file that is missing.
+/// What is grasped by the thesis's rules: a built-in object, and files of other authors; a line for each file
+/// that is missing.
 fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
     let named = |name: &str, path: &Path| Object {
         name: name.to_owned(),
-        arguments: vec!["--object".into(), path.as_os_str().to_owned()],
+        arguments: ["--grasp", "thesis", "--object"]
+            .into_iter()
+            .map(Into::into)
+            .chain([path.as_os_str().to_owned()])
+            .collect(),
         deformation: "linear",
     };
     let mut objects = vec![named("strawberry", Path::new("strawberry"))];

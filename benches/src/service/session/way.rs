@@ -73,8 +73,6 @@ pub(super) fn play(
             let mut arguments: Vec<&OsStr> = [
                 "run",
                 "--headless",
-                "--grasp",
-                "thesis",
                 "--deformation",
                 object.deformation,
                 "--rate",
