@@ -87,11 +87,7 @@ pub fn measure(options: &Options, report: &mut Report) -> Result<(), ReportError
 fn objects(options: &Options) -> (Vec<Object>, Vec<String>) {
     let named = |name: &str, path: &Path| Object {
         name: name.to_owned(),
-        arguments: ["--grasp", "thesis", "--object"]
-            .into_iter()
-            .map(Into::into)
-            .chain([path.as_os_str().to_owned()])
-            .collect(),
+        arguments: vec!["--grasp".into(), "thesis".into(), "--object".into(), path.into()],
         deformation: "linear",
     };
     let mut objects = vec![named("strawberry", Path::new("strawberry"))];

@@ -104,7 +104,8 @@ fn load_at(
     let made = MeshOfRegions::try_new(mesh, &region_names, regions)?;
     let (mut mesh, regions) = (made.mesh, made.regions);
     notes.extend(made.notes);
-    if *contact == ContactModel::Friction {
+    let by_friction = *contact == ContactModel::Friction;
+    if by_friction {
         let (lies, turn) = lying(&mesh).map_err(ObjectError::Shape)?;
         mesh = lies;
         if turn.angle() > TURN_WORTH_SAYING {
@@ -128,7 +129,6 @@ fn load_at(
     }
     let rest = Arc::clone(object.rest_shape());
     let plan = PlanRequest::new(rest, setup.clone(), *contact).grip();
-    let by_friction = *contact == ContactModel::Friction;
     if by_friction && plan.as_ref().is_ok_and(|plan| !plan.holds_by_friction) {
         summary.notes.push(MAY_SLIDE.to_owned());
     }

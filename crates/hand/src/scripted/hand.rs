@@ -102,8 +102,6 @@ const CLOSE_TIGHT: f64 = 0.003;
 const COME_UP: f64 = 2e-4;
 const COME_UP_MAX: f64 = 0.01;
 const PRESSED_DOWN: f64 = 1.05;
-/// Share of its weight that a lifted object leaves on the table where one end still lies there.
-const DRAGS: f64 = 0.03;
 /// A grip presses so many times as hard as friction needs to hold the weight.
 const GRIP_MARGIN: f64 = 2.5;
 /// … and so many times as hard once the object has slipped.
@@ -290,8 +288,7 @@ impl ScriptedHand {
     /// Whether the object, as far as it can move, has not come up with the hand that lifts it: all of it, or
     /// one end of what is held beside its centre of mass.
     fn has_lost(&self, seen: &Seen) -> bool {
-        let drags = seen.table_force_n > DRAGS * self.lay.weight_n;
-        seen.friction > 0.0 && (drags || self.lay.risen(seen) < 0.5 * self.lift)
+        seen.friction > 0.0 && (self.lay.drags(seen) || self.lay.risen(seen) < 0.5 * self.lift)
     }
 
     /// Lets the hand open, go back and lift in another way, as a person does from whose hand a thing slips.

@@ -4,6 +4,9 @@ use nalgebra::Point3;
 
 use super::seen::Seen;
 
+/// Share of its weight that a lifted object leaves on the table where one end still lies there.
+const DRAGS: f64 = 0.03;
+
 /// How an object lay before the hand touched it.
 ///
 /// Units: m, N. Frame: world.
@@ -29,6 +32,11 @@ impl Lay {
             self.origin_y = seen.world_from_object.translation.y;
             self.weight_n = seen.table_force_n;
         }
+    }
+
+    /// Whether a part of the object still lies on the table; of one that was never looked at nothing is said.
+    pub fn drags(&self, seen: &Seen) -> bool {
+        self.centre.is_some() && seen.table_force_n > DRAGS * self.weight_n
     }
 
     /// How far the object has come up since.
