@@ -288,7 +288,8 @@ impl ScriptedHand {
     /// Whether the object, as far as it can move, has not come up with the hand that lifts it: all of it, or
     /// one end of what is held beside its centre of mass.
     fn has_lost(&self, seen: &Seen) -> bool {
-        seen.friction > 0.0 && (self.lay.drags(seen) || self.lay.risen(seen) < 0.5 * self.lift)
+        let has_lifted = seen.friction > 0.0 && self.lift > 0.0;
+        has_lifted && (self.lay.drags(seen) || self.lay.risen(seen) < 0.5 * self.lift)
     }
 
     /// Lets the hand open, go back and lift in another way, as a person does from whose hand a thing slips.
