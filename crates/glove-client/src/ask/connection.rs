@@ -403,6 +403,9 @@ fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
     let socket = socket2::SockRef::from(stream);
     let alive = socket2::TcpKeepalive::new().with_time(ALIVE_EVERY).with_interval(ALIVE_EVERY);
+    // Linux counts time, also while something that was sent is not confirmed; others count questions.
+    #[cfg(any(windows, target_vendor = "apple"))]
+    let alive = alive.with_retries((ALIVE_MAX.as_secs() / ALIVE_EVERY.as_secs()) as u32 - 1);
     socket.set_tcp_keepalive(&alive)?;
     #[cfg(target_os = "linux")]
     socket.set_tcp_user_timeout(Some(ALIVE_MAX))?;

@@ -23,6 +23,7 @@ mod joint_runs;
 mod killed_server;
 mod loads;
 mod numbers;
+mod older_server;
 #[cfg(feature = "xr")]
 mod page;
 mod press;

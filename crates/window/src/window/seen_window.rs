@@ -19,6 +19,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(300);
 impl SeenWindow {
     /// The window of this process that has a title.
     pub fn titled(title: &str) -> Self {
+        // Nobody is asked about it elsewhere.
+        #[cfg(not(all(unix, not(target_os = "macos"))))]
+        let _ = title;
         Self {
             looked: None,
             is_seen: true,
