@@ -15,6 +15,7 @@ use crate::report::{ReportError, check, progress};
 use crate::sample::timed_ms;
 use crate::table::{Cell, Table};
 use crate::tail::Tail;
+use crate::threads::{pool, processors};
 
 /// Radius of a fingertip, m, depth of its press, and height of the lift.
 const TIP: f64 = 0.008;
@@ -174,6 +175,8 @@ impl Phase {
 pub(super) fn table(is_quick: bool) -> Result<Table, ReportError> {
     let sizes: &[usize] = if is_quick { &[300] } else { &[1000, 4000, 10_648] };
     let title = "Steps of a ball that five fingers pinch, lift and hold by friction";
+    // As in the server, where a thread of the pool makes the step.
+    let pool = pool(processors())?;
     let mut table = Table::new("contact-steps", title, &COLUMNS);
     for &nodes in sizes {
         let ball = Pinched(Ball::try_new(nodes)?);
@@ -184,7 +187,7 @@ pub(super) fn table(is_quick: bool) -> Result<Table, ReportError> {
             // Columns of contacts that nobody asked about before are made in the first round.
             let rounds: &[&str] = if way == WAYS[0] { &["cold", "warm"] } else { &["warm"] };
             for columns in rounds {
-                play(&ball, (way, columns), &mut table)?;
+                pool.install(|| play(&ball, (way, columns), &mut table))?;
             }
         }
     }
