@@ -6,7 +6,7 @@ import contextlib
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,11 @@ from softgrasp.framing import HEADER_LEN, VERSION, Header, Kind, decode_header, 
 from softgrasp.payload import PayloadReader, payload_of
 
 
-@dataclass(frozen=True)
-class Heard(Header):
-    """The header of a request and its payload."""
+class Heard(NamedTuple):
+    """A request as it came."""
 
+    kind: int
+    request_id: int
     payload: bytes
 
 
@@ -83,11 +84,11 @@ def stand_in(speak: Speak, greet: bool = True) -> Iterator[str]:
         with contextlib.suppress(OSError, EOFError), stream:
             while True:
                 header = decode_header(exactly(stream, HEADER_LEN), Limits())
-                header = Heard(**vars(header), payload=exactly(stream, header.length))
-                if greet and header.kind == Kind.HELLO:
-                    stream.sendall(encode_frame(Kind.WELCOME, header.request_id, welcome_payload()))
+                heard = Heard(header.kind, header.request_id, exactly(stream, header.length))
+                if greet and heard.kind == Kind.HELLO:
+                    stream.sendall(encode_frame(Kind.WELCOME, heard.request_id, welcome_payload()))
                 else:
-                    speak(stream, header)
+                    speak(stream, heard)
 
     threading.Thread(target=serve, daemon=True).start()
     try:

@@ -261,9 +261,20 @@ def read_answer_arrays(reader: PayloadReader, part: AnswerPart) -> Answer:
     dofs = reader.numbers(part.reaction_count, limits.dof_count_max, "reactions")
     forces = reader.floats(part.reaction_count, limits.dof_count_max, "reactions")
     mask_forces = reader.floats(part.mask_count, limits.dof_count_max, "forces of masks", 3)
-    return Answer(
-        nodes, displacements, Reactions(dofs, forces), mask_forces, part.report, None, None
+    # What a frozen dataclass does by itself takes three times as long: a frame should not wait for it.
+    reactions = object.__new__(Reactions)
+    reactions.__dict__.update(dofs=dofs, forces=forces)
+    answer = object.__new__(Answer)
+    answer.__dict__.update(
+        nodes=nodes,
+        displacements=displacements,
+        reactions=reactions,
+        mask_forces=mask_forces,
+        report=part.report,
+        fields=None,
+        gradient=None,
     )
+    return answer
 
 
 _COUNTS = struct.Struct("<BId4I")

@@ -184,7 +184,7 @@ class AsyncKeptModel(NamedModel):
 
     async def frame(self, case: LoadCase, **options: Unpack[FrameOptions]) -> Answer:
         """As `KeptModel.frame`."""
-        return await self._ask(calls.frame(self.hash, case, Question(**options), self.model.labels))
+        return await self._ask(calls.frame(self.hash, case, self._question(options), self.model.labels))
 
     async def large_frame(
         self,
@@ -194,7 +194,9 @@ class AsyncKeptModel(NamedModel):
     ) -> LargeAnswer:
         """As `KeptModel.large_frame`."""
         return await self._ask(
-            calls.large_frame(self.hash, case, large, Question(**options), self.model.labels)
+            calls.large_frame(
+                self.hash, case, large, self._question(options), self.model.labels
+            )
         )
 
     async def solve_several(

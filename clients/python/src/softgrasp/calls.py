@@ -46,7 +46,7 @@ from .question import REPORTS, Precision, Question
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Call(Generic[T]):
     """A request that is ready to be sent."""
 

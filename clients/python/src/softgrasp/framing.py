@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import google_crc32c
 import numpy as np
@@ -46,8 +46,7 @@ class Kind(IntEnum):
     CONTACT_ANSWER = 0x8009
 
 
-@dataclass(frozen=True)
-class Header:
+class Header(NamedTuple):
     """A header whose own checksum fits."""
 
     kind: int

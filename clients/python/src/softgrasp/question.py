@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, TypedDict, cast, get_args
 
 from numpy.typing import ArrayLike, NDArray
@@ -84,15 +85,20 @@ class Question:
             if value is not None:
                 positive(value, name)
 
-    def part(self, case: LoadCase) -> Part:
-        """The fields of the question on the wire."""
+    @cached_property
+    def _of_all_cases(self) -> bytes:
+        """The fields that do not depend on the load case, on the wire."""
         part = Part().text(self.method)
         precision = PRECISIONS.index(self.precision)
         if self.nodes is None:
             part.raw(_ALL_NODES.pack(0, self.reactions, precision))
         else:
             part.raw(_NODES.pack(1, len(self._wanted()), self.reactions, precision))
-        part.option(self.max_error).option(self.deadline_ms)
+        return part.option(self.max_error).option(self.deadline_ms).data()
+
+    def part(self, case: LoadCase) -> Part:
+        """The fields of the question on the wire."""
+        part = Part().raw(self._of_all_cases)
         mask_nodes = sum([len(mask.nodes) for mask in case.masks]) if case.masks else 0
         counts = (len(case.known_dofs), len(case.force_dofs), len(case.masks), mask_nodes)
         part.raw(_COUNTS.pack(*counts, field_bits(self.fields) if self.fields else 0))

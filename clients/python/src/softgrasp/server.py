@@ -209,7 +209,7 @@ class KeptModel(NamedModel):
 
     def frame(self, case: LoadCase, **options: Unpack[FrameOptions]) -> Answer:
         """Solves a load case by linear elasticity; the fixed nodes stay at zero."""
-        return self._ask(calls.frame(self.hash, case, Question(**options), self.model.labels))
+        return self._ask(calls.frame(self.hash, case, self._question(options), self.model.labels))
 
     def large_frame(
         self,
@@ -219,7 +219,9 @@ class KeptModel(NamedModel):
     ) -> LargeAnswer:
         """Finds an equilibrium at large deformation, from this session's last one on the model."""
         return self._ask(
-            calls.large_frame(self.hash, case, large, Question(**options), self.model.labels)
+            calls.large_frame(
+                self.hash, case, large, self._question(options), self.model.labels
+            )
         )
 
     def solve_several(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import is_
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ from .limits import Limits
 from .model import Model
 from .patience import Patience
 from .program import ServerProgram
+from .question import FrameOptions, Question
 
 CLIENT = "softgrasp for Python 0.1.0"
 """How this package calls itself in the server's log."""
@@ -77,6 +79,22 @@ class NamedModel:
         self.fixed_dofs = model.fixed_dofs(fixed)
         self.hash = model.hash(self.fixed_dofs)
         """Name of the model: 32 bytes."""
+        self._asked: tuple[FrameOptions, Question] | None = None
+
+    def _question(self, options: FrameOptions) -> Question:
+        """What is asked; what the frame before asked, where its options were these very objects.
+
+        Frames that differ in their load case alone ask the same again and again.
+        """
+        asked = self._asked
+        if asked is not None and options.keys() == asked[0].keys():
+            if all(map(is_, options.values(), asked[0].values())):
+                return asked[1]
+        question = Question(**options)
+        # What was copied to be checked would not follow a change of the caller's own.
+        follows = question.nodes is options.get("nodes") and not question.fields
+        self._asked = (options, question) if follows and question.quantity is None else None
+        return question
 
 
 _ALIVE_MIN = 0.1
