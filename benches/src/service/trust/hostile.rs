@@ -152,14 +152,18 @@ fn upload_on(address: &str, number: usize, is_over: &AtomicBool, acts: &AtomicUs
 }
 
 /// Gives the calling thread the lowest priority, because hostile clients would be on another machine.
-/// Where the system refuses, the figures are worse for it.
+/// Where the system refuses, the figures are worse for it. One that is only nice keeps a share of the
+/// processors: with that, the p99 of honest clients was 13 times that of a quiet server, and 5 times without.
 fn be_last() {
     let tid = std::fs::read_link("/proc/thread-self").ok();
     let tid = tid.and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
     if let Some(tid) = tid {
-        let renice = Command::new("renice").args(["-n", "19", "-p", &tid]).output();
-        // Without the program nothing has changed.
-        drop(renice);
+        // Behind all that is not of this kind itself, without a share of its own.
+        let is_idle = Command::new("chrt").args(["--idle", "--pid", "0", &tid]).output();
+        if !is_idle.is_ok_and(|said| said.status.success()) {
+            // Without these programs nothing has changed.
+            drop(Command::new("renice").args(["-n", "19", "-p", &tid]).output());
+        }
     }
 }
 
