@@ -9,8 +9,8 @@ import json
 import sys
 from pathlib import Path
 
-# Largest difference of displacements over the largest displacement. Direct methods differ by rounding; the
-# others end where a residual is small enough; contact where the residual of its law is.
+# Largest difference over the largest value. Direct methods differ by rounding, the others end where a
+# residual is small enough, and contact where the residual of its law is.
 ALLOWED = {"pcg": 1e-7, "multigrid": 1e-7, "large": 1e-6, "auto": 1e-7}
 ALLOWED_DIRECT = 1e-10
 ALLOWED_PRESS = 1e-4

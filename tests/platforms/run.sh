@@ -25,6 +25,7 @@ windows=x86_64-pc-windows-gnu arm=aarch64-unknown-linux-gnu mac=aarch64-apple-da
 [ "$(id -u)" = 0 ] || skip "a Debian of its own needs root"
 [ "$(uname -m)" = x86_64 ] || skip "it is made for x86_64"
 command -v unshare >/dev/null || skip "there is no unshare"
+command -v python3 >/dev/null || skip "there is no python3"
 
 work="$(mktemp -d)"
 cleanup() {
@@ -45,8 +46,10 @@ inside() {
 make_debian() {
     command -v debootstrap >/dev/null || install debootstrap
     command -v debootstrap >/dev/null || skip "there is no debootstrap and it could not be installed"
-    curl -fsS -m 20 -o /dev/null "$mirror/dists/trixie-backports/InRelease" 2>/dev/null ||
-        skip "$mirror cannot be reached"
+    python3 - "$mirror/dists/trixie-backports/InRelease" <<'PY' 2>/dev/null || skip "$mirror cannot be reached"
+import sys, urllib.request
+urllib.request.urlopen(sys.argv[1], timeout=20).read(64)
+PY
     say "making a Debian 13 with compilers in $root"
     mkdir -p "$root"
     debootstrap --variant=minbase --include=ca-certificates trixie "$root" "$mirror" \
@@ -89,7 +92,8 @@ copy_source() {
     rm -rf "$root/softgrasp"
     mkdir "$root/softgrasp"
     git ls-files -z --cached --others --exclude-standard |
-        tar --create --null --files-from=- --ignore-failed-read 2>/dev/null | tar --extract --directory="$root/softgrasp"
+        tar --create --null --files-from=- --ignore-failed-read 2>/dev/null |
+        tar --extract --directory="$root/softgrasp"
 }
 
 # other_cargo TARGET ARGUMENT…: cargo for another system, whose standard library is compiled too.
@@ -174,7 +178,6 @@ compared() {
 }
 
 case $only in *" arm "* | *" windows "*)
-    command -v python3 >/dev/null || skip "there is no python3"
     take_programs glove-client
     mkdir -p "$root/here" "$root/answers"
     cp "$bin_dir/glove-client" "$root/here/"
