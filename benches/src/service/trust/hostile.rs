@@ -152,8 +152,7 @@ fn upload_on(address: &str, number: usize, is_over: &AtomicBool, acts: &AtomicUs
 }
 
 /// Gives the calling thread the lowest priority, because hostile clients would be on another machine.
-/// Where the system refuses, the figures are worse for it. One that is only nice keeps a share of the
-/// processors: with that, the p99 of honest clients was 13 times that of a quiet server, and 5 times without.
+/// Where the system refuses, the figures are worse for it. One that is only nice keeps a share of the processors.
 fn be_last() {
     let tid = std::fs::read_link("/proc/thread-self").ok();
     let tid = tid.and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
