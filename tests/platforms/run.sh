@@ -5,9 +5,9 @@
 # with 0 and one line where a part is missing.
 #
 #   tests/platforms/run.sh                      all of it: a Debian (10 GB with what is built there, thrown away
-#                                               afterwards), three checks and three builds: an hour on two cores
+#                                               afterwards), three checks and two builds: an hour on two cores
 #   PLATFORMS_ROOT=DIR tests/platforms/run.sh   keeps that Debian and what was built in DIR, or takes what is there
-#   ONLY="check" …  ONLY="arm windows" …        some parts of it; `kernels`: tests of softgrasp-core on ARM
+#   ONLY="check" …  ONLY="arm windows" …        some parts of it
 #   BIN_DIR=DIR tests/platforms/run.sh          compares with the glove-client of this system that is there
 #
 # Of macOS nothing is linked and nothing run: the C parts of dependencies are left out, as their compiler wants
@@ -18,7 +18,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 source tests/script.sh platforms
 
 mirror="${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
-only=" ${ONLY:-check arm windows kernels} "
+only=" ${ONLY:-check arm windows} "
 published="core grasp protocol os hand window xr force emulator"
 windows=x86_64-pc-windows-gnu arm=aarch64-unknown-linux-gnu mac=aarch64-apple-darwin
 
@@ -54,6 +54,7 @@ PY
     mkdir -p "$root"
     debootstrap --variant=minbase --include=ca-certificates trixie "$root" "$mirror" \
         >"$work/debootstrap.log" 2>&1 || fail "debootstrap"
+    cp /etc/resolv.conf "$root/etc/resolv.conf"
     echo "deb $mirror trixie-backports main" >"$root/etc/apt/sources.list.d/backports.list"
     {
         inside apt-get update &&
@@ -63,7 +64,6 @@ PY
     } >"$work/packages.log" 2>&1 || fail "its packages"
     # The authorities that this machine trusts, a company's among them.
     cp /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/ca-certificates.crt"
-    cp /etc/resolv.conf "$root/etc/resolv.conf"
     stand_ins
     touch "$root/made-for-softgrasp"
 }
@@ -201,20 +201,4 @@ case $only in *" windows "*)
     ;;
 esac
 
-# -- Tests of what is written for vectors
-
-case $only in *" kernels "*)
-    other_cargo "$arm" test --package softgrasp-core --lib --no-run >"$work/build-tests.log" 2>&1 ||
-        fail "the tests of softgrasp-core are not built for $arm"
-    for tests in "$root/target/$arm/debug/deps/"softgrasp_core-*; do
-        [ -x "$tests" ] && [ "${tests%.d}" = "$tests" ] || continue
-        # What is written with vectors in mind: products, elements, fronts, multigrid, contact.
-        inside qemu-aarch64-static -L /usr/aarch64-linux-gnu "${tests#"$root"}" \
-            fem::products fem::hyperelastic::lanes fem::hyperelastic::groups fem::hyperelastic::shrink \
-            solve::front::substitute solve::multigrid::block_rows contact::coulomb \
-            >"$work/tests-arm.log" 2>&1 || fail "tests of softgrasp-core on ARM"
-        say "$(grep '^test result' "$work/tests-arm.log")"
-    done
-    ;;
-esac
 say "passed ($SECONDS s)"
