@@ -36,9 +36,12 @@ def test_field_of_an_openigtlink_client_is_that_of_the_answer(tmp_path: Path) ->
         message = client.wait_for_message("DisplacementField", timeout=30)
         assert message is not None, "no field comes"
         client.stop()
+        children = Path(f"/proc/{sender.pid}/task/{sender.pid}/children")
+        servers = children.read_text().split() if children.exists() else []
     finally:
         sender.terminate()
         sender.wait(30)
+    assert not [pid for pid in servers if Path(f"/proc/{pid}").exists()], "its server is left over"
     mesh = softgrasp.Mesh.read(CUBE)
     low, high = mesh.bounds
     field = np.asarray(message.image)

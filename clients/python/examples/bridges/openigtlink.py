@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import signal
+import sys
 import time
 from pathlib import Path
 
@@ -82,6 +84,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=0, help="fields to send; 0 for ever")
     given = parser.parse_args()
 
+    # Who is asked to end leaves the `with` block, and its server ends too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     mesh = softgrasp.Mesh.read(given.mesh, given.scale)
     low, high = mesh.bounds
     height = high[2] - low[2]
