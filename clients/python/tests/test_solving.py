@@ -8,6 +8,7 @@ from conftest import Bar
 
 import softgrasp
 from softgrasp import LargeDeformation, LoadCase, Material, Mesh, Model, Server, WarningCode, calls
+from softgrasp.session import NamedModel
 
 
 def test_uniform_strain_of_a_pulled_bar_is_exact(server: Server, bar: Bar) -> None:
@@ -252,3 +253,17 @@ def test_drop_leaves_the_models_of_others(program: softgrasp.ServerProgram, bar:
             other._tell(calls.drop(kept.hash))
             other.ping()
         assert holder._ask(calls.have_model(kept.hash))
+
+
+def test_question_of_the_frame_before_is_asked_again_only_where_every_option_is_the_same() -> None:
+    """Options in another order are told apart by name."""
+    mesh = Mesh.block((0.02,) * 3, (1, 1, 1))
+    kept = NamedModel(Model(mesh, Material(20_000.0, 0.3)), ())
+    one, other = 1e-3, 2.0
+    first = kept._question({"max_error": one, "deadline_ms": other})
+    assert kept._question({"deadline_ms": other, "max_error": one}) is first
+    swapped = kept._question({"deadline_ms": one, "max_error": other})
+    assert (swapped.deadline_ms, swapped.max_error) == (one, other)
+    assert kept._question({"max_error": other}).deadline_ms is None
+    nodes = np.array([1, 2], dtype=np.int64)
+    assert kept._question({"nodes": nodes}) is not kept._question({"nodes": nodes})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from operator import is_
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -87,8 +86,8 @@ class NamedModel:
         Frames that differ in their load case alone ask the same again and again.
         """
         asked = self._asked
-        if asked is not None and options.keys() == asked[0].keys():
-            if all(map(is_, options.values(), asked[0].values())):
+        if asked is not None and len(options) == len(asked[0]):
+            if all(asked[0].get(name, self) is value for name, value in options.items()):
                 return asked[1]
         question = Question(**options)
         # What was copied to be checked would not follow a change of the caller's own.
