@@ -24,6 +24,20 @@ install() {
     } >/dev/null 2>&1 </dev/null || true
 }
 
+# debian_13 FOLDER PACKAGE,…: a Debian 13 of the script's own; `mirror` is where from, `work` has the log.
+debian_13() {
+    command -v debootstrap >/dev/null || install debootstrap
+    command -v debootstrap >/dev/null || skip "there is no debootstrap and it could not be installed"
+    python3 - "$mirror/dists/trixie/InRelease" <<'PY' 2>/dev/null || skip "$mirror cannot be reached"
+import sys, urllib.request
+urllib.request.urlopen(sys.argv[1], timeout=20).read(64)
+PY
+    say "making a Debian 13 in $1"
+    mkdir -p "$1"
+    debootstrap --variant=minbase --include="$2" trixie "$1" "$mirror" >"$work/debootstrap.log" 2>&1 ||
+        fail "debootstrap"
+}
+
 # take_programs PROGRAM…: those in BIN_DIR, or else built now; `bin_dir` is where they are.
 take_programs() {
     local program

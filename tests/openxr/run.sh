@@ -37,16 +37,7 @@ ends_by cleanup
 
 root="${OPENXR_ROOT:-$work/trixie}"
 if [ ! -e "$root/usr/bin/monado-service" ]; then
-    command -v debootstrap >/dev/null || install debootstrap
-    command -v debootstrap >/dev/null || skip "there is no debootstrap and it could not be installed"
-    python3 - "$mirror/dists/trixie/InRelease" <<'PY' 2>/dev/null || skip "$mirror cannot be reached"
-import sys, urllib.request
-urllib.request.urlopen(sys.argv[1], timeout=20).read(64)
-PY
-    say "making a Debian 13 with Monado in $root"
-    mkdir -p "$root"
-    debootstrap --variant=minbase --include="$packages" trixie "$root" "$mirror" \
-        >"$work/debootstrap.log" 2>&1 || fail "debootstrap"
+    debian_13 "$root" "$packages"
 fi
 
 if [ -z "${BIN_DIR:-}" ]; then

@@ -6,6 +6,7 @@
 
 import csv
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -53,8 +54,8 @@ def displacements(table: Path) -> list[float]:
 
 
 def off(right: list[float], found: list[float]) -> float:
-    """Largest difference over the largest value."""
-    if len(right) != len(found):
+    """Largest difference over the largest value; endless where numbers are missing or no numbers."""
+    if len(right) != len(found) or not all(map(math.isfinite, right + found)):
         return float("inf")
     most = max(map(abs, right))
     return max(abs(a - b) for a, b in zip(right, found)) / most
@@ -66,7 +67,7 @@ def compared_solve(right: Path, found: Path) -> tuple[float, float]:
 
 
 def compared_press(right: Path, found: Path) -> tuple[float, float]:
-    """Poses of the object, and what presses on it, over all steps."""
+    """Forces of all bodies on the object, over all steps."""
 
     def told(path: Path) -> list[float]:
         steps = json.loads(path.read_text())["steps"]

@@ -44,16 +44,7 @@ inside() {
 }
 
 make_debian() {
-    command -v debootstrap >/dev/null || install debootstrap
-    command -v debootstrap >/dev/null || skip "there is no debootstrap and it could not be installed"
-    python3 - "$mirror/dists/trixie-backports/InRelease" <<'PY' 2>/dev/null || skip "$mirror cannot be reached"
-import sys, urllib.request
-urllib.request.urlopen(sys.argv[1], timeout=20).read(64)
-PY
-    say "making a Debian 13 with compilers in $root"
-    mkdir -p "$root"
-    debootstrap --variant=minbase --include=ca-certificates trixie "$root" "$mirror" \
-        >"$work/debootstrap.log" 2>&1 || fail "debootstrap"
+    debian_13 "$root" ca-certificates
     cp /etc/resolv.conf "$root/etc/resolv.conf"
     echo "deb $mirror trixie-backports main" >"$root/etc/apt/sources.list.d/backports.list"
     {
@@ -147,7 +138,7 @@ asked() {
     shift
     rm -rf "${root:?}/answers/$name"
     mkdir -p "$root/answers/$name"
-    # ask FILE ARGUMENT…: one question.
+    # ask ARGUMENT…: one question.
     ask() {
         inside env WINEDEBUG=-all "${program[@]}" "$@" >>"$log" 2>&1 || fail "$name: glove-client $*"
     }
