@@ -8,7 +8,8 @@ FROM ${BASE_BUILD} AS build
 WORKDIR /src
 COPY . .
 # No display, no window: the client is built without it.
-RUN cargo build --release --locked --bins --package fea-server --package glove-client --no-default-features
+RUN cargo build --release --locked --bins --package fea-server --package glove-client --no-default-features \
+    --features fea-server/otlp,glove-client/otlp
 
 FROM ${BASE_RUN} AS run
 WORKDIR /out

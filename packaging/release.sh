@@ -44,7 +44,8 @@ build() {
         RUSTFLAGS="${RUSTFLAGS:-} --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
         RUSTFLAGS="$RUSTFLAGS --remap-path-prefix=$PWD=softgrasp"
         export RUSTFLAGS CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-target}/packaging"
-        cargo build --release --locked --package fea-server --package glove-client --bins --example pages
+        cargo build --release --locked --package fea-server --package glove-client \
+            --features fea-server/otlp,glove-client/otlp --bins --example pages
         BIN_DIR="$CARGO_TARGET_DIR/release"
     fi
     take_programs fea-server glove-client

@@ -19,6 +19,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = ("fea-server", "glove-client")
+# As packaging/release.sh builds them.
+FEATURES = "fea-server/otlp,glove-client/otlp"
 
 
 def metadata(target):
@@ -33,7 +35,7 @@ def built_for(target):
     `cargo metadata` counts the features that tests and reports of the workspace ask for too.
     """
     command = ["cargo", "tree", "--locked", "--edges", "normal", "--prefix", "none"]
-    command += ["--format", "{p}", "--target", target]
+    command += ["--format", "{p}", "--target", target, "--features", FEATURES]
     for name in PROGRAMS:
         command += ["--package", name]
     told = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)

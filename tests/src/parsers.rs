@@ -152,6 +152,7 @@ fn sound_frame(bytes: &[u8], of_server: bool) -> Option<Frame> {
 
 fn request(bytes: &[u8]) {
     let Some(frame) = sound_frame(bytes, false) else { return };
+    assert!(Request::trace(&frame).is_none_or(|trace| trace.is_valid()));
     let Ok(request) = Request::decode(&frame, &Limits::default()) else { return };
     let mut written = Vec::new();
     match request.encode_into(7, &Limits::default(), &mut written) {

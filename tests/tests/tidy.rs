@@ -148,11 +148,12 @@ fn packages() -> Vec<String> {
 }
 
 /// What each package may need of the others, and what it may not need at all.
-const RULES: [(&str, &[&str], &[&str]); 12] = [
+const RULES: [(&str, &[&str], &[&str]); 13] = [
     // JSON is the text of glTF, no form of the wire: no type of core derives a form of it.
     ("crates/core", &[], &["tokio", "serde"]),
     ("crates/protocol", &[], &["nalgebra", "rayon"]),
     ("crates/os", &[], &["nalgebra", "rayon"]),
+    ("crates/telemetry", &["softgrasp-protocol"], &["nalgebra", "rayon", "tokio"]),
     ("crates/grasp", &["softgrasp-core"], &["tokio", "serde", "serde_json"]),
     ("crates/hand", &["softgrasp-core", "softgrasp-grasp", "softgrasp-os"], &["tokio", "kiss3d"]),
     (
@@ -179,7 +180,7 @@ const RULES: [(&str, &[&str], &[&str]); 12] = [
     ("crates/emulator", &["softgrasp-grasp", "softgrasp-hand"], &["tokio", "kiss3d"]),
     (
         "crates/fea-server",
-        &["softgrasp-core", "softgrasp-os", "softgrasp-protocol"],
+        &["softgrasp-core", "softgrasp-os", "softgrasp-protocol", "softgrasp-telemetry"],
         &["kiss3d", "mcap", "serial2"],
     ),
     (
@@ -192,6 +193,7 @@ const RULES: [(&str, &[&str], &[&str]); 12] = [
             "softgrasp-hand",
             "softgrasp-os",
             "softgrasp-protocol",
+            "softgrasp-telemetry",
             "softgrasp-window",
             "softgrasp-xr",
             "fea-server",
@@ -200,7 +202,13 @@ const RULES: [(&str, &[&str], &[&str]); 12] = [
     ),
     (
         "cluster/fea-worker",
-        &["softgrasp-core", "softgrasp-os", "softgrasp-protocol", "fea-server"],
+        &[
+            "softgrasp-core",
+            "softgrasp-os",
+            "softgrasp-protocol",
+            "softgrasp-telemetry",
+            "fea-server",
+        ],
         &["kiss3d", "mcap", "serial2", "mpi"],
     ),
 ];

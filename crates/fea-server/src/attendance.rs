@@ -10,7 +10,7 @@ use tracing::Instrument;
 
 use crate::log_line::foreign_sentence;
 use crate::server_handle::{ServerHandle, stopped};
-use crate::session;
+use crate::session::{self, Peer};
 use crate::standing::{Greeting, Standing};
 
 /// Time of silence after which the system asks the peer's machine whether it is there, and between such
@@ -27,14 +27,14 @@ pub(crate) fn make_ready(stream: &TcpStream) -> std::io::Result<()> {
 
 /// Serves a connection, encrypted if the server is.
 pub(crate) async fn attend(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
-    let span = session::span(&server, peer);
-    agree_and_serve(stream, peer, server).instrument(span).await;
+    let peer = Peer::new(peer, &server);
+    agree_and_serve(stream, peer, server).instrument(peer.span()).await;
 }
 
-async fn agree_and_serve(stream: TcpStream, peer: SocketAddr, server: ServerHandle) {
+async fn agree_and_serve(stream: TcpStream, peer: Peer, server: ServerHandle) {
     let resources = &server.resources;
     let limit = resources.config.greeting_limit;
-    let guest = server.strangers.let_in(peer.ip());
+    let guest = server.strangers.let_in(peer.address.ip());
     let greeting = Greeting { guest, until: Instant::now() + limit, limit };
     let Some(encryption) = &resources.config.encryption else {
         return session::serve(stream, peer, server, Standing::Stranger(greeting)).await;
@@ -49,7 +49,7 @@ async fn agree_and_serve(stream: TcpStream, peer: SocketAddr, server: ServerHand
         Ok(stream) => session::serve(stream, peer, server, Standing::Stranger(greeting)).await,
         Err(error) => {
             resources.metrics.not_introduced();
-            if resources.log_lines.has_room(peer.ip()) {
+            if resources.log_lines.has_room(peer.address.ip()) {
                 let error = foreign_sentence(error);
                 tracing::info!(error, "connection ends before a session: TLS was not agreed on");
             }

@@ -12,7 +12,7 @@ use tracing::Instrument;
 use crate::config::ServerConfig;
 use crate::server::StartError;
 use crate::server_handle::ServerHandle;
-use crate::session;
+use crate::session::{self, Peer};
 use crate::standing::Standing;
 use crate::status_pages::gauges;
 use crate::workers::Workers;
@@ -49,14 +49,14 @@ impl LocalServer {
         let place = self.server.places.take(PEER.ip()).ok()?;
         let (client, stream) = duplex(PIPE_BYTES);
         let server = self.server.clone();
-        let span = session::span(&server, PEER);
+        let peer = Peer::new(PEER, &server);
         let serves = session::serve(
             stream,
-            PEER,
+            peer,
             server,
             Standing::Known { _place: place, _of_token: None },
         );
-        Some((client, serves.instrument(span)))
+        Some((client, serves.instrument(peer.span())))
     }
 
     /// Text of the page `/metrics`.

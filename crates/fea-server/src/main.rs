@@ -75,6 +75,9 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
         ends_in = Duration::ZERO;
     })
     .context("cannot wait for the signals that end the server")?;
+    let _export = softgrasp_telemetry::start("fea-server", env!("CARGO_PKG_VERSION"))
+        .inspect_err(|error| tracing::warn!(%error, "no traces and no metrics"))
+        .unwrap_or_default();
     let runtime =
         fea_server::sockets_runtime(&config).context("cannot start the server's sockets")?;
     let served = runtime.block_on(fea_server::serve(config, announce, stopped));

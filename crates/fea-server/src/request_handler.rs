@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use softgrasp_protocol::{
     Answer, Ask, Body, ContactAnswer, ContactFrame, Frame, Hello, LargeAsk, Limits, ModelHash,
-    ModelReady, Question, Reply, ReportLevel, Request, Subject, UploadModel, VERSIONS, Welcome,
+    ModelReady, Question, Reply, ReportLevel, Request, Subject, TraceContext, UploadModel,
+    VERSIONS, Welcome,
 };
 use tokio::task::JoinHandle;
 
@@ -54,6 +55,8 @@ pub(crate) struct RequestHandler {
     grasping: Option<Grasping>,
     /// Silence of the server after which the client wants an `Alive`.
     alive_every: Option<Duration>,
+    /// Trace of the request that is answered, for what the engine is asked.
+    trace: Option<TraceContext>,
 }
 
 /// Names of this server's capabilities, for `Welcome`.
@@ -100,6 +103,7 @@ impl RequestHandler {
             making: None,
             grasping: None,
             alive_every: None,
+            trace: None,
             server,
         }
     }
@@ -117,6 +121,11 @@ impl RequestHandler {
     /// Whether the client has shown a right token, or none is required.
     pub fn is_authorised(&self) -> bool {
         self.is_authorised
+    }
+
+    /// Sets the trace that the next request belongs to.
+    pub fn set_trace(&mut self, trace: Option<TraceContext>) {
+        self.trace = trace;
     }
 
     /// Bearer of the token that the client has shown.
@@ -238,7 +247,7 @@ impl RequestHandler {
             self.held.hold(model);
             let asked = (model, question, cases);
             let handed = place_kept(resources, elsewhere, asked, without_estimate, clock())?;
-            return handed.answer().await;
+            return handed.answer(self.trace).await;
         }
         if cases.is_empty() {
             return self.frame(model, question, clock).await;
@@ -279,7 +288,7 @@ impl RequestHandler {
         };
         match workers.run(turn, work).await?? {
             Placed::Here(answer) => Ok(*answer),
-            Placed::Elsewhere(handed) => handed.answer().await,
+            Placed::Elsewhere(handed) => handed.answer(self.trace).await,
         }
     }
 

@@ -11,6 +11,7 @@ use tokio::task::JoinSet;
 
 use crate::attendance::{attend, make_ready};
 use crate::config::{ConfigError, ServerConfig};
+use crate::observed::observe_server;
 use crate::pace::Pace;
 use crate::resources::Resources;
 use crate::server_handle::{ServerHandle, stopped};
@@ -88,6 +89,7 @@ pub async fn serve(
         Workers::new(threads, queue).map_err(|source| StartError::Threads { threads, source })?;
     let (end_sessions, sessions_end) = watch::channel(false);
     let server = ServerHandle::new(config, workers, sessions_end);
+    observe_server(&server);
     let is_stopping = Arc::new(AtomicBool::new(false));
     // Ends with this function.
     let mut beside = JoinSet::new();

@@ -19,20 +19,36 @@ use crate::log_line::foreign_sentence;
 use crate::manners::Manners;
 use crate::refusal::Refusal;
 use crate::request_handler::RequestHandler;
+use crate::request_trace;
 use crate::room::Room;
 use crate::server_handle::{ServerHandle, stopped};
 use crate::standing::Standing;
 use crate::tokens::Bearer;
 
-/// Span of all log lines about a connection: its number and its peer.
-pub(crate) fn span(server: &ServerHandle, peer: SocketAddr) -> tracing::Span {
-    // Of the highest level, so that no filter takes it from a line that passes.
-    tracing::error_span!("session", id = server.next_connection(), %peer)
+/// The other side of a connection.
+#[derive(Clone, Copy)]
+pub(crate) struct Peer {
+    pub address: SocketAddr,
+    /// Number of the connection, different from all others of this server.
+    number: u64,
+}
+
+impl Peer {
+    /// The other side of a new connection.
+    pub fn new(address: SocketAddr, server: &ServerHandle) -> Self {
+        Self { address, number: server.next_connection() }
+    }
+
+    /// Span of all log lines about the connection: its number and its peer.
+    pub fn span(&self) -> tracing::Span {
+        // Of the highest level, so that no filter takes it from a line that passes.
+        tracing::error_span!("session", id = self.number, peer = %self.address)
+    }
 }
 
 /// Serves one connection until the client goes, sends damaged bytes, or the server stops; one that has
 /// not introduced itself also until its time or its room ends.
-pub(crate) async fn serve<S>(stream: S, peer: SocketAddr, server: ServerHandle, standing: Standing)
+pub(crate) async fn serve<S>(stream: S, peer: Peer, server: ServerHandle, standing: Standing)
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
@@ -47,7 +63,7 @@ where
             wants_token,
             Room::new(Arc::clone(&server.resources)),
         ),
-        handler: RequestHandler::new(server.clone(), peer),
+        handler: RequestHandler::new(server.clone(), peer.address),
         server,
         peer,
         standing,
@@ -66,7 +82,7 @@ struct Session<S> {
     connection: ClientConnection<S>,
     handler: RequestHandler,
     server: ServerHandle,
-    peer: SocketAddr,
+    peer: Peer,
     standing: Standing,
     /// Encoded reply; kept so that its memory is reused.
     out: Vec<u8>,
@@ -133,7 +149,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         if !self.standing.is_stranger() {
             return Ok(());
         }
-        let place = self.server.places.take(self.peer.ip()).and_then(|place| {
+        let place = self.server.places.take(self.peer.address.ip()).and_then(|place| {
             let of_token = self.handler.bearer().map(Bearer::take_place).transpose()?;
             Ok(Standing::Known { _place: place, _of_token: of_token })
         });
@@ -180,7 +196,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
 
     /// Whether a line about this client may be logged.
     fn may_log(&self) -> bool {
-        self.server.resources.log_lines.has_room(self.peer.ip())
+        self.server.resources.log_lines.has_room(self.peer.address.ip())
     }
 
     /// Sends a last `Rejected` to a client whose bytes are damaged or foreign; it need not arrive.
@@ -271,6 +287,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         let kept_model = Ask::kept_model(&frame);
         let is_request = kind.is_some_and(|kind| !kind.is_reply());
         let start = Instant::now();
+        let mut span = request_trace::begin(&frame, self.peer.number);
         // Without a token any request introduces a client, before it is worked for.
         if self.handler.is_authorised() && is_request {
             self.introduced().await?;
@@ -281,10 +298,17 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
             Some((model, true)) if self.connection.has_newer(model).await => {
                 Err(Refusal::Superseded)
             }
-            _ => work(&mut self.handler, &mut self.connection, frame, received)
-                .await
-                .inspect_err(|_| metrics.abandoned())?,
+            _ => {
+                self.handler.set_trace(span.context());
+                work(&mut self.handler, &mut self.connection, frame, received).await.inspect_err(
+                    |gone| {
+                        metrics.abandoned();
+                        span.fail("Abandoned", || foreign_sentence(gone));
+                    },
+                )?
+            }
         };
+        request_trace::tell(&mut span, &replied);
         let refused = replied.as_ref().err().map(Refusal::code);
         metrics.answered((kind, kept_model.is_some()), start.elapsed(), refused);
         if self.handler.is_authorised() && is_request {

@@ -65,6 +65,29 @@ impl Kind {
         Self::ContactAnswer,
     ];
 
+    /// Name of the kind, as in `docs/wire.md`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hello => "Hello",
+            Self::Ask => "Ask",
+            Self::HaveModel => "HaveModel",
+            Self::UploadModel => "UploadModel",
+            Self::Cancel => "Cancel",
+            Self::Prefetch => "Prefetch",
+            Self::Drop => "Drop",
+            Self::Ping => "Ping",
+            Self::ContactFrame => "ContactFrame",
+            Self::Welcome => "Welcome",
+            Self::Answer => "Answer",
+            Self::ModelState => "ModelState",
+            Self::ModelReady => "ModelReady",
+            Self::Rejected => "Rejected",
+            Self::Alive => "Alive",
+            Self::Pong => "Pong",
+            Self::ContactAnswer => "ContactAnswer",
+        }
+    }
+
     /// Number of the kind in the header.
     pub const fn number(self) -> u16 {
         self as u16
@@ -83,7 +106,7 @@ impl Kind {
 
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Debug::fmt(self, f)
+        f.write_str(self.name())
     }
 }
 
@@ -97,6 +120,7 @@ mod tests {
         for number in 0..=u16::MAX {
             if let Some(kind) = Kind::from_number(number) {
                 assert_eq!(kind.number(), number);
+                assert_eq!(kind.name(), format!("{kind:?}"));
                 found += 1;
             }
         }

@@ -42,6 +42,7 @@ mod limits;
 mod message;
 mod payload;
 pub mod solve_report;
+mod trace;
 
 pub use error::{ConnectionError, DecodeError, EncodeError, FrameError};
 pub use format::{HEADER_LEN, MAGIC, PART_LEN_MAX, VERSION, VERSIONS, VersionRange};
@@ -50,3 +51,4 @@ pub use header::Header;
 pub use kind::Kind;
 pub use limits::Limits;
 pub use message::*;
+pub use trace::TraceContext;

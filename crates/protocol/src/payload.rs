@@ -4,6 +4,7 @@ use wincode::config::Serialize;
 use wincode::{SchemaRead, SchemaWrite};
 
 use crate::block::{PartFormat, read_fields};
+use crate::trace::{TraceContext, TracePart};
 use crate::{DecodeError, DofValue, EncodeError, HEADER_LEN, Header, Kind, Limits, PART_LEN_MAX};
 
 /// Length of the number that states the part's length, bytes.
@@ -74,7 +75,7 @@ fn append_frame(
     let frame_start = out.len();
     let start = frame_start + HEADER_LEN;
     out.resize(start, 0);
-    fill(&mut PayloadWriter { out, start })?;
+    fill(&mut PayloadWriter { out, start, trace: None })?;
     // The payload stays where it was written; only the header is filled in afterwards.
     let (before, payload) = out.split_at_mut(start);
     let len_max = limits.payload_len_max;
@@ -91,9 +92,16 @@ fn append_frame(
 pub(crate) struct PayloadWriter<'a> {
     out: &'a mut Vec<u8>,
     start: usize,
+    /// Trace that the message belongs to, written behind the fields of its part.
+    trace: Option<TraceContext>,
 }
 
 impl PayloadWriter<'_> {
+    /// Trace that the part, which is written next, shall tell.
+    pub(crate) fn belongs_to(&mut self, trace: Option<TraceContext>) {
+        self.trace = trace;
+    }
+
     /// Writes the part as a block, its length first; to be called before any array.
     ///
     /// # Errors
@@ -106,6 +114,11 @@ impl PayloadWriter<'_> {
         self.out.extend_from_slice(&[0; LENGTH_LEN]);
         T::serialize_into(&mut *self.out, part, PartFormat::new())
             .map_err(|source| EncodeError::Part { source })?;
+        if let Some(trace) = self.trace.take() {
+            let later = TracePart { trace: Some(trace) };
+            TracePart::serialize_into(&mut *self.out, &later, PartFormat::new())
+                .map_err(|source| EncodeError::Part { source })?;
+        }
         let len = self.out.len() - start - LENGTH_LEN;
         if len > PART_LEN_MAX {
             return Err(EncodeError::PartTooLong { len });
@@ -301,7 +314,7 @@ mod tests {
 
     fn payload_of(fill: impl FnOnce(&mut PayloadWriter<'_>)) -> Vec<u8> {
         let mut out = Vec::new();
-        fill(&mut PayloadWriter { out: &mut out, start: 0 });
+        fill(&mut PayloadWriter { out: &mut out, start: 0, trace: None });
         out
     }
 

@@ -7,7 +7,8 @@ use softgrasp_core::solve::choose::cheapest_element;
 use softgrasp_core::solve::memory::Bytes;
 use softgrasp_core::solve::{ERROR_SERIOUS, ERROR_UNREMARKABLE, Method};
 use softgrasp_protocol::{
-    Answer, Body, ModelHash, ModelReady, Question, UploadModel, Warning, WarningCode, WarningLevel,
+    Answer, Body, ModelHash, ModelReady, Question, TraceContext, UploadModel, Warning, WarningCode,
+    WarningLevel,
 };
 
 use super::once::solve_once;
@@ -83,6 +84,7 @@ pub(crate) fn place_once(
         question: message,
         cases,
         without_estimate: !estimate,
+        trace: None,
     };
     handed_over(engine, task, why, (clock, reservation)).map(Placed::Elsewhere)
 }
@@ -122,7 +124,7 @@ pub(crate) fn place_kept(
         true => String::new(),
         false => "the model is too large for this server's memory".to_owned(),
     };
-    let task = Task { model, kept: Some(hash), question, cases, without_estimate };
+    let task = Task { model, kept: Some(hash), question, cases, without_estimate, trace: None };
     handed_over(engine, task, why, (clock, resources.budget.reservation()))
 }
 
@@ -236,14 +238,14 @@ fn handed_over(
 }
 
 impl HandedOver {
-    /// Asks the engine. Dropping the future tells the engine that nobody waits any more.
+    /// Asks the engine, as part of a trace. Dropping the future tells the engine that nobody waits any more.
     ///
     /// # Errors
     /// The engine's refusal.
-    pub async fn answer(self) -> Result<Answer, Refusal> {
+    pub async fn answer(self, trace: Option<TraceContext>) -> Result<Answer, Refusal> {
         let Self { engine, task, why, clock, poisson_max, _reservation: _held } = self;
         let (question, element) = (task.question.clone(), element_of(task.model.element));
-        let mut answer = engine.answer(task).await.map_err(Refusal::Elsewhere)?;
+        let mut answer = engine.answer(Task { trace, ..task }).await.map_err(Refusal::Elsewhere)?;
         let report = &mut answer.report;
         if !why.is_empty() {
             report.chosen_because = match report.chosen_because.is_empty() {

@@ -4,9 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use softgrasp_protocol::{
-    Answer, Ask, Body, EncodeError, Limits, RejectCode, Rejected, Reply, Request, Subject,
-    UploadModel,
+    Answer, Ask, Body, EncodeError, Kind, Limits, RejectCode, Rejected, Reply, Request, Subject,
+    TraceContext, UploadModel,
 };
+use softgrasp_telemetry::RequestSpan;
 use tokio::time::{Instant, sleep};
 
 use super::conversation::{Conversation, Lost};
@@ -26,6 +27,8 @@ struct Requests {
     ask: Vec<u8>,
     /// The model that the question is about, if it is to be kept by the cluster.
     model: Option<Arc<UploadModel>>,
+    /// Trace that they belong to.
+    trace: Option<TraceContext>,
 }
 
 /// Ids of the question and of an upload.
@@ -53,7 +56,21 @@ impl Cluster {
     }
 
     async fn asked(&self, task: Task) -> Result<Answer, Rejected> {
-        let encoding = tokio::task::spawn_blocking(move || Requests::of(task));
+        let mut span = RequestSpan::client_of(task.trace, Kind::Ask.name(), ASK);
+        span.set("server.address", self.endpoint.address.as_str());
+        let trace = span.context();
+        self.asked_within(task, trace).await.inspect_err(|rejected| {
+            span.fail(rejected.code.to_string(), || rejected.text.clone());
+        })
+    }
+
+    /// Asks as part of a trace.
+    async fn asked_within(
+        &self,
+        task: Task,
+        trace: Option<TraceContext>,
+    ) -> Result<Answer, Rejected> {
+        let encoding = tokio::task::spawn_blocking(move || Requests::of(task, trace));
         let requests = match encoding.await {
             Ok(Ok(requests)) => requests,
             Ok(Err(error)) => return Err(Rejected::new(RejectCode::TooLarge, error.to_string())),
@@ -115,9 +132,9 @@ async fn attempted(
     if let (Reply::Rejected(rejected), Some(model)) = (&reply, &requests.model)
         && rejected.code == RejectCode::UnknownModel
     {
-        let model = Arc::clone(model);
+        let (model, trace) = (Arc::clone(model), requests.trace);
         let encoding = tokio::task::spawn_blocking(move || {
-            encoded(&Request::UploadModel((*model).clone()), UPLOAD)
+            encoded(&Request::UploadModel((*model).clone()), UPLOAD, trace)
         });
         let bytes = match encoding.await {
             Ok(Ok(bytes)) => bytes,
@@ -147,8 +164,8 @@ impl Engine for Cluster {
 }
 
 impl Requests {
-    fn of(task: Task) -> Result<Self, EncodeError> {
-        let Task { model, kept, question, cases, without_estimate } = task;
+    fn of(task: Task, trace: Option<TraceContext>) -> Result<Self, EncodeError> {
+        let Task { model, kept, question, cases, without_estimate, trace: _ } = task;
         let (subject, model) = match kept {
             Some(hash) => (Subject::Model(hash), Some(model)),
             None => {
@@ -158,12 +175,16 @@ impl Requests {
             }
         };
         let ask = Ask { cases, without_estimate, ..Ask::new(subject, question) };
-        Ok(Self { ask: encoded(&Request::Ask(Box::new(ask)), ASK)?, model })
+        Ok(Self { ask: encoded(&Request::Ask(Box::new(ask)), ASK, trace)?, model, trace })
     }
 }
 
-fn encoded(request: &Request, id: u64) -> Result<Vec<u8>, EncodeError> {
+fn encoded(
+    request: &Request,
+    id: u64,
+    trace: Option<TraceContext>,
+) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
-    request.encode_into(id, &Limits::LARGEST, &mut bytes)?;
+    request.encode_traced_into(id, trace, &Limits::LARGEST, &mut bytes)?;
     Ok(bytes)
 }

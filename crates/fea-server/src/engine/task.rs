@@ -4,7 +4,7 @@ use std::fmt;
 use std::pin::Pin;
 use std::sync::Arc;
 
-use softgrasp_protocol::{Answer, ModelHash, Question, Rejected, UploadModel};
+use softgrasp_protocol::{Answer, ModelHash, Question, Rejected, TraceContext, UploadModel};
 
 /// The answer that comes later; dropping it tells the engine that nobody waits any more.
 pub type Answered<'a> = Pin<Box<dyn Future<Output = Result<Answer, Rejected>> + Send + 'a>>;
@@ -31,6 +31,8 @@ pub struct Task {
     pub cases: Vec<Vec<f64>>,
     /// Whether error, rotation and strain may be left out.
     pub without_estimate: bool,
+    /// Trace that the request belongs to.
+    pub trace: Option<TraceContext>,
 }
 
 /// A method by which several processes answer together.

@@ -10,8 +10,9 @@ use softgrasp_core::solve::rates::Rates;
 use softgrasp_protocol::blocking::Connection;
 use softgrasp_protocol::{
     Answer, Ask, ConnectionError, DecodeError, EncodeError, Frame, FrameError, HEADER_LEN, Hello,
-    Limits, Rejected, Reply, Request, Welcome,
+    Limits, Rejected, Reply, Request, TraceContext, Welcome,
 };
+use softgrasp_telemetry::RequestSpan;
 
 use crate::ask::endpoint::{Endpoint, TrustError};
 use crate::ask::server_stream::ServerStream;
@@ -103,6 +104,19 @@ pub enum LinkError {
         /// Kind of the reply.
         got: String,
     },
+}
+
+impl LinkError {
+    /// The error in one word, for metrics: the server's code of a refusal, or what broke.
+    fn code(&self) -> String {
+        match self {
+            Self::Rejected(rejected) => rejected.code.to_string(),
+            Self::Encode(_) => "Encode".to_owned(),
+            Self::Decode(_) => "Decode".to_owned(),
+            Self::Unexpected { .. } => "Unexpected".to_owned(),
+            _ => "Connection".to_owned(),
+        }
+    }
 }
 
 /// Connection to a server that has received `Hello` and sent `Welcome`.
@@ -297,7 +311,20 @@ impl ServerConnection {
         request: &Request,
         read_frame: impl Fn(&mut Self) -> Result<Option<Frame>, ConnectionError>,
     ) -> Result<Reply, LinkError> {
-        let request_id = self.send(request)?;
+        let mut span = RequestSpan::client(request.kind().name(), self.request_id + 1);
+        self.ask_within(request, span.context(), read_frame).inspect_err(|error| {
+            span.fail(error.code(), || error.to_string());
+        })
+    }
+
+    /// Asks as part of a trace.
+    fn ask_within(
+        &mut self,
+        request: &Request,
+        trace: Option<TraceContext>,
+        read_frame: impl Fn(&mut Self) -> Result<Option<Frame>, ConnectionError>,
+    ) -> Result<Reply, LinkError> {
+        let request_id = self.send_within(request, trace)?;
         loop {
             let frame = read_frame(self)?.ok_or(LinkError::Closed)?;
             // Id 0 is the server speaking on its own: turned away, stopping, bad stream.
@@ -342,9 +369,17 @@ impl ServerConnection {
     /// [`LinkError::Encode`] for a request that is too large, [`LinkError::Connection`] for a broken
     /// connection.
     pub fn send(&mut self, request: &Request) -> Result<u64, LinkError> {
+        self.send_within(request, None)
+    }
+
+    fn send_within(
+        &mut self,
+        request: &Request,
+        trace: Option<TraceContext>,
+    ) -> Result<u64, LinkError> {
         self.request_id += 1;
         self.out.clear();
-        request.encode_into(self.request_id, &self.limits, &mut self.out)?;
+        request.encode_traced_into(self.request_id, trace, &self.limits, &mut self.out)?;
         self.connection.write_bytes(&self.out)?;
         Ok(self.request_id)
     }

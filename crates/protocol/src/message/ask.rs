@@ -11,6 +11,7 @@ use super::report::ReportLevel;
 use crate::block::Block;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
+use crate::trace::{TraceContext, TracePart};
 use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 
 /// Request for displacements, answered by `Answer`.
@@ -145,6 +146,13 @@ impl Ask {
             writer.array(case);
         }
         Ok(())
+    }
+
+    /// Trace that the request in a frame belongs to.
+    pub(super) fn trace(frame: &Frame) -> Option<TraceContext> {
+        let mut reader = PayloadReader::new(&frame.payload);
+        let (_, later): (AskPart, TracePart) = reader.part_and_later().ok()?;
+        later.trace
     }
 
     pub(super) fn read(

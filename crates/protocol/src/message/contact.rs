@@ -13,7 +13,8 @@ use super::small_system::SmallSystem;
 use crate::block::Block;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
-use crate::{DecodeError, EncodeError, Limits};
+use crate::trace::{TraceContext, TracePart};
+use crate::{DecodeError, EncodeError, Frame, Limits};
 
 /// One step of a kept model that no fixed degree of freedom holds, among rigid bodies. The state comes
 /// with the request and goes back with the answer; the server does not depend on an earlier one.
@@ -231,6 +232,13 @@ impl ContactFrame {
         writer.array(&self.triangle_bodies);
         writer.array(nodes);
         Ok(())
+    }
+
+    /// Trace that the request in a frame belongs to.
+    pub(super) fn trace(frame: &Frame) -> Option<TraceContext> {
+        let mut reader = PayloadReader::new(&frame.payload);
+        let (_, later): (ContactFramePart, TracePart) = reader.part_and_later().ok()?;
+        later.trace
     }
 
     pub(super) fn read(

@@ -11,7 +11,8 @@ use super::names::ElementName;
 use super::report::StageMs;
 use crate::limits::check_count;
 use crate::payload::{PayloadReader, PayloadWriter, count_of};
-use crate::{DecodeError, EncodeError, Limits};
+use crate::trace::{TraceContext, TracePart};
+use crate::{DecodeError, EncodeError, Frame, Limits};
 
 /// Content hash that names a model; opaque here, shown as 64 hexadecimal digits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, SchemaRead, SchemaWrite)]
@@ -135,6 +136,13 @@ impl UploadModel {
         write_mesh(writer, &self.mesh, &self.materials);
         writer.array(&self.fixed);
         Ok(())
+    }
+
+    /// Trace that the request in a frame belongs to.
+    pub(super) fn trace(frame: &Frame) -> Option<TraceContext> {
+        let mut reader = PayloadReader::new(&frame.payload);
+        let (_, later): (UploadModelPart, TracePart) = reader.part_and_later().ok()?;
+        later.trace
     }
 
     pub(super) fn read(

@@ -4,7 +4,8 @@ use super::ask::Ask;
 use super::contact::ContactFrame;
 use super::model::{ModelHash, Prefetch, UploadModel};
 use super::session::Hello;
-use crate::payload::{PayloadReader, encode_frame};
+use crate::payload::{PayloadReader, PayloadWriter, encode_frame};
+use crate::trace::TraceContext;
 use crate::{DecodeError, EncodeError, Frame, Kind, Limits};
 
 /// Message from client to server.
@@ -72,7 +73,31 @@ impl Request {
         limits: &Limits,
         out: &mut Vec<u8>,
     ) -> Result<(), EncodeError> {
-        encode_frame(self.kind(), request_id, limits, out, |writer| match self {
+        self.encode_traced_into(request_id, None, limits, out)
+    }
+
+    /// [`Self::encode_into`] for a request that belongs to a trace. Only `Ask`, `UploadModel` and
+    /// `ContactFrame` carry one; others are encoded as without.
+    ///
+    /// # Errors
+    /// As [`Self::encode_into`].
+    pub fn encode_traced_into(
+        &self,
+        request_id: u64,
+        trace: Option<TraceContext>,
+        limits: &Limits,
+        out: &mut Vec<u8>,
+    ) -> Result<(), EncodeError> {
+        let carries = matches!(self, Self::Ask(_) | Self::UploadModel(_) | Self::ContactFrame(_));
+        let trace = trace.filter(|_| carries);
+        encode_frame(self.kind(), request_id, limits, out, |writer| {
+            writer.belongs_to(trace);
+            self.write(writer)
+        })
+    }
+
+    fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
+        match self {
             Self::Hello(hello) => writer.part(hello),
             Self::Ask(ask) => ask.write(writer),
             Self::HaveModel(model) | Self::Drop(model) => writer.part(model),
@@ -81,7 +106,19 @@ impl Request {
             Self::Prefetch(prefetch) => prefetch.write(writer),
             Self::Ping { nonce } => writer.part(nonce),
             Self::ContactFrame(frame) => frame.write(writer),
-        })
+        }
+    }
+
+    /// Trace that the request in a frame belongs to; `None` for one of another kind, without a trace, or
+    /// with an identity of zeros. Decodes the part only.
+    pub fn trace(frame: &Frame) -> Option<TraceContext> {
+        let trace = match frame.kind()? {
+            Kind::Ask => Ask::trace(frame),
+            Kind::UploadModel => UploadModel::trace(frame),
+            Kind::ContactFrame => ContactFrame::trace(frame),
+            _ => None,
+        };
+        trace.filter(TraceContext::is_valid)
     }
 
     /// Decodes the request in a frame.

@@ -14,3 +14,4 @@ mod random_messages;
 mod raw;
 mod round_trip;
 mod samples;
+mod traced;
