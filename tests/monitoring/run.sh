@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Checks packaging/grafana and packaging/prometheus: the alerts by promtool, with an example of each; what
-# a running server tells by promtool too; and that dashboard, alerts and docs/operations.md name the
-# metrics that it has, and all of them. Ends with 0 and one line where promtool cannot be had.
+# a running server tells by promtool too; that dashboard, alerts and docs/operations.md name the metrics
+# that it has, and all of them; and what client, servers and cluster send to a collector of OpenTelemetry.
+# Ends with 0 and one line where promtool cannot be had.
 #
 #   tests/monitoring/run.sh                            builds the server and runs
 #   BIN_DIR=target/release tests/monitoring/run.sh     takes a server that is built already
@@ -18,7 +19,7 @@ missing() {
 
 [ -z "$(missing)" ] || install prometheus python3 curl
 [ -z "$(missing)" ] || skip "$(missing) is not there and could not be installed"
-take_programs fea-server
+take_programs fea-server glove-client
 server="$bin_dir/fea-server"
 
 work="$(mktemp -d)"
@@ -60,4 +61,12 @@ curl --silent --show-error --fail --max-time 10 --noproxy '*' "http://$address/m
 promtool check metrics <"$work/metrics" >"$work/told" 2>&1 || fail "metrics: $(cat "$work/told")"
 python3 tests/monitoring/check.py "$work/metrics" packaging/grafana/softgrasp.json \
     packaging/prometheus/alerts.yml docs/operations.md || fail "names"
+
+# With the schema of OpenTelemetry itself, where an index of packages can be reached.
+python=python3
+if python3 -m venv "$work/venv" >/dev/null 2>&1 && timeout 120 "$work/venv/bin/python" -m pip install \
+    -q --retries 1 --timeout 15 opentelemetry-proto >/dev/null 2>&1; then
+    python="$work/venv/bin/python"
+fi
+"$python" tests/monitoring/traces.py "$server" "$bin_dir/glove-client" docs/operations.md || fail "traces"
 say "passed"

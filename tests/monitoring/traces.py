@@ -121,6 +121,8 @@ def play(server, client, folder, collector, protocol):
             OTEL_EXPORTER_OTLP_PROTOCOL=protocol,
             OTEL_SERVICE_NAME=service,
             OTEL_BSP_MAX_QUEUE_SIZE="100000",
+            # What a server keeps is read while it runs.
+            OTEL_METRIC_EXPORT_INTERVAL="500",
             NO_PROXY="127.0.0.1",
         )
 
@@ -185,6 +187,7 @@ def check(collector):
     for span in spans:
         if (span["service"], span["name"]) != ("client", "Ask"):
             continue
+        assert attributes(span)["server.address"], span
         (server,) = below[span["spanId"]]
         (question,) = below[server["spanId"]]
         (worker,) = below[question["spanId"]]

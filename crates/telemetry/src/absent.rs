@@ -3,8 +3,8 @@
 use softgrasp_protocol::TraceContext;
 
 use crate::attribute::AttributeValue;
+use crate::error::StartError;
 use crate::observed::Observed;
-use crate::start::{Export, StartError};
 
 /// There is none.
 pub(crate) enum Exporting {}
@@ -16,7 +16,7 @@ pub(crate) fn start(
     _: &'static str,
     _: &'static str,
     variable: &'static str,
-) -> Result<Export, StartError> {
+) -> Result<Exporting, StartError> {
     Err(StartError::NotCompiled { variable })
 }
 

@@ -1,7 +1,5 @@
 //! Values that are read each time metrics are exported.
 
-use crate::backend;
-
 /// A value that changes, and how it is read.
 pub struct Observed {
     /// Name of the metric, as `softgrasp.server.sessions`.
@@ -12,10 +10,4 @@ pub struct Observed {
     pub description: &'static str,
     /// Present value; `None` where there is none any more.
     pub read: Box<dyn Fn() -> Option<f64> + Send + Sync>,
-}
-
-/// Exports values with every export of metrics, for as long as the program runs; does nothing before
-/// [`start`](crate::start).
-pub fn observe(values: Vec<Observed>) {
-    backend::observe(values);
 }

@@ -43,7 +43,7 @@ impl RequestSpan {
 
     /// Sets an attribute.
     pub fn set(&mut self, name: &'static str, value: impl Into<AttributeValue>) {
-        if let Some(span) = &mut self.0 {
+        if let Some(span) = self.0.as_mut().filter(|span| span.is_recorded()) {
             span.set(name, value.into());
         }
     }

@@ -106,12 +106,17 @@ fn serve(stream: &TcpStream, to: &Sender<(String, Value)>) {
     }
 }
 
-/// Runs this program as one that exports to an address.
+/// Runs this program as one that exports everything to an address.
 fn work(work: &str, collector: SocketAddr) -> Output {
+    let address = format!("http://{collector}");
+    work_with(work, &[("OTEL_EXPORTER_OTLP_ENDPOINT", &address)])
+}
+
+fn work_with(work: &str, endpoints: &[(&str, &str)]) -> Output {
     Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "works_if_asked", "--nocapture", "--test-threads=1"])
         .env(WORK, work)
-        .env("OTEL_EXPORTER_OTLP_ENDPOINT", format!("http://{collector}"))
+        .envs(endpoints.iter().copied())
         .env("OTEL_EXPORTER_OTLP_PROTOCOL", "http/json")
         .env("OTEL_BSP_SCHEDULE_DELAY", "50")
         .env("NO_PROXY", "127.0.0.1")
@@ -189,6 +194,17 @@ fn spans_of_one_request_are_one_trace_and_their_durations_are_metrics() {
     assert_eq!(attribute(answered, "rpc.method").unwrap(), "Frame");
     let sessions = &metric("softgrasp.server.sessions")["gauge"]["dataPoints"][0];
     assert_eq!(sessions["asDouble"], 3.0);
+}
+
+#[test]
+fn signal_without_an_address_is_not_sent_to_one_that_nobody_named() {
+    let collector = Collector::start();
+    let address = format!("http://{}/v1/traces", collector.address);
+    let ran = work_with("once", &[("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", &address)]);
+    let log = String::from_utf8_lossy(&ran.stderr);
+    assert!(ran.status.success() && !log.contains("collector"), "{log}");
+    let posted = collector.all();
+    assert!(!posted.is_empty() && posted.iter().all(|(path, _)| path == "/v1/traces"));
 }
 
 #[test]

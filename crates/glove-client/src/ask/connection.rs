@@ -121,6 +121,8 @@ impl LinkError {
 
 /// Connection to a server that has received `Hello` and sent `Welcome`.
 pub struct ServerConnection {
+    /// Address of the server, as it was given.
+    address: String,
     connection: Connection<ServerStream>,
     limits: Limits,
     welcome: Welcome,
@@ -234,6 +236,7 @@ impl ServerConnection {
         let stream = ServerStream::new(open_socket(&endpoint.address)?, &endpoint)?;
         stream.set_read_timeout(Some(WELCOME_MAX)).map_err(|e| LinkError::Connection(e.into()))?;
         let mut this = Self {
+            address: endpoint.address.clone(),
             connection: Connection::new(stream, Limits::LARGEST),
             limits: Limits::default(),
             welcome: Welcome::default(),
@@ -312,6 +315,7 @@ impl ServerConnection {
         read_frame: impl Fn(&mut Self) -> Result<Option<Frame>, ConnectionError>,
     ) -> Result<Reply, LinkError> {
         let mut span = RequestSpan::client(request.kind().name(), self.request_id + 1);
+        span.set("server.address", self.address.as_str());
         self.ask_within(request, span.context(), read_frame).inspect_err(|error| {
             span.fail(error.code(), || error.to_string());
         })

@@ -6,14 +6,18 @@ use std::time::Duration;
 use opentelemetry::metrics::{Histogram, Meter, MeterProvider as _};
 use opentelemetry::trace::TracerProvider as _;
 use opentelemetry::{InstrumentationScope, KeyValue};
-use opentelemetry_otlp::{ExporterBuildError, MetricExporter, SpanExporter, WithHttpConfig as _};
+use opentelemetry_otlp::{
+    ExporterBuildError, MetricExporter, OTEL_EXPORTER_OTLP_ENDPOINT,
+    OTEL_EXPORTER_OTLP_METRICS_ENDPOINT, OTEL_EXPORTER_OTLP_TRACES_ENDPOINT, SpanExporter,
+    WithHttpConfig as _,
+};
 use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::metrics::SdkMeterProvider;
 use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
 
 use super::collector::Collector;
+use crate::error::StartError;
 use crate::observed::Observed;
-use crate::start::{Export, StartError};
 
 /// The providers, which are shut down when this is dropped.
 pub(crate) struct Exporting {
@@ -45,20 +49,22 @@ pub(crate) fn start(
     program: &'static str,
     version: &'static str,
     _: &'static str,
-) -> Result<Export, StartError> {
+) -> Result<Exporting, StartError> {
     let settings = |error: ExporterBuildError| StartError::Settings { reason: error.to_string() };
     let collector = Arc::new(Collector::new());
-    let spans = SpanExporter::builder().with_http().with_shared_http_client(collector.clone());
-    let metrics = MetricExporter::builder().with_http().with_shared_http_client(collector);
     let resource = resource(program, version);
-    let tracers = SdkTracerProvider::builder()
-        .with_batch_exporter(spans.build().map_err(settings)?)
-        .with_resource(resource.clone())
-        .build();
-    let meters = SdkMeterProvider::builder()
-        .with_periodic_exporter(metrics.build().map_err(settings)?)
-        .with_resource(resource)
-        .build();
+    let mut tracers = SdkTracerProvider::builder().with_resource(resource.clone());
+    let mut meters = SdkMeterProvider::builder().with_resource(resource);
+    // Where one signal alone has an address, the other would go to the specification's.
+    if is_named(OTEL_EXPORTER_OTLP_TRACES_ENDPOINT) {
+        let spans = SpanExporter::builder().with_http().with_shared_http_client(collector.clone());
+        tracers = tracers.with_batch_exporter(spans.build().map_err(settings)?);
+    }
+    if is_named(OTEL_EXPORTER_OTLP_METRICS_ENDPOINT) {
+        let metrics = MetricExporter::builder().with_http().with_shared_http_client(collector);
+        meters = meters.with_periodic_exporter(metrics.build().map_err(settings)?);
+    }
+    let (tracers, meters) = (tracers.build(), meters.build());
     let scope = || InstrumentationScope::builder("softgrasp").with_version(version).build();
     let meter = meters.meter_with_scope(scope());
     let durations = |name: &'static str, description: &'static str| {
@@ -80,7 +86,14 @@ pub(crate) fn start(
     let tracer = tracers.tracer_with_scope(scope());
     // A second start of the same process keeps the first one's tracer, which then sends nothing more.
     let _ = STARTED.set(Instruments { tracer, client_s, server_s, meter });
-    Ok(Export(Exporting { tracers, meters }))
+    Ok(Exporting { tracers, meters })
+}
+
+/// Whether the environment names a collector for one signal, by the signal's own variable or for all.
+fn is_named(signal: &str) -> bool {
+    [signal, OTEL_EXPORTER_OTLP_ENDPOINT]
+        .into_iter()
+        .any(|name| std::env::var(name).is_ok_and(|address| !address.is_empty()))
 }
 
 /// Name of the program, unless the environment has another one; its version; its process.

@@ -85,9 +85,7 @@ impl Span {
     }
 
     pub fn set(&mut self, name: &'static str, value: AttributeValue) {
-        if self.is_recorded() {
-            self.span.set_attribute(KeyValue::new(name, value_of(value)));
-        }
+        self.span.set_attribute(KeyValue::new(name, value_of(value)));
     }
 
     pub fn fail(&mut self, code: String, sentence: impl FnOnce() -> String) {

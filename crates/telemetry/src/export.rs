@@ -1,28 +1,13 @@
-//! Begin and end of the export.
+//! Begin and end of the export, and the values that it reads.
 
 use crate::backend;
+use crate::error::StartError;
+use crate::observed::Observed;
 
 /// The export of a program, which ends when it is dropped: what has not been exported yet is sent, for some
 /// seconds at most.
 #[must_use = "the export ends when it is dropped"]
-pub struct Export(#[allow(dead_code, reason = "kept for its end")] pub(crate) backend::Exporting);
-
-/// Why nothing can be exported.
-#[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    /// The variables name a collector, and this program was compiled without the feature.
-    #[error("{variable} is set, but this program was built without the feature otlp")]
-    NotCompiled {
-        /// Variable of the environment.
-        variable: &'static str,
-    },
-    /// The variables cannot be used.
-    #[error("traces and metrics cannot be exported: {reason}")]
-    Settings {
-        /// What is wrong, with the name of the variable.
-        reason: String,
-    },
-}
+pub struct Export(#[allow(dead_code, reason = "kept for its end")] backend::Exporting);
 
 /// Variables that name a collector (OpenTelemetry specification, "OpenTelemetry Protocol Exporter").
 const ENDPOINTS: [&str; 3] = [
@@ -40,7 +25,15 @@ pub fn start(program: &'static str, version: &'static str) -> Result<Option<Expo
     let value = |name: &str| std::env::var(name).ok().filter(|text| !text.is_empty());
     let is_off = value("OTEL_SDK_DISABLED").is_some_and(|text| text.eq_ignore_ascii_case("true"));
     match ENDPOINTS.into_iter().find(|name| value(name).is_some()) {
-        Some(variable) if !is_off => backend::start(program, version, variable).map(Some),
+        Some(variable) if !is_off => {
+            backend::start(program, version, variable).map(|begun| Some(Export(begun)))
+        }
         _ => Ok(None),
     }
+}
+
+/// Exports values with every export of metrics, for as long as the program runs; does nothing before
+/// [`start`].
+pub fn observe(values: Vec<Observed>) {
+    backend::observe(values);
 }
