@@ -3,10 +3,11 @@
     python3 tests/monitoring/traces.py FEA_SERVER GLOVE_CLIENT OPERATIONS.md
 
 A client asks a server, which hands a mesh that does not fit into its memory to a second server, in the place
-of a cluster; then a hand lifts an object. Every attribute of a span and every metric must be in the page. The
+of a cluster; then a hand lifts an object; then, where the package is there, a Python program asks. Every attribute of a span and every metric must be in the page. The
 collector reads JSON, and protobuf where the package opentelemetry-proto is there.
 """
 
+import base64
 import json
 import os
 import re
@@ -21,8 +22,12 @@ from pathlib import Path
 # Nodes of the mesh that is too large for so much memory.
 NODES, MEMORY = "20000", "100MiB"
 SOON_S = 60
-# What OpenTelemetry itself adds, and the collector's form of a kind.
+# The forms of a kind.
 SERVER, CLIENT = 2, 3
+# Trace and span that the Python program tells, and the forms in which the collector has the span: as
+# hexadecimal text in JSON, as base64 of its bytes where the protobuf package makes JSON of it.
+TRACE, SPAN = "4bf92f3577b34da6a3ce929d0e0e4736", "00f067aa0ba902b7"
+IDENTITIES = {SPAN, base64.b64encode(bytes.fromhex(SPAN)).decode()}
 # Attributes that the page has no line for: they are the specification's.
 OF_SPECIFICATION = {"rpc.system", "rpc.method"}
 
@@ -151,7 +156,31 @@ def play(server, client, folder, collector, protocol):
         solve = ["solve", "--mesh", str(mesh), "--known", str(known)]
         told = run(*solve, *where, "--out", str(folder / "solved.csv"))
         run("run", "--headless", "--ticks", "300", *where)
-    return told
+        is_asked = ask_from_python(head.address)
+    return told, is_asked
+
+
+def ask_from_python(address):
+    """Asks a server as part of a trace; whether the package is there."""
+    try:
+        import softgrasp
+    except ImportError:
+        return False
+    mesh = softgrasp.Mesh.block((0.04, 0.02, 0.02), (4, 2, 2))
+    model = softgrasp.Model(mesh, softgrasp.Material(20_000.0, 0.3))
+    case = softgrasp.LoadCase().prescribe(mesh.nodes_at(x=0.0), (0, 0, 0))
+    case = case.prescribe(mesh.nodes_at(x=0.04), (0.001, 0, 0))
+    with softgrasp.Server(address) as server, softgrasp.traced(f"00-{TRACE}-{SPAN}-01"):
+        server.keep(model).frame(case)
+    return True
+
+
+def check_python(collector):
+    """The server's spans of these requests stand below the span that the program told."""
+    ours = [span for span in collector.spans if span.get("parentSpanId") in IDENTITIES]
+    assert {span["name"] for span in ours} == {"UploadModel", "Frame"}, ours
+    traces = {span["traceId"] for span in ours}
+    assert len(traces) == 1, traces
 
 
 def write_known(mesh, known):
@@ -179,7 +208,7 @@ def check(collector):
     by_id = {span["spanId"]: span for span in spans}
     below = {}
     for span in spans:
-        if parent := span.get("parentSpanId"):
+        if (parent := span.get("parentSpanId")) and parent not in IDENTITIES:
             assert parent in by_id, f"{span['service']} {span['name']}: its parent is not there"
             assert by_id[parent]["traceId"] == span["traceId"]
             below.setdefault(parent, []).append(span)
@@ -241,7 +270,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         for protocol in protocols:
             collector = Collector()
-            told = play(server, client, Path(name), collector, protocol)
+            told, is_asked = play(server, client, Path(name), collector, protocol)
             if "without the feature otlp" in told:
                 print("monitoring: traces skipped: the programs were built without the feature otlp")
                 return
@@ -250,6 +279,9 @@ def main():
                 time.sleep(0.1)
             counts = "%d spans, %d request through all three, %d steps of contact" % check(collector)
             check_names(collector, page)
+            if is_asked:
+                check_python(collector)
+                counts += ", and those of Python"
             assert len(collector.kinds) == 1, collector.kinds
             print(f"monitoring: traces by {protocol}: {counts}")
 

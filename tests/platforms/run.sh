@@ -19,7 +19,7 @@ source tests/script.sh platforms
 
 mirror="${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
 only=" ${ONLY:-check arm windows} "
-published="core grasp protocol os hand window xr force emulator"
+published="core grasp protocol os telemetry hand window xr force emulator"
 windows=x86_64-pc-windows-gnu arm=aarch64-unknown-linux-gnu mac=aarch64-apple-darwin
 
 [ "$(id -u)" = 0 ] || skip "a Debian of its own needs root"

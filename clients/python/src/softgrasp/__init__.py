@@ -57,6 +57,7 @@ from .quantity import Gradient, Quantity
 from .question import Precision, Question, Report
 from .report import ContactReport, LargeReport, SolveReport, StageTimes
 from .server import KeptModel, Server
+from .trace import traced
 from .warning import AnswerWarning, WarningCode
 
 __all__ = [
@@ -138,6 +139,7 @@ __all__ = [
     "Welcome",
     "candidate_triangles",
     "matrices",
+    "traced",
 ]
 
 __version__ = "0.1.0"

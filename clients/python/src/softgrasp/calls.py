@@ -42,6 +42,7 @@ from .mesh import Mesh
 from .model import ELEMENTS, Model
 from .payload import PayloadReader, payload_of
 from .question import REPORTS, Precision, Question
+from .trace import with_trace
 
 T = TypeVar("T")
 
@@ -192,7 +193,7 @@ def upload_model(model: Model, fixed_dofs: Numbers) -> Call[ModelReady]:
         reader.finish()
         return ready
 
-    payload = payload_of(part, *model.arrays(), fixed_dofs)
+    payload = payload_of(with_trace(part), *model.arrays(), fixed_dofs)
     return Call(Kind.UPLOAD_MODEL, payload, Kind.MODEL_READY, read, model.needs)
 
 
@@ -277,7 +278,7 @@ def _ask(
     part.option_block(None if large is None else large.part())
     level = REPORTS.index(question.report)
     part.raw(_FURTHER.pack(len(further), not estimate, level))
-    payload = payload_of(part, *mesh, *question.arrays(case), further)
+    payload = payload_of(with_trace(part), *mesh, *question.arrays(case), further)
     needs = subject.needs if isinstance(subject, Model) else _NOTHING_NEEDED
     if case.has_spread_loads:
         needs |= {"loads"}

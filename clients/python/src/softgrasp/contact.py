@@ -22,6 +22,7 @@ from .payload import PayloadReader, payload_of
 from .pose import Pose
 from .question import PRECISIONS, Precision
 from .report import ContactReport, read_contact_report
+from .trace import with_trace
 
 _MARGIN_OF_SIZE = 0.02
 """Triangles this share of the object's size beyond the ways of a step are candidates too."""
@@ -212,7 +213,8 @@ def contact_payload(
     part.fields("II?I", len(bodies), len(triangles), nodes is not None, len(wanted))
     part.fields("II", PRECISIONS.index(precision), field_bits(fields, with_contact=True))
     of_state = (state.force_nodes, state.forces, state.contact_names, state.contact_numbers)
-    return payload_of(part, *of_state, *body_arrays(bodies), triangles, of_body, wanted)
+    of_bodies = body_arrays(bodies)
+    return payload_of(with_trace(part), *of_state, *of_bodies, triangles, of_body, wanted)
 
 
 def read_contact_answer(reader: PayloadReader, node_count: int) -> ContactAnswer:
