@@ -39,7 +39,7 @@ impl Ball {
         let material = Material::try_new(YOUNG, POISSON)?;
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {})?;
         let base = model.condense(None, &mut |_| {})?;
-        let body = FreeBody::try_new(model.mesh(), &base)?;
+        let body = FreeBody::try_new(model.spread_loads(), &base)?;
         Ok(Self { model, surface, base, body, columns: Columns::new(usize::MAX) })
     }
 

@@ -50,7 +50,7 @@ def all_calls(server: Server, bar: Bar) -> list[calls.Call]:
         calls.frame(kept.hash, bar.case, question),
         calls.large_frame(kept.hash, bar.case, large, Question()),
         calls.solve_several(bar.model, bar.case, sets, True, Question()),
-        calls.contact_frame(kept.hash, bar.mesh, ObjectState(), [body], step, None, "f64"),
+        calls.contact_frame(kept.hash, bar.model, ObjectState(), [body], step, None, "f64"),
     ]
 
 
@@ -232,7 +232,7 @@ def test_program_that_is_no_server_is_told_apart() -> None:
 def test_nodes_that_no_mesh_has_are_refused_in_a_contact_answer(server: Server, bar: Bar) -> None:
     model = server.keep(bar.model).hash
     bodies, step, wanted = [Body(Plane())], ContactStep(0.01), bar.mesh.boundary_nodes
-    call = calls.contact_frame(model, bar.mesh, ObjectState(), bodies, step, wanted, "f64")
+    call = calls.contact_frame(model, bar.model, ObjectState(), bodies, step, wanted, "f64")
     header, payload = received(server, call)
     assert judged(call, header, payload)
 

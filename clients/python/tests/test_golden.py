@@ -98,7 +98,7 @@ def contact_frame() -> calls.Call:
         from_rest=True,
     )
     mesh = Mesh(POINTS, [[0, 1, 2, 3]])
-    return calls.contact_frame(NAME, mesh, state, bodies, step, [0, 3], "f64")
+    return calls.contact_frame(NAME, Model(mesh, MATERIAL), state, bodies, step, [0, 3], "f64")
 
 
 def requests() -> dict[str, calls.Call]:

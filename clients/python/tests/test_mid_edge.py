@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 from conftest import Bar
 
-from softgrasp import LoadCase, Material, Mesh, Model, NotCapable, Server
+from softgrasp import (
+    Body,
+    ContactStep,
+    LoadCase,
+    Material,
+    Mesh,
+    Model,
+    NotCapable,
+    ObjectState,
+    Plane,
+    Pose,
+    Server,
+)
 
 EDGES = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]
 """Corners of the six edges, in the order of the mid-edge nodes."""
@@ -62,3 +74,36 @@ def test_an_older_server_is_not_sent_mid_edge_nodes(server: Server, bar: Bar, mo
             asked()
     straight = Model(bar.mesh, bar.model.material, "t10")
     assert server.solve(straight, bar.case).report.element == "t10"
+
+
+def areas(mesh: Mesh, triangles: np.ndarray) -> np.ndarray:
+    a, b, c = (mesh.points[triangles[:, corner].astype(int)] for corner in range(3))
+    return 0.5 * np.cross(b - a, c - a)
+
+
+def test_faces_with_mid_edge_nodes_are_four_triangles_that_cover_them(bar: Bar) -> None:
+    mesh = with_mid_edge(bar.mesh)
+    whole, parts = areas(mesh, mesh.boundary), areas(mesh, mesh.faces_between_nodes)
+    assert np.allclose(parts.reshape(-1, 4, 3).sum(axis=1), whole, atol=1e-15)
+    assert np.abs(areas(bar.mesh, bar.mesh.faces_between_nodes) - whole).max() < 1e-15
+    corners = set(bar.mesh.boundary_nodes.tolist())
+    assert set(mesh.faces_between_nodes.reshape(-1).tolist()) > corners
+
+
+@pytest.mark.parametrize("element", ["t10", "t4"])
+def test_object_with_mid_edge_nodes_lies_on_a_table(
+    server: Server, bar: Bar, element: str
+) -> None:
+    mesh = with_mid_edge(bar.mesh)
+    kept = server.keep(Model(mesh, bar.model.material, element))
+    table, step = Body(Plane((0, 0, 1)), Pose()), ContactStep(0.01, density=1000.0)
+    state, pressed = ObjectState(), set()
+    for _ in range(150):
+        answer = kept.contact_frame(state, [table], step)
+        state = answer.state
+        pressed |= set(np.asarray(state.force_nodes).tolist())
+    weight = 1000.0 * 9.81 * bar.mesh.volume
+    assert answer.loads.forces[0, 2] == pytest.approx(weight, rel=1e-6)
+    assert answer.contact.is_converged
+    # Between corners too, where there are nodes.
+    assert (max(pressed) >= bar.mesh.node_count) == (element == "t10")

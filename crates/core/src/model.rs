@@ -292,8 +292,9 @@ impl Model {
     fn base_of(&self) -> Result<BaseOf<'_>, ModelError> {
         let Self { mesh, bodies, rigid, stiffness, quadratic, .. } = self;
         match quadratic {
-            Some(_) => Err(ModelError::QuadraticCondensed),
-            None => Ok(BaseOf { mesh, bodies, rigid, stiffness }),
+            // Nodes that were made have no number by which a contact could name them.
+            Some(quadratic) if !quadratic.is_curved() => Err(ModelError::QuadraticCondensed),
+            _ => Ok(BaseOf { mesh, bodies, rigid, stiffness }),
         }
     }
 

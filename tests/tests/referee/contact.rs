@@ -6,6 +6,7 @@ use std::path::Path;
 use clap::Parser;
 use glove_client::commands::press::PressCommand;
 use serde_json::Value;
+use softgrasp_core::fem::QuadraticMesh;
 
 use crate::ccx::Ccx;
 use crate::contact_deck::{INCREMENTS, Press, STICK_OF_PENALTY};
@@ -70,6 +71,8 @@ fn by_press(folder: &Path, object: &Object, press: &Press<'_>) -> Found {
     arguments.extend(["--bodies", &bodies, "--gravity", "0,0,0", "--density", "1"]);
     arguments.extend(["--step", &step, "--young", &young, "--poisson", &poisson]);
     arguments.extend(["--friction", &friction, "--out", &out, "--report", &report]);
+    let is_linear = press.mesh.mid_edge_nodes().is_empty();
+    arguments.extend(["--element", if is_linear { "t4" } else { "t10" }]);
     PressArguments::parse_from(arguments).press.run().unwrap();
     let report: Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
     assert_eq!(report["steps_not_converged"], 0, "{}", object.name);
@@ -106,22 +109,28 @@ fn presses_between_plates_agree_with_calculix_within_the_give_of_its_penalty() {
     let folder = tempfile::tempdir().unwrap();
     let objects = object::built_in(folder.path(), 150);
     let of = |name: &str| objects.iter().find(|object| object.name == name).unwrap();
-    // Object, Poisson's ratio, friction, and the way of the lid over the height of the object.
-    let cases: [(&str, f64, f64, &[[f64; 2]]); 5] = [
-        ("cube", 0.3, 0.0, &[[0.0, 0.01]]),
-        ("cube", 0.3, 0.3, &[[0.0, 0.01]]),
-        ("sphere", 0.4, 0.5, &[[0.0, 0.03]]),
-        ("strawberry", 0.45, 0.4, &[[0.0, 0.02]]),
-        ("cube", 0.3, 0.6, &[[0.0, 0.01], [0.001, 0.01]]),
+    // Object, nodes of an element, Poisson's ratio, friction, and the way of the lid over the height.
+    let cases: [(&str, usize, f64, f64, &[[f64; 2]]); 8] = [
+        ("cube", 4, 0.3, 0.0, &[[0.0, 0.01]]),
+        ("cube", 4, 0.3, 0.3, &[[0.0, 0.01]]),
+        ("sphere", 4, 0.4, 0.5, &[[0.0, 0.03]]),
+        ("strawberry", 4, 0.45, 0.4, &[[0.0, 0.02]]),
+        ("cube", 4, 0.3, 0.6, &[[0.0, 0.01], [0.001, 0.01]]),
+        ("cube", 10, 0.3, 0.3, &[[0.0, 0.01]]),
+        ("sphere", 10, 0.4, 0.5, &[[0.0, 0.03]]),
+        ("strawberry", 10, 0.45, 0.4, &[[0.0, 0.02]]),
     ];
-    for (name, poisson, friction, way) in cases {
+    for (name, nodes, poisson, friction, way) in cases {
         let object = of(name);
+        let mesh = match nodes {
+            4 => object.mesh.clone(),
+            _ => QuadraticMesh::try_new(&object.mesh).unwrap().to_mesh().unwrap(),
+        };
         let (low, high) = object.mesh.bounds();
         let height = high.z - low.z;
         let way: Vec<[f64; 2]> = way.iter().map(|place| place.map(|x| x * height)).collect();
         let penalty = PENALTY * YOUNG / height;
-        let press =
-            Press { mesh: &object.mesh, young: YOUNG, poisson, friction, way: &way, penalty };
+        let press = Press { mesh: &mesh, young: YOUNG, poisson, friction, way: &way, penalty };
         let theirs = by_calculix(&ccx, folder.path(), &press);
         let ours = by_press(folder.path(), object, &press);
         let give = give_of_penalty(&press, &theirs);
@@ -142,7 +151,7 @@ fn presses_between_plates_agree_with_calculix_within_the_give_of_its_penalty() {
         let forces = ours.force.iter().zip(&theirs.force);
         let force_off = forces.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / force;
         println!(
-            "{name}, friction {friction}: force {force:.4} N, differs by {force_off:.1e}; displacements \
+            "{name}, {nodes} nodes, friction {friction}: force {force:.4} N, differs by {force_off:.1e}; displacements \
              differ by {:.1e} of the depth; the penalty gives way by {:.1e}",
             off / depth,
             give / depth

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use softgrasp_core::mesh::{Surface, TetMesh};
+use softgrasp_core::mesh::{Surface, TetMesh, mirrored, mirrored_middles};
 
 /// Press between two plates, which begin at the object's lowest and highest node.
 ///
@@ -84,11 +84,14 @@ impl Press<'_> {
                 add(&mut text, place);
             }
         }
-        text.push_str("*ELEMENT, TYPE=C3D4, ELSET=SOFT\n");
-        for (element, [a, b, c, d]) in (1..).zip(self.mesh.tets()) {
+        let kind = if self.mesh.mid_edge_nodes().is_empty() { "C3D4" } else { "C3D10" };
+        writeln!(text, "*ELEMENT, TYPE={kind}, ELSET=SOFT").unwrap();
+        for (at, corners) in self.mesh.tets().iter().enumerate() {
             // CalculiX counts the volume with the other sign.
-            let [a, b, c, d] = [b, a, c, d].map(|node| node + 1);
-            writeln!(text, "{element},{a},{b},{c},{d}").unwrap();
+            let middles = self.mesh.mid_edge_nodes().get(at).copied().map(mirrored_middles);
+            let nodes = mirrored(*corners).into_iter().chain(middles.into_iter().flatten());
+            let nodes: Vec<String> = nodes.map(|node| (node + 1).to_string()).collect();
+            writeln!(text, "{},{}", at + 1, nodes.join(",")).unwrap();
         }
         text.push_str("*ELEMENT, TYPE=C3D8, ELSET=HARD\n");
         let (nodes, tets) = (self.mesh.node_count(), self.mesh.tets().len());
@@ -111,7 +114,7 @@ impl Press<'_> {
         );
         let (low, high) = self.mesh.bounds();
         let middle = 0.5 * (low.z + high.z);
-        let surface = Surface::from_mesh(self.mesh).nodes;
+        let surface = Surface::with_mid_edge_nodes(self.mesh).nodes;
         for (name, is_upper) in [("LOWER", false), ("UPPER", true)] {
             writeln!(text, "*SURFACE, NAME={name}, TYPE=NODE").unwrap();
             let vertices = self.mesh.vertices();

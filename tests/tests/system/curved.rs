@@ -1,16 +1,19 @@
 //! Meshes with mid-edge nodes of their own through a socket: what is prescribed there comes back there.
 
+use std::time::Duration;
+
 use softgrasp_core::mesh::{BuiltIn, TetMesh, mirrored, mirrored_middles};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{Loads, Method};
 use softgrasp_core::{Element, Material};
 use softgrasp_protocol::RejectCode::BadRequest;
 use softgrasp_protocol::{
-    Answer, Ask, DofValue, ElementChoice, ElementName, Field, FieldSet, LargeAsk, ModelHash,
+    Answer, Ask, DofValue, ElementChoice, ElementName, Field, FieldSet, LargeAsk, Masks, ModelHash,
     Question, Reply, Request, UploadModel, Want,
 };
 use softgrasp_tests::curved::{round_sphere, with_middles};
 use softgrasp_tests::questions::{MATERIAL, Once, object, once, question, squeeze, upload};
+use softgrasp_tests::watchdog::until;
 
 use crate::start::{answer, client, refusal, server};
 
@@ -108,6 +111,44 @@ fn a_kept_model_answers_as_one_request_does_and_its_name_covers_its_middles() {
     let stress = large.fields[0].get(Field::NodeStress).unwrap();
     assert_eq!(stress.len(), 6 * mesh.node_count());
     assert!(stress.chunks_exact(6).all(|stress| stress.iter().any(|s| *s != 0.0)));
+}
+
+#[test]
+fn frames_of_ten_node_elements_are_condensed_with_masks_and_a_bound_above_their_error() {
+    let server = server(2);
+    let mut connection = client(&server);
+    let mesh = round_sphere(60);
+    let known = known(&mesh);
+    let message = UploadModel { element: ElementName::T10, ..upload(&mesh) };
+    let name = ModelHash::of(&message);
+    connection.ask(&Request::UploadModel(message)).unwrap();
+    let mut by = |question: Question| answer(&mut connection, &Ask::new(name, question).into());
+    let exact = nodes_of(&by(question(known.clone(), "front")));
+    let mut bound = None;
+    // The bound is proven beside the frames.
+    until(Duration::from_secs(60), "a bound", || {
+        let found = by(question(known.clone(), "auto"));
+        assert_eq!(found.report.method, "condensed", "{}", found.report.chosen_because);
+        let found_nodes = nodes_of(&found);
+        assert_near(&found_nodes, exact.as_flattened(), 1e-9);
+        let off = found_nodes.as_flattened().iter().zip(exact.as_flattened());
+        let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        bound = found.report.error_bound_rel.map(|bound| (bound, off));
+        bound.is_some()
+    });
+    let largest = exact.as_flattened().iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+    let (bound, off) = bound.unwrap();
+    assert!(bound < 1e-6 && off <= (bound + 1e-12) * largest, "{bound:e} {off:e} of {largest:e}");
+    // A mask of one mid-edge node is that node.
+    let middle = known.iter().rfind(|known| !mesh.is_corner()[known.dof as usize / 3]).unwrap();
+    let node = middle.dof / 3;
+    let (of_node, others): (Vec<DofValue>, Vec<DofValue>) =
+        known.iter().partition(|known| known.dof / 3 == node);
+    let mut masks = Masks::default();
+    masks.push(&[(node, 1.0)]);
+    let moved = std::array::from_fn(|axis| of_node[axis].value);
+    let held = Question { masks, mask_displacements: vec![moved], ..question(others, "auto") };
+    assert_near(&nodes_of(&by(held)), exact.as_flattened(), 1e-9);
 }
 
 #[test]

@@ -237,9 +237,9 @@ class AsyncKeptModel(NamedModel):
         fields: WantedFields = (),
     ) -> ContactAnswer:
         """As `KeptModel.contact_frame`."""
-        mesh = self.model.mesh
+        of = self.model
         return await self._ask(
-            calls.contact_frame(self.hash, mesh, state, bodies, step, nodes, precision, fields)
+            calls.contact_frame(self.hash, of, state, bodies, step, nodes, precision, fields)
         )
 
     async def prefetch(self, nodes: ArrayLike = (), masks: Sequence[Mask] = ()) -> None:

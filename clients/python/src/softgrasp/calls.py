@@ -38,7 +38,6 @@ from .framing import VERSION, Kind
 from .large import LargeDeformation
 from .limits import Limits
 from .load_case import LoadCase, Mask, mask_arrays
-from .mesh import Mesh
 from .model import ELEMENTS, Model
 from .payload import PayloadReader, payload_of
 from .question import REPORTS, Precision, Question
@@ -219,7 +218,7 @@ def large_frame(
 
 def contact_frame(
     model: bytes,
-    mesh: Mesh,
+    of: Model,
     state: ObjectState,
     bodies: Sequence[Body],
     step: ContactStep,
@@ -228,10 +227,10 @@ def contact_frame(
     fields: WantedFields = (),
 ) -> Call[ContactAnswer]:
     """One step of a kept model that nothing holds, among rigid bodies."""
-    payload = contact_payload(model, mesh, state, bodies, step, nodes, precision, fields)
+    payload = contact_payload(model, of, state, bodies, step, nodes, precision, fields)
 
     def read(reader: PayloadReader) -> ContactAnswer:
-        return read_contact_answer(reader, mesh.node_count)
+        return read_contact_answer(reader, of.mesh.node_count)
 
     return Call(Kind.CONTACT_FRAME, payload, Kind.CONTACT_ANSWER, read)
 

@@ -18,6 +18,7 @@ from .field_values import WantedFields, field_bits
 from .fields import Part
 from .large import DEFORMATIONS, LAWS, Deformation, Law
 from .mesh import Mesh
+from .model import Model
 from .payload import PayloadReader, payload_of
 from .pose import Pose
 from .question import PRECISIONS, Precision
@@ -165,14 +166,21 @@ class ContactAnswer(Answer):
 
 
 def candidate_triangles(
-    mesh: Mesh, state: ObjectState, bodies: Sequence[Body], step: ContactStep
+    mesh: Mesh,
+    state: ObjectState,
+    bodies: Sequence[Body],
+    step: ContactStep,
+    triangles: Numbers | None = None,
 ) -> tuple[Numbers, Numbers]:
     """Boundary triangles that can touch a body in a step, and the position of the body of each.
+
+    They are chosen from `triangles`, or from all of the mesh's boundary.
 
     Near are triangles within twice the ways that the bodies and the object can make in the step
     and 2 % of the object's size. What is left out cannot touch.
     """
-    corners = state.places(mesh)[mesh.boundary]
+    boundary = mesh.boundary if triangles is None else triangles
+    corners = state.places(mesh)[boundary]
     middle = corners.mean(axis=1)
     radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
     low, high = mesh.bounds
@@ -187,7 +195,7 @@ def candidate_triangles(
             body.shape.distance(body.start.to_body(middle)),
             body.shape.distance(body.at_end.to_body(middle)),
         )
-        chosen = mesh.boundary[away <= radius + reach + 2.0 * body.way]
+        chosen = boundary[away <= radius + reach + 2.0 * body.way]
         near.append(chosen)
         of_body.append(np.full(len(chosen), position, dtype=U32))
     return np.concatenate(near), np.concatenate(of_body)
@@ -195,7 +203,7 @@ def candidate_triangles(
 
 def contact_payload(
     model: bytes,
-    mesh: Mesh,
+    of: Model,
     state: ObjectState,
     bodies: Sequence[Body],
     step: ContactStep,
@@ -203,8 +211,8 @@ def contact_payload(
     precision: Precision,
     fields: WantedFields = (),
 ) -> bytes:
-    """The payload of a `ContactFrame`."""
-    triangles, of_body = candidate_triangles(mesh, state, bodies, step)
+    """The payload of a `ContactFrame` about the kept model of this name, and what it is of."""
+    triangles, of_body = candidate_triangles(of.mesh, state, bodies, step, of.pressed_triangles)
     wanted = np.zeros(0, U32) if nodes is None else numbers(nodes, "wanted nodes")
     moved = Part().fields("7d", *state.pose.numbers)
     moved.fields("6d", *state.velocity, *state.angular_velocity)

@@ -17,6 +17,9 @@ from .mesh_file import read_mesh
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
+# Corners of the edges whose middles a tetrahedron may have.
+_EDGES = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -133,6 +136,15 @@ class Mesh:
         return self._cache["boundary"]
 
     @property
+    def faces_between_nodes(self) -> Numbers:
+        """The boundary between all its nodes, as `boundary`; a face with mid-edge nodes is four triangles."""
+        if self.mid_edge is None:
+            return self.boundary
+        if "faces" not in self._cache:
+            self._cache["faces"] = self._split_faces(self.mid_edge)
+        return self._cache["faces"]
+
+    @property
     def boundary_nodes(self) -> Numbers:
         """Nodes of the boundary, in ascending order."""
         if "nodes" not in self._cache:
@@ -169,6 +181,20 @@ class Mesh:
         used = np.unique(self.tets)
         away = np.linalg.norm(self.points[used] - np.asarray(place, dtype=float), axis=1)
         return int(used[int(away.argmin())])
+
+    def _split_faces(self, mid_edge: Numbers) -> Numbers:
+        ends = np.sort(self.tets[:, _EDGES].reshape(-1, 2).astype(np.int64), axis=1)
+        names = ends[:, 0] * self.node_count + ends[:, 1]
+        names, first = np.unique(names, return_index=True)
+        middles = mid_edge.reshape(-1)[first]
+        corners = self.boundary.astype(np.int64)
+        sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), axis=2)
+        asked = sides[:, :, 0] * self.node_count + sides[:, :, 1]
+        ab, bc, ca = middles[np.searchsorted(names, asked)].T
+        a, b, c = corners.T
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        stacked = np.stack([np.stack(part, axis=1) for part in parts], axis=1)
+        return np.ascontiguousarray(stacked.reshape(-1, 3), dtype=U32)
 
     def _faces_of_one(self) -> Numbers:
         a, b, c, d = (self.points[self.tets[:, corner]] for corner in range(4))

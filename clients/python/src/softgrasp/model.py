@@ -78,6 +78,12 @@ class Model:
         return "t4-anp" if ratio >= _LOCKS_FROM else "t4"
 
     @property
+    def pressed_triangles(self) -> Numbers:
+        """The boundary where bodies can touch it: between all nodes that the kept element has there."""
+        is_quadratic = self.kept_element == "t10"
+        return self.mesh.faces_between_nodes if is_quadratic else self.mesh.boundary
+
+    @property
     def used_nodes(self) -> Numbers:
         """Nodes of the elements, ascending: corners, and the mid-edge nodes that `t10` has."""
         _, tets, _, _, mid_edge = self._arrays()

@@ -276,9 +276,9 @@ class KeptModel(NamedModel):
         `nodes`, which should then be the boundary's at least, others count as not displaced when
         triangles near a body are looked for.
         """
-        mesh = self.model.mesh
+        of = self.model
         return self._ask(
-            calls.contact_frame(self.hash, mesh, state, bodies, step, nodes, precision, fields)
+            calls.contact_frame(self.hash, of, state, bodies, step, nodes, precision, fields)
         )
 
     def prefetch(self, nodes: ArrayLike = (), masks: Sequence[Mask] = ()) -> None:

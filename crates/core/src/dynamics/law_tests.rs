@@ -15,39 +15,46 @@ use crate::rigid_body::RigidShape;
 /// The depth is small, so that the terms of second order that linear elasticity leaves out are.
 #[test]
 fn block_between_planes_without_friction_has_the_force_and_the_linear_field_of_the_closed_form() {
-    let (young, edge, depth): (f64, f64, f64) = (2.0e4, 0.05, 2e-6);
     for nodes in [64, 216, 729] {
-        let block = Object::sized(BuiltIn::Cube, nodes, edge, young, 0.3);
-        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        let settings = StepSettings {
-            gravity: Vector3::zeros(),
-            penetration_rel: 1e-12,
-            ..StepSettings::default()
-        };
-        let height = Translation3::new(0.0, 0.0, edge - depth);
-        let lid = MovingBody {
-            world_from_body_start: Isometry3::from_parts(height, half_turn),
-            world_from_body_end: Isometry3::from_parts(height, half_turn),
-            ..table(0.0)
-        };
-        let mut state = ObjectState::at_rest(at(0.0, 0.0, 0.5 * (edge - depth)));
-        let mut found = None;
-        for _ in 0..30 {
-            let outcome = block.advance(&state, &[table(0.0), lid.clone()], settings);
-            state = outcome.state.clone();
-            found = Some(outcome);
-        }
-        let found = found.unwrap();
-        let expected = young * edge * edge * depth / edge;
-        let force = found.loads[1].normal_force;
-        assert!((force - expected).abs() < 1e-6 * expected, "{nodes}: {force} N for {expected} N");
-        // The surface: every height has gone down in proportion.
-        for (&node, moved) in block.surface.nodes.iter().zip(&found.displacements) {
-            let rest = block.model.mesh().vertices()[node as usize];
-            let height = (state.world_from_object * (rest + Vector3::from(*moved))).z;
-            let linear = (rest.z + 0.5 * edge) * (1.0 - depth / edge);
-            assert!((height - linear).abs() < 1e-5 * depth, "{nodes}: {height} for {linear}");
-        }
+        press_evenly(&Object::sized(BuiltIn::Cube, nodes, EDGE, YOUNG, 0.3));
+    }
+}
+
+/// Edge of the block, m.
+pub(super) const EDGE: f64 = 0.05;
+
+/// Presses a block between two planes and compares force and field with the closed form.
+pub(super) fn press_evenly(block: &Object) {
+    let (depth, nodes) = (2e-6, block.surface.nodes.len());
+    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let settings = StepSettings {
+        gravity: Vector3::zeros(),
+        penetration_rel: 1e-12,
+        ..StepSettings::default()
+    };
+    let height = Translation3::new(0.0, 0.0, EDGE - depth);
+    let lid = MovingBody {
+        world_from_body_start: Isometry3::from_parts(height, half_turn),
+        world_from_body_end: Isometry3::from_parts(height, half_turn),
+        ..table(0.0)
+    };
+    let mut state = ObjectState::at_rest(at(0.0, 0.0, 0.5 * (EDGE - depth)));
+    let mut found = None;
+    for _ in 0..30 {
+        let outcome = block.advance(&state, &[table(0.0), lid.clone()], settings);
+        state = outcome.state.clone();
+        found = Some(outcome);
+    }
+    let found = found.unwrap();
+    let expected = YOUNG * EDGE * EDGE * depth / EDGE;
+    let force = found.loads[1].normal_force;
+    assert!((force - expected).abs() < 1e-6 * expected, "{nodes}: {force} N for {expected} N");
+    // The surface: every height has gone down in proportion.
+    for (&node, moved) in block.surface.nodes.iter().zip(&found.displacements) {
+        let rest = block.model.mesh().vertices()[node as usize];
+        let height = (state.world_from_object * (rest + Vector3::from(*moved))).z;
+        let linear = (rest.z + 0.5 * EDGE) * (1.0 - depth / EDGE);
+        assert!((height - linear).abs() < 1e-5 * depth, "{nodes}: {height} for {linear}");
     }
 }
 
@@ -196,7 +203,7 @@ fn every_step_of_a_ball_that_five_fingertips_pinch_lift_and_hold_meets_the_law()
     assert!(height > 0.06, "it is at {height} m");
 }
 
-const YOUNG: f64 = 2.0e4;
+pub(super) const YOUNG: f64 = 2.0e4;
 const POISSON: f64 = 0.4;
 /// Radius of the ball, m.
 const RADIUS: f64 = 0.02;

@@ -31,6 +31,8 @@ mod large_tests;
 #[cfg(test)]
 mod law_tests;
 mod near;
+#[cfg(test)]
+mod quadratic_tests;
 mod resultants;
 mod rigid_motion;
 mod rolling;

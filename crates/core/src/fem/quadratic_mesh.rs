@@ -8,7 +8,7 @@ use super::mid_edge::{MidEdgeFault, edges_and_middles, ten_node_tets};
 use super::tet4;
 use super::tet10::EDGES;
 use super::tet10_points::Points;
-use crate::mesh::TetMesh;
+use crate::mesh::{MeshError, TetMesh};
 
 /// Mesh of ten-node tetrahedra.
 ///
@@ -117,6 +117,18 @@ impl QuadraticMesh {
             .collect();
         let (middles, regions) = (Vec::new(), mesh.regions().to_vec());
         Ok(Self { corner_count, vertices, edges, middles, tets, regions })
+    }
+
+    /// The linear mesh with all nodes of this one: those that were made are its own mid-edge nodes then, after
+    /// the others, and can be named.
+    ///
+    /// # Errors
+    /// [`MeshError`] as for any list of nodes and elements.
+    pub fn to_mesh(&self) -> Result<TetMesh, MeshError> {
+        let corners = self.tets.iter().map(|nodes| std::array::from_fn(|i| nodes[i])).collect();
+        let middles = self.tets.iter().map(|nodes| std::array::from_fn(|i| nodes[4 + i])).collect();
+        TetMesh::try_new(self.vertices.clone(), corners, self.regions.clone())?
+            .with_mid_edge_nodes(middles)
     }
 
     /// Number N of the nodes of the linear mesh, its orphans included; what was made comes after them.

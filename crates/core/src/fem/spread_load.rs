@@ -66,6 +66,33 @@ impl<'a> SpreadLoads<'a> {
         Self { mesh, quadratic }
     }
 
+    /// Integrals of the shape functions, one for each node of the system: the share that a node has of a load
+    /// that is even over the volume. Those of corners of ten-node elements may be below zero.
+    ///
+    /// Units: m³.
+    pub fn nodal_volumes(self) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.node_count()];
+        for (tet, corners) in self.mesh.tets().iter().enumerate() {
+            match self.quadratic {
+                None => {
+                    let quarter = 0.25 * self.mesh.signed_volume(tet);
+                    corners.iter().for_each(|&node| volumes[node as usize] += quarter);
+                }
+                Some(quadratic) => {
+                    let (volume, shares) = self.shares(quadratic, tet);
+                    let nodes = quadratic.tets()[tet].iter().zip(shares);
+                    nodes.for_each(|(&node, share)| volumes[node as usize] += share * volume);
+                }
+            }
+        }
+        volumes
+    }
+
+    /// Places of the nodes of the system at rest, m.
+    pub fn vertices(self) -> &'a [Point3<f64>] {
+        self.quadratic.map_or(self.mesh.vertices(), QuadraticMesh::vertices)
+    }
+
     /// Forces of the weight `ρ a` of every unit of volume, in an even field of acceleration.
     ///
     /// Shapes: `densities` one for the whole body, or one for each region. Units: kg/m³, m/s².

@@ -71,6 +71,30 @@ fn sorted_faces(corners: &[u32; 4]) -> [[u32; 3]; 4] {
     })
 }
 
+/// The faces that exactly one element has, as element and face, in the order of the elements.
+fn boundary_faces(mesh: &TetMesh) -> Vec<(usize, usize)> {
+    let mut boundary = Vec::new();
+    Faces::from_mesh(mesh).for_each_triangle(|same| {
+        if let [(_, id)] = same {
+            boundary.push(*id);
+        }
+    });
+    boundary.sort_unstable();
+    boundary.into_iter().map(|id| (id / 4, id % 4)).collect()
+}
+
+/// Position of the edge between two corners among the edges 12, 23, 13, 14, 24, 34.
+const fn edge_between(ends: [usize; 2]) -> usize {
+    match ends {
+        [0, 1] | [1, 0] => 0,
+        [1, 2] | [2, 1] => 1,
+        [0, 2] | [2, 0] => 2,
+        [0, 3] | [3, 0] => 3,
+        [1, 3] | [3, 1] => 4,
+        _ => 5,
+    }
+}
+
 /// Boundary triangles of a mesh, and the vertices they use.
 ///
 /// Shapes: `triangles` P × 3 node indices, counter-clockwise seen from outside, in the order of
@@ -91,20 +115,29 @@ impl Surface {
     /// A face of three or more elements (overlapping elements) is not part of the surface; see
     /// [`Surface::overused_faces`].
     pub fn from_mesh(mesh: &TetMesh) -> Self {
-        let mut boundary = Vec::new();
-        Faces::from_mesh(mesh).for_each_triangle(|same| {
-            if let [(_, id)] = same {
-                boundary.push(*id);
-            }
+        let face = |(tet, face): (usize, usize)| OUTWARD[face].map(|c| mesh.tets()[tet][c]);
+        Self::of_triangles(mesh, boundary_faces(mesh).into_iter().map(face).collect())
+    }
+
+    /// The same faces between all nodes of the mesh: one of an element with mid-edge nodes is four flat
+    /// triangles. That of [`Surface::from_mesh`] where the mesh has no mid-edge nodes.
+    pub fn with_mid_edge_nodes(mesh: &TetMesh) -> Self {
+        if mesh.mid_edge_nodes().is_empty() {
+            return Self::from_mesh(mesh);
+        }
+        let faces = boundary_faces(mesh).into_iter().flat_map(|(tet, face)| {
+            let corners = OUTWARD[face];
+            let [a, b, c] = corners.map(|corner| mesh.tets()[tet][corner]);
+            let [ab, bc, ca] = [0, 1, 2].map(|side| {
+                let ends = [corners[side], corners[(side + 1) % 3]];
+                mesh.mid_edge_nodes()[tet][edge_between(ends)]
+            });
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
         });
-        boundary.sort_unstable();
-        let triangles: Vec<[u32; 3]> = boundary
-            .iter()
-            .map(|&id| {
-                let corners = &mesh.tets()[id / 4];
-                OUTWARD[id % 4].map(|c| corners[c])
-            })
-            .collect();
+        Self::of_triangles(mesh, faces.collect())
+    }
+
+    fn of_triangles(mesh: &TetMesh, triangles: Vec<[u32; 3]>) -> Self {
         let mut on_surface = vec![false; mesh.node_count()];
         for &n in triangles.iter().flatten() {
             on_surface[n as usize] = true;

@@ -44,8 +44,11 @@ pub enum ModelError {
         /// What is wrong with it.
         reason: MaskError,
     },
-    /// The condensed engine does not know ten-node elements.
-    #[error("condensed works on linear tetrahedra; use front for ten-node ones")]
+    /// The condensed engine does not know ten-node elements whose mid-edge nodes are not the mesh's own.
+    #[error(
+        "condensed works on linear tetrahedra, and on ten-node ones if the mesh has the mid-edge nodes; use \
+         front for others"
+    )]
     QuadraticCondensed,
     /// The condensed engine failed.
     #[error(transparent)]

@@ -138,7 +138,7 @@ fn surface_load(mesh: &TetMesh, u: &[f64], contacts: &[HeldContact]) -> SurfaceL
         let parts = contact.nodes.into_iter().zip(contact.weights);
         parts.map(|(node, weight)| (node, weight * contact.force))
     });
-    SurfaceLoad::new(&places, &Surface::from_mesh(mesh).triangles, forces)
+    SurfaceLoad::new(&places, &Surface::with_mid_edge_nodes(mesh).triangles, forces)
 }
 
 /// Checks that the wanted fields exist for the question, and reserves the memory that they take.

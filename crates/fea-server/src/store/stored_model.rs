@@ -135,7 +135,7 @@ impl StoredModel {
         if let Some(kept) = self.free_body.with(|kept| kept.clone()) {
             return Ok(kept);
         }
-        let made = Arc::new(FreeBody::try_new(self.model.mesh(), base)?);
+        let made = Arc::new(FreeBody::try_new(self.model.spread_loads(), base)?);
         Ok(self.free_body.with(|kept| Arc::clone(kept.get_or_insert(made))))
     }
 

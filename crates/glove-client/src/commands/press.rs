@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::Point3;
+use softgrasp_core::fem::{QuadraticMesh, SpreadLoads};
 use softgrasp_core::mesh::{Surface, TetMesh};
 use softgrasp_protocol::solve_report::SCHEMA;
 use softgrasp_protocol::{
@@ -70,8 +71,9 @@ pub struct PressCommand {
     step: f64,
     #[command(flatten)]
     elasticity: ElasticityArguments,
-    /// Finite element.
-    #[arg(long, default_value = "t4", value_name = "t4|t4-anp", value_parser = element)]
+    /// Finite element. t10 has nodes in the middles of all edges, those of the file or halfway between
+    /// corners, and is pressed at all of them.
+    #[arg(long, default_value = "t4", value_name = "t4|t4-anp|t10", value_parser = element)]
     element: ElementName,
     /// Where to solve: HOST:PORT, or embedded.
     #[arg(long, default_value = "embedded", value_name = "ADDR|embedded")]
@@ -98,7 +100,8 @@ fn element(text: &str) -> Result<ElementName, String> {
     match text {
         "t4" => Ok(ElementName::T4),
         "t4-anp" => Ok(ElementName::T4Anp),
-        _ => Err("there are t4 and t4-anp".to_owned()),
+        "t10" => Ok(ElementName::T10),
+        _ => Err("there are t4, t4-anp and t10".to_owned()),
     }
 }
 
@@ -111,8 +114,10 @@ impl PressCommand {
         let progress = Progress::start("reading");
         let elasticity = self.elasticity.of_request()?;
         let bodies = read_bodies(&self.bodies)?;
-        let (mesh, region_names) = self.read_object()?;
-        let surface = Surface::from_mesh(&mesh);
+        let (given, region_names) = self.read_object()?;
+        let own_nodes = given.node_count();
+        let mesh = with_nodes_of(given, self.element)?;
+        let surface = Surface::with_mid_edge_nodes(&mesh);
         let is_known = |path: &PathBuf| {
             matches!(path.extension().and_then(|e| e.to_str()), Some("vtu" | "csv"))
         };
@@ -151,7 +156,7 @@ impl PressCommand {
             steps.push(StepReport::new(&step, &names));
             if let Some(series) = &mut series {
                 let path = series.add(step.time);
-                write_file(&path, &encode(&path, &mesh, &step)?)?;
+                write_file(&path, &encode(&path, (&mesh, own_nodes), &step)?)?;
             }
             last = Some(step);
             Ok(())
@@ -161,9 +166,9 @@ impl PressCommand {
             series.finish()?;
         }
         if let (Some(path), Some(last)) = (&self.out, &last) {
-            write_file(path, &encode(path, &mesh, last)?)?;
+            write_file(path, &encode(path, (&mesh, own_nodes), last)?)?;
         }
-        let report = self.summary(&mesh, steps, elasticity);
+        let report = self.summary(&mesh, steps, elasticity)?;
         if let Some(path) = &self.report {
             write_json(path, &report)?;
         }
@@ -174,9 +179,7 @@ impl PressCommand {
     /// told.
     fn read_object(&self) -> anyhow::Result<(TetMesh, Vec<String>)> {
         match read_object_file(&self.mesh, NODES_DEFAULT)? {
-            ObjectFile::Mesh(file) => {
-                Ok((file.mesh.without_mid_edge_nodes(), file.findings.region_labels))
-            }
+            ObjectFile::Mesh(file) => Ok((file.mesh, file.findings.region_labels)),
             ObjectFile::Surface(surface) => {
                 let doubt = surface.doubtful_unit().map(|doubt| {
                     format!("{doubt}: `glove-client fill {} --scale S` first", self.mesh.display())
@@ -220,11 +223,15 @@ impl PressCommand {
         mesh: &TetMesh,
         steps: Vec<StepReport>,
         elasticity: Elasticity,
-    ) -> PressReport {
+    ) -> anyhow::Result<PressReport> {
         let is_large = elasticity.deformation != Deformation::Linear;
         let most = |number: fn(&StepReport) -> f64| steps.iter().map(number).fold(0.0, f64::max);
-        let volume: f64 = (0..mesh.tets().len()).map(|tet| mesh.signed_volume(tet)).sum();
-        PressReport {
+        let quadratic = match mesh.mid_edge_nodes().is_empty() {
+            true => None,
+            false => Some(QuadraticMesh::try_new(mesh)?),
+        };
+        let volume: f64 = SpreadLoads::new(mesh, quadratic.as_ref()).nodal_volumes().iter().sum();
+        Ok(PressReport {
             schema: SCHEMA,
             command: "press",
             mesh: self.mesh.display().to_string(),
@@ -247,7 +254,7 @@ impl PressCommand {
             penetration_max: most(|step| step.penetration_max),
             contact_residual_rel_max: most(|step| step.contact_residual_rel),
             steps,
-        }
+        })
     }
 
     fn describe(&self, report: &PressReport, bodies: &PressBodies) -> String {
@@ -306,10 +313,26 @@ fn world_displacement(mesh: &TetMesh, step: &Step) -> Vec<[f64; 3]> {
     mesh.vertices().iter().zip(&step.displacement).map(moved).collect()
 }
 
-fn encode(path: &Path, mesh: &TetMesh, step: &Step) -> anyhow::Result<Vec<u8>> {
+/// The mesh with the nodes that the element has; those that it lacks come after its own.
+fn with_nodes_of(mesh: TetMesh, element: ElementName) -> anyhow::Result<TetMesh> {
+    match element {
+        ElementName::T10 if mesh.mid_edge_nodes().is_empty() => {
+            Ok(QuadraticMesh::try_new(&mesh)?.to_mesh()?)
+        }
+        ElementName::T10 => Ok(mesh),
+        ElementName::T4 | ElementName::T4Anp => Ok(mesh.without_mid_edge_nodes()),
+    }
+}
+
+/// File of a step: a table of the nodes that the mesh file has, or a mesh with all nodes.
+fn encode(
+    path: &Path,
+    (mesh, own_nodes): (&TetMesh, usize),
+    step: &Step,
+) -> anyhow::Result<Vec<u8>> {
     let whole = world_displacement(mesh, step);
     if !is_vtu(path) {
-        return Ok(write_displacements(&whole).into_bytes());
+        return Ok(write_displacements(&whole[..own_nodes]).into_bytes());
     }
     let vectors = [
         NodeVectors { name: "displacement", unit: "m", values: &whole },

@@ -139,3 +139,43 @@ fn bodies_that_make_no_sense_are_told_by_name() {
     let told = fail(1, &["press", "--mesh", &mesh, "--bodies", &bodies]);
     assert!(told.contains("\"tip\": a sphere needs radius"), "{told}");
 }
+
+/// Force by which a fingertip is pressed when it has closed on a ball of so many nodes, N.
+fn pinching_force(nodes: &str, element: &str) -> f64 {
+    let folder = Folder::new();
+    succeed(&["mesh", "sphere", "--nodes", nodes, "--out", &folder.path("ball.msh")]);
+    folder.write("bodies.toml", &format!("end = 0.7\n{TABLE}{}", pinch(0.041)));
+    let report = report(&folder, &["--viscosity", "0.01", "--element", element]);
+    assert_eq!(number(&report, "/steps_not_converged"), 0.0, "{element}");
+    let steps = report["steps"].as_array().unwrap();
+    number(steps.last().unwrap(), "/bodies/left/normal_force")
+}
+
+#[test]
+fn press_of_ten_node_elements_is_nearer_to_that_of_a_fine_mesh() {
+    let fine = pinching_force("6000", "t4");
+    let off = |element: &str| (pinching_force("300", element) / fine - 1.0).abs();
+    let (four, ten) = (off("t4"), off("t10"));
+    assert!(ten < 0.4 * four, "off by {ten}, with four nodes by {four}");
+}
+
+#[test]
+fn ball_of_ten_node_elements_is_lifted_and_all_its_nodes_are_in_the_picture() {
+    let folder = folder(1.6, &pinch(0.035));
+    let [table, picture] = ["u.csv", "u.vtu"].map(|file| folder.path(file));
+    let options = ["--viscosity", "0.01", "--element", "t10", "--out"];
+    let with_table = report(&folder, &[&options[..], &[&table]].concat());
+    let last = with_table["steps"].as_array().unwrap().last().unwrap().clone();
+    assert!(number(&last, "/object_pose/2") > 0.02, "{last}");
+    assert_eq!(number(&last, "/bodies/table/contacts"), 0.0);
+    assert_eq!(with_table["element"], "t10");
+    // The table has the nodes of the file, the picture those between them too.
+    let given = displacements(&folder.read("u.csv")).len();
+    assert!((250..=350).contains(&given), "{given}");
+    assert!(number(&with_table, "/nodes") > 5.0 * given as f64);
+    report(&folder, &[&options[..], &[&picture]].concat());
+    let file = std::fs::read(folder.path("u.vtu")).unwrap();
+    let mesh = softgrasp_core::mesh_io::parse("u.vtu", &file, &mut |_| None).unwrap().mesh;
+    assert_eq!(mesh.node_count() as f64, number(&with_table, "/nodes"));
+    assert!(!mesh.mid_edge_nodes().is_empty());
+}

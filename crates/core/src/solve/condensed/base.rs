@@ -328,7 +328,7 @@ const INSIDE: u32 = u32::MAX;
 
 impl SurfaceNodes {
     pub fn from_mesh(mesh: &TetMesh) -> Self {
-        let nodes = Surface::from_mesh(mesh).nodes;
+        let nodes = Surface::with_mid_edge_nodes(mesh).nodes;
         let mut places = vec![INSIDE; mesh.node_count()];
         for (place, &node) in (0..).zip(&nodes) {
             places[node as usize] = place;

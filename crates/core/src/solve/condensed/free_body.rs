@@ -15,7 +15,7 @@ use super::base::Base;
 #[cfg(test)]
 use super::columns::ContactColumns;
 use super::error::CondensedError;
-use crate::mesh::TetMesh;
+use crate::fem::SpreadLoads;
 
 /// Rigid motions, masses and the response of the held body to them, made once for a shape.
 ///
@@ -48,15 +48,15 @@ impl FreeBody {
     /// # Errors
     /// [`CondensedError::NotFree`] where the scene holds the body, or it has several parts that move
     /// on their own; [`CondensedError::NotConverged`] where the base has no factor.
-    pub fn try_new(mesh: &TetMesh, base: &Base) -> Result<Self, CondensedError> {
+    pub fn try_new(body: SpreadLoads<'_>, base: &Base) -> Result<Self, CondensedError> {
         let motions = base.modes.len();
         if motions != 6 || !base.fixed.is_empty() {
             return Err(CondensedError::NotFree { motions });
         }
-        let volumes = nodal_volumes(mesh);
+        let (volumes, vertices) = (body.nodal_volumes(), body.vertices());
         let volume: f64 = volumes.iter().sum();
         let moment = |f: &dyn Fn(&Point3<f64>) -> f64| -> f64 {
-            volumes.iter().zip(mesh.vertices()).map(|(v, p)| v * f(p)).sum()
+            volumes.iter().zip(vertices).map(|(v, p)| v * f(p)).sum()
         };
         let centre = Point3::new(
             moment(&|p| p.x) / volume,
@@ -64,7 +64,7 @@ impl FreeBody {
             moment(&|p| p.z) / volume,
         );
         let mut inertia = Matrix3::zeros();
-        for (v, p) in volumes.iter().zip(mesh.vertices()) {
+        for (v, p) in volumes.iter().zip(vertices) {
             let r = p - centre;
             inertia += *v * (r.norm_squared() * Matrix3::identity() - r * r.transpose());
         }
@@ -75,7 +75,7 @@ impl FreeBody {
         let turning = inertia.try_inverse().ok_or(CondensedError::NotFree { motions })?;
         inverse.fixed_view_mut::<3, 3>(3, 3).copy_from(&turning);
         let mut body = Self {
-            vertices: mesh.vertices().to_vec(),
+            vertices: vertices.to_vec(),
             volumes,
             volume,
             centre,
@@ -338,16 +338,6 @@ pub struct Relief {
     left: Matrix6x3<f64>,
 }
 
-/// A quarter of the volume of every element for each of its corners.
-fn nodal_volumes(mesh: &TetMesh) -> Vec<f64> {
-    let mut volumes = vec![0.0; mesh.node_count()];
-    for (tet, corners) in mesh.tets().iter().enumerate() {
-        let quarter = 0.25 * mesh.signed_volume(tet);
-        corners.iter().for_each(|&node| volumes[node as usize] += quarter);
-    }
-    volumes
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{Columns, Contact};
@@ -385,7 +375,7 @@ mod tests {
     #[test]
     fn displacement_balances_the_load_less_inertia_and_has_no_mean_motion() {
         let (model, base) = sphere();
-        let body = FreeBody::try_new(model.mesh(), &base).unwrap();
+        let body = FreeBody::try_new(model.spread_loads(), &base).unwrap();
         let forces = [(7, Vector3::new(0.3, -1.0, 0.2)), (100, Vector3::new(0.1, 0.5, -0.7))];
         let u = field(&body, &base, &forces);
         let flat: Vec<f64> = u.iter().flatten().copied().collect();
@@ -395,7 +385,7 @@ mod tests {
         let arm = |node: usize| model.mesh().vertices()[node] - body.centre();
         let torque: Vector3<f64> = forces.iter().map(|(n, f)| arm(*n as usize).cross(f)).sum();
         let turning = body.inertia().try_inverse().unwrap() * torque;
-        let volumes = nodal_volumes(model.mesh());
+        let volumes = model.spread_loads().nodal_volumes();
         let (mut mean, mut turned) = (Vector3::zeros(), Vector3::zeros());
         for node in 0..u.len() {
             let acceleration = total / body.volume() + turning.cross(&arm(node));
@@ -416,7 +406,7 @@ mod tests {
     #[test]
     fn compliance_of_two_nodes_is_the_field_there_and_symmetric() {
         let (model, base) = sphere();
-        let body = FreeBody::try_new(model.mesh(), &base).unwrap();
+        let body = FreeBody::try_new(model.spread_loads(), &base).unwrap();
         let columns = Columns::new(usize::MAX);
         let contacts = [Contact::Node(3), Contact::Node(90)];
         let columns = columns.of_contacts(&base, &contacts).unwrap();
@@ -435,7 +425,7 @@ mod tests {
         let fixed = [0, 1, 2, 15, 16, 17, 24, 25, 26].to_vec();
         let model = Model::try_new(mesh, Element::Tet4, &[material], fixed, &mut |_| {}).unwrap();
         let base = model.condense(None, &mut |_| {}).unwrap();
-        let refused = FreeBody::try_new(model.mesh(), &base).err();
+        let refused = FreeBody::try_new(model.spread_loads(), &base).err();
         assert_eq!(refused, Some(CondensedError::NotFree { motions: 0 }));
     }
 }

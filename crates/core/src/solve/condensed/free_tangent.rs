@@ -228,7 +228,7 @@ mod tests {
         let material = Material::try_new(2.0e4, 0.4).unwrap();
         let model = Model::try_new(mesh, Element::Tet4, &[material], vec![], &mut |_| {}).unwrap();
         let base = model.condense(None, &mut |_| {}).unwrap();
-        let body = FreeBody::try_new(model.mesh(), &base).unwrap();
+        let body = FreeBody::try_new(model.spread_loads(), &base).unwrap();
         let elements = model.hyperelastic(Law::NeoHookean).unwrap();
         // Pressed by a hundredth, and bent.
         let u: Vec<f64> = model

@@ -1,0 +1,75 @@
+//! Contact of ten-node elements: the same laws and closed forms as for four-node ones, closer on fewer corners.
+
+use nalgebra::Vector3;
+
+use super::law_tests::{EDGE, YOUNG, press_evenly};
+use super::tests::{Object, at, off_hertz, settled, table};
+use super::*;
+use crate::fem::hyperelastic::Law;
+use crate::mesh::{BuiltIn, Surface};
+
+#[test]
+fn block_of_ten_node_elements_is_pressed_evenly_by_planes() {
+    for corners in [27, 64, 125] {
+        press_evenly(&Object::quadratic(BuiltIn::Cube, corners, EDGE, YOUNG, 0.3));
+    }
+}
+
+#[test]
+fn cube_of_ten_node_elements_lies_on_a_table_with_its_weight() {
+    let cube = Object::quadratic(BuiltIn::Cube, 64, 0.05, 2.0e4, 0.4);
+    assert!((cube.mass() - 1000.0 * 0.05_f64.powi(3)).abs() < 1e-12);
+    let (state, found) = settled(&cube, ObjectState::at_rest(at(0.0, 0.0, 0.03)), 300);
+    let weight = 9.81 * cube.mass();
+    let force = found.loads[0].force;
+    assert!((force.z - weight).abs() < 1e-9 * weight, "{force} {weight}");
+    assert!(force.xy().norm() < 1e-9 * weight);
+    assert!(state.velocity.norm() < 1e-9, "{}", state.velocity);
+    assert!(found.penetration_max < 1e-6 * 0.05);
+    assert!(found.is_converged);
+}
+
+#[test]
+fn ball_of_ten_node_elements_is_nearer_to_hertz_than_one_of_four_node_elements_with_as_many_nodes()
+{
+    let (radius, young, poisson) = (0.03, 2.0e4, 0.4);
+    let ball = Object::quadratic(BuiltIn::Sphere, 300, 2.0 * radius, young, poisson);
+    let nodes = ball.model.mesh().node_count();
+    let linear = Object::sized(BuiltIn::Sphere, nodes, 2.0 * radius, young, poisson);
+    let of = |ball: &Object| off_hertz(ball, radius, (young, poisson));
+    let (ten, four) = (of(&ball), of(&linear));
+    assert!(ten < 0.5 * four && ten < 0.02, "{nodes} nodes: ten {ten}, four {four}");
+}
+
+#[test]
+fn every_face_of_the_surface_is_four_triangles_that_cover_it() {
+    let ball = Object::quadratic(BuiltIn::Sphere, 200, 0.06, 2.0e4, 0.4);
+    let mesh = ball.model.mesh();
+    let area = |triangles: &[[u32; 3]]| -> Vector3<f64> {
+        let at = |n: u32| mesh.vertices()[n as usize];
+        let of = |&[a, b, c]: &[u32; 3]| 0.5 * (at(b) - at(a)).cross(&(at(c) - at(a)));
+        triangles.iter().map(|t| of(t).map(f64::abs)).sum()
+    };
+    let corners = Surface::from_mesh(mesh);
+    assert_eq!(ball.surface.triangles.len(), 4 * corners.triangles.len());
+    assert!((area(&ball.surface.triangles) - area(&corners.triangles)).norm() < 1e-12);
+    assert!(ball.surface.nodes.len() > 3 * corners.nodes.len());
+}
+
+#[test]
+fn ten_node_elements_are_pressed_at_large_deformation_too() {
+    let cube = Object::quadratic(BuiltIn::Cube, 27, 0.05, 3.0e3, 0.4);
+    let mut large = cube.large(Law::NeoHookean);
+    let settings = StepSettings { viscosity: 0.02, ..StepSettings::default() };
+    let mut state = ObjectState::at_rest(at(0.0, 0.0, 0.03));
+    let mut found = None;
+    for _ in 0..200 {
+        let made = cube.advance_large(&mut large, &state, &[table(0.5)], settings);
+        state = made.state.clone();
+        found = Some(made);
+    }
+    let found = found.unwrap();
+    let (force, weight) = (found.loads[0].force, 9.81 * cube.mass());
+    assert!((force.z - weight).abs() < 1e-6 * weight, "{force} {weight}");
+    assert!(found.is_converged && found.penetration_max < 1e-6 * 0.05);
+}
