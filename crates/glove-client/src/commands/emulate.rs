@@ -88,6 +88,7 @@ mod serving {
     use softgrasp_hand::recording::read_recording;
     use softgrasp_hand::scripted::Rehearsal;
     use softgrasp_hand::serial::motion::Motion;
+    use softgrasp_protocol::ElementName;
 
     impl EmulateCommand {
         /// Prints the paths of the devices and serves until it is stopped.
@@ -172,6 +173,7 @@ mod serving {
                 size_m: self.object_size.or_else(|| size_to_hold(&choice)),
                 setup: setup.clone(),
                 contact: ContactModel::default(),
+                element: ElementName::T4,
                 choice,
             };
             let loaded = load(&request, |_| true)?.context("the object was called off")?;

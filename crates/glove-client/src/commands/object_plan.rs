@@ -115,7 +115,7 @@ impl ObjectFlags<'_> {
             regions,
             settings: SolveSettings {
                 material,
-                element: chosen_element(element, largest)?,
+                element: chosen_element(element, largest),
                 method: self.method.clone(),
                 contact: rule.contact,
                 subscription: self.subscription,
@@ -153,19 +153,17 @@ impl ObjectPlan {
             regions: self.regions.clone(),
             setup: setup.clone(),
             contact: self.settings.contact,
+            element: self.settings.element,
         }
     }
 }
 
-/// Element for the ticks; it must be one that `condensed` can solve.
-fn chosen_element(choice: ElementChoice, poisson: f64) -> anyhow::Result<ElementName> {
+/// Element for the ticks.
+fn chosen_element(choice: ElementChoice, poisson: f64) -> ElementName {
     match choice {
-        ElementChoice::T4 => Ok(ElementName::T4),
-        ElementChoice::T4Anp => Ok(ElementName::T4Anp),
-        ElementChoice::Auto => Ok(element_for_frames(poisson)),
-        ElementChoice::T10 => bail!(
-            "run has no ten-node elements: a frame would take as long as a whole solve; take t4, \
-             t4-anp or auto, or solve one request with `glove-client solve --element t10`"
-        ),
+        ElementChoice::T4 => ElementName::T4,
+        ElementChoice::T4Anp => ElementName::T4Anp,
+        ElementChoice::T10 => ElementName::T10,
+        ElementChoice::Auto => element_for_frames(poisson),
     }
 }

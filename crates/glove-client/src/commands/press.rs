@@ -24,6 +24,7 @@ use crate::ask::contact_frame::isometry_of;
 use crate::ask::displacement_table::write_displacements;
 use crate::ask::model_upload::{ModelUpload, materials};
 use crate::ask::solve_settings::Elasticity;
+use crate::object::element_nodes::with_nodes_of;
 use crate::object::field_writing::{NodeVectors, encode_fields};
 use crate::object::file_writing::write_file;
 use crate::object::object_file::{ObjectFile, read_object_file};
@@ -311,17 +312,6 @@ fn world_displacement(mesh: &TetMesh, step: &Step) -> Vec<[f64; 3]> {
         [place.x - rest.x, place.y - rest.y, place.z - rest.z]
     };
     mesh.vertices().iter().zip(&step.displacement).map(moved).collect()
-}
-
-/// The mesh with the nodes that the element has; those that it lacks come after its own.
-fn with_nodes_of(mesh: TetMesh, element: ElementName) -> anyhow::Result<TetMesh> {
-    match element {
-        ElementName::T10 if mesh.mid_edge_nodes().is_empty() => {
-            Ok(QuadraticMesh::try_new(&mesh)?.to_mesh()?)
-        }
-        ElementName::T10 => Ok(mesh),
-        ElementName::T4 | ElementName::T4Anp => Ok(mesh.without_mid_edge_nodes()),
-    }
 }
 
 /// File of a step: a table of the nodes that the mesh file has, or a mesh with all nodes.

@@ -9,7 +9,9 @@ use softgrasp_grasp::object::{
 use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject, ObjectSummary};
 use softgrasp_hand::scripted::{NoGrasp, PlanRequest};
+use softgrasp_protocol::ElementName;
 
+use crate::object::element_nodes::{ElementNodesError, with_nodes_of};
 use crate::object::region_choice::{MeshOfRegions, RegionChoice, RegionError};
 use crate::object::scene::{SceneError, SceneObject, load_object};
 
@@ -28,6 +30,8 @@ pub struct ObjectRequest {
     pub setup: HandSetup,
     /// What a fingertip holds: a node, a patch or a mask.
     pub contact: ContactModel,
+    /// Element whose nodes the object has.
+    pub element: ElementName,
 }
 
 /// Why there is no object.
@@ -39,6 +43,9 @@ pub enum LoadError {
     /// Regions that it has not.
     #[error(transparent)]
     Region(#[from] RegionError),
+    /// The mesh cannot have the nodes of the element.
+    #[error(transparent)]
+    Element(#[from] ElementNodesError),
     /// The mesh is none that can be touched.
     #[error(transparent)]
     Object(#[from] ObjectError),
@@ -96,7 +103,7 @@ fn load_at(
     size: Option<f64>,
     goes_on: &mut impl FnMut(LoadStage) -> bool,
 ) -> Result<Option<LoadedObject>, LoadError> {
-    let ObjectRequest { choice, nodes, regions, setup, contact, .. } = request;
+    let ObjectRequest { choice, nodes, regions, setup, contact, element, .. } = request;
     if !goes_on(LoadStage::Mesh) {
         return Ok(None);
     }
@@ -113,6 +120,7 @@ fn load_at(
             notes.push(format!("turned by {degrees:.0}° so that it lies on the table"));
         }
     }
+    let mesh = with_nodes_of(mesh, *element)?;
     let mut summary = ObjectSummary {
         name: choice.to_string(),
         nodes: mesh.node_count(),
@@ -150,6 +158,7 @@ mod tests {
             regions: Vec::new(),
             setup: HandSetup::default(),
             contact: ContactModel::default(),
+            element: ElementName::T4,
         }
     }
 
@@ -163,6 +172,17 @@ mod tests {
         let loaded = loaded.unwrap().unwrap();
         assert_eq!(stages, LoadStage::ALL);
         assert_eq!((loaded.summary.nodes, loaded.object.shape().len()), (64, 64));
+        assert!(loaded.plan.is_ok());
+    }
+
+    #[test]
+    fn object_of_ten_node_elements_can_be_touched_between_its_corners() {
+        let asked = ObjectRequest { element: ElementName::T10, ..request("cube") };
+        let loaded = load(&asked, |_| true).unwrap().unwrap();
+        let rest = loaded.object.rest_shape();
+        let nodes = rest.mesh().node_count();
+        assert!(nodes > 300 && loaded.summary.nodes == nodes, "{nodes}");
+        assert!(rest.surface().nodes.iter().any(|node| *node >= 64));
         assert!(loaded.plan.is_ok());
     }
 

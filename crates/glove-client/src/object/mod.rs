@@ -1,5 +1,6 @@
 //! The object in the scene: read, made ready, changed, kept, written.
 
+pub mod element_nodes;
 pub mod field_writing;
 pub mod file_writing;
 pub mod loading;

@@ -24,12 +24,7 @@ fn run_of_which_nothing_is_said_lifts_a_strawberry_and_says_how_wrong_every_step
         frames.iter().map(|frame| &frame["contact"]).filter(|step| !step.is_null()).collect();
     assert!(steps.len() > 100, "{} steps", steps.len());
     // Once it is lifted the fingers carry its weight and the table nothing.
-    let carried = steps.iter().filter(|step| {
-        let fingers: f64 =
-            step["finger_force_n"].as_array().unwrap().iter().map(|f| f.as_f64().unwrap()).sum();
-        step["table_force_n"] == 0.0 && fingers > 0.5
-    });
-    assert!(carried.count() > 60, "the hand never carried it");
+    assert!(ticks_carried(&report) > 60, "the hand never carried it");
     for step in steps {
         for number in ["penetration_max_m", "residual_n", "residual_rel", "cone_violation_n"] {
             assert!(step[number].as_f64().unwrap() >= 0.0, "{number} in {step}");
@@ -38,6 +33,30 @@ fn run_of_which_nothing_is_said_lifts_a_strawberry_and_says_how_wrong_every_step
     let all = &report["summary"]["contact"];
     assert!(all["penetration_max_m"].as_f64().unwrap() < 5e-4, "{all}");
     assert!(all["steps"].as_u64() > all["not_converged"].as_u64(), "{all}");
+}
+
+/// Ticks of a run in which the fingers carry the object and the table nothing.
+fn ticks_carried(report: &Value) -> usize {
+    let frames = report["frames"].as_array().unwrap().iter();
+    let of_step = frames.map(|frame| &frame["contact"]).filter(|step| !step.is_null());
+    let carries = |step: &&Value| {
+        let fingers = step["finger_force_n"].as_array().unwrap().iter();
+        step["table_force_n"] == 0.0 && fingers.map(|f| f.as_f64().unwrap()).sum::<f64>() > 0.5
+    };
+    of_step.filter(carries).count()
+}
+
+#[test]
+fn strawberry_of_ten_node_elements_is_lifted_and_its_lift_replayed() {
+    let folder = Folder::new();
+    let path = folder.path("ten.mcap");
+    let report = lifted(&folder, &["--element", "t10", "--nodes", "100", "--record", &path]);
+    assert!(ticks_carried(&report) > 60, "the hand never carried it");
+    assert!(report["object"]["nodes"].as_u64().unwrap() > 400, "{}", report["object"]);
+    let again = folder.path("replay.json");
+    succeed(&["replay", &path, "--check", "--threads", "1", "--report", &again]);
+    let replayed: Value = serde_json::from_str(&folder.read("replay.json")).unwrap();
+    assert_eq!(replayed["replay"]["difference"], Value::Null);
 }
 
 #[test]

@@ -45,12 +45,12 @@ pub enum ObjectError {
 }
 
 impl RestShape {
-    /// The rest shape that a mesh describes.
+    /// The rest shape that a mesh describes; it can be touched at mid-edge nodes too.
     ///
     /// # Errors
     /// [`ObjectError::Tree`].
     pub fn try_new(mesh: TetMesh) -> Result<Self, ObjectError> {
-        let surface = Surface::from_mesh(&mesh);
+        let surface = Surface::with_mid_edge_nodes(&mesh);
         let stars = SurfaceStars::new(&surface, mesh.node_count());
         let tree = SphereTree::try_build(mesh.vertices(), &surface.nodes)?;
         let mut normals = Vec::new();

@@ -12,6 +12,7 @@ use softgrasp_hand::hand_reader::{HandReader, HandSetup};
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_hand::sent::Arrival;
+use softgrasp_protocol::ElementName;
 
 use super::noise::Noise;
 
@@ -48,6 +49,7 @@ impl Stage {
             size_m: size_to_hold(&choice),
             setup: HandSetup::default(),
             contact: ContactModel::default(),
+            element: ElementName::T4,
             choice,
         };
         let loaded = load(&request, |_| true)?.context("the object was called off")?;
