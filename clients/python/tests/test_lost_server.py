@@ -5,6 +5,8 @@ import os
 import pathlib
 import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -200,3 +202,32 @@ def test_program_is_found_beside_the_scripts_of_this_python(monkeypatch, tmp_pat
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr("sysconfig.get_path", lambda name: str(tmp_path / name))
     assert find_program(None) == str(laid)
+
+
+def test_server_ends_with_a_python_that_is_killed() -> None:
+    text = (
+        "import sys, time, softgrasp\n"
+        "program = softgrasp.ServerProgram(sys.argv[1])\n"
+        "print(program.pid, flush=True)\n"
+        "time.sleep(60)\n"
+    )
+    command = [sys.executable, "-c", text, find_program(PROGRAM)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as python:
+        assert python.stdout is not None
+        server = int(python.stdout.readline())
+        os.kill(server, 0)
+        python.kill()
+    deadline = time.monotonic() + 10.0
+    while is_there(server):
+        assert time.monotonic() < deadline, "the server goes on without anybody"
+        time.sleep(0.05)
+
+
+def is_there(pid: int) -> bool:
+    """Whether a process lives; one that has ended and is not waited for does not."""
+    try:
+        state = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+

@@ -39,6 +39,10 @@ pub struct Arguments {
     /// Seconds for which sessions may go on after SIGTERM or Ctrl-C; a second signal ends at once.
     #[arg(long, value_name = "S", default_value = "0", value_parser = seconds)]
     pub drain: Duration,
+    /// End, as after SIGTERM, when standard input is closed: with the program that holds its other end,
+    /// however that ends. What is written to it is passed over.
+    #[arg(long)]
+    pub end_with_input: bool,
     #[command(flatten)]
     limits: LimitArguments,
     /// Who may come.

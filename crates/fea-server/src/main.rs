@@ -62,6 +62,14 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
     let config = arguments.config(tokens, encryption)?;
     let (stop, stopped) = watch::channel(false);
     let mut ends_in = arguments.drain + END_MAX;
+    let input_ended = {
+        let stop = stop.clone();
+        move || {
+            tracing::info!("standard input is closed: asked to end");
+            let _ = stop.send(true);
+            softgrasp_os::end_within(ends_in);
+        }
+    };
     let renewal = Renewal::of(access, &config);
     // Before the first thread: all of them leave these signals to the one that waits.
     softgrasp_os::on_end_signal(true, move |signal| {
@@ -75,6 +83,16 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
         ends_in = Duration::ZERO;
     })
     .context("cannot wait for the signals that end the server")?;
+    if arguments.end_with_input {
+        std::thread::Builder::new()
+            .name("input".to_owned())
+            .spawn(move || {
+                // What cannot be read has ended too.
+                let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+                input_ended();
+            })
+            .context("cannot wait for the end of standard input")?;
+    }
     let _export = softgrasp_telemetry::start("fea-server", env!("CARGO_PKG_VERSION"))
         .inspect_err(|error| tracing::warn!(%error, "no traces and no metrics"))
         .unwrap_or_default();

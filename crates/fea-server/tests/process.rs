@@ -439,3 +439,31 @@ fn dense_cholesky_stays_within_its_memory() {
 fn gauss_jordan_stays_within_its_memory() {
     check_dense_memory("gauss-jordan", 590, 1400..1700);
 }
+
+#[test]
+fn server_ends_with_the_program_that_holds_its_input_and_not_before() {
+    let mut child = command()
+        .args(["--listen", "127.0.0.1:0", "--threads", "1", "--end-with-input"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut first = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut first).unwrap();
+    assert!(first.starts_with("listening on "), "{first}");
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(b"whatever is written\n").unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(child.try_wait().unwrap().is_none(), "it ended though its input is open");
+    drop(input);
+    let asked = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        assert!(asked.elapsed() < END_MAX, "it goes on without its input");
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert!(status.success(), "{status}");
+}

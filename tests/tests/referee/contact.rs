@@ -18,6 +18,9 @@ const PENALTY: f64 = 1e4;
 /// That for ten-node elements, where CalculiX takes a node of a face to stand for less of it.
 const PENALTY_OF_TEN: f64 = 1e6;
 
+/// Object, nodes of an element, Poisson's ratio, friction, and the way of the lid over the object's height.
+type Case<'a> = (&'a str, usize, f64, f64, &'a [[f64; 2]]);
+
 /// Displacement of every node, m, and force of the upper plate on the object, N.
 struct Found {
     displacement: Vec<[f64; 3]>,
@@ -111,8 +114,7 @@ fn presses_between_plates_agree_with_calculix_within_the_give_of_its_penalty() {
     let folder = tempfile::tempdir().unwrap();
     let objects = object::built_in(folder.path(), 150);
     let of = |name: &str| objects.iter().find(|object| object.name == name).unwrap();
-    // Object, nodes of an element, Poisson's ratio, friction, and the way of the lid over the height.
-    let cases: [(&str, usize, f64, f64, &[[f64; 2]]); 8] = [
+    let cases: [Case<'_>; 8] = [
         ("cube", 4, 0.3, 0.0, &[[0.0, 0.01]]),
         ("cube", 4, 0.3, 0.3, &[[0.0, 0.01]]),
         ("sphere", 4, 0.4, 0.5, &[[0.0, 0.03]]),

@@ -12,6 +12,7 @@ import sysconfig
 import tempfile
 import threading
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 from .errors import ServerNotStarted
@@ -22,12 +23,15 @@ _SAYS = "listening on "
 _END_MAX = 5.0
 """Seconds after which a server that was asked to end is killed; it promises three."""
 _STORY_LEN = 2_000
+_WITH_INPUT = "--end-with-input"
+"""Option by which a server ends when its standard input does."""
 
 
 class ServerProgram:
     """A server that this process started, on the loopback of this machine.
 
-    It ends with `end`, and at the latest when Python does; not where Python itself is killed.
+    It ends with `end`, and at the latest when Python does, also where that is killed (by servers of
+    versions that have the option --end-with-input).
     """
 
     def __init__(
@@ -49,11 +53,14 @@ class ServerProgram:
         self._log = tempfile.TemporaryFile()
         environment = {"RUST_LOG": "warn", **os.environ}
         options = [] if threads is None else ["--threads", str(threads)]
+        if _knows(path, _WITH_INPUT):
+            options.append(_WITH_INPUT)
         command = [path, "--listen", "127.0.0.1:0", *options, *arguments]
         try:
             self._process = subprocess.Popen(
                 command,
-                stdin=subprocess.DEVNULL,
+                # Held open by this process alone, and closed with it.
+                stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._log,
                 env=environment,
@@ -92,8 +99,9 @@ class ServerProgram:
                 self._process.wait(_END_MAX)
             except subprocess.TimeoutExpired:
                 self.kill()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                stream.close()
         self._log.close()
 
     def _first_words(self, path: str, wait: float) -> str:
@@ -118,6 +126,16 @@ class ServerProgram:
         self._log.seek(0, os.SEEK_END)
         self._log.seek(max(0, self._log.tell() - _STORY_LEN))
         return self._log.read().decode(errors="replace").strip()
+
+
+@lru_cache
+def _knows(path: str, option: str) -> bool:
+    """Whether the program has an option; an older one would refuse to start with it."""
+    try:
+        told = subprocess.run([path, "--help"], capture_output=True, timeout=10.0, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return option.encode() in told.stdout
 
 
 def find_program(program: str | os.PathLike[str] | None) -> str:

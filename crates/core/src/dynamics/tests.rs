@@ -296,19 +296,19 @@ fn a_finger_that_gives_way_presses_by_how_far_it_is_pushed_back() {
     assert!((found.loads[0].force.z - force - 9.81 * cube.mass()).abs() < 1e-6);
 }
 
-/// A ball pressed between two planes. Hertz's law is of half spaces; the far load moves the near pole by
+/// How far off the depth of a ball is that two planes press, by the force that it takes: depths count from the
+/// poles of the sphere, which need not be nodes. Hertz's law is of half spaces; the far load moves the near pole by
 /// what a point load does at the distance 2 R (Boussinesq), `(1 + ν)(3 − 2 ν) F / (4 π E R)`.
 ///
 /// Source: Hertz (1881), F = 4/3 E* √R δ^(3/2); Boussinesq (1885).
 pub(super) fn off_hertz(ball: &Object, radius: f64, (young, poisson): (f64, f64)) -> f64 {
-    let (low, high) = ball.model.mesh().bounds();
     let floor = MovingBody { friction: 0.0, ..table(0.0) };
     let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     let settings = StepSettings { gravity: Vector3::zeros(), ..StepSettings::default() };
-    let mut state = ObjectState::at_rest(at(0.0, 0.0, -low.z));
+    let mut state = ObjectState::at_rest(at(0.0, 0.0, radius));
     let mut most: f64 = 0.0;
     for depth in [0.001, 0.002] {
-        let height = Translation3::new(0.0, 0.0, high.z - low.z - 2.0 * depth);
+        let height = Translation3::new(0.0, 0.0, 2.0 * (radius - depth));
         let lid = MovingBody {
             world_from_body_start: Isometry3::from_parts(height, half_turn),
             world_from_body_end: Isometry3::from_parts(height, half_turn),

@@ -79,9 +79,10 @@ pub struct RunArguments {
     /// Method, or auto.
     #[arg(long, value_name = "NAME|auto")]
     pub(super) method: Option<MethodName>,
-    /// Element: t4, t4-anp (does not lock when Poisson's ratio nears 0.5), or auto: t4 below 0.45,
+    /// Element: t4, t4-anp (does not lock when Poisson's ratio nears 0.5), t10 (with a node in the middle of
+    /// every edge: about seven times the nodes), or auto: t4 below 0.45,
     /// t4-anp from there on [default: auto].
-    #[arg(long, value_name = "t4|t4-anp|auto")]
+    #[arg(long, value_name = "t4|t4-anp|t10|auto")]
     pub(super) element: Option<ElementChoice>,
     #[command(flatten)]
     pub(super) grasp: ContactArguments,
