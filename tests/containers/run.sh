@@ -265,7 +265,8 @@ if [ -n "${BIN_DIR:-}" ]; then
     bin_dir="$(cd "$BIN_DIR" && pwd)"
 else
     say "building the programs"
-    cargo build --release --locked --bins --package fea-server --package glove-client --no-default-features
+    cargo build --release --locked --bins --package fea-server --package glove-client --no-default-features \
+        --features fea-server/otlp,glove-client/otlp
     bin_dir="$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)"
 fi
 say "building images on stand-in bases"

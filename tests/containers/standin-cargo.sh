@@ -2,7 +2,7 @@
 # Stands for cargo in the build stage where no image with Rust can be had: accepts exactly the
 # command of the Dockerfile and lays out binaries that were built outside.
 set -eu
-expected='build --release --locked --bins --package fea-server --package glove-client --no-default-features'
+expected='build --release --locked --bins --package fea-server --package glove-client --no-default-features --features fea-server/otlp,glove-client/otlp'
 if [ "$*" != "$expected" ]; then
     echo "stand-in cargo: called with '$*', expected '$expected'" >&2
     exit 1
