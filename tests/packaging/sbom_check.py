@@ -19,6 +19,8 @@ def tree(program):
     """What cargo says that a program links, asked for each program by itself."""
     command = ["cargo", "tree", "--locked", "--edges", "normal", "--prefix", "none", "--no-dedupe"]
     command += ["--package", program, "--target", target, "--format", "{p}"]
+    # As packaging/release.sh builds it.
+    command += ["--features", f"{program}/otlp"]
     told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     lines = (line.split() for line in told.splitlines() if line)
     return {(words[0], words[1].removeprefix("v")) for words in lines}
