@@ -15,7 +15,7 @@ use softgrasp_telemetry::{Observed, RequestSpan, observe, start};
 /// Variable that makes this program work and end, and says at what.
 const WORK: &str = "SOFTGRASP_TEST_WORK";
 /// The longest time for what must come.
-const SOON: Duration = Duration::from_secs(20);
+const SOON: Duration = Duration::from_secs(60);
 
 /// Body of the program that is observed; returns at once if this one was not started for that.
 #[test]
