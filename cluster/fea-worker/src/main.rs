@@ -70,9 +70,7 @@ mod ranked {
         config: ServerConfig,
     ) -> anyhow::Result<()> {
         // Rank 0 alone talks to others.
-        let _export = softgrasp_telemetry::start("fea-worker", env!("CARGO_PKG_VERSION"))
-            .inspect_err(|error| tracing::warn!(%error, "no traces and no metrics"))
-            .unwrap_or_default();
+        let _export = softgrasp_telemetry::start_or_warn("fea-worker", env!("CARGO_PKG_VERSION"));
         let (job, asked) = Job::new();
         let server = fea_server::start(ServerConfig { engine: Some(Arc::new(job)), ..config })?;
         let mut out = std::io::stdout();

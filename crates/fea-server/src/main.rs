@@ -93,9 +93,7 @@ fn run(arguments: Arguments) -> anyhow::Result<()> {
             })
             .context("cannot wait for the end of standard input")?;
     }
-    let _export = softgrasp_telemetry::start("fea-server", env!("CARGO_PKG_VERSION"))
-        .inspect_err(|error| tracing::warn!(%error, "no traces and no metrics"))
-        .unwrap_or_default();
+    let _export = softgrasp_telemetry::start_or_warn("fea-server", env!("CARGO_PKG_VERSION"));
     let runtime =
         fea_server::sockets_runtime(&config).context("cannot start the server's sockets")?;
     let served = runtime.block_on(fea_server::serve(config, announce, stopped));

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use softgrasp_protocol::{Kind, RejectCode};
+use softgrasp_telemetry::DURATION_BOUNDS_S as BOUNDS_S;
 
 use crate::tokens::TokenNumbers;
 
@@ -35,10 +36,6 @@ struct Durations {
     counts: [AtomicU64; BOUNDS_S.len() + 1],
     sum_us: AtomicU64,
 }
-
-/// Upper ends of the ranges in which durations are counted, s.
-const BOUNDS_S: [f64; 12] =
-    [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.016, 0.05, 0.25, 1.0, 10.0];
 
 /// Values that are read when the page is asked for.
 pub(crate) struct Gauges {

@@ -1,14 +1,13 @@
 //! What the trace of a request tells: its kind, session and model, and of the answer how it was found.
 
-use softgrasp_protocol::{Answer, Ask, Frame, Kind, Reply, Request};
+use softgrasp_protocol::{Answer, Frame, Kind, ModelHash, Reply, Request};
 use softgrasp_telemetry::RequestSpan;
 
 use crate::log_line::foreign_sentence;
 use crate::refusal::Refusal;
 
 /// Span of a request that has come; the part of the client's trace that is this server's.
-pub(crate) fn begin(frame: &Frame, session: u64) -> RequestSpan {
-    let kept_model = Ask::kept_model(frame);
+pub(crate) fn begin(frame: &Frame, kept_model: Option<ModelHash>, session: u64) -> RequestSpan {
     let kind = match frame.kind() {
         // As on the page `/metrics`.
         Some(Kind::Ask) if kept_model.is_some() => "Frame",
@@ -17,7 +16,7 @@ pub(crate) fn begin(frame: &Frame, session: u64) -> RequestSpan {
     };
     let mut span =
         RequestSpan::server(kind, (session, frame.request_id()), || Request::trace(frame));
-    if let (Some((model, _)), true) = (kept_model, span.is_recorded()) {
+    if let (Some(model), true) = (kept_model, span.is_recorded()) {
         span.set("softgrasp.model", model.to_string());
     }
     span

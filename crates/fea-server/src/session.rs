@@ -287,7 +287,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Session<S> {
         let kept_model = Ask::kept_model(&frame);
         let is_request = kind.is_some_and(|kind| !kind.is_reply());
         let start = Instant::now();
-        let mut span = request_trace::begin(&frame, self.peer.number);
+        let named = kept_model.map(|(model, _)| model);
+        let mut span = request_trace::begin(&frame, named, self.peer.number);
         // Without a token any request introduces a client, before it is worked for.
         if self.handler.is_authorised() && is_request {
             self.introduced().await?;

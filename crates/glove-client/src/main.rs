@@ -15,9 +15,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse_from(with_command(std::env::args_os(), is_command));
     start_log();
     interruption::watch();
-    let _export = softgrasp_telemetry::start("glove-client", env!("CARGO_PKG_VERSION"))
-        .inspect_err(|error| tracing::warn!(%error, "no traces and no metrics"))
-        .unwrap_or_default();
+    let _export = softgrasp_telemetry::start_or_warn("glove-client", env!("CARGO_PKG_VERSION"));
     match arguments.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -32,6 +32,13 @@ pub fn start(program: &'static str, version: &'static str) -> Result<Option<Expo
     }
 }
 
+/// [`start`] for a program that goes on without: what is wrong is a warning in its log.
+pub fn start_or_warn(program: &'static str, version: &'static str) -> Option<Export> {
+    start(program, version)
+        .inspect_err(|error| tracing::warn!(%error, "no traces and no metrics"))
+        .unwrap_or_default()
+}
+
 /// Exports values with every export of metrics, for as long as the program runs; does nothing before
 /// [`start`].
 pub fn observe(values: Vec<Observed>) {

@@ -1,7 +1,7 @@
 //! Traces and metrics of the programs of Softgrasp, by OpenTelemetry: where a request spent its time, from
 //! the client through the server to the cluster.
 //!
-//! A program calls [`start()`] once. It exports by OTLP over HTTP if the variables of OpenTelemetry's
+//! A program calls [`start()`] or [`start_or_warn`] once. It exports by OTLP over HTTP if the variables of OpenTelemetry's
 //! specification name a collector (`OTEL_EXPORTER_OTLP_ENDPOINT`), and if the feature `otlp` is compiled in.
 //! Else all calls of this crate do nothing.
 //!
@@ -27,6 +27,6 @@ mod request_span;
 
 pub use attribute::AttributeValue;
 pub use error::StartError;
-pub use export::{Export, observe, start};
-pub use observed::Observed;
+pub use export::{Export, observe, start, start_or_warn};
+pub use observed::{DURATION_BOUNDS_S, Observed};
 pub use request_span::RequestSpan;

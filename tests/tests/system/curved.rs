@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, TetMesh, mirrored, mirrored_middles};
 use softgrasp_core::model::Model;
 use softgrasp_core::solve::{Loads, Method};
@@ -25,6 +26,17 @@ fn ask(mesh: &TetMesh, known: Vec<DofValue>) -> Once {
 /// Held below, pushed above, mid-edge nodes with the corners.
 fn known(mesh: &TetMesh) -> Vec<DofValue> {
     squeeze(mesh, 0.1)
+}
+
+/// Uploads the mesh as a model of ten-node elements; its name.
+fn kept(connection: &mut ServerConnection, mesh: &TetMesh) -> ModelHash {
+    let message = UploadModel { element: ElementName::T10, ..upload(mesh) };
+    let name = ModelHash::of(&message);
+    match connection.ask(&Request::UploadModel(message)) {
+        Ok(Reply::ModelReady(ready)) => assert_eq!(ready.model, name),
+        other => panic!("the upload got {other:?}"),
+    }
+    name
 }
 
 fn nodes_of(answer: &Answer) -> Vec<[f64; 3]> {
@@ -85,12 +97,7 @@ fn a_kept_model_answers_as_one_request_does_and_its_name_covers_its_middles() {
     let mut connection = client(&server);
     let mesh = round_sphere(100);
     let known = known(&mesh);
-    let message = UploadModel { element: ElementName::T10, ..upload(&mesh) };
-    let name = ModelHash::of(&message);
-    match connection.ask(&Request::UploadModel(message.clone())) {
-        Ok(Reply::ModelReady(ready)) => assert_eq!(ready.model, name),
-        other => panic!("the upload got {other:?}"),
-    }
+    let name = kept(&mut connection, &mesh);
     let straight = with_middles(&object(BuiltIn::Sphere, 100), nalgebra::center);
     let straight = UploadModel { element: ElementName::T10, ..upload(&straight) };
     assert_ne!(ModelHash::of(&straight), name);
@@ -119,9 +126,7 @@ fn frames_of_ten_node_elements_are_condensed_with_masks_and_a_bound_above_their_
     let mut connection = client(&server);
     let mesh = round_sphere(60);
     let known = known(&mesh);
-    let message = UploadModel { element: ElementName::T10, ..upload(&mesh) };
-    let name = ModelHash::of(&message);
-    connection.ask(&Request::UploadModel(message)).unwrap();
+    let name = kept(&mut connection, &mesh);
     let mut by = |question: Question| answer(&mut connection, &Ask::new(name, question).into());
     let exact = nodes_of(&by(question(known.clone(), "front")));
     let mut bound = None;

@@ -17,7 +17,7 @@ use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
 
 use super::collector::Collector;
 use crate::error::StartError;
-use crate::observed::Observed;
+use crate::observed::{DURATION_BOUNDS_S, Observed};
 
 /// The providers, which are shut down when this is dropped.
 pub(crate) struct Exporting {
@@ -35,9 +35,6 @@ pub(super) struct Instruments {
 
 static STARTED: OnceLock<Instruments> = OnceLock::new();
 
-/// Upper ends of the ranges in which durations are counted, s; those of the page `/metrics`.
-const BOUNDS_S: [f64; 12] =
-    [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.016, 0.05, 0.25, 1.0, 10.0];
 /// Time for the last spans at the end of a program.
 const END_MAX: Duration = Duration::from_secs(2);
 
@@ -72,7 +69,7 @@ pub(crate) fn start(
             .f64_histogram(name)
             .with_unit("s")
             .with_description(description)
-            .with_boundaries(BOUNDS_S.to_vec())
+            .with_boundaries(DURATION_BOUNDS_S.to_vec())
             .build()
     };
     let client_s = durations(
