@@ -225,7 +225,8 @@ lost_server_never_stops_a_tick() {
     # 1 where the server was gone before the fingers asked for the first time.
     take_report 300 '0|1'
     reported '"what": "lost: ' || fail "the report does not say that the server was lost"
-    reported '"entered Deforming"' || fail "the grasp did not go on"
+    reported '"entered Deforming"' ||
+        fail "the grasp did not go on: $(grep -oE '"(what|ticks_skipped)": .*' "$work/r.json" | tr '\n' ' ')"
     say "server killed during a run: all 300 ticks played, the loss reported"
 }
 

@@ -182,3 +182,42 @@ fn no_published_package_needs_a_private_one() {
         }
     }
 }
+
+/// Packages that the manifest in `folder` always depends on, by their name in a lock file.
+fn needed(folder: &str) -> BTreeSet<String> {
+    let manifest = manifest(folder);
+    let tables = manifest.get("dependencies").and_then(Value::as_table).into_iter();
+    let always = tables
+        .flatten()
+        .filter(|(_, wanted)| wanted.get("optional").and_then(Value::as_bool) != Some(true));
+    let named = always.map(|(name, wanted)| match wanted.get("package").and_then(Value::as_str) {
+        Some(package) => package.to_owned(),
+        None => name.clone(),
+    });
+    named.collect()
+}
+
+/// Symptom: `cargo check --locked` of the fuzz targets failed, because a crate of ours had a new dependency.
+#[test]
+fn lock_file_of_the_fuzz_targets_has_what_our_crates_need() {
+    let lock: Table = toml::from_str(&read("fuzz/Cargo.lock")).expect("a lock file");
+    let mut seen = 0;
+    for folder in published() {
+        let name = manifest(&folder)["package"]["name"].as_str().expect("a name").to_owned();
+        let packages = lock["package"].as_array().expect("packages");
+        let Some(locked) = packages.iter().find(|package| package["name"].as_str() == Some(&name))
+        else {
+            continue;
+        };
+        seen += 1;
+        let dependencies = locked.get("dependencies").map(texts).unwrap_or_default();
+        // A version stands behind the name where two versions of a package are there.
+        let names: BTreeSet<&str> =
+            dependencies.iter().map(|text| text.split(' ').next().unwrap_or(text)).collect();
+        for package in needed(&folder) {
+            let fix = "cargo metadata --manifest-path fuzz/Cargo.toml";
+            assert!(names.contains(package.as_str()), "{name} needs {package}: run `{fix}`");
+        }
+    }
+    assert!(seen > 5, "only {seen} of our crates are in the lock file");
+}

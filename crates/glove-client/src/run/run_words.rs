@@ -1,5 +1,6 @@
 //! Report of a run in words, for a person who does not know the program.
 
+use crate::ask::unanswered::Unanswered;
 use crate::pace::Pace;
 use crate::run::run_report::{ReplaySummary, RunReport};
 
@@ -22,13 +23,19 @@ pub fn failure(report: &RunReport) -> Option<String> {
     if solves > 0 || deforming == 0 || report.interrupted {
         return None;
     }
-    let why = match &report.last_failure {
-        Some(what) => format!("the server {}", what.replacen("lost", "was lost", 1)),
-        None => {
-            s.unanswered.by_count().first().map_or_else(String::new, |(why, _)| why.to_string())
+    Some(format!("none of {deforming} deforming ticks was answered: {}", why_unanswered(report)))
+}
+
+/// The reason that most ticks without an answer have: in the server's words where it was lost or refused.
+fn why_unanswered(report: &RunReport) -> String {
+    let most = report.summary.unanswered.by_count().first().map(|&(why, _)| why);
+    match (most, &report.last_failure) {
+        (None | Some(Unanswered::ServerLost | Unanswered::Refused), Some(what)) => {
+            format!("the server {}", what.replacen("lost", "was lost", 1))
         }
-    };
-    Some(format!("none of {deforming} deforming ticks was answered: {why}"))
+        (Some(why), _) => why.to_string(),
+        (None, None) => String::new(),
+    }
 }
 
 /// Summary of one screen, for a person who does not know the program.

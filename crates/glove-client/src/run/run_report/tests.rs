@@ -75,6 +75,22 @@ fn age_of_a_shape_is_the_time_since_the_tick_that_asked_for_it() {
     assert!((shown_age_ms_max.unwrap() - 20.0).abs() < 2e-2);
 }
 
+/// Symptom: a run of which nearly every answer was late ended with "the server was lost".
+#[test]
+fn run_without_any_answer_says_the_reason_of_most_ticks() {
+    let mut report = report();
+    let lost = LoopEvent::Server("lost: the stream failed".to_owned());
+    let unanswered = vec![(0, Unanswered::AnswerLate)];
+    tick(&mut report, 0, 0, TickOutcome { unanswered, ..deforming() });
+    let unanswered = vec![(1, Unanswered::ServerLost)];
+    tick(&mut report, 1, 0, TickOutcome { events: vec![lost], unanswered, ..deforming() });
+    let unanswered = vec![(2, Unanswered::AnswerLate)];
+    tick(&mut report, 2, 0, TickOutcome { unanswered, ..deforming() });
+    report.finish(DeviceFaults::default(), &TickBudget::new(Priority::Ordinary));
+    let why = failure(&report).unwrap();
+    assert_eq!(why, "none of 3 deforming ticks was answered: the answer before it was late");
+}
+
 #[test]
 fn run_without_any_answer_says_what_the_server_refused() {
     let mut report = report();
