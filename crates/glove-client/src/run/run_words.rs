@@ -43,7 +43,7 @@ pub fn describe(report: &RunReport) -> String {
     let s = &report.summary;
     let mut text = format!(
         "\n{} ({} nodes, {} tetrahedra, {:.0} mm), grasped by the hand {}\n  \
-         a fingertip holds {}; solved {}\n",
+         {}; solved {}\n",
         report.object.name,
         report.object.nodes,
         report.object.tets,
@@ -178,15 +178,16 @@ fn words_of_devices(report: &RunReport) -> String {
     text
 }
 
-/// Words for what a fingertip holds, by the name of `--contact`.
+/// Words for how the hand holds the object, by the name of `--contact`, or of the grasp by friction.
 pub fn words_of_contact(contact: &str) -> String {
-    match contact {
-        "vertex" => "the node that it touches (vertex)".to_owned(),
-        "patch" => "every node under it (patch)".to_owned(),
-        "mask" => "what lies under it, weighted by its pressure (mask)".to_owned(),
-        "friction" => "nothing: the hand presses with friction".to_owned(),
-        other => other.to_owned(),
-    }
+    let held = match contact {
+        "friction" => return "the hand presses with friction".to_owned(),
+        "vertex" => "the node that it touches (vertex)",
+        "patch" => "every node under it (patch)",
+        "mask" => "what lies under it, weighted by its pressure (mask)",
+        other => other,
+    };
+    format!("a fingertip holds {held}")
 }
 
 /// Words for the server, by the name of `--server`.

@@ -55,7 +55,7 @@ pub(super) fn running_with(hand: HandChoice, change: impl FnOnce(&mut ViewFrame)
     let about = About {
         object: "strawberry".to_owned(),
         server: "in this program".to_owned(),
-        contact: "what lies under it, weighted by its pressure (mask)".to_owned(),
+        contact: "a fingertip holds what lies under it, weighted by its pressure (mask)".to_owned(),
         is_lifted: false,
         material: Material::try_new(2.0e4, 0.4).unwrap(),
         hand,

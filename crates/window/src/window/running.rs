@@ -56,7 +56,7 @@ pub struct About {
     pub object: String,
     /// Server that answers, as it is shown to a person.
     pub server: String,
-    /// Name of the contact model: what a fingertip holds.
+    /// Words for how the hand holds the object: by friction, or by what a fingertip holds.
     pub contact: String,
     /// Whether fingers press with friction, so that an object is pinched and lifted.
     pub is_lifted: bool,

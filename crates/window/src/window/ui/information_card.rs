@@ -12,7 +12,7 @@ pub struct RunFacts {
     pub object: String,
     /// Young's modulus, Pa, and Poisson's ratio.
     pub material: (f64, f64),
-    /// Name of the contact model: what a fingertip holds.
+    /// Words for how the hand holds the object: by friction, or by what a fingertip holds.
     pub contact: String,
     /// Server that answers, as it is shown to a person.
     pub server: String,
@@ -52,7 +52,7 @@ fn of_run(ui: &mut Ui, facts: &RunFacts) {
     let (young, poisson) = facts.material;
     row(ui, "object", facts.object.clone());
     row(ui, "material", format!("{} kPa, Poisson's ratio {poisson}", young / 1e3));
-    row(ui, "hand", format!("{}; a fingertip holds {}", facts.hand, facts.contact));
+    row(ui, "hand", format!("{}; {}", facts.hand, facts.contact));
     row(ui, "server", facts.server.clone());
     row(ui, "drawn by", facts.graphics.clone());
 }
