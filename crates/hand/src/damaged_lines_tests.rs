@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Vector3};
 use softgrasp_grasp::hand::JointAngles;
 
-use crate::hand_reader::{HandReader, HandSetup};
+use crate::hand_reader::HandReader;
+
+use crate::hand_setup::HandSetup;
 use crate::notice::NoticeKind;
 use crate::sent::{Arrival, Device};
 

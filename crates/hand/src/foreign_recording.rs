@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::devices::recordings::{LeapError, LeapRecording, TrajError, Trajectory};
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 use crate::joints::JointsRecord;
 use crate::sent::Sent;
 use crate::sent::{Arrival, Device};

@@ -1,93 +1,20 @@
 //! Turns the bytes of glove and tracker into the pose of the hand.
 
-use nalgebra::{Isometry3, Translation3};
-use softgrasp_grasp::hand::{HandDimensions, HandPose, Handedness, JointAngles, pose};
+use nalgebra::Isometry3;
+use softgrasp_grasp::hand::{HandPose, Handedness, pose};
 
-use crate::devices::calibration::{Calibration, sensor_name};
+use crate::devices::calibration::sensor_name;
 use crate::devices::cyberglove::{
-    self, GloveEvent, GloveParser, GloveRecord, RecordKind, RecordOptions, SensorCount,
-    SensorHealth, SensorSet,
+    GloveEvent, GloveParser, GloveRecord, RecordOptions, SensorCount, SensorHealth, SensorSet,
 };
-use crate::devices::fastrak::{
-    self, Encoding, FastrakEvent, FastrakFormat, FastrakParser, FastrakRecord, LengthUnit,
-    OutputList, Station,
-};
-use crate::devices::{
-    Detected, Freshness, HandSample, Heard, PoseGate, ReceiverMount, SampleHold, SensorGate,
-};
+use crate::devices::fastrak::{Encoding, FastrakEvent, FastrakFormat, FastrakParser, OutputList};
+use crate::devices::{Detected, Freshness, HandSample, Heard, PoseGate, SampleHold, SensorGate};
+use crate::even_motion::{EvenMotion, MeasuredHand};
+use crate::hand_setup::HandSetup;
 use crate::joints::JointsRecord;
 use crate::joints_reader::{FitErrors, JointsReader};
 use crate::notice::Notice;
 use crate::sent::{Arrival, Device};
-
-/// Everything that says how a hand, its glove and its tracker are set up.
-#[derive(Clone, Debug)]
-pub struct HandSetup {
-    /// Bone lengths, widths and side of the hand.
-    pub dimensions: HandDimensions,
-    /// Calibration: from raw sensor values to joint angles.
-    pub calibration: Calibration,
-    /// Number of sensors of the glove.
-    pub sensors: SensorCount,
-    /// What the glove's records hold besides the sensor values.
-    pub glove_options: RecordOptions,
-    /// Format of the tracker's records.
-    pub tracker: FastrakFormat,
-    /// Mount of the tracker's receiver: its place on the arm.
-    pub mount: ReceiverMount,
-    /// Where the transmitter stands: its Y-up frame (`docs/frames.md`) in the scene's world, m.
-    pub world_from_stand: Isometry3<f64>,
-}
-
-impl Default for HandSetup {
-    /// The scripted set-up: 22 sensors, binary quaternion records in centimetres, transmitter 60 cm
-    /// behind the object so that the hand never crosses the tracker's hemisphere.
-    fn default() -> Self {
-        Self {
-            dimensions: HandDimensions::default(),
-            calibration: Calibration::default(),
-            sensors: SensorCount::TwentyTwo,
-            glove_options: RecordOptions::default(),
-            tracker: FastrakFormat {
-                encoding: Encoding::Binary,
-                output: OutputList::PositionQuaternion,
-                units: LengthUnit::Centimetres,
-            },
-            mount: ReceiverMount::default(),
-            world_from_stand: Translation3::new(0.0, 0.0, 0.6).into(),
-        }
-    }
-}
-
-impl HandSetup {
-    /// The angles that the client reads when the glove's sensors measure these.
-    pub fn felt(&self, angles: &JointAngles) -> JointAngles {
-        let raw = self.calibration.raw_from_angles(angles, self.sensors);
-        self.calibration.angles(&raw, SensorSet::EMPTY)
-    }
-
-    /// What glove and tracker send for a hand in this pose.
-    pub fn arrivals_of(
-        &self,
-        angles: &JointAngles,
-        world_from_palm: &Isometry3<f64>,
-    ) -> Vec<Arrival> {
-        let glove = cyberglove::encode_record(&GloveRecord {
-            kind: RecordKind::Polled,
-            sensors: self.calibration.raw_from_angles(angles, self.sensors),
-            timestamp: None,
-            status: None,
-        });
-        let hand = self.dimensions.handedness;
-        let world_from_receiver = self.mount.world_from_receiver(world_from_palm, angles, hand);
-        let stand_from_receiver = self.world_from_stand.inverse() * world_from_receiver;
-        let FastrakFormat { encoding, output, units } = self.tracker;
-        let record = FastrakRecord::from_world(Station::FIRST, &stand_from_receiver, output, units);
-        // A pose too far for the record's columns is a record that does not come.
-        let tracker = fastrak::encode_record(&record, encoding).unwrap_or_default();
-        vec![Arrival::with_tick(Device::Glove, glove), Arrival::with_tick(Device::Tracker, tracker)]
-    }
-}
 
 /// Reads a hand from its devices' bytes.
 pub struct HandReader {
@@ -109,6 +36,11 @@ pub struct HandReader {
     faults: DeviceFaults,
     /// Whether the tracker takes the receiver for its mirror image through the transmitter.
     is_flipped: bool,
+    /// Time from tick to tick of a hand that moves evenly between its samples, s; `None` for one that is
+    /// always where its newest sample has it.
+    even_tick_s: Option<f64>,
+    /// Even motion, from the first sample on.
+    motion: Option<EvenMotion>,
 }
 
 /// The gates that keep out what a damaged line brings.
@@ -194,7 +126,15 @@ impl HandReader {
             heard: Default::default(),
             faults: DeviceFaults::default(),
             is_flipped: false,
+            even_tick_s: None,
+            motion: None,
         }
+    }
+
+    /// The reader of a hand that moves evenly between its samples, in ticks of this length, s.
+    #[must_use]
+    pub fn evened(self, tick_s: f64) -> Self {
+        Self { even_tick_s: Some(tick_s), ..self }
     }
 
     /// Set-up of hand, glove and tracker.
@@ -218,9 +158,12 @@ impl HandReader {
         self.joints.fit_errors()
     }
 
-    /// Number that a sender of joints gave the record which the hand follows.
-    pub fn joints_number(&self) -> Option<u64> {
-        self.joints.number()
+    /// Number that a sender of joints gave the newest record which the hand has come to.
+    pub fn joints_number(&self, now_s: f64) -> Option<u64> {
+        match &self.motion {
+            Some(motion) if !motion.has_arrived(now_s) => self.joints.number_before(),
+            _ => self.joints.number(),
+        }
     }
 
     /// Takes bytes of the devices, in the order in which they came.
@@ -230,6 +173,7 @@ impl HandReader {
         for Arrival { device, at_s, is_datagram, bytes, .. } in arrivals {
             let time_s = at_s.unwrap_or(now_s);
             self.first_s.get_or_insert(time_s);
+            let before = self.sample_of(*device);
             match device {
                 Device::Glove => self.feed_glove(bytes, time_s),
                 Device::Tracker => self.feed_tracker(bytes, time_s),
@@ -238,14 +182,40 @@ impl HandReader {
                     self.meet_sender(told);
                 }
             }
+            if self.sample_of(*device) != before {
+                self.move_on(*device, time_s);
+            }
+        }
+    }
+
+    /// What tells the samples of a device apart: how many, or when the newest one came, s.
+    fn sample_of(&self, device: Device) -> Option<f64> {
+        let sample = self.hold.sample(0.0);
+        match device {
+            Device::Glove => sample.glove.map(|glove| glove.time_s),
+            Device::Tracker => sample.tracker.map(|tracker| tracker.time_s),
+            Device::Joints => Some(self.joints.fit_errors().records as f64),
+        }
+    }
+
+    /// Begins the way to a sample of a device that came at a time, s.
+    fn move_on(&mut self, device: Device, time_s: f64) {
+        let Some((tick_s, newest)) = self.even_tick_s.zip(self.newest(time_s)) else { return };
+        match &mut self.motion {
+            Some(motion) => motion.meet(device, newest, time_s),
+            None => self.motion = Some(EvenMotion::begin(tick_s, device, newest, time_s)),
         }
     }
 
     /// Takes records of this hand's joints that came in the stream of the other one, at a time, s.
     pub(crate) fn take_joints(&mut self, records: &[JointsRecord], time_s: f64) {
         for record in records {
+            let before = self.sample_of(Device::Joints);
             let told = self.joints.take(record, time_s);
             self.meet_sender(told);
+            if self.sample_of(Device::Joints) != before {
+                self.move_on(Device::Joints, time_s);
+            }
         }
     }
 
@@ -417,8 +387,17 @@ impl HandReader {
         Some(pose(&self.setup.dimensions, &angles, world_from_palm))
     }
 
-    /// Joint angles and palm by the newest samples, however old; `None` until all devices have spoken.
-    pub fn measured(&self, now_s: f64) -> Option<(JointAngles, Isometry3<f64>)> {
+    /// Joint angles and palm in a tick at a time, s, by the samples so far, however old; `None` until all
+    /// devices have spoken.
+    pub fn measured(&self, now_s: f64) -> Option<MeasuredHand> {
+        match &self.motion {
+            Some(motion) => Some(motion.at(now_s)),
+            None => self.newest(now_s),
+        }
+    }
+
+    /// Joint angles and palm by the newest samples.
+    fn newest(&self, now_s: f64) -> Option<MeasuredHand> {
         if let Some(measured) = self.joints.measured() {
             return Some(measured);
         }
@@ -441,6 +420,7 @@ impl HandReader {
 mod tests {
     use super::*;
     use nalgebra::Vector3;
+    use softgrasp_grasp::hand::JointAngles;
 
     #[test]
     fn scripted_pose_comes_back_through_the_device_bytes() {

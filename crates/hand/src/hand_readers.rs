@@ -178,11 +178,6 @@ impl HandReaders {
         self.all().map(HandReader::fit_errors).fold(FitErrors::default(), |a, b| a.with(&b))
     }
 
-    /// Number that a sender of joints gave the newest record that a hand follows.
-    pub fn joints_number(&self) -> Option<u64> {
-        self.all().filter_map(HandReader::joints_number).max()
-    }
-
     /// What is wrong with what the devices send, a sentence each; none while all is as it should be.
     pub fn complaints(&self) -> Vec<String> {
         let of_readers = self.all().flat_map(HandReader::complaints);
@@ -224,7 +219,7 @@ mod tests {
     use softgrasp_grasp::hand::{HandDimensions, JointAngles};
 
     use super::*;
-    use crate::hand_reader::HandSetup;
+    use crate::hand_setup::HandSetup;
     use crate::joints::record_of_hand;
     use crate::sent::Device;
 

@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use crate::foreign_recording::is_foreign;
 use crate::scripted::ScriptName;
 use crate::serial::SerialSource;
 use crate::xr_runtime::{RuntimeError, WantedHands};
@@ -44,6 +45,12 @@ impl HandRequest {
     /// Whether live devices or senders determine what comes and when.
     pub fn is_live(&self) -> bool {
         self.choice() == HandChoice::Live
+    }
+
+    /// Whether the hand moves evenly between its samples: one whose samples do not come with the ticks. A
+    /// recording of ours says itself how its hand moved.
+    pub fn is_even(&self) -> bool {
+        self.is_live() || matches!(self, Self::Replay(path) if is_foreign(path))
     }
 }
 

@@ -23,8 +23,9 @@ pub struct JointsReader {
     /// Where the sender's frame lies in the world; `None` until the first hand.
     world_from_sender: Option<Isometry3<f64>>,
     newest: Option<(FittedHand, f64)>,
-    /// Number that the sender gave the newest record that was fitted.
+    /// Number that the sender gave the newest record that was fitted, and the one before it.
     number: Option<u64>,
+    number_before: Option<u64>,
     faults: u64,
     fit_errors: FitErrors,
     doubts: Doubts,
@@ -87,6 +88,7 @@ impl JointsReader {
             world_from_sender,
             newest: None,
             number: None,
+            number_before: None,
             faults: 0,
             fit_errors: FitErrors::default(),
             doubts: Doubts::default(),
@@ -200,6 +202,11 @@ impl JointsReader {
         self.number
     }
 
+    /// Number of the record that was fitted before the newest one.
+    pub fn number_before(&self) -> Option<u64> {
+        self.number_before
+    }
+
     /// Joint angles and palm (world) by the newest record.
     pub fn measured(&self) -> Option<(JointAngles, Isometry3<f64>)> {
         let (fitted, _) = self.newest?;
@@ -222,7 +229,7 @@ impl JointsReader {
                     Translation3::from(FIRST_PALM_M - first).into()
                 });
                 self.newest = Some((fitted, time_s));
-                self.number = record.frame;
+                self.number_before = std::mem::replace(&mut self.number, record.frame);
                 let errors = &mut self.fit_errors;
                 let squares = errors.rms_m.powi(2) * errors.records as f64;
                 errors.records += 1;

@@ -4,7 +4,7 @@
 //! reads a glove and a tracker ([`devices`]), [`joints`] a stream of tracked joints, [`xr_runtime`] asks
 //! an OpenXR runtime for them, [`scripted`] plays a person, [`mouse`] has one with a mouse, [`recording`] and [`foreign_recording`] repeat what was.
 //! [`hand_reader`] makes a pose of the hand of them, by the dimensions, calibration and mount of
-//! [`hand_setup`]; [`hand_readers`] does so for a left and a right hand at once.
+//! [`hand_setup`], and moves it evenly between samples ([`even_motion`]); [`hand_readers`] does so for a left and a right hand at once.
 //!
 //! ```
 //! use softgrasp_hand::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
@@ -20,6 +20,7 @@
 #[cfg(test)]
 mod damaged_lines_tests;
 pub mod devices;
+pub mod even_motion;
 pub mod foreign_recording;
 pub mod hand_reader;
 pub mod hand_readers;

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use softgrasp_core::mesh::TetMesh;
 use softgrasp_grasp::grasp::StateName;
 use softgrasp_grasp::object::{ContactModel, SoftObject};
-use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::mouse::MouseInput;
 use softgrasp_hand::notice::NoticeKind;

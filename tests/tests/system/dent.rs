@@ -10,7 +10,8 @@ use nalgebra::Isometry3;
 use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_grasp::grasp::{Grasp, StateName};
 use softgrasp_grasp::object::SoftObject;
-use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::scripted::{ScriptName, ScriptedHand, Seen};
 use softgrasp_protocol::{Deformation, LawName};
 

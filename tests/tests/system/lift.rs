@@ -16,7 +16,8 @@ use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_grasp::grasp::{Command, Grasp, StateName};
 use softgrasp_grasp::hand::{clearance, hand_bodies, pose_of_segments};
 use softgrasp_grasp::object::{ContactModel, SoftObject, lying};
-use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::scripted::{PlanRequest, ScriptName, ScriptedHand, Seen};
 use softgrasp_hand::sent::Sent;
 

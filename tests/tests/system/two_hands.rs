@@ -13,8 +13,9 @@ use softgrasp_core::mesh::{BuiltIn, TetMesh};
 use softgrasp_grasp::grasp::{Grasp, StateName};
 use softgrasp_grasp::hand::{HandDimensions, Handedness, JointAngles};
 use softgrasp_grasp::object::{ContactModel, SoftObject};
-use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::hand_reader::HandReader;
 use softgrasp_hand::hand_readers::HandReaders;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::joints::record_of_hand;
 use softgrasp_hand::sent::{Arrival, Device, Sent, WhichHand};
 

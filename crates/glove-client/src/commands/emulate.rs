@@ -84,7 +84,7 @@ mod serving {
     use softgrasp_grasp::object::ObjectChoice;
     use softgrasp_hand::devices::cyberglove::SensorCount;
     use softgrasp_hand::devices::recordings::Trajectory;
-    use softgrasp_hand::hand_reader::HandSetup;
+    use softgrasp_hand::hand_setup::HandSetup;
     use softgrasp_hand::recording::read_recording;
     use softgrasp_hand::scripted::Rehearsal;
     use softgrasp_hand::serial::motion::Motion;

@@ -4,7 +4,7 @@ use anyhow::Context;
 use nalgebra::Isometry3;
 use softgrasp_grasp::grasp::Grasp;
 use softgrasp_grasp::object::SoftObject;
-use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 
 use super::object_plan::Laying;

@@ -48,6 +48,8 @@ pub(super) struct SecondHand {
     pub(super) configuration: HandConfiguration,
     /// Whether its samples come from live devices.
     pub(super) is_live: bool,
+    /// Whether the hand moves evenly between its samples.
+    pub(super) is_even: bool,
     /// Pose in the world of a sender of its joints, where that is known.
     pub(super) world_from_sender: Option<Isometry3<f64>>,
 }
@@ -171,6 +173,7 @@ impl HandArguments {
             shares_stream: request.is_none(),
             configuration,
             is_live: source.is_live(),
+            is_even: source.is_even(),
             world_from_sender: self.world_from_sender(*source == HandRequest::Xr),
             request,
         }))

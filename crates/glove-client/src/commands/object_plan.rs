@@ -3,7 +3,7 @@
 use anyhow::{Context, bail};
 use softgrasp_core::fem::Material as ElasticMaterial;
 use softgrasp_grasp::object::ObjectChoice;
-use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_protocol::{ElementChoice, ElementName, Material, MethodName};
 use softgrasp_window::view::object_skin::Look;
 

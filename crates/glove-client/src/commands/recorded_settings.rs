@@ -89,6 +89,7 @@ pub(super) fn recorded_second_hand(setup: &RecordedSetup) -> anyhow::Result<Opti
         shares_stream: recorded.shares_stream,
         configuration: configuration(&recorded.hand_setup, &recorded.calibration)?,
         is_live: recorded.is_live,
+        is_even: recorded.is_even,
         world_from_sender: recorded.world_from_sender.map(pose_of),
     }))
 }

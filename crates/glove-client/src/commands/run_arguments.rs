@@ -247,6 +247,7 @@ impl RunArguments {
             pace: if period.is_some() { Pace::Free } else { Pace::Lockstep },
             period,
             is_live: hand.is_live(),
+            is_even: hand.is_even(),
             hand,
             second,
             hand_configuration,
@@ -434,6 +435,7 @@ impl RunArguments {
             period: period.map(Duration::from_secs_f64),
             hand_configuration: recorded_hand(setup)?,
             is_live: setup.is_live,
+            is_even: setup.is_even,
             world_from_sender: recorded_place(setup),
             recording: Some(Arc::new(recording)),
         })

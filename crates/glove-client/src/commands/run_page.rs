@@ -5,8 +5,8 @@ use std::sync::mpsc::{Receiver, Sender};
 
 use anyhow::Context;
 use fea_server::{Encryption, EncryptionError};
-use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::hand_request::HandChoice;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::joints::JointsFeed;
 use softgrasp_hand::notice::Notice;
 use softgrasp_window::view::control::Control;

@@ -52,6 +52,8 @@ pub(super) struct RunPlan {
     pub(super) hand_configuration: HandConfiguration,
     /// Whether the samples come from live devices.
     pub(super) is_live: bool,
+    /// Whether the hand moves evenly between its samples.
+    pub(super) is_even: bool,
     /// Pose in the world of a sender of joints; `None` puts its first hand before the object.
     pub(super) world_from_sender: Option<Isometry3<f64>>,
     /// Recording that is replayed.

@@ -61,6 +61,7 @@ pub(super) fn start_recorder(
         hand_setup: plan.hand_configuration.to_text(),
         calibration: toml_text(&plan.hand_configuration.setup.calibration)?,
         is_live: plan.is_live,
+        is_even: plan.is_even,
         world_from_sender: plan.world_from_sender.as_ref().map(recorded_place),
         second_hand: plan.second.as_ref().map(recorded_hand).transpose()?,
     };
@@ -68,11 +69,13 @@ pub(super) fn start_recorder(
 }
 
 fn recorded_hand(second: &SecondHand) -> anyhow::Result<RecordedHand> {
-    let SecondHand { configuration, is_live, shares_stream, world_from_sender, .. } = second;
+    let SecondHand { configuration, is_live, is_even, shares_stream, world_from_sender, .. } =
+        second;
     Ok(RecordedHand {
         hand_setup: configuration.to_text(),
         calibration: toml_text(&configuration.setup.calibration)?,
         is_live: *is_live,
+        is_even: *is_even,
         shares_stream: *shares_stream,
         world_from_sender: world_from_sender.as_ref().map(recorded_place),
     })

@@ -194,15 +194,26 @@ pub(super) fn load_beside(request: ObjectRequest) -> LoadObject {
 
 /// Readers of the hands of a run.
 fn readers_of(plan: &RunPlan) -> HandReaders {
-    let reader = |is_live, configuration: &HandConfiguration, place| match is_live {
-        true => HandReader::of_devices(configuration.setup.clone(), place),
-        false => HandReader::new(configuration.setup.clone()),
+    let reader = |is_live, is_even, configuration: &HandConfiguration, place| {
+        let reader = match is_live {
+            true => HandReader::of_devices(configuration.setup.clone(), place),
+            false => HandReader::new(configuration.setup.clone()),
+        };
+        if is_even { reader.evened(plan.tick_s()) } else { reader }
     };
-    let first = reader(plan.is_live, &plan.hand_configuration, plan.world_from_sender);
+    let RunPlan { is_live, is_even, hand_configuration, world_from_sender, .. } = plan;
+    let first = reader(*is_live, *is_even, hand_configuration, *world_from_sender);
     match &plan.second {
         None => first.into(),
-        Some(SecondHand { shares_stream, configuration, is_live, world_from_sender, .. }) => {
-            let second = reader(*is_live, configuration, *world_from_sender);
+        Some(SecondHand {
+            shares_stream,
+            configuration,
+            is_live,
+            is_even,
+            world_from_sender,
+            ..
+        }) => {
+            let second = reader(*is_live, *is_even, configuration, *world_from_sender);
             match shares_stream {
                 true => HandReaders::of_stream(first, second),
                 false => HandReaders::of_two(first, second),

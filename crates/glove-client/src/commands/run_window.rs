@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
-use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::loaded_object::LoadStage;
 use softgrasp_hand::notice::Notice;
 use softgrasp_os::one_line;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use softgrasp_grasp::object::{
     ContactModel, ObjectChoice, ObjectError, RestShape, SoftObject, lying,
 };
-use softgrasp_hand::hand_reader::HandSetup;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject, ObjectSummary};
 use softgrasp_hand::scripted::{NoGrasp, PlanRequest};
 use softgrasp_protocol::ElementName;

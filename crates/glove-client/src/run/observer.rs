@@ -95,8 +95,8 @@ impl Observer {
             at_s: now_s,
             object: object_view(grasp_loop, touched),
             others: others.map(|number| object_view(grasp_loop, number)).collect(),
-            hand: hand_view(grasp_loop, WhichHand::First),
-            second_hand: hand_view(grasp_loop, WhichHand::Second),
+            hand: hand_view(grasp_loop, WhichHand::First, now_s),
+            second_hand: hand_view(grasp_loop, WhichHand::Second, now_s),
             grasp: GraspView {
                 state: part.state,
                 tips: part.tips,
@@ -140,14 +140,14 @@ fn object_view(grasp_loop: &GraspLoop, number: usize) -> ObjectView {
     }
 }
 
-fn hand_view(grasp_loop: &GraspLoop, which: WhichHand) -> Option<HandView> {
+fn hand_view(grasp_loop: &GraspLoop, which: WhichHand, now_s: f64) -> Option<HandView> {
     let (hand, shown) = grasp_loop.shown_hand(which)?;
     let reader = grasp_loop.readers().of(which)?;
     Some(HandView {
         dimensions: reader.setup().dimensions,
         world_from_palm: hand.world_from_palm,
         world_from_segment: *shown,
-        record: reader.joints_number(),
+        record: reader.joints_number(now_s),
     })
 }
 

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Point3;
-use softgrasp_hand::hand_reader::{HandReader, HandSetup};
+use softgrasp_hand::hand_reader::HandReader;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::joints::{JointsRecord, WEBXR_JOINT_COUNT, WRIST, record_of_hand};
 use softgrasp_hand::recording::{ReplayHand, read_recording};
 use tungstenite::stream::MaybeTlsStream;

@@ -164,7 +164,7 @@ fn shown(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_reader::HandSetup;
+    use crate::hand_setup::HandSetup;
     use nalgebra::Isometry3;
     use softgrasp_grasp::hand::JointAngles;
 

@@ -11,11 +11,11 @@ use super::reading::{
     EncodingWord, GloveText, HandText, MountText, OutputWord, PartWord, Side, SizeText, StandText,
     TrackerText, UnitWord,
 };
+use super::setup::HandSetup;
 use crate::devices::ReceiverMount;
 use crate::devices::calibration::{Calibration, Form, read_calibration};
 use crate::devices::cyberglove::SensorCount;
 use crate::devices::fastrak::{Encoding, LengthUnit, OutputList, Station};
-use crate::hand_reader::HandSetup;
 
 /// Version of the text; raised when an old reader would misread a new file.
 const FORMAT: u32 = 1;

@@ -11,7 +11,7 @@ use super::glide::{Glide, Station};
 use super::grip::Grip;
 use super::input::{Digits, MouseInput};
 use super::speed::limited;
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 use crate::notice::Notice;
 use crate::scripted::{GraspPlan, PalmPath, PlanRequest, Planner, Posture, Seen, angles};
 use crate::sent::Sent;

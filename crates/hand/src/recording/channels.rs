@@ -118,7 +118,7 @@ impl Channel {
                 "deformation": text, "law": text, "yield_pa": {"type": ["number", "null"]},
                 "max_error": {"type": ["number", "null"]},
                 "period_s": {"type": ["number", "null"]}, "hand_setup": text,
-                "calibration": text, "is_live": flag,
+                "calibration": text, "is_live": flag, "is_even": flag,
                 "world_from_sender": {"type": ["array", "null"], "items": number},
                 "second_hand": {"type": "object"},
             }),

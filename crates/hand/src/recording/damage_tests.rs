@@ -35,6 +35,7 @@ pub(super) fn setup() -> RecordedSetup {
         hand_setup: String::new(),
         calibration: String::new(),
         is_live: false,
+        is_even: false,
         world_from_sender: None,
         second_hand: None,
     }

@@ -65,6 +65,9 @@ pub struct RecordedSetup {
     pub calibration: String,
     /// Whether devices sent what they would, so that the form of their records was found out.
     pub is_live: bool,
+    /// Whether the hand moved evenly between its samples; not in recordings from before it could.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_even: bool,
     /// Where a sender of joints was placed: m, then quaternion x y z w; `None` where its first hand
     /// was placed before the object.
     pub world_from_sender: Option<[f64; 7]>,
@@ -82,6 +85,9 @@ pub struct RecordedHand {
     pub calibration: String,
     /// Whether devices sent what they would, so that the form of their records was found out.
     pub is_live: bool,
+    /// Whether the hand moved evenly between its samples.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_even: bool,
     /// Whether the hand came in the first one's stream of joints, which carries both.
     pub shares_stream: bool,
     /// Where a sender of its joints was placed, as [`RecordedSetup::world_from_sender`].

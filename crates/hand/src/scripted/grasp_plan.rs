@@ -7,7 +7,7 @@ use softgrasp_grasp::object::RestShape;
 
 use super::approach::{BACK_OFF, PalmPath};
 use super::posture::{Posture, angles};
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 
 /// A palm pose and how far each finger closes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,7 +14,7 @@ use super::planner::{NoGrasp, PlanRequest, Planner};
 use super::posture::{Posture, angles};
 use super::script::{ScriptName, Step};
 use super::seen::Seen;
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 use crate::sent::Sent;
 
 /// Fingers, posture and palm of the hand at one moment.

@@ -10,7 +10,7 @@ use super::grasp_plan::{GraspPlan, is_over, outline_without_thumb};
 use super::opposed::{OpposedPair, PinchedSurface, STRAIGHT_MIN};
 use super::posture::{Posture, angles};
 use super::tip_paths::{STEPS, Tip, TipPath, closures, finger_paths, thumb_paths, tips};
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 
 /// How far the fingers are gathered.
 const GATHERS: [f64; 3] = [0.0, 0.5, 1.0];

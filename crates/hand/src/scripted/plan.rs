@@ -13,7 +13,7 @@ use super::grasp_plan::{GraspPlan, is_over, outline_without_thumb};
 use super::pinch::plan_pinch;
 use super::posture::Posture;
 use super::tip_paths::{STEPS, TipPath, closures, finger_paths, thumb_paths, tips};
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 
 /// Closure of the first and the last contact that count: there must be room to open and to press.
 const TOUCH_RANGE: (f64, f64) = (0.08, 0.80);

@@ -8,7 +8,7 @@ use softgrasp_os::Beside;
 
 use super::grasp_plan::GraspPlan;
 use super::plan::{GraspWish, plan_grasp};
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 
 /// An approach that is to be planned.
 #[derive(Clone)]

@@ -9,7 +9,7 @@ use super::grasp_plan::GraspPlan;
 use super::hand::{Moment, ScriptedHand};
 use super::script::ScriptName;
 use super::seen::Seen;
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 
 /// The motion of a script, one moment per tick.
 #[derive(Clone, Debug, PartialEq)]

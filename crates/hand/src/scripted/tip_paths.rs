@@ -6,7 +6,7 @@ use softgrasp_grasp::hand::{HandColliders, pose};
 use softgrasp_grasp::shape::Sphere;
 
 use super::posture::{Posture, angles};
-use crate::hand_reader::HandSetup;
+use crate::hand_setup::HandSetup;
 
 /// Steps from open to closed.
 pub(super) const STEPS: usize = 40;

@@ -5,7 +5,8 @@ use softgrasp_grasp::hand::JointAngles;
 
 use crate::devices::cyberglove::{RawSensors, SensorCount};
 use crate::devices::recordings::Trajectory;
-use crate::hand_reader::{HandReader, HandSetup};
+use crate::hand_reader::HandReader;
+use crate::hand_setup::HandSetup;
 use crate::recording::Recording;
 use crate::scripted::Rehearsal;
 

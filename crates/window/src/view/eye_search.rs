@@ -176,7 +176,7 @@ fn gap(p: &Point3<f64>, q: &Point3<f64>, r: &Point3<f64>, s: &Point3<f64>) -> f6
 mod tests {
     use softgrasp_core::mesh::{BuiltIn, generate};
     use softgrasp_grasp::object::ContactModel;
-    use softgrasp_hand::hand_reader::HandSetup;
+    use softgrasp_hand::hand_setup::HandSetup;
     use softgrasp_hand::scripted::PlanRequest;
     use std::sync::Arc;
 

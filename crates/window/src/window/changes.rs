@@ -6,8 +6,8 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use nalgebra::Isometry3;
 use softgrasp_grasp::object::{ContactModel, ObjectChoice, RestShape};
-use softgrasp_hand::hand_reader::HandSetup;
 use softgrasp_hand::hand_request::HandChoice;
+use softgrasp_hand::hand_setup::HandSetup;
 use softgrasp_hand::hand_source::HandSource;
 use softgrasp_hand::loaded_object::{LoadStage, LoadedObject};
 use softgrasp_hand::mouse::MouseHand;
