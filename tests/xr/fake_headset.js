@@ -1,9 +1,9 @@
 // A headset that is not there: navigator.xr with two eyes and one tracked hand, the right one. It plays the frames of
 // `window.fakeHand` (25 places of a joint in tenths of a millimetre each, 15 frames a second) as often as a
-// display of 72 Hz asks; where pictures come more slowly than 30 a second, the hand moves more slowly; a left one would be its mirror image,
+// display of 72 Hz asks; where pictures come more slowly than 15 a second, the hand moves more slowly; a left one would be its mirror image,
 // beside it (`ASIDE_M`). The eye is where the page puts the world's origin at the origin.
 (() => {
-  const RATE_HZ = 72, FRAMES_HZ = 15, STEP_MAX_S = 1 / 30, EYES_M = 0.032, ASIDE_M = 0.25;
+  const RATE_HZ = 72, FRAMES_HZ = 15, STEP_MAX_S = 1 / 15, EYES_M = 0.032, ASIDE_M = 0.25;
   const identity = { x: 0, y: 0, z: 0, w: 1 };
   window.XRRigidTransform = class {
     constructor(position = { x: 0, y: 0, z: 0 }, orientation = identity) {

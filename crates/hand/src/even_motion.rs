@@ -11,9 +11,9 @@ pub type MeasuredHand = (JointAngles, Isometry3<f64>);
 /// Spreads the way to each new sample over the ticks until the next one is expected.
 ///
 /// A sample that comes every tick is taken as it is, to the bit. One that comes every n ticks is reached in n
-/// equal steps, the first in the tick that takes it: the hand lags by (n − 1)/2 ticks in the mean. Without it the
-/// hand would go the whole way in one tick and rest in n − 1, and a friction of μ would have to give an object
-/// in it n² times the acceleration.
+/// equal steps, the first in the tick that takes it: the hand is (n − 1)/2 ticks later than its samples in the
+/// mean. Without it the hand would go the whole way in one tick and rest in n − 1: an object that it holds by
+/// friction would have to start and stop at n times its speed, and slips.
 ///
 /// Units: s on the client's clock. Frame: world.
 pub struct EvenMotion {
@@ -41,7 +41,7 @@ struct Intervals {
 }
 
 /// A device that is silent for longer begins anew: its next sample is reached at once, s.
-const INTERVAL_MAX_S: f64 = 0.25;
+const INTERVAL_MAX_S: f64 = 1.0;
 /// A share of the way that differs from the whole way by rounding is the whole way.
 const SHARE_EPS: f64 = 1e-6;
 
@@ -202,9 +202,9 @@ mod tests {
         for i in 1..5 {
             motion.meet(Device::Joints, hand(0.1), 0.1 * f64::from(i));
         }
-        motion.meet(Device::Joints, hand(0.5), 1.0);
-        assert_eq!(motion.at(1.0), hand(0.5));
-        assert!(motion.has_arrived(1.0));
+        motion.meet(Device::Joints, hand(0.5), 2.0);
+        assert_eq!(motion.at(2.0), hand(0.5));
+        assert!(motion.has_arrived(2.0));
     }
 
     #[test]

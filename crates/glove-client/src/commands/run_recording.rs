@@ -9,7 +9,7 @@ use softgrasp_hand::devices::calibration::toml_text;
 use softgrasp_hand::loaded_object::LoadedObject;
 use softgrasp_hand::recording::{
     RecordedFriction, RecordedHand, RecordedRegion, RecordedSetup, Recorder, VERSION,
-    VERSION_OF_ONE_HAND,
+    VERSION_OF_ONE_HAND, VERSION_OF_TWO_HANDS,
 };
 
 use super::hand_arguments::SecondHand;
@@ -31,7 +31,7 @@ pub(super) fn start_recorder(
     let SolveSettings { material, element, method, contact, subscription, elasticity, max_error } =
         &plan.first.settings;
     let setup = RecordedSetup {
-        version: if plan.second.is_some() { VERSION } else { VERSION_OF_ONE_HAND },
+        version: version_needed(plan),
         program: concat!("glove-client ", env!("CARGO_PKG_VERSION")).to_owned(),
         object: plan.first.object.to_string(),
         nodes: plan.first.nodes,
@@ -66,6 +66,15 @@ pub(super) fn start_recorder(
         second_hand: plan.second.as_ref().map(recorded_hand).transpose()?,
     };
     Ok(Recorder::start(path, setup)?)
+}
+
+/// The oldest version of the messages that does not lose what the run needs.
+fn version_needed(plan: &RunPlan) -> u32 {
+    match &plan.second {
+        second if plan.is_even || second.as_ref().is_some_and(|hand| hand.is_even) => VERSION,
+        Some(_) => VERSION_OF_TWO_HANDS,
+        None => VERSION_OF_ONE_HAND,
+    }
 }
 
 fn recorded_hand(second: &SecondHand) -> anyhow::Result<RecordedHand> {

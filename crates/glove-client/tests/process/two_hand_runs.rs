@@ -44,7 +44,7 @@ fn both_hands_of_a_sender_press_one_object_and_are_replayed_bit_by_bit() {
     let fixed = ["run", "--headless", "--object", "cube", "--nodes", "64", "--object-size", "0.06"];
     let mut run = command()
         .args(fixed)
-        .args(["--hand", &hand, "--joints-origin", "0,0,0", "--threads", "1"])
+        .args(["--hand", &hand, "--joints-origin", "0,0,0", "--threads", "1", "--rate", "120"])
         .args(["--record", &path, "--report", &report])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -52,15 +52,16 @@ fn both_hands_of_a_sender_press_one_object_and_are_replayed_bit_by_bit() {
         .unwrap();
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
     let begun = Instant::now();
-    // Before the run listens nobody takes them: the hands come near only after a while, and then stay.
-    for i in 0..700 {
+    // Before the run listens nobody takes them: the hands come near only after a while, and then stay. They are
+    // seen less often than the run ticks.
+    for i in 0..350 {
         assert!(begun.elapsed() < HANG && run.try_wait().unwrap().is_none(), "the run ended");
-        let apart = 0.05 * (1.0 - (f64::from(i - 250) / 150.0).clamp(0.0, 1.0));
+        let apart = 0.05 * (1.0 - (f64::from(i - 125) / 75.0).clamp(0.0, 1.0));
         for side in [Handedness::Right, Handedness::Left] {
             let line = flat_hand(side, 0.033 + apart);
             let _ = sender.send_to(line.as_bytes(), &address);
         }
-        std::thread::sleep(Duration::from_millis(10));
+        std::thread::sleep(Duration::from_millis(20));
     }
     let kill = format!("kill -INT {}", run.id());
     assert!(std::process::Command::new("sh").args(["-c", &kill]).status().unwrap().success());
@@ -72,6 +73,9 @@ fn both_hands_of_a_sender_press_one_object_and_are_replayed_bit_by_bit() {
     let last = last.expect("a step was answered");
     let (first, second) = (force_n(last), force_n(&last["second_hand"]));
     assert!(first > 0.3 && second > 0.3, "they press with {first} and {second} N");
+    let recording = softgrasp_hand::recording::read_recording(path.as_ref()).unwrap();
+    assert_eq!((recording.setup.version, recording.setup.is_even), (3, true));
+    // Played as fast as it goes, each hand moves as it did at its own rate.
     let replay = folder.path("replay.json");
     succeed(&["replay", &path, "--check", "--threads", "2", "--report", &replay]);
     let replayed: Value = serde_json::from_str(&folder.read("replay.json")).unwrap();

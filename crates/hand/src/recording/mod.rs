@@ -12,7 +12,9 @@ mod replay_check;
 mod stages;
 mod tick;
 
-pub use read::{ReadError, Recording, VERSION, VERSION_OF_ONE_HAND, read_recording};
+pub use read::{
+    ReadError, Recording, VERSION, VERSION_OF_ONE_HAND, VERSION_OF_TWO_HANDS, read_recording,
+};
 pub use recorder::{RecordError, Recorder, TickNews};
 pub use replay::{ReplayHand, Replayed};
 pub use replay_check::{Difference, ReplayCheck};

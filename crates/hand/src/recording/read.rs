@@ -61,8 +61,10 @@ pub enum ReadError {
 }
 
 /// Newest version of the messages; raised when an old reader would misread a new file. This is that of a run
-/// of two hands.
-pub const VERSION: u32 = 2;
+/// whose hands move evenly between their samples.
+pub const VERSION: u32 = 3;
+/// Version of the messages of a run of two hands.
+pub const VERSION_OF_TWO_HANDS: u32 = 2;
 /// Version of the messages of a run of one hand.
 pub const VERSION_OF_ONE_HAND: u32 = 1;
 /// No message of ours is longer; a file that says so is not followed.
