@@ -1,9 +1,9 @@
 // A headset that is not there: navigator.xr with two eyes and one tracked hand, the right one. It plays the frames of
 // `window.fakeHand` (25 places of a joint in tenths of a millimetre each, 15 frames a second) as often as a
-// display of 72 Hz asks; where pictures come more slowly than 15 a second, the hand moves more slowly; a left one would be its mirror image,
+// display of 72 Hz asks; where pictures come more slowly than ten a second, the hand moves more slowly; a left one would be its mirror image,
 // beside it (`ASIDE_M`). The eye is where the page puts the world's origin at the origin.
 (() => {
-  const RATE_HZ = 72, FRAMES_HZ = 15, STEP_MAX_S = 1 / 15, EYES_M = 0.032, ASIDE_M = 0.25;
+  const RATE_HZ = 72, LOOK_MS = 4, FRAMES_HZ = 15, STEP_MAX_S = 1 / 10, EYES_M = 0.032, ASIDE_M = 0.25;
   const identity = { x: 0, y: 0, z: 0, w: 1 };
   window.XRRigidTransform = class {
     constructor(position = { x: 0, y: 0, z: 0 }, orientation = identity) {
@@ -46,8 +46,22 @@
     }
     updateRenderState(state) { Object.assign(this.renderState, state); }
     async requestReferenceSpace() { return space; }
+    // The next picture is asked for when the last one is drawn, as a headset does: pictures that queue up for a slow
+    // renderer come in bursts, with a second of silence between them.
     requestAnimationFrame(draw) {
-      setTimeout(() => { if (!this.ended) draw(performance.now(), this.frame()); }, 1000 / RATE_HZ);
+      const next = () => {
+        const { gl } = this.renderState.baseLayer;
+        if (this.ended) return;
+        if (this.drawn && gl.getSyncParameter(this.drawn, gl.SYNC_STATUS) !== gl.SIGNALED) {
+          setTimeout(next, LOOK_MS);
+          return;
+        }
+        if (this.drawn) gl.deleteSync(this.drawn);
+        draw(performance.now(), this.frame());
+        this.drawn = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+        gl.flush();
+      };
+      setTimeout(next, 1000 / RATE_HZ);
     }
     frame() {
       const eye = window.fakeEye || { x: 0, y: 0.38, z: 0.45 }, f = 1.2, n = 0.02, far = 20;
