@@ -1,10 +1,11 @@
 //! Where the hand comes from: devices, joints, scripts, a mouse, recordings.
 //!
-//! Every source ([`hand_source`]) brings bytes with their times ([`arrival`], [`sent`]): [`serial`]
-//! reads a glove and a tracker ([`devices`]), [`joints`] a stream of tracked joints, [`xr_runtime`] asks
-//! an OpenXR runtime for them, [`scripted`] plays a person, [`mouse`] has one with a mouse, [`recording`] and [`foreign_recording`] repeat what was.
-//! [`hand_reader`] makes a pose of the hand of them, by the dimensions, calibration and mount of
-//! [`hand_setup`], and moves it evenly between samples ([`even_motion`]); [`hand_readers`] does so for a left and a right hand at once.
+//! Every source ([`hand_source`]) brings bytes with their times ([`sent`]): [`serial`] reads a glove and a
+//! tracker ([`devices`]), [`joints`] a stream of tracked joints, [`xr_runtime`] asks an OpenXR runtime for
+//! them, [`scripted`] plays a person, [`mouse`] has one with a mouse, [`recording`] and [`foreign_recording`]
+//! repeat what was. [`hand_reader`] makes a pose of the hand of them, by the dimensions, calibration and mount
+//! of [`hand_setup`], and moves it evenly between samples ([`even_motion`]); [`hand_readers`] does so for a
+//! left and a right hand at once.
 //!
 //! ```
 //! use softgrasp_hand::devices::cyberglove::{GloveEvent, GloveParser, RecordOptions, SensorCount};
