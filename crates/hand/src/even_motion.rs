@@ -1,6 +1,6 @@
 //! Even motion between samples: a hand that is sampled less often than ticks come does not leap.
 
-use nalgebra::{Isometry3, Unit, UnitQuaternion};
+use nalgebra::Isometry3;
 use softgrasp_grasp::hand::JointAngles;
 
 use crate::sent::Device;
@@ -105,18 +105,10 @@ impl EvenMotion {
             return self.to;
         }
         let ((angles, palm), (to_angles, to_palm)) = (self.from, self.to);
-        let translation = palm.translation.vector.lerp(&to_palm.translation.vector, share);
-        let rotation = turned(&palm.rotation, &to_palm.rotation, share);
-        (angles.lerp(&to_angles, share), Isometry3::from_parts(translation.into(), rotation))
+        // Half a turn has no shorter way.
+        let between = palm.try_lerp_slerp(&to_palm, share, 1e-9).unwrap_or(to_palm);
+        (angles.lerp(&to_angles, share), between)
     }
-}
-
-/// Attitude between two, along the shorter arc.
-fn turned(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
-    let same_side = if from.coords.dot(&to.coords) < 0.0 { -to.coords } else { to.coords };
-    // Attitudes of neighbouring samples differ by degrees: a chord is as good as the arc.
-    let between = from.coords.lerp(&same_side, share);
-    Unit::try_new(between.into(), 1e-9).unwrap_or(*to)
 }
 
 /// Position of a device among all three.
@@ -131,7 +123,7 @@ const fn place(device: Device) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
+    use nalgebra::{UnitQuaternion, Vector3};
 
     const TICK_S: f64 = 1.0 / 60.0;
 

@@ -173,18 +173,23 @@ impl HandReader {
         for Arrival { device, at_s, is_datagram, bytes, .. } in arrivals {
             let time_s = at_s.unwrap_or(now_s);
             self.first_s.get_or_insert(time_s);
-            let before = self.sample_of(*device);
-            match device {
-                Device::Glove => self.feed_glove(bytes, time_s),
-                Device::Tracker => self.feed_tracker(bytes, time_s),
+            self.take_samples(*device, time_s, |reader| match device {
+                Device::Glove => reader.feed_glove(bytes, time_s),
+                Device::Tracker => reader.feed_tracker(bytes, time_s),
                 Device::Joints => {
-                    let told = self.joints.feed(bytes, *is_datagram, time_s);
-                    self.meet_sender(told);
+                    let told = reader.joints.feed(bytes, *is_datagram, time_s);
+                    reader.meet_sender(told);
                 }
-            }
-            if self.sample_of(*device) != before {
-                self.move_on(*device, time_s);
-            }
+            });
+        }
+    }
+
+    /// Takes what a device sent at a time, s, and begins the way to its sample if that is a new one.
+    fn take_samples(&mut self, device: Device, time_s: f64, take: impl FnOnce(&mut Self)) {
+        let before = self.sample_of(device);
+        take(self);
+        if self.sample_of(device) != before {
+            self.move_on(device, time_s);
         }
     }
 
@@ -210,12 +215,10 @@ impl HandReader {
     /// Takes records of this hand's joints that came in the stream of the other one, at a time, s.
     pub(crate) fn take_joints(&mut self, records: &[JointsRecord], time_s: f64) {
         for record in records {
-            let before = self.sample_of(Device::Joints);
-            let told = self.joints.take(record, time_s);
-            self.meet_sender(told);
-            if self.sample_of(Device::Joints) != before {
-                self.move_on(Device::Joints, time_s);
-            }
+            self.take_samples(Device::Joints, time_s, |reader| {
+                let told = reader.joints.take(record, time_s);
+                reader.meet_sender(told);
+            });
         }
     }
 

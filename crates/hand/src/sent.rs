@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 use softgrasp_grasp::grasp::Command;
 use softgrasp_grasp::hand::Handedness;
 
+/// Ticks per second of a run that asks for no other rate.
+pub const TICKS_PER_S: f64 = 60.0;
+
 /// Input of one tick: device bytes and a menu command.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sent {

@@ -12,6 +12,7 @@ use softgrasp_hand::foreign_recording::is_foreign;
 use softgrasp_hand::hand_request::HandRequest;
 use softgrasp_hand::recording::read_recording;
 use softgrasp_hand::scripted::ScriptName;
+use softgrasp_hand::sent::TICKS_PER_S;
 use softgrasp_protocol::{ElementChoice, MethodName};
 
 use super::access_arguments::AccessArguments;
@@ -29,7 +30,7 @@ use super::recorded_settings::{
     recorded_settings,
 };
 use super::region_arguments::RegionArguments;
-use super::run_plan::{RunPlan, WATCHED_RATE_HZ};
+use super::run_plan::RunPlan;
 use crate::ask::connection::ServerChoice;
 use crate::ask::solve_settings::{Elasticity, Subscription};
 use crate::object::object_place::ObjectPlace;
@@ -349,7 +350,7 @@ impl RunArguments {
     /// Time from tick to tick, if a person watches or the hand `is_timed`.
     fn period(&self, is_timed: bool) -> Option<Duration> {
         let is_timed = is_timed || self.is_watched();
-        let rate = self.rate.or(is_timed.then_some(WATCHED_RATE_HZ))?;
+        let rate = self.rate.or(is_timed.then_some(TICKS_PER_S))?;
         Some(Duration::from_secs_f64((1.0 / rate).min(PERIOD_MAX_S)))
     }
 
@@ -404,10 +405,9 @@ impl RunArguments {
         }
         let recording = read_recording(path)?;
         let setup = &recording.setup;
-        let recorded_s = setup.period_s.unwrap_or(1.0 / WATCHED_RATE_HZ);
         let watched = self.is_watched();
         let speed = self.speed.unwrap_or(if watched { 1.0 } else { 0.0 });
-        let period = (speed > 0.0).then(|| (recorded_s / speed).min(PERIOD_MAX_S));
+        let period = (speed > 0.0).then(|| (setup.tick_s() / speed).min(PERIOD_MAX_S));
         let server = self.server.clone().unwrap_or(ServerChoice::Embedded);
         Ok(RunPlan {
             first: ObjectPlan {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use softgrasp_grasp::grasp::StateName;
+use softgrasp_hand::sent::TICKS_PER_S;
 use softgrasp_window::view::camera::ViewCamera;
 use softgrasp_window::view::directed_eye::DirectedEye;
 use softgrasp_window::view::display::{Display, Level};
@@ -142,7 +143,7 @@ impl RunPictures {
     pub(super) fn finish(mut self) -> anyhow::Result<()> {
         self.take_snapshot()?;
         if let Some((path, animation)) = self.animation {
-            let period_s = ANIMATED_TICKS as f64 / 60.0;
+            let period_s = ANIMATED_TICKS as f64 / TICKS_PER_S;
             let bytes = animation.encode(period_s).context("cannot form the animation")?;
             write_file(&path, &bytes)?;
         }

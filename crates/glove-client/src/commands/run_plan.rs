@@ -11,6 +11,7 @@ use softgrasp_hand::hand_request::HandChoice;
 use softgrasp_hand::hand_request::HandRequest;
 use softgrasp_hand::hand_setup::HandConfiguration;
 use softgrasp_hand::recording::Recording;
+use softgrasp_hand::sent::TICKS_PER_S;
 #[cfg(any(feature = "window", feature = "xr"))]
 use softgrasp_protocol::Material;
 
@@ -60,13 +61,10 @@ pub(super) struct RunPlan {
     pub(super) recording: Option<Arc<Recording>>,
 }
 
-/// Ticks per second if a person watches.
-pub(super) const WATCHED_RATE_HZ: f64 = 60.0;
-
 impl RunPlan {
     /// Time from tick to tick of a hand that a person moves or watches, s.
     pub(super) fn tick_s(&self) -> f64 {
-        self.period.map_or(1.0 / WATCHED_RATE_HZ, |period| period.as_secs_f64())
+        self.period.map_or(1.0 / TICKS_PER_S, |period| period.as_secs_f64())
     }
 
     /// The same settings for a person who watches: in real time.

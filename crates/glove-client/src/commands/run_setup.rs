@@ -30,7 +30,7 @@ use softgrasp_window::view::loading::LoadObject;
 
 use super::further_setup::FurtherObjects;
 use super::hand_arguments::SecondHand;
-use super::run_plan::{RunPlan, WATCHED_RATE_HZ};
+use super::run_plan::RunPlan;
 use super::run_recording::{check_object, start_recorder};
 use crate::ask::connection::Host;
 use crate::ask::link::Link;
@@ -196,7 +196,7 @@ pub(super) fn load_beside(request: ObjectRequest) -> LoadObject {
 fn readers_of(plan: &RunPlan) -> HandReaders {
     // At whatever speed a recording is played, its hand moves as it did.
     let tick_s = match &plan.recording {
-        Some(recording) => recording.setup.period_s.unwrap_or(1.0 / WATCHED_RATE_HZ),
+        Some(recording) => recording.setup.tick_s(),
         None => plan.tick_s(),
     };
     let reader = |is_live, is_even, configuration: &HandConfiguration, place| {

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use softgrasp_grasp::object::ObjectError;
 use softgrasp_hand::notice::Notice;
+use softgrasp_hand::sent::TICKS_PER_S;
 use softgrasp_window::view::control::Control;
 
 use crate::pace::run_clock::RunClock;
@@ -44,8 +45,6 @@ enum Mode {
     Stopped,
 }
 
-/// Ticks per second of a run without a period, on the client's clock.
-const LOCKSTEP_RATE_HZ: f64 = 60.0;
 /// Time between two looks for controls, while no tick is played and before a tick that is far off.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
@@ -157,7 +156,7 @@ impl<'a> TickLoop<'a> {
     /// Tick to be played now, and its time on the client's clock, s.
     fn due(&mut self) -> (Due, f64) {
         let Some(schedule) = &mut self.schedule else {
-            return (Due { tick: self.next, skipped: 0 }, self.next as f64 / LOCKSTEP_RATE_HZ);
+            return (Due { tick: self.next, skipped: 0 }, self.next as f64 / TICKS_PER_S);
         };
         if self.mode == Mode::Steps {
             self.clock.set_forward(schedule.next_at());

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use softgrasp_grasp::hand::{ANGLE_COUNT, HandDimensions};
 
 use super::stages::StageDigests;
-use crate::sent::Arrival;
+use crate::sent::{Arrival, TICKS_PER_S};
 
 /// How a recorded run was set up: enough to play it again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,6 +74,13 @@ pub struct RecordedSetup {
     /// The second hand; `None` in a run of one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second_hand: Option<RecordedHand>,
+}
+
+impl RecordedSetup {
+    /// Time from tick to tick in which the recorded hand moved, s.
+    pub fn tick_s(&self) -> f64 {
+        self.period_s.unwrap_or(1.0 / TICKS_PER_S)
+    }
 }
 
 /// How the second hand of a recorded run was set up.

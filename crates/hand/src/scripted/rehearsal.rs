@@ -10,6 +10,7 @@ use super::hand::{Moment, ScriptedHand};
 use super::script::ScriptName;
 use super::seen::Seen;
 use crate::hand_setup::HandSetup;
+use crate::sent::TICKS_PER_S;
 
 /// The motion of a script, one moment per tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +20,6 @@ pub struct Rehearsal {
     ticks_per_s: f64,
 }
 
-/// Ticks per second of a person who watches.
-const TICKS_PER_S: f64 = 60.0;
 /// How much further than the expected touch a finger closes before it counts as touching.
 const BEYOND_TOUCH: f64 = 0.02;
 /// Most ticks of a script.
