@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use softgrasp_grasp::object::{ContactModel, ObjectError, RestShape, SoftObject};
 use softgrasp_os::{Beside, one_line};
 use softgrasp_protocol::{ElementName, Material};
@@ -22,6 +22,9 @@ pub enum ObjectJob {
         rest: Arc<RestShape>,
         /// Every vertex of the shape to keep, m, in the object's frame.
         vertices: Vec<Point3<f64>>,
+        /// Displacement of every node from the present rest shape, m, and the least share of it that is not to be
+        /// kept; a larger one is left where elements would be turned inside out. `None`: all is kept, or nothing.
+        left: Option<(Vec<[f64; 3]>, f64)>,
         /// Number of rest shapes so far.
         rest_shapes: u64,
         /// Material of the model.
@@ -80,13 +83,39 @@ pub struct KeptShape {
     pub object: SoftObject,
     /// Model of the rest shape.
     pub model: ModelUpload,
+    /// Share of the displacement from the rest shape before that has not become a part of this one.
+    pub share_left: f64,
+}
+
+/// Largest share of a displacement that is not kept: something is.
+const SHARE_LEFT_MAX: f64 = 0.9;
+/// Larger shares that are tried where elements would be turned inside out.
+const SHARES_TRIED: u32 = 8;
+
+/// The rest shape that a deformed shape makes, and the share of its displacement that is not in it.
+fn kept(
+    rest: &RestShape,
+    vertices: Vec<Point3<f64>>,
+    left: Option<(Vec<[f64; 3]>, f64)>,
+) -> Result<(RestShape, f64), ObjectError> {
+    let Some((displacement, least)) = left else { return Ok((rest.kept(vertices)?, 0.0)) };
+    let without = |share: f64| {
+        let places = vertices.iter().zip(&displacement);
+        places.map(|(place, u)| place - share * Vector3::from(*u)).collect::<Vec<_>>()
+    };
+    let least = least.clamp(0.0, SHARE_LEFT_MAX);
+    let more = (SHARE_LEFT_MAX - least) / f64::from(SHARES_TRIED);
+    let shares = (0..=SHARES_TRIED).map(|i| least + f64::from(i) * more);
+    let fits = |share: &f64| rest.check(&without(*share)).is_ok();
+    let share = shares.into_iter().find(fits).unwrap_or(least);
+    Ok((rest.kept(without(share))?, share))
 }
 
 impl ObjectJob {
     fn work(self) -> ObjectDone {
         match self {
-            Self::Keep { rest, vertices, rest_shapes, material, element } => {
-                ObjectDone::Kept(rest.kept(vertices).map(|kept| {
+            Self::Keep { rest, vertices, left, rest_shapes, material, element } => {
+                ObjectDone::Kept(kept(&rest, vertices, left).map(|(kept, share_left)| {
                     let object = SoftObject::at_rest(kept, rest_shapes + 1);
                     let model = ModelUpload::new(
                         object.rest_shape(),
@@ -94,13 +123,13 @@ impl ObjectJob {
                         material,
                         element,
                     );
-                    Box::new(KeptShape { object, model })
+                    Box::new(KeptShape { object, model, share_left })
                 }))
             }
             Self::Replace { rest, rest_shapes, material, element } => {
                 let object = SoftObject::at_rest(rest, rest_shapes);
                 let model = ModelUpload::new(object.rest_shape(), rest_shapes, material, element);
-                ObjectDone::Replacement(Box::new(KeptShape { object, model }))
+                ObjectDone::Replacement(Box::new(KeptShape { object, model, share_left: 0.0 }))
             }
             Self::Save(shape) => ObjectDone::Saved(shape.save().map_err(|error| one_line(&error))),
             Self::Prefetch { rest, rest_shapes, model, tip_radii, contacts } => {

@@ -128,10 +128,11 @@ impl Changing {
         }
     }
 
-    /// Begins to make the present shape a rest shape; the object keeps its shape meanwhile.
+    /// Begins to make the present shape a rest shape, except for a share of its displacement, if there is one
+    /// that may be left; the object keeps its shape meanwhile.
     pub(crate) fn begin_to_keep(
         &mut self,
-        keep: Keep,
+        (keep, share_left): (Keep, Option<f64>),
         object: &SoftObject,
         settings: &SolveSettings,
     ) {
@@ -139,6 +140,7 @@ impl Changing {
         self.work.begin(ObjectJob::Keep {
             rest: Arc::clone(object.rest_shape()),
             vertices: object.shape().to_vec(),
+            left: share_left.map(|share| (object.displacement().to_vec(), share)),
             rest_shapes: object.rest_shapes(),
             material: settings.material,
             element: settings.element,

@@ -26,6 +26,7 @@ use crate::run::contact_ledger::StepRecord;
 pub use crate::run::contact_scene::ContactScene;
 use crate::run::felt::FeltHand;
 use crate::run::grasping_hand::{BodyPoses, BothHands, GraspingHand};
+use crate::run::kept_grip::{KeptGrip, pressing_on};
 
 /// State of a grasp by contact with friction.
 pub struct ContactGrasp {
@@ -182,9 +183,19 @@ impl ContactGrasp {
         self.still_steps = 0;
     }
 
-    /// Makes the present shape the rest shape; the object keeps its pose.
-    pub fn meet_new_shape(&mut self) {
-        self.state = ObjectState::at_rest(self.state.pose);
+    /// The grip of the hands in the last answer, on an object in its present shape.
+    pub(crate) fn grip(&self, object: &SoftObject) -> KeptGrip {
+        let loads = self.hands.iter().flat_map(GraspingHand::every_load);
+        let forces = loads.map(|load| Vector3::from(load.force));
+        let of_hands = self.state.contacts.iter().filter(|c| c.body as usize >= TABLE);
+        let up = self.world_from_object().inverse() * -self.scene.gravity;
+        KeptGrip::new((&self.scene, up), forces, of_hands, object)
+    }
+
+    /// Makes the present shape the rest shape, except for a share of its displacement that goes on pressing;
+    /// the object keeps its pose.
+    pub(crate) fn meet_new_shape(&mut self, share_left: f64) {
+        self.state = pressing_on(&self.state, share_left);
         self.felt.iter_mut().for_each(FeltHand::let_go);
         (self.asked, self.still_steps, self.strayed) = (None, 0, true);
     }

@@ -199,11 +199,21 @@ fn obey(
             live.shown.relax()?;
             GraspEvent::ReturnedHome
         }
-        Command::KeepShape if live.keep_made() => {
-            contact.meet_new_shape();
-            GraspEvent::ShapeKept
-        }
-        Command::KeepShape => GraspEvent::Ignored(command),
+        Command::KeepShape => match live.keep_made()? {
+            Some(share_left) => {
+                contact.meet_new_shape(share_left);
+                if share_left > 0.0 {
+                    let percent = 1e2 * share_left;
+                    let text = format!(
+                        "the shape is kept but for {percent:.0} %, which go on pressing on the hand and spring \
+                         back when it opens"
+                    );
+                    outcome.events.push(LoopEvent::Shape(text));
+                }
+                GraspEvent::ShapeKept
+            }
+            None => GraspEvent::Ignored(command),
+        },
     };
     outcome.events.push(LoopEvent::Grasp(event));
     Ok(())

@@ -121,6 +121,11 @@ impl GraspingHand {
         HandLoads::of(|digit| self.of_finger(digit), palm)
     }
 
+    /// Load of every body of the hand; none before the first answer.
+    pub(super) fn every_load(&self) -> impl Iterator<Item = &BodyLoad> {
+        self.loads.iter()
+    }
+
     /// Loads of the segments of a finger; empty before the first answer.
     fn of_finger(&self, digit: usize) -> &[BodyLoad] {
         let first = SEGMENTS * digit;

@@ -182,21 +182,32 @@ impl LiveObject {
         matches!(self.changing.keep(), Keep::Made(_)).then_some(Command::KeepShape)
     }
 
-    /// Begins to make the present shape the next rest shape.
+    /// Begins to make the present shape the next rest shape, as far as a hand that holds the object by friction
+    /// can do without its pressing back.
     fn begin_to_keep(&mut self, keep: Keep, holding: &mut Holding, outcome: &mut TickOutcome) {
-        self.changing.begin_to_keep(keep, self.shown.object(), self.questions.settings());
+        let object = self.shown.object();
+        let contact = holding.friction().filter(|_| !keep.is_dent());
+        let share_left = contact.map(|contact| contact.grip(object).share_left());
+        self.changing.begin_to_keep((keep, share_left), object, self.questions.settings());
         self.take_work(holding, outcome);
     }
 
-    /// Takes the kept shape as the rest shape, if it is ready; returns whether it was.
-    pub(crate) fn keep_made(&mut self) -> bool {
-        let made = self.changing.take_made();
-        let is_kept = made.is_some();
-        if let Some(kept) = made {
-            self.changing.remember(self.shown.object().rest_shape());
-            self.show_from_now_on(kept);
+    /// Takes the kept shape as the rest shape, if it is ready; returns the share of the displacement that goes
+    /// on as one of the new rest shape.
+    ///
+    /// # Errors
+    /// [`ObjectError`] if the object cannot be shown.
+    pub(crate) fn keep_made(&mut self) -> Result<Option<f64>, ObjectError> {
+        let Some(kept) = self.changing.take_made() else { return Ok(None) };
+        let object = self.shown.object();
+        let share_left = kept.share_left;
+        let left = object.displacement().iter().map(|u| u.map(|u| share_left * u)).collect();
+        self.changing.remember(object.rest_shape());
+        self.show_from_now_on(kept);
+        if share_left > 0.0 {
+            self.shown.deform(&NodeChoice::All, left)?;
         }
-        is_kept
+        Ok(Some(share_left))
     }
 
     /// Ends a wish to keep the shape, because nothing deforms the object any more.

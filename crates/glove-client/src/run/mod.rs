@@ -12,6 +12,7 @@ pub mod given_way;
 pub mod grasp_loop;
 pub mod grasping_hand;
 mod holding;
+mod kept_grip;
 pub mod latency;
 mod live_object;
 mod objects;

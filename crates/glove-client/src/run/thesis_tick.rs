@@ -75,7 +75,7 @@ impl ThesisTick {
         let (tick, tip_radii) = (self.tick, self.hand.dimensions.tip_radii());
         let TableObject { holding, live, .. } = object;
         if step.events.contains(&GraspEvent::ShapeKept) {
-            live.keep_made();
+            live.keep_made()?;
         }
         match &step.known {
             Some(known) => {
