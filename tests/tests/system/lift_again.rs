@@ -32,22 +32,23 @@ fn lifted(mesh: TetMesh) -> (f64, f64) {
     (highest, lift.above_table())
 }
 
-fn check(name: &str, mesh: TetMesh) {
+/// Checks that an object is lifted, and higher than some m, and lies on the table at the end.
+fn check(name: &str, mesh: TetMesh, least: f64) {
     let (highest, above) = lifted(mesh);
-    assert!(highest > 0.04, "{name}: lifted by {highest} m");
+    assert!(highest > least, "{name}: lifted by {highest} m");
     assert!(above.abs() < 1e-3, "{name}: {above} m above the table at the end");
 }
 
 /// They slid out of the only grasp that was tried, and the script went on without them.
 #[test]
 fn flat_and_thin_objects_that_slip_are_lifted_at_the_second_try() {
-    check("lens", of_size(BuiltIn::Sphere, 400, [0.08, 0.025, 0.07]));
-    check("bar", of_size(BuiltIn::Cube, 343, [0.08, 0.02, 0.03]));
+    check("lens", of_size(BuiltIn::Sphere, 400, [0.08, 0.025, 0.07]), 0.05);
+    check("bar", of_size(BuiltIn::Cube, 343, [0.08, 0.02, 0.03]), 0.05);
     let Some(folder) = shared("meshes") else { return };
     let name = "cylinder.medit.mesh";
     let bytes = std::fs::read(folder.join(name)).unwrap();
     let mesh = mesh_io::parse(name, &bytes, &mut |_| None).unwrap().mesh;
-    check(name, laid(&mesh, |extent| Vector3::repeat(0.08 / extent.max())));
+    check(name, laid(&mesh, |extent| Vector3::repeat(0.08 / extent.max())), 0.05);
 }
 
 /// It stood on a facet of its back, fell over, and the hand went after it as it pushed it along.
@@ -57,5 +58,6 @@ fn banana_that_fell_over_beside_the_hand_lies_and_is_lifted() {
     let name = "banana.vtk";
     let bytes = std::fs::read(folder.join(name)).unwrap();
     let mesh = mesh_io::parse(name, &bytes, &mut |_| None).unwrap().mesh;
-    check(name, laid(&mesh, |extent| Vector3::repeat(0.16 / extent.max())));
+    // Its first place is that of the banana that has not fallen over yet, which is higher.
+    check(name, laid(&mesh, |extent| Vector3::repeat(0.16 / extent.max())), 0.04);
 }
