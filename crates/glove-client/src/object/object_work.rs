@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use softgrasp_grasp::object::{ContactModel, ObjectError, RestShape, SoftObject};
 use softgrasp_os::{Beside, one_line};
 use softgrasp_protocol::{ElementName, Material};
@@ -22,9 +22,9 @@ pub enum ObjectJob {
         rest: Arc<RestShape>,
         /// Every vertex of the shape to keep, m, in the object's frame.
         vertices: Vec<Point3<f64>>,
-        /// Displacement of every node from the present rest shape, m, and the least share of it that is not to be
-        /// kept; a larger one is left where elements would be turned inside out. `None`: all is kept, or nothing.
-        left: Option<(Vec<[f64; 3]>, f64)>,
+        /// Least share of the displacement from the present rest shape that is not to be kept; a larger one is
+        /// left where elements would be turned inside out. `None`: all is kept, or nothing.
+        share_left: Option<f64>,
         /// Number of rest shapes so far.
         rest_shapes: u64,
         /// Material of the model.
@@ -96,12 +96,12 @@ const SHARES_TRIED: u32 = 8;
 fn kept(
     rest: &RestShape,
     vertices: Vec<Point3<f64>>,
-    left: Option<(Vec<[f64; 3]>, f64)>,
+    share_left: Option<f64>,
 ) -> Result<(RestShape, f64), ObjectError> {
-    let Some((displacement, least)) = left else { return Ok((rest.kept(vertices)?, 0.0)) };
+    let Some(least) = share_left else { return Ok((rest.kept(vertices)?, 0.0)) };
     let without = |share: f64| {
-        let places = vertices.iter().zip(&displacement);
-        places.map(|(place, u)| place - share * Vector3::from(*u)).collect::<Vec<_>>()
+        let places = vertices.iter().zip(rest.mesh().vertices());
+        places.map(|(place, at_rest)| place + share * (at_rest - place)).collect::<Vec<_>>()
     };
     let least = least.clamp(0.0, SHARE_LEFT_MAX);
     let more = (SHARE_LEFT_MAX - least) / f64::from(SHARES_TRIED);
@@ -114,8 +114,8 @@ fn kept(
 impl ObjectJob {
     fn work(self) -> ObjectDone {
         match self {
-            Self::Keep { rest, vertices, left, rest_shapes, material, element } => {
-                ObjectDone::Kept(kept(&rest, vertices, left).map(|(kept, share_left)| {
+            Self::Keep { rest, vertices, share_left, rest_shapes, material, element } => {
+                ObjectDone::Kept(kept(&rest, vertices, share_left).map(|(kept, share_left)| {
                     let object = SoftObject::at_rest(kept, rest_shapes + 1);
                     let model = ModelUpload::new(
                         object.rest_shape(),

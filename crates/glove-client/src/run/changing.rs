@@ -140,7 +140,7 @@ impl Changing {
         self.work.begin(ObjectJob::Keep {
             rest: Arc::clone(object.rest_shape()),
             vertices: object.shape().to_vec(),
-            left: share_left.map(|share| (object.displacement().to_vec(), share)),
+            share_left,
             rest_shapes: object.rest_shapes(),
             material: settings.material,
             element: settings.element,

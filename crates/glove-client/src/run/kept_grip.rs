@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, U3, Vector3};
 use softgrasp_grasp::object::SoftObject;
+use softgrasp_hand::scripted::GRIP_MARGIN;
 use softgrasp_protocol::{HeldContact, ObjectState};
 
 use crate::run::contact_scene::ContactScene;
@@ -35,8 +36,6 @@ struct GripContact {
     displacement: Vector3<f64>,
 }
 
-/// Friction is to hold the object so many times over, as where the scripted hand lifts.
-const MARGIN: f64 = 2.5;
 /// Share of the inertia of all contacts that counts as one about every line.
 const ON_A_LINE: f64 = 1e-6;
 /// Steps of an eigenvalue of three: more than it ever takes.
@@ -61,12 +60,13 @@ impl KeptGrip {
     /// Share of the displacement that is not to become a part of the rest shape, at most 1: 0 where the grip
     /// holds the object without.
     ///
-    /// With a share s of its displacement left the object presses with s of its force in the place where it is,
+    /// Friction is to hold the object as many times over as where the scripted hand lifts. With a share s of its
+    /// displacement left the object presses with s of its force in the place where it is,
     /// and hand and object go to the equilibrium of their springs in series: the forces become the part
     /// `(given_way + s pressed_in)/(given_way + pressed_in)` of what they were.
     pub(crate) fn share_left(&self) -> f64 {
         let pressed_in: f64 = self.contacts.iter().map(|c| c.force.dot(&c.displacement)).sum();
-        let needed = MARGIN * self.friction_used();
+        let needed = GRIP_MARGIN * self.friction_used();
         // Written so that what is no number leaves nothing.
         let is_pressed = needed > 0.0 && pressed_in > 0.0;
         if !is_pressed {
@@ -225,7 +225,7 @@ mod tests {
         // Springs in series from the fingers' way of 2 mm and what is left of the object's 4 mm.
         let force = (2e-3 + share * 4e-3) / (1e-3 + 1.0 / 500.0);
         let held = grip.friction * 2.0 * force;
-        assert!((held - MARGIN * carried).abs() < 1e-12, "{held} N held of {carried} N");
+        assert!((held - GRIP_MARGIN * carried).abs() < 1e-12, "{held} N held of {carried} N");
     }
 
     #[test]

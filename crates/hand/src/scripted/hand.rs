@@ -103,7 +103,7 @@ const COME_UP: f64 = 2e-4;
 const COME_UP_MAX: f64 = 0.01;
 const PRESSED_DOWN: f64 = 1.05;
 /// A grip presses so many times as hard as friction needs to hold the weight.
-const GRIP_MARGIN: f64 = 2.5;
+pub const GRIP_MARGIN: f64 = 2.5;
 /// … and so many times as hard once the object has slipped.
 const GRIP_MARGIN_AGAIN: f64 = 4.0;
 /// How much further than expected a finger closes while it looks for the touch.

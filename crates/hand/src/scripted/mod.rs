@@ -16,7 +16,7 @@ mod tip_paths;
 
 pub use approach::PalmPath;
 pub use grasp_plan::GraspPlan;
-pub use hand::ScriptedHand;
+pub use hand::{GRIP_MARGIN, ScriptedHand};
 pub use plan::{GraspWish, plan_grasp};
 pub use planner::{NoGrasp, PlanRequest, Planner};
 pub use posture::{Posture, angles};
