@@ -315,10 +315,12 @@ mod tests {
             for shape in shapes() {
                 let p = Point3::from(p);
                 let here = shape.distance(&p);
+                // Across the middle of a box the nearest face changes.
+                if here.distance <= -0.05 {
+                    continue;
+                }
                 let h = 1e-7;
                 let there = shape.distance(&(p + h * here.normal.into_inner()));
-                // Across the middle of a box the nearest face changes.
-                prop_assume!(here.distance > -0.05);
                 prop_assert!(((there.distance - here.distance) / h - 1.0).abs() < 1e-6);
             }
         }

@@ -275,12 +275,21 @@ impl Delassus {
             });
             place
         };
-        let row = |k: usize| 3 * corners[k / 3] + k % 3;
-        let rows = 3 * corners.len();
-        Self {
-            compliance: DMatrix::from_fn(rows, rows, |r, c| self.compliance[(row(r), row(c))]),
-            points: points.iter().map(renamed).collect(),
+        let points = points.iter().map(renamed).collect();
+        Self { compliance: self.compliance_between(&corners), points }
+    }
+
+    /// The compliance between some corners, ascending.
+    fn compliance_between(&self, corners: &[usize]) -> DMatrix<f64> {
+        let (rows, all) = (3 * corners.len(), self.corner_rows());
+        let mut between = Vec::with_capacity(rows * rows);
+        for &corner in corners {
+            for column in self.compliance.as_slice()[3 * corner * all..].chunks_exact(all).take(3) {
+                let of_corner = |&row: &usize| &column[3 * row..3 * row + 3];
+                corners.iter().for_each(|row| between.extend_from_slice(of_corner(row)));
+            }
         }
+        DMatrix::from_vec(rows, rows, between)
     }
 
     /// W as a matrix, 3n × 3n.

@@ -31,14 +31,21 @@ impl Shape {
     fn check_estimate(&self, dofs: &[u32], q: &[f64], what: &str) {
         let (u, lambda, certificate) = self.answer(dofs, q);
         let (expected, reaction) = self.direct(dofs, q);
-        let error = norm(&subtract(&u, &expected)) / norm(&expected);
+        let error = relative_error(&u, &expected);
         let estimate = certificate.error_estimate_rel.expect("an estimate");
-        assert!(error <= estimate + 1e-11, "{what}: off by {error:e}, estimated {estimate:e}");
+        // Nodes that hold the body weakly cost the direct solve digits: three nearly in line (condition
+        // 1200) 3e-11, where the condensed answers by a factor and by cycles differ by 1e-15.
+        let rounding = 1e-11 * (1.0 + 1e-2 * self.condition(dofs));
+        assert!(error <= estimate + rounding, "{what}: off by {error:e}, estimated {estimate:e}");
         assert!(estimate < 1e-5, "{what}: an estimate of {estimate:e} for {error:e} is of no use");
         let forces = norm(&subtract(&lambda, &reaction)) / norm(&reaction);
         assert!(forces < 1e-6, "{what}: reactions differ by {forces:e}");
         assert!(certificate.error_bound_rel.unwrap_err().contains("no bound is proven"));
     }
+}
+
+fn relative_error(u: &[f64], expected: &[f64]) -> f64 {
+    norm(&subtract(u, expected)) / norm(expected)
 }
 
 /// Nodes far apart, spread over the numbers of a mesh.
@@ -128,7 +135,7 @@ fn loads_beside_contacts_without_a_factor_equal_those_by_a_factor() {
         (loaded.full_displacement(&s.base, &answer), certificate.error_estimate_rel)
     });
     let [(by_factor, none), (by_cycles, estimate)] = answers;
-    let error = norm(&subtract(&by_cycles, &by_factor)) / norm(&by_factor);
+    let error = relative_error(&by_cycles, &by_factor);
     assert_eq!(none, None);
     assert!(error <= estimate.unwrap() && error < 1e-7, "{error:e}, {estimate:?}");
 }
@@ -189,8 +196,14 @@ proptest! {
         let rigid = RigidBodies::new(&mesh, &bodies);
         // Nodes in line leave a turn about them free, which is refused.
         prop_assume!(find_free_motion(&mesh, &bodies, &rigid, &dofs, &[]).is_none());
+        let by_factor = Shape::new(mesh.clone(), poisson, &[]);
         let shape = Shape::by_cycles(mesh, poisson, &[]);
         let q: Vec<f64> = pushes(dofs.len()).iter().map(|q| amount * q).collect();
         shape.check_estimate(&dofs, &q, "random");
+        let (u, _, certificate) = shape.answer(&dofs, &q);
+        let (expected, _, _) = by_factor.answer(&dofs, &q);
+        let error = relative_error(&u, &expected);
+        let estimate = certificate.error_estimate_rel.unwrap();
+        prop_assert!(error <= estimate + 1e-13, "off by {error:e}, estimated {estimate:e}");
     }
 }
