@@ -1,9 +1,9 @@
-// A headset that is not there: navigator.xr with two eyes and one tracked hand, the right one. It plays the frames of
-// `window.fakeHand` (25 places of a joint in tenths of a millimetre each, 15 frames a second) as often as a
-// display of 72 Hz asks; where pictures come more slowly than ten a second, the hand moves more slowly; a left one would be its mirror image,
-// beside it (`ASIDE_M`). The eye is where the page puts the world's origin at the origin.
+// A headset that is not there: navigator.xr with two eyes and the tracked hands of `window.fakeHands`: for "right",
+// "left" or both the frames that the hand plays (25 places of a joint in tenths of a millimetre each, 15 frames a
+// second), as often as a display of 72 Hz asks; where pictures come more slowly than ten a second, the hands move more
+// slowly. The eye is where the page puts the world's origin at the origin.
 (() => {
-  const RATE_HZ = 72, LOOK_MS = 4, FRAMES_HZ = 15, STEP_MAX_S = 1 / 10, EYES_M = 0.032, ASIDE_M = 0.25;
+  const RATE_HZ = 72, LOOK_MS = 4, FRAMES_HZ = 15, STEP_MAX_S = 1 / 10, EYES_M = 0.032;
   const identity = { x: 0, y: 0, z: 0, w: 1 };
   window.XRRigidTransform = class {
     constructor(position = { x: 0, y: 0, z: 0 }, orientation = identity) {
@@ -30,20 +30,22 @@
   const joints = (side) => Array.from({ length: 25 }, (_, joint) => [joint, { joint, side }]);
   // Where a joint is now, between two frames.
   function place({ joint, side }, seconds) {
-    const frames = window.fakeHand, at = Math.min(seconds * FRAMES_HZ, frames.length - 1), i = Math.floor(at), t = at - i;
+    const frames = window.fakeHands[side], at = Math.min(seconds * FRAMES_HZ, frames.length - 1), i = Math.floor(at), t = at - i;
     const a = frames[i][joint], b = frames[Math.min(i + 1, frames.length - 1)][joint];
-    const x = 1e-4 * (a[0] + t * (b[0] - a[0]));
-    return { x: side === "right" ? x : -x - ASIDE_M, y: 1e-4 * (a[1] + t * (b[1] - a[1])), z: 1e-4 * (a[2] + t * (b[2] - a[2])) };
+    const [x, y, z] = a.map((of_a, axis) => 1e-4 * (of_a + t * (b[axis] - of_a)));
+    return { x, y, z };
   }
   class Session extends EventTarget {
     constructor() {
       super();
       this.renderState = {};
-      this.inputSources = ["right"].map((side) => ({ handedness: side, hand: new Map(joints(side)) }));
+      this.inputSources = Object.keys(window.fakeHands).map((side) => ({ handedness: side, hand: new Map(joints(side)) }));
       this.seconds = 0;
       this.before = performance.now();
       window.fakeSession = this;
     }
+    // Whether the hands have come to the end of their frames.
+    get isOver() { return this.seconds > Math.max(...Object.values(window.fakeHands).map((frames) => frames.length)) / FRAMES_HZ; }
     updateRenderState(state) { Object.assign(this.renderState, state); }
     async requestReferenceSpace() { return space; }
     // The next picture is asked for when the last one is drawn, as a headset does: pictures that queue up for a slow

@@ -14,7 +14,10 @@ from pathlib import Path
 from browser import Browser
 
 HERE = Path(__file__).parent
-OBJECT = ["--object", "strawberry", "--nodes", "1000"]
+STRAWBERRY = ["--object", "strawberry", "--nodes", "1000"]
+# Edge of the cube that two palms lift, m.
+EDGE_M = 0.06
+CUBE = ["--object", "cube", "--nodes", "343", "--object-size", str(EDGE_M)]
 
 
 def say(text):
@@ -24,11 +27,11 @@ def say(text):
 class Run:
     """A run that serves a page."""
 
-    def __init__(self, client, folder, *more):
+    def __init__(self, client, folder, *options):
         self.log = Path(folder) / f"run-{time.monotonic_ns()}.log"
         with open(self.log, "wb") as log:
             self.process = subprocess.Popen(
-                [client, "run", "--headless", "--xr", "127.0.0.1:0", *OBJECT, *more],
+                [client, "run", "--headless", "--xr", "127.0.0.1:0", *options],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=folder)
         end = time.monotonic() + 60
         while True:
@@ -118,7 +121,7 @@ def check(holds, what):
 
 def flat(client, program, folder, pictures):
     """A browser without a headset sees a scripted hand squeeze and lift."""
-    run = Run(client, folder, "--hand", "scripted:lift", "--shading", "plain")
+    run = Run(client, folder, *STRAWBERRY, "--hand", "scripted:lift", "--shading", "plain")
     browser = Browser(program, folder)
     try:
         browser.open(run.address)
@@ -152,9 +155,9 @@ def flat(client, program, folder, pictures):
 
 
 def lift(browser):
-    """Lets the tracked hand lift the strawberry. Where the machine is so busy that it slips, the menu of the
-    board puts it home, the hand begins anew, and that is told."""
-    is_over = "window.fakeSession.seconds > window.fakeHand.length / 15"
+    """Lets the tracked hands lift the object. Where the machine is so busy that it slips, the menu of the
+    board puts it home, the hands begin anew, and that is told."""
+    is_over = "window.fakeSession.isOver"
     status = "softgrasp.figures.status"
     # What both eyes draw has risen as well, and not only what the run tells of it.
     lying_m = browser.value("softgrasp.scene.picture.pose[1]")
@@ -167,11 +170,11 @@ def lift(browser):
         if browser.value("window.hasRisen"):
             return
         told = browser.value(f"JSON.stringify({status})")
-        say(f"the strawberry slipped; it is put home and lifted once more: {told}")
+        say(f"the object slipped; it is put home and lifted once more: {told}")
         browser.value("window.fakeHandMoves = false; window.fakeSession.seconds = 0")
         browser.value("softgrasp.headset.board.press('return-home')")
         browser.until(f"Math.abs({status}.height_mm) < 4 && !{status}.deforming", 30)
-    raise AssertionError(f"the strawberry slipped {LIFTS_MAX} times")
+    raise AssertionError(f"the object slipped {LIFTS_MAX} times")
 
 
 def picture_of_scene(browser, path):
@@ -189,25 +192,84 @@ def picture_of_scene(browser, path):
         "document.adoptedStyleSheets = document.adoptedStyleSheets.filter((sheet) => sheet !== window.alone); 0")
 
 
+# Joints of a flat right hand in the order of WebXR: how far from the wrist toward the fingertips, and toward the
+# thumb, m.
+FLAT_HAND = [
+    (0, 0), (0.025, 0.028), (0.055, 0.042), (0.080, 0.048), (0.100, 0.050),
+    (0.030, 0.018), (0.095, 0.025), (0.138, 0.027), (0.163, 0.028), (0.183, 0.028),
+    (0.030, 0.005), (0.095, 0.004), (0.141, 0.004), (0.170, 0.004), (0.191, 0.004),
+    (0.030, -0.008), (0.090, -0.015), (0.133, -0.016), (0.160, -0.017), (0.180, -0.017),
+    (0.030, -0.020), (0.082, -0.034), (0.115, -0.037), (0.135, -0.038), (0.153, -0.039)]
+# Half the thickness of a hand, how far each palm presses into the cube, and where the hands begin: so far from the
+# cube, above the table and behind the cube, m.
+HALF_HAND_M, PRESS_M, APART_M, ABOVE_M, BEHIND_M = 0.011, 0.008, 0.05, 0.035, 0.085
+LIFT_M = 0.06
+
+
+def share(frame, first, last):
+    """Gentle way from 0 to 1 between two frames."""
+    t = min(max((frame - first) / (last - first), 0), 1)
+    return t * t * (3 - 2 * t)
+
+
+def palms():
+    """Frames of two upright hands that press a cube between their palms and lift it, for the fake headset."""
+    hands = {"right": [], "left": []}
+    for frame in range(90):
+        x = EDGE_M / 2 + HALF_HAND_M - PRESS_M + APART_M * (1 - share(frame, 10, 35))
+        y = ABOVE_M + LIFT_M * share(frame, 40, 70)
+        for side, sign in (("right", 1), ("left", -1)):
+            joints = [(sign * x, y + up, BEHIND_M - ahead) for ahead, up in FLAT_HAND]
+            hands[side].append([[round(1e4 * place) for place in joint] for joint in joints])
+    return hands
+
+
+def enter(browser, address, hands):
+    """Opens the page and enters the fake headset with these hands, until both eyes see the run and them."""
+    browser.before_every_page((HERE / "fake_headset.js").read_text())
+    browser.before_every_page(f"window.fakeHands = {json.dumps(hands)};")
+    browser.open(address)
+    browser.until("window.softgrasp && softgrasp.figures.drawn > 3 && softgrasp.scene.picture")
+    browser.until("[...softgrasp.scene.textures.values()].every((t) => t)")
+    browser.until("softgrasp.figures.status.server === 'connected' && !softgrasp.figures.status.preparing")
+    browser.until("!document.getElementById('enter').hidden")
+    browser.value("document.getElementById('enter').click()")
+    browser.until("softgrasp.figures.stereo > 10")
+    browser.until(f"softgrasp.scene.picture.hands.length === {len(hands)}")
+    check(browser.value("softgrasp.scene.picture.hands.every((hand) => softgrasp.scene.hands.has(hand.version))"),
+          "a hand has no skin")
+
+
+def two_hands(client, program, folder, pictures):
+    """Both tracked hands of a headset lift a cube between their palms."""
+    run = Run(client, folder, *CUBE, "--hand", "xr", "--grasp", "contact", "--shading", "plain")
+    browser = Browser(program, folder, (960, 480), 0.5)
+    try:
+        enter(browser, run.address, palms())
+        check(browser.value("new Set(softgrasp.scene.picture.hands.map((hand) => hand.version)).size") == 2,
+              "both hands have one skin")
+        lift(browser)
+        browser.picture(f"{pictures}/two-hands.png")
+        # Where the palms are drawn: a bone is a dual quaternion, its turn and half of its shift times the turn.
+        drawn = json.loads(browser.value(
+            "JSON.stringify(softgrasp.scene.picture.hands.map(({bones: [x, y, z, w, dx, dy, dz, dw]}) =>"
+            "2 * (dx * w - dw * x + dz * y - dy * z)))"))
+        say(f"two hands: palms drawn at {drawn[0]:.3f} and {drawn[1]:.3f} m")
+        check(drawn[0] > 0.02 and drawn[1] < -0.02, "a hand is drawn on the wrong side")
+        check(browser.value("softgrasp.figures.faults") == [], browser.value("softgrasp.figures.faults"))
+        check(run.end() == 0, f"the run ended with {run.process.returncode}:\n{run.said()}")
+    finally:
+        browser.close()
+        run.end()
+
+
 def headset(client, program, folder, pictures):
     """The tracked hand of a headset lifts the strawberry; the connection is lost and comes back."""
-    run = Run(client, folder, "--hand", "xr", "--grasp", "contact", "--shading", "plain")
+    run = Run(client, folder, *STRAWBERRY, "--hand", "xr", "--grasp", "contact", "--shading", "plain")
     # The processor draws: with fewer pixels pictures come often enough for a hand that holds something.
     browser = Browser(program, folder, (960, 480), 0.5)
     try:
-        browser.before_every_page((HERE / "fake_headset.js").read_text())
-        hand = json.loads((HERE / "lifting_hand.json").read_text())
-        browser.before_every_page(f"window.fakeHand = {json.dumps(hand)};")
-        browser.open(run.address)
-        browser.until("window.softgrasp && softgrasp.figures.drawn > 3 && softgrasp.scene.picture")
-        browser.until("[...softgrasp.scene.textures.values()].every((t) => t)")
-        browser.until("softgrasp.figures.status.server === 'connected' && !softgrasp.figures.status.preparing")
-        browser.until("!document.getElementById('enter').hidden")
-        browser.value("document.getElementById('enter').click()")
-        browser.until("softgrasp.figures.stereo > 10")
-        browser.until("softgrasp.scene.picture.hands.length === 1")
-        check(browser.value("softgrasp.scene.picture.hands.every((hand) => softgrasp.scene.hands.has(hand.version))"),
-              "a hand has no skin")
+        enter(browser, run.address, {"right": json.loads((HERE / "lifting_hand.json").read_text())})
         picture_of_scene(browser, f"{pictures}/headset-before.png")
         for name, share in eyes(f"{pictures}/headset-before.png").items():
             say(f"{name} eye: {share} of it is as red as the strawberry")
@@ -243,7 +305,7 @@ def headset(client, program, folder, pictures):
 def main():
     client, folder, pictures = sys.argv[1:4]
     program = os.environ["BROWSER_PROGRAM"]
-    for part in (flat, headset):
+    for part in (flat, headset, two_hands):
         say(part.__doc__.split(";")[0].rstrip("."))
         part(client, program, folder, pictures)
 
