@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Opens the page of a run in a headless browser: flat, then with a fake headset whose tracked hand lifts
-# a strawberry, then again after the connection was lost, then with both hands, which lift a cube. Ends with 0 when all of it holds, and with 0
-# and one line where there is no browser and none can be installed.
+# Opens the page of a run in a headless browser: flat, then with a fake headset whose tracked hand lifts a
+# strawberry, then again after the connection was lost, then with both hands, which lift a cube. Ends with 0
+# when all of it holds, and with 0 and one line where there is no browser and none can be installed.
 #
 #   BIN_DIR=target/debug tests/xr/run.sh [FOLDER]     keeps the pictures of the page in FOLDER
 set -euo pipefail
