@@ -123,7 +123,8 @@ impl LargeBody {
         self.tangent.clone()
     }
 
-    /// Factors the tangent at a shape, with as little added to it as it takes.
+    /// Factors the tangent at a shape, with as little added to it as it takes; for a steady one, until every
+    /// motion of the free body takes energy.
     ///
     /// A pressed body that a few nodes hold would rather turn about them than be pressed: that alone
     /// leaves most tangents without a factor. Springs at all nodes, in proportion to their masses, hold
@@ -132,6 +133,7 @@ impl LargeBody {
         &mut self,
         elasticity: Elasticity<'_>,
         displacement: &[f64],
+        is_steady: bool,
     ) -> Result<Arc<FreeTangent>, CondensedError> {
         let Elasticity { base, body, columns } = elasticity;
         let of = |curvature| self.elements().tangent(&self.pattern, displacement, curvature);
@@ -143,16 +145,20 @@ impl LargeBody {
             sprung
         };
         let bound = columns.bound();
+        let is_refused = |made: &Result<FreeTangent, CondensedError>| match made {
+            Ok(made) => is_steady && !made.takes_energy(),
+            Err(error) => matches!(error, CondensedError::NotPositiveDefinite { .. }),
+        };
         let mut made = FreeTangent::try_new(base, body, &tangent, bound);
         for share in SPRINGS {
-            if matches!(made, Err(CondensedError::NotPositiveDefinite { .. })) {
+            if is_refused(&made) {
                 made = FreeTangent::try_new(base, body, &sprung(share), bound);
             }
         }
-        if matches!(made, Err(CondensedError::NotPositiveDefinite { .. })) {
+        if is_refused(&made) {
             let positive = of(Curvature::PositivePart);
             for share in POSITIVE_SHARES {
-                if matches!(made, Err(CondensedError::NotPositiveDefinite { .. })) {
+                if is_refused(&made) {
                     let mut blended = tangent.clone();
                     blended.blend(&positive, share);
                     made = FreeTangent::try_new(base, body, &blended, bound);
@@ -271,7 +277,7 @@ impl LargeBody {
             if left <= SHAPE_RESIDUAL || is_rounding || !left.is_finite() {
                 break;
             }
-            let tangent = self.factor_at(elasticity, displacement)?;
+            let tangent = self.factor_at(elasticity, displacement, false)?;
             let off: Vec<f64> =
                 applied.iter().zip(&balance.holding).map(|(f, holding)| f - holding).collect();
             let step = tangent.apply(elasticity.base, elasticity.body, &off);

@@ -86,7 +86,7 @@ impl LargeStep<'_, '_> {
         let whole = self.advance_shape(state, wanted);
         let is_lost = match &whole {
             Ok(whole) => whole.residual_rel > LOST || whole.contact_residual_rel > LOST,
-            Err(error) => *error == StepError::InsideOut,
+            Err(error) => matches!(error, StepError::InsideOut | StepError::Problem(_)),
         };
         if halvings == 0 || !is_lost {
             return whole.inspect(|_| self.body.flow());
@@ -128,7 +128,10 @@ impl LargeStep<'_, '_> {
             effort: Effort::default(),
         };
         while progress.effort.shapes < SHAPES_MAX && progress.no_nearer < NO_NEARER_MAX {
-            let end = self.next_end(&scene, &rows, &mut progress)?;
+            let end = match self.next_end(&scene, &rows, &mut progress) {
+                Err(StepError::Problem(_)) if progress.best.is_some() => break,
+                end => end?,
+            };
             if self.take(&scene, end, &mut progress) {
                 break;
             }
@@ -148,7 +151,7 @@ impl LargeStep<'_, '_> {
     ) -> Result<End, StepError> {
         let tangent = match self.body.tangent().filter(|_| !progress.is_stale) {
             Some(kept) => kept,
-            None => self.body.factor_at(self.step.elasticity, &progress.about)?,
+            None => self.body.factor_at(self.step.elasticity, &progress.about, false)?,
         };
         let start_rows = at_rows(rows, &progress.about);
         let start = Configured {
@@ -157,8 +160,16 @@ impl LargeStep<'_, '_> {
             body_forces: &progress.body_forces,
         };
         let held = std::mem::take(&mut progress.held);
-        let about = (progress.about.as_slice(), &tangent, rows);
-        let end = self.end_about(scene, about, (held, &start), INEXACT * progress.left)?;
+        let (about, exactness) = (progress.about.as_slice(), INEXACT * progress.left);
+        let asked = (held.clone(), &start);
+        let end = match self.end_about(scene, (about, &tangent, rows), asked, exactness) {
+            // The shape would give way by itself: a node goes against the force on it, and contact has no answer.
+            Err(StepError::Problem(_)) if !tangent.takes_energy() => {
+                let steady = self.body.factor_at(self.step.elasticity, about, true)?;
+                self.end_about(scene, (about, &steady, rows), (held, &start), exactness)?
+            }
+            end => end?,
+        };
         progress.effort.see(&end.found);
         Ok(end)
     }

@@ -18,6 +18,8 @@
 
 mod assemble;
 mod bodies;
+#[cfg(test)]
+mod buckling_tests;
 mod carried;
 #[cfg(test)]
 mod carried_tests;

@@ -15,7 +15,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::{DVector, Dyn, LU};
+use nalgebra::{DMatrix, DVector, Dyn, LU};
 use rayon::prelude::*;
 
 use super::base::Base;
@@ -39,6 +39,8 @@ pub struct FreeTangent {
     answered: Vec<Vec<f64>>,
     /// Motion of the held degrees of freedom and acceleration, from what the held body misses.
     small: LU<f64, Dyn, Dyn>,
+    /// Whether every motion of the free body but the rigid ones takes energy.
+    takes_energy: bool,
     kept: Mutex<BTreeMap<u32, Arc<ContactColumns>>>,
     /// Bytes that columns may take.
     bound: usize,
@@ -69,7 +71,7 @@ impl FreeTangent {
             field[dof as usize] = 1.0;
         }
         let z = following.len();
-        let mut small = nalgebra::DMatrix::zeros(z + 6, z + 6);
+        let mut small = DMatrix::zeros(z + 6, z + 6);
         for (j, field) in following.iter().enumerate() {
             let forces = tangent.mul(field);
             for (i, &dof) in base.held.iter().enumerate() {
@@ -85,8 +87,15 @@ impl FreeTangent {
             let mean = body.mean_motion(field);
             (0..6).for_each(|axis| small[(z + axis, z + j)] = -mean[axis]);
         }
+        let takes_energy = negative_eigenvalues(&small) <= 6;
         let (answered, small) = (solved, small.lu());
-        Ok(Self { factor, following, answered, small, kept: Mutex::default(), bound })
+        Ok(Self { factor, following, answered, small, takes_energy, kept: Mutex::default(), bound })
+    }
+
+    /// Whether every motion of the free body but the rigid ones takes energy, so that each node yields to a
+    /// force along it. A pressed body may have a factor while it is held, and none of that free.
+    pub fn takes_energy(&self) -> bool {
+        self.takes_energy
     }
 
     /// The change of the shape under a change of the forces at all nodes.
@@ -192,6 +201,16 @@ impl FreeTangent {
     }
 }
 
+/// Negative eigenvalues of a symmetric matrix. By Sylvester's law of inertia those of the small system are six
+/// where the tangent is positive definite on motions without a mean: the six accelerations.
+fn negative_eigenvalues(matrix: &DMatrix<f64>) -> usize {
+    // Metres and radians beside newtons: equal scales keep the signs of small ones.
+    let size = matrix.diagonal().map(|x| x.abs().sqrt().max(f64::MIN_POSITIVE));
+    let scaled = matrix.map_with_location(|i, j, x| x / (size[i] * size[j]));
+    // Written so that what is no number counts as negative.
+    scaled.symmetric_eigenvalues().iter().filter(|&&eigenvalue| !(eigenvalue >= 0.0)).count()
+}
+
 /// One column of a stiffness.
 fn column(stiffness: &Stiffness, dof: u32) -> Vec<f64> {
     let mut unit = vec![0.0; 3 * stiffness.node_count()];
@@ -247,7 +266,7 @@ mod tests {
         // What is left of the balance is a sum of the six columns of M R.
         let held = tangent.mul(&z);
         let left: Vec<f64> = forces.iter().zip(&held).map(|(f, k)| f - k).collect();
-        let loads = nalgebra::DMatrix::from_columns(
+        let loads = DMatrix::from_columns(
             &body.mean_loads().into_iter().map(DVector::from_vec).collect::<Vec<_>>(),
         );
         let left = DVector::from_vec(left);
