@@ -207,8 +207,11 @@ fn negative_eigenvalues(matrix: &DMatrix<f64>) -> usize {
     // Metres and radians beside newtons: equal scales keep the signs of small ones.
     let size = matrix.diagonal().map(|x| x.abs().sqrt().max(f64::MIN_POSITIVE));
     let scaled = matrix.map_with_location(|i, j, x| x / (size[i] * size[j]));
-    // Written so that what is no number counts as negative.
-    scaled.symmetric_eigenvalues().iter().filter(|&&eigenvalue| !(eigenvalue >= 0.0)).count()
+    // What is no number has no sign, and no eigenvalues that a search for them ends at.
+    match scaled.iter().all(|x| x.is_finite()) {
+        true => scaled.symmetric_eigenvalues().iter().filter(|x| **x < 0.0).count(),
+        false => scaled.nrows(),
+    }
 }
 
 /// One column of a stiffness.
