@@ -206,7 +206,7 @@ HALF_HAND_M, PRESS_M, APART_M, ABOVE_M, BEHIND_M = 0.011, 0.008, 0.05, 0.035, 0.
 LIFT_M = 0.06
 
 
-def share(frame, first, last):
+def way(frame, first, last):
     """Gentle way from 0 to 1 between two frames."""
     t = min(max((frame - first) / (last - first), 0), 1)
     return t * t * (3 - 2 * t)
@@ -216,8 +216,8 @@ def palms():
     """Frames of two upright hands that press a cube between their palms and lift it, for the fake headset."""
     hands = {"right": [], "left": []}
     for frame in range(90):
-        x = EDGE_M / 2 + HALF_HAND_M - PRESS_M + APART_M * (1 - share(frame, 10, 35))
-        y = ABOVE_M + LIFT_M * share(frame, 40, 70)
+        x = EDGE_M / 2 + HALF_HAND_M - PRESS_M + APART_M * (1 - way(frame, 10, 35))
+        y = ABOVE_M + LIFT_M * way(frame, 40, 70)
         for side, sign in (("right", 1), ("left", -1)):
             joints = [(sign * x, y + up, BEHIND_M - ahead) for ahead, up in FLAT_HAND]
             hands[side].append([[round(1e4 * place) for place in joint] for joint in joints])

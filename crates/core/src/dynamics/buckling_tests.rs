@@ -1,50 +1,25 @@
 //! A column that buckles between two plates: the tangent of its shape is that of a body that would give way by
 //! itself.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::tests::{Object, at, table};
 use super::*;
 use crate::fem::hyperelastic::Law;
-use crate::mesh::TetMesh;
+use crate::mesh::samples::block;
 use crate::rigid_body::RigidShape;
 
-/// Cells across and along the column, the edge of one, m, and Young's modulus, Pa.
-const ACROSS: usize = 2;
-const ALONG: usize = 16;
-const EDGE: f64 = 0.006;
+/// Width, height, m, and Young's modulus, Pa, of the column.
+const WIDTH: f64 = 0.012;
+const HEIGHT: f64 = 8.0 * WIDTH;
 const YOUNG: f64 = 5.0e4;
-const WIDTH: f64 = ACROSS as f64 * EDGE;
-const HEIGHT: f64 = ALONG as f64 * EDGE;
 
-/// A column on the ground of cubes of six tetrahedra each: one for each order in which a path along three edges
-/// goes from one corner to the opposite one.
+/// A column on the ground, two cells wide.
 fn column() -> Object {
-    let node = |[x, y, z]: [usize; 3]| ((z * (ACROSS + 1) + y) * (ACROSS + 1) + x) as u32;
-    let place = |n: usize| {
-        let (x, y) = (n % (ACROSS + 1), n / (ACROSS + 1) % (ACROSS + 1));
-        let z = n / (ACROSS + 1).pow(2);
-        Point3::new(x as f64 * EDGE - 0.5 * WIDTH, y as f64 * EDGE - 0.5 * WIDTH, z as f64 * EDGE)
-    };
-    let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 0, 2], [2, 1, 0]];
-    let tet = |cell: [usize; 3], order: [usize; 3]| {
-        let mut at = cell;
-        let mut nodes = [node(at); 4];
-        for (n, axis) in order.into_iter().enumerate() {
-            at[axis] += 1;
-            nodes[n + 1] = node(at);
-        }
-        // Three of the orders are mirror images of the others.
-        if (order[0] + 1) % 3 == order[1] {
-            nodes.swap(2, 3);
-        }
-        nodes
-    };
-    let cells =
-        (0..ACROSS * ACROSS * ALONG).map(|n| [n % ACROSS, n / ACROSS % ACROSS, n / ACROSS.pow(2)]);
-    let tets = cells.flat_map(|cell| orders.map(|order| tet(cell, order))).collect();
-    let vertices = (0..(ACROSS + 1).pow(2) * (ALONG + 1)).map(place).collect();
-    Object::new(TetMesh::try_new(vertices, tets, vec![]).unwrap(), YOUNG, 0.4)
+    let mesh = block(2, 16);
+    let aside = Vector3::new(0.5 * WIDTH, 0.5 * WIDTH, 0.0);
+    let vertices = mesh.vertices().iter().map(|p| p * WIDTH - aside).collect();
+    Object::new(mesh.with_vertices(vertices).unwrap(), YOUNG, 0.4)
 }
 
 /// A plate with its lower face at some height and some way aside at the beginning of a step and at its end.

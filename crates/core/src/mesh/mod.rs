@@ -5,6 +5,8 @@ mod folds;
 mod generate;
 mod inversion;
 mod quality;
+#[cfg(test)]
+pub(crate) mod samples;
 mod surface;
 mod tet_mesh;
 

@@ -61,8 +61,8 @@ impl KeptGrip {
     /// holds the object without.
     ///
     /// Friction is to hold the object as many times over as where the scripted hand lifts. With a share s of its
-    /// displacement left the object presses with s of its force in the place where it is,
-    /// and hand and object go to the equilibrium of their springs in series: the forces become the part
+    /// displacement left the object presses with s of its force in the place where it is, and hand and object
+    /// go to the equilibrium of their springs in series: the forces become the part
     /// `(given_way + s pressed_in)/(given_way + pressed_in)` of what they were.
     pub(crate) fn share_left(&self) -> f64 {
         let pressed_in: f64 = self.contacts.iter().map(|c| c.force.dot(&c.displacement)).sum();

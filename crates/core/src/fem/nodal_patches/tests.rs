@@ -1,9 +1,10 @@
 //! Tests of averaged nodal pressure: energy written out, patch test, a block on which t4 locks.
 
-use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use proptest::prelude::*;
 
 use crate::fem::{Element, Material, QuadraticMesh, Stiffness, dof, tet4};
+use crate::mesh::samples::block;
 use crate::mesh::{BuiltIn, TetMesh, generate};
 use crate::model::Model;
 use crate::solve::{Factored, Loads, Method, Partition};
@@ -140,33 +141,6 @@ fn pushed_block(element: Element, cells: usize, nu: f64) -> f64 {
     let loads = Loads { q_known: &q_known, ..Loads::default() };
     let solution = factored.solve(&k, loads, &mut |_| {}).unwrap();
     1.0 / solution.reaction.iter().zip(&q_known).map(|(f, q)| f * q).sum::<f64>()
-}
-
-/// `a` × `a` × `b` cells of edge 1 / `a`, six tetrahedra each.
-fn block(a: usize, b: usize) -> TetMesh {
-    let at = |i: usize, j: usize, k: usize| (i + (a + 1) * (j + (a + 1) * k)) as u32;
-    let mut vertices = Vec::new();
-    for (k, j, i) in
-        (0..=b).flat_map(|k| (0..=a).flat_map(move |j| (0..=a).map(move |i| (k, j, i))))
-    {
-        vertices.push(Point3::new(i as f64, j as f64, k as f64) / a as f64);
-    }
-    let mut tets = Vec::new();
-    for (k, j, i) in (0..b).flat_map(|k| (0..a).flat_map(move |j| (0..a).map(move |i| (k, j, i)))) {
-        for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-            let mut corner = [i, j, k];
-            let mut tet = [at(i, j, k); 4];
-            for (position, axis) in axes.into_iter().enumerate() {
-                corner[axis] += 1;
-                tet[position + 1] = at(corner[0], corner[1], corner[2]);
-            }
-            if crate::mesh::signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
-                tet.swap(0, 1);
-            }
-            tets.push(tet);
-        }
-    }
-    TetMesh::try_new(vertices, tets, vec![]).unwrap()
 }
 
 /// At ν = 0.4999 the plain element is off by tens of per cent, this one by less than 5 % of what
