@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # Other systems than Linux on x86_64, from a Debian 13 of its own, whose compiler builds their standard libraries
-# from source: whether every published crate compiles for Windows, macOS and ARM, and whether the programs give
-# the same answers on ARM (under qemu) and Windows (under Wine) as here. Ends with 0 when all of it holds, and
-# with 0 and one line where a part is missing.
+# from source: whether every published crate compiles for Windows, macOS and ARM, whether the core's tests of its
+# vector kernels hold with ARM's vectors (NEON, under qemu), and whether the programs give the same answers on ARM
+# (under qemu) and Windows (under Wine) as here. Ends with 0 when all of it holds, and with 0 and one line where a
+# part is missing.
 #
 #   tests/platforms/run.sh                      all of it: a Debian (10 GB with what is built there, thrown away
 #                                               afterwards), three checks and two builds: an hour on two cores
 #   PLATFORMS_ROOT=DIR tests/platforms/run.sh   keeps that Debian and what was built in DIR, or takes what is there
-#   ONLY="check" …  ONLY="arm windows" …        some parts of it
+#   ONLY="check" …  ONLY="kernels arm" …        some parts of it: check, kernels, arm and windows
 #   BIN_DIR=DIR tests/platforms/run.sh          compares with the glove-client of this system that is there
 #
 # Of macOS nothing is linked and nothing run: the C parts of dependencies are left out, as their compiler wants
@@ -18,8 +19,9 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 source tests/script.sh platforms
 
 mirror="${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
-only=" ${ONLY:-check arm windows} "
+only=" ${ONLY:-check kernels arm windows} "
 published="core grasp protocol os telemetry hand window xr force emulator"
+qemu="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
 windows=x86_64-pc-windows-gnu arm=aarch64-unknown-linux-gnu mac=aarch64-apple-darwin
 
 [ "$(id -u)" = 0 ] || skip "a Debian of its own needs root"
@@ -87,17 +89,18 @@ copy_source() {
         tar --extract --directory="$root/softgrasp"
 }
 
-# other_cargo TARGET ARGUMENT…: cargo for another system, whose standard library is compiled too.
+# other_cargo TARGET COMMAND ARGUMENT…: cargo for another system, whose standard library is compiled too.
 other_cargo() {
-    local target=$1
-    shift
+    local target=$1 command=$2
+    shift 2
     # The stable compiler takes `-Z` when it is asked to compile its own library.
     inside env RUSTC_BOOTSTRAP=1 CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=0 CARGO_TARGET_DIR=/target \
         CC_aarch64_apple_darwin=no-cc AR_aarch64_apple_darwin=no-ar RANLIB_aarch64_apple_darwin=true \
         SDKROOT=/usr/share \
         CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
+        CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="$qemu" \
         CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER=x86_64-w64-mingw32-gcc \
-        cargo "$@" --manifest-path /softgrasp/Cargo.toml -Z build-std --target "$target" --locked
+        cargo "$command" --manifest-path /softgrasp/Cargo.toml -Z build-std --target "$target" --locked "$@"
 }
 
 # checked TARGET: every published crate compiles, without a warning of its own.
@@ -127,6 +130,21 @@ case $only in *" check "*)
     checked "$windows"
     checked "$mac"
     checked "$arm"
+    ;;
+esac
+
+# -- Vector kernels
+
+# Modules of the core that compute by the processor's vectors; each test compares them with plain loops, with
+# dense algebra or with closed forms.
+kernels="solve::front solve::direct solve::condensed solve::multigrid fem::hyperelastic::groups fem::products
+    contact::coulomb"
+
+case $only in *" kernels "*)
+    # shellcheck disable=SC2086  # a word for each module
+    other_cargo "$arm" test --package softgrasp-core --lib -- $kernels >"$work/kernels.log" 2>&1 ||
+        fail "tests of the vector kernels on ARM"
+    say "on ARM: $(grep '^test result' "$work/kernels.log")"
     ;;
 esac
 
@@ -180,7 +198,8 @@ esac
 
 case $only in *" arm "*)
     built "$arm"
-    asked arm qemu-aarch64-static -L /usr/aarch64-linux-gnu "/target/$arm/debug/glove-client"
+    # shellcheck disable=SC2086  # the emulator's words
+    asked arm $qemu "/target/$arm/debug/glove-client"
     compared arm
     ;;
 esac

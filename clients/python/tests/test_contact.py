@@ -14,6 +14,7 @@ from softgrasp import (
     Material,
     Mesh,
     Model,
+    NotCapable,
     ObjectState,
     Plane,
     Pose,
@@ -100,16 +101,21 @@ def test_little_friction_lets_a_tilted_table_keep_nothing(block: KeptModel) -> N
     assert np.linalg.norm(state.velocity) < 0.05 * speed
 
 
-@pytest.mark.parametrize("what", ["box", "capsule", "surface"])
+@pytest.mark.parametrize("what", ["box", "rounded box", "capsule", "surface", "rounded surface"])
 def test_all_shapes_carry(block: KeptModel, what: str) -> None:
     box = Mesh.block((0.2, 0.2, 0.02), (1, 1, 1))
     shapes = {
         "box": (Box((0.1, 0.1, 0.01)), Pose((0.02, 0.015, -0.01))),
+        "rounded box": (Box((0.1, 0.1, 0.01), 0.01), Pose((0.02, 0.015, -0.01))),
         "capsule": (
             Capsule(1.0, 0.5),
             Pose.about((1.0, 0.0, 0.0), np.pi / 2, (0.02, 0.015, -1.0)),
         ),
         "surface": (ClosedSurface(box.points, box.boundary), Pose((-0.08, -0.085, -0.02))),
+        "rounded surface": (
+            ClosedSurface(box.points, box.boundary, 0.005),
+            Pose((-0.08, -0.085, -0.025)),
+        ),
     }
     shape, pose = shapes[what]
     state = ObjectState()
@@ -118,6 +124,20 @@ def test_all_shapes_carry(block: KeptModel, what: str) -> None:
         state = answer.state
     weight = DENSITY * block.model.mesh.volume * G
     assert answer.loads.forces[0, 2] == pytest.approx(weight, rel=0.02)
+
+
+def test_an_older_server_is_not_sent_rounded_bodies(
+    server: Server, block: KeptModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = server.capabilities
+    older = server.welcome.__class__(
+        **{**server.welcome.__dict__, "capabilities": known - {"rounded-bodies"}}
+    )
+    monkeypatch.setattr(server, "_welcome", older)
+    step, half = ContactStep(0.01, DENSITY), (0.1, 0.1, 0.01)
+    block.contact_frame(ObjectState(), [Body(Box(half))], step)
+    with pytest.raises(NotCapable, match="rounded-bodies"):
+        block.contact_frame(ObjectState(), [Body(Box(half, 0.001))], step)
 
 
 def test_candidates_are_near(bar: Bar) -> None:

@@ -46,6 +46,7 @@ REQUESTS += [
     "Drop",
     "Ping",
     "ContactFrame",
+    "ContactFrame-rounded",
 ]
 NAME = bytes(0xA0 ^ k for k in range(32))
 POINTS = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0, 0, 0]]
@@ -71,10 +72,11 @@ def curved() -> Model:
     return Model(mesh, {7: MATERIAL, 2: MATERIAL}, "t10")
 
 
-def contact_frame() -> calls.Call:
+def contact_frame(of_mesh: float = 0.0, of_box: float = 0.0) -> calls.Call:
     surface = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2]]
-    closed = ClosedSurface(surface[0], [*surface[1], [1, 2, 3]])
-    shapes = [Plane((0, 0, 1)), Capsule(0.008, 0.03), closed, Sphere(0.5), Box((0.5, 0.25, 0.125))]
+    closed = ClosedSurface(surface[0], [*surface[1], [1, 2, 3]], of_mesh)
+    shapes = [Plane((0, 0, 1)), Capsule(0.008, 0.03), closed, Sphere(0.5)]
+    shapes.append(Box((0.5, 0.25, 0.125), of_box))
     bodies = [Body(shape, friction=0.5) for shape in shapes]
     state = ObjectState(
         Pose((0.5, 0.25, -0.125)),
@@ -137,6 +139,7 @@ def requests() -> dict[str, calls.Call]:
         "Drop": calls.drop(NAME),
         "Ping": calls.ping(0x0123456789ABCDEF),
         "ContactFrame": contact_frame(),
+        "ContactFrame-rounded": contact_frame(0.25, 0.0625),
     }
 
 

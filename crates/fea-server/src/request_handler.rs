@@ -60,7 +60,7 @@ pub(crate) struct RequestHandler {
 }
 
 /// Names of this server's capabilities, for `Welcome`.
-const CAPABILITIES: [&str; 12] = [
+const CAPABILITIES: [&str; 13] = [
     "large",
     "cases",
     "contact",
@@ -73,6 +73,7 @@ const CAPABILITIES: [&str; 12] = [
     "loads",
     "mid-edge",
     "gradients",
+    "rounded-bodies",
 ];
 /// The capability of a server with an engine beside it.
 const CLUSTER: &str = "cluster";

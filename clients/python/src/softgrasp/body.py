@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,11 +63,15 @@ class Box:
 
     half: ArrayLike
     """Half its edges, m: x, y, z."""
+    radius: float = 0.0
+    """Radius of its edges and corners, which are rounded within its sizes, m; 0 leaves them sharp.
+    Contact with rounded ones converges better. Above 0 it needs the capability `rounded-bodies`."""
 
     def distance(self, points: Floats) -> Floats:
-        """Distance of points of the body's frame, m; 0 inside."""
-        outside = np.maximum(np.abs(points) - vector(self.half, "half the edges of a box"), 0.0)
-        away: Floats = np.linalg.norm(outside, axis=1)
+        """Distance of points of the body's frame, m; 0 or below inside."""
+        inner = vector(self.half, "half the edges of a box") - self.radius
+        outside = np.maximum(np.abs(points) - inner, 0.0)
+        away: Floats = np.linalg.norm(outside, axis=1) - self.radius
         return away
 
 
@@ -79,8 +83,12 @@ class ClosedSurface:
     """Corners, m; shape (corners, 3)."""
     triangles: Numbers
     """Corners of each triangle; shape (triangles, 3)."""
+    radius: float
+    """All points within this radius of the inside belong to it, m: its edges are rounded; 0 leaves them
+    sharp. Contact with rounded ones converges better. Above 0 it needs the capability `rounded-bodies`."""
 
-    def __init__(self, points: ArrayLike, triangles: ArrayLike) -> None:
+    def __init__(self, points: ArrayLike, triangles: ArrayLike, radius: float = 0.0) -> None:
+        object.__setattr__(self, "radius", radius)
         object.__setattr__(self, "points", floats(points, "corners", 3))
         object.__setattr__(self, "triangles", numbers(triangles, "triangles", 3))
         if not len(self.triangles) or int(self.triangles.max()) >= len(self.points):
@@ -90,7 +98,7 @@ class ClosedSurface:
         """Distance of points of the body's frame from the box around the surface, m."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         outside = np.maximum(np.maximum(low - points, points - high), 0.0)
-        away: Floats = np.linalg.norm(outside, axis=1)
+        away: Floats = np.linalg.norm(outside, axis=1) - self.radius
         return away
 
 
@@ -127,12 +135,16 @@ class Body:
 
 
 def body_arrays(bodies: Sequence[Body]) -> tuple[NDArray[Any], ...]:
-    """Kinds, numbers, and sizes, corners and triangles of the surfaces, as they travel."""
+    """Kinds, numbers, radii of rounded bodies, and sizes, corners and triangles of the surfaces, as they
+    travel."""
     kinds: list[int] = []
     rows: list[Floats] = []
+    radii: list[float] = []
     surfaces: list[ClosedSurface] = []
     for body in bodies:
         kind, sizes = _kind_and_sizes(body.shape)
+        if _is_rounded(body.shape):
+            radii.append(body.shape.radius)
         if isinstance(body.shape, ClosedSurface):
             surfaces.append(body.shape)
         poses = (body.start.numbers, body.at_end.numbers)
@@ -142,10 +154,20 @@ def body_arrays(bodies: Sequence[Body]) -> tuple[NDArray[Any], ...]:
     return (
         np.array(kinds, dtype=U32),
         np.array(rows, dtype=F64).reshape(-1, 19),
+        np.array(radii, dtype=F64),
         np.array(counts, dtype=U32),
         np.concatenate([np.zeros((0, 3)), *(surface.points for surface in surfaces)]),
         np.concatenate([np.zeros((0, 3), U32), *(surface.triangles for surface in surfaces)]),
     )
+
+
+def body_needs(bodies: Sequence[Body]) -> frozenset[str]:
+    """Capabilities of a server that the shapes of bodies need."""
+    return frozenset({"rounded-bodies"} if any(_is_rounded(body.shape) for body in bodies) else ())
+
+
+def _is_rounded(shape: Shape) -> TypeGuard[Box | ClosedSurface]:
+    return isinstance(shape, Box | ClosedSurface) and shape.radius != 0.0
 
 
 def _reach(shape: Shape) -> float:
@@ -157,7 +179,7 @@ def _reach(shape: Shape) -> float:
     if isinstance(shape, Box):
         return float(np.linalg.norm(vector(shape.half, "half the edges of a box")))
     if isinstance(shape, ClosedSurface):
-        return float(np.linalg.norm(shape.points, axis=1).max())
+        return float(np.linalg.norm(shape.points, axis=1).max()) + shape.radius
     return 0.0
 
 
@@ -169,5 +191,5 @@ def _kind_and_sizes(shape: Shape) -> tuple[int, Floats]:
     if isinstance(shape, Plane):
         return 2, vector(shape.normal, "the normal of a plane")
     if isinstance(shape, Box):
-        return 3, vector(shape.half, "half the edges of a box")
-    return 4, np.zeros(3)
+        return 5 if _is_rounded(shape) else 3, vector(shape.half, "half the edges of a box")
+    return 6 if _is_rounded(shape) else 4, np.zeros(3)

@@ -23,7 +23,7 @@ from .answer import (
     read_several_answers,
 )
 from .arrays import NO_FLOATS, Floats, Numbers, floats, numbers
-from .body import Body
+from .body import Body, body_needs
 from .contact import (
     ContactAnswer,
     ContactStep,
@@ -232,7 +232,7 @@ def contact_frame(
     def read(reader: PayloadReader) -> ContactAnswer:
         return read_contact_answer(reader, of.mesh.node_count)
 
-    return Call(Kind.CONTACT_FRAME, payload, Kind.CONTACT_ANSWER, read)
+    return Call(Kind.CONTACT_FRAME, payload, Kind.CONTACT_ANSWER, read, body_needs(bodies))
 
 
 def prefetch(model: bytes, nodes: ArrayLike, masks: Sequence[Mask]) -> Call[None]:

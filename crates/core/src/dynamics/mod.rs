@@ -38,6 +38,8 @@ mod quadratic_tests;
 mod resultants;
 mod rigid_motion;
 mod rolling;
+#[cfg(test)]
+mod rounded_box_tests;
 mod rounds;
 mod settings;
 mod small_system;

@@ -2,6 +2,9 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
+/// Edges of a triangle, by the positions of their ends.
+pub(super) const EDGES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
+
 /// Weights of the corners of a triangle that make a point of it; not negative, their sum is one.
 pub type Barycentric = [f64; 3];
 
@@ -98,7 +101,7 @@ pub(super) fn of_triangle_and_segment(
     };
     consider(on_triangle(corners, from), 0.0);
     consider(on_triangle(corners, to), 1.0);
-    for (first, second) in [(0, 1), (1, 2), (2, 0)] {
+    for (first, second) in EDGES {
         let (s, t) = of_segments([&corners[first], &corners[second]], [from, to]);
         let mut weights = [0.0; 3];
         (weights[first], weights[second]) = (1.0 - s, s);
@@ -126,6 +129,47 @@ fn crossing(
     };
     let weights = [share(1, 2), share(2, 0), share(0, 1)];
     weights.iter().all(|w| *w >= 0.0).then_some((weights, t))
+}
+
+/// The point of a triangle that is closest to another triangle, and the square of the distance there; where
+/// they cross, a point at which an edge of one goes through the other.
+///
+/// Units: m².
+pub(super) fn on_triangle_to_triangle(
+    corners: &[Point3<f64>; 3],
+    other: &[Point3<f64>; 3],
+) -> (Barycentric, f64) {
+    let on_edge = |(a, b): (usize, usize), t: f64| {
+        let mut weights = [0.0; 3];
+        (weights[a], weights[b]) = (1.0 - t, t);
+        weights
+    };
+    let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
+    let mut consider = |weights: Barycentric, place: Point3<f64>| {
+        let square = (point_at(corners, &weights) - place).norm_squared();
+        if square < best.1 {
+            best = (weights, square);
+        }
+    };
+    // Corners first: of several nearest points one at a corner counts.
+    for (k, corner) in corners.iter().enumerate() {
+        consider(on_edge((k, (k + 1) % 3), 0.0), point_at(other, &on_triangle(other, corner)));
+    }
+    other.iter().for_each(|corner| consider(on_triangle(corners, corner), *corner));
+    for (a, b) in EDGES {
+        let (from, to) = (&corners[a], &corners[b]);
+        for (c, d) in EDGES {
+            let (s, t) = of_segments([from, to], [&other[c], &other[d]]);
+            consider(on_edge((a, b), s), other[c] + t * (other[d] - other[c]));
+        }
+        if let Some((_, t)) = crossing(other, from, to) {
+            return (on_edge((a, b), t), 0.0);
+        }
+        if let Some((weights, _)) = crossing(corners, &other[a], &other[b]) {
+            return (weights, 0.0);
+        }
+    }
+    best
 }
 
 /// Twice the area of a triangle along its normal; outward where the corners are counter-clockwise
@@ -181,6 +225,21 @@ mod tests {
             let found = (point_at(&corners, &on_triangle(&corners, &p)) - p).norm();
             for weights in lattice() {
                 prop_assert!(found <= (point_at(&corners, &weights) - p).norm() + 1e-12);
+            }
+        }
+
+        #[test]
+        fn no_points_of_two_triangles_are_closer(
+            corners in prop::array::uniform3(point()), other in prop::array::uniform3(point()),
+        ) {
+            let (weights, square) = on_triangle_to_triangle(&corners, &other);
+            let place = point_at(&corners, &weights);
+            let there = (point_at(&other, &on_triangle(&other, &place)) - place).norm();
+            prop_assert!((there - square.sqrt()).abs() < 1e-9, "{there} {}", square.sqrt());
+            for weights in lattice() {
+                let place = point_at(&corners, &weights);
+                let other = point_at(&other, &on_triangle(&other, &place));
+                prop_assert!(square.sqrt() <= (place - other).norm() + 1e-9);
             }
         }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
-use super::closest::{Barycentric, Deepest, SignedDistance, point_at};
+use super::closest::{Barycentric, Deepest, EDGES, SignedDistance, point_at};
 
 /// Pieces into which a triangle is cut at most while its deepest point is looked for.
 const PIECES_MAX: usize = 64;
@@ -61,7 +61,7 @@ pub(super) fn deepest_of(
         }
     }
     let mut best = descend(corners, best, at);
-    for (first, second) in [(0, 1), (1, 2), (2, 0)] {
+    for (first, second) in EDGES {
         let on_edge = deepest_on_edge(first, second, at);
         if on_edge.distance.distance < best.distance.distance {
             best = on_edge;

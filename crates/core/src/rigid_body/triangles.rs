@@ -1,14 +1,14 @@
 //! A rigid body with a closed surface of triangles: a tool, a robot's finger.
 
-use std::collections::BTreeMap;
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
-use nalgebra::{Point3, Unit, Vector3};
-
-use super::closest::{Barycentric, area_normal, on_triangle, point_at};
-use super::closest::{Deepest, SignedDistance};
+use super::closed_surface::{RigidMeshError, check_closed, pseudonormals, welded};
+use super::closest::{
+    Barycentric, Deepest, SignedDistance, on_triangle, on_triangle_to_triangle, point_at,
+};
 use super::deepest::deepest_of;
 
-/// The inside of a closed surface of triangles.
+/// The inside of a closed surface of triangles, and all points within a radius of it.
 ///
 /// Shapes: `boxes` a binary tree of bounding boxes over `order`, children of i at 2i + 1 and 2i + 2.
 /// Units: m. Frame: the body's.
@@ -22,6 +22,8 @@ pub struct RigidMesh {
     boxes: Vec<Node>,
     reach: f64,
     thickness: f64,
+    /// Radius by which the body goes beyond its triangles: that of its edges and corners; 0 where they are sharp.
+    radius: f64,
 }
 
 /// A box of the tree and the triangles in it.
@@ -36,51 +38,13 @@ struct Node {
     second: usize,
 }
 
-/// Why triangles bound no rigid body.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RigidMeshError {
-    /// No triangle with an area.
-    #[error("the surface has no triangle with an area")]
-    Empty,
-    /// A corner that is not there.
-    #[error("triangle {triangle} names vertex {vertex}, but there are {vertex_count} (0-based)")]
-    NoSuchVertex {
-        /// Index of the triangle, from 0.
-        triangle: usize,
-        /// The vertex it names.
-        vertex: u32,
-        /// Vertices there are.
-        vertex_count: usize,
-    },
-    /// A coordinate that is not finite.
-    #[error("vertex {vertex} is not finite")]
-    NotFinite {
-        /// Index of the vertex, from 0.
-        vertex: usize,
-    },
-    /// An edge that does not join exactly two triangles of the same sense.
-    #[error(
-        "the surface is not closed: the edge between vertices {from} and {to} belongs to {count} \
-         triangles of one sense; close it, and turn all triangles outward"
-    )]
-    Open {
-        /// An end of the edge.
-        from: u32,
-        /// Its other end.
-        to: u32,
-        /// Triangles that run along it.
-        count: usize,
-    },
-    /// A surface that is turned inside out.
-    #[error("the surface encloses the volume {volume:e} m³; turn its triangles outward")]
-    InsideOut {
-        /// Signed volume that the triangles enclose, m³.
-        volume: f64,
-    },
-}
-
 /// Triangles of a leaf.
 const LEAF: usize = 4;
+/// Weights below this count as zero: the nearest point is on an edge or at a corner.
+const ON_EDGE: f64 = 1e-12;
+/// What is missing to 1 of the cosine between the way out and a face's normal, below which the face is nearest.
+const FLAT: f64 = 1e-12;
+
 impl RigidMesh {
     /// Triangles with their corners counter-clockwise seen from outside; vertices in the same place
     /// count as one.
@@ -111,26 +75,69 @@ impl RigidMesh {
         let reach = vertices.iter().map(|v| v.coords.norm()).fold(0.0, f64::max);
         let extent = boxes[0].high - boxes[0].low;
         let thickness = 0.25 * extent.min();
-        Ok(Self { vertices, triangles, normals, boxes, reach, thickness })
+        Ok(Self { vertices, triangles, normals, boxes, reach, thickness, radius: 0.0 })
+    }
+
+    /// The body with all points within a radius of it: its edges and corners are rounded, and it has one normal
+    /// everywhere outside of its triangles, which contact needs to converge.
+    ///
+    /// Units: m.
+    ///
+    /// # Errors
+    /// [`RigidMeshError::Radius`].
+    pub fn with_radius(self, radius: f64) -> Result<Self, RigidMeshError> {
+        match radius >= 0.0 && radius.is_finite() {
+            true => Ok(Self { radius, ..self }),
+            false => Err(RigidMeshError::Radius { radius }),
+        }
     }
 
     /// Radius of a ball around the origin that holds the body, m.
     pub fn reach(&self) -> f64 {
-        self.reach
+        self.reach + self.radius
     }
 
-    /// A quarter of the smallest width of its bounding box, m.
+    /// A quarter of the smallest width of its bounding box, and the radius, m.
     pub fn thickness(&self) -> f64 {
-        self.thickness
+        self.thickness + self.radius
     }
 
     /// Signed distance of a point, and the way out.
+    pub fn distance(&self, point: &Point3<f64>) -> SignedDistance {
+        let sharp = self.distance_from_triangles(point);
+        SignedDistance { distance: sharp.distance - self.radius, ..sharp }
+    }
+
+    /// Curvature of the surface where it is nearest to a point; `None` where a triangle is nearest, and where
+    /// edges are sharp.
+    ///
+    /// Units: 1/m.
+    pub(super) fn curvature(&self, point: &Point3<f64>) -> Option<Matrix3<f64>> {
+        let (_, triangle, weights) = self.nearest_to(point);
+        let corners = self.corners(triangle);
+        let away = point - point_at(&corners, &weights);
+        let normal = away.try_normalize(1e-9 * self.reach)?;
+        let pseudonormal = self.pseudonormal(triangle, &weights);
+        let across = |along: Vector3<f64>| Matrix3::identity() - along * along.transpose();
+        let bends = match weights.map(|weight| weight <= ON_EDGE) {
+            [false, false, false] => return None,
+            [true, false, false] => across((corners[2] - corners[1]).normalize()),
+            [false, true, false] => across((corners[0] - corners[2]).normalize()),
+            [false, false, true] => across((corners[1] - corners[0]).normalize()),
+            _ => Matrix3::identity(),
+        };
+        // The edge of triangles in one plane is part of a face; inside, the way out is another.
+        let is_face = normal.dot(&self.normals[triangle][0]) > 1.0 - FLAT;
+        let is_inside = normal.dot(&pseudonormal) < 0.0;
+        let is_flat = self.radius == 0.0 || is_face || is_inside;
+        (!is_flat).then(|| (bends - normal * normal.transpose()) / self.radius)
+    }
+
+    /// Signed distance from the triangles, and the way out.
     ///
     /// Source: Bærentzen and Aanæs (2005), signed distance by angle-weighted pseudonormals.
-    pub fn distance(&self, point: &Point3<f64>) -> SignedDistance {
-        let mut best = (f64::INFINITY, 0, [1.0, 0.0, 0.0]);
-        self.nearest(0, point, &mut best);
-        let (square, triangle, weights) = best;
+    fn distance_from_triangles(&self, point: &Point3<f64>) -> SignedDistance {
+        let (square, triangle, weights) = self.nearest_to(point);
         let pseudonormal = self.pseudonormal(triangle, &weights);
         let away = point - point_at(&self.corners(triangle), &weights);
         let is_inside = away.dot(&pseudonormal) < 0.0;
@@ -144,9 +151,57 @@ impl RigidMesh {
         SignedDistance { distance: sign * size, normal }
     }
 
-    /// The deepest point of a triangle, by a search.
+    /// The deepest point of a triangle: the nearest to the body's triangles where it is outside of them all, by
+    /// a search where it crosses them.
     pub(super) fn deepest(&self, corners: &[Point3<f64>; 3]) -> Deepest {
-        deepest_of(corners, |point| self.distance(point))
+        let [a, b, c] = corners;
+        let around =
+            Node { low: a.inf(b).inf(c), high: a.sup(b).sup(c), first: 0, count: 0, second: 0 };
+        let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
+        self.nearest_triangle(0, (corners, &around), &mut best);
+        let (weights, square) = best;
+        let distance = self.distance(&point_at(corners, &weights));
+        match square > 0.0 && distance.distance > -self.radius {
+            true => Deepest { weights, distance },
+            false => deepest_of(corners, |point| self.distance(point)),
+        }
+    }
+
+    /// The point of a triangle nearest to the body's triangles below a node, and the square of the distance, if
+    /// it is nearer than the best so far.
+    fn nearest_triangle(
+        &self,
+        node: usize,
+        (corners, around): (&[Point3<f64>; 3], &Node),
+        best: &mut (Barycentric, f64),
+    ) {
+        let Node { first, count, second, .. } = self.boxes[node];
+        if second == 0 {
+            for triangle in first..first + count {
+                let found = on_triangle_to_triangle(corners, &self.corners(triangle));
+                if found.1 < best.1 {
+                    *best = found;
+                }
+            }
+            return;
+        }
+        let far = |child: usize| self.boxes[child].square_between(around);
+        let mut children = [(far(node + 1), node + 1), (far(second), second)];
+        if children[1].0 < children[0].0 {
+            children.swap(0, 1);
+        }
+        for (square, child) in children {
+            if square < best.1 {
+                self.nearest_triangle(child, (corners, around), best);
+            }
+        }
+    }
+
+    /// Square of the distance of a point from the triangles, the nearest triangle, and the point of it.
+    fn nearest_to(&self, point: &Point3<f64>) -> (f64, usize, Barycentric) {
+        let mut best = (f64::INFINITY, 0, [1.0, 0.0, 0.0]);
+        self.nearest(0, point, &mut best);
+        best
     }
 
     fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
@@ -155,7 +210,7 @@ impl RigidMesh {
 
     /// The pseudonormal of that part of a triangle which a point of it belongs to.
     fn pseudonormal(&self, triangle: usize, weights: &Barycentric) -> Vector3<f64> {
-        let is_zero = weights.map(|w| w <= 1e-12);
+        let is_zero = weights.map(|w| w <= ON_EDGE);
         let normals = &self.normals[triangle];
         match is_zero {
             [false, true, true] => normals[4],
@@ -198,6 +253,12 @@ impl Node {
     fn square_from(&self, point: &Point3<f64>) -> f64 {
         (0..3).map(|k| (point[k] - point[k].clamp(self.low[k], self.high[k])).powi(2)).sum()
     }
+
+    fn square_between(&self, other: &Node) -> f64 {
+        let apart =
+            |k: usize| (self.low[k] - other.high[k]).max(other.low[k] - self.high[k]).max(0.0);
+        (0..3).map(|k| apart(k).powi(2)).sum()
+    }
 }
 
 /// Triangles while they are sorted into boxes.
@@ -229,94 +290,6 @@ impl Sorted<'_> {
         }
         place
     }
-}
-
-/// Vertices and triangles.
-type Triangles = (Vec<Point3<f64>>, Vec<[u32; 3]>);
-
-/// One vertex for each place, and the triangles that have an area.
-fn welded(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Result<Triangles, RigidMeshError> {
-    if let Some(vertex) = vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
-        return Err(RigidMeshError::NotFinite { vertex });
-    }
-    let mut places: BTreeMap<[u64; 3], u32> = BTreeMap::new();
-    let mut kept = Vec::new();
-    let mut number = Vec::with_capacity(vertices.len());
-    for vertex in vertices {
-        // Adding zero makes one zero of both.
-        let key = [vertex.x + 0.0, vertex.y + 0.0, vertex.z + 0.0].map(f64::to_bits);
-        number.push(*places.entry(key).or_insert_with(|| {
-            kept.push(*vertex);
-            kept.len() as u32 - 1
-        }));
-    }
-    let mut sound = Vec::with_capacity(triangles.len());
-    for (triangle, corners) in triangles.iter().enumerate() {
-        let mut named = [0; 3];
-        for (named, &vertex) in named.iter_mut().zip(corners) {
-            *named = *number.get(vertex as usize).ok_or(RigidMeshError::NoSuchVertex {
-                triangle,
-                vertex,
-                vertex_count: vertices.len(),
-            })?;
-        }
-        if named[0] != named[1] && named[1] != named[2] && named[2] != named[0] {
-            sound.push(named);
-        }
-    }
-    match sound.is_empty() {
-        true => Err(RigidMeshError::Empty),
-        false => Ok((kept, sound)),
-    }
-}
-
-/// Every edge must be run along once in each sense.
-fn check_closed(triangles: &[[u32; 3]]) -> Result<(), RigidMeshError> {
-    let mut runs: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-    for t in triangles {
-        for k in 0..3 {
-            *runs.entry((t[k], t[(k + 1) % 3])).or_default() += 1;
-        }
-    }
-    for (&(from, to), &count) in &runs {
-        if runs.get(&(to, from)) != Some(&count) {
-            return Err(RigidMeshError::Open { from, to, count });
-        }
-    }
-    Ok(())
-}
-
-fn pseudonormals(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<[Vector3<f64>; 7]> {
-    let mut of_edges: BTreeMap<(u32, u32), Vector3<f64>> = BTreeMap::new();
-    let mut of_vertices = vec![Vector3::zeros(); vertices.len()];
-    let faces: Vec<Vector3<f64>> = triangles
-        .iter()
-        .map(|t| {
-            let normal = area_normal(&t.map(|n| vertices[n as usize]));
-            Unit::try_new(normal, f64::MIN_POSITIVE).map_or(Vector3::zeros(), Unit::into_inner)
-        })
-        .collect();
-    for (t, normal) in triangles.iter().zip(&faces) {
-        for k in 0..3 {
-            let [at, next, last] = [k, (k + 1) % 3, (k + 2) % 3].map(|k| vertices[t[k] as usize]);
-            of_vertices[t[k] as usize] += (next - at).angle(&(last - at)) * normal;
-            *of_edges.entry(edge(t[k], t[(k + 1) % 3])).or_insert(Vector3::zeros()) += normal;
-        }
-    }
-    let opposite = |t: &[u32; 3], k: usize| of_edges[&edge(t[(k + 1) % 3], t[(k + 2) % 3])];
-    let at = |n: u32| of_vertices[n as usize];
-    triangles
-        .iter()
-        .zip(&faces)
-        .map(|(t, normal)| {
-            let edges = [opposite(t, 0), opposite(t, 1), opposite(t, 2)];
-            [*normal, edges[0], edges[1], edges[2], at(t[0]), at(t[1]), at(t[2])]
-        })
-        .collect()
-}
-
-fn edge(a: u32, b: u32) -> (u32, u32) {
-    (a.min(b), a.max(b))
 }
 
 #[cfg(test)]
@@ -364,6 +337,34 @@ mod tests {
             prop_assume!((-0.05..0.05).contains(&theirs.distance.distance));
             let off = ours.distance.distance - theirs.distance.distance;
             prop_assert!(off.abs() < 5e-4, "{off:e}: {ours:?} {theirs:?}");
+        }
+
+        /// A box of triangles with a radius is a larger box whose edges have that radius.
+        #[test]
+        fn box_of_triangles_with_a_radius_is_the_rounded_box(
+            corners in prop::array::uniform3(prop::array::uniform3(-0.6..0.6f64)),
+        ) {
+            let (half, radius) = (Vector3::new(0.15, 0.35, 0.25), 0.05);
+            let mesh = cuboid(half).with_radius(radius).unwrap();
+            let plain = RigidShape::rounded_cuboid(half.add_scalar(radius), radius).unwrap();
+            let corners = corners.map(Point3::from);
+            let (ours, theirs) = (mesh.deepest(&corners), plain.deepest(&corners));
+            // Where it is outside of the triangles the nearest point is exact.
+            prop_assume!(theirs.distance.distance > -radius);
+            let off = ours.distance.distance - theirs.distance.distance;
+            prop_assert!(off.abs() < 1e-12, "{off:e}: {ours:?} {theirs:?}");
+            let place = point_at(&corners, &ours.weights);
+            let bend = |found: Option<Matrix3<f64>>| found.unwrap_or(Matrix3::zeros());
+            let (of_mesh, of_box) = (bend(mesh.curvature(&place)), bend(plain.curvature(&place)));
+            prop_assert!((of_mesh - of_box).norm() < 1e-6 / radius, "{of_mesh} {of_box}");
+        }
+    }
+
+    #[test]
+    fn radius_that_is_no_size_is_refused() {
+        for radius in [-1e-3, f64::NAN, f64::INFINITY] {
+            let refused = cuboid(Vector3::repeat(0.1)).with_radius(radius).err();
+            assert!(matches!(refused, Some(RigidMeshError::Radius { .. })));
         }
     }
 

@@ -40,13 +40,26 @@ fn shape_of(shape: BodyShape) -> Result<RigidShape, String> {
         BodyShape::Capsule { radius, length } => RigidShape::capsule(radius, length),
         BodyShape::Plane { normal } => RigidShape::plane(Vector3::from(normal)),
         BodyShape::Box { half } => RigidShape::cuboid(Vector3::from(half)),
-        BodyShape::Mesh { vertices, triangles } => {
-            let vertices: Vec<Point3<f64>> = vertices.into_iter().map(Point3::from).collect();
-            let mesh = RigidMesh::try_new(&vertices, &triangles).map_err(|e| e.to_string())?;
-            return Ok(RigidShape::Mesh(Arc::new(mesh)));
+        BodyShape::RoundedBox { half, radius } => {
+            RigidShape::rounded_cuboid(Vector3::from(half), radius)
+        }
+        BodyShape::Mesh { vertices, triangles } => return mesh_of(vertices, &triangles, 0.0),
+        BodyShape::RoundedMesh { vertices, triangles, radius } => {
+            return mesh_of(vertices, &triangles, radius);
         }
     };
     made.map_err(|error| error.to_string())
+}
+
+/// A closed surface of triangles with all points within a radius of it, m.
+fn mesh_of(
+    vertices: Vec<[f64; 3]>,
+    triangles: &[[u32; 3]],
+    radius: f64,
+) -> Result<RigidShape, String> {
+    let vertices: Vec<Point3<f64>> = vertices.into_iter().map(Point3::from).collect();
+    let mesh = RigidMesh::try_new(&vertices, triangles).and_then(|mesh| mesh.with_radius(radius));
+    mesh.map(|mesh| RigidShape::Mesh(Arc::new(mesh))).map_err(|error| error.to_string())
 }
 
 /// Pose with its quaternion normalised; `None` if it is no pose.

@@ -9,7 +9,7 @@ use softgrasp_core::fem::{QuadraticMesh, SpreadLoads};
 use softgrasp_core::mesh::{Surface, TetMesh};
 use softgrasp_protocol::solve_report::SCHEMA;
 use softgrasp_protocol::{
-    ContactAsk, Deformation, ElementName, Material, PathChoice, Reply, Request,
+    ContactAsk, Deformation, ElementName, Material, PathChoice, Reply, Request, Welcome,
 };
 
 use super::access_arguments::AccessArguments;
@@ -106,6 +106,23 @@ fn element(text: &str) -> Result<ElementName, String> {
     }
 }
 
+/// Refuses rounded bodies that a server does not know, before it is asked.
+///
+/// # Errors
+/// One line that names the server and a body.
+fn check_server(bodies: &PressBodies, server: &Welcome) -> anyhow::Result<()> {
+    let knows = server.capabilities.iter().any(|name| name == "rounded-bodies");
+    if let Some(name) = bodies.rounded().filter(|_| !knows) {
+        bail!(
+            "{} {} is an older server and knows no bodies with rounded edges; leave out \
+             the radius of {name}",
+            server.server,
+            server.version
+        );
+    }
+    Ok(())
+}
+
 impl PressCommand {
     /// Reads the files, plays the press, and writes the results.
     ///
@@ -131,6 +148,7 @@ impl PressCommand {
             None => Host::open(&self.server, self.threads)?,
         };
         let mut connection = host.connect()?;
+        check_server(&bodies, connection.welcome())?;
         progress.now(&format!("{} nodes:", mesh.node_count()));
         progress.watch(host.stage());
         let material = Material { young: self.young, poisson: self.poisson };

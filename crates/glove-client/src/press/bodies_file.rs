@@ -124,6 +124,17 @@ pub enum BodyError {
     Mesh(#[from] RigidMeshError),
 }
 
+impl PressBodies {
+    /// Name of a body with rounded edges, which a server without the capability `rounded-bodies` does not
+    /// know.
+    pub fn rounded(&self) -> Option<&str> {
+        let is_rounded = |body: &&PressBody| {
+            matches!(body.on_the_wire, BodyShape::RoundedBox { .. } | BodyShape::RoundedMesh { .. })
+        };
+        self.bodies.iter().find(is_rounded).map(|body| body.name.as_str())
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -220,15 +231,26 @@ fn shape_of(folder: &Path, entry: &Entry) -> Result<(RigidShape, BodyShape), Bod
         }
         "box" => {
             let half = need("a box", "half", entry.half)?;
-            (RigidShape::cuboid(Vector3::from(half))?, BodyShape::Box { half })
+            let radius = entry.radius.unwrap_or(0.0);
+            let shape = RigidShape::rounded_cuboid(Vector3::from(half), radius)?;
+            // A sharp box is of the kind that every server knows.
+            let is_rounded = radius > 0.0;
+            let on_the_wire = match is_rounded {
+                true => BodyShape::RoundedBox { half, radius },
+                false => BodyShape::Box { half },
+            };
+            (shape, on_the_wire)
         }
-        "mesh" => mesh_of(&folder.join(need("a mesh", "file", entry.file.as_ref())?))?,
+        "mesh" => {
+            let file = need("a mesh", "file", entry.file.as_ref())?;
+            mesh_of(&folder.join(file), entry.radius.unwrap_or(0.0))?
+        }
         other => return Err(BodyError::Shape(other.to_owned())),
     })
 }
 
-/// The boundary of a mesh file, or a closed surface file, as a rigid body.
-fn mesh_of(path: &Path) -> Result<(RigidShape, BodyShape), BodyError> {
+/// The boundary of a mesh file, or a closed surface file, with all points within a radius of it, as a rigid body.
+fn mesh_of(path: &Path, radius: f64) -> Result<(RigidShape, BodyShape), BodyError> {
     let (vertices, triangles) = match holds_surface(path)? {
         true => {
             let surface = read_surface_file(path)?.surface;
@@ -239,9 +261,14 @@ fn mesh_of(path: &Path) -> Result<(RigidShape, BodyShape), BodyError> {
             (mesh.vertices().to_vec(), Surface::from_mesh(&mesh).triangles)
         }
     };
-    let shape = RigidShape::Mesh(Arc::new(RigidMesh::try_new(&vertices, &triangles)?));
+    let mesh = RigidMesh::try_new(&vertices, &triangles)?.with_radius(radius)?;
     let vertices = vertices.into_iter().map(Into::into).collect();
-    Ok((shape, BodyShape::Mesh { vertices, triangles }))
+    let is_rounded = radius > 0.0;
+    let on_the_wire = match is_rounded {
+        true => BodyShape::RoundedMesh { vertices, triangles, radius },
+        false => BodyShape::Mesh { vertices, triangles },
+    };
+    Ok((RigidShape::Mesh(Arc::new(mesh)), on_the_wire))
 }
 
 #[cfg(test)]
@@ -263,11 +290,16 @@ mod tests {
              [[body]]\nname = \"tip\"\nshape = \"sphere\"\nradius = 0.008\nfriction = 0.7\n\
              poses = [[0, 0, 0, 0.1, 1, 0, 0, 0], [1, 0, 0, 0.05, 1, 0, 0, 0]]\n\
              [[body]]\nshape = \"capsule\"\nradius = 0.01\nlength = 0.03\n{pose}\n\
-             [[body]]\nshape = \"box\"\nhalf = [0.1, 0.1, 0.01]\n{pose}\n"
+             [[body]]\nshape = \"box\"\nhalf = [0.1, 0.1, 0.01]\n{pose}\n\
+             [[body]]\nshape = \"box\"\nhalf = [0.1, 0.1, 0.01]\nradius = 0.001\n{pose}\n"
         );
         let read = read(&text).unwrap();
         let names: Vec<&str> = read.bodies.iter().map(|b| b.name.as_str()).collect();
-        assert_eq!(names, ["table", "tip", "body2", "body3"]);
+        assert_eq!(names, ["table", "tip", "body2", "body3", "body4"]);
+        assert_eq!(read.rounded(), Some("body4"));
+        let half = [0.1, 0.1, 0.01];
+        assert_eq!(read.bodies[3].on_the_wire, BodyShape::Box { half });
+        assert_eq!(read.bodies[4].on_the_wire, BodyShape::RoundedBox { half, radius: 0.001 });
         assert_eq!((read.end, read.bodies[1].friction), (2.0, Some(0.7)));
         assert!((read.bodies[1].way.at(0.5).translation.z - 0.075).abs() < 1e-15);
     }
@@ -281,6 +313,9 @@ mod tests {
         assert!(told(&no_radius).contains("\"tip\": a sphere needs radius"));
         let other = format!("end = 1.0\n[[body]]\nshape = \"cone\"\n{pose}");
         assert!(told(&other).contains("no shape is called \"cone\""));
+        let round =
+            format!("end = 1.0\n[[body]]\nshape = \"box\"\nhalf = [1, 2, 3]\nradius = 1.5\n{pose}");
+        assert!(told(&round).contains("\"body0\": the radius of the edges of a box is 1.5"));
         let still = format!("[[body]]\nshape = \"sphere\"\nradius = 1\n{pose}");
         assert!(told(&still).contains("end is 0 s"));
         let unknown = format!("end = 1.0\n[[body]]\nshape = \"sphere\"\nradios = 1\n{pose}");

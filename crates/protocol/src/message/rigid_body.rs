@@ -33,12 +33,30 @@ pub enum BodyShape {
         /// Half the length of the edge along each axis, m.
         half: [f64; 3],
     },
+    /// Box around the origin with edges along the axes, rounded within its sizes. A server without the
+    /// capability `rounded-bodies` refuses it as `BadRequest`.
+    RoundedBox {
+        /// Half the length of the edge along each axis, m.
+        half: [f64; 3],
+        /// Radius of the edges and corners, m.
+        radius: f64,
+    },
     /// Inside of a closed surface of triangles.
     Mesh {
         /// Coordinates of the corners, m.
         vertices: Vec<[f64; 3]>,
         /// Corners of each triangle, counter-clockwise seen from outside.
         triangles: Vec<[u32; 3]>,
+    },
+    /// All points within a radius of the inside of a closed surface of triangles. A server without the
+    /// capability `rounded-bodies` refuses it as `BadRequest`.
+    RoundedMesh {
+        /// Coordinates of the corners, m.
+        vertices: Vec<[f64; 3]>,
+        /// Corners of each triangle, counter-clockwise seen from outside.
+        triangles: Vec<[u32; 3]>,
+        /// Radius by which the body goes beyond its triangles, m.
+        radius: f64,
     },
 }
 
@@ -59,6 +77,10 @@ pub struct BodyMotion {
 
 /// Numbers of a body besides its mesh: three sizes, two poses of seven, friction, compliance.
 const NUMBERS: usize = 19;
+/// Kinds of bodies that have more than the numbers.
+const MESH: u32 = 4;
+const ROUNDED_BOX: u32 = 5;
+const ROUNDED_MESH: u32 = 6;
 const BODIES: &str = "rigid bodies";
 const SIZES: &str = "sizes of meshes of bodies";
 const VERTICES: &str = "vertices of bodies";
@@ -71,7 +93,9 @@ impl BodyShape {
             Self::Capsule { .. } => 1,
             Self::Plane { .. } => 2,
             Self::Box { .. } => 3,
-            Self::Mesh { .. } => 4,
+            Self::Mesh { .. } => MESH,
+            Self::RoundedBox { .. } => ROUNDED_BOX,
+            Self::RoundedMesh { .. } => ROUNDED_MESH,
         }
     }
 
@@ -79,8 +103,18 @@ impl BodyShape {
         match self {
             Self::Sphere { radius } => [*radius, 0.0, 0.0],
             Self::Capsule { radius, length } => [*radius, *length, 0.0],
-            Self::Plane { normal: sizes } | Self::Box { half: sizes } => *sizes,
-            Self::Mesh { .. } => [0.0; 3],
+            Self::Plane { normal: sizes }
+            | Self::Box { half: sizes }
+            | Self::RoundedBox { half: sizes, .. } => *sizes,
+            Self::Mesh { .. } | Self::RoundedMesh { .. } => [0.0; 3],
+        }
+    }
+
+    /// Radius of a rounded shape.
+    fn radius(&self) -> Option<f64> {
+        match self {
+            Self::RoundedBox { radius, .. } | Self::RoundedMesh { radius, .. } => Some(*radius),
+            _ => None,
         }
     }
 }
@@ -96,7 +130,8 @@ pub(super) fn check_bodies(count: u32, limits: &Limits) -> Result<(), DecodeErro
     Ok(())
 }
 
-/// Writes the arrays: kinds, numbers, and of the meshes sizes, vertices and triangles.
+/// Writes the arrays: kinds, numbers, radii of rounded bodies, and of the meshes sizes, vertices and
+/// triangles.
 pub(super) fn write_bodies(
     writer: &mut PayloadWriter<'_>,
     bodies: &[BodyMotion],
@@ -104,19 +139,24 @@ pub(super) fn write_bodies(
     let kinds: Vec<u32> = bodies.iter().map(|body| body.shape.kind()).collect();
     writer.array(&kinds);
     let mut numbers = Vec::with_capacity(NUMBERS * bodies.len());
+    let mut radii = Vec::new();
     let (mut sizes, mut vertices, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for body in bodies {
         numbers.extend(body.shape.sizes());
         numbers.extend(body.start);
         numbers.extend(body.end);
         numbers.extend([body.friction, body.compliance]);
-        if let BodyShape::Mesh { vertices: of_body, triangles: faces } = &body.shape {
+        radii.extend(body.shape.radius());
+        if let BodyShape::Mesh { vertices: of_body, triangles: faces }
+        | BodyShape::RoundedMesh { vertices: of_body, triangles: faces, .. } = &body.shape
+        {
             sizes.extend([count_of(VERTICES, of_body.len())?, count_of(TRIANGLES, faces.len())?]);
             vertices.extend_from_slice(of_body);
             triangles.extend_from_slice(faces);
         }
     }
     writer.array(&numbers);
+    writer.array(&radii);
     writer.array(&sizes);
     writer.array(&vertices);
     writer.array(triangles.as_flattened());
@@ -131,7 +171,10 @@ pub(super) fn read_bodies(
 ) -> Result<Vec<BodyMotion>, DecodeError> {
     let kinds: Vec<u32> = reader.array(BODIES, count)?;
     let numbers: Vec<f64> = reader.array("numbers of bodies", NUMBERS * count)?;
-    let meshes = kinds.iter().filter(|kind| **kind == 4).count();
+    let count_of = |wanted: [u32; 2]| kinds.iter().filter(|kind| wanted.contains(kind)).count();
+    let rounded = count_of([ROUNDED_BOX, ROUNDED_MESH]);
+    let radii: Vec<f64> = reader.array("radii of rounded bodies", rounded)?;
+    let meshes = count_of([MESH, ROUNDED_MESH]);
     let sizes: Vec<u32> = reader.array(SIZES, 2 * meshes)?;
     let total = |which: usize| sizes.iter().skip(which).step_by(2).map(|&n| u64::from(n)).sum();
     let vertex_count = checked_sum(VERTICES, total(0), limits.node_count_max)?;
@@ -140,8 +183,10 @@ pub(super) fn read_bodies(
     let corners: Vec<u32> = reader.array(TRIANGLES, 3 * triangle_count)?;
     let (triangles, _) = corners.as_chunks::<3>();
     let (mut vertices, mut triangles, mut sizes) = (&vertices[..], triangles, &sizes[..]);
+    let mut radii = radii.into_iter();
+    let mut radius = |kind| radii.next().ok_or(DecodeError::UnknownShape { kind });
     let mut bodies = Vec::with_capacity(count);
-    for (kind, numbers) in kinds.iter().zip(numbers.chunks_exact(NUMBERS)) {
+    for (&kind, numbers) in kinds.iter().zip(numbers.chunks_exact(NUMBERS)) {
         let at = |first: usize| [numbers[first], numbers[first + 1], numbers[first + 2]];
         let pose = |first: usize| std::array::from_fn(|k| numbers[first + k]);
         let shape = match kind {
@@ -149,14 +194,19 @@ pub(super) fn read_bodies(
             1 => BodyShape::Capsule { radius: numbers[0], length: numbers[1] },
             2 => BodyShape::Plane { normal: at(0) },
             3 => BodyShape::Box { half: at(0) },
-            4 => {
+            ROUNDED_BOX => BodyShape::RoundedBox { half: at(0), radius: radius(kind)? },
+            MESH | ROUNDED_MESH => {
                 let (mine, rest) = sizes.split_at(2);
                 let (of_body, vertices_left) = vertices.split_at(mine[0] as usize);
                 let (faces, triangles_left) = triangles.split_at(mine[1] as usize);
                 (vertices, triangles, sizes) = (vertices_left, triangles_left, rest);
-                BodyShape::Mesh { vertices: of_body.to_vec(), triangles: faces.to_vec() }
+                let (vertices, triangles) = (of_body.to_vec(), faces.to_vec());
+                match kind {
+                    MESH => BodyShape::Mesh { vertices, triangles },
+                    _ => BodyShape::RoundedMesh { vertices, triangles, radius: radius(kind)? },
+                }
             }
-            &kind => return Err(DecodeError::UnknownShape { kind }),
+            kind => return Err(DecodeError::UnknownShape { kind }),
         };
         bodies.push(BodyMotion {
             shape,

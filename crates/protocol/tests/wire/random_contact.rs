@@ -150,8 +150,12 @@ fn body() -> impl Strategy<Value = BodyMotion> {
         (number(), number()).prop_map(|(radius, length)| BodyShape::Capsule { radius, length }),
         point().prop_map(|normal| BodyShape::Plane { normal }),
         point().prop_map(|half| BodyShape::Box { half }),
+        (point(), number()).prop_map(|(half, radius)| BodyShape::RoundedBox { half, radius }),
         (vec(point(), 0..5), vec(any::<[u32; 3]>(), 0..5))
             .prop_map(|(vertices, triangles)| BodyShape::Mesh { vertices, triangles }),
+        (vec(point(), 0..5), vec(any::<[u32; 3]>(), 0..5), number()).prop_map(
+            |(vertices, triangles, radius)| BodyShape::RoundedMesh { vertices, triangles, radius }
+        ),
     ];
     (shape, pose(), pose(), number(), number()).prop_map(
         |(shape, start, end, friction, compliance)| BodyMotion {

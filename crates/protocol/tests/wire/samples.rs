@@ -77,7 +77,7 @@ pub fn variants() -> Vec<(&'static str, Message)> {
     let with_fields =
         Answer { fields: vec![field_values(1.0), field_values(-2.0)], ..of_several.clone() };
     let with_gradient = Answer { gradient: Some(gradient()), ..*answer.clone() };
-    let untold = Answer { report: SolveReport::untold(), ..*answer };
+    let contact = |frame| Message::Request(1, Request::ContactFrame(Box::new(frame)));
     let request = |ask| Message::Request(1, Request::Ask(Box::new(ask)));
     let reply = |answer| Message::Reply(1, Reply::Answer(Box::new(answer)));
     vec![
@@ -90,10 +90,11 @@ pub fn variants() -> Vec<(&'static str, Message)> {
         ("UploadModel-mid-edge", Message::Request(1, Request::UploadModel(curved_model()))),
         ("Answer-large", reply(large_answer())),
         ("Answer-cases", reply(of_several)),
-        ("Answer-untold", reply(untold)),
+        ("Answer-untold", reply(Answer { report: SolveReport::untold(), ..*answer })),
         ("Answer-fields", reply(with_fields)),
         ("Answer-gradient", reply(with_gradient)),
-        ("ContactFrame-small", Message::Request(1, Request::ContactFrame(Box::new(felt_frame())))),
+        ("ContactFrame-rounded", contact(rounded(contact_frame()))),
+        ("ContactFrame-small", contact(felt_frame())),
         ("ContactAnswer-small", Message::Reply(1, Reply::ContactAnswer(Box::new(felt_answer())))),
     ]
 }
@@ -418,6 +419,18 @@ fn contact_frame() -> ContactFrame {
         precision: Precision::F64,
         fields: FieldSet::NONE,
     }
+}
+
+/// The frame with box and mesh rounded.
+fn rounded(mut frame: ContactFrame) -> ContactFrame {
+    for BodyMotion { shape, .. } in &mut frame.bodies {
+        if let BodyShape::Mesh { vertices, triangles } = shape.clone() {
+            *shape = BodyShape::RoundedMesh { vertices, triangles, radius: 0.25 };
+        } else if let BodyShape::Box { half } = *shape {
+            *shape = BodyShape::RoundedBox { half, radius: 0.0625 };
+        }
+    }
+    frame
 }
 
 fn contact_answer() -> ContactAnswer {

@@ -85,7 +85,7 @@ impl ContactProblem {
         moved.iter().zip(&self.b).map(|(w, b)| w + b).collect()
     }
 
-    /// Largest residual of the natural map over all points, N.
+    /// Largest residual of the natural map over all points, N; infinite where a force or a motion is no number.
     ///
     /// Shapes: `lambda` and `motion` 3n.
     pub fn residual_of(&self, lambda: &[f64], motion: &[f64]) -> f64 {
@@ -94,7 +94,7 @@ impl ContactProblem {
             let (force, motion) = (at(lambda, i), at(motion, i));
             self.laws[i].residual(force, motion, self.rho[i])
         });
-        residuals.fold(0.0, f64::max)
+        residuals.fold(0.0, |most: f64, r| if r.is_nan() { f64::INFINITY } else { most.max(r) })
     }
 
     /// Every force moved to the nearest one that its law allows.

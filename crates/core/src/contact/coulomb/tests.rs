@@ -98,6 +98,22 @@ fn what_makes_no_problem_is_refused_by_name() {
     assert!(matches!(nan, Some(ProblemError::NotFinite)));
 }
 
+/// A splitting that runs away ends at forces that are no numbers: their residual was 0, and they were taken for
+/// the solution.
+#[test]
+fn forces_that_are_no_numbers_do_not_count_as_a_solution() {
+    let cones = vec![FrictionCone { friction: 0.5 }; 2];
+    let b = vec![-1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+    let problem = ContactProblem::try_new(DMatrix::identity(6, 6), b, cones).unwrap();
+    let solved = [1.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+    assert_eq!(problem.residual_of(&solved, &problem.motion(&solved)), 0.0);
+    for wrong in [f64::NAN, f64::INFINITY] {
+        let lambda = [1.0, 0.0, 0.0, wrong, wrong, 0.0];
+        let residual = problem.residual_of(&lambda, &problem.motion(&lambda));
+        assert_eq!(residual, f64::INFINITY);
+    }
+}
+
 /// A random compliance as bodies have it: everything is coupled, near things more.
 fn compliance(n: usize, seed: &[f64]) -> DMatrix<f64> {
     let place = |i: usize| {
