@@ -14,6 +14,13 @@ pub(crate) fn point_at(corners: &[Point3<f64>; 3], weights: &Barycentric) -> Poi
     Point3::from(weights[0] * a + weights[1] * b + weights[2] * c)
 }
 
+/// The point of a triangle on an edge, at a share of the way from its first corner to its second.
+pub(super) fn on_edge((first, second): (usize, usize), share: f64) -> Barycentric {
+    let mut weights = [0.0; 3];
+    (weights[first], weights[second]) = (1.0 - share, share);
+    weights
+}
+
 /// The point of a segment that is closest to another point, as a share of the way from `a` to `b`.
 pub(super) fn on_segment(a: &Point3<f64>, b: &Point3<f64>, point: &Point3<f64>) -> f64 {
     let along = b - a;
@@ -103,9 +110,7 @@ pub(super) fn of_triangle_and_segment(
     consider(on_triangle(corners, to), 1.0);
     for (first, second) in EDGES {
         let (s, t) = of_segments([&corners[first], &corners[second]], [from, to]);
-        let mut weights = [0.0; 3];
-        (weights[first], weights[second]) = (1.0 - s, s);
-        consider(weights, t);
+        consider(on_edge((first, second), s), t);
     }
     (best.1, best.2)
 }
@@ -139,11 +144,6 @@ pub(super) fn on_triangle_to_triangle(
     corners: &[Point3<f64>; 3],
     other: &[Point3<f64>; 3],
 ) -> (Barycentric, f64) {
-    let on_edge = |(a, b): (usize, usize), t: f64| {
-        let mut weights = [0.0; 3];
-        (weights[a], weights[b]) = (1.0 - t, t);
-        weights
-    };
     let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
     let mut consider = |weights: Barycentric, place: Point3<f64>| {
         let square = (point_at(corners, &weights) - place).norm_squared();

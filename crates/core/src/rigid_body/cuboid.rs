@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use super::closest::{
-    Barycentric, Deepest, EDGES, SignedDistance, area_normal, on_triangle, point_at,
+    Barycentric, Deepest, EDGES, SignedDistance, area_normal, on_edge, on_triangle, point_at,
 };
 use super::sizes::{ShapeError, positive};
 
@@ -184,11 +184,4 @@ impl Cuboid {
 /// Way to a point from the nearest one of a box around the origin; zero inside.
 fn outside_of(point: &Point3<f64>, half: &Vector3<f64>) -> Vector3<f64> {
     point.coords.zip_map(half, |x, h| x - x.clamp(-h, h))
-}
-
-/// The point of an edge of a triangle at a share of the way.
-fn on_edge((a, b): (usize, usize), t: f64) -> Barycentric {
-    let mut weights = [0.0; 3];
-    (weights[a], weights[b]) = (1.0 - t, t);
-    weights
 }

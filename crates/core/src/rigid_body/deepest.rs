@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
-use super::closest::{Barycentric, Deepest, EDGES, SignedDistance, point_at};
+use super::closest::{Barycentric, Deepest, EDGES, SignedDistance, on_edge, point_at};
 
 /// Pieces into which a triangle is cut at most while its deepest point is looked for.
 const PIECES_MAX: usize = 64;
@@ -173,11 +173,7 @@ fn shortest(vectors: &[Vector2<f64>]) -> Vector2<f64> {
 
 /// The deepest point of an edge: the best of some samples, then a search by thirds around it.
 fn deepest_on_edge(first: usize, second: usize, at: impl Fn(Barycentric) -> Deepest) -> Deepest {
-    let on = |t: f64| {
-        let mut weights = [0.0; 3];
-        (weights[first], weights[second]) = (1.0 - t, t);
-        at(weights)
-    };
+    let on = |t: f64| at(on_edge((first, second), t));
     let sample = |k: u32| f64::from(k) / f64::from(EDGE_SAMPLES);
     let depth = |t: f64| on(t).distance.distance;
     let best = (0..=EDGE_SAMPLES).min_by(|&a, &b| depth(sample(a)).total_cmp(&depth(sample(b))));

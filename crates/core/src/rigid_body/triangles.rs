@@ -26,11 +26,17 @@ pub struct RigidMesh {
     radius: f64,
 }
 
+/// Lowest and highest corner of a bounding box, m.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
+
 /// A box of the tree and the triangles in it.
 #[derive(Clone, Debug)]
 struct Node {
-    low: Point3<f64>,
-    high: Point3<f64>,
+    bounds: Bounds,
     /// Range in `triangles`.
     first: usize,
     count: usize,
@@ -73,8 +79,8 @@ impl RigidMesh {
         let Sorted { triangles, boxes, .. } = sorted;
         let normals = pseudonormals(&vertices, &triangles);
         let reach = vertices.iter().map(|v| v.coords.norm()).fold(0.0, f64::max);
-        let extent = boxes[0].high - boxes[0].low;
-        let thickness = 0.25 * extent.min();
+        let Bounds { low, high } = boxes[0].bounds;
+        let thickness = 0.25 * (high - low).min();
         Ok(Self { vertices, triangles, normals, boxes, reach, thickness, radius: 0.0 })
     }
 
@@ -113,6 +119,9 @@ impl RigidMesh {
     ///
     /// Units: 1/m.
     pub(super) fn curvature(&self, point: &Point3<f64>) -> Option<Matrix3<f64>> {
+        if self.radius == 0.0 {
+            return None;
+        }
         let (_, triangle, weights) = self.nearest_to(point);
         let corners = self.corners(triangle);
         let away = point - point_at(&corners, &weights);
@@ -129,8 +138,7 @@ impl RigidMesh {
         // The edge of triangles in one plane is part of a face; inside, the way out is another.
         let is_face = normal.dot(&self.normals[triangle][0]) > 1.0 - FLAT;
         let is_inside = normal.dot(&pseudonormal) < 0.0;
-        let is_flat = self.radius == 0.0 || is_face || is_inside;
-        (!is_flat).then(|| (bends - normal * normal.transpose()) / self.radius)
+        (!is_face && !is_inside).then(|| (bends - normal * normal.transpose()) / self.radius)
     }
 
     /// Signed distance from the triangles, and the way out.
@@ -155,8 +163,7 @@ impl RigidMesh {
     /// a search where it crosses them.
     pub(super) fn deepest(&self, corners: &[Point3<f64>; 3]) -> Deepest {
         let [a, b, c] = corners;
-        let around =
-            Node { low: a.inf(b).inf(c), high: a.sup(b).sup(c), first: 0, count: 0, second: 0 };
+        let around = Bounds { low: a.inf(b).inf(c), high: a.sup(b).sup(c) };
         let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
         self.nearest_triangle(0, (corners, &around), &mut best);
         let (weights, square) = best;
@@ -172,7 +179,7 @@ impl RigidMesh {
     fn nearest_triangle(
         &self,
         node: usize,
-        (corners, around): (&[Point3<f64>; 3], &Node),
+        (corners, around): (&[Point3<f64>; 3], &Bounds),
         best: &mut (Barycentric, f64),
     ) {
         let Node { first, count, second, .. } = self.boxes[node];
@@ -185,7 +192,7 @@ impl RigidMesh {
             }
             return;
         }
-        let far = |child: usize| self.boxes[child].square_between(around);
+        let far = |child: usize| self.boxes[child].bounds.square_between(around);
         let mut children = [(far(node + 1), node + 1), (far(second), second)];
         if children[1].0 < children[0].0 {
             children.swap(0, 1);
@@ -236,7 +243,7 @@ impl RigidMesh {
             }
             return;
         }
-        let far = |child: usize| self.boxes[child].square_from(point);
+        let far = |child: usize| self.boxes[child].bounds.square_from(point);
         let mut children = [(far(node + 1), node + 1), (far(second), second)];
         if children[1].0 < children[0].0 {
             children.swap(0, 1);
@@ -249,12 +256,12 @@ impl RigidMesh {
     }
 }
 
-impl Node {
+impl Bounds {
     fn square_from(&self, point: &Point3<f64>) -> f64 {
         (0..3).map(|k| (point[k] - point[k].clamp(self.low[k], self.high[k])).powi(2)).sum()
     }
 
-    fn square_between(&self, other: &Node) -> f64 {
+    fn square_between(&self, other: &Self) -> f64 {
         let apart =
             |k: usize| (self.low[k] - other.high[k]).max(other.low[k] - self.high[k]).max(0.0);
         (0..3).map(|k| apart(k).powi(2)).sum()
@@ -278,7 +285,7 @@ impl Sorted<'_> {
             (low, high) = (low.inf(&vertex), high.sup(&vertex));
         }
         let place = self.boxes.len();
-        self.boxes.push(Node { low, high, first, count, second: 0 });
+        self.boxes.push(Node { bounds: Bounds { low, high }, first, count, second: 0 });
         if count > LEAF {
             let axis = (high - low).imax();
             let vertices = self.vertices;
