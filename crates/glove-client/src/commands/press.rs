@@ -294,6 +294,18 @@ impl PressCommand {
                 "{} steps end above the residual asked for; the report says how far\n",
                 report.steps_not_converged
             ));
+            let left = |name: &str| {
+                let presses = |step: &StepReport| {
+                    !step.converged && step.bodies.get(name).is_some_and(|body| body.contacts > 0)
+                };
+                report.steps.iter().any(presses)
+            };
+            if let Some(name) = bodies.sharp().find(|name| left(name)) {
+                text.push_str(&format!(
+                    "{name} has sharp edges, at which contact often does not converge: a radius in its \
+                     [[body]] rounds them\n"
+                ));
+            }
         }
         if report.deformation != Deformation::Linear.as_str() {
             text.push_str(&format!(

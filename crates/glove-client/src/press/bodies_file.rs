@@ -125,6 +125,14 @@ pub enum BodyError {
 }
 
 impl PressBodies {
+    /// Names of boxes and meshes whose edges are sharp: contact there often does not converge.
+    pub fn sharp(&self) -> impl Iterator<Item = &str> {
+        let is_sharp = |body: &&PressBody| {
+            matches!(body.on_the_wire, BodyShape::Box { .. } | BodyShape::Mesh { .. })
+        };
+        self.bodies.iter().filter(is_sharp).map(|body| body.name.as_str())
+    }
+
     /// Name of a body with rounded edges, which a server without the capability `rounded-bodies` does not
     /// know.
     pub fn rounded(&self) -> Option<&str> {
@@ -297,6 +305,7 @@ mod tests {
         let names: Vec<&str> = read.bodies.iter().map(|b| b.name.as_str()).collect();
         assert_eq!(names, ["table", "tip", "body2", "body3", "body4"]);
         assert_eq!(read.rounded(), Some("body4"));
+        assert_eq!(read.sharp().collect::<Vec<_>>(), ["body3"]);
         let half = [0.1, 0.1, 0.01];
         assert_eq!(read.bodies[3].on_the_wire, BodyShape::Box { half });
         assert_eq!(read.bodies[4].on_the_wire, BodyShape::RoundedBox { half, radius: 0.001 });

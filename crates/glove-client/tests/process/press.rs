@@ -140,6 +140,29 @@ fn bodies_that_make_no_sense_are_told_by_name() {
     assert!(told.contains("\"tip\": a sphere needs radius"), "{told}");
 }
 
+/// An edge of a box that comes down 12 mm into a ball on a table.
+#[test]
+fn edge_with_a_radius_converges_and_a_sharp_one_that_does_not_is_told() {
+    for radius in [0.0, 0.001] {
+        let folder = folder(
+            0.2,
+            &format!(
+                "[[body]]\nname = \"edge\"\nshape = \"box\"\nhalf = [0.03, 0.02, 0.01]\n\
+                 radius = {radius}\nfriction = 0.8\n\
+                 poses = [[0, 0, 0, 0.0565, 0.9239, 0.3827, 0, 0], [0.2, 0, 0, 0.0445, 0.9239, 0.3827, 0, 0]]\n"
+            ),
+        );
+        let [mesh, bodies, file] = ["ball.msh", "bodies.toml", "r.json"].map(|f| folder.path(f));
+        let said = succeed(&["press", "--mesh", &mesh, "--bodies", &bodies, "--report", &file]);
+        let report: Value = serde_json::from_str(&folder.read("r.json")).unwrap();
+        let last = report["steps"].as_array().unwrap().last().unwrap();
+        assert!(number(last, "/bodies/edge/normal_force") > 0.1);
+        let left = number(&report, "/steps_not_converged");
+        assert_eq!(said.contains("edge has sharp edges"), left > 0.0, "{said}");
+        assert!(radius == 0.0 || left == 0.0, "{said}");
+    }
+}
+
 /// Force by which a fingertip is pressed when it has closed on a ball of so many nodes, N.
 fn pinching_force(nodes: &str, element: &str) -> f64 {
     let folder = Folder::new();
