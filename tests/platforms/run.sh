@@ -6,7 +6,7 @@
 # part is missing.
 #
 #   tests/platforms/run.sh                      all of it: a Debian (10 GB with what is built there, thrown away
-#                                               afterwards), three checks and two builds: an hour on two cores
+#                                               afterwards), three checks, three builds and tests: an hour and a half
 #   PLATFORMS_ROOT=DIR tests/platforms/run.sh   keeps that Debian and what was built in DIR, or takes what is there
 #   ONLY="check" …  ONLY="kernels arm" …        some parts of it: check, kernels, arm and windows
 #   BIN_DIR=DIR tests/platforms/run.sh          compares with the glove-client of this system that is there
