@@ -5,7 +5,8 @@
 # Ends with 0 when all of it holds, and with 0 and one line where a part is missing.
 #
 #   BIN_DIR=target/debug tests/packaging/run.sh    takes programs that are built already
-#   FULL=1 tests/packaging/run.sh                  also installs the package in a fresh Debian (debootstrap)
+#   FULL=1 tests/packaging/run.sh                  also in a fresh Debian (debootstrap): the package, the run that
+#                                                  lifts a strawberry, the wheels
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 # shellcheck source=tests/script.sh
@@ -133,7 +134,9 @@ say "package: $(sed -n '2p' "$work/solve.log")"
 
 "$installed" -m pip install -q --no-deps --no-index "$out"/*.whl || fail "the wheels cannot be installed"
 "$installed" -m pip check >/dev/null || fail "the wheels need what is not there"
-env -i "$installed" - <<'END' || fail "the example in Python"
+cat >"$work/example.py" <<'END'
+import sys
+
 import softgrasp
 
 mesh = softgrasp.Mesh.block((0.04, 0.04, 0.02), (4, 4, 2))
@@ -144,8 +147,9 @@ with softgrasp.Server.spawn() as server:
     answer = server.solve(model, case)
 force = answer.reactions.total(mesh.nodes_at(z=0.02))[2]
 assert force < -0.5 and answer.residual_rel < 1e-9, (force, answer.residual_rel)
-print(f"packaging: wheels: pressed by {force:.2f} N, residual {answer.residual_rel:.0e}")
+print(f"packaging: {sys.argv[1]}: pressed by {force:.2f} N, residual {answer.residual_rel:.0e}")
 END
+env -i "$installed" "$work/example.py" wheels || fail "the example in Python"
 
 # -- The list of contents by the schema of CycloneDX
 
@@ -179,8 +183,30 @@ if [ -n "${FULL:-}" ]; then
     chroot "$fresh" glove-client solve --mesh /tmp/cube.msh --known /tmp/K.csv --out /tmp/U.csv >/dev/null ||
         fail "solve in a fresh Debian"
     cmp "$fresh/tmp/U.csv" "$work/U.csv" || fail "a fresh Debian gives other bits"
+    # What a person with nothing runs first, then the wheels with Debian's own Python.
+    chroot "$fresh" glove-client run --headless --report /tmp/run.json >"$work/run.log" 2>&1 ||
+        fail "the run in a fresh Debian"
+    python3 - "$fresh/tmp/run.json" <<'END' || fail "nothing is lifted in a fresh Debian"
+import json
+import sys
+
+with open(sys.argv[1]) as file:
+    contacts = [frame["contact"] for frame in json.load(file)["frames"] if frame["contact"]]
+carried = [c for c in contacts if c["table_force_n"] == 0 and sum(c["finger_force_n"]) > 0]
+sys.exit(len(carried) < 100)
+END
+    chroot "$fresh" apt-get install -y --no-install-recommends python3-numpy python3-pip >>"$work/apt.log" 2>&1 ||
+        fail "Python in a fresh Debian"
+    # What the wheels need beyond Debian's packages comes from where this machine's pip gets it.
+    version="$(chroot "$fresh" python3 -c 'import sys; print(f"{sys.version_info[0]}.{sys.version_info[1]}")')"
+    "$installed" -m pip download -q --only-binary=:all: --python-version "$version" --dest "$fresh/tmp" \
+        blake3 google-crc32c >"$work/pip.log" 2>&1 || fail "what the wheels need, for Python $version"
+    cp "$out"/*.whl "$work/example.py" "$fresh/tmp/"
+    chroot "$fresh" sh -c 'pip install -q --no-index --break-system-packages /tmp/*.whl' \
+        >"$work/pip.log" 2>&1 || fail "the wheels in a fresh Debian"
+    chroot "$fresh" python3 /tmp/example.py "a fresh Debian" || fail "the example in a fresh Debian"
     chroot "$fresh" apt-get purge -y softgrasp >>"$work/apt.log" 2>&1 || fail "apt-get purge"
     [ ! -e "$fresh/usr/bin/fea-server" ] || fail "purge leaves the programs"
-    say "a fresh Debian: installed, solved the same, purged"
+    say "a fresh Debian: installed, solved the same, a strawberry lifted, Python, purged"
 fi
 say "passed ($SECONDS s)"
