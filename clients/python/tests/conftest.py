@@ -41,6 +41,22 @@ def program() -> Iterator[softgrasp.ServerProgram]:
     started.end()
 
 
+Without = Callable[[str], None]
+
+
+@pytest.fixture
+def without(server: softgrasp.Server, monkeypatch: pytest.MonkeyPatch) -> Without:
+    """Makes the session take its server for an older one that lacks a capability."""
+
+    def forget(capability: str) -> None:
+        known = server.capabilities
+        assert capability in known
+        told = {**server.welcome.__dict__, "capabilities": known - {capability}}
+        monkeypatch.setattr(server, "_welcome", server.welcome.__class__(**told))
+
+    return forget
+
+
 @pytest.fixture
 def server(program: softgrasp.ServerProgram) -> Iterator[softgrasp.Server]:
     """A session with that server."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import Bar, Spawn
+from conftest import Bar, Spawn, Without
 
 from softgrasp import (
     Body,
@@ -126,14 +126,8 @@ def test_all_shapes_carry(block: KeptModel, what: str) -> None:
     assert answer.loads.forces[0, 2] == pytest.approx(weight, rel=0.02)
 
 
-def test_an_older_server_is_not_sent_rounded_bodies(
-    server: Server, block: KeptModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    known = server.capabilities
-    older = server.welcome.__class__(
-        **{**server.welcome.__dict__, "capabilities": known - {"rounded-bodies"}}
-    )
-    monkeypatch.setattr(server, "_welcome", older)
+def test_an_older_server_is_not_sent_rounded_bodies(block: KeptModel, without: Without) -> None:
+    without("rounded-bodies")
     step, half = ContactStep(0.01, DENSITY), (0.1, 0.1, 0.01)
     block.contact_frame(ObjectState(), [Body(Box(half))], step)
     with pytest.raises(NotCapable, match="rounded-bodies"):

@@ -4,7 +4,7 @@ import asyncio
 
 import numpy as np
 import pytest
-from conftest import Bar
+from conftest import Bar, Without
 
 import softgrasp
 from softgrasp import AsyncServer, LoadCase, Material, Mesh, Model, NotCapable, Server
@@ -129,12 +129,8 @@ def test_arguments_that_no_server_could_take_are_named(bar: Bar) -> None:
     assert twice.pressures[0].pressure == 6.0 and twice.densities.tolist() == [2.0]
 
 
-def test_an_older_server_is_not_asked_for_loads(server: Server, bar: Bar, monkeypatch) -> None:
-    known = server.capabilities
-    older = server.welcome.__class__(
-        **{**server.welcome.__dict__, "capabilities": known - {"loads"}}
-    )
-    monkeypatch.setattr(server, "_welcome", older)
+def test_an_older_server_is_not_asked_for_loads(server: Server, bar: Bar, without: Without) -> None:
+    without("loads")
     with pytest.raises(NotCapable, match="loads"):
         server.solve(bar.model, bar.case.weight(DENSITY))
     assert server.solve(bar.model, bar.case).displacements.any()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import Bar
+from conftest import Bar, Without
 
 from softgrasp import (
     Body,
@@ -59,13 +59,10 @@ def test_other_elements_leave_mid_edge_nodes_out(server: Server, bar: Bar) -> No
     assert not answer.displacements[corners:].any()
 
 
-def test_an_older_server_is_not_sent_mid_edge_nodes(server: Server, bar: Bar, monkeypatch) -> None:
-    known = server.capabilities
-    assert "mid-edge" in known
-    older = server.welcome.__class__(
-        **{**server.welcome.__dict__, "capabilities": known - {"mid-edge"}}
-    )
-    monkeypatch.setattr(server, "_welcome", older)
+def test_an_older_server_is_not_sent_mid_edge_nodes(
+    server: Server, bar: Bar, without: Without
+) -> None:
+    without("mid-edge")
     model, case, _ = pulled(bar)
     # Of a material that no server has seen: it is uploaded.
     other = Model(model.mesh, Material(31_000.0, 0.21), "t10")
