@@ -116,6 +116,8 @@ pub(super) fn check_closed(triangles: &[[u32; 3]]) -> Result<(), RigidMeshError>
     Ok(())
 }
 
+/// Normals of every triangle, of its edges (opposite corner 0, 1, 2) and of its corners: sums over what meets
+/// there, at corners weighted by angle.
 pub(super) fn pseudonormals(
     vertices: &[Point3<f64>],
     triangles: &[[u32; 3]],

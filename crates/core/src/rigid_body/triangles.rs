@@ -165,7 +165,13 @@ impl RigidMesh {
         let [a, b, c] = corners;
         let around = Bounds { low: a.inf(b).inf(c), high: a.sup(b).sup(c) };
         let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
-        self.nearest_triangle(0, (corners, &around), &mut best);
+        self.visit(0, f64::INFINITY, &|bounds| bounds.square_between(&around), &mut |triangle| {
+            let found = on_triangle_to_triangle(corners, &self.corners(triangle));
+            if found.1 < best.1 {
+                best = found;
+            }
+            best.1
+        });
         let (weights, square) = best;
         let distance = self.distance(&point_at(corners, &weights));
         match square > 0.0 && distance.distance > -self.radius {
@@ -174,40 +180,18 @@ impl RigidMesh {
         }
     }
 
-    /// The point of a triangle nearest to the body's triangles below a node, and the square of the distance, if
-    /// it is nearer than the best so far.
-    fn nearest_triangle(
-        &self,
-        node: usize,
-        (corners, around): (&[Point3<f64>; 3], &Bounds),
-        best: &mut (Barycentric, f64),
-    ) {
-        let Node { first, count, second, .. } = self.boxes[node];
-        if second == 0 {
-            for triangle in first..first + count {
-                let found = on_triangle_to_triangle(corners, &self.corners(triangle));
-                if found.1 < best.1 {
-                    *best = found;
-                }
-            }
-            return;
-        }
-        let far = |child: usize| self.boxes[child].bounds.square_between(around);
-        let mut children = [(far(node + 1), node + 1), (far(second), second)];
-        if children[1].0 < children[0].0 {
-            children.swap(0, 1);
-        }
-        for (square, child) in children {
-            if square < best.1 {
-                self.nearest_triangle(child, (corners, around), best);
-            }
-        }
-    }
-
     /// Square of the distance of a point from the triangles, the nearest triangle, and the point of it.
     fn nearest_to(&self, point: &Point3<f64>) -> (f64, usize, Barycentric) {
         let mut best = (f64::INFINITY, 0, [1.0, 0.0, 0.0]);
-        self.nearest(0, point, &mut best);
+        self.visit(0, f64::INFINITY, &|bounds| bounds.square_from(point), &mut |triangle| {
+            let corners = self.corners(triangle);
+            let weights = on_triangle(&corners, point);
+            let square = (point_at(&corners, &weights) - point).norm_squared();
+            if square < best.0 {
+                best = (square, triangle, weights);
+            }
+            best.0
+        });
         best
     }
 
@@ -230,29 +214,33 @@ impl RigidMesh {
         }
     }
 
-    fn nearest(&self, node: usize, point: &Point3<f64>, best: &mut (f64, usize, Barycentric)) {
+    /// Goes through the triangles below a node, from near boxes to far ones, and leaves out boxes that are not
+    /// nearer than the best triangle.
+    ///
+    /// Units: `far` is the square of the distance of a box; `consider` takes a triangle and says the square of
+    /// the best distance then; `best` is that from before; result the best; m².
+    fn visit(
+        &self,
+        node: usize,
+        mut best: f64,
+        far: &impl Fn(&Bounds) -> f64,
+        consider: &mut impl FnMut(usize) -> f64,
+    ) -> f64 {
         let Node { first, count, second, .. } = self.boxes[node];
         if second == 0 {
-            for triangle in first..first + count {
-                let corners = self.corners(triangle);
-                let weights = on_triangle(&corners, point);
-                let square = (point_at(&corners, &weights) - point).norm_squared();
-                if square < best.0 {
-                    *best = (square, triangle, weights);
-                }
-            }
-            return;
+            return (first..first + count).map(consider).fold(best, f64::min);
         }
-        let far = |child: usize| self.boxes[child].bounds.square_from(point);
-        let mut children = [(far(node + 1), node + 1), (far(second), second)];
+        let far_child = |child: usize| (far(&self.boxes[child].bounds), child);
+        let mut children = [far_child(node + 1), far_child(second)];
         if children[1].0 < children[0].0 {
             children.swap(0, 1);
         }
         for (square, child) in children {
-            if square < best.0 {
-                self.nearest(child, point, best);
+            if square < best {
+                best = self.visit(child, best, far, consider);
             }
         }
+        best
     }
 }
 

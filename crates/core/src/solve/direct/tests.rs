@@ -8,7 +8,8 @@ use super::block::Block;
 use super::kernel::Kernel;
 use super::*;
 use crate::fem::{Material, Stiffness, StiffnessPattern, assemble};
-use crate::mesh::{TetMesh, signed_volume};
+use crate::mesh::TetMesh;
+use crate::mesh::samples::of_cell;
 use crate::solve::front::{FrontAnalysis, FrontFactor};
 use crate::solve::k11::SparseK11;
 use crate::solve::oracle::sparse::Analysis;
@@ -29,20 +30,7 @@ fn irregular_cube(n: usize) -> TetMesh {
     for (k, j, i) in
         (0..n - 1).flat_map(|k| (0..n - 1).flat_map(move |j| (0..n - 1).map(move |i| (k, j, i))))
     {
-        // Kuhn: one tetrahedron per order of the axes, along the cell's diagonal.
-        for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-            let mut corner = [i, j, k];
-            let mut tet = vec![at(i, j, k)];
-            for axis in axes {
-                corner[axis] += 1;
-                tet.push(at(corner[0], corner[1], corner[2]));
-            }
-            let mut tet: [u32; 4] = tet.try_into().unwrap();
-            if signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
-                tet.swap(0, 1);
-            }
-            tets.push(tet);
-        }
+        tets.extend(of_cell([i, j, k], at, &vertices));
     }
     TetMesh::try_new(vertices, tets, vec![]).unwrap()
 }

@@ -7,7 +7,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::fem::{Material, Stiffness, StiffnessPattern, assemble};
-use crate::mesh::{TetMesh, signed_volume};
+use crate::mesh::TetMesh;
+use crate::mesh::samples::of_cell;
 use crate::solve::k11::{SparseK11, visit_k11};
 use crate::solve::oracle::sparse::Analysis;
 use crate::solve::{Partition, ordering};
@@ -28,19 +29,8 @@ fn boxes(sizes: &[[usize; 3]]) -> TetMesh {
             vertices.push(Point3::new(p[0] + 100.0 * region as f64, p[1], p[2]));
         }
         for cell in cells(nx - 1, ny - 1, nz - 1) {
-            for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-                let mut corner = cell;
-                let mut tet = [at(cell[0], cell[1], cell[2]); 4];
-                for (position, axis) in axes.into_iter().enumerate() {
-                    corner[axis] += 1;
-                    tet[position + 1] = at(corner[0], corner[1], corner[2]);
-                }
-                if signed_volume(&tet.map(|v| vertices[v as usize])) < 0.0 {
-                    tet.swap(0, 1);
-                }
-                tets.push(tet);
-                regions.push(region as u32);
-            }
+            tets.extend(of_cell(cell, at, &vertices));
+            regions.extend([region as u32; 6]);
         }
     }
     TetMesh::try_new(vertices, tets, regions).unwrap()
