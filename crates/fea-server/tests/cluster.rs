@@ -219,7 +219,7 @@ fn methods_of_a_cluster_are_refused_where_there_is_none() {
     assert!(refused.text.contains("--cluster"), "{}", refused.text);
     let welcome = |client: &mut Client| match client.ask(&Request::Hello(Hello::new("test", None)))
     {
-        Reply::Welcome(welcome) => welcome.capabilities.contains(&"cluster".to_owned()),
+        Reply::Welcome(welcome) => welcome.knows("cluster"),
         other => panic!("{other:?}"),
     };
     assert!(!welcome(&mut client));

@@ -87,12 +87,10 @@ impl GradientArguments {
     /// # Errors
     /// One line that names the server.
     pub(super) fn check_server(&self, server: &Welcome) -> anyhow::Result<()> {
-        let knows = server.capabilities.iter().any(|name| name == "gradients");
-        if self.gradient.is_some() && !knows {
+        if self.gradient.is_some() && !server.knows("gradients") {
             bail!(
-                "{} {} is an older server and answers no derivatives; leave out --gradient",
-                server.server,
-                server.version
+                "{} is an older server and answers no derivatives; leave out --gradient",
+                server.program()
             );
         }
         Ok(())

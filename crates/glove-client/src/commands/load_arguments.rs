@@ -197,15 +197,14 @@ pub(super) fn check_server(
     (mesh, spread): (&TetMesh, &SpreadLoads),
     server: &Welcome,
 ) -> anyhow::Result<()> {
-    let knows = |what: &str| server.capabilities.iter().any(|name| name == what);
-    let older = format!("{} {} is an older server", server.server, server.version);
-    if !spread.is_empty() && !knows("loads") {
+    let older = format!("{} is an older server", server.program());
+    if !spread.is_empty() && !server.knows("loads") {
         bail!(
             "{older} and takes no weight and no pressure; leave out --gravity, --density and \
              --pressure, or give them as --forces"
         );
     }
-    if !mesh.mid_edge_nodes().is_empty() && !knows("mid-edge") {
+    if !mesh.mid_edge_nodes().is_empty() && !server.knows("mid-edge") {
         bail!(
             "{older} and takes no mid-edge nodes; take --element t4, or a file of four-node \
              tetrahedra, to which it adds straight edges for t10"

@@ -15,6 +15,7 @@ use softgrasp_protocol::{
 use super::access_arguments::AccessArguments;
 use super::elasticity_arguments::ElasticityArguments;
 use super::field_arguments::{FieldArguments, is_vtu};
+use super::interruption;
 use super::numbers::{count, poisson, positive, speed, vector};
 use super::output::Progress;
 use super::output::{print, write_json};
@@ -33,7 +34,7 @@ use crate::object::scene::NODES_DEFAULT;
 use crate::object::series::Series;
 use crate::press::bodies_file::{PressBodies, read_bodies};
 use crate::press::course::{Course, Step};
-use crate::press::report::{PressReport, StepReport};
+use crate::press::report::{PressReport, StepReport, steps};
 use crate::press::world_fields::in_world;
 
 /// Press rigid bodies against a soft object that nothing else holds, with friction and weight.
@@ -111,13 +112,10 @@ fn element(text: &str) -> Result<ElementName, String> {
 /// # Errors
 /// One line that names the server and a body.
 fn check_server(bodies: &PressBodies, server: &Welcome) -> anyhow::Result<()> {
-    let knows = server.capabilities.iter().any(|name| name == "rounded-bodies");
-    if let Some(name) = bodies.rounded().filter(|_| !knows) {
+    if let Some(name) = bodies.rounded().filter(|_| !server.knows("rounded-bodies")) {
         bail!(
-            "{} {} is an older server and knows no bodies with rounded edges; leave out \
-             the radius of {name}",
-            server.server,
-            server.version
+            "{} is an older server and knows no bodies with rounded edges; leave out the radius of {name}",
+            server.program()
         );
     }
     Ok(())
@@ -166,32 +164,50 @@ impl PressCommand {
             whole: self.series.is_some(),
             fields: self.fields.of_contact(&mesh, self.has_fields_file())?,
         };
-        let names: Vec<String> = bodies.bodies.iter().map(|body| body.name.clone()).collect();
-        let mut steps = Vec::new();
-        let mut series = self.series.as_deref().map(Series::create).transpose()?;
-        let mut last = None;
-        course.play(&mut connection, |step| -> anyhow::Result<()> {
+        let mut played = Played {
+            names: bodies.bodies.iter().map(|body| body.name.clone()).collect(),
+            end: bodies.end,
+            object: (&mesh, own_nodes),
+            steps: Vec::new(),
+            series: self.series.as_deref().map(Series::create).transpose()?,
+            last: None,
+        };
+        // A signal ends the press after the step that is being made, with the report.
+        interruption::hear();
+        let ended = course.play(&mut connection, |step| {
             progress.now(&format!("{:.3} of {:.3} s", step.time, bodies.end));
-            steps.push(StepReport::new(&step, &names));
-            if let Some(series) = &mut series {
-                let path = series.add(step.time);
-                write_file(&path, &encode(&path, (&mesh, own_nodes), &step)?)?;
-            }
-            last = Some(step);
-            Ok(())
-        })?;
+            played.add(step)
+        });
         drop(progress);
-        if let Some(series) = series {
+        self.write(played, ended, (&mesh, elasticity), &bodies)
+    }
+
+    /// Writes the results of a press; where it ended before its time, those of the steps before.
+    ///
+    /// # Errors
+    /// What ended the press, with its time, and files that cannot be written.
+    fn write(
+        &self,
+        played: Played<'_>,
+        ended: anyhow::Result<()>,
+        (mesh, elasticity): (&TetMesh, Elasticity),
+        bodies: &PressBodies,
+    ) -> anyhow::Result<()> {
+        let ended = ended.map_err(|error| played.when(error));
+        if let Some(series) = played.series {
             series.finish()?;
         }
-        if let (Some(path), Some(last)) = (&self.out, &last) {
-            write_file(path, &encode(path, (&mesh, own_nodes), last)?)?;
+        if let (Some(path), Some(last), Ok(())) = (&self.out, &played.last, &ended) {
+            write_file(path, &encode(path, played.object, last)?)?;
         }
-        let report = self.summary(&mesh, steps, elasticity)?;
-        if let Some(path) = &self.report {
+        let has_steps = !played.steps.is_empty();
+        let why = ended.as_ref().err().map(|error| format!("{error:#}"));
+        let report = self.summary(mesh, played.steps, elasticity, why)?;
+        if let Some(path) = self.report.as_ref().filter(|_| has_steps) {
             write_json(path, &report)?;
         }
-        print(&self.describe(&report, &bodies))
+        ended?;
+        print(&report.told(bodies))
     }
 
     /// The mesh with the names of its regions, or what fills the surface; a surface and what was done to it are
@@ -242,6 +258,7 @@ impl PressCommand {
         mesh: &TetMesh,
         steps: Vec<StepReport>,
         elasticity: Elasticity,
+        ended_early: Option<String>,
     ) -> anyhow::Result<PressReport> {
         let is_large = elasticity.deformation != Deformation::Linear;
         let most = |number: fn(&StepReport) -> f64| steps.iter().map(number).fold(0.0, f64::max);
@@ -267,6 +284,7 @@ impl PressCommand {
             deformation: elasticity.deformation.as_str(),
             material: is_large.then(|| elasticity.law.to_string()),
             yield_pa: elasticity.yield_stress,
+            ended_early,
             steps_large: steps.iter().filter(|step| step.deformation == "large").count(),
             residual_rel_max: most(|step| step.residual_rel),
             steps_not_converged: steps.iter().filter(|step| !step.converged).count(),
@@ -275,54 +293,48 @@ impl PressCommand {
             steps,
         })
     }
+}
 
-    fn describe(&self, report: &PressReport, bodies: &PressBodies) -> String {
-        let mut text = format!(
-            "{}: {} nodes, {} tetrahedra, {:.1} g\n{} steps of {:.4} s, deepest penetration {:.1e} m, \
-             residual of contact {:.1e} at most\n",
-            report.mesh,
-            report.nodes,
-            report.tets,
-            1e3 * report.mass,
-            report.steps.len(),
-            bodies.end / report.steps.len().max(1) as f64,
-            report.penetration_max,
-            report.contact_residual_rel_max,
-        );
-        if report.steps_not_converged > 0 {
-            text.push_str(&format!(
-                "{} steps end above the residual asked for; the report says how far\n",
-                report.steps_not_converged
-            ));
-            let left = |name: &str| {
-                let presses = |step: &StepReport| {
-                    !step.converged && step.bodies.get(name).is_some_and(|body| body.contacts > 0)
-                };
-                report.steps.iter().any(presses)
-            };
-            if let Some(name) = bodies.sharp().find(|name| left(name)) {
-                text.push_str(&format!(
-                    "{name} has sharp edges, at which contact often does not converge: a radius in its \
-                     [[body]] rounds them\n"
-                ));
-            }
+/// Steps of a press that have been made.
+struct Played<'a> {
+    /// Names of the bodies.
+    names: Vec<String>,
+    /// Time at which the press is to end, s.
+    end: f64,
+    /// Mesh, and how many of its nodes its file has.
+    object: (&'a TetMesh, usize),
+    steps: Vec<StepReport>,
+    series: Option<Series>,
+    last: Option<Step>,
+}
+
+impl Played<'_> {
+    /// Keeps a step, and writes its file.
+    fn add(&mut self, step: Step) -> anyhow::Result<()> {
+        self.steps.push(StepReport::new(&step, &self.names));
+        if let Some(series) = &mut self.series {
+            let path = series.add(step.time);
+            write_file(&path, &encode(&path, self.object, &step)?)?;
         }
-        if report.deformation != Deformation::Linear.as_str() {
-            text.push_str(&format!(
-                "{} steps at large deformation, forces out of balance by {:.1e} at most\n",
-                report.steps_large, report.residual_rel_max
-            ));
+        let is_before_the_end = step.time < self.end;
+        self.last = Some(step);
+        if is_before_the_end && interruption::asked() {
+            bail!("a signal has ended it");
         }
-        if let Some(last) = report.steps.last() {
-            for (name, body) in &last.bodies {
-                let [x, y, z] = body.force;
-                text.push_str(&format!(
-                    "at the end {name} presses at {} points with {:.4} N: ({x:.4}, {y:.4}, {z:.4}) N\n",
-                    body.contacts, body.normal_force
-                ));
-            }
+        Ok(())
+    }
+
+    /// What ended the press, with its time.
+    fn when(&self, error: anyhow::Error) -> anyhow::Error {
+        match &self.last {
+            None => error,
+            Some(last) => error.context(format!(
+                "the press ends after {}, at {:.3} of {:.3} s",
+                steps(self.steps.len()),
+                last.time,
+                self.end
+            )),
         }
-        text
     }
 }
 

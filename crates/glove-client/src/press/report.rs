@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use softgrasp_protocol::Deformation;
 
+use super::bodies_file::PressBodies;
 use super::course::Step;
 
 /// JSON report of a press.
@@ -42,6 +43,8 @@ pub struct PressReport {
     pub material: Option<String>,
     /// Yield stress, Pa; null for a material that never flows.
     pub yield_pa: Option<f64>,
+    /// What ended the press before its time, with the time; null where all steps are made.
+    pub ended_early: Option<String>,
     /// Number of steps at large deformation.
     pub steps_large: usize,
     /// Number of steps whose penetration or residual is above what was asked for.
@@ -122,6 +125,75 @@ pub struct BodyReport {
     pub normal_force: f64,
     /// Number of points that slip.
     pub slipping: usize,
+}
+
+impl PressReport {
+    /// The press in a few lines of text.
+    pub fn told(&self, bodies: &PressBodies) -> String {
+        let mut text = format!(
+            "{}: {} nodes, {} tetrahedra, {:.1} g\n{} of {:.4} s, deepest penetration {:.1e} m, \
+             residual of contact {:.1e} at most\n",
+            self.mesh,
+            self.nodes,
+            self.tets,
+            1e3 * self.mass,
+            steps(self.steps.len()),
+            bodies.end / self.steps.len().max(1) as f64,
+            self.penetration_max,
+            self.contact_residual_rel_max,
+        );
+        text.push_str(&self.told_of_unconverged(bodies));
+        if self.deformation != Deformation::Linear.as_str() {
+            text.push_str(&format!(
+                "{} at large deformation, forces out of balance by {:.1e} at most\n",
+                steps(self.steps_large),
+                self.residual_rel_max
+            ));
+        }
+        for (name, body) in self.steps.last().iter().flat_map(|last| &last.bodies) {
+            let [x, y, z] = body.force;
+            text.push_str(&format!(
+                "at the end {name} presses at {} points with {:.4} N: ({x:.4}, {y:.4}, {z:.4}) N\n",
+                body.contacts, body.normal_force
+            ));
+        }
+        text
+    }
+
+    /// Steps that have not converged, and the body whose sharp edges they touch.
+    fn told_of_unconverged(&self, bodies: &PressBodies) -> String {
+        if self.steps_not_converged == 0 {
+            return String::new();
+        }
+        let mut text = format!(
+            "{} above the residual asked for; the report says how far\n",
+            match self.steps_not_converged {
+                1 => "1 step ends".to_owned(),
+                count => format!("{count} steps end"),
+            }
+        );
+        let touches = |step: &StepReport, name: &str| {
+            step.bodies.get(name).is_some_and(|body| body.contacts > 0)
+        };
+        let fails =
+            |name: &str| self.steps.iter().any(|step| !step.converged && touches(step, name));
+        let sharp = bodies.sharp().find(|name| fails(name));
+        if let Some(name) = sharp {
+            text.push_str(&format!(
+                "{name} has sharp edges, at which contact often does not converge: a radius in its \
+                 [[body]] rounds them\n"
+            ));
+        }
+        text
+    }
+}
+
+/// A number of steps in words.
+pub fn steps(count: usize) -> String {
+    match count {
+        1 => "1 step".to_owned(),
+        _ => format!("{count} steps"),
+    }
 }
 
 impl StepReport {

@@ -5,7 +5,7 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use crate::start::{Folder, command};
+use crate::start::{Folder, command, succeed};
 
 fn signal(name: &str, child: &Child) {
     let kill = format!("kill -{name} {}", child.id());
@@ -37,6 +37,38 @@ fn run_that_is_interrupted_writes_its_report() {
         assert_eq!(run.wait().unwrap().code(), Some(0), "SIG{name}");
         assert!(folder.read("report.json").contains("\"interrupted\": true"), "SIG{name}");
     }
+}
+
+#[test]
+fn press_that_is_interrupted_writes_the_report_of_the_steps_before() {
+    let folder = Folder::new();
+    let [mesh, report, series] = ["ball.msh", "r.json", "series"].map(|name| folder.path(name));
+    succeed(&["mesh", "sphere", "--nodes", "100", "--out", &mesh]);
+    let bodies = folder.write(
+        "bodies.toml",
+        "end = 10000\n[[body]]\nname = \"table\"\nshape = \"plane\"\nnormal = [0, 0, 1]\n\
+         poses = [[0, 0, 0, -0.035, 1, 0, 0, 0]]\n",
+    );
+    let mut press = command();
+    press.args(["press", "--mesh", &mesh, "--bodies", &bodies, "--report", &report]);
+    let press = press.args(["--series", &series]).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut press = press.spawn().unwrap();
+    let third = std::path::Path::new(&series).join("step_00003.vtu");
+    while !third.exists() {
+        assert!(press.try_wait().unwrap().is_none(), "it ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    signal("INT", &press);
+    let ended = press.wait_with_output().unwrap();
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    let report: serde_json::Value = serde_json::from_str(&folder.read("r.json")).unwrap();
+    let count = report["steps"].as_array().unwrap().len();
+    assert!(count >= 3, "{count}");
+    let told = format!("the press ends after {count} steps");
+    assert!(said.contains(&told) && said.contains("a signal has ended it"), "{said}");
+    assert!(report["ended_early"].as_str().unwrap().contains(&told));
+    assert!(folder.read("series/series.pvd").contains(&format!("step_{count:05}.vtu")));
 }
 
 #[test]

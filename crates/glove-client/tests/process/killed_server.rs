@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use fea_server::{RunningServer, ServerConfig};
 use serde_json::Value;
 
-use crate::start::{Folder, succeed};
+use crate::start::{Folder, fail, succeed};
 
 /// Server behind a connection that is cut for good once so many bytes have gone to it.
 struct Mortal {
@@ -110,4 +110,43 @@ fn ticks_after_a_killed_server_are_not_said_to_wait_for_a_late_answer_when_grasp
 #[test]
 fn recording_of_a_run_whose_server_was_killed_is_repeated_by_the_rules_of_the_thesis() {
     check_runs(&[0.4, 0.6, 0.8], &["--grasp", "thesis", "--hand", "scripted:release"]);
+}
+
+#[test]
+fn report_of_a_press_whose_server_was_killed_has_the_steps_before() {
+    let folder = Folder::new();
+    let [mesh, report] = ["ball.msh", "r.json"].map(|name| folder.path(name));
+    succeed(&["mesh", "sphere", "--nodes", "150", "--out", &mesh]);
+    let bodies = folder.write(
+        "bodies.toml",
+        "end = 0.2\n[[body]]\nname = \"table\"\nshape = \"plane\"\nnormal = [0, 0, 1]\n\
+         poses = [[0, 0, 0, -0.035, 1, 0, 0, 0]]\n",
+    );
+    let press = |server: &Mortal| {
+        let files = ["--mesh", &mesh, "--bodies", &bodies, "--report", &report];
+        let address = server.address.to_string();
+        [&["press", "--server", &address][..], &files]
+            .concat()
+            .iter()
+            .map(|s| (*s).to_owned())
+            .collect()
+    };
+    let steps = || -> Value { serde_json::from_str(&folder.read("r.json")).unwrap() };
+    let whole = Mortal::dies_after(i64::MAX);
+    let arguments: Vec<String> = press(&whole);
+    succeed(&arguments);
+    let (all, bytes) = (steps(), i64::MAX - whole.left.load(Ordering::SeqCst));
+    assert_eq!(all["ended_early"], Value::Null);
+    let arguments: Vec<String> = press(&Mortal::dies_after(bytes * 7 / 10));
+    let said = fail(1, &arguments);
+    let some = steps();
+    let count = some["steps"].as_array().unwrap().len();
+    assert!((1..20).contains(&count), "{count}");
+    assert!(said.contains(&format!("the press ends after {count} step")), "{said}");
+    assert!(some["ended_early"].as_str().unwrap().contains(&format!("after {count} step")));
+    for (some, all) in
+        some["steps"].as_array().unwrap().iter().zip(all["steps"].as_array().unwrap())
+    {
+        assert_eq!(some["object_pose"], all["object_pose"]);
+    }
 }

@@ -92,6 +92,16 @@ impl Hello {
 }
 
 impl Welcome {
+    /// Whether the server has a capability of this name.
+    pub fn knows(&self, capability: &str) -> bool {
+        self.capabilities.iter().any(|name| name == capability)
+    }
+
+    /// Name and version of the server program, for people.
+    pub fn program(&self) -> String {
+        format!("{} {}", self.server, self.version)
+    }
+
     pub(super) fn write(&self, writer: &mut PayloadWriter<'_>) -> Result<(), EncodeError> {
         writer.part(&WelcomePart {
             server: self.server.clone(),
