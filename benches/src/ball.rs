@@ -68,7 +68,8 @@ impl Ball {
         let reach = reach_of_step(SIZE, bodies, settings.seconds, (speed, turning));
         let near = near_triangles(vertices, triangles, &state.world_from_object, bodies, reach);
         let elasticity = Elasticity { base: &self.base, body: &self.body, columns: &self.columns };
-        make(ContactStep { vertices, triangles, elasticity, bodies, candidates: &near, settings })
+        let (candidates, is_late) = (&near[..], &|| false);
+        make(ContactStep { vertices, triangles, elasticity, bodies, candidates, settings, is_late })
     }
 }
 

@@ -31,10 +31,15 @@ impl Drop for Waiting {
 }
 
 impl Awaited {
+    /// Whether no client waits for the answer any more.
+    pub fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+
     /// Returns if the client still waits for the answer. Otherwise the work unwinds with the payload
     /// [`Abandoned`], which frees all that it holds and is no fault. The panic hook is not called.
     pub fn go_on(&self) {
-        if self.is_over.load(Ordering::Relaxed) {
+        if self.is_over() {
             resume_unwind(Box::new(Abandoned));
         }
     }

@@ -77,6 +77,23 @@ impl StageClock {
         }
     }
 
+    /// Returns if a client still waits for the answer; unwinds otherwise.
+    pub fn go_on(&self) {
+        self.awaited.go_on();
+    }
+
+    /// Whether work ends at the best that it has: its deadline is over, or no client waits any more.
+    ///
+    /// Units: ms since the request came; `None` for no deadline.
+    pub fn is_late(&self, deadline_ms: Option<f64>) -> bool {
+        self.is_abandoned() || deadline_ms.is_some_and(|deadline| self.elapsed_ms() > deadline)
+    }
+
+    /// Whether no client waits for the answer any more.
+    pub fn is_abandoned(&self) -> bool {
+        self.awaited.is_over()
+    }
+
     /// Milliseconds since the request came.
     pub fn elapsed_ms(&self) -> f64 {
         self.stage_ms.decode + ms_since(self.decoded)

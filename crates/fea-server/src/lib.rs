@@ -32,6 +32,7 @@ mod client_connection;
 mod clock;
 pub mod cluster;
 mod config;
+mod contact_steps;
 mod encryption;
 pub mod engine;
 mod held_models;

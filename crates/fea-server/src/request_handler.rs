@@ -12,13 +12,14 @@ use softgrasp_protocol::{
 use tokio::task::JoinHandle;
 
 use crate::answer::{
-    CarriedSeat, KeptQuestion, Placed, PosedContact, PosedFrame, PressedSeat, Readiness,
-    answer_cases, answer_large_frame, is_finite, kept_elsewhere, place_kept, place_once,
-    place_upload, prefetch, prove, readiness, reserve_fields, solve_large,
+    KeptQuestion, Placed, PosedFrame, Readiness, answer_cases, answer_large_frame, is_finite,
+    kept_elsewhere, place_kept, place_once, place_upload, prefetch, prove, readiness,
+    reserve_fields, solve_large,
 };
 use crate::awaited::Waiting;
 use crate::budget::Reservation;
 use crate::clock::{StageClock, ms_since};
+use crate::contact_steps::ContactSteps;
 use crate::held_models::HeldModels;
 use crate::log_line::foreign_name;
 use crate::paths::Paths;
@@ -45,10 +46,8 @@ pub(crate) struct RequestHandler {
     held: HeldModels,
     /// The equilibria that this session follows.
     paths: Paths,
-    /// The object that this session presses at large deformation.
-    pressed: PressedSeat,
-    /// What a step of each object of this session leaves for the next.
-    carried: CarriedSeat,
+    /// What the contact frames of this session keep.
+    contact: ContactSteps,
     /// Task that makes a path in the background of this session.
     making: Option<JoinHandle<()>>,
     /// Counts this session among those that ask frame questions, from its first one on.
@@ -60,7 +59,7 @@ pub(crate) struct RequestHandler {
 }
 
 /// Names of this server's capabilities, for `Welcome`.
-const CAPABILITIES: [&str; 13] = [
+const CAPABILITIES: [&str; 14] = [
     "large",
     "cases",
     "contact",
@@ -74,6 +73,7 @@ const CAPABILITIES: [&str; 13] = [
     "mid-edge",
     "gradients",
     "rounded-bodies",
+    "contact-deadline",
 ];
 /// The capability of a server with an engine beside it.
 const CLUSTER: &str = "cluster";
@@ -99,8 +99,7 @@ impl RequestHandler {
             is_introduced: false,
             held: HeldModels::new(Arc::clone(resources)),
             paths: Paths::default(),
-            pressed: PressedSeat::default(),
-            carried: CarriedSeat::default(),
+            contact: ContactSteps::default(),
             making: None,
             grasping: None,
             alive_every: None,
@@ -167,8 +166,7 @@ impl RequestHandler {
             Request::HaveModel(hash) => Reply::ModelState { known: self.held.hold(hash) },
             Request::Drop(hash) => {
                 self.paths.leave(hash);
-                self.pressed.with(|pressed| *pressed = None);
-                self.carried.with(|carried| carried.retain(|(model, _)| *model != hash));
+                self.contact.forget(hash);
                 self.held.drop_model(hash);
                 return Ok(None);
             }
@@ -410,8 +408,6 @@ impl RequestHandler {
         Ok(answered.answer)
     }
 
-    /// Answers a contact frame: on the pool of frames if its columns are cached, else in the lane of the
-    /// predicted cost of computing them.
     async fn contact_frame(
         &mut self,
         frame: ContactFrame,
@@ -419,23 +415,9 @@ impl RequestHandler {
     ) -> Result<ContactAnswer, Refusal> {
         self.check_is_here(Some(frame.model))?;
         self.held.hold(frame.model);
-        let resources = Arc::clone(&self.server.resources);
-        let workers = &self.server.resources.workers;
         self.grasping.get_or_insert_with(|| self.server.grasping());
-        let shared = Arc::clone(&resources);
-        let seats = (Arc::clone(&self.pressed), Arc::clone(&self.carried));
-        let among_frames = move || match PosedContact::new(&shared, frame, seats) {
-            Err(refusal) => Ok(Err(refusal)),
-            Ok(frame) if frame.is_prepared() => Ok(frame.answer(&shared, clock())),
-            Ok(frame) => Err((Box::new(frame), clock)),
-        };
-        match workers.run_frame(among_frames).await? {
-            Ok(answered) => answered,
-            Err((frame, clock)) => {
-                let turn = self.turn(frame.predicted_ms(&resources));
-                workers.run(turn, move || frame.answer(&resources, clock())).await?
-            }
-        }
+        let resources = &self.server.resources;
+        self.contact.answer(resources, self.asker, frame, clock).await
     }
 
     /// Logs the client's first introduction; later ones are not logged.

@@ -97,8 +97,11 @@ impl LocalModel {
         let free = self.free_motion(places);
         let problem = ContactProblem::try_new(self.w.clone(), free, self.cones.clone());
         let Ok(problem) = problem else { return self.unsolved() };
-        let budget =
-            SolveBudget { residual_rel: RESIDUAL_REL, residual: 0.0, attempts_max: ATTEMPTS };
+        let budget = SolveBudget {
+            residual_rel: RESIDUAL_REL,
+            attempts_max: ATTEMPTS,
+            ..SolveBudget::default()
+        };
         let solution = Solution::of(&problem, &self.lambda, budget);
         self.lambda.clone_from(&solution.lambda);
         for (slipped, motion) in self.slipped.iter_mut().zip(solution.motion.chunks_exact(3)) {

@@ -5,26 +5,30 @@ use glove_client::ask::connection::ServerConnection;
 use softgrasp_core::mesh::{BuiltIn, Surface, TetMesh};
 use softgrasp_protocol::{
     BodyMotion, BodyShape, ContactAnswer, ContactAsk, ContactFrame, Deformation, Field, FieldSet,
-    LawName, ModelHash, NodeChoice, ObjectState, PathChoice, Precision, Reply, Request,
+    ModelHash, NodeChoice, ObjectState, Precision, Reply, Request,
 };
 use softgrasp_tests::questions::{object, upload};
 
 use crate::start::{client, refusal, server};
 
-const STILL: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+pub const STILL: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 /// Object above a table, and a finger that comes down on it.
 pub struct Scene {
     mesh: TetMesh,
     surface: Surface,
     model: ModelHash,
-    deformation: Option<Deformation>,
+    pub deformation: Option<Deformation>,
     fields: FieldSet,
 }
 
 impl Scene {
-    fn new(connection: &mut ServerConnection) -> Self {
+    pub fn new(connection: &mut ServerConnection) -> Self {
         scene_of(connection, object(BuiltIn::Strawberry, 300), None)
+    }
+
+    pub fn mesh(&self) -> &TetMesh {
+        &self.mesh
     }
 
     pub fn frame(&self, state: ObjectState, step: u32) -> ContactFrame {
@@ -54,10 +58,7 @@ impl Scene {
                 rounds_max: 12,
                 newton_max: 60,
                 deformation: self.deformation,
-                law: LawName::default(),
-                yield_stress: None,
-                path: PathChoice::Continue,
-                small_system: false,
+                ..ContactAsk::default()
             },
             state,
             bodies: vec![
@@ -87,7 +88,7 @@ pub fn scene_of(
     Scene { mesh, surface, model, deformation, fields: FieldSet::NONE }
 }
 
-fn advance(connection: &mut ServerConnection, frame: ContactFrame) -> ContactAnswer {
+pub fn advance(connection: &mut ServerConnection, frame: ContactFrame) -> ContactAnswer {
     match connection.ask(&Request::ContactFrame(Box::new(frame))) {
         Ok(Reply::ContactAnswer(answer)) => *answer,
         other => panic!("a contact frame got {other:?}"),
@@ -95,7 +96,7 @@ fn advance(connection: &mut ServerConnection, frame: ContactFrame) -> ContactAns
 }
 
 /// Answer as text, without times and memory.
-fn bits(mut answer: ContactAnswer) -> String {
+pub fn bits(mut answer: ContactAnswer) -> String {
     answer.answer.report = Default::default();
     answer.contact.columns_computed = 0;
     format!("{answer:?}")

@@ -10,6 +10,7 @@ mod access;
 mod awaited_model;
 mod bad_requests;
 mod bad_streams;
+mod contact_deadline;
 mod contact_frames;
 mod control;
 mod controlled;

@@ -232,7 +232,8 @@ def contact_frame(
     def read(reader: PayloadReader) -> ContactAnswer:
         return read_contact_answer(reader, of.mesh.node_count)
 
-    return Call(Kind.CONTACT_FRAME, payload, Kind.CONTACT_ANSWER, read, body_needs(bodies))
+    needs = body_needs(bodies) | step.needs()
+    return Call(Kind.CONTACT_FRAME, payload, Kind.CONTACT_ANSWER, read, needs)
 
 
 def prefetch(model: bytes, nodes: ArrayLike, masks: Sequence[Mask]) -> Call[None]:

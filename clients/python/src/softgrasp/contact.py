@@ -87,6 +87,9 @@ class ContactStep:
     """Stress above which the material flows and stays deformed, Pa; None: never."""
     from_rest: bool = False
     """Forget shape, factor and plastic strain of the session's last step."""
+    deadline_ms: float | None = None
+    """Time after which the step ends at the best that was found, ms; None: as long as it takes. A time
+    needs the capability `contact-deadline`."""
 
     def __post_init__(self) -> None:
         positive(self.seconds, "the length of a step")
@@ -100,6 +103,12 @@ class ContactStep:
             positive(self.yield_stress, "the yield stress")
             if self.deformation in (None, "linear"):
                 raise ValueError("a yield stress needs deformation large or auto")
+        if self.deadline_ms is not None:
+            positive(self.deadline_ms, "the deadline")
+
+    def needs(self) -> frozenset[str]:
+        """Capabilities of a server that the step needs."""
+        return frozenset() if self.deadline_ms is None else frozenset({"contact-deadline"})
 
     def part(self) -> Part:
         """The fields on the wire."""
@@ -116,7 +125,11 @@ class ContactStep:
             part.fields("B", 0)
         else:
             part.fields("Bd", 1, self.yield_stress)
-        return part.fields("I", int(self.from_rest))
+        part.fields("I", int(self.from_rest))
+        if self.deadline_ms is not None:
+            # No small system, then the deadline.
+            part.fields("BBd", 0, 1, self.deadline_ms)
+        return part
 
 
 @dataclass(frozen=True, eq=False)

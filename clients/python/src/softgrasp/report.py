@@ -148,6 +148,8 @@ class ContactReport:
     """Factors of the tangent that were made."""
     plastic_strain: float
     """Largest accumulated plastic strain."""
+    is_late: bool = False
+    """Whether the deadline has ended the step before it met what was asked for."""
 
 
 @dataclass(frozen=True)
@@ -250,10 +252,11 @@ def read_contact_report(fields: Fields) -> ContactReport:
     depth, slip, residual, relative, cone, converged, *counts = fields.fields(_CONTACT)
     errors = (depth, slip, residual, relative, cone)
     rounds, sweeps, newton, columns = counts
-    is_large, shapes, factors, plastic = fields.fields(_CONTACT_END)
+    is_large, shapes, factors, plastic, _, is_late = fields.fields(_CONTACT_END)
     deformation = "large" if fields.truth(is_large) else "linear"
     told = (fields.truth(converged), rounds, sweeps, newton, columns)
-    return ContactReport(*errors, *told, deformation, shapes, factors, plastic)
+    late = fields.truth(is_late)
+    return ContactReport(*errors, *told, deformation, shapes, factors, plastic, late)
 
 
 _LEVELS = ("none", "caution", "serious")
@@ -285,4 +288,4 @@ _MEMORY = struct.Struct("<QB")
 _LARGE = struct.Struct("<B4Id")
 _LARGE_END = struct.Struct("<dBBd")
 _CONTACT = struct.Struct("<5dB4I")
-_CONTACT_END = struct.Struct("<BIId")
+_CONTACT_END = struct.Struct("<BIIdIB")

@@ -19,7 +19,7 @@ use crate::solve::vectors::norm;
 /// Shapes: 3N. Units: m.
 pub struct LargeBody {
     pattern: Arc<StiffnessPattern>,
-    shape: Shape,
+    shape: LargeShape,
     tangent: Option<Arc<FreeTangent>>,
     factors: usize,
     /// Size that the imbalance of a yielding body without forces is told relative to, N: its yield stress
@@ -27,12 +27,12 @@ pub struct LargeBody {
     unloaded: f64,
 }
 
-/// A shape, the forces that it answers, and the plastic flow before it.
+/// A shape of a [`LargeBody`], the forces that it answers, and the plastic flow before it.
 #[derive(Clone)]
-pub(super) struct Shape {
-    pub elements: Arc<Elements>,
-    pub displacement: Vec<f64>,
-    pub forces: Vec<NodeForce>,
+pub struct LargeShape {
+    pub(super) elements: Arc<Elements>,
+    pub(super) displacement: Vec<f64>,
+    pub(super) forces: Vec<NodeForce>,
 }
 
 /// How well a shape answers forces.
@@ -64,7 +64,7 @@ impl LargeBody {
     pub fn at_rest(elements: Arc<Elements>, pattern: Arc<StiffnessPattern>) -> Self {
         let displacement = vec![0.0; 3 * elements.node_count()];
         let unloaded = elements.yield_stress().map_or(0.0, |stress| stress * area_of(&pattern));
-        let shape = Shape { elements, displacement, forces: Vec::new() };
+        let shape = LargeShape { elements, displacement, forces: Vec::new() };
         Self { pattern, shape, tangent: None, factors: 0, unloaded }
     }
 
@@ -103,18 +103,19 @@ impl LargeBody {
 
     /// Makes the plastic flow of the present shape permanent.
     pub(super) fn flow(&mut self) {
-        let Shape { elements, displacement, .. } = &mut self.shape;
+        let LargeShape { elements, displacement, .. } = &mut self.shape;
         if elements.is_plastic() {
             Arc::make_mut(elements).commit(displacement);
         }
     }
 
-    pub(super) fn shape(&self) -> &Shape {
+    /// The shape that the body has.
+    pub fn shape(&self) -> &LargeShape {
         &self.shape
     }
 
-    /// Puts the body into another shape; gives the one that it had.
-    pub(super) fn put(&mut self, shape: Shape) -> Shape {
+    /// Puts the body into another shape, one that it has had before; gives the one that it had.
+    pub fn put(&mut self, shape: LargeShape) -> LargeShape {
         std::mem::replace(&mut self.shape, shape)
     }
 

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::checks::mass_of;
 use super::configuration::{Configured, Scene};
-use super::large_body::{LargeBody, Shape};
+use super::large_body::{LargeBody, LargeShape};
 use super::rigid_motion::MassProperties;
 use super::rounds::{Effort, Found, Rounds};
 use super::settings::{StepError, StepSettings};
@@ -88,7 +88,7 @@ impl LargeStep<'_, '_> {
             Ok(whole) => whole.residual_rel > LOST || whole.contact_residual_rel > LOST,
             Err(error) => matches!(error, StepError::InsideOut | StepError::Problem(_)),
         };
-        if halvings == 0 || !is_lost {
+        if halvings == 0 || !is_lost || (self.step.is_late)() {
             return whole.inspect(|_| self.body.flow());
         }
         let after = self.body.put(before);
@@ -125,9 +125,14 @@ impl LargeStep<'_, '_> {
             no_nearer: 0,
             left: LEFT_AT_FIRST,
             is_stale: self.body.tangent().is_none(),
+            is_late: false,
             effort: Effort::default(),
         };
         while progress.effort.shapes < SHAPES_MAX && progress.no_nearer < NO_NEARER_MAX {
+            if progress.best.is_some() && (step.is_late)() {
+                progress.is_late = true;
+                break;
+            }
             let end = match self.next_end(&scene, &rows, &mut progress) {
                 Err(StepError::Problem(_)) if progress.best.is_some() => break,
                 end => end?,
@@ -139,7 +144,8 @@ impl LargeStep<'_, '_> {
         let is_sound = |end: &End| end.residual_rel.is_finite() && end.told.is_finite();
         let Some(end) = progress.best.filter(is_sound) else { return Err(StepError::InsideOut) };
         let outcome = self.finished(&scene, (rows, end), wanted)?;
-        Ok(progress.effort.told(outcome))
+        let is_late = !outcome.is_converged && (outcome.is_late || progress.is_late);
+        Ok(StepOutcome { is_late, ..progress.effort.told(outcome) })
     }
 
     /// Solves contact about the shape that was reached.
@@ -238,8 +244,14 @@ impl LargeStep<'_, '_> {
         };
         let size = self.step.size();
         let unpressed = &response.displacement(&scene.elastic_forces(&[]));
-        let mut rounds =
-            Rounds { settings: &settings, size, scene, response: &mut response, unpressed };
+        let mut rounds = Rounds {
+            settings: &settings,
+            size,
+            scene,
+            response: &mut response,
+            unpressed,
+            is_late: self.step.is_late,
+        };
         let found = rounds.play(held, start)?;
         let all: Vec<u32> = (0..self.step.vertices.len() as u32).collect();
         let mut displacement: Vec<f64> =
@@ -289,7 +301,7 @@ impl LargeStep<'_, '_> {
         let displacements = wanted.iter().map(of_node).collect();
         let outcome = self.step.outcome(scene, &response, &found, displacements);
         let (elements, forces) = (Arc::clone(self.body.elements()), found.end.forces);
-        self.body.put(Shape { elements, displacement, forces });
+        self.body.put(LargeShape { elements, displacement, forces });
         let is_converged = far <= 1.0;
         Ok(StepOutcome { residual_rel: told, is_converged, ..outcome })
     }
@@ -318,6 +330,8 @@ struct Progress {
     left: f64,
     /// Whether the factor is to be made anew.
     is_stale: bool,
+    /// Whether it ended with shapes left to try, because it was late.
+    is_late: bool,
     effort: Effort,
 }
 

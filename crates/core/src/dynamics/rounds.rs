@@ -34,6 +34,8 @@ pub(super) struct Found {
     /// Whether a force acts elsewhere than where the problem was made.
     pub has_moved: bool,
     pub is_converged: bool,
+    /// Whether more rounds would have been played if it had not been late.
+    pub is_late: bool,
     pub rounds: usize,
     pub sweeps: usize,
     pub newton_steps: usize,
@@ -71,6 +73,8 @@ pub(super) struct Rounds<'s, 'r> {
     pub response: &'r mut Response<'s>,
     /// Displacement of the response's rows at the end of the step if nothing pressed, m.
     pub unpressed: &'r [Vector3<f64>],
+    /// Asked between rounds: whether the best that there is will do.
+    pub is_late: &'r (dyn Fn() -> bool + Sync),
 }
 
 /// The points of a contact problem, and how well the configuration that it is about answers it.
@@ -109,7 +113,8 @@ impl Rounds<'_, '_> {
             let far = round.far(allowed, settings.residual_rel * force_max);
             let is_converged = far <= 1.0 && !round.has_moved;
             let is_last = rounds >= settings.rounds_max || newton_steps >= settings.newton_max;
-            if is_converged || is_last {
+            let is_late = !is_converged && !is_last && (self.is_late)();
+            if is_converged || is_last || is_late {
                 let is_best = best.as_ref().is_none_or(|(best_far, ..)| far <= *best_far);
                 let (end, round) = match (is_best, best) {
                     (false, Some((_, end, round))) => (end, round),
@@ -126,6 +131,7 @@ impl Rounds<'_, '_> {
                     residual,
                     has_moved,
                     is_converged,
+                    is_late,
                     rounds,
                     sweeps,
                     newton_steps,
@@ -136,6 +142,7 @@ impl Rounds<'_, '_> {
                 residual_rel: 0.1 * settings.residual_rel,
                 residual: INEXACT * round.residual,
                 attempts_max: ATTEMPTS,
+                is_late: self.is_late,
             };
             let about_now = (&about, self.unpressed);
             let what = (round.points.as_slice(), round.rollings.as_slice());

@@ -127,6 +127,8 @@ pub struct StepOutcome {
     pub residual_rel: f64,
     /// Whether gaps and residual are within what was asked for.
     pub is_converged: bool,
+    /// Whether it ended before that because it was late.
+    pub is_late: bool,
     /// Times the contact problem was made anew about where it had ended.
     pub rounds: usize,
     /// Sweeps over all points.
@@ -161,6 +163,7 @@ impl StepOutcome {
             cone_violation: self.cone_violation.max(before.cone_violation),
             residual_rel: self.residual_rel.max(before.residual_rel),
             is_converged: self.is_converged && before.is_converged,
+            is_late: self.is_late || before.is_late,
             rounds: self.rounds + before.rounds,
             sweeps: self.sweeps + before.sweeps,
             newton_steps: self.newton_steps + before.newton_steps,

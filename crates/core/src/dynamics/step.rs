@@ -34,6 +34,8 @@ pub struct ContactStep<'a> {
     pub candidates: &'a [Candidate],
     /// How the step is made.
     pub settings: StepSettings,
+    /// Asked between rounds and steps of Newton's method: whether the step ends at the best that was found.
+    pub is_late: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// Makes one part of a step, from where the part before it has ended.
@@ -224,7 +226,8 @@ impl ContactStep<'_> {
             body_forces: &[],
         };
         let settings = &self.settings;
-        let mut rounds = Rounds { settings, size, scene, response, unpressed: &unpressed };
+        let (unpressed, is_late) = (&unpressed, self.is_late);
+        let mut rounds = Rounds { settings, size, scene, response, unpressed, is_late };
         rounds.play(start.held, &configured)
     }
 
@@ -369,6 +372,7 @@ impl ContactStep<'_> {
             cone_violation: found.pressing.iter().map(violation).fold(0.0, f64::max),
             residual_rel: response.residual_rel(&end.forces),
             is_converged: found.is_converged,
+            is_late: found.is_late,
             rounds: found.rounds,
             sweeps: found.sweeps,
             newton_steps: found.newton_steps,

@@ -103,7 +103,8 @@ impl Object {
         let candidates =
             near_triangles(vertices, triangles, &state.world_from_object, bodies, margin);
         let candidates = &candidates;
-        make(ContactStep { vertices, triangles, elasticity, bodies, candidates, settings })
+        let is_late = &|| false;
+        make(ContactStep { vertices, triangles, elasticity, bodies, candidates, settings, is_late })
     }
 
     /// The object at large deformation, at rest.

@@ -41,6 +41,10 @@ pub(crate) type CarriedSeat = Arc<Lock<Vec<(ModelHash, Carried)>>>;
 /// Objects for which a session carries something, those of the newest steps: a megabyte each at most.
 const CARRIED_MAX: usize = 8;
 
+/// A step with more points that press, or more nodes near bodies, may take long.
+const POINTS_OF_FRAME: usize = 100;
+const NODES_OF_FRAME: usize = 1500;
+
 /// A contact frame that has been checked, with all data for its answer.
 pub(crate) struct PosedContact {
     model: ModelHash,
@@ -51,6 +55,8 @@ pub(crate) struct PosedContact {
     triangles: Vec<[u32; 3]>,
     candidates: Vec<Candidate>,
     settings: StepSettings,
+    /// ms from the beginning of the request; `None` for none.
+    deadline_ms: Option<f64>,
     nodes: NodeChoice,
     precision: Precision,
     fields: FieldSet,
@@ -112,6 +118,7 @@ impl PosedContact {
             triangles,
             candidates,
             settings: settings_of(&ask),
+            deadline_ms: ask.deadline_ms,
             nodes,
             precision,
             fields,
@@ -135,6 +142,11 @@ impl PosedContact {
         self.stored.has_free_body() && is_there
     }
 
+    /// Whether the step may have so many points that it takes long.
+    pub fn may_have_many_points(&self) -> bool {
+        self.state.contacts.len() > POINTS_OF_FRAME || self.near_nodes().len() > NODES_OF_FRAME
+    }
+
     /// Predicted time to compute the columns that the step may need.
     ///
     /// Units: ms.
@@ -145,10 +157,15 @@ impl PosedContact {
 
     /// Number of nodes near bodies whose columns are not cached.
     fn missing(&self) -> usize {
+        self.stored.columns.missing(self.near_nodes().into_iter().map(Contact::Node))
+    }
+
+    /// Nodes near bodies, ascending.
+    fn near_nodes(&self) -> Vec<u32> {
         let mut nodes = self.triangles.as_flattened().to_vec();
         nodes.sort_unstable();
         nodes.dedup();
-        self.stored.columns.missing(nodes.into_iter().map(Contact::Node))
+        nodes
     }
 
     /// Answers the contact frame: makes the step.
@@ -167,6 +184,7 @@ impl PosedContact {
         let computed = columns.computed();
         let elasticity = Elasticity { base: &base, body: &body, columns };
         let mesh = self.stored.model.mesh();
+        let (running, deadline_ms) = (clock.clone(), self.deadline_ms);
         let step = ContactStep {
             vertices: mesh.vertices(),
             triangles: &self.triangles,
@@ -174,6 +192,7 @@ impl PosedContact {
             bodies: &self.bodies,
             candidates: &self.candidates,
             settings: self.settings,
+            is_late: &|| running.is_late(deadline_ms),
         };
         let _of_fields =
             reserve_contact_fields(resources, &self.stored.model, (self.fields, &self.nodes))?;
@@ -184,9 +203,14 @@ impl PosedContact {
             NodeChoice::Nodes(nodes) => nodes.clone(),
         };
         let mut made = match &self.large {
-            Some(wish) => wish.advance(resources, &self.stored, &step, &self.state, &wanted)?,
+            Some(wish) => {
+                let is_abandoned = || running.is_abandoned();
+                let object = (&*self.stored, &self.state);
+                wish.advance(resources, object, &step, &wanted, &is_abandoned)?
+            }
             None => Made::linear(self.advance_linear(&step, &wanted)?),
         };
+        clock.go_on();
         let computed = columns.computed().saturating_sub(computed);
         resources.models.trim();
         let mut stage_ms = clock.finish();
@@ -288,6 +312,7 @@ impl PosedContact {
             factors: factors as u32,
             plastic_strain,
             small_contacts: small_system.contacts.len() as u32,
+            is_late: outcome.is_late,
         };
         let displacements = Displacements::of(outcome.displacements, self.precision);
         ContactAnswer {

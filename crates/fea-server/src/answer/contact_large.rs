@@ -126,17 +126,17 @@ impl LargeWish {
             && kept.yield_stress == self.yield_stress
     }
 
-    /// Makes one step of the object.
+    /// Makes one step of the object, which goes back to where it was if the client does not wait any more.
     ///
     /// # Errors
     /// [`Refusal`]; the object then stays unchanged.
     pub(super) fn advance(
         &self,
         resources: &Resources,
-        stored: &StoredModel,
+        (stored, state): (&StoredModel, &ObjectState),
         step: &ContactStep<'_>,
-        state: &ObjectState,
         wanted: &[u32],
+        is_abandoned: &dyn Fn() -> bool,
     ) -> Result<Made, Refusal> {
         let base = step.elasticity.base;
         let kept = self.seat.with(Option::take).filter(|kept| self.is_of(kept));
@@ -144,7 +144,11 @@ impl LargeWish {
             Some(kept) => kept,
             None => Pressed::at_rest(resources, stored, self, base)?,
         };
+        let before = pressed.body.shape().clone();
         let made = self.made(&mut pressed, step, state, wanted);
+        if is_abandoned() {
+            pressed.body.put(before);
+        }
         pressed.reservation.settle(pressed.body.bytes(base) as u64);
         self.seat.with(|seat| *seat = Some(pressed));
         made

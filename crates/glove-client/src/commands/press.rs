@@ -71,6 +71,10 @@ pub struct PressCommand {
     /// Longest step, s.
     #[arg(long, default_value_t = 0.01, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     step: f64,
+    /// Time after which a step ends at the best that was found, ms; the report says which steps did
+    /// [default: as long as it takes].
+    #[arg(long, value_name = "MS", value_parser = positive, allow_hyphen_values = true)]
+    deadline: Option<f64>,
     #[command(flatten)]
     elasticity: ElasticityArguments,
     /// Finite element. t10 has nodes in the middles of all edges, those of the file or halfway between
@@ -107,11 +111,21 @@ fn element(text: &str) -> Result<ElementName, String> {
     }
 }
 
-/// Refuses rounded bodies that a server does not know, before it is asked.
+/// Refuses rounded bodies and a deadline that a server does not know, before it is asked.
 ///
 /// # Errors
-/// One line that names the server and a body.
-fn check_server(bodies: &PressBodies, server: &Welcome) -> anyhow::Result<()> {
+/// One line that names the server, and a body or the deadline.
+fn check_server(
+    bodies: &PressBodies,
+    deadline: Option<f64>,
+    server: &Welcome,
+) -> anyhow::Result<()> {
+    if deadline.is_some() && !server.knows("contact-deadline") {
+        bail!(
+            "{} is an older server and keeps no deadline of a step; leave out --deadline",
+            server.program()
+        );
+    }
     if let Some(name) = bodies.rounded().filter(|_| !server.knows("rounded-bodies")) {
         bail!(
             "{} is an older server and knows no bodies with rounded edges; leave out the radius of {name}",
@@ -146,7 +160,7 @@ impl PressCommand {
             None => Host::open(&self.server, self.threads)?,
         };
         let mut connection = host.connect()?;
-        check_server(&bodies, connection.welcome())?;
+        check_server(&bodies, self.deadline, connection.welcome())?;
         progress.now(&format!("{} nodes:", mesh.node_count()));
         progress.watch(host.stage());
         let material = Material { young: self.young, poisson: self.poisson };
@@ -240,16 +254,13 @@ impl PressCommand {
             gravity: self.gravity.into(),
             density: self.density,
             viscosity: self.viscosity,
-            penetration_rel: 1e-7,
-            residual_rel: 1e-9,
-            rounds_max: 40,
-            newton_max: 1000,
             deformation: Some(elasticity.deformation),
             law: elasticity.law,
             yield_stress: elasticity.yield_stress,
             // The first step of a session finds nothing to go on with.
             path: PathChoice::Continue,
-            small_system: false,
+            deadline_ms: self.deadline,
+            ..ContactAsk::default()
         }
     }
 
@@ -288,6 +299,7 @@ impl PressCommand {
             steps_large: steps.iter().filter(|step| step.deformation == "large").count(),
             residual_rel_max: most(|step| step.residual_rel),
             steps_not_converged: steps.iter().filter(|step| !step.converged).count(),
+            steps_late: steps.iter().filter(|step| step.late).count(),
             penetration_max: most(|step| step.penetration_max),
             contact_residual_rel_max: most(|step| step.contact_residual_rel),
             steps,

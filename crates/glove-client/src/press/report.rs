@@ -49,6 +49,8 @@ pub struct PressReport {
     pub steps_large: usize,
     /// Number of steps whose penetration or residual is above what was asked for.
     pub steps_not_converged: usize,
+    /// Number of those steps that their deadline has ended.
+    pub steps_late: usize,
     /// Largest penetration of all steps, m.
     pub penetration_max: f64,
     /// Largest residual of the law of contact of all steps, relative.
@@ -84,6 +86,8 @@ pub struct StepReport {
     pub friction_law: &'static str,
     /// Whether penetration and residual are within what was asked for.
     pub converged: bool,
+    /// Whether the deadline has ended the step before that.
+    pub late: bool,
     /// Residual of the elastic part, relative to its forces.
     pub residual_rel: f64,
     /// Proven bound of the relative error of the elastic part, or null.
@@ -172,6 +176,9 @@ impl PressReport {
                 count => format!("{count} steps end"),
             }
         );
+        if self.steps_late > 0 {
+            text.push_str(&format!("the deadline has ended {}\n", steps(self.steps_late)));
+        }
         let touches = |step: &StepReport, name: &str| {
             step.bodies.get(name).is_some_and(|body| body.contacts > 0)
         };
@@ -227,6 +234,7 @@ impl StepReport {
             cone_violation: contact.cone_violation,
             friction_law: "coulomb",
             converged: contact.is_converged,
+            late: contact.is_late,
             residual_rel: report.residual_rel,
             error_bound_rel: report.error_bound_rel,
             why: report.error_bound_why.clone().unwrap_or_default(),

@@ -307,6 +307,7 @@ impl ContactGrasp {
             yield_stress,
             path: if self.strayed { PathChoice::FromRest } else { wish.path },
             small_system: self.felt.is_some(),
+            deadline_ms: None,
         }
     }
 

@@ -73,6 +73,9 @@ pub struct ContactAsk {
     pub path: PathChoice,
     /// Whether the small system of the step is wanted.
     pub small_system: bool,
+    /// Time from the beginning of the request on after which the step ends at the best that was found, ms;
+    /// `None` for as long as it takes.
+    pub deadline_ms: Option<f64>,
 }
 
 /// Answer to `ContactFrame`.
@@ -125,6 +128,8 @@ pub struct ContactReport {
     pub plastic_strain: f64,
     /// Number of bodies of the small system; 0 where it was not asked for, or nothing presses.
     pub small_contacts: u32,
+    /// Whether the step was ended by its deadline before it met what was asked for.
+    pub is_late: bool,
 }
 
 /// A point of the object's surface that presses on a body.
@@ -187,20 +192,53 @@ const LOADS: &str = "loads of bodies";
 /// Numbers that a contact point takes in its array.
 const POINT_NUMBERS: usize = 12;
 const LOAD_NUMBERS: usize = 7;
+/// Bytes of an option that is none.
+const NO_DEADLINE: usize = 1;
+
+impl Default for ContactAsk {
+    /// A step of 10 ms by linear elasticity, with weight along −z and the density of water, as exact as a
+    /// press asks for.
+    fn default() -> Self {
+        Self {
+            seconds: 0.01,
+            gravity: [0.0, 0.0, -9.81],
+            density: 1000.0,
+            viscosity: 0.0,
+            penetration_rel: 1e-7,
+            residual_rel: 1e-9,
+            rounds_max: 40,
+            newton_max: 1000,
+            deformation: None,
+            law: LawName::default(),
+            yield_stress: None,
+            path: PathChoice::Continue,
+            small_system: false,
+            deadline_ms: None,
+        }
+    }
+}
 
 impl ContactAsk {
-    /// The fields; one that asks for no small system is as short as it was before there were any.
+    /// The fields; what is not asked for at their end is left out, as it was before there was any.
     fn block(&self) -> Result<Block, EncodeError> {
         let block = Block::of(self)?;
-        Ok(if self.small_system { block } else { block.without_last(size_of::<bool>()) })
+        Ok(match (self.small_system, self.deadline_ms) {
+            (_, Some(_)) => block,
+            (true, None) => block.without_last(NO_DEADLINE),
+            (false, None) => block.without_last(size_of::<bool>() + NO_DEADLINE),
+        })
     }
 }
 
 impl ContactReport {
-    /// The fields with the number of bodies of a small system, which is left out where it is 0.
+    /// The fields with the number of bodies of a small system; what is 0 at their end is left out.
     fn block(&self, small_contacts: u32) -> Result<Block, EncodeError> {
         let block = Block::of(&Self { small_contacts, ..*self })?;
-        Ok(if small_contacts > 0 { block } else { block.without_last(size_of::<u32>()) })
+        Ok(match (small_contacts, self.is_late) {
+            (_, true) => block,
+            (1.., false) => block.without_last(size_of::<bool>()),
+            (0, false) => block.without_last(size_of::<u32>() + size_of::<bool>()),
+        })
     }
 }
 

@@ -33,6 +33,7 @@ pub fn contact_frame() -> impl Strategy<Value = ContactFrame> {
                 yield_stress: (rounds % 3 == 0).then_some(seconds),
                 path: if steps % 2 == 0 { PathChoice::Continue } else { PathChoice::FromRest },
                 small_system,
+                deadline_ms: (rounds % 2 == 0).then_some(density),
             }
         },
     );
@@ -82,6 +83,7 @@ pub fn contact_answer() -> impl Strategy<Value = ContactAnswer> {
                 factors,
                 plastic_strain: slip_max,
                 small_contacts: 0,
+                is_late: factors % 2 == 1,
             }
         },
     );

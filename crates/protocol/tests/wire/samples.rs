@@ -403,7 +403,7 @@ fn contact_frame() -> ContactFrame {
             law: LawName::NeoHookeanLog,
             yield_stress: Some(750.0),
             path: PathChoice::FromRest,
-            small_system: false,
+            ..ContactAsk::default()
         },
         state: object_state(),
         bodies: vec![
@@ -466,7 +466,7 @@ fn contact_answer() -> ContactAnswer {
             shapes: 4,
             factors: 1,
             plastic_strain: 0.125,
-            small_contacts: 0,
+            ..ContactReport::default()
         },
         state: object_state(),
         points: vec![point],

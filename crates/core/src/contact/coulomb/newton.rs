@@ -49,12 +49,12 @@ impl<'a> Proximal<'a> {
         Self { problem, added, from }
     }
 
-    /// Takes steps of the semismooth Newton method until the residual is small enough.
+    /// Takes steps of the semismooth Newton method until the residual is small enough, or it is late.
     ///
     /// Units: `tolerance` N.
     ///
     /// Source: Alart and Curnier (1991); Rockafellar (1976) for the proximal point.
-    pub fn solve(&self, steps_max: usize, tolerance: f64) -> Step {
+    pub fn solve(&self, steps_max: usize, tolerance: f64, is_late: &dyn Fn() -> bool) -> Step {
         let mut lambda = self.from.to_vec();
         let mut best_at = 0;
         let mut best = Step { lambda: self.from.to_vec(), residual: f64::INFINITY, steps: 0 };
@@ -66,7 +66,7 @@ impl<'a> Proximal<'a> {
                 (best.lambda, best.residual, best_at) = (inside, residual, steps);
             }
             let strays = steps >= best_at + STRAYING || residual > RUNAWAY * best.residual;
-            if best.residual <= tolerance || steps == steps_max || strays {
+            if best.residual <= tolerance || steps == steps_max || strays || is_late() {
                 break;
             }
             match self.step(&lambda) {

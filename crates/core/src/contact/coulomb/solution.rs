@@ -7,19 +7,21 @@ use super::problem::ContactProblem;
 use super::splitting::Splitting;
 
 /// How exactly and how long to solve.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolveBudget {
+#[derive(Clone, Copy)]
+pub struct SolveBudget<'a> {
     /// Residual of the natural map that is small enough, as a share of the largest force.
     pub residual_rel: f64,
     /// Residual that is small enough in any case, N.
     pub residual: f64,
     /// Most attempts, each of Newton's method and then of the splitting.
     pub attempts_max: usize,
+    /// Asked between steps of Newton's method: whether the best forces so far will do.
+    pub is_late: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl Default for SolveBudget {
+impl Default for SolveBudget<'_> {
     fn default() -> Self {
-        Self { residual_rel: 1e-10, residual: 0.0, attempts_max: 40 }
+        Self { residual_rel: 1e-10, residual: 0.0, attempts_max: 40, is_late: &|| false }
     }
 }
 
@@ -99,12 +101,13 @@ impl Forces {
         &mut self,
         problem: &ContactProblem,
         share: &mut f64,
-        budget: &SolveBudget,
+        budget: &SolveBudget<'_>,
     ) -> usize {
         let (first, mut steps) = (self.residual, 0);
         for _ in 0..NEWTON_ROUNDS {
             let tolerance = 0.1 * self.allowed(budget);
-            let found = Proximal::new(problem, &self.lambda, *share).solve(NEWTON_STEPS, tolerance);
+            let proximal = Proximal::new(problem, &self.lambda, *share);
+            let found = proximal.solve(NEWTON_STEPS, tolerance, budget.is_late);
             steps += found.steps;
             let is_solved = found.residual <= tolerance;
             let next = Self::new(problem, found.lambda);
@@ -113,7 +116,7 @@ impl Forces {
                 *self = next;
             }
             let pays = left < LEFT || is_solved && left < LEFT_IF_SOLVED;
-            if !pays || self.is_within(budget) {
+            if !pays || self.is_within(budget) || (budget.is_late)() {
                 break;
             }
             if self.residual < LEFT_TO_SHRINK * first {
@@ -124,16 +127,16 @@ impl Forces {
     }
 
     /// Residual that is small enough, N.
-    fn allowed(&self, budget: &SolveBudget) -> f64 {
+    fn allowed(&self, budget: &SolveBudget<'_>) -> f64 {
         budget.allowed(&self.lambda)
     }
 
-    fn is_within(&self, budget: &SolveBudget) -> bool {
+    fn is_within(&self, budget: &SolveBudget<'_>) -> bool {
         self.residual <= self.allowed(budget)
     }
 }
 
-impl SolveBudget {
+impl SolveBudget<'_> {
     /// Residual that is small enough for some forces, N.
     pub(super) fn allowed(&self, lambda: &[f64]) -> f64 {
         self.residual.max(self.residual_rel * force_max(lambda))
@@ -156,7 +159,7 @@ impl Solution {
     /// where the others have their forces, are solved for alone, until no point is inside that has none.
     ///
     /// Shapes: `warm` 3n forces to begin with, those of the last tick, N.
-    pub fn of(problem: &ContactProblem, warm: &[f64], budget: SolveBudget) -> Self {
+    pub fn of(problem: &ContactProblem, warm: &[f64], budget: SolveBudget<'_>) -> Self {
         let n = problem.point_count();
         let mut lambda = match warm.len() == 3 * n {
             true => problem.projected(warm),
@@ -188,8 +191,9 @@ impl Solution {
             }
         }
         let residual = problem.residual_of(&lambda, &motion);
-        if residual <= budget.allowed(&lambda) {
-            return Self { lambda, motion, residual, sweeps, newton_steps, is_converged: true };
+        let is_converged = residual <= budget.allowed(&lambda);
+        if is_converged || (budget.is_late)() {
+            return Self { lambda, motion, residual, sweeps, newton_steps, is_converged };
         }
         let whole = Self::of_whole(problem, lambda, budget);
         let (sweeps, newton_steps) = (sweeps + whole.sweeps, newton_steps + whole.newton_steps);
@@ -200,9 +204,9 @@ impl Solution {
     /// from there, from those of less friction.
     ///
     /// Shapes: `lambda` 3n, N.
-    fn of_whole(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget) -> Self {
+    fn of_whole(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget<'_>) -> Self {
         let mut best = Self::from_forces(problem, lambda, budget);
-        if best.is_converged {
+        if best.is_converged || (budget.is_late)() {
             return best;
         }
         let (mut sweeps, mut newton_steps) = (best.sweeps, best.newton_steps);
@@ -223,7 +227,7 @@ impl Solution {
     /// The forces of all points at once, from some to begin with, each in its cone.
     ///
     /// Shapes: `lambda` 3n, N.
-    fn from_forces(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget) -> Self {
+    fn from_forces(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget<'_>) -> Self {
         let mut now = Forces::new(problem, lambda);
         let mut best = now.clone();
         let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
@@ -237,7 +241,7 @@ impl Solution {
             if now.residual < best.residual {
                 best.clone_from(&now);
             }
-            if best.is_within(&budget) {
+            if best.is_within(&budget) || (budget.is_late)() {
                 break;
             }
             let mut begins_anew = now.residual < LEFT_TO_BEGIN_ANEW * before;

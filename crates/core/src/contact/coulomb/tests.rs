@@ -165,7 +165,7 @@ proptest! {
         friction in 0.2..0.9f64,
     ) {
         let problem = fingertip(&places, press, shear, friction);
-        let budget = SolveBudget { residual_rel: 1e-8, residual: 0.0, attempts_max: 20 };
+        let budget = SolveBudget { residual_rel: 1e-8, attempts_max: 20, ..SolveBudget::default() };
         let found = Solution::of(&problem, &[], budget);
         prop_assert!(found.is_converged, "residual {:e} of {:e} N", found.residual, found.force_max());
     }
@@ -296,7 +296,7 @@ proptest! {
             let laws = cones.into_iter().map(PointLaw::from).collect();
             ContactProblem::between_corners(w, pushed, laws).unwrap()
         };
-        let budget = SolveBudget { residual_rel: 1e-8, residual: 0.0, attempts_max: 40 };
+        let budget = SolveBudget { residual_rel: 1e-8, ..SolveBudget::default() };
         let (ours, theirs) = (Solution::of(&problem, &[], budget), Solution::of(&dense, &[], budget));
         prop_assert!(ours.is_converged, "residual {:e} of {:e} N", ours.residual, ours.force_max());
         prop_assume!(theirs.is_converged);

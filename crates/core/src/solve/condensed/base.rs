@@ -53,6 +53,8 @@ pub(super) struct Rigid {
     pub norm: f64,
     /// Bound of `‖K R D‖`, `‖Kᵀ R D‖` and that of the symmetric part, N/m.
     pub stiffness: f64,
+    /// `‖K R D‖` about, as computed: rounding, N/m.
+    pub computed_stiffness: f64,
 }
 
 impl Rigid {
@@ -83,16 +85,19 @@ impl Rigid {
         let inverse = Ball::exact(rows.middle.clone().try_inverse()?);
         // Written so that a NaN is refused too.
         let is_proven = departure < 1.0 && inverse.times(&rows).distance_from_identity() < 1.0;
-        let column = |j: usize| {
-            let bound = |i: usize| modes[i].residual_bound + 2.0 * asymmetry * modes[i].norm;
-            (0..z).map(|i| bound(i) * to_orthonormal[(i, j)].abs()).sum::<f64>()
+        let of_columns = |of_mode: &dyn Fn(&Mode) -> f64| {
+            let of = |(i, j): (usize, usize)| of_mode(&modes[i]) * to_orthonormal[(i, j)].abs();
+            let column = |j: usize| (0..z).map(|i| of((i, j))).sum::<f64>();
+            (0..z).map(|j| column(j).powi(2)).sum::<f64>().sqrt()
         };
-        let stiffness = (0..z).map(|j| column(j).powi(2)).sum::<f64>().sqrt() * SLACK;
+        let stiffness = of_columns(&|m| m.residual_bound + 2.0 * asymmetry * m.norm) * SLACK;
+        let computed_stiffness = of_columns(&|m| m.residual);
         is_proven.then(|| Self {
             norm: (1.0 + departure).sqrt() * SLACK,
             from_modes: lower.transpose(),
             to_orthonormal,
             stiffness,
+            computed_stiffness,
         })
     }
 }

@@ -140,7 +140,8 @@ impl Judge<'_> {
     /// Estimate of the relative error that conjugate gradients leave; `None` where a factor was used.
     ///
     /// The errors of the columns add up in proportion to the forces. Where the contacts are held, the small
-    /// system takes out again what moves them, which is a part of the same size.
+    /// system takes out again what moves them, which is a part of the same size. Rounding in the stiffness
+    /// turns a body that the contacts hold weakly.
     ///
     /// Units: `asked` and `delivered` norms, m; `of_loads` norm of the error of what loads move, m.
     fn estimate(
@@ -157,7 +158,8 @@ impl Judge<'_> {
         let places = self.small.places.iter().map(|&(at, axis)| columns[at].errors[axis]);
         let of_columns: f64 = places.zip(&answer.lambda).map(|(e, force)| e * force.abs()).sum();
         let size = delivered.max(asked / self.overlap.stretch);
-        let error = ESTIMATE_SAFETY * (of_columns + of_loads);
+        let turned = self.verified.turned_by_rounding(self.base) * size;
+        let error = ESTIMATE_SAFETY * (of_columns + of_loads) + turned;
         Some(if size > 0.0 { error / size } else { error })
     }
 

@@ -160,6 +160,13 @@ impl Verified {
         })
     }
 
+    /// Estimate of the displacement that rounding in the stiffness makes, over the displacements: `K` moves
+    /// motions without energy by a little force, and the contacts hold these so weakly or firmly.
+    pub fn turned_by_rounding(&self, base: &Base) -> f64 {
+        let (Some(rigid), Some(hold)) = (&base.rigid, &self.hold) else { return 0.0 };
+        rigid.norm * hold.compliance * rigid.computed_stiffness
+    }
+
     /// Finds a left inverse N of `EᵀR D` in the inverse of S and verifies it.
     fn hold(&self, base: &Base, c: usize) -> Option<Hold> {
         let rigid = base.rigid.as_ref()?;
