@@ -134,6 +134,29 @@ def test_an_older_server_is_not_sent_rounded_bodies(block: KeptModel, without: W
         block.contact_frame(ObjectState(), [Body(Box(half, 0.001))], step)
 
 
+def test_a_step_ends_at_its_deadline_and_says_so(block: KeptModel, without: Without) -> None:
+    start, end = (Pose((0.02, 0.015, height)) for height in (0.0285, 0.025))
+    finger = Body(Sphere(0.008), start, end, friction=0.8)
+    bodies = [table(), finger]
+    whole = block.contact_frame(ObjectState(), bodies, ContactStep(0.01, DENSITY)).contact
+    assert whole.is_converged and not whole.is_late
+    step = ContactStep(0.01, DENSITY, deadline_ms=1e-6)
+    late = block.contact_frame(ObjectState(), bodies, step).contact
+    assert late.is_late and not late.is_converged and late.rounds < whole.rounds
+    in_time = ContactStep(0.01, DENSITY, deadline_ms=1e6)
+    assert not block.contact_frame(ObjectState(), bodies, in_time).contact.is_late
+    without("contact-deadline")
+    block.contact_frame(ObjectState(), bodies, ContactStep(0.01, DENSITY))
+    with pytest.raises(NotCapable, match="contact-deadline"):
+        block.contact_frame(ObjectState(), bodies, step)
+
+
+def test_a_deadline_is_a_positive_time() -> None:
+    for wrong in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="the deadline"):
+            ContactStep(0.01, deadline_ms=wrong)
+
+
 def test_candidates_are_near(bar: Bar) -> None:
     state, step = ObjectState(), ContactStep(0.001)
     far = Body(Sphere(0.001), Pose((1.0, 0.0, 0.0)))

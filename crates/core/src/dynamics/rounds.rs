@@ -17,8 +17,6 @@ use crate::solve::condensed::Response;
 const MARGIN: f64 = 2e-3;
 /// Share of a round's residual that its solution may leave.
 const INEXACT: f64 = 1e-3;
-/// Points of one contact problem: its matrix grows with the square, its time with the cube.
-const POINTS_MAX: usize = 600;
 /// Attempts of Newton's method in a round.
 const ATTEMPTS: usize = 8;
 
@@ -205,9 +203,9 @@ impl Rounds<'_, '_> {
                 chosen.push((*point, gap, force.unwrap_or_default()));
             }
         }
-        let points = chosen.len();
-        if points > POINTS_MAX {
-            return Err(StepError::TooManyPoints { points, max: POINTS_MAX });
+        let (points, max) = (chosen.len(), self.settings.points_max);
+        if points > max {
+            return Err(StepError::TooManyPoints { points, max });
         }
         self.response.need(chosen.iter().flat_map(|(p, ..)| p.weighted()).map(|(n, _)| n))?;
         let mut points = Vec::with_capacity(chosen.len());

@@ -25,8 +25,24 @@ pub struct StepSettings {
     pub rounds_max: usize,
     /// Steps of Newton's method after which no further round is begun.
     pub newton_max: usize,
+    /// Most points of one contact problem: its memory grows with the square of their number
+    /// ([`StepSettings::bytes_of_points`]), its time with the cube.
+    pub points_max: usize,
     /// Whether the small system of the step is wanted.
     pub small_system: bool,
+}
+
+impl StepSettings {
+    /// Points that fit a problem which nobody has reserved memory for.
+    pub const POINTS_USUAL: usize = 600;
+    /// Points of the largest problem that is taken on.
+    pub const POINTS_MOST: usize = 2000;
+
+    /// Bytes of the matrices of a problem with so many points, at most.
+    pub fn bytes_of_points(points: usize) -> u64 {
+        // The compliance, those of the points that press and of a proximal step, a factor, a splitting.
+        5 * 9 * size_of::<f64>() as u64 * (points as u64).pow(2)
+    }
 }
 
 impl Default for StepSettings {
@@ -40,6 +56,7 @@ impl Default for StepSettings {
             residual_rel: 1e-9,
             rounds_max: 16,
             newton_max: 400,
+            points_max: Self::POINTS_MOST,
             small_system: false,
         }
     }

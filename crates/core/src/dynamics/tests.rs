@@ -347,3 +347,19 @@ fn ball_between_two_planes_presses_as_hertz_says_on_finer_and_finer_meshes() {
     }
     assert!(worst[2] < worst[0], "no better on a finer mesh: {worst:?}");
 }
+
+#[test]
+fn more_points_than_a_problem_takes_are_refused_with_both_numbers() {
+    let ball = Object::sized(BuiltIn::Sphere, 300, 0.06, 2.0e4, 0.4);
+    let state = ObjectState::at_rest(at(0.0, 0.0, 0.029));
+    let of = |points_max: usize| {
+        let settings = StepSettings { points_max, ..StepSettings::default() };
+        ball.with_step(&state, &[table(0.5)], settings, |step| step.advance(&state, &[]))
+    };
+    let points = of(StepSettings::POINTS_MOST).unwrap().contacts.len();
+    assert!(points > 3, "{points}");
+    match of(3).unwrap_err() {
+        StepError::TooManyPoints { points: all, max: 3 } => assert!(all >= points, "{all}"),
+        other => panic!("{other}"),
+    }
+}

@@ -26,6 +26,7 @@ use super::fields::{Shape, contact_field_values, reserve_contact_fields};
 use super::large::law_of;
 use super::large_once::promised_error;
 use super::warnings::strain_warnings;
+use crate::budget::Reservation;
 use crate::clock::{StageClock, ms_since};
 use crate::lock::Lock;
 use crate::machine_memory::last_peak_rss_bytes;
@@ -185,13 +186,14 @@ impl PosedContact {
         let elasticity = Elasticity { base: &base, body: &body, columns };
         let mesh = self.stored.model.mesh();
         let (running, deadline_ms) = (clock.clone(), self.deadline_ms);
+        let (points_max, _of_points) = self.points_max(resources);
         let step = ContactStep {
             vertices: mesh.vertices(),
             triangles: &self.triangles,
             elasticity,
             bodies: &self.bodies,
             candidates: &self.candidates,
-            settings: self.settings,
+            settings: StepSettings { points_max, ..self.settings },
             is_late: &|| running.is_late(deadline_ms),
         };
         let _of_fields =
@@ -220,6 +222,20 @@ impl PosedContact {
         stage_ms.encode = ms_since(start);
         answer.answer.report.stage_ms = stage_ms;
         Ok(answer)
+    }
+
+    /// Most points of the contact problem: more than usual where so many nodes are near, and memory for them
+    /// could be reserved.
+    fn points_max(&self, resources: &Resources) -> (usize, Reservation) {
+        let reservation = resources.budget.reservation();
+        // Some lie between nodes.
+        let points = (self.near_nodes().len() * 3 / 2).min(StepSettings::POINTS_MOST);
+        let is_usual = points <= StepSettings::POINTS_USUAL;
+        if is_usual || !reservation.reserve(StepSettings::bytes_of_points(points), 0) {
+            return (StepSettings::POINTS_USUAL, reservation);
+        }
+        resources.models.make_room(None);
+        (points, reservation)
     }
 
     /// Makes the step by linear elasticity, from what the session has carried if it goes on from there: the

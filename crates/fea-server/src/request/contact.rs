@@ -131,6 +131,7 @@ pub(crate) fn settings_of(ask: &ContactAsk) -> StepSettings {
         residual_rel: ask.residual_rel,
         rounds_max: most(ask.rounds_max, ROUNDS_MAX),
         newton_max: most(ask.newton_max, NEWTON_MAX),
+        points_max: StepSettings::POINTS_USUAL,
         small_system: ask.small_system,
     }
 }
