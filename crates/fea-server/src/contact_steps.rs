@@ -3,18 +3,25 @@
 use std::sync::Arc;
 
 use softgrasp_protocol::{ContactAnswer, ContactFrame, ModelHash};
-use tokio::sync::Mutex;
+use tokio::sync::{Mutex, OwnedMutexGuard};
 
 use crate::answer::{CarriedSeat, PosedContact, PressedSeat};
 use crate::clock::StageClock;
 use crate::refusal::Refusal;
 use crate::resources::Resources;
-use crate::workers::{Asker, Turn};
+use crate::workers::{Asker, EndedAbnormally, Turn};
 
-/// A step that took longer is not worked on among frames the next time: others would wait for it.
+/// A step that takes longer is not worked on among frames, where others would wait for it: it is begun anew in a
+/// lane, and the next one of the session goes there at once.
 ///
 /// Units: ms.
 const FRAME_MS_MAX: f64 = 50.0;
+/// A step that takes so many times its cost in a lane is begun anew as one of that cost, …
+const TIMES_COST: f64 = 5.0;
+/// … up to those that go to the lane of the longest work.
+///
+/// Units: ms.
+const LONG_MS: f64 = 5000.0;
 
 /// What a session keeps from one contact frame to the next.
 #[derive(Default)]
@@ -37,8 +44,8 @@ impl ContactSteps {
         self.carried.with(|carried| carried.retain(|(of, _)| *of != model));
     }
 
-    /// Answers a contact frame: among frames if its columns are cached and it is expected to be short, else
-    /// in the lane of its predicted cost.
+    /// Answers a contact frame: among frames if its columns are cached and it is short, else in the lane of
+    /// its predicted cost.
     ///
     /// # Errors
     /// [`Refusal`].
@@ -54,32 +61,55 @@ impl ContactSteps {
         let shared = Arc::clone(resources);
         let seats = (Arc::clone(&self.pressed), Arc::clone(&self.carried));
         let newest_ms = self.newest_ms;
-        let is_short = move |frame: &PosedContact| match newest_ms {
-            Some(ms) => ms <= FRAME_MS_MAX,
-            None => !frame.may_have_many_points(),
-        };
-        let among_frames = move || match PosedContact::new(&shared, frame, seats) {
-            Err(refusal) => Ok(Err(refusal)),
-            Ok(frame) if frame.is_prepared() && is_short(&frame) => {
-                Ok(frame.answer(&shared, clock()))
+        let is_short = newest_ms.is_none_or(|ms| ms <= FRAME_MS_MAX);
+        let among_frames = move || {
+            let frame = match PosedContact::new(&shared, frame, seats) {
+                Err(refusal) => return Ok(Err(refusal)),
+                Ok(frame) => frame,
+            };
+            let clock = clock();
+            if !(is_short && frame.is_prepared()) {
+                return Err((Box::new(frame), Box::new(clock), alone));
             }
-            Ok(frame) => Err((Box::new(frame), clock, alone)),
+            let answered = frame.answer_within(&shared, clock.clone(), FRAME_MS_MAX);
+            answered.map_err(|frame| (frame, Box::new(clock), alone))
         };
         let answered = match workers.run_frame(among_frames).await? {
             Ok(answered) => answered,
             Err((frame, clock, alone)) => {
-                let cost_ms = frame.predicted_ms(resources) + newest_ms.unwrap_or(0.0);
-                let shared = Arc::clone(resources);
-                let work = move || {
-                    let _alone = alone;
-                    frame.answer(&shared, clock())
-                };
-                workers.run(Turn { asker, cost_ms }, work).await?
+                let expected_ms = newest_ms.unwrap_or(0.0).max(FRAME_MS_MAX);
+                in_lanes(resources, (asker, expected_ms), frame, (clock, alone)).await?
             }
         };
         if let Ok(answer) = &answered {
             self.newest_ms = Some(answer.answer.report.stage_ms.solve);
         }
         answered
+    }
+}
+
+/// Answers a contact frame in the lane of its predicted cost; where that was too low, in one of longer work.
+///
+/// Units: ms.
+async fn in_lanes(
+    resources: &Arc<Resources>,
+    (asker, expected_ms): (Asker, f64),
+    mut frame: Box<PosedContact>,
+    (clock, mut alone): (Box<StageClock>, OwnedMutexGuard<()>),
+) -> Result<Result<ContactAnswer, Refusal>, EndedAbnormally> {
+    let mut cost_ms = frame.predicted_ms(resources) + expected_ms;
+    loop {
+        let (shared, clock) = (Arc::clone(resources), (*clock).clone());
+        let slice_ms = if cost_ms > LONG_MS { f64::INFINITY } else { TIMES_COST * cost_ms };
+        let work = move || {
+            let answered = frame.answer_within(&shared, clock, slice_ms);
+            answered.map_err(|frame| (frame, alone))
+        };
+        match resources.workers.run(Turn { asker, cost_ms }, work).await? {
+            Ok(answered) => return Ok(answered),
+            Err((again, still_alone)) => (frame, alone) = (again, still_alone),
+        }
+        // Above the limit of a lane, not at it.
+        cost_ms = 1.01 * slice_ms;
     }
 }

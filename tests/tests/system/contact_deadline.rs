@@ -15,6 +15,7 @@ use crate::contact_frames::{STILL, Scene, advance, bits, scene_of};
 use crate::start::{client, server};
 
 const LIMIT: Duration = Duration::from_secs(240);
+const YIELD_PA: f64 = 2000.0;
 
 /// A step in which a finger comes down through ten usual ones.
 fn deep(scene: &Scene, state: ObjectState) -> ContactFrame {
@@ -46,7 +47,7 @@ fn step_ends_at_its_deadline_and_says_so() {
         };
         let whole = with_deadline(None);
         assert!(whole.contact.is_converged && !whole.contact.is_late, "{:?}", whole.contact);
-        assert_eq!(bits(with_deadline(Some(1e9))), bits(whole.clone()));
+        assert!(bits(with_deadline(Some(1e9))) == bits(whole.clone()), "other bits");
         for over in [1e-6, 0.0, -1.0] {
             let late = with_deadline(Some(over)).contact;
             assert!(late.is_late && !late.is_converged, "{late:?}");
@@ -65,13 +66,14 @@ fn step_that_is_cancelled_leaves_a_clay_object_as_it_was() {
         let mut scene = Scene::new(&mut connection);
         scene.deformation = Some(Deformation::Large);
         let clay = |mut frame: ContactFrame| {
-            frame.ask.yield_stress = Some(300.0);
+            frame.ask.yield_stress = Some(YIELD_PA);
             frame
         };
         let first = advance(&mut connection, clay(deep(&scene, ObjectState::at_rest(STILL))));
         let second = clay(scene.frame(first.state.clone(), 9));
         let expected = advance(&mut connection, second.clone());
-        assert!(first.contact.plastic_strain > 0.0, "{:?}", first.contact);
+        let flowed = [&first, &expected].map(|answer| answer.contact.plastic_strain);
+        assert!(flowed[0] > 0.0 && flowed[1] > 1.1 * flowed[0], "{flowed:?}");
 
         let mut session = RawSession::open(other.address());
         let model = softgrasp_tests::questions::upload(scene.mesh());
@@ -94,7 +96,7 @@ fn step_that_is_cancelled_leaves_a_clay_object_as_it_was() {
         }
         assert_eq!(cancelled, 6);
         match session.ask(3, &Request::ContactFrame(Box::new(second))) {
-            Reply::ContactAnswer(answer) => assert_eq!(bits(*answer), bits(expected)),
+            Reply::ContactAnswer(answer) => assert!(bits(*answer) == bits(expected), "other bits"),
             other => panic!("a contact frame got {other:?}"),
         }
     });

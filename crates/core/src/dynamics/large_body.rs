@@ -17,9 +17,10 @@ use crate::solve::vectors::norm;
 /// factor, already. A body that yields is another matter: what has flowed is known to it alone.
 ///
 /// Shapes: 3N. Units: m.
+#[derive(Clone)]
 pub struct LargeBody {
     pattern: Arc<StiffnessPattern>,
-    shape: LargeShape,
+    shape: Shape,
     tangent: Option<Arc<FreeTangent>>,
     factors: usize,
     /// Size that the imbalance of a yielding body without forces is told relative to, N: its yield stress
@@ -27,12 +28,12 @@ pub struct LargeBody {
     unloaded: f64,
 }
 
-/// A shape of a [`LargeBody`], the forces that it answers, and the plastic flow before it.
+/// A shape, the forces that it answers, and the plastic flow before it.
 #[derive(Clone)]
-pub struct LargeShape {
-    pub(super) elements: Arc<Elements>,
-    pub(super) displacement: Vec<f64>,
-    pub(super) forces: Vec<NodeForce>,
+pub(super) struct Shape {
+    pub elements: Arc<Elements>,
+    pub displacement: Vec<f64>,
+    pub forces: Vec<NodeForce>,
 }
 
 /// How well a shape answers forces.
@@ -64,7 +65,7 @@ impl LargeBody {
     pub fn at_rest(elements: Arc<Elements>, pattern: Arc<StiffnessPattern>) -> Self {
         let displacement = vec![0.0; 3 * elements.node_count()];
         let unloaded = elements.yield_stress().map_or(0.0, |stress| stress * area_of(&pattern));
-        let shape = LargeShape { elements, displacement, forces: Vec::new() };
+        let shape = Shape { elements, displacement, forces: Vec::new() };
         Self { pattern, shape, tangent: None, factors: 0, unloaded }
     }
 
@@ -103,19 +104,18 @@ impl LargeBody {
 
     /// Makes the plastic flow of the present shape permanent.
     pub(super) fn flow(&mut self) {
-        let LargeShape { elements, displacement, .. } = &mut self.shape;
+        let Shape { elements, displacement, .. } = &mut self.shape;
         if elements.is_plastic() {
             Arc::make_mut(elements).commit(displacement);
         }
     }
 
-    /// The shape that the body has.
-    pub fn shape(&self) -> &LargeShape {
+    pub(super) fn shape(&self) -> &Shape {
         &self.shape
     }
 
-    /// Puts the body into another shape, one that it has had before; gives the one that it had.
-    pub fn put(&mut self, shape: LargeShape) -> LargeShape {
+    /// Puts the body into another shape; gives the one that it had.
+    pub(super) fn put(&mut self, shape: Shape) -> Shape {
         std::mem::replace(&mut self.shape, shape)
     }
 

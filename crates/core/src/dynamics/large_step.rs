@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::checks::mass_of;
 use super::configuration::{Configured, Scene};
-use super::large_body::{LargeBody, LargeShape};
+use super::large_body::{LargeBody, Shape};
 use super::rigid_motion::MassProperties;
 use super::rounds::{Effort, Found, Rounds};
 use super::settings::{StepError, StepSettings};
@@ -301,7 +301,7 @@ impl LargeStep<'_, '_> {
         let displacements = wanted.iter().map(of_node).collect();
         let outcome = self.step.outcome(scene, &response, &found, displacements);
         let (elements, forces) = (Arc::clone(self.body.elements()), found.end.forces);
-        self.body.put(LargeShape { elements, displacement, forces });
+        self.body.put(Shape { elements, displacement, forces });
         let is_converged = far <= 1.0;
         Ok(StepOutcome { residual_rel: told, is_converged, ..outcome })
     }

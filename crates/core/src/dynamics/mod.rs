@@ -57,7 +57,7 @@ mod yield_tests;
 pub use bodies::{MovingBody, near_triangles, reach_of_step};
 pub use carried::Carried;
 pub use features::Candidate;
-pub use large_body::{LargeBody, LargeShape};
+pub use large_body::LargeBody;
 pub use large_step::LargeStep;
 pub use rigid_motion::MassProperties;
 pub use settings::{StepError, StepSettings};

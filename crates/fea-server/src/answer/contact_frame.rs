@@ -42,10 +42,6 @@ pub(crate) type CarriedSeat = Arc<Lock<Vec<(ModelHash, Carried)>>>;
 /// Objects for which a session carries something, those of the newest steps: a megabyte each at most.
 const CARRIED_MAX: usize = 8;
 
-/// A step with more points that press, or more nodes near bodies, may take long.
-const POINTS_OF_FRAME: usize = 100;
-const NODES_OF_FRAME: usize = 1500;
-
 /// A contact frame that has been checked, with all data for its answer.
 pub(crate) struct PosedContact {
     model: ModelHash,
@@ -143,11 +139,6 @@ impl PosedContact {
         self.stored.has_free_body() && is_there
     }
 
-    /// Whether the step may have so many points that it takes long.
-    pub fn may_have_many_points(&self) -> bool {
-        self.state.contacts.len() > POINTS_OF_FRAME || self.near_nodes().len() > NODES_OF_FRAME
-    }
-
     /// Predicted time to compute the columns that the step may need.
     ///
     /// Units: ms.
@@ -169,15 +160,34 @@ impl PosedContact {
         nodes
     }
 
-    /// Answers the contact frame: makes the step.
+    /// Answers the contact frame: makes the step. `Err` with the frame where the step would take longer than
+    /// `slice_ms`, counted from here: nothing has changed then, and it can be begun anew.
     ///
     /// # Errors
-    /// [`Refusal`] if the request cannot be answered.
-    pub fn answer(
+    /// The inner [`Refusal`] if the request cannot be answered.
+    pub fn answer_within(
         self,
         resources: &Resources,
+        clock: StageClock,
+        slice_ms: f64,
+    ) -> Result<Result<ContactAnswer, Refusal>, Box<Self>> {
+        let begun = Instant::now();
+        let is_too_long = || ms_since(begun) > slice_ms;
+        match self.made(resources, clock, &is_too_long) {
+            Ok(Some((made, clock, computed))) => Ok(Ok(self.answer_of(made, clock, computed))),
+            Ok(None) => Err(Box::new(self)),
+            Err(refusal) => Ok(Err(refusal)),
+        }
+    }
+
+    /// The step, the clock and the number of columns that were computed; `None` where it ended because it was
+    /// too long, and is taken back.
+    fn made(
+        &self,
+        resources: &Resources,
         mut clock: StageClock,
-    ) -> Result<ContactAnswer, Refusal> {
+        is_too_long: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<(Made, StageClock, u64)>, Refusal> {
         clock.begin(Stage::Solve);
         let base = self.stored.base()?;
         let body = self.stored.free_body(&base).map_err(ModelError::Condensed)?;
@@ -194,7 +204,7 @@ impl PosedContact {
             bodies: &self.bodies,
             candidates: &self.candidates,
             settings: StepSettings { points_max, ..self.settings },
-            is_late: &|| running.is_late(deadline_ms),
+            is_late: &|| running.is_late(deadline_ms) || is_too_long(),
         };
         let _of_fields =
             reserve_contact_fields(resources, &self.stored.model, (self.fields, &self.nodes))?;
@@ -204,24 +214,32 @@ impl PosedContact {
             NodeChoice::All => (0..mesh.node_count() as u32).collect(),
             NodeChoice::Nodes(nodes) => nodes.clone(),
         };
-        let mut made = match &self.large {
+        let is_given_up = |outcome: &StepOutcome| {
+            running.is_abandoned()
+                || outcome.is_late && is_too_long() && !running.is_late(deadline_ms)
+        };
+        let made = match &self.large {
             Some(wish) => {
-                let is_abandoned = || running.is_abandoned();
                 let object = (&*self.stored, &self.state);
-                wish.advance(resources, object, &step, &wanted, &is_abandoned)?
+                wish.advance(resources, object, &step, &wanted, &is_given_up)?
             }
-            None => Made::linear(self.advance_linear(&step, &wanted)?),
+            None => Some(Made::linear(self.advance_linear(&step, &wanted)?))
+                .filter(|made| !is_given_up(&made.outcome)),
         };
         clock.go_on();
         let computed = columns.computed().saturating_sub(computed);
         resources.models.trim();
+        Ok(made.map(|made| (made, clock, computed)))
+    }
+
+    fn answer_of(self, mut made: Made, clock: StageClock, computed: u64) -> ContactAnswer {
         let mut stage_ms = clock.finish();
         let start = Instant::now();
         let fields = self.field_values(&mut made);
         let mut answer = self.answered(made, fields, computed);
         stage_ms.encode = ms_since(start);
         answer.answer.report.stage_ms = stage_ms;
-        Ok(answer)
+        answer
     }
 
     /// Most points of the contact problem: more than usual where so many nodes are near, and memory for them

@@ -126,7 +126,8 @@ impl LargeWish {
             && kept.yield_stress == self.yield_stress
     }
 
-    /// Makes one step of the object, which goes back to where it was if the client does not wait any more.
+    /// Makes one step of the object. `None` where the step is given up: the object then goes back to where it
+    /// was.
     ///
     /// # Errors
     /// [`Refusal`]; the object then stays unchanged.
@@ -136,18 +137,19 @@ impl LargeWish {
         (stored, state): (&StoredModel, &ObjectState),
         step: &ContactStep<'_>,
         wanted: &[u32],
-        is_abandoned: &dyn Fn() -> bool,
-    ) -> Result<Made, Refusal> {
+        is_given_up: &dyn Fn(&StepOutcome) -> bool,
+    ) -> Result<Option<Made>, Refusal> {
         let base = step.elasticity.base;
         let kept = self.seat.with(Option::take).filter(|kept| self.is_of(kept));
         let mut pressed = match kept {
             Some(kept) => kept,
             None => Pressed::at_rest(resources, stored, self, base)?,
         };
-        let before = pressed.body.shape().clone();
+        let before = pressed.body.clone();
         let made = self.made(&mut pressed, step, state, wanted);
-        if is_abandoned() {
-            pressed.body.put(before);
+        let made = made.map(|made| Some(made).filter(|made| !is_given_up(&made.outcome)));
+        if matches!(made, Ok(None)) {
+            pressed.body = before;
         }
         pressed.reservation.settle(pressed.body.bytes(base) as u64);
         self.seat.with(|seat| *seat = Some(pressed));

@@ -137,7 +137,8 @@ fn report_of_a_press_whose_server_was_killed_has_the_steps_before() {
     succeed(&arguments);
     let (all, bytes) = (steps(), i64::MAX - whole.left.load(Ordering::SeqCst));
     assert_eq!(all["ended_early"], Value::Null);
-    let arguments: Vec<String> = press(&Mortal::dies_after(bytes * 7 / 10));
+    let mortal = Mortal::dies_after(bytes * 7 / 10);
+    let arguments: Vec<String> = press(&mortal);
     let said = fail(1, &arguments);
     let some = steps();
     let count = some["steps"].as_array().unwrap().len();
