@@ -79,7 +79,10 @@ fn step_that_is_cancelled_leaves_a_clay_object_as_it_was() {
         let model = softgrasp_tests::questions::upload(scene.mesh());
         session.ask(1, &Request::UploadModel(model));
         let begin = clay(deep(&scene, ObjectState::at_rest(STILL)));
-        session.ask(2, &Request::ContactFrame(Box::new(begin)));
+        match session.ask(2, &Request::ContactFrame(Box::new(begin))) {
+            Reply::ContactAnswer(answer) => assert!(bits(*answer) == bits(first), "other bits"),
+            other => panic!("a contact frame got {other:?}"),
+        }
         let mut cancelled = 0;
         for (id, wait_ms) in (10..).zip([0, 1, 3, 10, 20, 40]) {
             let endless = endless(second.clone());

@@ -214,22 +214,33 @@ impl PosedContact {
             NodeChoice::All => (0..mesh.node_count() as u32).collect(),
             NodeChoice::Nodes(nodes) => nodes.clone(),
         };
-        let is_given_up = |outcome: &StepOutcome| {
-            running.is_abandoned()
-                || outcome.is_late && is_too_long() && !running.is_late(deadline_ms)
-        };
+        // What was looked for when the time was over may be other than what would have been found: only a
+        // linear step that has met the law is certainly the same.
+        let is_cut_short = || is_too_long() && !running.is_late(deadline_ms);
         let made = match &self.large {
             Some(wish) => {
+                let is_given_up = || running.is_abandoned() || is_cut_short();
                 let object = (&*self.stored, &self.state);
-                wish.advance(resources, object, &step, &wanted, &is_given_up)?
+                wish.advance(resources, object, &step, &wanted, &is_given_up)
             }
-            None => Some(Made::linear(self.advance_linear(&step, &wanted)?))
-                .filter(|made| !is_given_up(&made.outcome)),
+            None => self.advance_linear(&step, &wanted).map_err(Refusal::from).map(|outcome| {
+                let is_given_up = !outcome.is_converged && is_cut_short();
+                Some(Made::linear(outcome)).filter(|_| !is_given_up)
+            }),
+        };
+        let made = match made {
+            Err(_) if is_cut_short() => None,
+            made => made?,
         };
         clock.go_on();
         let computed = columns.computed().saturating_sub(computed);
         resources.models.trim();
-        Ok(made.map(|made| (made, clock, computed)))
+        Ok(made.map(|mut made| {
+            let outcome = &mut made.outcome;
+            // A part of the step may have been cut short, and another one ended by itself.
+            outcome.is_late |= !outcome.is_converged && running.is_late(deadline_ms);
+            (made, clock, computed)
+        }))
     }
 
     fn answer_of(self, mut made: Made, clock: StageClock, computed: u64) -> ContactAnswer {

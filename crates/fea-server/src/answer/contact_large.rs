@@ -137,7 +137,7 @@ impl LargeWish {
         (stored, state): (&StoredModel, &ObjectState),
         step: &ContactStep<'_>,
         wanted: &[u32],
-        is_given_up: &dyn Fn(&StepOutcome) -> bool,
+        is_given_up: &dyn Fn() -> bool,
     ) -> Result<Option<Made>, Refusal> {
         let base = step.elasticity.base;
         let kept = self.seat.with(Option::take).filter(|kept| self.is_of(kept));
@@ -147,8 +147,8 @@ impl LargeWish {
         };
         let before = pressed.body.clone();
         let made = self.made(&mut pressed, step, state, wanted);
-        let made = made.map(|made| Some(made).filter(|made| !is_given_up(&made.outcome)));
-        if matches!(made, Ok(None)) {
+        let made = made.map(|made| Some(made).filter(|_| !is_given_up()));
+        if !matches!(made, Ok(Some(_))) {
             pressed.body = before;
         }
         pressed.reservation.settle(pressed.body.bytes(base) as u64);
