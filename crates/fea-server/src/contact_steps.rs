@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use softgrasp_protocol::{ContactAnswer, ContactFrame, ModelHash};
-use tokio::sync::{Mutex, OwnedMutexGuard};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::answer::{CarriedSeat, PosedContact, PressedSeat};
 use crate::clock::StageClock;
@@ -24,17 +24,28 @@ const TIMES_COST: f64 = 5.0;
 const LONG_MS: f64 = 5000.0;
 
 /// What a session keeps from one contact frame to the next.
-#[derive(Default)]
 pub(crate) struct ContactSteps {
     /// The object that this session presses at large deformation.
     pressed: PressedSeat,
     /// What a step of each object of this session leaves for the next.
     carried: CarriedSeat,
-    /// Held by the step that is worked on: one that was cancelled puts back what it took before the next one
-    /// looks for it.
-    working: Arc<Mutex<()>>,
+    /// One permit, of the step that is worked on: one that was cancelled puts back what it took before the next
+    /// one looks for it, which waits without a thread.
+    working: Arc<Semaphore>,
     /// Time that the newest step took, ms; `None` before the first.
     newest_ms: Option<f64>,
+}
+
+impl Default for ContactSteps {
+    /// Nothing, before the first contact frame.
+    fn default() -> Self {
+        Self {
+            pressed: PressedSeat::default(),
+            carried: CarriedSeat::default(),
+            working: Arc::new(Semaphore::new(1)),
+            newest_ms: None,
+        }
+    }
 }
 
 impl ContactSteps {
@@ -56,7 +67,8 @@ impl ContactSteps {
         frame: ContactFrame,
         clock: impl FnOnce() -> StageClock + Send + 'static,
     ) -> Result<ContactAnswer, Refusal> {
-        let alone = Arc::clone(&self.working).lock_owned().await;
+        // Never closed: then as if nothing else were worked on.
+        let alone = Arc::clone(&self.working).acquire_owned().await.ok();
         let workers = &resources.workers;
         let shared = Arc::clone(resources);
         let seats = (Arc::clone(&self.pressed), Arc::clone(&self.carried));
@@ -95,7 +107,7 @@ async fn in_lanes(
     resources: &Arc<Resources>,
     (asker, expected_ms): (Asker, f64),
     mut frame: Box<PosedContact>,
-    (clock, mut alone): (Box<StageClock>, OwnedMutexGuard<()>),
+    (clock, mut alone): (Box<StageClock>, Option<OwnedSemaphorePermit>),
 ) -> Result<Result<ContactAnswer, Refusal>, EndedAbnormally> {
     let mut cost_ms = frame.predicted_ms(resources) + expected_ms;
     loop {
