@@ -154,7 +154,6 @@ fn compliance(
     about: &Configuration,
     corners: &[Corner],
 ) -> DMatrix<f64> {
-    let rows = 3 * corners.len();
     let mut k = relief_and_inertia(scene, response, about, corners);
     let answered = scene.answered();
     for (j, force) in corners.iter().enumerate() {
@@ -165,14 +164,13 @@ fn compliance(
                 let yields = scene.bodies[usize::from(force.body)].compliance;
                 (0..3).for_each(|axis| block[(axis, axis)] += yields);
             }
-            let mut to = k.fixed_view_mut::<3, 3>(3 * i, 3 * j);
-            to += block;
-        }
-    }
-    // Symmetric: what lies above the diagonal is what lies below.
-    for column in 0..rows {
-        for row in 0..column {
-            k[(row, column)] = k[(column, row)];
+            block += k.fixed_view::<3, 3>(3 * i, 3 * j);
+            if i == j {
+                block.fill_upper_triangle_with_lower_triangle();
+            }
+            k.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
+            // Symmetric: what lies above the diagonal is what lies below.
+            k.fixed_view_mut::<3, 3>(3 * j, 3 * i).copy_from(&block.transpose());
         }
     }
     k

@@ -88,8 +88,11 @@ impl LargeStep<'_, '_> {
             Ok(whole) => whole.residual_rel > LOST || whole.contact_residual_rel > LOST,
             Err(error) => matches!(error, StepError::InsideOut | StepError::Problem(_)),
         };
-        if halvings == 0 || !is_lost || (self.step.is_late)() {
+        if halvings == 0 || !is_lost {
             return whole.inspect(|_| self.body.flow());
+        }
+        if (self.step.is_late)() {
+            return whole.inspect(|_| self.body.flow()).map(StepOutcome::ended_early);
         }
         let after = self.body.put(before);
         let body = &mut *self.body;
@@ -99,9 +102,12 @@ impl LargeStep<'_, '_> {
         match (halves, &whole) {
             (Ok(halves), Err(_)) => Ok(halves),
             (Ok(halves), Ok(whole)) if halves.is_nearer_than(whole) => Ok(halves),
-            _ => {
+            (halves, _) => {
                 self.body.put(after);
-                whole.inspect(|_| self.body.flow())
+                // Halves that had the time might have been better.
+                let were_late = halves.is_ok_and(|halves| halves.is_late);
+                let whole = whole.inspect(|_| self.body.flow());
+                if were_late { whole.map(StepOutcome::ended_early) } else { whole }
             }
         }
     }

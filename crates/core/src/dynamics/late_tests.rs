@@ -98,3 +98,29 @@ fn large_step_ended_at_any_moment_says_so_and_what_is_missing() {
         })
     });
 }
+
+/// Of a step that is lost, halves are tried. One that ends before they do may have missed a better end.
+#[test]
+fn large_step_whose_halves_are_cut_short_says_that_it_is_late() {
+    let (ball, bodies) = (ball(), pressed(0.01));
+    let state = ObjectState::at_rest(at(0.0, 0.0, 0.035));
+    // One round for each shape never meets the law.
+    let settings = StepSettings { rounds_max: 1, newton_max: 1, ..settings() };
+    let mut make = |is_late: &(dyn Fn() -> bool + Sync)| {
+        let mut large = ball.large(Law::NeoHookean);
+        ball.with_step(&state, &bodies, settings, |step| {
+            let step = ContactStep { is_late, ..step };
+            LargeStep { step, body: &mut large }.advance(&state, &ball.surface.nodes).unwrap()
+        })
+    };
+    let (whole, all) = ended_after(usize::MAX, &mut make);
+    assert!(!whole.is_converged && !whole.is_late, "{whole:?}");
+    let mut cut_short = 0;
+    for looks in (0..all).step_by(1 + all / 40) {
+        let (some, looked) = ended_after(looks, &mut make);
+        assert!(looked > looks, "it was looked at {looked} times");
+        cut_short += usize::from(looked < all);
+        assert!(looked == all || some.is_late, "after {looks} looks of {all}: {looked}");
+    }
+    assert!(cut_short > 10, "{cut_short}");
+}

@@ -9,7 +9,7 @@ use super::configuration::{Configuration, Configured, Scene};
 use super::features::{Candidate, MaterialPoint, Pool, force_at};
 use super::rolling::{Rolling, freedoms, rolled, rollings};
 use super::settings::{StepError, StepSettings};
-use super::state::{HeldContact, StepOutcome, at_nodes, mix};
+use super::state::{HeldContact, StepOutcome, mix};
 use crate::contact::coulomb::{PointForce, Solution, SolveBudget};
 use crate::solve::condensed::Response;
 
@@ -32,7 +32,7 @@ pub(super) struct Found {
     /// Whether a force acts elsewhere than where the problem was made.
     pub has_moved: bool,
     pub is_converged: bool,
-    /// Whether more rounds would have been played if it had not been late.
+    /// Whether it was late before the law was met.
     pub is_late: bool,
     pub rounds: usize,
     pub sweeps: usize,
@@ -111,7 +111,8 @@ impl Rounds<'_, '_> {
             let far = round.far(allowed, settings.residual_rel * force_max);
             let is_converged = far <= 1.0 && !round.has_moved;
             let is_last = rounds >= settings.rounds_max || newton_steps >= settings.newton_max;
-            let is_late = !is_converged && !is_last && (self.is_late)();
+            // The last round's solution too may have ended for that.
+            let is_late = !is_converged && (self.is_late)();
             if is_converged || is_last || is_late {
                 let is_best = best.as_ref().is_none_or(|(best_far, ..)| far <= *best_far);
                 let (end, round) = match (is_best, best) {
@@ -160,7 +161,6 @@ impl Rounds<'_, '_> {
 
     /// The configuration that contact forces lead to. Their columns have been asked for.
     fn configuration(&mut self, contacts: Vec<HeldContact>, at: &Configured<'_>) -> Configuration {
-        self.response.gather(at_nodes(&contacts).iter().map(|(node, _)| *node));
         self.scene.configuration((&*self.response, self.unpressed), contacts, at)
     }
 

@@ -153,6 +153,11 @@ impl StepOutcome {
         worst(self) < worst(other) && self.penetration_max <= other.penetration_max
     }
 
+    /// The outcome of a step that could have ended nearer to what is asked for if there had been time.
+    pub(super) fn ended_early(self) -> Self {
+        Self { is_late: !self.is_converged, ..self }
+    }
+
     /// The outcome of the last part of a step, with what the parts before it have added.
     pub(super) fn after(self, before: &Self) -> Self {
         Self {

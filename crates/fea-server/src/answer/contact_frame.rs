@@ -51,6 +51,8 @@ pub(crate) struct PosedContact {
     bodies: Vec<MovingBody>,
     triangles: Vec<[u32; 3]>,
     candidates: Vec<Candidate>,
+    /// Nodes of the triangles, ascending.
+    near_nodes: Vec<u32>,
     settings: StepSettings,
     /// ms from the beginning of the request; `None` for none.
     deadline_ms: Option<f64>,
@@ -112,6 +114,7 @@ impl PosedContact {
             carried,
             state,
             bodies: bodies_of(bodies)?,
+            near_nodes: nodes_of(&triangles),
             triangles,
             candidates,
             settings: settings_of(&ask),
@@ -149,15 +152,7 @@ impl PosedContact {
 
     /// Number of nodes near bodies whose columns are not cached.
     fn missing(&self) -> usize {
-        self.stored.columns.missing(self.near_nodes().into_iter().map(Contact::Node))
-    }
-
-    /// Nodes near bodies, ascending.
-    fn near_nodes(&self) -> Vec<u32> {
-        let mut nodes = self.triangles.as_flattened().to_vec();
-        nodes.sort_unstable();
-        nodes.dedup();
-        nodes
+        self.stored.columns.missing(self.near_nodes.iter().copied().map(Contact::Node))
     }
 
     /// Answers the contact frame: makes the step. `Err` with the frame where the step would take longer than
@@ -235,12 +230,7 @@ impl PosedContact {
         clock.go_on();
         let computed = columns.computed().saturating_sub(computed);
         resources.models.trim();
-        Ok(made.map(|mut made| {
-            let outcome = &mut made.outcome;
-            // A part of the step may have been cut short, and another one ended by itself.
-            outcome.is_late |= !outcome.is_converged && running.is_late(deadline_ms);
-            (made, clock, computed)
-        }))
+        Ok(made.map(|made| (made, clock, computed)))
     }
 
     fn answer_of(self, mut made: Made, clock: StageClock, computed: u64) -> ContactAnswer {
@@ -258,7 +248,7 @@ impl PosedContact {
     fn points_max(&self, resources: &Resources) -> (usize, Reservation) {
         let reservation = resources.budget.reservation();
         // Some lie between nodes.
-        let points = (self.near_nodes().len() * 3 / 2).min(StepSettings::POINTS_MOST);
+        let points = (self.near_nodes.len() * 3 / 2).min(StepSettings::POINTS_MOST);
         let is_usual = points <= StepSettings::POINTS_USUAL;
         if is_usual || !reservation.reserve(StepSettings::bytes_of_points(points), 0) {
             return (StepSettings::POINTS_USUAL, reservation);
@@ -379,6 +369,14 @@ impl PosedContact {
             small_system,
         }
     }
+}
+
+/// Nodes of some triangles, ascending.
+fn nodes_of(triangles: &[[u32; 3]]) -> Vec<u32> {
+    let mut nodes = triangles.as_flattened().to_vec();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
 }
 
 /// Warnings of a step by linear elasticity that large deformation was open to, where memory is too short for

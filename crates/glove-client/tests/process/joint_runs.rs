@@ -10,7 +10,7 @@ use nalgebra::Isometry3;
 use softgrasp_grasp::hand::{HandDimensions, JointAngles};
 use softgrasp_hand::joints::record_of_hand;
 
-use crate::start::command;
+use crate::start::{command, free_address};
 
 /// Run that listens for joints, and the lines that it prints.
 struct JointRun {
@@ -27,8 +27,7 @@ const HANG: Duration = Duration::from_secs(120);
 impl JointRun {
     fn start() -> Self {
         let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
-        // A port that was free a moment ago.
-        let address = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+        let address = free_address();
         let hand = format!("joints:{address}");
         let mut run = command()
             .args(["run", "--headless", "--object", "cube", "--nodes", "64", "--hand", &hand])

@@ -1,5 +1,6 @@
 //! Starts the program, and finds the data of the tests.
 
+use std::net::{TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -53,6 +54,18 @@ impl Folder {
 
     pub fn read(&self, name: &str) -> String {
         std::fs::read_to_string(self.path(name)).unwrap()
+    }
+}
+
+/// Address of this machine with a port that was free a moment ago, for datagrams and for streams: a run that takes
+/// joints listens for both.
+pub fn free_address() -> String {
+    loop {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        if UdpSocket::bind(address).is_ok() {
+            return address.to_string();
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use serde_json::Value;
 use softgrasp_grasp::hand::{HandDimensions, Handedness, JointAngles};
 use softgrasp_hand::joints::record_of_hand;
 
-use crate::start::{Folder, command, fail, succeed};
+use crate::start::{Folder, command, fail, free_address, succeed};
 
 /// Time after which a run is taken to hang.
 const HANG: Duration = Duration::from_secs(120);
@@ -38,8 +38,7 @@ fn force_n(hand: &Value) -> f64 {
 fn both_hands_of_a_sender_press_one_object_and_are_replayed_bit_by_bit() {
     let folder = Folder::new();
     let (path, report) = (folder.path("two.mcap"), folder.path("two.json"));
-    // A port that was free a moment ago.
-    let address = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let address = free_address();
     let hand = format!("joints:{address}");
     let fixed = ["run", "--headless", "--object", "cube", "--nodes", "64", "--object-size", "0.06"];
     let mut run = command()

@@ -35,7 +35,8 @@ pub struct Slide {
 
 /// `W = Bᵀ K B`.
 ///
-/// Shapes: m corners; `compliance` K 3m × 3m, symmetric, positive semidefinite; n points. B has a block
+/// Shapes: m corners; `compliance` K 3m × 3m, symmetric, positive semidefinite (of a body; between points whose
+/// springs are eliminated it is not symmetric); n points. B has a block
 /// of weight times frame for each corner and point. Units: m/N. Where a point slides, its row of Bᵀ has that
 /// besides, and W is not symmetric.
 ///
@@ -252,10 +253,45 @@ impl Delassus {
         for (to, blocks) in coupled.as_mut_slice().chunks_exact_mut(3 * rows).zip(&s.0) {
             for (row, block) in blocks {
                 let from = &k[3 * row * rows..3 * (row + 1) * rows];
-                arch.dispatch(AddBlock { from, block, to });
+                let block: [Vector3<f64>; 3] = std::array::from_fn(|k| block.column(k).into());
+                arch.dispatch(AddProducts { from, by: &block, to });
             }
         }
         coupled
+    }
+
+    /// `Mᵀ K F` for two matrices of few entries: how far the columns of M go by the forces of those of F.
+    ///
+    /// Shapes: `motions` a columns and `forces` b columns of 3m rows, each a list of corners and their parts;
+    /// result a × b.
+    pub(super) fn between(
+        &self,
+        motions: &[CornerColumn],
+        forces: &[CornerColumn],
+    ) -> DMatrix<f64> {
+        // K of a body is symmetric: its product with M is that of the transposed, transposed.
+        products(&transposed(&products(&self.compliance, motions)), forces)
+    }
+
+    /// What a force of a point is at its corners: B of the point times it.
+    pub(super) fn force_column(&self, point: usize, force: &PointForce) -> CornerColumn {
+        let place = &self.points[point];
+        let along = place.frame * force;
+        place.weighted().map(|(corner, weight)| (corner, weight * along)).collect()
+    }
+
+    /// What the motion of a point along its normal, 0, or a tangent, 1 or 2, is of those of its corners.
+    pub(super) fn motion_row(&self, point: usize, axis: usize) -> CornerColumn {
+        let mut unit = PointForce::zeros();
+        unit[axis] = 1.0;
+        let mut row = self.force_column(point, &unit);
+        let place = &self.points[point];
+        if let Some(slide) = place.slide.filter(|_| axis == 0) {
+            let along = place.frame.fixed_columns::<2>(1) * Vector2::from(slide.share);
+            let corners = place.corners.iter().zip(slide.weights).filter(|(_, w)| *w != 0.0);
+            row.extend(corners.map(|(&corner, weight)| (corner as usize, weight * along)));
+        }
+        row
     }
 
     /// The operator of some points alone, between their own corners.
@@ -306,6 +342,43 @@ impl Delassus {
     }
 }
 
+/// A column with few entries: corners, and what it has at their three rows.
+pub(super) type CornerColumn = Vec<(usize, Vector3<f64>)>;
+
+/// A matrix times columns of few entries.
+fn products(matrix: &DMatrix<f64>, columns: &[CornerColumn]) -> DMatrix<f64> {
+    let rows = matrix.nrows();
+    let mut made = DMatrix::zeros(rows, columns.len());
+    if rows == 0 {
+        return made;
+    }
+    let arch = pulp::Arch::new();
+    for (to, column) in made.as_mut_slice().chunks_exact_mut(rows).zip(columns) {
+        for (corner, by) in column {
+            let from = &matrix.as_slice()[3 * corner * rows..3 * (corner + 1) * rows];
+            arch.dispatch(AddProducts { from, by: std::slice::from_ref(by), to });
+        }
+    }
+    made
+}
+
+/// A matrix transposed by tiles, which lie in the fastest memory as they are read and as they are written.
+fn transposed(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    const TILE: usize = 8;
+    let (rows, columns) = matrix.shape();
+    let (from, mut made) = (matrix.as_slice(), vec![0.0; rows * columns]);
+    for first_column in (0..columns).step_by(TILE) {
+        for first_row in (0..rows).step_by(TILE) {
+            for column in first_column..columns.min(first_column + TILE) {
+                for row in first_row..rows.min(first_row + TILE) {
+                    made[row * columns + column] = from[column * rows + row];
+                }
+            }
+        }
+    }
+    DMatrix::from_vec(columns, rows, made)
+}
+
 /// A sparse matrix of blocks by columns, in the order in which they come.
 struct BlockColumns(Vec<Vec<(usize, Matrix3<f64>)>>);
 
@@ -323,28 +396,27 @@ impl BlockColumns {
     }
 }
 
-/// Adds three columns times a block to three columns.
-struct AddBlock<'a> {
+/// Adds three columns, times the numbers of a vector, to a column; so for each of some vectors and columns.
+struct AddProducts<'a> {
     from: &'a [f64],
-    block: &'a Matrix3<f64>,
+    by: &'a [Vector3<f64>],
     to: &'a mut [f64],
 }
 
-impl pulp::WithSimd for AddBlock<'_> {
+impl pulp::WithSimd for AddProducts<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let rows = self.to.len() / 3;
-        let b = self.block;
+        let rows = self.from.len() / 3;
         let (x, yz) = self.from.split_at(rows);
         let (y, z) = yz.split_at(rows);
         let (x, x_tail) = S::as_simd_f64s(x);
         let (y, y_tail) = S::as_simd_f64s(y);
         let (z, z_tail) = S::as_simd_f64s(z);
-        for (axis, to) in self.to.chunks_exact_mut(rows).enumerate() {
-            let (bx, by, bz) = (b[(0, axis)], b[(1, axis)], b[(2, axis)]);
-            let (sx, sy, sz) = (simd.splat_f64s(bx), simd.splat_f64s(by), simd.splat_f64s(bz));
+        for (by, to) in self.by.iter().zip(self.to.chunks_exact_mut(rows)) {
+            let (sx, sy, sz) =
+                (simd.splat_f64s(by.x), simd.splat_f64s(by.y), simd.splat_f64s(by.z));
             let (to, tail) = S::as_mut_simd_f64s(to);
             for (((to, x), y), z) in to.iter_mut().zip(x).zip(y).zip(z) {
                 let sum = simd.mul_add_f64s(*x, sx, *to);
@@ -352,7 +424,7 @@ impl pulp::WithSimd for AddBlock<'_> {
                 *to = simd.mul_add_f64s(*z, sz, sum);
             }
             for (((to, x), y), z) in tail.iter_mut().zip(x_tail).zip(y_tail).zip(z_tail) {
-                *to += x * bx + y * by + z * bz;
+                *to += x * by.x + y * by.y + z * by.z;
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Contact with Coulomb friction between points: the cone, the problem, its solution, its residual.
 
+mod between_points;
 mod cone;
 mod delassus;
 mod law;

@@ -124,7 +124,8 @@ impl<'a> Proximal<'a> {
             }
         };
         let answers: Vec<Answer> = pressed.iter().map(answer).collect();
-        let w = problem.w.of_points(&pressed);
+        let part = (pressed.len() < problem.point_count()).then(|| problem.w.of_points(&pressed));
+        let w = part.as_ref().unwrap_or(&problem.w);
         let given: Vec<f64> = answers.iter().flat_map(|a| <[f64; 3]>::from(a.given)).collect();
         let blocks: Vec<Matrix3<f64>> = answers.iter().map(|a| a.per_motion).collect();
         let mut v = w.moved_corners(&given);

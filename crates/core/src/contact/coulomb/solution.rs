@@ -1,6 +1,7 @@
 //! The solution of a contact problem: of the points that press, or would be pressed into, and of all
 //! points at once, by Newton's method with sweeps of a splitting where it strays.
 
+use super::between_points::BetweenPoints;
 use super::cone::{PointForce, at};
 use super::newton::Proximal;
 use super::problem::ContactProblem;
@@ -72,6 +73,8 @@ const LEFT: f64 = 0.3;
 /// Sweeps of the splitting after Newton's method has strayed, and the shares of compliance that they are
 /// made with in turn: no single one suits far and near, and every system of points.
 const SWEEPS: usize = 150;
+/// Sweeps after which it is looked whether the forces are found.
+const SWEEPS_TO_LOOK: usize = 25;
 const SPLITTING_SHARES: [f64; 3] = [1.0, 0.1, 0.005];
 /// The first of these shares is left out where the residual is below this part of the largest force.
 const NEAR: f64 = 0.1;
@@ -179,7 +182,7 @@ impl Solution {
             new.into_iter().for_each(|i| is_in[i] = true);
             let set: Vec<usize> = (0..n).filter(|&i| is_in[i]).collect();
             let begin = set.iter().flat_map(|&i| <[f64; 3]>::from(at(&lambda, i))).collect();
-            let found = Self::of_whole(&problem.of_points(&set), begin, budget);
+            let found = Self::of_all(&problem.of_points(&set), begin, budget);
             sweeps += found.sweeps;
             newton_steps += found.newton_steps;
             for (&i, force) in set.iter().zip(found.lambda.chunks_exact(3)) {
@@ -195,9 +198,35 @@ impl Solution {
         if is_converged || (budget.is_late)() {
             return Self { lambda, motion, residual, sweeps, newton_steps, is_converged };
         }
-        let whole = Self::of_whole(problem, lambda, budget);
+        let whole = Self::of_all(problem, lambda, budget);
         let (sweeps, newton_steps) = (sweeps + whole.sweeps, newton_steps + whole.newton_steps);
         Self { sweeps, newton_steps, ..whole }
+    }
+
+    /// The forces of all points at once, from some to begin with: between the points alone where those are fewer
+    /// than the corners.
+    ///
+    /// Shapes: `lambda` 3n, N.
+    fn of_all(problem: &ContactProblem, lambda: Vec<f64>, budget: SolveBudget<'_>) -> Self {
+        let Some(between) = BetweenPoints::new(problem) else {
+            return Self::of_whole(problem, lambda, budget);
+        };
+        let found = Self::of_whole(between.problem(), between.of_points(&lambda), budget);
+        let forces = Forces::new(problem, between.with_springs(&found.lambda));
+        Self::told(problem, forces, (found.sweeps, found.newton_steps), &budget)
+    }
+
+    /// Forces that were found, by so many sweeps and steps of Newton's method.
+    fn told(
+        problem: &ContactProblem,
+        forces: Forces,
+        (sweeps, newton_steps): (usize, usize),
+        budget: &SolveBudget<'_>,
+    ) -> Self {
+        let is_converged = forces.is_within(budget);
+        let Forces { lambda, residual } = forces;
+        let motion = problem.motion(&lambda);
+        Self { lambda, motion, residual, sweeps, newton_steps, is_converged }
     }
 
     /// The forces of all points at once, from some to begin with, each in its cone; where they are not found
@@ -262,13 +291,15 @@ impl Solution {
                 None => splitting = Splitting::new(problem, &now.lambda, of_turn),
             }
             let Some(splitting) = &mut splitting else { break };
-            now = Forces::new(problem, splitting.advance(SWEEPS));
-            sweeps += SWEEPS;
+            for _ in 0..SWEEPS / SWEEPS_TO_LOOK {
+                now = Forces::new(problem, splitting.advance(SWEEPS_TO_LOOK));
+                sweeps += SWEEPS_TO_LOOK;
+                if now.residual <= 0.1 * now.allowed(&budget) {
+                    break;
+                }
+            }
         }
-        let is_converged = best.is_within(&budget);
-        let motion = problem.motion(&best.lambda);
-        let Forces { lambda, residual } = best;
-        Self { lambda, motion, residual, sweeps, newton_steps, is_converged }
+        Self::told(problem, best, (sweeps, newton_steps), &budget)
     }
 
     /// Largest force of a point, N.

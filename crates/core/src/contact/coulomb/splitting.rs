@@ -20,6 +20,14 @@ pub(super) struct Splitting<'a> {
     problem: &'a ContactProblem,
     /// Forces less what their motions push them by; the forces are their projections. 3n, N.
     pushed: Vec<f64>,
+    /// The shares that it was made with, and which of them it goes on with.
+    softened: Vec<Softened>,
+    at: usize,
+}
+
+/// The points as they yield with a share of their own compliance added to each.
+struct Softened {
+    share: f64,
     /// Compliance added at each point, m/N: it turns motions into forces.
     added: Vec<f64>,
     /// Compliance of the corners if every point yields by what is added to it, 3m × 3m, m/N.
@@ -35,8 +43,8 @@ impl<'a> Splitting<'a> {
     ///
     /// Shapes: `lambda` 3n, N.
     pub fn new(problem: &'a ContactProblem, lambda: &[f64], share: f64) -> Option<Self> {
-        let (added, compliance) = added_and_compliance(problem, share)?;
-        let mut splitting = Self { problem, pushed: Vec::new(), added, compliance };
+        let softened = vec![Softened::new(problem, share)?];
+        let mut splitting = Self { problem, pushed: Vec::new(), softened, at: 0 };
         splitting.begin_at(lambda);
         Some(splitting)
     }
@@ -44,7 +52,7 @@ impl<'a> Splitting<'a> {
     /// Begins anew at some forces, 3n, N.
     pub fn begin_at(&mut self, lambda: &[f64]) {
         let motion = self.problem.motion(lambda);
-        let pushed = self.added.iter().enumerate().flat_map(|(point, added)| {
+        let pushed = self.added().iter().enumerate().flat_map(|(point, added)| {
             let mut motion = at(&motion, point);
             motion.x += self.correction(point, &motion);
             <[f64; 3]>::from(at(lambda, point) - motion / *added)
@@ -54,12 +62,24 @@ impl<'a> Splitting<'a> {
 
     /// Goes on with another share of every point's own compliance; as it is where that has no inverse.
     pub fn change_share(&mut self, share: f64) {
-        let Some((added, compliance)) = added_and_compliance(self.problem, share) else { return };
+        let next = match self.softened.iter().position(|softened| softened.share == share) {
+            Some(next) => next,
+            None => {
+                let Some(softened) = Softened::new(self.problem, share) else { return };
+                self.softened.push(softened);
+                self.softened.len() - 1
+            }
+        };
         let inside = self.inside();
+        let (added, next_added) = (&self.softened[self.at].added, &self.softened[next].added);
         for (k, (pushed, inside)) in self.pushed.iter_mut().zip(&inside).enumerate() {
-            *pushed = inside + (*pushed - inside) * self.added[k / 3] / added[k / 3];
+            *pushed = inside + (*pushed - inside) * added[k / 3] / next_added[k / 3];
         }
-        (self.added, self.compliance) = (added, compliance);
+        self.at = next;
+    }
+
+    fn added(&self) -> &[f64] {
+        &self.softened[self.at].added
     }
 
     /// Goes on for some sweeps; the forces then, each in its cone, 3n, N.
@@ -67,7 +87,7 @@ impl<'a> Splitting<'a> {
         let mut wanted = vec![0.0; self.pushed.len()];
         for _ in 0..sweeps {
             let inside = self.inside();
-            for (point, &added) in self.added.iter().enumerate() {
+            for (point, &added) in self.added().iter().enumerate() {
                 let force = at(&inside, point);
                 // What a force was pushed by is the motion, corrected already.
                 let motion = added * (force - at(&self.pushed, point));
@@ -86,7 +106,7 @@ impl<'a> Splitting<'a> {
 
     /// The forces that obey their laws one by one, 3n, N.
     fn inside(&self) -> Vec<f64> {
-        let points = self.problem.laws.iter().zip(&self.added).enumerate();
+        let points = self.problem.laws.iter().zip(self.added()).enumerate();
         let of_point = |(point, (law, &added)): (usize, (&PointLaw, &f64))| {
             <[f64; 3]>::from(law.yielding(at(&self.pushed, point), added))
         };
@@ -97,8 +117,8 @@ impl<'a> Splitting<'a> {
     /// `(W + D)⁻¹ D λ = λ − D⁻¹ Bᵀ N B λ`, N the compliance of the corners.
     fn yield_to_compliance(&self, lambda: &mut [f64]) {
         let w = &self.problem.w;
-        let moved = w.moved_by(&self.compliance, lambda);
-        for (point, added) in self.added.iter().enumerate() {
+        let moved = w.moved_by(&self.softened[self.at].compliance, lambda);
+        for (point, added) in self.added().iter().enumerate() {
             let less = w.motion_of(point, &moved) / *added;
             (0..3).for_each(|axis| lambda[3 * point + axis] -= less[axis]);
         }
@@ -110,11 +130,15 @@ impl<'a> Splitting<'a> {
     }
 }
 
-/// What a share adds to each point, m/N, and the compliance `(I + K B D⁻¹ Bᵀ)⁻¹ K` of the corners with it.
-fn added_and_compliance(problem: &ContactProblem, share: f64) -> Option<(Vec<f64>, DMatrix<f64>)> {
-    let added: Vec<f64> = problem.rho.iter().map(|rho| share / rho).collect();
-    let blocks: Vec<Matrix3<f64>> = added.iter().map(|a| Matrix3::identity() / *a).collect();
-    let mut compliance = problem.w.compliance().clone();
-    solve_in_place(problem.w.coupled(&blocks), compliance.as_mut_slice());
-    compliance.iter().all(|x| x.is_finite()).then_some((added, compliance))
+impl Softened {
+    /// What a share adds to each point, and the compliance `(I + K B D⁻¹ Bᵀ)⁻¹ K` of the corners with it; `None`
+    /// where that has no inverse.
+    fn new(problem: &ContactProblem, share: f64) -> Option<Self> {
+        let added: Vec<f64> = problem.rho.iter().map(|rho| share / rho).collect();
+        let blocks: Vec<Matrix3<f64>> = added.iter().map(|a| Matrix3::identity() / *a).collect();
+        let mut compliance = problem.w.compliance().clone();
+        solve_in_place(problem.w.coupled(&blocks), compliance.as_mut_slice());
+        let is_finite = compliance.iter().all(|x| x.is_finite());
+        is_finite.then_some(Self { share, added, compliance })
+    }
 }

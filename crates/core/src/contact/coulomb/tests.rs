@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 use proptest::prelude::*;
 
+use super::between_points::BetweenPoints;
 use super::cone::at;
 use super::sweeps::PointProblem;
 use super::sweeps::Sweeps;
@@ -346,6 +347,59 @@ proptest! {
         let pairs = ours.motion[..n].iter().zip(&theirs.motion);
         let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         prop_assert!(friction > 0.3 || off < 1e-4, "{off:e}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    /// The oracle: the operator between corners, of points and springs together.
+    #[test]
+    fn problem_between_points_alone_moves_them_as_that_of_corners_and_springs(
+        corners in 8usize..14,
+        seed in prop::collection::vec(-1.0..1.0f64, 42),
+        points in prop::collection::vec(-1.0..1.0f64, 4 * 5),
+        springs in prop::collection::vec((0usize..5, prop::array::uniform5(-1.0..1.0f64)), 0..9),
+        pushed in prop::collection::vec(-1.0..0.5f64, 3 * 14),
+        lambda in prop::collection::vec(-1.0..1.0f64, 3 * 14),
+    ) {
+        let contacts = between(corners, &points);
+        let (mut places, mut laws) = (Vec::new(), Vec::new());
+        for (i, place) in contacts.iter().enumerate() {
+            // Springs stand among the points: their order says nothing.
+            for (_, [rise, fall, share, logarithm, along]) in springs.iter().filter(|s| s.0 == i) {
+                let weights = [-rise - fall, *rise, *fall];
+                let slide = Some(Slide { weights: place.weights, share: [0.3 * share, 0.2 * share] });
+                places.push(PointPlace { weights, slide, ..*place });
+                let normal = 10.0f64.powf(2.0 * logarithm);
+                let stiffness = Vector3::new(normal, along * normal, -share * normal);
+                laws.push(PointLaw::Spring { stiffness });
+            }
+            places.push(*place);
+            laws.push(FrictionCone { friction: 0.4 }.into());
+        }
+        let n = places.len();
+        let w = Delassus::try_new(compliance(corners, &seed), places).unwrap();
+        let problem = ContactProblem::between_corners(w, pushed[..3 * n].to_vec(), laws.clone());
+        // A spring of no compliance at all is refused, as a point is.
+        prop_assume!(problem.is_ok());
+        let problem = problem.unwrap();
+        let between = BetweenPoints::new(&problem).expect("more corners than points");
+        let of_points = between.of_points(&lambda[..3 * n]);
+        prop_assert_eq!(of_points.len(), 3 * contacts.len());
+        let all = between.with_springs(&of_points);
+        prop_assert_eq!(between.of_points(&all), of_points.clone());
+        let (whole, alone) = (problem.motion(&all), between.problem().motion(&of_points));
+        let largest = whole.iter().chain(&all).fold(1.0, |most: f64, x| most.max(x.abs()));
+        let mut alone = alone.chunks_exact(3);
+        for (i, law) in laws.iter().enumerate() {
+            let (force, motion) = (at(&all, i), at(&whole, i));
+            let off = match law {
+                PointLaw::Contact(_) => motion - Vector3::from_column_slice(alone.next().unwrap()),
+                PointLaw::Spring { stiffness } => (force + stiffness * motion.x) / (1.0 + stiffness.norm()),
+            };
+            prop_assert!(off.norm() < 1e-11 * largest, "point {i}: {:e} of {largest:e}", off.norm());
+        }
     }
 }
 

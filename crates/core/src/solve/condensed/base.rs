@@ -346,6 +346,12 @@ impl SurfaceNodes {
         let place = self.places.get(node as usize).copied().unwrap_or(INSIDE);
         (place != INSIDE).then_some(place as usize)
     }
+
+    /// Number of nodes of the surface.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
     pub fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.places.as_slice())
     }

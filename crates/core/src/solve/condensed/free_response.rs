@@ -62,15 +62,16 @@ impl<'a> Source<'a> {
 pub struct Response<'a> {
     source: Source<'a>,
     rows: Vec<u32>,
+    /// The row of each node of the surface; `NO_ROW` for none.
+    row_at: Vec<u32>,
     /// Columns of the held compliance, by node of the force.
     columns: BTreeMap<u32, Arc<ContactColumns>>,
-    /// The rows' blocks of the columns of forces that press, side by side: they are asked for in every round,
-    /// and lie far apart in the columns.
-    gathered: BTreeMap<u32, Vec<Block>>,
 }
 
 /// Nodes whose displacement one task sums.
-const TASK_NODES: usize = 256;
+const TASK_NODES: usize = 128;
+/// Says that a node is none of the rows.
+const NO_ROW: u32 = u32::MAX;
 
 impl<'a> Response<'a> {
     /// Shapes: `rows` ascending nodes.
@@ -86,7 +87,14 @@ impl<'a> Response<'a> {
     }
 
     fn from(source: Source<'a>, rows: Vec<u32>) -> Self {
-        Self { source, rows, columns: BTreeMap::new(), gathered: BTreeMap::new() }
+        let surface = &source.base().surface;
+        let mut row_at = vec![NO_ROW; surface.len()];
+        for (row, &node) in (0..).zip(&rows) {
+            if let Some(place) = surface.place_of(node) {
+                row_at[place] = row;
+            }
+        }
+        Self { source, rows, row_at, columns: BTreeMap::new() }
     }
 
     /// The response of other nodes, with the columns that are there.
@@ -103,7 +111,10 @@ impl<'a> Response<'a> {
 
     /// Position of a node among the rows.
     pub fn row_of(&self, node: u32) -> Option<usize> {
-        self.rows.binary_search(&node).ok()
+        match self.source.base().surface.place_of(node) {
+            Some(place) => (self.row_at[place] != NO_ROW).then_some(self.row_at[place] as usize),
+            None => self.rows.binary_search(&node).ok(),
+        }
     }
 
     /// Gets the columns of nodes at which forces act, from the cache or by solves.
@@ -130,19 +141,6 @@ impl<'a> Response<'a> {
         };
         self.columns.extend(missing.into_iter().zip(found));
         Ok(())
-    }
-
-    /// Puts the rows' blocks of needed nodes side by side: what these nodes' forces move is summed quicker
-    /// from then on, to the same bits.
-    pub fn gather(&mut self, nodes: impl IntoIterator<Item = u32>) {
-        let is_new = |node: &u32| !self.gathered.contains_key(node);
-        let new: Vec<u32> = nodes.into_iter().filter(is_new).collect();
-        let of_node = |&node: &u32| {
-            let held = self.held(node);
-            (node, self.rows.iter().map(|&row| held.block(row)).collect())
-        };
-        let found: Vec<(u32, Vec<Block>)> = new.par_iter().map(of_node).collect();
-        self.gathered.extend(found);
     }
 
     /// Held compliance of all nodes under forces at one.
@@ -196,20 +194,23 @@ impl<'a> Response<'a> {
     }
 
     fn moved_rows(&self, forces: &[NodeForce]) -> Vec<[f64; 3]> {
-        let mut u = vec![[0.0; 3]; self.rows.len()];
-        for (node, force) in forces {
-            match self.gathered.get(node) {
-                Some(blocks) => {
-                    u.iter_mut().zip(blocks).for_each(|(u, block)| add_moved(u, force, block));
-                }
-                None => {
-                    let held = self.held(*node);
-                    let rows = u.iter_mut().zip(&self.rows);
-                    rows.for_each(|(u, &row)| add_moved(u, force, &held.block(row)));
-                }
-            }
-        }
+        let mut u = self.summed(&self.rows, forces);
         self.relieve(forces, &self.rows, &mut u);
+        u
+    }
+
+    /// Sum of the columns of forces at some nodes, on the current rayon pool: every node is summed by one task,
+    /// in the order of the forces.
+    fn summed(&self, nodes: &[u32], forces: &[NodeForce]) -> Vec<[f64; 3]> {
+        let surface = &self.source.base().surface;
+        let places: Vec<Option<usize>> = nodes.iter().map(|&node| surface.place_of(node)).collect();
+        let columns: Vec<(HeldCompliance<'_>, &Vector3<f64>)> =
+            forces.iter().map(|(node, force)| (self.held(*node), force)).collect();
+        let mut u = vec![[0.0; 3]; nodes.len()];
+        let tasks = u
+            .par_chunks_mut(TASK_NODES)
+            .zip(nodes.par_chunks(TASK_NODES).zip(places.par_chunks(TASK_NODES)));
+        tasks.for_each(|(u, at)| columns.iter().for_each(|(held, force)| held.add(force, at, u)));
         u
     }
 
@@ -217,16 +218,7 @@ impl<'a> Response<'a> {
     ///
     /// Units: N, m. Frame: the object's.
     pub fn displacement_of(&self, nodes: &[u32], forces: &[NodeForce]) -> Vec<[f64; 3]> {
-        let surface = &self.source.base().surface;
-        let places: Vec<Option<usize>> = nodes.iter().map(|&node| surface.place_of(node)).collect();
-        let columns: Vec<(HeldCompliance<'_>, &Vector3<f64>)> =
-            forces.iter().map(|(node, force)| (self.held(*node), force)).collect();
-        let mut u = vec![[0.0; 3]; nodes.len()];
-        // Every node is summed by one task, in the order of the forces.
-        let tasks = u
-            .par_chunks_mut(TASK_NODES)
-            .zip(nodes.par_chunks(TASK_NODES).zip(places.par_chunks(TASK_NODES)));
-        tasks.for_each(|(u, at)| columns.iter().for_each(|(held, force)| held.add(force, at, u)));
+        let mut u = self.summed(nodes, forces);
         self.relieve(forces, nodes, &mut u);
         self.add_offset(nodes, &mut u);
         u
