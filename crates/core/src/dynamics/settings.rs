@@ -40,8 +40,8 @@ impl StepSettings {
 
     /// Bytes of the matrices of a problem with so many points, at most.
     pub fn bytes_of_points(points: usize) -> u64 {
-        // The compliance, those of the points that press and of a proximal step, a factor, a splitting.
-        5 * 9 * size_of::<f64>() as u64 * (points as u64).pow(2)
+        // The compliance, those of the points that press and of a proximal step, a factor, three of a splitting.
+        7 * 9 * size_of::<f64>() as u64 * (points as u64).pow(2)
     }
 }
 
