@@ -197,6 +197,35 @@ fn needed(folder: &str) -> BTreeSet<String> {
     named.collect()
 }
 
+/// Symptom: the fuzz targets took newer versions than everything else, which were loaded and compiled for them alone.
+#[test]
+fn fuzz_targets_take_the_versions_of_the_workspace_and_build_them_in_the_same_way() {
+    let locked = |file: &str| -> BTreeSet<(String, String)> {
+        let lock: Table = toml::from_str(&read(file)).expect("a lock file");
+        let packages = lock["package"].as_array().expect("packages").iter();
+        let text = |package: &toml::Value, key: &str| {
+            package.get(key).and_then(toml::Value::as_str).unwrap_or_default().to_owned()
+        };
+        packages.map(|package| (text(package, "name"), text(package, "version"))).collect()
+    };
+    let (ours, of_fuzz) = (locked("Cargo.lock"), locked("fuzz/Cargo.lock"));
+    assert!(of_fuzz.len() > 200, "only {} packages", of_fuzz.len());
+    let other: Vec<_> = of_fuzz.difference(&ours).filter(|p| p.0 != "softgrasp-fuzz").collect();
+    let fix = "cp Cargo.lock fuzz/Cargo.lock && cargo metadata --manifest-path fuzz/Cargo.toml";
+    assert!(other.is_empty(), "{other:?} are of other versions: run `{fix}`");
+    let profile = |folder: &str| manifest(folder)["profile"]["dev"].clone();
+    let (ours, of_fuzz) = (profile("."), profile("fuzz"));
+    for (key, value) in of_fuzz.as_table().expect("a profile") {
+        let Some(packages) = value.as_table() else {
+            assert_eq!(ours.get(key), Some(value), "{key} of the fuzz targets' profile");
+            continue;
+        };
+        for (package, settings) in packages {
+            assert_eq!(ours[key].get(package), Some(settings), "{package} in fuzz/Cargo.toml");
+        }
+    }
+}
+
 /// Symptom: `cargo check --locked` of the fuzz targets failed, because a crate of ours had a new dependency.
 #[test]
 fn lock_file_of_the_fuzz_targets_has_what_our_crates_need() {
