@@ -82,7 +82,7 @@ fn step_that_is_cancelled_leaves_a_clay_object_as_it_was() {
         let mut begin = clay(deep(&scene, ObjectState::at_rest(STILL)));
         begin.ask.path = PathChoice::FromRest;
         let begin = Request::ContactFrame(Box::new(begin));
-        let mut begin_anew = |session: &mut RawSession, id: u64| match session.ask(id, &begin) {
+        let begin_anew = |session: &mut RawSession, id: u64| match session.ask(id, &begin) {
             Reply::ContactAnswer(answer) => {
                 assert!(bits(*answer) == bits(first.clone()), "other bits")
             }
