@@ -34,7 +34,8 @@ pub struct ContactStep<'a> {
     pub candidates: &'a [Candidate],
     /// How the step is made.
     pub settings: StepSettings,
-    /// Asked between rounds and steps of Newton's method: whether the step ends at the best that was found.
+    /// Asked between rounds, steps of Newton's method and some sweeps: whether the step ends at the best that was
+    /// found.
     pub is_late: &'a (dyn Fn() -> bool + Sync),
 }
 

@@ -16,7 +16,7 @@ pub struct SolveBudget<'a> {
     pub residual: f64,
     /// Most attempts, each of Newton's method and then of the splitting.
     pub attempts_max: usize,
-    /// Asked between steps of Newton's method: whether the best forces so far will do.
+    /// Asked between steps of Newton's method and among the sweeps: whether the best forces so far will do.
     pub is_late: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -213,7 +213,14 @@ impl Solution {
         };
         let found = Self::of_whole(between.problem(), between.of_points(&lambda), budget);
         let forces = Forces::new(problem, between.with_springs(&found.lambda));
-        Self::told(problem, forces, (found.sweeps, found.newton_steps), &budget)
+        let told = Self::told(problem, forces, (found.sweeps, found.newton_steps), &budget);
+        if told.is_converged || !found.is_converged {
+            return told;
+        }
+        // Digits were lost with the springs.
+        let whole = Self::of_whole(problem, told.lambda, budget);
+        let sweeps = told.sweeps + whole.sweeps;
+        Self { sweeps, newton_steps: told.newton_steps + whole.newton_steps, ..whole }
     }
 
     /// Forces that were found, by so many sweeps and steps of Newton's method.
@@ -294,10 +301,14 @@ impl Solution {
             for _ in 0..SWEEPS / SWEEPS_TO_LOOK {
                 now = Forces::new(problem, splitting.advance(SWEEPS_TO_LOOK));
                 sweeps += SWEEPS_TO_LOOK;
-                if now.residual <= 0.1 * now.allowed(&budget) {
+                if now.residual <= 0.1 * now.allowed(&budget) || (budget.is_late)() {
                     break;
                 }
             }
+        }
+        // Those of the last sweeps have not been compared yet.
+        if now.residual < best.residual {
+            best = now;
         }
         Self::told(problem, best, (sweeps, newton_steps), &budget)
     }
