@@ -56,7 +56,7 @@ pub fn measure(options: &Options) -> Result<Report, ReportError> {
     let plot = Plot {
         title: "Energy that a hand is given on a closed path".to_owned(),
         x_label: "delay of the answers, ms".to_owned(),
-        y_label: "mJ, the worst path; 1e-6 for none".to_owned(),
+        y_label: "mJ, the worst path; 0.001 for none".to_owned(),
         x_scale: Scale::Log,
         y_scale: Scale::Log,
         series,
