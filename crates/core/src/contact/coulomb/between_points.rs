@@ -8,7 +8,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
-use super::cone::PointForce;
+use super::cone::{PointForce, chosen, put_back};
 use super::delassus::{CornerColumn, Delassus, PointPlace};
 use super::law::PointLaw;
 use super::newton::solve_in_place;
@@ -78,10 +78,7 @@ impl BetweenPoints {
     ///
     /// Shapes: n points and s springs; `lambda` 3(n + s), result 3n. Units: N.
     pub fn of_points(&self, lambda: &[f64]) -> Vec<f64> {
-        self.points
-            .iter()
-            .flat_map(|&i| [lambda[3 * i], lambda[3 * i + 1], lambda[3 * i + 2]])
-            .collect()
+        chosen(lambda, &self.points)
     }
 
     /// The forces of points and springs, of those of the points.
@@ -89,9 +86,7 @@ impl BetweenPoints {
     /// Shapes: n points and s springs; `lambda` 3n, result 3(n + s). Units: N.
     pub fn with_springs(&self, lambda: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; 3 * (self.points.len() + self.springs.len())];
-        for (&position, force) in self.points.iter().zip(lambda.chunks_exact(3)) {
-            all[3 * position..3 * position + 3].copy_from_slice(force);
-        }
+        put_back(lambda, &self.points, &mut all);
         for (row, spring) in self.springs.iter().enumerate() {
             let of_row = self.moved.row(row);
             let by_points: f64 = of_row.iter().zip(lambda).map(|(p, force)| p * force).sum();

@@ -57,6 +57,18 @@ pub(super) fn at(numbers: &[f64], point: usize) -> PointForce {
     Vector3::new(numbers[3 * point], numbers[3 * point + 1], numbers[3 * point + 2])
 }
 
+/// The numbers of some points, three for each, of those of all.
+pub(super) fn chosen(all: &[f64], points: &[usize]) -> Vec<f64> {
+    points.iter().flat_map(|&point| <[f64; 3]>::from(at(all, point))).collect()
+}
+
+/// Puts the numbers of some points, three for each, among those of all.
+pub(super) fn put_back(numbers: &[f64], points: &[usize], all: &mut [f64]) {
+    for (&point, numbers) in points.iter().zip(numbers.chunks_exact(3)) {
+        all[3 * point..3 * point + 3].copy_from_slice(numbers);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

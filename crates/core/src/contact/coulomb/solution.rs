@@ -2,7 +2,7 @@
 //! points at once, by Newton's method with sweeps of a splitting where it strays.
 
 use super::between_points::BetweenPoints;
-use super::cone::{PointForce, at};
+use super::cone::{PointForce, at, chosen, put_back};
 use super::newton::Proximal;
 use super::problem::ContactProblem;
 use super::splitting::Splitting;
@@ -86,17 +86,19 @@ const FRICTION_SHARES: [f64; 3] = [0.0, 0.3, 1.0];
 /// Over the largest force, or a newton, a residual that is no approximation of anything.
 const RUNAWAY: f64 = 10.0;
 
-/// Forces of all points, 3n, and their residual of the natural map, N.
+/// Forces of all points, 3n, N; their motions by them, 3n, m; and the residual of the natural map, N.
 #[derive(Clone)]
 struct Forces {
     lambda: Vec<f64>,
+    motion: Vec<f64>,
     residual: f64,
 }
 
 impl Forces {
     fn new(problem: &ContactProblem, lambda: Vec<f64>) -> Self {
-        let residual = problem.residual_of(&lambda, &problem.motion(&lambda));
-        Self { lambda, residual }
+        let motion = problem.motion(&lambda);
+        let residual = problem.residual_of(&lambda, &motion);
+        Self { lambda, motion, residual }
     }
 
     /// Newton's method from some forces, again and again while it pays; the number of its steps.
@@ -181,13 +183,10 @@ impl Solution {
             }
             new.into_iter().for_each(|i| is_in[i] = true);
             let set: Vec<usize> = (0..n).filter(|&i| is_in[i]).collect();
-            let begin = set.iter().flat_map(|&i| <[f64; 3]>::from(at(&lambda, i))).collect();
-            let found = Self::of_all(&problem.of_points(&set), begin, budget);
+            let found = Self::of_all(&problem.of_points(&set), chosen(&lambda, &set), budget);
             sweeps += found.sweeps;
             newton_steps += found.newton_steps;
-            for (&i, force) in set.iter().zip(found.lambda.chunks_exact(3)) {
-                lambda[3 * i..3 * i + 3].copy_from_slice(force);
-            }
+            put_back(&found.lambda, &set, &mut lambda);
             motion = problem.motion(&lambda);
             if !found.is_converged {
                 break;
@@ -213,7 +212,7 @@ impl Solution {
         };
         let found = Self::of_whole(between.problem(), between.of_points(&lambda), budget);
         let forces = Forces::new(problem, between.with_springs(&found.lambda));
-        let told = Self::told(problem, forces, (found.sweeps, found.newton_steps), &budget);
+        let told = Self::told(forces, (found.sweeps, found.newton_steps), &budget);
         if told.is_converged || !found.is_converged {
             return told;
         }
@@ -225,14 +224,12 @@ impl Solution {
 
     /// Forces that were found, by so many sweeps and steps of Newton's method.
     fn told(
-        problem: &ContactProblem,
         forces: Forces,
         (sweeps, newton_steps): (usize, usize),
         budget: &SolveBudget<'_>,
     ) -> Self {
         let is_converged = forces.is_within(budget);
-        let Forces { lambda, residual } = forces;
-        let motion = problem.motion(&lambda);
+        let Forces { lambda, motion, residual } = forces;
         Self { lambda, motion, residual, sweeps, newton_steps, is_converged }
     }
 
@@ -310,7 +307,7 @@ impl Solution {
         if now.residual < best.residual {
             best = now;
         }
-        Self::told(problem, best, (sweeps, newton_steps), &budget)
+        Self::told(best, (sweeps, newton_steps), &budget)
     }
 
     /// Largest force of a point, N.
