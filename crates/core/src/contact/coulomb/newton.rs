@@ -35,10 +35,16 @@ pub(super) struct Step {
     pub steps: usize,
 }
 
-/// Steps without a better residual after which no better one is expected.
-const STRAYING: usize = 4;
-/// Over the best residual, one from which Newton's method does not come back.
-const RUNAWAY: f64 = 30.0;
+/// When Newton's method ends without a solution.
+pub(super) struct NewtonLimits {
+    /// Most steps.
+    pub steps: usize,
+    /// Steps without a better residual after which no better one is expected.
+    pub straying: usize,
+    /// Over the best residual, one from which it does not come back. One step may lead far away from a residual that
+    /// is small already, and the next ones back.
+    pub runaway: f64,
+}
 
 impl<'a> Proximal<'a> {
     /// `share` of every point's own compliance is added to it; a spring has its own.
@@ -54,19 +60,20 @@ impl<'a> Proximal<'a> {
     /// Units: `tolerance` N.
     ///
     /// Source: Alart and Curnier (1991); Rockafellar (1976) for the proximal point.
-    pub fn solve(&self, steps_max: usize, tolerance: f64, is_late: &dyn Fn() -> bool) -> Step {
+    pub fn solve(&self, limits: &NewtonLimits, tolerance: f64, is_late: &dyn Fn() -> bool) -> Step {
         let mut lambda = self.from.to_vec();
         let mut best_at = 0;
         let mut best = Step { lambda: self.from.to_vec(), residual: f64::INFINITY, steps: 0 };
-        for steps in 0..=steps_max {
+        for steps in 0..=limits.steps {
             let inside = self.problem.projected(&lambda);
             let residual = self.problem.residual_of(&inside, &self.motion(&inside));
             best.steps = steps;
             if residual < best.residual {
                 (best.lambda, best.residual, best_at) = (inside, residual, steps);
             }
-            let strays = steps >= best_at + STRAYING || residual > RUNAWAY * best.residual;
-            if best.residual <= tolerance || steps == steps_max || strays || is_late() {
+            let strays = steps >= best_at + limits.straying;
+            let strays = strays || residual > limits.runaway * best.residual;
+            if best.residual <= tolerance || steps == limits.steps || strays || is_late() {
                 break;
             }
             match self.step(&lambda) {

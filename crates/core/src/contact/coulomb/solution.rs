@@ -3,7 +3,7 @@
 
 use super::between_points::BetweenPoints;
 use super::cone::{PointForce, at, chosen, put_back};
-use super::newton::Proximal;
+use super::newton::{NewtonLimits, Proximal};
 use super::problem::ContactProblem;
 use super::splitting::Splitting;
 
@@ -56,20 +56,23 @@ pub struct Solution {
 
 /// Times that points are added before all of them are solved for.
 const ADDITIONS_MAX: usize = 8;
-/// Steps of Newton's method from one set of forces …
-const NEWTON_STEPS: usize = 5;
-/// … and how often it may go on from where it ended, in one attempt.
-const NEWTON_ROUNDS: usize = 6;
-/// Share of its own compliance that is added to a point for Newton's method, at first and at least.
+/// Share of its own compliance that is added to a point for Newton's method, at first, at least and at most.
 const SHARE_FIRST: f64 = 1e-4;
 const SHARE_MIN: f64 = 1e-6;
-/// The share shrinks by this where Newton's method left so little of the residual.
+const SHARE_MAX: f64 = 1.0;
+/// The share shrinks by this …
 const SHRINK: f64 = 0.3;
+/// … or grows by this: with more compliance Newton's method strays less.
+const GROW: f64 = 3.5;
+/// In the first attempt the share shrinks where this much of the residual is left.
 const LEFT_TO_SHRINK: f64 = 0.1;
-/// Newton's method goes on where it solved its own problem and left no more of the residual than this …
-const LEFT_IF_SOLVED: f64 = 0.7;
-/// … or no more than this in any case.
+/// Newton's method went well where it left no more of the residual than this.
 const LEFT: f64 = 0.3;
+/// After so many rounds no more than this part of the residual may be left: slow ones are the splitting's.
+const ROUNDS_TO_LOOK: usize = 6;
+const LEFT_TO_GO_ON: f64 = 0.5;
+/// Its own problem solved, it pays to go on where no more than this is left.
+const LEFT_IF_SOLVED: f64 = 0.7;
 /// Sweeps of the splitting after Newton's method has strayed, and the shares of compliance that they are
 /// made with in turn: no single one suits far and near, and every system of points.
 const SWEEPS: usize = 150;
@@ -83,7 +86,7 @@ const LEFT_TO_BEGIN_ANEW: f64 = 0.2;
 /// Shares of friction that are solved for one after the other where forces were not found: without friction
 /// they are those of a convex problem.
 const FRICTION_SHARES: [f64; 3] = [0.0, 0.3, 1.0];
-/// Over the largest force, or a newton, a residual that is no approximation of anything.
+/// Over the residual of the first forces and of none at all, one that is no approximation of anything.
 const RUNAWAY: f64 = 10.0;
 
 /// Forces of all points, 3n, N; their motions by them, 3n, m; and the residual of the natural map, N.
@@ -105,14 +108,22 @@ impl Forces {
     fn improve(
         &mut self,
         problem: &ContactProblem,
+        patience: &Patience,
         share: &mut f64,
         budget: &SolveBudget<'_>,
     ) -> usize {
         let (first, mut steps) = (self.residual, 0);
-        for _ in 0..NEWTON_ROUNDS {
+        let mut looked_at = first;
+        for round in 0..patience.rounds {
+            if round > 0 && round % ROUNDS_TO_LOOK == 0 {
+                if self.residual > LEFT_TO_GO_ON * looked_at {
+                    break;
+                }
+                looked_at = self.residual;
+            }
             let tolerance = 0.1 * self.allowed(budget);
             let proximal = Proximal::new(problem, &self.lambda, *share);
-            let found = proximal.solve(NEWTON_STEPS, tolerance, budget.is_late);
+            let found = proximal.solve(&patience.newton, tolerance, budget.is_late);
             steps += found.steps;
             let is_solved = found.residual <= tolerance;
             let next = Self::new(problem, found.lambda);
@@ -120,12 +131,13 @@ impl Forces {
             if left < 1.0 {
                 *self = next;
             }
-            let pays = left < LEFT || is_solved && left < LEFT_IF_SOLVED;
-            if !pays || self.is_within(budget) || (budget.is_late)() {
+            if self.is_within(budget) || (budget.is_late)() {
                 break;
             }
-            if self.residual < LEFT_TO_SHRINK * first {
-                *share = (SHRINK * *share).max(SHARE_MIN);
+            let far = self.residual / first;
+            match patience.next_share(*share, is_solved, (left, far)) {
+                Some(next) => *share = next,
+                None => break,
             }
         }
         steps
@@ -138,6 +150,45 @@ impl Forces {
 
     fn is_within(&self, budget: &SolveBudget<'_>) -> bool {
         self.residual <= self.allowed(budget)
+    }
+}
+
+/// How long Newton's method goes on from some forces before the splitting is asked.
+struct Patience {
+    /// Problems with compliance added that are solved one after another.
+    rounds: usize,
+    newton: NewtonLimits,
+    /// Whether more compliance is added where Newton's method strayed, and less wherever it went well.
+    adapts_share: bool,
+}
+
+impl Patience {
+    /// In the first attempt: a few steps find what is near, and where many points are far from their forces the
+    /// sweeps of the splitting cost less than more steps.
+    const FIRST: Self = Self {
+        rounds: 6,
+        newton: NewtonLimits { steps: 5, straying: 4, runaway: 30.0 },
+        adapts_share: false,
+    };
+    /// Later: Newton's method and the splitting must not come back to the forces of the attempt before.
+    const LATER: Self = Self {
+        rounds: 20,
+        newton: NewtonLimits { steps: 6, straying: 5, runaway: 1e4 },
+        adapts_share: true,
+    };
+
+    /// The share of compliance to go on with; `None` where it does not pay to go on. `left` is the part of the
+    /// residual that the last round left, `far` that of all rounds.
+    fn next_share(&self, share: f64, is_solved: bool, (left, far): (f64, f64)) -> Option<f64> {
+        let less = (SHRINK * share).max(SHARE_MIN);
+        let pays = left < LEFT || is_solved && left < LEFT_IF_SOLVED;
+        if !self.adapts_share {
+            return pays.then_some(if far < LEFT_TO_SHRINK { less } else { share });
+        }
+        match is_solved || left < LEFT {
+            true => (pays || share > SHARE_MIN).then_some(less),
+            false => (share < SHARE_MAX).then_some((GROW * share).min(SHARE_MAX)),
+        }
     }
 }
 
@@ -265,11 +316,14 @@ impl Solution {
         let mut best = now.clone();
         let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
         let mut splitting: Option<Splitting<'_>> = None;
+        let of_none = problem.residual_of(&vec![0.0; now.lambda.len()], &problem.b);
+        let runaway = RUNAWAY * of_none.max(now.residual);
         let first = usize::from(now.residual < NEAR * force_max(&now.lambda));
         for turn in (first..).take(budget.attempts_max) {
             let before = now.residual;
             if !now.is_within(&budget) {
-                newton_steps += now.improve(problem, &mut share, &budget);
+                let patience = if turn == first { Patience::FIRST } else { Patience::LATER };
+                newton_steps += now.improve(problem, &patience, &mut share, &budget);
             }
             if now.residual < best.residual {
                 best.clone_from(&now);
@@ -277,27 +331,26 @@ impl Solution {
             if best.is_within(&budget) || (budget.is_late)() {
                 break;
             }
-            let mut begins_anew = now.residual < LEFT_TO_BEGIN_ANEW * before;
-            // Friction can make the splitting run away: no descent is proven for it.
-            let is_bounded = now.residual < force_max(&best.lambda).max(1.0) * RUNAWAY;
-            if !is_bounded {
-                now.clone_from(&best);
-                begins_anew = true;
-            }
             let of_turn = SPLITTING_SHARES[turn % SPLITTING_SHARES.len()];
             match &mut splitting {
                 Some(splitting) => {
                     splitting.change_share(of_turn);
-                    if begins_anew {
-                        splitting.begin_at(&now.lambda);
+                    if now.residual < LEFT_TO_BEGIN_ANEW * before {
+                        splitting.begin_at(&now.lambda, &now.motion);
                     }
                 }
-                None => splitting = Splitting::new(problem, &now.lambda, of_turn),
+                None => splitting = Splitting::new(problem, (&now.lambda, &now.motion), of_turn),
             }
             let Some(splitting) = &mut splitting else { break };
             for _ in 0..SWEEPS / SWEEPS_TO_LOOK {
                 now = Forces::new(problem, splitting.advance(SWEEPS_TO_LOOK));
                 sweeps += SWEEPS_TO_LOOK;
+                // Friction can make the splitting run away: no descent is proven for it.
+                if now.residual > runaway {
+                    now.clone_from(&best);
+                    splitting.begin_at(&now.lambda, &now.motion);
+                    break;
+                }
                 if now.residual <= 0.1 * now.allowed(&budget) || (budget.is_late)() {
                     break;
                 }

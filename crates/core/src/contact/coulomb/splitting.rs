@@ -41,19 +41,22 @@ impl<'a> Splitting<'a> {
     /// Begins at some forces, with a share of every point's own compliance added to it: a large share
     /// goes far, a small one is exact in soft directions. `None` where `W` is that of no body.
     ///
-    /// Shapes: `lambda` 3n, N.
-    pub fn new(problem: &'a ContactProblem, lambda: &[f64], share: f64) -> Option<Self> {
+    /// Shapes: forces 3n, N, and their motions 3n, m.
+    pub fn new(
+        problem: &'a ContactProblem,
+        (lambda, motion): (&[f64], &[f64]),
+        share: f64,
+    ) -> Option<Self> {
         let softened = vec![Softened::new(problem, share)?];
         let mut splitting = Self { problem, pushed: Vec::new(), softened, at: 0 };
-        splitting.begin_at(lambda);
+        splitting.begin_at(lambda, motion);
         Some(splitting)
     }
 
-    /// Begins anew at some forces, 3n, N.
-    pub fn begin_at(&mut self, lambda: &[f64]) {
-        let motion = self.problem.motion(lambda);
+    /// Begins anew at some forces, 3n, N, and their motions, 3n, m.
+    pub fn begin_at(&mut self, lambda: &[f64], motion: &[f64]) {
         let pushed = self.added().iter().enumerate().flat_map(|(point, added)| {
-            let mut motion = at(&motion, point);
+            let mut motion = at(motion, point);
             motion.x += self.correction(point, &motion);
             <[f64; 3]>::from(at(lambda, point) - motion / *added)
         });
