@@ -261,7 +261,7 @@ Where `columns` are cold, new contacts pay for their columns of the compliance; 
 motion played before, as a run's hints prefetch them. `points_most` is the most points that press at once. A \
 step is `converged` where penetration is below 1e-6 of the object and the residual of the law of Signorini \
 and Coulomb below `asked_rel` of the largest force (at large deformation the forces out of balance too, over \
-the forces), within 80 steps of Newton's method; what was reached is in `penetration_max_m`, \
+the forces), within 160 steps of Newton's method; what was reached is in `penetration_max_m`, \
 `residual_rel_max` and `elastic_residual_rel_max`. A run asks for 1e-6 by linear elasticity. `factors` are those \
 of tangents that were made in the phase. Before times are told the ball must have been lifted, and the \
 forces on it must add up to its weight within 1e-3; `drift_m` is how far it sinks in the last four seconds.";

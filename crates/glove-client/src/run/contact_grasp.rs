@@ -111,7 +111,7 @@ const LOST_DEPTH: f64 = 0.1;
 const LOST_WAY: f64 = 0.5;
 /// Largest number of rounds of a step in a run: a later tick asks again anyway.
 const ROUNDS_MAX: u32 = 12;
-const NEWTON_MAX: u32 = 80;
+const NEWTON_MAX: u32 = 160;
 /// Penetration that is small enough to see and feel; the report of every step tells what was reached.
 const PENETRATION_REL: f64 = 1e-6;
 const RESIDUAL_REL: f64 = 1e-6;

@@ -68,9 +68,11 @@ const GROW: f64 = 3.5;
 const LEFT_TO_SHRINK: f64 = 0.1;
 /// Newton's method went well where it left no more of the residual than this.
 const LEFT: f64 = 0.3;
-/// After so many rounds no more than this part of the residual may be left: slow ones are the splitting's.
-const ROUNDS_TO_LOOK: usize = 6;
+/// After some rounds no more than this part of the residual may be left: slow ones are the splitting's.
 const LEFT_TO_GO_ON: f64 = 0.5;
+/// In later attempts the solution of a problem with compliance added is taken although it leaves so many times the
+/// residual: forces come nearer with every one (Rockafellar 1976), the residual need not.
+const GROWN: f64 = 10.0;
 /// Its own problem solved, it pays to go on where no more than this is left.
 const LEFT_IF_SOLVED: f64 = 0.7;
 /// Sweeps of the splitting after Newton's method has strayed, and the shares of compliance that they are
@@ -115,7 +117,7 @@ impl Forces {
         let (first, mut steps) = (self.residual, 0);
         let mut looked_at = first;
         for round in 0..patience.rounds {
-            if round > 0 && round % ROUNDS_TO_LOOK == 0 {
+            if round > 0 && round % patience.rounds_to_look == 0 {
                 if self.residual > LEFT_TO_GO_ON * looked_at {
                     break;
                 }
@@ -128,7 +130,7 @@ impl Forces {
             let is_solved = found.residual <= tolerance;
             let next = Self::new(problem, found.lambda);
             let left = next.residual / self.residual;
-            if left < 1.0 {
+            if left < 1.0 || patience.adapts_share && is_solved && left < GROWN {
                 *self = next;
             }
             if self.is_within(budget) || (budget.is_late)() {
@@ -155,8 +157,10 @@ impl Forces {
 
 /// How long Newton's method goes on from some forces before the splitting is asked.
 struct Patience {
-    /// Problems with compliance added that are solved one after another.
+    /// Problems with compliance added that are solved one after another …
     rounds: usize,
+    /// … and after how many of them it is looked whether they go on fast enough.
+    rounds_to_look: usize,
     newton: NewtonLimits,
     /// Whether more compliance is added where Newton's method strayed, and less wherever it went well.
     adapts_share: bool,
@@ -167,15 +171,28 @@ impl Patience {
     /// sweeps of the splitting cost less than more steps.
     const FIRST: Self = Self {
         rounds: 6,
+        rounds_to_look: 6,
         newton: NewtonLimits { steps: 5, straying: 4, runaway: 30.0 },
         adapts_share: false,
     };
-    /// Later: Newton's method and the splitting must not come back to the forces of the attempt before.
-    const LATER: Self = Self {
-        rounds: 20,
+    /// In the next two: Newton's method and the splitting must not come back to the forces of the attempt before.
+    const SECOND: Self = Self {
+        rounds: 12,
+        rounds_to_look: 4,
         newton: NewtonLimits { steps: 6, straying: 5, runaway: 1e4 },
         adapts_share: true,
     };
+    /// In all others: however slowly.
+    const LATER: Self = Self { rounds: 20, rounds_to_look: 20, ..Self::SECOND };
+
+    /// That of an attempt, counted from 0.
+    fn of_attempt(attempt: usize) -> &'static Self {
+        match attempt {
+            0 => &Self::FIRST,
+            1 | 2 => &Self::SECOND,
+            _ => &Self::LATER,
+        }
+    }
 
     /// The share of compliance to go on with; `None` where it does not pay to go on. `left` is the part of the
     /// residual that the last round left, `far` that of all rounds.
@@ -322,8 +339,8 @@ impl Solution {
         for turn in (first..).take(budget.attempts_max) {
             let before = now.residual;
             if !now.is_within(&budget) {
-                let patience = if turn == first { Patience::FIRST } else { Patience::LATER };
-                newton_steps += now.improve(problem, &patience, &mut share, &budget);
+                let patience = Patience::of_attempt(turn - first);
+                newton_steps += now.improve(problem, patience, &mut share, &budget);
             }
             if now.residual < best.residual {
                 best.clone_from(&now);
