@@ -83,7 +83,7 @@ pub(crate) fn as_a_run(seconds: f64, residual_rel: f64) -> StepSettings {
         viscosity: 0.02,
         residual_rel,
         rounds_max: 12,
-        newton_max: 80,
+        newton_max: 160,
         ..StepSettings::default()
     }
 }
