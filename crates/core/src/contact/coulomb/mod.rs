@@ -3,6 +3,7 @@
 mod between_points;
 mod cone;
 mod delassus;
+mod forces;
 mod law;
 mod newton;
 mod problem;
@@ -13,9 +14,10 @@ mod sweeps;
 
 pub use cone::{FrictionCone, PointForce};
 pub use delassus::{Delassus, PointPlace, ProblemError, Slide};
+pub use forces::SolveBudget;
 pub use law::PointLaw;
 pub use problem::ContactProblem;
-pub use solution::{PointState, Solution, SolveBudget, state_of};
+pub use solution::{PointState, Solution, state_of};
 
 #[cfg(test)]
 mod tests;
