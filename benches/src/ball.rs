@@ -1,5 +1,6 @@
 //! A soft ball that nothing holds, and its steps among rigid bodies: the object of the reports on contact.
 
+use glove_client::run::contact_grasp::{NEWTON_MAX, ROUNDS_MAX};
 use nalgebra::{Point3, Vector3};
 use softgrasp_core::dynamics::{
     ContactStep, MovingBody, ObjectState, StepSettings, near_triangles, reach_of_step,
@@ -82,8 +83,8 @@ pub(crate) fn as_a_run(seconds: f64, residual_rel: f64) -> StepSettings {
         gravity: Vector3::new(0.0, -GRAVITY, 0.0),
         viscosity: 0.02,
         residual_rel,
-        rounds_max: 12,
-        newton_max: 160,
+        rounds_max: ROUNDS_MAX as usize,
+        newton_max: NEWTON_MAX as usize,
         ..StepSettings::default()
     }
 }

@@ -110,8 +110,9 @@ const SLOW_STEPS: u32 = 12;
 const LOST_DEPTH: f64 = 0.1;
 const LOST_WAY: f64 = 0.5;
 /// Largest number of rounds of a step in a run: a later tick asks again anyway.
-const ROUNDS_MAX: u32 = 12;
-const NEWTON_MAX: u32 = 160;
+pub const ROUNDS_MAX: u32 = 12;
+/// Steps of Newton's method after which no further round of a step in a run is begun.
+pub const NEWTON_MAX: u32 = 160;
 /// Penetration that is small enough to see and feel; the report of every step tells what was reached.
 const PENETRATION_REL: f64 = 1e-6;
 const RESIDUAL_REL: f64 = 1e-6;

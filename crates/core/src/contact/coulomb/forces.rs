@@ -141,7 +141,7 @@ impl Patience {
         newton: NewtonLimits { steps: 6, straying: 5, runaway: 1e4 },
         adapts_share: true,
     };
-    /// In all others: however slowly.
+    /// In all that follow: Newton's method is not ended for going slowly.
     const LATER: Self = Self { rounds: 20, rounds_to_look: 20, ..Self::SECOND };
 
     /// That of an attempt, counted from 0.

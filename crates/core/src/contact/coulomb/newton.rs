@@ -71,8 +71,8 @@ impl<'a> Proximal<'a> {
             if residual < best.residual {
                 (best.lambda, best.residual, best_at) = (inside, residual, steps);
             }
-            let strays = steps >= best_at + limits.straying;
-            let strays = strays || residual > limits.runaway * best.residual;
+            let strays =
+                steps >= best_at + limits.straying || residual > limits.runaway * best.residual;
             if best.residual <= tolerance || steps == limits.steps || strays || is_late() {
                 break;
             }

@@ -170,8 +170,7 @@ impl Solution {
         let mut best = now.clone();
         let (mut sweeps, mut newton_steps, mut share) = (0, 0, SHARE_FIRST);
         let mut splitting: Option<Splitting<'_>> = None;
-        let of_none = problem.residual_of(&vec![0.0; now.lambda.len()], &problem.b);
-        let runaway = RUNAWAY * of_none.max(now.residual);
+        let of_first = now.residual;
         let first = usize::from(now.residual < NEAR * force_max(&now.lambda));
         for turn in (first..).take(budget.attempts_max) {
             let before = now.residual;
@@ -196,6 +195,8 @@ impl Solution {
                 None => splitting = Splitting::new(problem, (&now.lambda, &now.motion), of_turn),
             }
             let Some(splitting) = &mut splitting else { break };
+            let of_none = problem.residual_of(&vec![0.0; now.lambda.len()], &problem.b);
+            let runaway = RUNAWAY * of_none.max(of_first);
             for _ in 0..SWEEPS / SWEEPS_TO_LOOK {
                 now = Forces::new(problem, splitting.advance(SWEEPS_TO_LOOK));
                 sweeps += SWEEPS_TO_LOOK;
